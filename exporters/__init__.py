@@ -14,6 +14,7 @@ TABLE = PluginTable[Exporter](
     {
         "birdseye": "gen_data.exporters.birdseye:Birdseye",
         "bop": "gen_data.exporters.bop:Bop",
+        "calibration": "gen_data.exporters.calibration:CalibrationFiles",
         "cityscapes": "gen_data.exporters.cityscapes:Cityscapes",
         "coco": "gen_data.exporters.coco:Coco",
         "coco_panoptic": "gen_data.exporters.coco_panoptic:CocoPanoptic",

@@ -43,7 +43,8 @@ class CameraIntrinsics(RandomizerBase):
     Attributes:
         camera: Name of a sensor; empty = every camera, drawn independently.
         hfov_deg: Horizontal field of view; null = field of view and principal point of the sensor.
-        principal_offset_px: Offset of the principal point along each axis.
+        principal_offset_px: Offset of the principal point: one distribution, drawn for each axis,
+            or two, ``[x, y]``.
         lens: Distortion coefficients for the sensor's lens model.
     """
 
@@ -51,7 +52,9 @@ class CameraIntrinsics(RandomizerBase):
     stage: Literal["scene", "view"] = "view"
     camera: str = ""
     hfov_deg: Annotated[dist.Scalar, dist.Bounds(1, 360)] | None = dist.Uniform(50.0, 70.0)
-    principal_offset_px: dist.Scalar = dist.Normal(0.0, 3.0, clip=(-10.0, 10.0))
+    principal_offset_px: dist.Scalar | tuple[dist.Scalar, dist.Scalar] = dist.Normal(
+        0.0, 3.0, clip=(-10.0, 10.0)
+    )
     lens: Coefficients = Coefficients()
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
@@ -70,7 +73,9 @@ class CameraIntrinsics(RandomizerBase):
         before = camera.intrinsics
         self._check_lens_model(camera)
         hfov_deg = None if self.hfov_deg is None else self.hfov_deg.draw(rng)
-        offset_x, offset_y = (self.principal_offset_px.draw(rng) for _ in range(2))
+        given = self.principal_offset_px
+        axes = given if isinstance(given, tuple) else (given, given)
+        offset_x, offset_y = (axis.draw(rng) for axis in axes)
         lens = self._draw_lens(before.lens, rng)
         try:
             drawn = replace(before, lens=lens)

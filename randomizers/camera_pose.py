@@ -14,7 +14,8 @@ from gen_data.generator.config import distributions as dist
 from gen_data.generator.core.errors import ConfigError, did_you_mean
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Camera, Scene
-from gen_data.generator.core.se3 import Array, Vec3, look_at
+from gen_data.generator.core.scene_time import place_sensors
+from gen_data.generator.core.se3 import SE3, Array, Vec3, look_at
 from gen_data.generator.core.streams import Rng
 from gen_data.randomizers.base import RandomizerBase, check_known
 from gen_data.randomizers.framing import (
@@ -42,7 +43,10 @@ class CameraPose(RandomizerBase):
     fills, for the lens that the camera has then: list ``camera_intrinsics`` before it.
 
     Attributes:
-        camera: Name of a sensor; empty = every camera that is not on a rig, drawn independently.
+        camera: Name of a sensor; empty = every camera that is not on a rig, drawn independently;
+            with ``rig``, its first camera.
+        rig: Name of a ``stand``: it is moved with all its sensors, whose places on it remain, so
+            that ``camera`` is where this randomizer places it.
         aim: What to look at: a group, of which an object is drawn, a surface, or an element by
             name; empty = the scene's focus.
         fills: Share of the image's longer side that the longer side of the projected box of the
@@ -62,6 +66,7 @@ class CameraPose(RandomizerBase):
     type: Literal["camera_pose"] = "camera_pose"
     stage: Literal["scene", "view"] = "view"
     camera: str = ""
+    rig: str = ""
     aim: dist.Name = dist.Constant("")
     fills: Annotated[dist.Scalar, dist.Bounds(0, 4, open_low=True)] | None = None
     off_center: Annotated[dist.Scalar, dist.Bounds(-1, 1)] = dist.Normal(0.0, 0.35, clip=(-1, 1))
@@ -102,23 +107,39 @@ class CameraPose(RandomizerBase):
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
         """Return the scene with its cameras moved, all outside of bodies and inside the room."""
-        moved = {camera.name for camera in self._moved(scene)}
         place = self._move_camera if self.fills is None else self._frame_thing
-        cameras = tuple(
-            place(camera, scene, assets, rng) if camera.name in moved else camera
-            for camera in scene.cameras
-        )
+        moved = {camera.name: place(camera, scene, assets, rng) for camera in self._moved(scene)}
+        if self.rig:
+            (aimed,) = moved.values()
+            return _with_rig(scene, self.rig, aimed)
+        cameras = tuple(moved.get(camera.name, camera) for camera in scene.cameras)
         return replace(scene, cameras=cameras)
 
     def _moved(self, scene: Scene) -> tuple[Camera, ...]:
-        free = tuple(camera for camera in scene.cameras if not camera.rig)
-        known = [camera.name for camera in free]
-        if self.camera and self.camera not in known:
+        """The cameras to place: without a rig, all that are meant; with one, one of its own."""
+        if self.rig:
+            stands = [rig.name for rig in scene.rigs if not rig.body]
+            fault = f"randomizers.{self.name}.rig: there is no stand"
+            check_known(self.rig, stands, fault)
+        free = tuple(camera for camera in scene.cameras if camera.rig == self.rig)
+        meant = tuple(camera for camera in free if self.camera in ("", camera.name))
+        if not meant and (self.camera or self.rig):
+            known = [camera.name for camera in free]
+            where = f"on the rig '{self.rig}'" if self.rig else "without a rig"
             raise ConfigError(
-                f"randomizers.{self.name}.camera: no camera '{self.camera}' without a rig; "
+                f"randomizers.{self.name}.camera: no camera '{self.camera}' {where}; "
                 f"expected one of {', '.join(known) or 'none'}{did_you_mean(self.camera, known)}"
             )
-        return tuple(camera for camera in free if self.camera in ("", camera.name))
+        return meant[:1] if self.rig else meant
+
+    def _is_free(self, camera: Camera, pose: SE3, scene: Scene, assets: AssetIndex) -> bool:
+        """Whether a camera, and the others on its rig, are clear of bodies at a pose."""
+        T_world_rig = pose @ camera.T_rig_camera.inverse()
+        others = [c for c in scene.cameras if self.rig and c.rig == self.rig and c != camera]
+        places = [pose, *(T_world_rig @ other.T_rig_camera for other in others)]
+        return all(
+            is_in_the_open(place.translation_m, scene, assets, self.clearance_m) for place in places
+        )
 
     def _move_camera(self, camera: Camera, scene: Scene, assets: AssetIndex, rng: Rng) -> Camera:
         x, y, z = self._draw_thing(scene, assets, rng).center_m
@@ -136,8 +157,9 @@ class CameraPose(RandomizerBase):
                 target[1] + level_m * math.sin(azimuth),
                 target[2] + distance_m * math.sin(elevation),
             )
-            if is_in_the_open(eye, scene, assets, self.clearance_m):
-                return replace(camera, T_world_camera=look_at(eye, target, roll).rounded())
+            pose = look_at(eye, target, roll)
+            if self._is_free(camera, pose, scene, assets):
+                return replace(camera, T_world_camera=pose.rounded())
         remedy = "other distance_m, azimuth_deg or elevation_deg"
         raise self.reject("no free place for a camera", remedy)
 
@@ -154,9 +176,7 @@ class CameraPose(RandomizerBase):
             framing = self._draw_framing(share, camera, rng)
             pose = frame(thing, framing, camera.intrinsics)
             seen = seen or pose is not None
-            if pose is not None and is_in_the_open(
-                pose.translation_m, scene, assets, self.clearance_m
-            ):
+            if pose is not None and self._is_free(camera, pose, scene, assets):
                 return replace(camera, T_world_camera=pose.rounded())
         if not seen:
             remedy = "a smaller range of fills or off_center, or another lens"
@@ -233,6 +253,13 @@ class CameraPose(RandomizerBase):
                 yield _extent_m(np.array(assets.bounds_m(asset)))
             for found in () if name in groups else candidates(scene, name):
                 yield _extent_m(measure(found, assets).points_m)
+
+
+def _with_rig(scene: Scene, name: str, aimed: Camera) -> Scene:
+    """The scene with a rig, and all its sensors, where one of its cameras has its new pose."""
+    pose = (aimed.T_world_camera @ aimed.T_rig_camera.inverse()).rounded(9)
+    rigs = tuple(replace(r, T_body_rig=pose) if r.name == name else r for r in scene.rigs)
+    return place_sensors(replace(scene, rigs=rigs))
 
 
 def _extent_m(points_m: Array) -> Vec3:

@@ -95,7 +95,7 @@ def find_ego(scene: Scene, name: str, field: str) -> Body:
     Raises:
         ConfigError: the template has no ego vehicle of that name.
     """
-    known = [rig.name for rig in scene.rigs]
+    known = [rig.name for rig in scene.rigs if rig.body]
     if name not in known:
         raise ConfigError(
             f"{field}: the template has no ego vehicle '{name}'; there is "

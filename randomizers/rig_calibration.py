@@ -20,18 +20,20 @@ Sensor = TypeVar("Sensor", Camera, Lidar, Device)
 
 
 class RigCalibration(RandomizerBase):
-    """Perturbs the pose of every sensor on its rig, as no two vehicles are built alike.
+    """Perturbs the pose of sensors on their rigs, as no two vehicles are built alike.
 
     Labels and calibration files contain the perturbed poses.
 
     Attributes:
         rig: Name of a rig; empty = every rig.
-        offset_m: Offset along each axis of the sensor.
-        turn_deg: Rotation about each axis of the sensor.
+        whole: Whether a rig moves as one on its carrier: its sensors keep their places on it.
+        offset_m: Offset along each axis of the sensor, or of the whole rig.
+        turn_deg: Rotation about each axis of the sensor, or of the whole rig.
     """
 
     type: Literal["rig_calibration"] = "rig_calibration"
     rig: str = ""
+    whole: bool = False
     offset_m: dist.Scalar = dist.Normal(0.0, 0.005, clip=(-0.02, 0.02))
     turn_deg: dist.Scalar = dist.Normal(0.0, 0.2, clip=(-1.0, 1.0))
 
@@ -47,6 +49,12 @@ class RigCalibration(RandomizerBase):
                 f"sensors: {', '.join(known) or 'none'}{did_you_mean(self.rig, known)}"
             )
         rigs = {self.rig} if self.rig else set(known)
+        if self.whole:
+            moved = (
+                replace(r, T_body_rig=self._perturb(r.T_body_rig, rng)) if r.name in rigs else r
+                for r in scene.rigs
+            )
+            return place_sensors(replace(scene, rigs=tuple(moved)))
 
         def perturb_all(sensors: tuple[Sensor, ...], pose: str) -> tuple[Sensor, ...]:
             changes: Iterator[dict[str, Any]] = (

@@ -108,7 +108,7 @@ class RoomPath(RandomizerBase):
             raise ConfigError(
                 f"{field}.room: the template has no element '{self.room}' of type room_layout"
             )
-        if self.carrier not in [rig.name for rig in scene.rigs]:
+        if self.carrier not in [rig.name for rig in scene.rigs if rig.body]:
             raise ConfigError(
                 f"{field}.carrier: the template has no element '{self.carrier}' of type carrier"
             )

@@ -38,6 +38,7 @@ TABLE = PluginTable[Element](
         "shelf": "gen_data.scene_templates.shelf:Shelf",
         "signals": "gen_data.scene_templates.signals:Signals",
         "square": "gen_data.scene_templates.square:Square",
+        "stand": "gen_data.scene_templates.stand:Stand",
         "surface": "gen_data.scene_templates.surface:SurfaceElement",
         "tram_line": "gen_data.scene_templates.tram_line:TramLine",
         "usd_stage": "gen_data.scene_templates.usd_stage:UsdStage",

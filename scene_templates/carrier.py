@@ -17,14 +17,16 @@ CATEGORY = "ego"
 
 
 class Carrier(Element):
-    """A body that carries a sensor rig of the same name; never labelled.
+    """A body that carries a rig, whose origin is on the floor below it, whatever its height_m.
 
-    The rig's origin is on the floor below the body, X forward, Z up. The randomizer ``room_path``
-    moves it.
+    The ``offset_m`` of sensors counts from there: 1.7 m up is ``offset_m: [0, 0, 1.7]``. X is
+    forward, Z up. The rig has the element's name; the body is never labelled, and the randomizer
+    ``room_path`` moves it. For sensors without a body, such as a pair over a table: ``stand``.
 
     Attributes:
         asset: Id of the asset, whose front is +X.
-        height_m: Height of its lowest point above the floor: 0 for a robot's base.
+        height_m: Height of the body's lowest point above the floor: 0 for a robot's base. It does
+            not move the rig.
     """
 
     type: Literal["carrier"] = "carrier"

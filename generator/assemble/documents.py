@@ -20,6 +20,7 @@ from gen_data.generator.config.yaml_scalars import quote_value
 from gen_data.generator.config.yaml_tree import Node, load_yaml, parse_yaml, with_override
 from gen_data.generator.core.errors import ConfigError, did_you_mean
 from gen_data.generator.pipeline.splits import SHARES
+from gen_data.generator.sensors.calibration.load_calibrations import load_calibrations
 from gen_data.generator.sensors.lidar.datasheets import load_sheets
 from gen_data.randomizers.arm_task_table import load_tasks
 
@@ -79,14 +80,19 @@ def resolve_document(
 
 
 def _with_files(document: Node) -> Node:
-    """Replace names of data sheets in sensors, and of tasks in randomizers, by the content."""
+    """Replace names of sheets and calibrations in sensors, of tasks in randomizers, by content."""
     sensors, randomizers = document.entries["sensors"], document.entries["randomizers"]
     if isinstance(sensors.content, tuple):
-        sensors = sensors.with_children(lambda _, sensor: load_sheets(sensor))
+        sensors = sensors.with_children(_with_sensor_files)
     if isinstance(randomizers.content, tuple):
         randomizers = randomizers.with_children(lambda _, randomizer: load_tasks(randomizer))
     content = {**document.entries, "sensors": sensors, "randomizers": randomizers}
     return replace(document, content=content)
+
+
+def _with_sensor_files(number: str | int, sensor: Node) -> Node:
+    field = f"sensors[{number}]"
+    return load_calibrations(load_sheets(sensor, field), field)
 
 
 def load_config_document(name: str) -> Node:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from gen_data.generator.assets.file_library import describe_unused
 from gen_data.generator.assets.folder_index import (
     METRES_PER_UNIT,
     IndexedAsset,
@@ -81,7 +82,10 @@ def _inspect(one: IndexedAsset, library: Library) -> Finding:
     measure = _measure_robot if one.kind == "robot" else _measure_object
     triangles, low, high = measure(one, library)
     size_m = (high[0] - low[0], high[1] - low[1], high[2] - low[2])
-    warnings = (*_find_doubts(one, max(size_m)), *library.remarks(one.asset_id), *origin)
+    unused = library.unused_elements(one.asset_id) if one.kind != "robot" else ()
+    left_out = (describe_unused(unused),) if unused else ()
+    remarks = (*library.remarks(one.asset_id), *left_out)
+    warnings = (*_find_doubts(one, max(size_m)), *remarks, *origin)
     found = (triangles, size_m, _describe_unit(one), _describe_up(one))
     return Finding(one.asset_id, one.kind, one.category(), *found, warnings=warnings)
 

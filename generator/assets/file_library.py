@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import math
+import warnings
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
@@ -32,8 +33,10 @@ from gen_data.generator.assets.folder_index import (
     user_folder,
 )
 from gen_data.generator.assets.importer import (
+    ROADS_VERSION,
     VERSION,
     ImportedMesh,
+    RoadNetworkContent,
 )
 from gen_data.generator.assets.installed_packs import RECORD_NAME, pack_assets
 from gen_data.generator.assets.parsing import (
@@ -63,7 +66,7 @@ from gen_data.generator.core.asset_types import (
     TextureData,
     UInt8,
 )
-from gen_data.generator.core.errors import AssetError
+from gen_data.generator.core.errors import AssetError, ConfigWarning
 from gen_data.generator.core.plates import Plate
 from gen_data.generator.core.scene import Lane, StageModel
 
@@ -163,13 +166,33 @@ class FileLibrary:
 
     def lanes(self, asset_id: str) -> tuple[Lane, ...]:
         """Lanes of a road network; empty for anything else."""
+        content = self._road_network(asset_id)
+        return content.lanes if content else ()
+
+    def unused_elements(self, asset_id: str) -> tuple[tuple[str, int], ...]:
+        """Elements of a road network without effect, and their number; empty for anything else."""
+        content = self._road_network(asset_id)
+        return content.unused if content else ()
+
+    def _road_network(self, asset_id: str) -> RoadNetworkContent | None:
+        """Content of a road network; warns of what it leaves out when the file is first read."""
         one = self._entries().get(asset_id)
         if one is None or not _is_road_network(one.entry):
-            return ()
+            return None
+
+        def parse() -> Arrays:
+            arrays = self._parse(one, parse_lanes, one.entry.file)
+            unused = unpack_value(RoadNetworkContent, arrays).unused
+            if unused:
+                place = one.root / one.entry.file
+                message = f"{place}: {describe_unused(unused)}"
+                warnings.warn(message, ConfigWarning, stacklevel=2)
+            return arrays
+
         return self._store.get(
             content_key({"asset": self._key(one), "part": "lanes"}),
-            lambda: self._parse(one, parse_lanes, one.entry.file),
-            lambda arrays: unpack_value(tuple[Lane, ...], arrays),
+            parse,
+            lambda arrays: unpack_value(RoadNetworkContent, arrays),
         )
 
     def remarks(self, asset_id: str) -> tuple[str, ...]:
@@ -369,6 +392,8 @@ class FileLibrary:
             }
             if isinstance(one.entry, RobotEntry) and one.entry.tool is not None:
                 content["tools"] = TOOLS_VERSION
+            if _is_road_network(one.entry):
+                content["roads"] = ROADS_VERSION
             self._keys[one.asset_id] = content_key(content)
         return self._keys[one.asset_id]
 
@@ -382,6 +407,11 @@ class FileLibrary:
                 for name, digest in self._digests.of(folder, file).items()
             }
         return self._hashed[one.asset_id]
+
+
+def describe_unused(unused: tuple[tuple[str, int], ...]) -> str:
+    """Elements of a road network without effect, in words."""
+    return "not used: " + ", ".join(f"{count} {name}" for name, count in unused)
 
 
 def _convert_symmetries(entry: MeshEntry) -> tuple[Symmetry, ...]:

@@ -44,6 +44,8 @@ from gen_data.generator.roads.opendrive_lanes import network_lanes
 
 VERSION = 7
 """Increased whenever the same files are imported as different geometry."""
+ROADS_VERSION = 1
+"""The same for road networks."""
 SIZE_TOLERANCE = 0.05
 """Largest deviation of a mesh's edges from the stated ones, as a share of the longest edge."""
 _DEFAULT_FRONT = {"x": "-z", "y": "x", "z": "x"}
@@ -410,13 +412,27 @@ def import_road_network(folder: Folder, relative: str) -> ImportedMesh:
     return ImportedMesh(solid.mesh, solid.collision, {}, solid.keypoints)
 
 
-def road_network_lanes(folder: Folder, relative: str) -> tuple[Lane, ...]:
+@dataclass(frozen=True, slots=True)
+class RoadNetworkContent:
+    """Content of an OpenDRIVE file besides its surface.
+
+    Attributes:
+        lanes: All lanes, in the frame of the surface.
+        unused: Names of elements without effect, and their number.
+    """
+
+    lanes: tuple[Lane, ...]
+    unused: tuple[tuple[str, int], ...]
+
+
+def road_network_content(folder: Folder, relative: str) -> RoadNetworkContent:
     """Read the lanes of an OpenDRIVE file, in the frame of its surface.
 
     Raises:
         AssetError: if it is malformed, or linked lanes do not meet.
     """
-    return network_lanes(_read_network(folder, relative))
+    network = _read_network(folder, relative)
+    return RoadNetworkContent(network_lanes(network), tuple(network.unused.items()))
 
 
 def _read_network(folder: Folder, relative: str) -> Network:

@@ -167,6 +167,10 @@ class Library:
         """Lanes of a road network (``.xodr``), in its own frame; empty for other assets."""
         return () if self._is_generated(asset_id) else self._files.lanes(asset_id)
 
+    def unused_elements(self, asset_id: str) -> tuple[tuple[str, int], ...]:
+        """Elements of a road network without effect, and their number; empty for other assets."""
+        return () if self._is_generated(asset_id) else self._files.unused_elements(asset_id)
+
     def robot(self, asset_id: str) -> RobotModel:
         """Kinematics of a robot. Raises AssetError if the asset is not a robot."""
         if self._is_generated(asset_id):

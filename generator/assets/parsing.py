@@ -21,7 +21,7 @@ from gen_data.generator.assets.importer import (
     import_link,
     import_object,
     import_road_network,
-    road_network_lanes,
+    road_network_content,
 )
 from gen_data.generator.assets.robot_formats import read_description
 from gen_data.generator.assets.robot_models import describe_robot
@@ -76,9 +76,9 @@ def parse_road_network(root: Path, digests: Digests, file: str) -> Arrays:
 
 
 def parse_lanes(root: Path, digests: Digests, file: str) -> Arrays:
-    """Read the lanes of a road network, for ``unpack_value``."""
+    """Read the lanes of a road network, and what it leaves out, for ``unpack_value``."""
     folder = Folder(root)
-    return _checked(folder, digests, _pack_value(road_network_lanes(folder, file)))
+    return _checked(folder, digests, _pack_value(road_network_content(folder, file)))
 
 
 def parse_stage(root: Path, digests: Digests, entry: MeshEntry, asset_id: str) -> Arrays:

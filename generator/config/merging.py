@@ -4,7 +4,8 @@
 2. A distribution and a selection by a shared value are one value each: they are replaced.
 3. A mapping with another ``type`` (``model`` if it has no type) replaces the old one as a whole.
 4. Keys that select assets (``asset``, ``ids``, ``tags``, ``any_of``) are alternatives: giving one
-   drops the inherited ones. So are the two ways to give a camera's distance.
+   drops the inherited ones. So are the ways to give a camera's distance, its focal length and
+   its place on a rig.
 5. Elements, randomizers and sensors merge item by item, see ``merge_named``.
 """
 
@@ -19,10 +20,17 @@ from gen_data.generator.config.yaml_tree import Node, is_distribution
 ASSET_KEYS = frozenset({"asset", "ids", "tags", "any_of"})
 """Alternatives: a mapping that gives one of these keys inherits none of them."""
 
+PLACE_KEYS = ("offset_m", "yaw_deg", "pitch_deg", "roll_deg")
+"""Place of a sensor on its rig, which a file may give (``mounting``)."""
+
 DROPPED: Mapping[str, frozenset[str]] = {
     **dict.fromkeys(ASSET_KEYS, ASSET_KEYS),
     "fills": frozenset({"distance_m", "jitter_m"}),
     "distance_m": frozenset({"fills", "off_center"}),
+    "intrinsics": frozenset({"hfov_deg"}),
+    "hfov_deg": frozenset({"intrinsics"}),
+    "mounting": frozenset(PLACE_KEYS),
+    **dict.fromkeys(PLACE_KEYS, frozenset({"mounting"})),
 }
 """Inherited keys that a mapping drops, by the key that it gives."""
 
@@ -35,6 +43,8 @@ def merge_nodes(base: Node, override: Node) -> Node:
     if is_one_value or _differ_in_kind(base, override):
         return override
     dropped = {old for key in override.content for old in DROPPED.get(key, ())}
+    if (model := override.get("lens", "model")) is not None and model.content == "calibrated":
+        dropped |= {"hfov_deg", "intrinsics"}
     content = {key: node for key, node in base.content.items() if key not in dropped}
     for key, node in override.content.items():
         content[key] = merge_nodes(content[key], node) if key in content else node

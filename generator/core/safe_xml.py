@@ -55,6 +55,7 @@ def parse_xml(
     def refuse(*_: Any) -> None:
         raise ValueError("it declares a document type, which is not allowed; remove it")
 
+    parser.CharacterDataHandler = builder.data
     parser.StartElementHandler, parser.EndElementHandler = start, end
     if text:
         parser.CharacterDataHandler = builder.data

@@ -521,8 +521,8 @@ class Rig:
     """A frame that sensors are mounted on: the ego vehicle's, a robot's wrist.
 
     Attributes:
-        body: Name of the body that carries it.
-        T_body_rig: Pose on the body. X forward, Y left, Z up.
+        body: Name of the body that carries it; empty = none, it stands in the world.
+        T_body_rig: Pose on the body, in the world without one. X forward, Y left, Z up.
     """
 
     name: str
@@ -709,7 +709,7 @@ class Scene:
     def rig_pose(self, name: str) -> SE3:
         """``T_world_rig``; KeyError if there is none."""
         rig = self.rig(name)
-        return self.body(rig.body).T_world_body @ rig.T_body_rig
+        return self.body(rig.body).T_world_body @ rig.T_body_rig if rig.body else rig.T_body_rig
 
     def instance(self, instance_id: int) -> Instance:
         """The instance with that id; KeyError if there is none."""

@@ -155,6 +155,27 @@ def rotation_to_quaternion(rotation: Array) -> Quaternion:
     return _normalised(q if q[0] >= 0 else [-v for v in q])
 
 
+def turned(origin_m: Vec3, yaw_rad: float, pitch_rad: float, roll_rad: float) -> SE3:
+    """Pose of a frame X forward, Y left, Z up after turns from another one's X axis.
+
+    First to the left, then upwards, then clockwise as seen from behind.
+    """
+    half_pitch, half_roll = -0.5 * pitch_rad, 0.5 * roll_rad
+    pitch = SE3((0.0, 0.0, 0.0), (math.cos(half_pitch), 0.0, math.sin(half_pitch), 0.0))
+    roll = SE3((0.0, 0.0, 0.0), (math.cos(half_roll), math.sin(half_roll), 0.0, 0.0))
+    return SE3.about_z(yaw_rad, origin_m) @ pitch @ roll
+
+
+def turns_of(pose: SE3) -> tuple[float, float, float]:
+    """Yaw, pitch and roll [rad] of a pose: the inverse of ``turned``; roll is 0 at the poles."""
+    R = pose.rotation()
+    level = math.hypot(R[0, 0], R[1, 0])
+    pitch_rad = math.atan2(float(R[2, 0]), level)
+    if level < 1e-9:
+        return math.atan2(-float(R[0, 1]), float(R[1, 1])), pitch_rad, 0.0
+    return math.atan2(R[1, 0], R[0, 0]), pitch_rad, math.atan2(R[2, 1], R[2, 2])
+
+
 VERTICAL = 0.999999
 """Vertical part of a unit vector from which on a camera that looks along it has no level."""
 

@@ -28,9 +28,13 @@ def baseline_m(left: Camera, right: Camera) -> float:
     if left.intrinsics != right.intrinsics or not left.intrinsics.straight:
         raise ValueError("they are not the same pinhole")
     T_left_right = left.T_world_camera.inverse() @ right.T_world_camera
+    x, y, z = T_left_right.translation_m
+    if left.rig and left.rig == right.rig:
+        # Poses in the world are rounded: on a rig that leans, the pair would not look exact.
+        T_left_right = left.T_rig_camera.inverse() @ right.T_rig_camera
+        _, y, z = T_left_right.translation_m
     if np.abs(T_left_right.rotation() - np.eye(3)).max() > ALIGNED:
         raise ValueError("they do not look the same way")
-    x, y, z = T_left_right.translation_m
     if max(abs(y), abs(z)) > ALIGNED or x <= 0.0:
         raise ValueError(
             f"one is {x:.6g} m to the right of, {y:.6g} m below and {z:.6g} m before the other, "

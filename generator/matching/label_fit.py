@@ -91,7 +91,7 @@ def _fit(
     """Fit one quantity, after others. Raises NoParameter."""
     config = with_fields(source, earlier)
     classes = {box[0].lower() for image in real for box in image.boxes}
-    intrinsics = camera.intrinsics()
+    intrinsics = camera.nominal_intrinsics()
     slope = quantity.slope(intrinsics.fy_px / intrinsics.height_px)
     simulated: list[Array] = []
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -28,6 +29,8 @@ RAISED_M = 0.12
 """Default height of sidewalks."""
 MAX_LINK_GAP_M = 0.1
 """Largest gap between linked lanes."""
+TAPERED_M = 0.5
+"""Width below which a lane has ended where another one continues."""
 DEFAULT_SPEED_M_S = 13.9
 _STEP_M = 2.0
 _SIGN_KINDS = frozenset({"sidewalk", "parking"})
@@ -74,17 +77,21 @@ def network_lanes(network: Network) -> tuple[Lane, ...]:
             extra += _make_side_lanes(road, index, section, T_body_file)
     linked = []
     for key, lane in made.items():
-        after = [k for k in _next_keys(network, key) if k in made and made[k].kind == lane.kind]
+        after = [
+            k
+            for k in _next_keys(network, key)
+            if k in made and made[k].kind == lane.kind and not _tapers(network, key, k)
+        ]
         for other in after:
             _check_gap(network, key, lane, made[other])
         linked.append(_link_lane(network, lane, key, after, made))
     return (*linked, *extra)
 
 
-def runs_forward(road: Road, number: int, kind: str) -> bool:
+def runs_forward(road: Road, lane: LaneRecord) -> bool:
     """Whether a lane runs along its road's direction."""
-    left_hand = road.left_hand and KINDS[kind] not in _SIGN_KINDS
-    return (number < 0) != left_hand
+    left_hand = road.left_hand and KINDS[lane.kind] not in _SIGN_KINDS
+    return ((lane.number < 0) != left_hand) != lane.reversed
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,14 +119,16 @@ def _make_lane(road: Road, index: int, section: Section, number: int, T_body_fil
     record = section.lanes[number]
     course = _trace_edges(road, section, number)
     lift = np.full(len(course.s_m), 0.5 * sum(heights_m(record)))
-    points = road.points(course.s_m, 0.5 * (course.inner_m + course.outer_m), lift)
+    points = road.points(section, course.s_m, 0.5 * (course.inner_m + course.outer_m), lift)
     low_m, high_m = heights_m(record)
-    inner = road.points(course.s_m, course.inner_m, np.full(len(lift), low_m))[:, 2].mean()
-    outer = road.points(course.s_m, course.outer_m, np.full(len(lift), high_m))[:, 2].mean()
+    inner = road.points(section, course.s_m, course.inner_m, np.full(len(lift), low_m))[:, 2].mean()
+    outer = road.points(section, course.s_m, course.outer_m, np.full(len(lift), high_m))[
+        :, 2
+    ].mean()
     width_m = round(float(np.abs(course.outer_m - course.inner_m).mean()), 6)
     # Lanes with negative numbers have their inner edge on the left, seen along the road.
     bank = float(inner - outer) / width_m * (1.0 if number < 0 else -1.0) if width_m else 0.0
-    if not runs_forward(road, number, record.kind):
+    if not runs_forward(road, record):
         points, bank = points[::-1], -bank
     kind = KINDS[record.kind]
     drives = kind == "driving"
@@ -129,7 +138,7 @@ def _make_lane(road: Road, index: int, section: Section, number: int, T_body_fil
         center_m=world_points(points, T_body_file),
         width_m=width_m,
         road=road.road_id,
-        speed_m_s=(road.speed_m_s or DEFAULT_SPEED_M_S) if drives else 0.0,
+        speed_m_s=(road.speed_m_s(section, number) or DEFAULT_SPEED_M_S) if drives else 0.0,
         junction=bool(road.junction),
         bank=round(bank, 9) + 0.0,
     )
@@ -153,7 +162,7 @@ def _make_side_lanes(road: Road, index: int, section: Section, T_body_file: SE3)
             if kind == "furniture":
                 into = side * np.minimum(FURNITURE_M, 0.5 * np.abs(course.outer_m - course.inner_m))
             lift = np.full(len(course.s_m), heights_m(section.lanes[number])[1])
-            points = road.points(course.s_m, course.inner_m + into, lift)
+            points = road.points(section, course.s_m, course.inner_m + into, lift)
             points = points if side < 0 else points[::-1]
             name = f"{_lane_name((road.road_id, index, number))}/{kind}"
             width = 0.6 if kind == "furniture" else 0.0
@@ -173,14 +182,18 @@ def _link_lane(
     """Add successors, and adjacent lanes of the same kind, to a lane."""
     road, section, number = key
     side = 1 if number > 0 else -1
-    kind = network.roads[road].sections[section].lanes[number].kind
+    lanes = network.roads[road].sections[section].lanes
+    forward = runs_forward(network.roads[road], lanes[number])
 
     def beside(step: int) -> str:
         other = (road, section, number + step)
-        return _lane_name(other) if other in made and made[other].kind == lane.kind else ""
+        if other not in made or made[other].kind != lane.kind:
+            return ""
+        alike = runs_forward(network.roads[road], lanes[number + step]) == forward
+        return _lane_name(other) if alike else ""
 
     # The centre lies at -side in t; left is +t for traffic along the road.
-    inner_is_left = runs_forward(network.roads[road], number, kind) == (side < 0)
+    inner_is_left = forward == (side < 0)
     left, right = (-side, side) if inner_is_left else (side, -side)
     return replace(
         lane,
@@ -194,7 +207,7 @@ def _next_keys(network: Network, key: Key) -> list[Key]:
     """Keys of a lane's successors."""
     road = network.roads[key[0]]
     record = road.sections[key[1]].lanes[key[2]]
-    forward = runs_forward(road, record.number, record.kind)
+    forward = runs_forward(road, record)
     step, target = (1, record.successor) if forward else (-1, record.predecessor)
     index = key[1] + step
     if 0 <= index < len(road.sections):
@@ -204,18 +217,37 @@ def _next_keys(network: Network, key: Key) -> list[Key]:
         return []
     if not link.junction:
         return [] if target is None else [_entry_key(network, link.target, link.contact, target)]
-    return [
-        _entry_key(network, one.connecting, one.contact, to)
-        for one in network.junctions[link.target]
-        if one.incoming == road.road_id
-        for origin, to in one.lanes
-        if origin == record.number
-    ]
+    return list(dict.fromkeys(_through_junction(network, link.target, road, record.number)))
+
+
+def _through_junction(network: Network, junction: str, road: Road, number: int) -> Iterator[Key]:
+    """Keys of the lanes that a lane leads to through a junction."""
+    for one in network.junctions[junction]:
+        for origin, to in one.lanes:
+            if one.incoming == road.road_id and origin == number:
+                yield _entry_key(network, one.connecting, one.contact, to)
+            if one.direct and one.connecting == road.road_id and to == number:
+                link = network.roads[one.incoming].successor
+                at_end = link is not None and link.junction and link.target == junction
+                yield _entry_key(network, one.incoming, "end" if at_end else "start", origin)
 
 
 def _entry_key(network: Network, road_id: str, contact: Contact, number: int) -> Key:
     sections = network.roads[road_id].sections
     return (road_id, 0 if contact == "start" else len(sections) - 1, number)
+
+
+def _tapers(network: Network, key: Key, after: Key) -> bool:
+    """Whether a lane has no width where it meets the next one: traffic merges before."""
+    ends = []
+    for road_id, index, number in (key, after):
+        road = network.roads[road_id]
+        section = road.sections[index]
+        starts = runs_forward(road, section.lanes[number]) == ((road_id, index, number) == after)
+        edges = road.boundaries_m(section, np.array([section.start_m if starts else section.end_m]))
+        inner = number - (1 if number > 0 else -1)
+        ends.append(abs(float(edges[number][0] - edges[inner][0])))
+    return min(ends) < TAPERED_M < max(ends)
 
 
 def _check_gap(network: Network, key: Key, lane: Lane, after: Lane) -> None:

@@ -6,10 +6,11 @@ import math
 import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
+from typing_extensions import Self
 
 from gen_data.generator.config.base_model import NAME_PATTERN, Strict
 from gen_data.generator.core.errors import ConfigError, ConfigWarning, did_you_mean
@@ -18,10 +19,35 @@ from gen_data.generator.core.measurement_dtypes import TABLE_COLUMNS, TIME_DECIM
 from gen_data.generator.core.motion import STILL, Trajectory, Twist
 from gen_data.generator.core.scene import Camera, Device, Lidar, Scene
 from gen_data.generator.core.scene_time import RIG_AXES
-from gen_data.generator.core.se3 import SE3, Array
+from gen_data.generator.core.se3 import SE3, Array, turned
 
 BURIED_M = 0.05
 """Allowed depth of a sensor inside its body's bounding box, which is larger than the body."""
+
+
+class Mounting(Strict):
+    """A sensor's place on its rig, from the file of a calibration.
+
+    Files of Kalibr, OpenCV (a pair), ROS (transforms in YAML, URDF), nuScenes and KITTI.
+
+    Attributes:
+        file: Its name. The place in it replaces this key in the configuration, as ``offset_m``,
+            ``yaw_deg``, ``pitch_deg`` and ``roll_deg``.
+        frame: Name of the sensor's frame in it, such as cam1; empty = the only one.
+        relative_to: Name of the frame that is the rig's: its origin, and X forward, Y left, Z up
+            (a camera's frame is turned to these axes); empty = the root above ``frame``.
+        axes: Of ``frame``: optical, X right, Y down, Z forward; or body, X forward, Y left, Z up.
+            null = as the format has them; by the frame's name for ROS (REP 103).
+        rectified: Whether to take the place of the rectified camera, from its projection matrix.
+        unit: Of lengths in the file.
+    """
+
+    file: str
+    frame: str = ""
+    relative_to: str = ""
+    axes: Literal["optical", "body"] | None = None
+    rectified: bool = False
+    unit: Literal["m", "cm", "mm"] = "m"
 
 
 class Mounted(Strict):
@@ -35,6 +61,8 @@ class Mounted(Strict):
         rate_hz: Readings per second; null = one per step.
         time_offset_s: Delay of its readings after the step's instant; the reading and its labels
             belong to the step.
+        mounting: Place on the rig from the file of a calibration, instead of ``offset_m`` and the
+            angles.
         inside: Whether it may be inside the body that carries its rig.
     """
 
@@ -45,17 +73,20 @@ class Mounted(Strict):
     roll_deg: float = Field(0.0, ge=-180, le=180)
     rate_hz: float | None = Field(None, gt=0, le=10_000)
     time_offset_s: float = Field(0.0, ge=-10, le=10)
+    mounting: Mounting | None = None
     inside: bool = False
+
+    @model_validator(mode="after")
+    def _is_placed(self) -> Self:
+        if self.mounting is not None:
+            raise ValueError("mounting: only a configuration can name a file, and not by a switch")
+        return self
 
     @property
     def T_rig_sensor(self) -> SE3:  # noqa: N802
         """Pose on the rig; both frames are X forward, Y left, Z up."""
-        half_pitch = -0.5 * math.radians(self.pitch_deg)
-        half_roll = 0.5 * math.radians(self.roll_deg)
-        pitch = SE3((0.0, 0.0, 0.0), (math.cos(half_pitch), 0.0, math.sin(half_pitch), 0.0))
-        roll = SE3((0.0, 0.0, 0.0), (math.cos(half_roll), math.sin(half_roll), 0.0, 0.0))
-        yaw = SE3.about_z(math.radians(self.yaw_deg), self.offset_m)
-        return (yaw @ pitch @ roll).rounded()
+        angles = (math.radians(a) for a in (self.yaw_deg, self.pitch_deg, self.roll_deg))
+        return turned(self.offset_m, *angles).rounded()
 
     def _info(self, name: str, modality: Modality, kind: str = "", **more: Any) -> SensorInfo:
         """Description with the rate of its readings; ``more`` are further fields.
@@ -160,6 +191,8 @@ def check_not_buried(scene: Scene, name: str, assets: AssetIndex) -> None:
     if not rig_name:
         return
     rig = scene.rig(rig_name)
+    if not rig.body:
+        return
     body = scene.body(rig.body)
     low_m, high_m = assets.bounds_m(body.asset)
     place_m = (rig.T_body_rig @ T_rig_sensor).translation_m
@@ -337,10 +370,8 @@ def mount_motion(scene: Scene, device: str) -> MountMotion:
     """Motion of the device of that name; KeyError if the scene has none."""
     mounted = scene.device(device)
     rig = scene.rig(mounted.rig)
-    body = scene.body(rig.body)
-    return MountMotion(
-        scene.track(rig.body), body.T_world_body, rig.T_body_rig @ mounted.T_rig_device
-    )
+    T_world_body = scene.body(rig.body).T_world_body if rig.body else SE3()
+    return MountMotion(scene.track(rig.body), T_world_body, rig.T_body_rig @ mounted.T_rig_device)
 
 
 def velocity_at(twist: Twist, lever_m: Array) -> Array:
@@ -361,6 +392,8 @@ def rotation_vector(turn: SE3) -> Array:
 
 def remove_carrier(scene: Scene, rig: str) -> Scene:
     """The scene without the body that carries a rig, so that it does not occlude devices."""
+    if not scene.rig(rig).body:
+        return scene
     carrier = scene.body(scene.rig(rig).body)
     own = carrier.instance_id
     bodies = tuple(

@@ -29,6 +29,7 @@ BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 FILE = re.compile(r"# ([\w./-]+\.(?:py|toml|yaml))\n")
 
 SMALLER = {
+    "my_calibration": {"--n 200": "--n 1 "},
     "my_own_objects": {"--n 2000": "--n 2", "--n 6 ": "--n 1 "},
     "my_own_template": {"--n 300": "--n 3", "--n 6 ": "--n 1 ", "[640, 480]": "[96, 72]"},
     "photo_plates": {

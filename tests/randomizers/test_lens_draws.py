@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 import math
 from dataclasses import replace
 from typing import Any
 
 import pytest
+from pydantic import ValidationError
 
 from gen_data.generator.config.distributions import Constant, Uniform
 from gen_data.generator.core.errors import ConfigError, LayoutRejected
@@ -91,3 +93,32 @@ def test_what_no_camera_has_is_refused(given: dict[str, Any], message: str) -> N
     """One message, naming the field."""
     with pytest.raises(ConfigError, match=message):
         drawn(**given)
+
+
+def test_the_principal_point_is_offset_along_each_axis_by_its_own() -> None:
+    """2 px to the left, 3.5 px down, from that of the sensor."""
+    given = {"name": "lens", "camera": "bent", "hfov_deg": None, "principal_offset_px": [-2, 3.5]}
+    lens = CameraIntrinsics.model_validate_json(json.dumps(given))
+    k = lens(SCENE, FakeAssets(), rng_of("lens")).camera("bent").intrinsics
+
+    assert (k.cx_px, k.cy_px) == (320.0, 239.5)
+    assert (k.fx_px, k.fy_px) == (500.0, 505.0)
+
+
+@pytest.mark.parametrize(
+    ("value", "found"),
+    [
+        (3.3, Constant(3.3)),
+        ([-1.3, {"uniform": [3, 4]}], (Constant(-1.3), Uniform(3.0, 4.0))),
+    ],
+)
+def test_offsets_are_read_as_one_or_as_two(value: Any, found: Any) -> None:
+    given = {"name": "lens", "principal_offset_px": value}
+    assert CameraIntrinsics.model_validate_json(json.dumps(given)).principal_offset_px == found
+
+
+@pytest.mark.parametrize("value", [[1.0], [1.0, 2.0, 3.0], "wide", [1.0, "a"]])
+def test_other_offsets_are_refused(value: Any) -> None:
+    given = {"name": "lens", "principal_offset_px": value}
+    with pytest.raises(ValidationError):
+        CameraIntrinsics.model_validate_json(json.dumps(given))

@@ -161,3 +161,50 @@ def test_sensors_inside_the_body_that_carries_them_are_refused(
 
     assert sensor.describe().needs_clear_view
     assert not sensor.model_copy(update={"inside": True}).describe().needs_clear_view
+
+
+def test_a_sheet_of_a_few_lines_has_the_rest_of_a_named_scanner(tmp_path: Path) -> None:
+    """VLP-16: 1,808 columns a turn, 2.79 mrad; its own lasers from the top, its turns and range."""
+    text = "like: VLP-16\nelevations_deg: [-10, -5, 0, 5]\nrotation_hz: 20\nrange_m: [0.2, 40]\n"
+    sensor = spec(tmp_path, "model: short.yaml", short_yaml=text).sensors[1]
+    device = sensor.device
+
+    np.testing.assert_allclose(np.degrees(device.elevations_rad()), [5, 0, -5, -10])
+    assert (device.name, device.rotation_hz, device.range_m) == ("short", 20, (0.2, 40))
+    assert (device.divergence_mrad, device.seen.range_m, device.wavelength_nm) == (3.0, 50, 903)
+    assert len(make_sweep(device, 0.0).ring) == 4 * round(289352 / 10 / 16)
+
+
+def test_a_step_in_azimuth_gives_the_pulses_of_a_turn(tmp_path: Path) -> None:
+    """0.5 degrees: 720 of each laser, at any speed of rotation; 2 s / 20 turns / 720 apart."""
+    text = "like: OS1-64\nelevations_deg: [3, 1, -2]\nazimuth_step_deg: 0.5\n"
+    for line in ("model: s.yaml", "model: s.yaml\n    rotation_hz: 5"):
+        sensor = spec(tmp_path, line, s_yaml=text).sensors[1]
+        sweep = make_sweep(sensor.device, 0.0)
+        assert len(sweep.ring) == 3 * 720
+        # Its own lasers have no offsets of the other scanner's.
+        assert sensor.device.azimuth_offsets_deg == ()
+
+
+@pytest.mark.parametrize(
+    ("text", "fact"),
+    [
+        ("elevations_deg: [-10, -5, 0, 5]\n",
+         "s.yaml:1:1: lacks rotation_hz, range_m, range_noise_m, range_step_m, divergence_mrad, "
+         "pulse_m, wavelength_nm, seen, white_intensity; give them, or name a scanner that has the "
+         "same: like: VLP-16"),
+        ("like: VLP\n", "s.yaml:1:7: like: expected one of HDL-32E"),
+        ("like: VLP-16\nelevations_deg: [a]\n", "s.yaml:2:18: sensors[1].model.elevations_deg[0]"),
+        ("like: VLP-16\nelevations_deg: [95]\n", "elevations_deg[0]"),
+        ("like: VLP-16\nelevations_deg: []\n", "expected either elevations_deg or prisms"),
+        ("like: VLP-16\npoints_per_second: 9\nazimuth_step_deg: 1\n",
+         "expected either points_per_second or azimuth_step_deg"),
+        ("like: VLP-16\nrate_hz: 9\n", "unknown key 'rate_hz'"),
+    ],
+)  # fmt: skip
+def test_a_short_sheet_with_a_fault_is_refused_in_one_message(
+    tmp_path: Path, text: str, fact: str
+) -> None:
+    message = told(tmp_path, "model: s.yaml", s_yaml=text)
+    assert fact in message
+    assert message.count("s.yaml:") == 1

@@ -6,10 +6,11 @@ import math
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from gen_data.generator.assets.procedural.data_tables import load_table
 from gen_data.generator.config.base_model import Strict
+from gen_data.generator.core.errors import did_you_mean
 from gen_data.generator.core.intrinsics import Intrinsics
 from gen_data.generator.core.lens import COEFFICIENTS, Lens, LensModel
 
@@ -84,30 +85,108 @@ class Equirectangular(_LensModel):
 class CalibratedLens(Strict):
     """The calibration of a real camera, scaled to the image's width and cropped to its height.
 
-    It defines the field of view: hfov_deg must be left out.
+    It defines the field of view: hfov_deg must be left out. The content of a ``file`` replaces its
+    name in the configuration: as ``lens``, ``intrinsics`` and, unless given, ``size_px``.
 
     Attributes:
-        camera: kitti_raw_02, the left colour camera of KITTI's raw recordings; euroc_cam0; or
-            tum_vi_cam0, a fisheye of 195 degrees.
+        camera: Without a file, kitti_raw_02, the left colour camera of KITTI's raw recordings;
+            euroc_cam0; or tum_vi_cam0, a fisheye of 195 degrees. With one, a camera in it, such as
+            cam0; empty = the only one.
+        file: Name of a file of OpenCV (YAML, XML, JSON), ROS (camera_info), Kalibr (camera chain),
+            COLMAP (cameras.txt), nuScenes (calibrated_sensor.json) or KITTI.
+        fisheye: Whether the four coefficients of an OpenCV file are those of its fisheye model.
+        rectified: Whether to take the rectified pinhole: the projection matrix of the file.
     """
 
     model: Literal["calibrated"]
-    camera: Literal["euroc_cam0", "kitti_raw_02", "tum_vi_cam0"]
+    camera: str = ""
+    file: str = ""
+    fisheye: bool = False
+    rectified: bool = False
+
+    @model_validator(mode="after")
+    def _has_a_source(self) -> CalibratedLens:
+        if self.file:
+            return self
+        if self.camera not in CALIBRATIONS:
+            known = ", ".join(sorted(CALIBRATIONS))
+            near = did_you_mean(self.camera, CALIBRATIONS)
+            raise ValueError(
+                f"camera: expected one of {known}{near}; or name the file of a calibration: file"
+            )
+        if self.fisheye or self.rectified:
+            raise ValueError("fisheye and rectified need a file")
+        return self
 
     def intrinsics(self, width_px: int, height_px: int) -> Intrinsics:
-        """Intrinsics at an image size."""
+        """Intrinsics at an image size.
+
+        Raises:
+            ValueError: it names a file, which only configurations can.
+        """
+        if self.file:
+            raise ValueError("lens.file: only a configuration can name it, and not by a switch")
         known = CALIBRATIONS[self.camera]
-        scale = width_px / known.size_px[0]
-        crop_px = 0.5 * (height_px - scale * known.size_px[1])
+        measured = MeasuredIntrinsics(
+            fx_px=known.fx_px,
+            fy_px=known.fy_px,
+            cx_px=known.cx_px,
+            cy_px=known.cy_px,
+            size_px=known.size_px,
+        )
+        return measured.at_size(width_px, height_px, known.lens, decimals=6)
+
+
+class MeasuredIntrinsics(Strict):
+    """Focal lengths and principal point of a real camera.
+
+    Attributes:
+        fx_px, fy_px: Focal lengths; they may differ.
+        cx_px, cy_px: Principal point.
+        size_px: Width and height of the images that they were measured in; null = the sensor's
+            size_px. Otherwise they are scaled to the sensor's width, and its height shows the
+            middle rows: it must not exceed the scaled one.
+        pixel_centers: Where the centre of the first pixel is: at ``integers``, (0, 0), as in
+            OpenCV, ROS, Kalibr and KITTI; or at ``halves``, (0.5, 0.5), as in COLMAP and in the
+            labels of this project, whose cx is greater by 0.5.
+    """
+
+    fx_px: float = Field(gt=0)
+    fy_px: float = Field(gt=0)
+    cx_px: float
+    cy_px: float
+    size_px: tuple[int, int] | None = None
+    pixel_centers: Literal["integers", "halves"] = "integers"
+
+    def at_size(
+        self, width_px: int, height_px: int, lens: Lens, *, decimals: int = 9
+    ) -> Intrinsics:
+        """Intrinsics at an image size, rounded to decimals of a pixel."""
+        measured_px = self.size_px or (width_px, height_px)
+        shift_px = 0.5 if self.pixel_centers == "integers" else 0.0
+        scale = width_px / measured_px[0]
+        crop_px = 0.5 * (height_px - scale * measured_px[1])
         return Intrinsics(
             width_px,
             height_px,
-            fx_px=round(scale * known.fx_px, 6),
-            fy_px=round(scale * known.fy_px, 6),
-            cx_px=round(scale * (known.cx_px + 0.5), 6),
-            cy_px=round(scale * (known.cy_px + 0.5) + crop_px, 6),
-            lens=known.lens,
+            fx_px=round(scale * self.fx_px, decimals),
+            fy_px=round(scale * self.fy_px, decimals),
+            cx_px=round(scale * (self.cx_px + shift_px), decimals),
+            cy_px=round(scale * (self.cy_px + shift_px) + crop_px, decimals),
+            lens=lens,
         )
+
+    def check_size(self, width_px: int, height_px: int) -> None:
+        """Raise ValueError if a sensor's image is taller than the scaled measured one."""
+        if self.size_px is None:
+            return
+        tallest_px = width_px / self.size_px[0] * self.size_px[1]
+        if height_px > tallest_px + 0.5:
+            width, height = self.size_px
+            raise ValueError(
+                f"size_px [{width_px}, {height_px}] is taller than the calibrated {width} x "
+                f"{height} scaled to its width; expected a height of at most {tallest_px:.0f}"
+            )
 
 
 LensConfig = Annotated[

@@ -15,7 +15,8 @@ from gen_data.generator.sensors.camera.image_pipeline import ImagePipeline
 from gen_data.generator.sensors.camera.rgb_camera import RgbCamera
 
 _GIVEN_BY_THE_PHOTOGRAPH = (
-    "hfov_deg", "lens", "rig", "offset_m", "yaw_deg", "pitch_deg", "roll_deg", "stereo_with",
+    "hfov_deg", "intrinsics", "lens", "rig", "offset_m", "yaw_deg", "pitch_deg", "roll_deg",
+    "stereo_with",
 )  # fmt: skip
 
 

@@ -23,7 +23,12 @@ from gen_data.generator.core.stereo import baseline_m, disparity_px, is_seen_by_
 from gen_data.generator.core.streams import Rng
 from gen_data.generator.sensors.camera.exposure import ExposureTime, RollingShutter, make_shutter
 from gen_data.generator.sensors.camera.image_pipeline import ImagePipeline, capture_photograph
-from gen_data.generator.sensors.camera.lens_models import CalibratedLens, LensConfig, Pinhole
+from gen_data.generator.sensors.camera.lens_models import (
+    CalibratedLens,
+    LensConfig,
+    MeasuredIntrinsics,
+    Pinhole,
+)
 from gen_data.generator.sensors.camera.rgb_encoding import RgbEncoding
 from gen_data.generator.sensors.mounting import Mounted, check_rig
 
@@ -56,7 +61,8 @@ class RgbCamera(Mounted):
         lens: Projection: a pinhole; brown_conrady, OpenCV's standard model with k1 to k6, p1 and
             p2; kannala_brandt, its fisheye with k1 to k4; both with field_deg, the full field of
             view outside which images are black; equirectangular, a panorama; or calibrated, a
-            known ``camera`` with its own field of view: kitti_raw_02, euroc_cam0 or tum_vi_cam0.
+            known ``camera`` or one of a calibration ``file``, with its own field of view.
+        intrinsics: Focal lengths and principal point, in place of hfov_deg; null = as hfov_deg.
         channels: Channels to write as images.
         ev100: Fixed exposure value at ISO 100; null = metered.
         exposure: Exposure time; null = an instant. Labels refer to the middle of the exposure,
@@ -77,6 +83,7 @@ class RgbCamera(Mounted):
     size_px: tuple[SidePx, SidePx] = (640, 480)
     hfov_deg: float = Field(60.0, ge=1, le=360)
     lens: LensConfig = Pinhole()
+    intrinsics: MeasuredIntrinsics | None = None
     channels: tuple[Image, ...] = Field(
         (Channel.RGB, Channel.Z_DEPTH, Channel.INSTANCE, Channel.CATEGORY), min_length=1
     )
@@ -101,9 +108,15 @@ class RgbCamera(Mounted):
                 f"hfov_deg {self.hfov_deg:g} is too wide for a pinhole; expected at most "
                 f"{PINHOLE_MAX_DEG:g}, or another lens, such as {{model: kannala_brandt}}"
             )
-        if isinstance(self.lens, CalibratedLens) and "hfov_deg" in self.model_fields_set:
+        calibrated = isinstance(self.lens, CalibratedLens)
+        if calibrated and "hfov_deg" in self.model_fields_set:
             raise ValueError("a calibrated lens has its own field of view: leave out hfov_deg")
-        if self.intrinsics().folds_over():
+        if self.intrinsics is not None:
+            if calibrated or "hfov_deg" in self.model_fields_set:
+                other = "a calibrated lens" if calibrated else "hfov_deg"
+                raise ValueError(f"intrinsics: excludes {other}, which defines the focal lengths")
+            self.intrinsics.check_size(*self.size_px)
+        if self.nominal_intrinsics().folds_over():
             raise ValueError(
                 f"lens {self.lens.model}: its polynomial folds over inside the image; check the "
                 "signs and magnitudes of its coefficients, reduce hfov_deg, or limit its field "
@@ -111,7 +124,7 @@ class RgbCamera(Mounted):
             )
         return self
 
-    def intrinsics(self) -> Intrinsics:
+    def nominal_intrinsics(self) -> Intrinsics:
         """Nominal intrinsics.
 
         Raises:
@@ -120,6 +133,8 @@ class RgbCamera(Mounted):
         width_px, height_px = self.size_px
         if isinstance(self.lens, CalibratedLens):
             return self.lens.intrinsics(width_px, height_px)
+        if self.intrinsics is not None:
+            return self.intrinsics.at_size(width_px, height_px, self.lens.lens())
         hfov_rad = math.radians(self.hfov_deg)
         return Intrinsics.from_hfov(width_px, height_px, hfov_rad, self.lens.lens())
 
@@ -130,7 +145,7 @@ class RgbCamera(Mounted):
 
     def describe(self) -> SensorInfo:
         """Describe a camera with the channels that it writes."""
-        lens = self.intrinsics().lens.model
+        lens = self.nominal_intrinsics().lens.model
         encoding = self.rgb_encoding.described()
         return self._info(
             self.name, Modality.CAMERA, channels=self.media, lens=lens, rgb_encoding=encoding
@@ -140,7 +155,7 @@ class RgbCamera(Mounted):
         """Add this camera, on its rig or looking at the scene's focus, unless it exists."""
         shutter = make_shutter(self.exposure, self.rolling_shutter)
         return add_camera(
-            scene, self.name, self, self.intrinsics(), ev100=self.ev100, shutter=shutter
+            scene, self.name, self, self.nominal_intrinsics(), ev100=self.ev100, shutter=shutter
         )
 
     def capture(

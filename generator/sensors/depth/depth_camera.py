@@ -15,9 +15,11 @@ from gen_data.generator.core.capture import Channel, SensorReading
 from gen_data.generator.core.errors import SampleError
 from gen_data.generator.core.interfaces import Modality, Renderer, SensorInfo
 from gen_data.generator.core.intrinsics import Intrinsics
+from gen_data.generator.core.lens import PINHOLE
 from gen_data.generator.core.scene import Scene
 from gen_data.generator.core.streams import Rng
 from gen_data.generator.sensors.camera.image_pipeline import ImagePipeline, capture_photograph
+from gen_data.generator.sensors.camera.lens_models import MeasuredIntrinsics
 from gen_data.generator.sensors.camera.rgb_camera import add_camera
 from gen_data.generator.sensors.depth.active_stereo import ActiveStereo
 from gen_data.generator.sensors.depth.structured_light import StructuredLight
@@ -90,6 +92,7 @@ class DepthCamera(Mounted):
         model: A file of ``generator/sensors/depth``, or the content of one.
         size_px: Width and height of its images; null = the model's.
         hfov_deg: Horizontal field of view; null = the model's.
+        intrinsics: Focal lengths and principal point, in place of hfov_deg.
         channels: Channels to write as images.
     """
 
@@ -98,6 +101,7 @@ class DepthCamera(Mounted):
     model: str | DepthModel = "kinect_v2"
     size_px: tuple[SidePx, SidePx] | None = None
     hfov_deg: float | None = Field(None, ge=1, le=150)
+    intrinsics: MeasuredIntrinsics | None = None
     channels: tuple[DepthImage, ...] = Field(
         (Channel.MEASURED_DEPTH, Channel.INFRARED, Channel.Z_DEPTH), min_length=1
     )
@@ -106,6 +110,14 @@ class DepthCamera(Mounted):
     @classmethod
     def _is_known(cls, model: str | DepthModel) -> str | DepthModel:
         return check_preset(MODELS, model) if isinstance(model, str) else model
+
+    @model_validator(mode="after")
+    def _has_one_lens(self) -> DepthCamera:
+        if self.intrinsics is not None:
+            if self.hfov_deg is not None:
+                raise ValueError("intrinsics: excludes hfov_deg")
+            self.intrinsics.check_size(*(self.size_px or self.device.size_px))
+        return self
 
     @property
     def device(self) -> DepthModel:
@@ -118,16 +130,18 @@ class DepthCamera(Mounted):
         """Channels to write as images, in the order of ``Channel``."""
         return tuple(channel for channel in Channel if channel in self.channels)
 
-    def intrinsics(self) -> Intrinsics:
+    def nominal_intrinsics(self) -> Intrinsics:
         """Nominal intrinsics."""
         device = self.device
         width_px, height_px = self.size_px or device.size_px
+        if self.intrinsics is not None:
+            return self.intrinsics.at_size(width_px, height_px, PINHOLE)
         hfov_deg = device.hfov_deg if self.hfov_deg is None else self.hfov_deg
         return Intrinsics.from_hfov(width_px, height_px, math.radians(hfov_deg))
 
     def describe(self) -> SensorInfo:
         """Describe a camera with the channels that it writes."""
-        lens = self.intrinsics().lens.model
+        lens = self.nominal_intrinsics().lens.model
         return self._info(self.name, Modality.CAMERA, channels=self.media, lens=lens)
 
     def mount(self, scene: Scene) -> Scene:
@@ -136,7 +150,7 @@ class DepthCamera(Mounted):
         Raises:
             ConfigError: the scene has no such rig.
         """
-        return add_camera(scene, self.name, self, self.intrinsics())
+        return add_camera(scene, self.name, self, self.nominal_intrinsics())
 
     def capture(
         self, scene: Scene, renderer: Renderer, channels: frozenset[Channel], rng: Rng

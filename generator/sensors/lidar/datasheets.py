@@ -11,15 +11,24 @@ from pathlib import Path
 
 from gen_data.generator.config.paths import find_path
 from gen_data.generator.config.problems import Position, Problem, Problems
+from gen_data.generator.config.validation import validate
 from gen_data.generator.config.yaml_tree import MAX_FILE_BYTES, Node, load_yaml
 from gen_data.generator.core.errors import ConfigError, did_you_mean
+from gen_data.generator.sensors.device_presets import preset_names, preset_path
+from gen_data.generator.sensors.lidar.scan_pattern import PRESETS, LidarModel, lidar_model
 
 COLUMNS = ("elevation_deg", "azimuth_offset_deg")
+LASERS = frozenset({"elevations_deg", "prisms", "azimuth_offsets_deg", "lateral_offsets_m"})
+"""Keys of a sheet that belong together: giving one inherits none."""
+RATES = frozenset({"points_per_second", "azimuth_step_deg"})
+REQUIRED = tuple(name for name, field in LidarModel.model_fields.items() if field.is_required())
 SHEETS, TABLES = (".yaml", ".yml"), (".csv",)
 
 
-def load_sheets(sensor: Node) -> Node:
+def load_sheets(sensor: Node, field: str) -> Node:
     """Replace the names of data sheets and beam tables in a sensor's document by their content.
+
+    ``field`` is the path of the sensor in messages: ``sensors[0]``.
 
     Raises:
         ConfigError: a file cannot be read or has another layout.
@@ -32,7 +41,9 @@ def load_sheets(sensor: Node) -> Node:
     if model is not None and _names(model, SHEETS + TABLES):
         if _names(model, TABLES):
             raise _error(model.position, "model", "a table of beams belongs into 'beams'")
-        content["model"] = _load_sheet(_find_file(model))
+        content["model"] = _checked(_load_sheet(_find_file(model)), f"{field}.model")
+    elif model is not None and isinstance(model.content, Mapping):
+        content["model"] = _checked(_complete(model), f"{field}.model")
     if beams is not None and isinstance(beams.content, str):
         if not _names(beams, TABLES):
             raise _error(beams.position, "beams", "expected a list, or the name of a .csv file")
@@ -73,7 +84,55 @@ def _load_sheet(path: Path) -> Node:
     node = load_yaml(path)
     assert isinstance(node.content, Mapping)
     name = Node(node.position, path.stem, text=path.stem)
-    return Node(node.position, {"name": name, **node.content}, node.key_positions)
+    named = Node(node.position, {"name": name, **node.content}, node.key_positions)
+    return _complete(named)
+
+
+def _checked(sheet: Node, field: str) -> Node:
+    """The sheet, if it is valid: a field that is a name or a sheet would only state that.
+
+    Raises:
+        ConfigError: it is not.
+    """
+    problems = Problems()
+    validate(sheet, LidarModel, problems, field)
+    problems.raise_if_any()
+    return sheet
+
+
+def _complete(sheet: Node) -> Node:
+    """Add the values of the scanner that a sheet is ``like`` to its own.
+
+    Raises:
+        ConfigError: there is no such scanner; or the sheet names none and lacks values.
+    """
+    own, like = dict(sheet.entries), sheet.get("like")
+    if like is None:
+        missing = [name for name in REQUIRED if name not in own]
+        if missing and not _looks_foreign(own):
+            fact = f"lacks {', '.join(missing)}; give them, or name a scanner that has the same"
+            raise _error(sheet.position, "", f"{fact}: like: VLP-16")
+        return sheet
+    del own["like"]
+    known = preset_names(PRESETS)
+    if like.content not in known:
+        near = did_you_mean(like.text, known)
+        raise _error(like.position, "like", f"expected one of {', '.join(known)}{near}")
+    base = dict(load_yaml(preset_path(PRESETS, like.text)).entries)
+    if LASERS & own.keys():
+        model = lidar_model(like.text)
+        base = {name: node for name, node in base.items() if name not in LASERS}
+        if "prisms" not in own and model.prisms is None and not RATES & own.keys():
+            step = round(360.0 / model.columns, 6)
+            own["azimuth_step_deg"] = Node(like.position, step, text=str(step))
+    if RATES & own.keys():
+        base = {name: node for name, node in base.items() if name not in RATES}
+    return Node(sheet.position, {**base, **own}, sheet.key_positions)
+
+
+def _looks_foreign(own: Mapping[str, Node]) -> bool:
+    """Whether a sheet has unknown keys, of which the usual message tells more."""
+    return bool(own.keys() - LidarModel.model_fields.keys())
 
 
 def _names(node: Node, endings: tuple[str, ...]) -> bool:

@@ -48,6 +48,7 @@ from gen_data.generator.sensors.lidar.lidar_detection import (
 )
 from gen_data.generator.sensors.lidar.scan_pattern import (
     PRESETS,
+    Elevation,
     LidarModel,
     Sweep,
     SweepPulses,
@@ -64,7 +65,6 @@ CLEAR = Weather()
 
 
 Angle = Annotated[float, Field(ge=-180, le=180)]
-Elevation = Annotated[float, Field(ge=-90, le=90)]
 Beam = tuple[Elevation, Angle]
 
 BEAMS_SCHEMA = {
@@ -82,7 +82,9 @@ class LidarSensor(Mounted):
     Attributes:
         name: Its name in labels and files.
         model: A file of ``generator/sensors/lidar/presets``, or a data sheet of the same layout
-            beside the configuration: ``./my_lidar.yaml``.
+            beside the configuration: ``./my_lidar.yaml``. A sheet with ``like: VLP-16`` has all
+            values of that scanner except its own: ``elevations_deg: [-10, -5, 0, 5]``,
+            ``rotation_hz``, ``range_m``; without a rate, pulses are as dense in azimuth.
         beams: Replaces the model's lasers: elevation and azimuth offset to the left of each
             [deg], or the name of a CSV file with the columns ``elevation_deg`` and
             ``azimuth_offset_deg``. The model's pulses per second remain.

@@ -11,7 +11,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Annotated
+from typing import Annotated, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,7 @@ from gen_data.generator.core.se3 import SE3
 from gen_data.generator.sensors.device_presets import load_preset
 
 PRESETS = "gen_data.generator.sensors.lidar.presets"
+Elevation = Annotated[float, Field(ge=-90, le=90)]
 Hertz = Annotated[float, Field(gt=0, le=10_000)]
 
 
@@ -99,13 +100,15 @@ class LidarModel(Strict):
 
     Attributes:
         name: Its name in labels; empty = the name of its file.
-        elevations_deg: Blocks of lasers, from the top; none for a rosette scanner.
+        elevations_deg: Elevation of every laser, or blocks of lasers from the top; none for a
+            rosette scanner. Rings are numbered from the top.
         azimuth_offsets_deg: Offsets of the lasers to the left, repeated down the table.
         lateral_offsets_m: Distances at which the beams pass the axis of rotation, to its left,
             repeated down the table.
         prisms: Prisms of a rosette scanner; none for a rotating one.
         rotation_hz: Sweeps per second.
-        points_per_second: Pulses per second of all lasers together.
+        points_per_second: Pulses per second of all lasers together; or give azimuth_step_deg.
+        azimuth_step_deg: Angle from one pulse of a laser to its next.
         range_m: Smallest and largest range.
         range_noise_m: Standard deviation of ranges.
         range_step_m: Quantisation of ranges; 0 = none.
@@ -125,12 +128,13 @@ class LidarModel(Strict):
     """
 
     name: str = ""
-    elevations_deg: tuple[Block, ...] = ()
+    elevations_deg: tuple[Block | Elevation, ...] = ()
     azimuth_offsets_deg: tuple[float, ...] = ()
     lateral_offsets_m: tuple[float, ...] = ()
     prisms: Prisms | None = None
     rotation_hz: Hertz
-    points_per_second: int = Field(ge=1, le=100_000_000)
+    points_per_second: int | None = Field(None, ge=1, le=100_000_000)
+    azimuth_step_deg: float | None = Field(None, ge=0.001, le=120)
     range_m: tuple[float, float]
     range_noise_m: float = Field(ge=0, le=1)
     range_step_m: float = Field(ge=0, le=1)
@@ -148,6 +152,12 @@ class LidarModel(Strict):
     def _is_one_kind(self) -> LidarModel:
         if (self.prisms is None) == (not self.elevations_deg):
             raise ValueError("expected either elevations_deg or prisms")
+        if (self.points_per_second is None) == (self.azimuth_step_deg is None):
+            raise ValueError("expected either points_per_second or azimuth_step_deg")
+        if self.prisms and self.azimuth_step_deg:
+            raise ValueError(
+                "a scanner with prisms has no azimuth_step_deg; give points_per_second"
+            )
         if self.response and self.response.range_exponent > 0 and self.near_m == 0:
             raise ValueError("response.range_exponent needs near_m above 0")
         if self.seen_far and self.loss_per_m < 0:
@@ -178,7 +188,7 @@ class LidarModel(Strict):
     def with_beams(self, beams: Sequence[tuple[float, float]]) -> LidarModel:
         """The same device with other lasers: (elevation, azimuth offset) [deg] in any order."""
         sorted_ = sorted(beams, key=lambda beam: -beam[0])
-        blocks = tuple(Block(first=up, last=up, count=1) for up, _ in sorted_)
+        blocks = tuple(up for up, _ in sorted_)
         offsets = tuple(left for _, left in sorted_)
         changed = {
             "elevations_deg": blocks,
@@ -188,14 +198,33 @@ class LidarModel(Strict):
         }
         return self.model_copy(update=changed)
 
+    @property
+    def blocks(self) -> tuple[Block, ...]:
+        """Blocks of lasers, from the top; a laser by itself is one of its own."""
+        given = self.elevations_deg
+        if not any(isinstance(one, Block) for one in given):
+            given = tuple(sorted(given, key=lambda up: -cast(float, up)))
+        return tuple(
+            one if isinstance(one, Block) else Block(first=one, last=one, count=1) for one in given
+        )
+
+    @property
+    def columns(self) -> int:
+        """Pulses of a laser in one turn."""
+        if self.azimuth_step_deg is not None:
+            return max(1, round(360.0 / self.azimuth_step_deg))
+        assert self.points_per_second is not None, "a sheet has one of both"
+        rings = sum(block.count for block in self.blocks)
+        return max(1, round(self.points_per_second / (self.rotation_hz * rings)))
+
     def heights_m(self) -> NDArray[np.float64]:
         """Height of every laser above the frame's origin, [rings]; empty for a rosette scanner."""
-        blocks = [np.linspace(*b.heights_m, b.count) for b in self.elevations_deg]
+        blocks = [np.linspace(*b.heights_m, b.count) for b in self.blocks]
         return np.asarray(np.concatenate([np.zeros(0), *blocks]), np.float64)
 
     def elevations_rad(self) -> NDArray[np.float64]:
         """Elevation of every laser, the highest first, [rings]; empty for a rosette scanner."""
-        blocks = [np.linspace(b.first, b.last, b.count) for b in self.elevations_deg]
+        blocks = [np.linspace(b.first, b.last, b.count) for b in self.blocks]
         return np.asarray(np.radians(np.concatenate([np.zeros(0), *blocks])), np.float64)
 
 
@@ -238,7 +267,7 @@ def _rotation(model: LidarModel) -> Sweep:
     """One rotation; its arrays are cached and read-only."""
     elevation = model.elevations_rad()
     rings = len(elevation)
-    columns = max(1, round(model.points_per_second / (model.rotation_hz * rings)))
+    columns = model.columns
     offset = np.zeros(rings)
     if model.azimuth_offsets_deg:
         offset = np.radians(np.resize(np.asarray(model.azimuth_offsets_deg), rings))
@@ -290,6 +319,7 @@ def _tile_order(azimuth: NDArray[np.float64]) -> NDArray[np.int32]:
 
 def _rosette(model: LidarModel, prisms: Prisms, start_s: float) -> Sweep:
     """One sweep of a rosette: the tilts of two rotating prisms add up (first order)."""
+    assert model.points_per_second is not None, "it has no azimuth_step_deg"
     count = max(1, round(model.points_per_second / model.rotation_hz))
     time_s = np.arange(count) / model.points_per_second
     left, up = np.zeros(count), np.zeros(count)

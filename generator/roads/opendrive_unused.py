@@ -1,0 +1,69 @@
+"""Counts the elements of an OpenDRIVE file that have no effect on lanes and surface here."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from xml.etree.ElementTree import Element
+
+_LINKS = frozenset({"predecessor", "successor"})
+_READ: Mapping[str, frozenset[str]] = {
+    "OpenDRIVE": frozenset({"header", "road", "junction"}),
+    "road": frozenset({"link", "type", "planView", "elevationProfile", "lateralProfile", "lanes"}),
+    "link": _LINKS,
+    "type": frozenset({"speed"}),
+    "planView": frozenset({"geometry"}),
+    "geometry": frozenset({"line", "arc", "spiral", "poly3", "paramPoly3"}),
+    "elevationProfile": frozenset({"elevation"}),
+    "lateralProfile": frozenset({"superelevation", "crossfall", "shape"}),
+    "lanes": frozenset({"laneOffset", "laneSection"}),
+    "laneSection": frozenset({"left", "center", "right"}),
+    **dict.fromkeys(("left", "center", "right"), frozenset({"lane"})),
+    "lane": frozenset({"link", "width", "border", "roadMark", "height", "speed"}),
+    "junction": frozenset({"connection"}),
+    "connection": frozenset({"laneLink"}),
+}
+"""Elements that are read, by the one that they are in."""
+_GROUPS = frozenset({"objects", "signals", "railroad", "surface"})
+"""Elements that only hold others."""
+_REMARKS = frozenset({"userData", "dataQuality", "vectorScene"})
+"""Remarks of programs, which are no part of the roads."""
+
+
+def count_unused(root: Element) -> dict[str, int]:
+    """Names of the elements without effect, with their number, sorted by name."""
+    return dict(sorted(Counter(_unused(root)).items()))
+
+
+def _unused(element: Element) -> Iterator[str]:
+    if element.tag == "header":
+        return
+    yield from _unused_attributes(element)
+    yield from _repeated(element)
+    for child in element:
+        if child.tag in _REMARKS:
+            continue
+        if child.tag in _GROUPS:
+            yield from (grandchild.tag for grandchild in child if grandchild.tag not in _REMARKS)
+        elif child.tag not in _READ.get(element.tag, frozenset()):
+            yield f"{child.tag} of {element.tag}"
+        else:
+            yield from _unused(child)
+
+
+def _repeated(element: Element) -> Iterator[str]:
+    """Records of a lane of which only the first has an effect."""
+    for tag, path in (("height", "height"), *((tag, f"link/{tag}") for tag in sorted(_LINKS))):
+        if element.tag == "lane":
+            yield from [f"{tag} after a lane's first"] * (len(element.findall(path)) - 1)
+
+
+def _unused_attributes(element: Element) -> Iterator[str]:
+    if element.tag == "lane" and element.get("direction") == "both":
+        yield "direction='both' of lane"
+    if element.tag == "laneSection" and element.get("singleSide") == "true":
+        yield "singleSide='true' of laneSection"
+    if element.tag == "junction" and element.get("type") == "virtual":
+        yield "virtual junction"
+    if element.tag in _LINKS and "elementS" in element.attrib:
+        yield "link into a road (elementS)"

@@ -1,0 +1,1 @@
+"""Calibrations of users' own cameras and rigs, from the files of common tools."""

@@ -1,0 +1,198 @@
+"""Content of a calibration file, in one form for all formats, and the reading of numbers in it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import NoReturn
+
+import numpy as np
+
+from gen_data.generator.config.problems import Position, refuse
+from gen_data.generator.config.yaml_scalars import quote_value
+from gen_data.generator.config.yaml_tree import Node
+from gen_data.generator.core.errors import did_you_mean
+from gen_data.generator.core.lens import LensModel
+from gen_data.generator.core.scene_time import RIG_AXES
+from gen_data.generator.core.se3 import IDENTITY, SE3, Array
+
+ROTATION_ERROR_MAX = 1e-2
+"""Largest entry of ``R R^T - 1`` of matrices that were printed with few digits."""
+
+
+@dataclass(frozen=True, slots=True)
+class CalibratedCamera:
+    """Intrinsics of one camera as its file has them.
+
+    Attributes:
+        position: Of its numbers in the file.
+        focal_px, center_px: fx, fy and cx, cy.
+        coefficients: All of ``COEFFICIENTS[model]``, in that order.
+        size_px: Size of the calibrated images; None = the file does not state it.
+        pixel_centers: Where pixel centres lie in its image coordinates: at integers (OpenCV, ROS,
+            Kalibr, KITTI) or halves (COLMAP).
+    """
+
+    position: Position
+    focal_px: tuple[float, float]
+    center_px: tuple[float, float]
+    model: LensModel = "pinhole"
+    coefficients: tuple[float, ...] = ()
+    size_px: tuple[int, int] | None = None
+    pixel_centers: str = "integers"
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """A frame of a rig.
+
+    Attributes:
+        parent: Name of the frame that its pose refers to; empty = a root.
+        T_parent_frame: Its pose.
+        optical: Whether it is X right, Y down, Z forward; else X forward, Y left, Z up.
+    """
+
+    parent: str = ""
+    T_parent_frame: SE3 = IDENTITY
+    optical: bool = False
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """Content of a calibration file.
+
+    Attributes:
+        file: Its path, for messages.
+        kind: Its format in words.
+        cameras: By name.
+        frames: By name; an ancestor of every frame is a root.
+        unused: Names of entries that have no effect here.
+    """
+
+    file: str
+    kind: str
+    cameras: Mapping[str, CalibratedCamera] = field(default_factory=dict)
+    frames: Mapping[str, Frame] = field(default_factory=dict)
+    unused: Sequence[str] = ()
+
+    def camera(self, name: str) -> CalibratedCamera:
+        """The camera of that name; an empty name stands for the only one.
+
+        Raises:
+            ValueError: there is none, or there are several.
+        """
+        if not name and len(self.cameras) == 1:
+            return next(iter(self.cameras.values()))
+        return self.cameras[self._known(name, list(self.cameras), "camera")]
+
+    def mount(self, frame: str, relative_to: str = "", *, optical: bool | None = None) -> SE3:
+        """``T_rig_sensor`` of a frame, both X forward, Y left, Z up.
+
+        Args:
+            frame: Its name; empty = the only one that is no root.
+            relative_to: Name of the frame that is the rig's; empty = the root above ``frame``.
+            optical: Axes of ``frame``; None = as the format has them.
+
+        Raises:
+            ValueError: a name is unknown, or no chain of poses connects them.
+        """
+        inner = [name for name, one in self.frames.items() if one.parent]
+        if not frame and len(inner) == 1:
+            frame = inner[0]
+        frame = self._known(frame, list(self.frames), "frame")
+        root, T_root_frame = self._from_root(frame)
+        base = self._known(relative_to or root, list(self.frames), "frame")
+        base_root, T_root_base = self._from_root(base)
+        if root != base_root:
+            raise ValueError(f"{self.file} does not connect the frames '{base}' and '{frame}'")
+        is_optical = self.frames[frame].optical if optical is None else optical
+        T_base_frame = T_root_base.inverse() @ T_root_frame
+        before = RIG_AXES.inverse() if self.frames[base].optical else SE3()
+        return before @ T_base_frame @ (RIG_AXES if is_optical else SE3())
+
+    def _from_root(self, name: str) -> tuple[str, SE3]:
+        """The root above a frame, and ``T_root_frame``."""
+        pose, seen = SE3(), {name}
+        while self.frames[name].parent:
+            pose = self.frames[name].T_parent_frame @ pose
+            name = self.frames[name].parent
+            if name in seen:
+                raise ValueError(f"{self.file}: frame '{name}' is its own ancestor")
+            seen.add(name)
+        return name, pose
+
+    def _known(self, name: str, known: list[str], kind: str) -> str:
+        if name in known:
+            return name
+        what = f"has no {kind} '{name}'" if name else f"has several {kind}s, or none: name one"
+        raise ValueError(
+            f"{self.file}, {self.kind}, {what}; expected one of {', '.join(known) or 'none'}"
+            f"{did_you_mean(name, known)}"
+        )
+
+
+def fail(node: Node, field_name: str, fact: str) -> NoReturn:
+    """Raise a ConfigError at a node of a file."""
+    refuse(node.position, field_name, fact)
+
+
+def numbers(node: Node, count: Sequence[int], name: str) -> list[float]:
+    """Read a list of numbers, possibly nested in rows, or the ``data`` of a matrix of OpenCV.
+
+    Args:
+        node: The list or matrix.
+        count: Allowed lengths.
+        name: Of the entry, in messages.
+
+    Raises:
+        ConfigError: it is not such a list.
+    """
+    given = node.get("data") or node
+    leaves: list[Node] = []
+    stack = [given]
+    while stack:
+        one = stack.pop()
+        if one.items:
+            stack.extend(reversed(one.items))
+        elif one.content != ():
+            leaves.append(one)
+    values = []
+    for leaf in leaves:
+        if isinstance(leaf.content, bool) or not isinstance(leaf.content, (int, float)):
+            fail(leaf, name, f"expected a number, got {quote_value(leaf.plain())}")
+        values.append(float(leaf.content))
+    if len(leaves) not in count:
+        wanted = " or ".join(str(n) for n in sorted(count))
+        fail(given, name, f"expected {wanted} numbers, got {len(leaves)}")
+    return values
+
+
+def camera_matrix(node: Node, name: str, columns: int = 3) -> tuple[float, float, float, float]:
+    """Fx, fy, cx and cy of a calibration matrix [3, columns].
+
+    Raises:
+        ConfigError: it is no matrix of a camera without skew.
+    """
+    K = np.array(numbers(node, [3 * columns], name)).reshape(3, columns)
+    if min(K[0, 0], K[1, 1]) <= 0.0:
+        fail(node, name, f"focal lengths must be positive, got {K[0, 0]:g} and {K[1, 1]:g}")
+    if abs(K[0, 1]) > 1e-9 * K[0, 0]:
+        fail(node, name, f"skew {K[0, 1]:g} has no place in a camera here; expected 0")
+    return (float(K[0, 0]), float(K[1, 1]), float(K[0, 2]), float(K[1, 2]))
+
+
+def rigid(values: Sequence[float], node: Node, name: str) -> SE3:
+    """Pose of 12 or 16 numbers, the rows of a matrix.
+
+    Raises:
+        ConfigError: its first three columns are no rotation.
+    """
+    matrix = np.array(values).reshape(-1, 4)
+    check_rotation(matrix[:3, :3], node, name)
+    return SE3.from_matrix(matrix)
+
+
+def check_rotation(R: Array, node: Node, name: str) -> None:
+    """Raise ConfigError unless a matrix [3, 3] is a rotation, to a few digits."""
+    if np.abs(R @ R.T - np.eye(3)).max() > ROTATION_ERROR_MAX or np.linalg.det(R) < 0.0:
+        fail(node, name, "is no rotation: its rows are not orthonormal and right-handed")

@@ -1,0 +1,332 @@
+"""Cameras of OpenCV, ROS, Kalibr and COLMAP.
+
+* OpenCV's ``FileStorage`` (YAML, XML, JSON): a camera matrix and distortion coefficients under the
+  names of its samples and of ``stereoCalibrate``; ``R`` and ``T`` of a pair.
+* ROS ``camera_info``: the file of ``camera_calibration``, or the printed message.
+* Kalibr's camera chain: https://github.com/ethz-asl/kalibr/wiki/yaml-formats
+* COLMAP's ``cameras.txt``: https://colmap.github.io/cameras.html
+
+Pixel centres are at integers in all but COLMAP's, where they are at halves, as in this project.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from gen_data.generator.config.problems import Position, refuse
+from gen_data.generator.config.yaml_tree import Node
+from gen_data.generator.core.errors import did_you_mean
+from gen_data.generator.core.lens import COEFFICIENTS, LensModel
+from gen_data.generator.core.se3 import SE3
+from gen_data.generator.sensors.calibration.calibration import (
+    CalibratedCamera,
+    Calibration,
+    Frame,
+    camera_matrix,
+    check_rotation,
+    fail,
+    numbers,
+    rigid,
+)
+
+_MATRICES = ("camera_matrix", "cameraMatrix", "Camera_Matrix", "intrinsic_matrix", "K", "k", "M")
+_DISTORTIONS = (
+    "distortion_coefficients", "Distortion_Coefficients", "dist_coeffs", "distCoeffs",
+    "distortion", "D", "d",
+)  # fmt: skip
+_MODELS: Mapping[str, LensModel] = {
+    "": "brown_conrady",
+    "plumb_bob": "brown_conrady",
+    "rational_polynomial": "brown_conrady",
+    "radtan": "brown_conrady",
+    "equidistant": "kannala_brandt",
+    "fisheye": "kannala_brandt",
+    "none": "pinhole",
+}
+_BROWN = COEFFICIENTS["brown_conrady"]
+_FISHEYE = COEFFICIENTS["kannala_brandt"]
+_COLMAP: Mapping[str, tuple[str, ...]] = {
+    "SIMPLE_PINHOLE": ("f", "cx", "cy"),
+    "PINHOLE": ("fx", "fy", "cx", "cy"),
+    "SIMPLE_RADIAL": ("f", "cx", "cy", "k1"),
+    "RADIAL": ("f", "cx", "cy", "k1", "k2"),
+    "OPENCV": ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2"),
+    "FULL_OPENCV": ("fx", "fy", "cx", "cy", *_BROWN),
+    "OPENCV_FISHEYE": ("fx", "fy", "cx", "cy", *_FISHEYE),
+    "SIMPLE_RADIAL_FISHEYE": ("f", "cx", "cy", "k1"),
+    "RADIAL_FISHEYE": ("f", "cx", "cy", "k1", "k2"),
+}
+"""Parameters of COLMAP's models that have a counterpart here, in order."""
+
+
+def lens_of(
+    model: LensModel, given: Sequence[float], node: Node, name: str
+) -> tuple[LensModel, tuple[float, ...]]:
+    """Model and all coefficients of a lens; a Brown-Conrady lens of zeros is a pinhole.
+
+    Raises:
+        ConfigError: there are coefficients that no lens here has.
+    """
+    names = COEFFICIENTS[model]
+    beyond = [value for value in given[len(names) :] if value != 0.0]
+    if beyond:
+        extra = "s1 to s4 (thin prism)" if len(given) <= 12 else "thin prism and tilted sensor"
+        fail(node, name, f"{extra} other than 0 have no lens here; calibrate with 8 or fewer")
+    values = (*given[: len(names)], *[0.0] * (len(names) - len(given)))
+    if model == "brown_conrady" and not any(values):
+        return "pinhole", ()
+    return model, values
+
+
+class _Entries:
+    """Entries of a mapping, under any of several names; it remembers which were taken."""
+
+    def __init__(self, root: Node) -> None:
+        self.root = root
+        self.used = {"camera_name"}
+
+    def take(self, names: Sequence[str], number: str = "") -> Node | None:
+        """The first entry of one of the names, with the number of a camera of a pair."""
+        for name in names:
+            for key in (f"{name}{number}", f"{name}_{number}")[: 2 if number else 1]:
+                if key in self.root.entries:
+                    self.used.add(key)
+                    return self.root.entries[key]
+        return None
+
+    def unused(self) -> list[str]:
+        """Names of the entries that were not taken."""
+        return [key for key in self.root.entries if key not in self.used]
+
+
+def camera_file(root: Node, *, fisheye: bool = False, rectified: bool = False) -> Calibration:
+    """One camera or a pair, of OpenCV or ROS.
+
+    Args:
+        root: The mapping in the file.
+        fisheye: Whether OpenCV's four coefficients are those of its fisheye model.
+        rectified: Whether to take the pinholes of projection matrices, behind which distortion and
+            rotation are removed; their frames then have one origin, ``rectified``.
+
+    Raises:
+        ConfigError: there is no camera matrix, or an entry is malformed.
+    """
+    entries = _Entries(root)
+    size_px = _size_px(entries)
+    named = root.get("camera_name")
+    single = named.text if named else "camera"
+    read = _read_rectified if rectified else _read_camera
+    cameras: dict[str, CalibratedCamera] = {}
+    frames: dict[str, Frame] = {}
+    fisheye = fisheye or _states_fisheye(entries)
+    for number in ("", "1", "2"):
+        found = read(entries, number, size_px, fisheye)
+        if found is not None:
+            camera, frame = found
+            cameras[number or single] = camera
+            frames |= {} if frame is None else {"rectified": Frame(optical=True)}
+            frames |= {} if frame is None else {number or single: frame}
+    if not cameras:
+        known = "projection matrix such as P" if rectified else "camera matrix such as K"
+        fail(root, "", f"no camera found; expected a {known}, {_MATRICES[0]} or M1")
+    if "2" in cameras and not rectified:
+        frames = _pair_frames(entries)
+    kind = "a calibration of OpenCV or ROS"
+    return Calibration(root.position.file, kind, cameras, frames, entries.unused())
+
+
+def _states_fisheye(entries: _Entries) -> bool:
+    flag = entries.take(("fisheye_model",))
+    return flag is not None and flag.content not in (0, False, "0", "false")
+
+
+def _read_camera(
+    entries: _Entries, number: str, size_px: tuple[int, int] | None, fisheye: bool
+) -> tuple[CalibratedCamera, None] | None:
+    K, D = entries.take(_MATRICES, number), entries.take(_DISTORTIONS, number)
+    if K is None:
+        return None
+    fx, fy, cx, cy = camera_matrix(K, "camera matrix")
+    stated = entries.take(("distortion_model", "distortion_type"))
+    name = stated.text if stated else ""
+    if stated is not None and name not in _MODELS:
+        known = ", ".join(key for key in _MODELS if key)
+        fact = f"'{name}' is no lens here; expected one of {known}{did_you_mean(name, _MODELS)}"
+        fail(stated, "distortion_model", fact)
+    model = "kannala_brandt" if fisheye else _MODELS[name]
+    lens: tuple[LensModel, tuple[float, ...]] = ("pinhole", ())
+    if D is not None and model != "pinhole":
+        count = (4,) if model == "kannala_brandt" else (0, 4, 5, 8, 12, 14)
+        lens = lens_of(model, numbers(D, count, "distortion coefficients"), D, "distortion")
+    return CalibratedCamera(K.position, (fx, fy), (cx, cy), *lens, size_px=size_px), None
+
+
+def _read_rectified(
+    entries: _Entries, number: str, size_px: tuple[int, int] | None, _fisheye: bool
+) -> tuple[CalibratedCamera, Frame] | None:
+    P = entries.take(("projection_matrix", "P", "p"), number)
+    if P is None:
+        return None
+    fx, fy, cx, cy = camera_matrix(P, "projection matrix", 4)
+    return CalibratedCamera(P.position, (fx, fy), (cx, cy), size_px=size_px), shifted(
+        P, "rectified"
+    )
+
+
+def shifted(P: Node, parent: str) -> Frame:
+    """Frame of a rectified camera with a projection matrix: ``P = K [1 | -origin]``."""
+    values = numbers(P, [12], "projection matrix")
+    fx, fy = values[0], values[5]
+    z = -values[11]
+    x, y = (-values[3] - values[2] * z) / fx, (-values[7] - values[6] * z) / fy
+    return Frame(parent, SE3((x, y, z)), optical=True)
+
+
+def _size_px(entries: _Entries) -> tuple[int, int] | None:
+    """Size of the calibrated images; None if the file does not state it."""
+    width, height = (
+        entries.take((f"image_{side}", side, f"image_{side.title()}"))
+        for side in ("width", "height")
+    )
+    whole = entries.take(
+        ("cameraResolution", "image_size", "imageSize", "img_size", "resolution", "size_px")
+    )
+    if whole is not None:
+        w, h = numbers(whole, [2], "image size")
+    elif width is not None and height is not None:
+        (w,), (h,) = numbers(width, [1], "image_width"), numbers(height, [1], "image_height")
+    else:
+        return None
+    if min(w, h) < 1:
+        # ROS drivers without a calibration send sizes of 0.
+        fail(whole or width or entries.root, "image size", f"is empty, got {w:g} x {h:g}")
+    return (int(w), int(h))
+
+
+def _pair_frames(entries: _Entries) -> dict[str, Frame]:
+    """Frames of ``stereoCalibrate``: points of camera 2 are ``R`` times those of 1, plus ``T``."""
+    R, T = entries.take(("R", "rotation")), entries.take(("T", "translation"))
+    if R is None or T is None:
+        return {}
+    rows = np.array(numbers(R, [9], "R")).reshape(3, 3)
+    check_rotation(rows, R, "R")
+    shift = numbers(T, [3], "T")
+    T_2_1 = SE3.from_matrix(np.column_stack([rows, shift]))
+    return {"1": Frame(optical=True), "2": Frame("1", T_2_1.inverse(), optical=True)}
+
+
+def kalibr_chain(root: Node) -> Calibration:
+    """Kalibr's camera chain, with or without an IMU.
+
+    Without ``relative_to``, mounts refer to the first camera. ``T_cn_cnm1`` takes points of the
+    camera before to a camera, ``T_cam_imu`` points of the IMU.
+
+    Raises:
+        ConfigError: a camera's model has no counterpart here, or an entry is malformed.
+    """
+    cameras: dict[str, CalibratedCamera] = {}
+    frames: dict[str, Frame] = {}
+    unused: list[str] = []
+    chain = [name for name, node in root.entries.items() if node.get("camera_model")]
+    for name in chain:
+        node = root.entries[name]
+        entries = _Entries(node)
+        cameras[name] = _kalibr_camera(entries)
+        imu, before = entries.take(("T_cam_imu",)), entries.take(("T_cn_cnm1",))
+        inverse = entries.take(("T_imu_cam",))
+        frames.setdefault(name, Frame(optical=True))
+        if before is not None and name != chain[0]:
+            pose = rigid(numbers(before, [12, 16], "T_cn_cnm1"), before, "T_cn_cnm1").inverse()
+            frames[name] = Frame(chain[chain.index(name) - 1], pose, optical=True)
+        T_cam_imu = _imu_pose(imu, inverse)
+        if T_cam_imu is not None and "imu" not in frames:
+            frames["imu"] = Frame(name, T_cam_imu)
+        elif T_cam_imu is not None and before is None:
+            frames[name] = Frame("imu", T_cam_imu.inverse(), optical=True)
+        unused += [f"{name}.{key}" for key in entries.unused()]
+    unused += [key for key in root.entries if key not in chain]
+    return Calibration(root.position.file, "a camera chain of Kalibr", cameras, frames, unused)
+
+
+def _imu_pose(T_cam_imu: Node | None, T_imu_cam: Node | None) -> SE3 | None:
+    if T_cam_imu is not None:
+        return rigid(numbers(T_cam_imu, [12, 16], "T_cam_imu"), T_cam_imu, "T_cam_imu")
+    if T_imu_cam is not None:
+        return rigid(numbers(T_imu_cam, [12, 16], "T_imu_cam"), T_imu_cam, "T_imu_cam").inverse()
+    return None
+
+
+def _kalibr_camera(entries: _Entries) -> CalibratedCamera:
+    projection, distortion = entries.take(("camera_model",)), entries.take(("distortion_model",))
+    given, coefficients = entries.take(("intrinsics",)), entries.take(("distortion_coeffs",))
+    if projection is None or given is None:
+        fail(entries.root, "", "expected camera_model and intrinsics")
+    if projection.text == "omni":
+        xi, *rest = numbers(given, [5], "intrinsics")
+        if xi != 0.0:
+            fact = (
+                f"omni with xi {xi:g} has no lens here; calibrate as pinhole-equi or pinhole-radtan"
+            )
+            fail(projection, "camera_model", fact)
+    elif projection.text == "pinhole":
+        rest = numbers(given, [4], "intrinsics")
+    else:
+        fact = f"'{projection.text}' has no lens here; expected pinhole, or omni with xi 0"
+        fail(projection, "camera_model", fact)
+    fx, fy, cx, cy = rest
+    name = distortion.text if distortion else "none"
+    lens: tuple[LensModel, tuple[float, ...]] = ("pinhole", ())
+    if name not in ("radtan", "equidistant", "none"):
+        fact = f"'{name}' has no lens here; expected radtan, equidistant or none"
+        fail(distortion or projection, "distortion_model", fact)
+    if name != "none":
+        if coefficients is None:
+            fail(entries.root, "distortion_coeffs", "is missing")
+        values = numbers(coefficients, [4], "distortion_coeffs")
+        lens = lens_of(_MODELS[name], values, coefficients, "distortion_coeffs")
+    return CalibratedCamera(given.position, (fx, fy), (cx, cy), *lens, size_px=_size_px(entries))
+
+
+def colmap_cameras(text: str, file: str) -> Calibration:
+    """COLMAP's ``cameras.txt``: a camera per line, by its number.
+
+    Raises:
+        ConfigError: a model has no counterpart here, or a line is malformed.
+    """
+    cameras = {}
+    for k, line in enumerate(text.splitlines(), 1):
+        words = line.split()
+        if not words or words[0].startswith("#"):
+            continue
+        place = Position(file, k, 1, line)
+        if len(words) < 4:
+            refuse(place, "", "expected CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]")
+        name, model = words[:2]
+        if model not in _COLMAP:
+            fact = f"'{model}' has no lens here; expected one of {', '.join(_COLMAP)}"
+            refuse(place, "MODEL", fact + did_you_mean(model, _COLMAP))
+        try:
+            width, height, *values = int(words[2]), int(words[3]), *map(float, words[4:])
+        except ValueError:
+            refuse(place, "", "expected numbers after the model")
+        names = _COLMAP[model]
+        if len(values) != len(names):
+            refuse(
+                place,
+                "PARAMS",
+                f"expected {len(names)} numbers {' '.join(names)}, got {len(values)}",
+            )
+        given = dict(zip(names, values, strict=True))
+        kind: LensModel = "kannala_brandt" if "FISHEYE" in model else "brown_conrady"
+        coefficients = [given.get(name, 0.0) for name in COEFFICIENTS[kind]]
+        lens = lens_of(kind, coefficients, Node(place, text), "PARAMS")
+        focal = (given.get("fx", given.get("f", 0.0)), given.get("fy", given.get("f", 0.0)))
+        if min(focal) <= 0.0 or min(width, height) < 1:
+            refuse(place, "", "sizes and focal lengths must be positive")
+        center = (given["cx"], given["cy"])
+        cameras[name] = CalibratedCamera(place, focal, center, *lens, (width, height), "halves")
+    if not cameras:
+        refuse(Position(file, 1, 1), "", "no camera found; expected lines of COLMAP's cameras.txt")
+    return Calibration(file, "cameras of COLMAP", cameras)

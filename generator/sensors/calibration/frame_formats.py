@@ -1,0 +1,255 @@
+"""Frames of rigs of ROS, nuScenes and KITTI.
+
+* ROS: ``TransformStamped`` in YAML, as ``ros2 topic echo /tf_static`` prints it, and URDF. By REP
+  103, frames whose names end with ``_optical`` or ``_optical_frame`` have Z forward, others X.
+* nuScenes: ``calibrated_sensor.json`` beside ``sensor.json``; frames are channels, the root is the
+  ego vehicle's: on the ground below the middle of the rear axle. Cameras have Z forward; the
+  laser scanner has Y forward.
+* KITTI: ``calib/000000.txt`` of the benchmarks and ``calib_*.txt`` of raw data. Frames are
+  ``camera_2`` (0 to 3), ``velodyne`` and ``imu``; X forward but for cameras.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+from xml.etree.ElementTree import Element
+
+import numpy as np
+
+from gen_data.generator.config.problems import Position, refuse
+from gen_data.generator.config.yaml_tree import Node
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.se3 import SE3, turned
+from gen_data.generator.sensors.calibration.calibration import (
+    CalibratedCamera,
+    Calibration,
+    Frame,
+    camera_matrix,
+    check_rotation,
+    fail,
+    numbers,
+    rigid,
+)
+from gen_data.generator.sensors.calibration.camera_formats import lens_of, shifted
+
+_TRACKING = {"R_rect": "R0_rect", "Tr_velo_cam": "Tr_velo_to_cam", "Tr_imu_velo": "Tr_imu_to_velo"}
+"""Names of the tracking benchmark, by which it differs from the others."""
+_OPTICAL = ("_optical", "_optical_frame")
+
+
+def is_optical(name: str) -> bool:
+    """Whether a frame of ROS is X right, Y down, Z forward by its name (REP 103)."""
+    return name.endswith(_OPTICAL)
+
+
+def tf_frames(root: Node) -> Calibration:
+    """Frames of ROS transforms: ``transforms:`` with a list, or one of them.
+
+    Raises:
+        ConfigError: a transform is malformed, or two have the same child.
+    """
+    listed = root.get("transforms")
+    frames: dict[str, Frame] = {}
+    for one in listed.items if listed else (root,):
+        child, parent = one.get("child_frame_id"), one.get("header", "frame_id")
+        shift, turn = one.get("transform", "translation"), one.get("transform", "rotation")
+        if child is None or parent is None or shift is None or turn is None:
+            fail(one, "", "expected header.frame_id, child_frame_id and transform")
+        values = {}
+        for part, keys in ((shift, "xyz"), (turn, "xyzw")):
+            for key in keys:
+                number = part.get(key)
+                if number is None:
+                    fail(part, key, "is missing")
+                (values[f"{key}{len(keys)}"],) = numbers(number, [1], key)
+        q = np.array([values[f"{key}4"] for key in "wxyz"])
+        if abs(float(np.linalg.norm(q)) - 1.0) > 1e-3:
+            fail(turn, "rotation", f"is no unit quaternion, its length is {np.linalg.norm(q):g}")
+        w, x, y, z = (float(v) for v in q / np.linalg.norm(q))
+        name, above = child.text.strip("/"), parent.text.strip("/")
+        if frames.get(name, Frame()).parent:
+            fail(child, "child_frame_id", f"'{name}' has two parents")
+        place = SE3((values["x3"], values["y3"], values["z3"]), (w, x, y, z))
+        frames[name] = Frame(above, place, is_optical(name))
+        frames.setdefault(above, Frame(optical=is_optical(above)))
+    return Calibration(root.position.file, "transforms of ROS", {}, frames)
+
+
+def urdf_frames(robot: Element, file: str) -> Calibration:
+    """Links of a URDF at the zero of its joints.
+
+    Raises:
+        ConfigError: a joint is malformed.
+    """
+    frames: dict[str, Frame] = {
+        link.get("name", ""): Frame(optical=is_optical(link.get("name", "")))
+        for link in robot.iter("link")
+    }
+    moving = []
+    for joint in robot.findall("joint"):
+        parent, child, origin = (joint.find(tag) for tag in ("parent", "child", "origin"))
+        name = joint.get("name", "")
+        if parent is None or child is None:
+            raise ConfigError(f"{file}: joint '{name}' lacks its parent or child")
+        try:
+            texts = origin.attrib if origin is not None else {}
+            x, y, z = (float(v) for v in texts.get("xyz", "0 0 0").split())
+            roll, pitch, yaw = (float(v) for v in texts.get("rpy", "0 0 0").split())
+        except ValueError:
+            raise ConfigError(f"{file}: joint '{name}': expected three numbers each") from None
+        if joint.get("type") != "fixed":
+            moving.append(name)
+        link = child.get("link", "")
+        # A pitch of URDF turns X downwards.
+        pose = turned((x, y, z), yaw, -pitch, roll)
+        frames[link] = Frame(parent.get("link", ""), pose, is_optical(link))
+    unused = [f"joint {name} (at 0)" for name in moving]
+    return Calibration(file, "a URDF", {}, frames, unused)
+
+
+def nuscenes_frames(records: Any, path: Path) -> Calibration:
+    """Channels of nuScenes' ``calibrated_sensor.json``; records that differ go by their token.
+
+    Raises:
+        ConfigError: ``sensor.json`` is missing, or a record is malformed.
+    """
+    table = path.parent / "sensor.json"
+    try:
+        sensors = {one["token"]: one for one in json.loads(table.read_bytes())}
+        by_channel: dict[str, list[Mapping[str, Any]]] = {}
+        for record in records:
+            channel = sensors[record["sensor_token"]]["channel"]
+            by_channel.setdefault(channel, []).append(record)
+        cameras: dict[str, CalibratedCamera] = {}
+        frames = {"ego": Frame()}
+        for channel, listed in by_channel.items():
+            distinct = {json.dumps({**r, "token": ""}, sort_keys=True): r for r in listed}
+            for record in distinct.values():
+                name = channel if len(distinct) == 1 else record["token"]
+                modality = sensors[record["sensor_token"]]["modality"]
+                frames[name] = _nuscenes_frame(record, modality, path)
+                if modality == "camera":
+                    cameras[name] = _nuscenes_camera(record, path)
+    except OSError as error:
+        fact = f"needs the names of channels in {table}: {error.strerror}"
+        raise ConfigError(f"{path}: {fact}") from None
+    except (KeyError, TypeError, ValueError) as error:
+        raise ConfigError(f"{path}: is no calibrated_sensor.json of nuScenes ({error})") from None
+    return Calibration(str(path), "calibrated sensors of nuScenes", cameras, frames)
+
+
+def _nuscenes_frame(record: Mapping[str, Any], modality: str, path: Path) -> Frame:
+    w, x, y, z = (float(v) for v in record["rotation"])
+    tx, ty, tz = (float(v) for v in record["translation"])
+    norm = math.sqrt(w * w + x * x + y * y + z * z)
+    if abs(norm - 1.0) > 1e-3:
+        raise ConfigError(f"{path}: the rotation of {record['token']} is no unit quaternion")
+    pose = SE3((tx, ty, tz), (w / norm, x / norm, y / norm, z / norm))
+    # The scanner's frame is X right, Y forward; a sensor here has X forward.
+    ahead = SE3.about_z(0.5 * math.pi) if modality == "lidar" else SE3()
+    return Frame("ego", pose @ ahead, optical=modality == "camera")
+
+
+def _nuscenes_camera(record: Mapping[str, Any], path: Path) -> CalibratedCamera:
+    (fx, _, cx), (_, fy, cy), _ = record["camera_intrinsic"]
+    place = Position(str(path), 1, 1)
+    return CalibratedCamera(place, (float(fx), float(fy)), (float(cx), float(cy)))
+
+
+def kitti_calibration(text: str, file: str, *, rectified: bool = False) -> Calibration:
+    """One file of KITTI's calibration: cameras, and frames as far as the file has them.
+
+    The benchmarks' files have rectified cameras. Of raw data, ``calib_cam_to_cam.txt`` has both:
+    ``rectified`` selects those of ``P_rect``.
+
+    Raises:
+        ConfigError: a line is malformed, or the file has nothing of it.
+    """
+    lines: dict[str, Node] = {}
+    for k, line in enumerate(text.splitlines(), 1):
+        key, _, rest = line.strip().partition(" ")  # Files of tracking lack some of the colons.
+        place = Position(file, k, 1, line)
+        cells = tuple(Node(place, _number(word), text=word) for word in rest.split())
+        key = _TRACKING.get(key, key.rstrip(":"))
+        if key:
+            lines[key] = Node(place, cells, text=rest.strip())
+    frames, cameras = {"camera_0": Frame(optical=True)}, {}
+    used = {"calib_time", "corner_dist"}
+    for number in "0123":
+        name = f"camera_{number}"
+        for camera, frame, keys in _kitti_camera(lines, number, rectified=rectified):
+            cameras[name], used = camera, used | keys
+            if number != "0":
+                frames[name] = frame
+    used |= _kitti_devices(lines, frames)
+    if not cameras and len(frames) < 2:
+        refuse(Position(file, 1, 1), "", "no calibration of KITTI found")
+    unused = [key for key in lines if key not in used]
+    return Calibration(file, "a calibration of KITTI", cameras, frames, unused)
+
+
+def _number(word: str) -> float | str:
+    try:
+        return float(word)
+    except ValueError:
+        return word
+
+
+def _kitti_camera(lines: Mapping[str, Node], number: str, *, rectified: bool) -> Any:
+    """The camera of a number, its frame and the lines used; nothing if there is none."""
+    P = lines.get(f"P{number}") or (lines.get(f"P_rect_0{number}") if rectified else None)
+    S = lines.get(f"S_rect_0{number}" if rectified else f"S_0{number}")
+    size = tuple(int(v) for v in numbers(S, [2], "S")) if S else None
+    if P is not None:
+        fx, fy, cx, cy = camera_matrix(P, "P", 4)
+        keys = {f"P{number}", f"P_rect_0{number}", f"S_rect_0{number}"}
+        camera = CalibratedCamera(P.position, (fx, fy), (cx, cy), size_px=size)  # type: ignore[arg-type]
+        yield camera, shifted(P, "camera_0"), keys
+        return
+    K, D = lines.get(f"K_0{number}"), lines.get(f"D_0{number}")
+    R, T = lines.get(f"R_0{number}"), lines.get(f"T_0{number}")
+    if K is None or D is None or R is None or T is None:
+        return
+    fx, fy, cx, cy = camera_matrix(K, "K")
+    lens = lens_of("brown_conrady", numbers(D, [5], "D"), D, "D")
+    rows = np.array(numbers(R, [9], "R")).reshape(3, 3)
+    check_rotation(rows, R, "R")
+    # Points of camera 0 are mapped to those of the camera.
+    pose = SE3.from_matrix(np.column_stack([rows, numbers(T, [3], "T")])).inverse()
+    keys = {f"{name}_0{number}" for name in "SKDRT"}
+    camera = CalibratedCamera(K.position, (fx, fy), (cx, cy), *lens, size_px=size)  # type: ignore[arg-type]
+    yield camera, Frame("camera_0", pose, optical=True), keys
+
+
+def _kitti_devices(lines: Mapping[str, Node], frames: dict[str, Frame]) -> set[str]:
+    """Add the scanner and the navigation unit to the frames; names of the lines used."""
+    used = set()
+    for key, inner, outer in (
+        ("Tr_velo_to_cam", "velodyne", "camera_0"),
+        ("Tr_imu_to_velo", "imu", "velodyne"),
+    ):
+        if key in lines:
+            # Benchmarks: to camera 0 before its rectification R0_rect, which is the frame of P.
+            pose = rigid(numbers(lines[key], [12], key), lines[key], key)
+            if outer == "camera_0" and "R0_rect" in lines:
+                rect = np.array(numbers(lines["R0_rect"], [9], "R0_rect")).reshape(3, 3)
+                pose = SE3.from_matrix(np.column_stack([rect, np.zeros(3)])) @ pose
+                used.add("R0_rect")
+            frames[inner] = Frame(outer, pose)
+            frames.setdefault(outer, Frame())
+            used.add(key)
+    if "R" in lines and "T" in lines:
+        # Raw data: one pose per file, named by the file.
+        file = Path(lines["R"].position.file).name
+        inner, outer = ("imu", "velodyne") if "imu_to_velo" in file else ("velodyne", "camera_0")
+        rows = np.array(numbers(lines["R"], [9], "R")).reshape(3, 3)
+        check_rotation(rows, lines["R"], "R")
+        shift = numbers(lines["T"], [3], "T")
+        frames[inner] = Frame(outer, SE3.from_matrix(np.column_stack([rows, shift])))
+        frames.setdefault(outer, Frame(optical=outer == "camera_0"))
+        used |= {"R", "T"}
+    return used

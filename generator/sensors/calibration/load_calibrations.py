@@ -1,0 +1,148 @@
+"""Calibrations in the documents of configurations: files are replaced by their content.
+
+Plans are therefore self-contained, and errors name the file and line that they come from.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any, TypeVar
+
+from gen_data.generator.config.base_model import Strict
+from gen_data.generator.config.paths import find_path
+from gen_data.generator.config.problems import Position, Problems, refuse
+from gen_data.generator.config.validation import validate
+from gen_data.generator.config.yaml_tree import Node
+from gen_data.generator.core.errors import ConfigWarning
+from gen_data.generator.core.lens import COEFFICIENTS
+from gen_data.generator.core.se3 import SE3, turns_of
+from gen_data.generator.sensors.calibration.calibration import CalibratedCamera, Calibration
+from gen_data.generator.sensors.calibration.read_calibration import read_calibration
+from gen_data.generator.sensors.camera.lens_models import CalibratedLens
+from gen_data.generator.sensors.mounting import Mounting
+
+M = TypeVar("M", bound=Strict)
+_UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
+_EXCLUDED = {
+    "lens": ("hfov_deg", "intrinsics"),
+    "mounting": ("offset_m", "yaw_deg", "pitch_deg", "roll_deg"),
+}
+
+
+def load_calibrations(sensor: Node, field: str) -> Node:
+    """Replace the names of calibration files in a sensor's document by their content.
+
+    ``field`` is the path of the sensor in messages: ``sensors[0]``.
+
+    Raises:
+        ConfigError: a file cannot be read, has another layout, or what has no counterpart here.
+    """
+    if not isinstance(sensor.content, Mapping):
+        return sensor
+    content = dict(sensor.content)
+    lens, mounting = content.get("lens"), content.get("mounting")
+    if lens is not None and lens.get("file") is not None:
+        content |= _load_lens(sensor, lens, field)
+    if mounting is not None and mounting.get("file") is not None:
+        content |= _load_mounting(sensor, mounting, field)
+        del content["mounting"]
+    return replace(sensor, content=content)
+
+
+def _load_lens(sensor: Node, lens: Node, field: str) -> dict[str, Node]:
+    """The lens, intrinsics and size of a camera in a calibration file."""
+    _check_alone(sensor, "lens", field)
+    asked = _validated(lens, CalibratedLens, f"{field}.lens")
+    file = lens.entries["file"]
+    calibration = _read(
+        file, f"{field}.lens.file", fisheye=asked.fisheye, rectified=asked.rectified
+    )
+    try:
+        camera = calibration.camera(asked.camera)
+    except ValueError as error:
+        refuse((lens.get("camera") or file).position, f"{field}.lens.camera", str(error))
+    place = camera.position
+    found = {
+        "lens": _node(place, _lens_entries(camera)),
+        "intrinsics": _node(place, _numbers_of(camera)),
+    }
+    if sensor.get("size_px") is None and camera.size_px is not None:
+        found["size_px"] = _node(place, list(camera.size_px))
+    return found
+
+
+def _load_mounting(sensor: Node, mounting: Node, field: str) -> dict[str, Node]:
+    """The place on its rig of a sensor in a calibration file."""
+    _check_alone(sensor, "mounting", field)
+    asked = _validated(mounting, Mounting, f"{field}.mounting")
+    file = mounting.entries["file"]
+    calibration = _read(file, f"{field}.mounting.file", rectified=asked.rectified)
+    optical = None if asked.axes is None else asked.axes == "optical"
+    try:
+        pose = calibration.mount(asked.frame, asked.relative_to, optical=optical)
+    except ValueError as error:
+        refuse(mounting.position, f"{field}.mounting", str(error))
+    return {
+        name: _node(file.position, value)
+        for name, value in place_of(pose, _UNITS[asked.unit]).items()
+    }
+
+
+def place_of(T_rig_sensor: SE3, unit_m: float = 1.0) -> dict[str, Any]:
+    """A pose on a rig as the fields of a sensor."""
+    angles = (round(math.degrees(a), 9) + 0.0 for a in turns_of(T_rig_sensor))
+    offset_m = [round(unit_m * v, 9) + 0.0 for v in T_rig_sensor.translation_m]
+    return {
+        "offset_m": offset_m,
+        **dict(zip(("yaw_deg", "pitch_deg", "roll_deg"), angles, strict=True)),
+    }
+
+
+def _read(file: Node, field: str, *, fisheye: bool = False, rectified: bool = False) -> Calibration:
+    """Read a file that a configuration names, and warn of entries without effect."""
+    path = find_path(file.text, file.position, field, "file")
+    calibration = read_calibration(path, fisheye=fisheye, rectified=rectified)
+    if calibration.unused:
+        listed = ", ".join(calibration.unused)
+        message = f"{path}: {calibration.kind}; not used: {listed}"
+        warnings.warn(message, ConfigWarning, stacklevel=2)
+    return calibration
+
+
+def _check_alone(sensor: Node, key: str, field: str) -> None:
+    for other in _EXCLUDED[key]:
+        if sensor.get(other) is not None:
+            place = sensor.key_position(other)
+            refuse(place, f"{field}.{other}", f"the file that {key} names gives it: leave it out")
+
+
+def _validated(node: Node, model: type[M], field: str) -> M:
+    problems = Problems()
+    found = validate(node, model, problems, field)
+    problems.raise_if_any()
+    assert found is not None
+    return found
+
+
+def _lens_entries(camera: CalibratedCamera) -> dict[str, Any]:
+    names = COEFFICIENTS[camera.model]
+    return {"model": camera.model, **dict(zip(names, camera.coefficients, strict=True))}
+
+
+def _numbers_of(camera: CalibratedCamera) -> dict[str, Any]:
+    (fx, fy), (cx, cy) = camera.focal_px, camera.center_px
+    numbers: dict[str, Any] = {"fx_px": fx, "fy_px": fy, "cx_px": cx, "cy_px": cy}
+    size = {} if camera.size_px is None else {"size_px": list(camera.size_px)}
+    return {**numbers, **size, "pixel_centers": camera.pixel_centers}
+
+
+def _node(place: Position, value: Any) -> Node:
+    """Plain data as a document, all at one place."""
+    if isinstance(value, dict):
+        return Node(place, {key: _node(place, one) for key, one in value.items()})
+    if isinstance(value, list):
+        return Node(place, tuple(_node(place, one) for one in value))
+    return Node(place, value, text=str(value))

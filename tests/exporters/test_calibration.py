@@ -1,0 +1,213 @@
+"""Calibrations of data sets in the files of OpenCV, ROS, Kalibr and COLMAP."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+import yaml
+
+from gen_data.exporters.calibration import CalibrationFiles, calibration_texts
+from gen_data.exporters.calibration_texts import colmap_camera
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.intrinsics import Intrinsics
+from gen_data.generator.core.lens import Lens
+from gen_data.generator.core.scene import Camera, Device, Rig, Scene
+from gen_data.generator.core.scene_time import RIG_AXES, place_sensors
+from gen_data.generator.core.se3 import SE3, turned
+from gen_data.generator.sensors.calibration.read_calibration import read_calibration
+
+BENT = Lens("brown_conrady", (-0.21, 0.09, 0.0007, -0.0004, 0.0, 0.0, 0.0, 0.0))
+STRONG = Lens("brown_conrady", (-0.21, 0.09, 0.0007, -0.0004, -0.012, 0.01, 0.002, 0.0005))
+FISHEYE = Lens("kannala_brandt", (0.0034, 0.0007, -0.002, 0.0002))
+PINHOLE = Lens()
+LENSES = {"bent": BENT, "fisheye": FISHEYE, "pinhole": PINHOLE, "strong": STRONG}
+POINTS_M = np.array([[-0.5, 0.3, 2.0], [0.4, -0.2, 1.7], [0.1, 0.1, 3.0]])
+
+
+def rig_scene() -> Scene:
+    """Four cameras and an IMU on a stand."""
+    cameras = []
+    for k, (name, lens) in enumerate(LENSES.items()):
+        K = Intrinsics(640, 512, 612.4 + k, 611.9, 319.2 - k, 259.8, lens)
+        pose = turned((0.1 * k, -0.06 * k, 0.02), 0.1 * k, -0.05, 0.02) @ RIG_AXES.inverse()
+        cameras.append(Camera(name, SE3(), K, None, "rig", pose.rounded()))
+    imu = Device("imu", "imu", "rig", turned((0.0, 0.05, -0.1), 0.3, 0.0, 0.0).rounded())
+    stand = Rig("rig", "", turned((1.0, 2.0, 1.5), 0.3, -0.7, 0.0).rounded())
+    scene = Scene("t", rigs=(stand,), cameras=tuple(cameras), devices=(imu,))
+    return place_sensors(scene)
+
+
+SCENE = rig_scene()
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The files of one calibration."""
+    folder = tmp_path_factory.mktemp("calibration")
+    for name, text in calibration_texts(SCENE, tuple(LENSES)).items():
+        (folder / name).parent.mkdir(exist_ok=True)
+        (folder / name).write_text(text, encoding="utf-8")
+    return folder
+
+
+def project_cv(K: Any, D: Any, *, fisheye: bool) -> Any:
+    zero = np.zeros(3)
+    if fisheye:
+        return cv2.fisheye.projectPoints(POINTS_M[:, None], zero, zero, K, D)[0].reshape(-1, 2)
+    return cv2.projectPoints(POINTS_M, zero, zero, K, D)[0].reshape(-1, 2)
+
+
+@pytest.mark.parametrize("name", sorted(LENSES))
+def test_opencv_reads_its_file_and_projects_to_the_same_places(folder: Path, name: str) -> None:
+    """Its pixel centres are at integers: half a pixel less."""
+    storage = cv2.FileStorage(str(folder / f"opencv/{name}.yml"), cv2.FILE_STORAGE_READ)
+    K, D = (storage.getNode(key).mat() for key in ("camera_matrix", "distortion_coefficients"))
+    fisheye = storage.getNode("fisheye_model").real() == 1.0
+
+    camera = SCENE.camera(name).intrinsics
+    expected = camera.project(POINTS_M) - 0.5
+    np.testing.assert_allclose(project_cv(K, D, fisheye=fisheye), expected, atol=1e-6)
+    assert storage.getNode("image_width").real() == 640
+    assert storage.getNode("image_height").real() == 512
+
+
+@pytest.mark.parametrize("name", sorted(LENSES))
+def test_ros_has_the_same_numbers(folder: Path, name: str) -> None:
+    """Read by a YAML parser, projected by OpenCV, as image_geometry does."""
+    info = yaml.safe_load((folder / f"ros/{name}.yaml").read_text())
+    K = np.array(info["camera_matrix"]["data"]).reshape(3, 3)
+    D = np.array(info["distortion_coefficients"]["data"])
+
+    camera = SCENE.camera(name).intrinsics
+    fisheye = info["distortion_model"] == "equidistant"
+    expected = camera.project(POINTS_M) - 0.5
+    np.testing.assert_allclose(project_cv(K, D, fisheye=fisheye), expected, atol=1e-6)
+    lengths = {"plumb_bob": 5, "rational_polynomial": 8, "equidistant": 4}
+    assert len(D) == lengths[info["distortion_model"]]
+    np.testing.assert_array_equal(
+        np.array(info["projection_matrix"]["data"]).reshape(3, 4)[:, :3], K
+    )
+
+
+def test_a_chain_of_kalibr_leads_from_camera_to_camera(folder: Path) -> None:
+    """A point seen by the IMU, the first and the last camera is one point."""
+    chain = yaml.safe_load((folder / "kalibr/rig.yaml").read_text())
+    point = np.array([0.3, -0.1, 2.5, 1.0])
+    names = sorted(LENSES)
+    world = SCENE.camera(names[0]).T_world_camera.matrix() @ point
+    at = point
+    for k, name in enumerate(names):
+        if k:
+            at = np.array(chain[f"cam{k}"]["T_cn_cnm1"]) @ at
+        there = np.linalg.inv(SCENE.camera(name).T_world_camera.matrix()) @ world
+        np.testing.assert_allclose(at, there, atol=5e-6)
+        from_imu = np.array(chain[f"cam{k}"]["T_cam_imu"])
+        imu = np.linalg.inv(SCENE.device("imu").T_world_device.matrix()) @ world
+        np.testing.assert_allclose(from_imu @ imu, there, atol=5e-6)
+
+
+def test_what_kalibr_lacks_is_left_out_with_a_comment(folder: Path) -> None:
+    text = (folder / "kalibr/rig.yaml").read_text()
+    chain = yaml.safe_load(text)
+
+    assert "radtan has no k3 to k6" in text
+    assert [chain[f"cam{k}"]["distortion_model"] for k in range(4)] == [
+        "radtan", "equidistant", "none", "none"
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", ["opencv", "ros"])
+@pytest.mark.parametrize("name", sorted(LENSES))
+def test_a_file_is_read_back_as_the_same_camera(folder: Path, name: str, kind: str) -> None:
+    ending = "yml" if kind == "opencv" else "yaml"
+    found = read_calibration(folder / kind / f"{name}.{ending}").camera("")
+    assert_is(found, SCENE.camera(name).intrinsics)
+
+
+@pytest.mark.parametrize("name", ["bent", "fisheye", "pinhole"])
+def test_a_chain_is_read_back_as_the_same_cameras_and_places(folder: Path, name: str) -> None:
+    """Places on the rig are those of the scene, relative to the IMU's."""
+    calibration = read_calibration(folder / "kalibr/rig.yaml")
+    key = f"cam{sorted(LENSES).index(name)}"
+    assert_is(calibration.camera(key), SCENE.camera(name).intrinsics)
+
+    T_rig_camera = SCENE.camera(name).T_rig_camera @ RIG_AXES
+    expected = SCENE.device("imu").T_rig_device.inverse() @ T_rig_camera
+    found = calibration.mount(key, "imu")
+    np.testing.assert_allclose(found.matrix(), expected.matrix(), atol=1e-8)
+
+
+@pytest.mark.parametrize("name", sorted(LENSES))
+def test_a_line_of_colmap_is_read_back_as_the_same_camera(tmp_path: Path, name: str) -> None:
+    """COLMAP's pixel centres are those of this project: nothing is subtracted."""
+    lens = SCENE.camera(name).intrinsics
+    (tmp_path / "cameras.txt").write_text(f"4 {colmap_camera(lens)}\n", encoding="utf-8")
+
+    assert f" {lens.cx_px!r} {lens.cy_px!r}" in colmap_camera(lens)
+    assert_is(read_calibration(tmp_path / "cameras.txt").camera("4"), lens)
+
+
+def assert_is(found: Any, lens: Intrinsics) -> None:
+    shift = 0.5 if found.pixel_centers == "integers" else 0.0
+    assert found.focal_px == (lens.fx_px, lens.fy_px)
+    assert found.center_px == pytest.approx((lens.cx_px - shift, lens.cy_px - shift), abs=1e-9)
+    assert (found.model, found.coefficients) == (lens.lens.model, lens.lens.coefficients)
+    assert found.size_px == (lens.width_px, lens.height_px)
+
+
+def test_every_photograph_has_its_pose_in_the_model_of_its_scene(
+    samples: Any, exported: Any
+) -> None:
+    """COLMAP's poses take the world to the camera; its images are there."""
+    folder = exported(CalibrationFiles())
+    samples = [s for s in samples if s.scene_index == 0]
+    lines = (folder / "colmap/000000/images.txt").read_text().splitlines()[1::2]
+
+    assert len(lines) == sum(len(s.truth) for s in samples)
+    first = lines[0].split()
+    sample, camera = samples[0], samples[0].scene.camera(first[9].split("/")[0])
+    w, x, y, z, *t = (float(v) for v in first[1:8])
+    inverse = camera.T_world_camera.inverse()
+    assert (w, x, y, z) == pytest.approx(inverse.quaternion_wxyz)
+    assert t == pytest.approx(inverse.translation_m)
+    assert first[9] == f"{camera.name}/{sample.index:09d}.png"
+    assert (folder / "colmap/000000/images" / first[9]).is_file()
+    known = (folder / "colmap/000000/cameras.txt").read_text().splitlines()[1:]
+    assert [line.split()[0] for line in known] == [str(k + 1) for k in range(len(known))]
+    assert int(first[8]) <= len(known)
+
+
+def test_every_distinct_calibration_has_a_number(world: Any, tmp_path: Path) -> None:
+    """Two lenses in turns: two folders, and the table names one for each sample."""
+    samples = []
+    for k, sample in enumerate(world.samples):
+        cameras = tuple(
+            replace(c, intrinsics=replace(c.intrinsics, fx_px=500.0 + k % 2))
+            for c in sample.scene.cameras
+        )
+        samples.append(replace(sample, scene=replace(sample.scene, cameras=cameras)))
+    folder = world.export(CalibrationFiles(), world.info(len(samples)), samples, tmp_path)
+
+    rows = (folder / "samples.csv").read_text().splitlines()
+    assert rows[0] == "index,split,calibration"
+    assert [row.split(",")[2] for row in rows[1:]] == [str(k % 2) for k in range(len(samples))]
+    assert sorted(p.name for p in folder.glob("0*")) == ["0000", "0001"]
+
+
+def test_a_data_set_of_panoramas_is_refused(world: Any) -> None:
+    info = world.info(4, lenses=dict.fromkeys(world.info(4).cameras, "equirectangular"))
+    with pytest.raises(ConfigError, match="no camera has a calibration"):
+        CalibrationFiles().check(info)
+
+
+def test_degrees_of_the_rig_are_not_lost() -> None:
+    """A guard of this file: the cameras of the scene do not all look the same way."""
+    turns = {round(math.degrees(2 * math.acos(min(1.0, c.T_rig_camera.quaternion_wxyz[0]))), 3)
+             for c in SCENE.cameras}  # fmt: skip
+    assert len(turns) == 4

@@ -1,0 +1,337 @@
+"""Records of OpenDRIVE files that change along a road, and newer elements of the standard."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gen_data.generator.assets.checking import check_folder
+from gen_data.generator.assets.library import open_library
+from gen_data.generator.assets.roads.network_surface import network_solid
+from gen_data.generator.core.errors import AssetError, ConfigWarning
+from gen_data.generator.core.scene import Lane
+from gen_data.generator.roads.opendrive import read_opendrive
+from gen_data.generator.roads.opendrive_lanes import network_lanes
+
+WIDTH = '<width sOffset="0" a="3.5" b="0" c="0" d="0"/>'
+SOLID = '<roadMark sOffset="0" type="solid" width="0.12"/>'
+
+
+def lane(number: int, inner: str = WIDTH, more: str = "", kind: str = "driving") -> str:
+    """A lane of one section."""
+    return f'<lane id="{number}" type="{kind}" {more}>{inner}</lane>'
+
+
+def road(  # noqa: PLR0917
+    left: str = "",
+    right: str = "",
+    lateral: str = "",
+    types: str = "",
+    number: int = 1,
+    x: int = 0,
+    link: str = "",
+    center: str = "",
+) -> str:
+    """A straight road of 100 m along +X."""
+    return (
+        f'<road length="100" id="{number}" junction="-1"><link>{link}</link>{types}'
+        f'<planView><geometry s="0" x="{x}" y="0" hdg="0" length="100"><line/></geometry>'
+        "</planView>"
+        f'<lateralProfile>{lateral}</lateralProfile><lanes><laneSection s="0">'
+        f'<left>{left}</left><center><lane id="0" type="none">{center}</lane></center>'
+        f"<right>{right}</right></laneSection></lanes></road>"
+    )
+
+
+def text(*roads: str, more: str = "") -> bytes:
+    return f'<?xml version="1.0"?><OpenDRIVE>{"".join(roads)}{more}</OpenDRIVE>'.encode()
+
+
+def lanes(*roads: str, more: str = "") -> dict[str, Lane]:
+    """Lanes by name."""
+    return {x.name: x for x in network_lanes(read_opendrive(text(*roads, more=more), "a.xodr"))}
+
+
+def painted_m(*roads: str, edge_m: float) -> list[tuple[float, float]]:
+    """From where to where along the road the line at ``y = edge_m`` is painted."""
+    mesh = network_solid(read_opendrive(text(*roads), "a.xodr")).mesh
+    slots = [k for k, material in enumerate(mesh.materials) if material.role == "marking"]
+    faces = mesh.faces[np.isin(mesh.face_slots, slots)]
+    corners = mesh.vertices_m[faces].astype(float)
+    corners = corners[np.abs(corners[..., 1] - edge_m).max(axis=1) < 0.2] + [50.0, 0.0, 0.0]
+    spans = sorted((c[:, 0].min(), c[:, 0].max()) for c in corners)
+    merged: list[list[float]] = []
+    for low, high in spans:
+        if merged and low <= merged[-1][1] + 1e-3:
+            merged[-1][1] = max(high, merged[-1][1])
+        else:
+            merged.append([low, high])
+    return [(round(float(low), 3), round(float(high), 3)) for low, high in merged]
+
+
+# --- marks ---
+
+
+@pytest.mark.parametrize(
+    ("marks", "spans"),
+    [
+        ('<roadMark sOffset="0" type="none"/><roadMark sOffset="50" type="solid"/>', [(50, 100)]),
+        ('<roadMark sOffset="50" type="none"/><roadMark sOffset="0" type="solid"/>', [(0, 50)]),
+        ('<roadMark sOffset="20" type="solid"/>', [(20, 100)]),
+        (SOLID + '<roadMark sOffset="40" type="none"/><roadMark sOffset="60" type="solid"/>',
+         [(0, 40), (60, 100)]),
+        (SOLID + '<roadMark sOffset="85" type="broken"/>', [(0, 87), (93, 96)]),
+        ("", []),
+    ],
+)  # fmt: skip
+def test_marks_change_along_the_road(marks: str, spans: list[tuple[float, float]]) -> None:
+    """Each record holds from its sOffset to the next; dashes keep the rhythm of the section.
+
+    Dashes are 3 m every 9 m, the first from 3 m: 2 m are left of that at 84 m.
+    """
+    found = painted_m(road(right=lane(-1, WIDTH + marks)), edge_m=-3.5)
+    assert len(found) == len(spans)
+    np.testing.assert_allclose(np.ravel(found), np.ravel(spans), atol=2e-3)
+
+
+# --- speeds ---
+
+TOWN = '<type s="0" type="town"><speed max="50" unit="km/h"/></type>'
+TYPES = (
+    TOWN + '<type s="40" type="rural"><speed max="100" unit="km/h"/></type>'
+    '<type s="70" type="motorway"><speed max="no limit"/></type>'
+)
+
+
+def test_the_speed_of_a_road_changes_along_it() -> None:
+    """A lane per speed; each leads to the next, and back on the other side."""
+    found = lanes(road(lane(1), lane(-1), types=TYPES))
+
+    speeds = [round(found[f"1.{k}.-1"].speed_m_s * 3.6, 6) for k in range(3)]
+    assert speeds == [50.0, 100.0, 130.0]
+    assert [found[f"1.{k}.-1"].successors for k in range(3)] == [("1.1.-1",), ("1.2.-1",), ()]
+    assert [found[f"1.{k}.1"].successors for k in range(3)] == [(), ("1.0.1",), ("1.1.1",)]
+    assert found["1.1.-1"].center_m[0][0] == pytest.approx(40 - 50)
+    assert found["1.1.-1"].center_m[-1][0] == pytest.approx(70 - 50)
+
+
+def test_a_lane_may_have_a_speed_of_its_own() -> None:
+    """From its sOffset on; the other lane keeps the road's."""
+    slow = '<speed sOffset="0" max="30" unit="km/h"/><speed sOffset="60" max="10" unit="m/s"/>'
+    found = lanes(road(right=lane(-1) + lane(-2, WIDTH + slow), types=TOWN))
+
+    kmh = {name: round(x.speed_m_s * 3.6, 6) for name, x in found.items() if x.kind == "driving"}
+    assert kmh == {"1.0.-1": 50.0, "1.1.-1": 50.0, "1.0.-2": 30.0, "1.1.-2": 36.0}
+
+
+def test_a_type_without_a_change_of_speed_splits_nothing() -> None:
+    same = TOWN + TOWN.replace('s="0"', 's="30"')
+    assert set(lanes(road(right=lane(-1), types=same))) == {"1.0.-1", "1.0.-1/frontage"}
+
+
+def test_a_split_road_has_the_widths_and_marks_of_the_whole_one() -> None:
+    """Records count from the start of the section in the file, not of its part."""
+    wider = '<width sOffset="0" a="3" b="0.01" c="0" d="0"/>'
+    found = lanes(road(right=lane(-1, wider + SOLID), types=TYPES))
+    whole = lanes(road(right=lane(-1, wider + SOLID)))
+
+    ys = [p[1] for k in range(3) for p in found[f"1.{k}.-1"].center_m]
+    assert min(ys) == pytest.approx(whole["1.0.-1"].center_m[-1][1])
+    assert min(ys) == pytest.approx(-2.0)
+    broken = WIDTH + '<roadMark sOffset="0" type="broken"/>'
+    assert painted_m(road(right=lane(-1, broken), types=TYPES), edge_m=-3.5) == painted_m(
+        road(right=lane(-1, broken)), edge_m=-3.5
+    )
+
+
+# --- lateral profile ---
+
+
+def z_m(lateral: str, number: int, more: str = "") -> float:
+    """Height of the middle of a lane, 1.75 m from the reference line or 5.25 m."""
+    pairs = lane(1) + lane(2, more=more), lane(-1) + lane(-2, more=more)
+    return lanes(road(*pairs, lateral=lateral))[f"1.0.{number}"].center_m[0][2]
+
+
+def crossfall(side: str, a: float = 0.05) -> str:
+    return f'<crossfall side="{side}" s="0" a="{a}" b="0" c="0" d="0"/>'
+
+
+@pytest.mark.parametrize(
+    ("side", "left", "right"), [("both", True, True), ("left", True, False), ("right", False, True)]
+)
+def test_crossfall_falls_from_the_reference_line(side: str, left: bool, right: bool) -> None:
+    """By 1.75 m times the tangent of 0.05 rad, on its side."""
+    fall = -1.75 * math.tan(0.05)
+    assert z_m(crossfall(side), 1) == pytest.approx(fall * left, abs=1e-6)
+    assert z_m(crossfall(side), -1) == pytest.approx(fall * right, abs=1e-6)
+
+
+def test_crossfall_adds_to_superelevation() -> None:
+    """A road that rises to its left, with a roof on top."""
+    bank = '<superelevation s="0" a="0.02" b="0" c="0" d="0"/>'
+    expected = 1.75 * (math.tan(0.02) - math.tan(0.05))
+    assert z_m(bank + crossfall("both"), 1) == pytest.approx(expected, abs=1e-6)
+
+
+SHAPE = (
+    '<shape s="{s}" t="-7" a="{a}" b="0" c="0" d="0"/>'
+    '<shape s="{s}" t="-3.5" a="{a}" b="{b}" c="0" d="0"/>'
+    '<shape s="{s}" t="0" a="0" b="0" c="0.02" d="0"/>'
+)
+
+
+def test_a_shape_is_a_profile_across_the_road() -> None:
+    """Level at -1 m beyond 3.5 m to the right, straight up to 0, and a parabola to the left."""
+    shape = SHAPE.format(s=0, a=-1.0, b=1 / 3.5)
+    assert z_m(shape, -2) == pytest.approx(-1.0)
+    assert z_m(shape, -1) == pytest.approx(-0.5)
+    assert z_m(shape, 1) == pytest.approx(0.02 * 1.75**2, abs=1e-6)
+    assert z_m(shape, 2) == pytest.approx(0.02 * 5.25**2, abs=1e-6)
+
+
+def test_shapes_are_interpolated_between_their_stations() -> None:
+    """Half of the depth in the middle between a flat profile and one of 1 m."""
+    shape = SHAPE.format(s=0, a=0.0, b=0.0) + SHAPE.format(s=80, a=-1.0, b=1 / 3.5)
+    middle = lanes(road(right=lane(-1) + lane(-2), lateral=shape))["1.0.-2"].center_m
+    z = {round(x + 50): height for x, _, height in middle}
+    assert (z[0], z[40], z[80], z[100]) == pytest.approx((0.0, -0.5, -1.0, -1.0))
+
+
+def test_the_surface_follows_the_shape_within_a_lane() -> None:
+    """Its middle is where vehicles drive: on the parabola, not on the chord."""
+    shape = SHAPE.format(s=0, a=0.0, b=0.0)
+    mesh = network_solid(read_opendrive(text(road(lane(1), lateral=shape)), "a")).mesh
+    asphalt = mesh.vertices_m[np.abs(mesh.vertices_m[:, 1] - 1.75) < 1e-3]
+    np.testing.assert_allclose(asphalt[:, 2].max(), 0.02 * 1.75**2, atol=1e-4)
+
+
+def test_level_lanes_keep_the_height_of_their_inner_edge() -> None:
+    """A sidewalk beyond a road that leans."""
+    bank = '<superelevation s="0" a="0.1" b="0" c="0" d="0"/>'
+    assert z_m(bank, 2, 'level="true"') == pytest.approx(3.5 * math.tan(0.1), abs=1e-6)
+    assert z_m(bank, -2, 'level="true"') == pytest.approx(-3.5 * math.tan(0.1), abs=1e-6)
+    assert z_m(bank, 2, 'level="false"') == pytest.approx(5.25 * math.tan(0.1), abs=1e-6)
+
+
+# --- lanes ---
+
+
+def test_a_reversed_lane_runs_against_its_side() -> None:
+    """Its neighbour of the other direction is no lane to change to."""
+    found = lanes(road(right=lane(-1) + lane(-2, more='direction="reversed"') + lane(-3)))
+
+    assert found["1.0.-1"].center_m[0][0] < found["1.0.-1"].center_m[-1][0]
+    assert found["1.0.-2"].center_m[0][0] > found["1.0.-2"].center_m[-1][0]
+    assert (found["1.0.-1"].right, found["1.0.-2"].left, found["1.0.-2"].right) == ("", "", "")
+
+
+def test_borders_are_outer_edges_at_t() -> None:
+    """A signed distance from the reference line, also where inner lanes change width."""
+
+    def border(a: float, b: float = 0.0) -> str:
+        return f'<border sOffset="0" a="{a}" b="{b}" c="0" d="0"/>'
+
+    found = lanes(
+        road(
+            lane(1, border(3)) + lane(2, border(7)),
+            lane(-1, border(-3, -0.01)) + lane(-2, border(-6)),
+        )
+    )
+    assert (found["1.0.1"].width_m, found["1.0.2"].width_m) == (3.0, 4.0)
+    assert found["1.0.-1"].center_m[0][1] == pytest.approx(-1.5)
+    assert found["1.0.-1"].center_m[-1][1] == pytest.approx(-2.0)
+    assert found["1.0.-2"].center_m[-1][1] == pytest.approx(-5.0)
+
+
+@pytest.mark.parametrize(
+    ("inner", "told"),
+    [
+        ('<width sOffset="0" a="3" b="-0.05" c="0" d="0"/>', "lane -1 is -2 m wide at s = 100 m"),
+        ('<border sOffset="0" a="3" b="0" c="0" d="0"/>', "lane -1 is -3 m wide at s = 0 m"),
+    ],
+)
+def test_a_lane_of_negative_width_is_refused_with_its_place(inner: str, told: str) -> None:
+    with pytest.raises(AssetError, match=rf"^a\.xodr: road '1': {told}; correct its width"):
+        lanes(road(right=lane(-1, inner)))
+
+
+def test_a_lane_may_end_in_a_taper() -> None:
+    """Its link to the lane that it merges into is none to drive along."""
+    taper = '<link><successor id="-1"/></link><width sOffset="0" a="3.5" b="-0.035" c="0" d="0"/>'
+    on = '<link><successor id="-1"/></link>' + WIDTH
+    link = '<successor elementType="road" elementId="2" contactPoint="start"/>'
+    first = road(right=lane(-1, on) + lane(-2, taper), link=link)
+    found = lanes(first, road(right=lane(-1), number=2, x=100))
+
+    assert found["1.0.-1"].successors == ("2.0.-1",)
+    assert found["1.0.-2"].successors == ()
+
+
+# --- junctions ---
+
+DIRECT = (
+    '<junction id="9" type="direct"><connection id="0" incomingRoad="1" linkedRoad="2" '
+    'contactPoint="start"><laneLink from="-1" to="-1"/><laneLink from="1" to="1"/>'
+    "</connection></junction>"
+)
+
+
+def test_a_direct_junction_joins_roads_both_ways() -> None:
+    """Without a road in between."""
+    roads = (
+        road(lane(1), lane(-1), link='<successor elementType="junction" elementId="9"/>'),
+        road(lane(1), lane(-1), number=2, x=100,
+             link='<predecessor elementType="junction" elementId="9"/>'),
+    )  # fmt: skip
+    found = lanes(*roads, more=DIRECT)
+
+    assert found["1.0.-1"].successors == ("2.0.-1",)
+    assert found["2.0.1"].successors == ("1.0.1",)
+    assert found["2.0.-1"].successors == found["1.0.1"].successors == ()
+
+
+def test_a_virtual_junction_is_left_out_and_named() -> None:
+    """Lanes do not lead into the middle of a road here."""
+    virtual = '<junction id="9" type="virtual"><connection id="0" incomingRoad="1"/></junction>'
+    link = '<predecessor elementType="road" elementId="2" elementS="30" elementDir="+"/>'
+    network = read_opendrive(text(road(right=lane(-1), link=link), more=virtual), "a.xodr")
+
+    assert network.unused == {"link into a road (elementS)": 1, "virtual junction": 1}
+
+
+# --- files ---
+
+
+@pytest.mark.parametrize(
+    "before",
+    [b"\xef\xbb\xbf", b"\n\n", b"\xef\xbb\xbf\n", b"saved by a tool\n", b"<!-- the\nlicence -->\n"],
+)
+def test_a_mark_or_text_before_the_declaration_is_skipped(before: bytes) -> None:
+    data = text(road(right=lane(-1)))
+    assert set(read_opendrive(before + data, "a.xodr").roads) == {"1"}
+
+
+OBJECTS = (
+    '<objects><object id="1"/><object id="2"/><userData/></objects>'
+    '<signals><signal id="3"/></signals></road>'
+)
+
+
+def test_what_has_no_effect_is_named_and_counted(tmp_path: Path) -> None:
+    """By the check of a folder, and by a warning when the file is first read."""
+    inner = (
+        WIDTH + '<height sOffset="0" inner="0" outer="0"/><height sOffset="9" inner="0" outer="0"/>'
+    )
+    data = text(road(right=lane(-1, inner + "<material/>"))).replace(b"</road>", OBJECTS.encode())
+    (tmp_path / "town.xodr").write_bytes(data)
+    told = "not used: 1 height after a lane's first, 1 material of lane, 2 object, 1 signal"
+    library = open_library([tmp_path], tmp_path / "cache")
+
+    with pytest.warns(ConfigWarning, match=told):
+        (finding,) = check_folder(tmp_path, library)
+    assert told in finding.warnings
+    assert not finding.error

@@ -1,0 +1,569 @@
+"""Calibrations of a user's own cameras, from the files of common tools.
+
+Expected values are computed by OpenCV (``projectPoints``, ``fisheye``) from the numbers in the
+files, or by hand.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+from gen_data.generator.assemble.config import load_config
+from gen_data.generator.core.errors import ConfigError, ConfigWarning
+from gen_data.generator.core.intrinsics import Intrinsics
+from gen_data.generator.core.se3 import SE3, Array
+from gen_data.generator.core.serialization import canonical_json
+
+K = np.array([[812.4, 0.0, 318.7], [0.0, 811.9, 259.3], [0.0, 0.0, 1.0]])
+D5 = np.array([-0.21, 0.09, 0.0007, -0.0004, -0.012])
+D8 = np.array([-0.21, 0.09, 0.0007, -0.0004, -0.012, 0.01, 0.002, 0.0005])
+D4 = np.array([0.0034, 0.0007, -0.002, 0.0002])
+POINTS_M = np.array([[x, y, 2.0] for x in (-0.6, 0.0, 0.5) for y in (-0.45, 0.1, 0.4)])
+CONFIG = """\
+template: tabletop
+sensors:
+  - {type: rgb_camera, name: eye, %s}
+"""
+
+
+def sensor(folder: Path, text: str, name: str = "camera.yaml", **files: str) -> Any:
+    """The camera of a configuration beside a file; ``FILE`` in its line is the file's name."""
+    if files.get("content"):
+        (folder / name).write_text(files["content"], encoding="utf-8")
+    (folder / "mine.yaml").write_text(CONFIG % text.replace("FILE", name), encoding="utf-8")
+    return load_config(str(folder / "mine.yaml")).sensors[0]
+
+
+def told(folder: Path, text: str, name: str = "camera.yaml", **files: str) -> str:
+    """What a user is told, without folders."""
+    with pytest.raises(ConfigError) as refused:
+        sensor(folder, text, name, **files)
+    return str(refused.value).replace(f"{folder}/", "")
+
+
+def project_cv(D: Array, *, fisheye: bool = False, matrix: Array = K) -> Array:
+    """Pixels as OpenCV projects the points: its centres are at integers."""
+    zero = np.zeros(3)
+    if fisheye:
+        points, _ = cv2.fisheye.projectPoints(POINTS_M[:, None], zero, zero, matrix, D)
+    else:
+        points, _ = cv2.projectPoints(POINTS_M, zero, zero, matrix, D)
+    return np.asarray(points.reshape(-1, 2))
+
+
+def assert_projects(found: Intrinsics, expected_px: Array) -> None:
+    """OpenCV's pixel coordinates plus a half are those of this project, to 1e-6 px."""
+    np.testing.assert_allclose(found.project(POINTS_M), expected_px + 0.5, atol=1e-6)
+
+
+def opencv_text(D: Array, ending: str, folder: Path, **more: Any) -> str:
+    """A file as OpenCV writes it."""
+    path = folder / f"written{ending}"
+    storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_WRITE)
+    for key, value in {"image_width": 640, "image_height": 512, "camera_matrix": K,
+                       "distortion_coefficients": D.reshape(-1, 1), **more}.items():  # fmt: skip
+        storage.write(key, value)
+    storage.release()
+    return path.read_text(encoding="utf-8")
+
+
+ROS = """\
+image_width: 640
+image_height: 512
+camera_name: left
+camera_matrix: {rows: 3, cols: 3, data: [812.4, 0, 318.7, 0, 811.9, 259.3, 0, 0, 1]}
+distortion_model: %s
+distortion_coefficients: {rows: 1, cols: %d, data: %s}
+"""
+MESSAGE = """\
+header: {stamp: {sec: 0, nanosec: 0}, frame_id: left_optical}
+height: 512
+width: 640
+distortion_model: plumb_bob
+d: [-0.21, 0.09, 0.0007, -0.0004, -0.012]
+k: [812.4, 0.0, 318.7, 0.0, 811.9, 259.3, 0.0, 0.0, 1.0]
+---
+"""
+KALIBR = """\
+cam0:
+  camera_model: pinhole
+  intrinsics: [812.4, 811.9, 318.7, 259.3]
+  distortion_model: radtan
+  distortion_coeffs: [-0.21, 0.09, 0.0007, -0.0004]
+  resolution: [640, 512]
+cam1:
+  camera_model: pinhole
+  intrinsics: [190.5, 190.9, 254.9, 256.8]
+  distortion_model: equidistant
+  distortion_coeffs: [0.0034, 0.0007, -0.002, 0.0002]
+  resolution: [512, 512]
+  T_cn_cnm1:
+  - [0.9998, -0.0199986667, 0.0, -0.06]
+  - [0.0199986667, 0.9998, 0.0, 0.001]
+  - [0.0, 0.0, 1.0, -0.002]
+  - [0.0, 0.0, 0.0, 1.0]
+"""
+LENS = "lens: {model: calibrated, file: FILE}"
+
+
+# --- numbers in a configuration ---
+
+
+def test_intrinsics_are_those_of_opencv() -> None:
+    """Different focal lengths, and a principal point whose pixel centres are at integers."""
+    from gen_data.generator.sensors.camera.rgb_camera import RgbCamera
+
+    given = {"fx_px": 812.4, "fy_px": 811.9, "cx_px": 318.7, "cy_px": 259.3}
+    lens = dict(zip(("k1", "k2", "p1", "p2", "k3"), D5, strict=True))
+    camera = RgbCamera.model_validate(
+        {"intrinsics": given, "lens": {"model": "brown_conrady", **lens}, "size_px": (640, 512)}
+    )
+
+    assert_projects(camera.nominal_intrinsics(), project_cv(D5))
+
+
+@pytest.mark.parametrize(
+    ("more", "center"),
+    [
+        ("", (320.5, 240.5)),
+        (", pixel_centers: halves", (320.0, 240.0)),
+        (", size_px: [1280, 960]", (160.25, 120.25)),
+        (", size_px: [1280, 1280]", (160.25, 40.25)),
+    ],
+)
+def test_a_principal_point_is_shifted_scaled_and_cropped(
+    tmp_path: Path, more: str, center: tuple[float, float]
+) -> None:
+    """By hand: half a pixel more; half of it at half the width; 160 rows less above the middle."""
+    text = (
+        f"size_px: [640, 480], intrinsics: {{fx_px: 500, fy_px: 510, cx_px: 320, cy_px: 240{more}}}"
+    )
+    found = sensor(tmp_path, text).nominal_intrinsics()
+
+    scale = 0.5 if "size" in more else 1.0
+    assert (found.cx_px, found.cy_px) == center
+    assert (found.fx_px, found.fy_px) == (500 * scale, 510 * scale)
+
+
+@pytest.mark.parametrize(
+    ("text", "fact"),
+    [
+        ("hfov_deg: 60, intrinsics: {fx_px: 5, fy_px: 5, cx_px: 1, cy_px: 1}",
+         "intrinsics: excludes hfov_deg"),
+        ("intrinsics: {fx_px: 500, fy_px: 500, cx_px: 1}", "missing key 'cy_px'"),
+        ("intrinsics: {fx_px: 0, fy_px: 500, cx_px: 1, cy_px: 1}", "0 is not"),
+        ("intrinsics: {fx_px: 500, fy_px: 500, cx_px: 1, cy_px: 1, size_px: [640, 400]}",
+         "is taller than the calibrated 640 x 400"),
+        ("hfov_deg: 60, lens: {model: calibrated, camera: euroc_cam0}", "leave out hfov_deg"),
+        ("lens: {model: calibrated, camera: euroc}", "expected one of euroc_cam0"),
+    ],
+)  # fmt: skip
+def test_contradictions_are_refused(tmp_path: Path, text: str, fact: str) -> None:
+    assert fact in told(tmp_path, text)
+
+
+# --- files ---
+
+
+@pytest.mark.parametrize("ending", [".yml", ".xml", ".json"])
+@pytest.mark.parametrize("D", [D5[:4], D5, D8], ids=["4", "5", "8"])
+def test_a_file_of_opencv_projects_as_opencv_does(tmp_path: Path, ending: str, D: Array) -> None:
+    """In all its formats, as it writes them itself; the image has the calibrated size."""
+    content = opencv_text(D, ending, tmp_path)
+    found = sensor(tmp_path, LENS, f"cam{ending}", content=content)
+
+    assert found.size_px == (640, 512)
+    assert_projects(found.nominal_intrinsics(), project_cv(D))
+
+
+def test_four_coefficients_of_a_fisheye_are_so_if_stated(tmp_path: Path) -> None:
+    """OpenCV's files do not state the model: its sample writes fisheye_model, others nothing."""
+    plain = opencv_text(D4, ".yml", tmp_path)
+    marked = opencv_text(D4, ".yml", tmp_path, fisheye_model=1)
+    by_key = sensor(tmp_path, LENS.replace("}", ", fisheye: true}"), content=plain)
+    by_file = sensor(tmp_path, LENS, content=marked)
+
+    assert_projects(by_key.nominal_intrinsics(), project_cv(D4, fisheye=True))
+    assert by_file.nominal_intrinsics() == by_key.nominal_intrinsics()
+
+
+def test_zeros_of_a_thin_prism_are_no_obstacle(tmp_path: Path) -> None:
+    zeros = opencv_text(np.concatenate([D8, np.zeros(4)]), ".yml", tmp_path)
+    assert_projects(sensor(tmp_path, LENS, content=zeros).nominal_intrinsics(), project_cv(D8))
+
+
+@pytest.mark.parametrize(
+    ("D", "fact"),
+    [
+        (
+            np.full(12, 0.01),
+            "camera.yaml:12:4: distortion: s1 to s4 (thin prism) other than 0 have no lens here",
+        ),
+        (
+            np.full(14, 0.01),
+            "camera.yaml:12:4: distortion: thin prism and tilted sensor other than 0",
+        ),
+        (
+            np.zeros(6),
+            "camera.yaml:15:10: distortion coefficients: expected 0 or 4 or 5 or 8 or 12 or 14",
+        ),
+    ],
+)
+def test_coefficients_without_a_lens_are_refused_at_their_line(
+    tmp_path: Path, D: Array, fact: str
+) -> None:
+    text = told(tmp_path, LENS, content=opencv_text(D, ".yml", tmp_path))
+    assert text.startswith(fact)
+
+
+@pytest.mark.parametrize(
+    ("model", "D", "fisheye"),
+    [("plumb_bob", D5, False), ("rational_polynomial", D8, False), ("equidistant", D4, True)],
+)
+def test_a_camera_info_of_ros_projects_as_opencv_does(
+    tmp_path: Path, model: str, D: Array, fisheye: bool
+) -> None:
+    content = ROS % (model, len(D), D.tolist())
+    found = sensor(tmp_path, LENS, content=content).nominal_intrinsics()
+    assert_projects(found, project_cv(D, fisheye=fisheye))
+
+
+def test_a_printed_message_of_ros_is_read_and_its_header_is_named(tmp_path: Path) -> None:
+    with pytest.warns(ConfigWarning, match=r"camera\.yaml: .*; not used: header$"):
+        found = sensor(tmp_path, LENS, content=MESSAGE)
+    assert_projects(found.nominal_intrinsics(), project_cv(D5))
+
+
+def test_a_rectified_camera_is_the_pinhole_of_its_projection(tmp_path: Path) -> None:
+    """P of a right camera: 600 px, and 0.12 m to the right, ``-600 * 0.12 = -72``."""
+    P = "projection_matrix: [600, 0, 310, -72, 0, 600, 250, 0, 0, 0, 1, 0]"
+    content = ROS % ("plumb_bob", 5, D5.tolist()) + P
+    text = LENS.replace("}", ", rectified: true}, mounting: {file: FILE, rectified: true}")
+    with pytest.warns(ConfigWarning, match="not used: camera_matrix"):
+        found = sensor(tmp_path, text, content=content)
+
+    expected = Intrinsics(640, 512, 600.0, 600.0, 310.5, 250.5)
+    assert found.nominal_intrinsics() == expected
+    assert found.offset_m == (0.0, -0.12, 0.0)
+    assert (found.yaw_deg, found.pitch_deg, found.roll_deg) == (0.0, 0.0, 0.0)
+
+
+def test_cameras_of_a_kalibr_chain_project_as_opencv_does(tmp_path: Path) -> None:
+    first = sensor(tmp_path, LENS.replace("}", ", camera: cam0}"), content=KALIBR)
+    other = sensor(tmp_path, LENS.replace("}", ", camera: cam1}"), content=KALIBR)
+
+    assert_projects(first.nominal_intrinsics(), project_cv(D5[:4]))
+    matrix = np.array([[190.5, 0, 254.9], [0, 190.9, 256.8], [0, 0, 1.0]])
+    expected = project_cv(D4, fisheye=True, matrix=matrix)
+    assert_projects(other.nominal_intrinsics(), expected)
+    assert other.size_px == (512, 512)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "fact"),
+    [
+        ("pinhole", "ds", "'ds' has no lens here; expected pinhole, or omni with xi 0"),
+        ("radtan", "fov", "'fov' has no lens here; expected radtan, equidistant or none"),
+        ("[812.4, 811.9, 318.7, 259.3]", "[812.4, 811.9]", "expected 4 numbers, got 2"),
+        ("[812.4, 811.9, 318.7, 259.3]", "[812.4, one, 1, 2]", "expected a number, got 'one'"),
+    ],
+)
+def test_a_kalibr_chain_with_another_model_is_refused(
+    tmp_path: Path, old: str, new: str, fact: str
+) -> None:
+    text = told(tmp_path, LENS.replace("}", ", camera: cam0}"), content=KALIBR.replace(old, new, 1))
+    assert text.startswith("camera.yaml:")
+    assert fact in text
+
+
+def test_a_camera_must_be_named_where_there_are_several(tmp_path: Path) -> None:
+    assert "has several cameras, or none: name one; expected one of cam0, cam1" in told(
+        tmp_path, LENS, content=KALIBR
+    )
+    assert "has no camera 'cam2'; expected one of cam0, cam1" in told(
+        tmp_path, LENS.replace("}", ", camera: cam2}"), content=KALIBR
+    )
+
+
+@pytest.mark.parametrize(
+    ("line", "D", "fisheye"),
+    [
+        ("1 PINHOLE 640 512 812.4 811.9 319.2 259.8", np.zeros(4), False),
+        ("1 OPENCV 640 512 812.4 811.9 319.2 259.8 -0.21 0.09 0.0007 -0.0004", D5[:4], False),
+        ("1 FULL_OPENCV 640 512 812.4 811.9 319.2 259.8 " + " ".join(map(str, D8)), D8, False),
+        ("1 OPENCV_FISHEYE 640 512 812.4 811.9 319.2 259.8 " + " ".join(map(str, D4)), D4, True),
+    ],
+)
+def test_a_camera_of_colmap_projects_as_opencv_does(
+    tmp_path: Path, line: str, D: Array, fisheye: bool
+) -> None:
+    """COLMAP's pixel centres are at halves: its principal point is OpenCV's plus a half."""
+    found = sensor(tmp_path, LENS, "cameras.txt", content=f"# cameras\n{line}\n")
+    assert_projects(found.nominal_intrinsics(), project_cv(D, fisheye=fisheye))
+
+
+@pytest.mark.parametrize(
+    ("line", "expected"),
+    [
+        ("1 SIMPLE_PINHOLE 640 512 800 320 256", (800.0, 800.0, ())),
+        ("1 SIMPLE_RADIAL 640 512 800 320 256 -0.1", (800.0, 800.0, (-0.1, 0, 0, 0, 0, 0, 0, 0))),
+        ("7 RADIAL 640 512 800 320 256 -0.1 0.02", (800.0, 800.0, (-0.1, 0.02, 0, 0, 0, 0, 0, 0))),
+        ("1 RADIAL_FISHEYE 640 512 800 320 256 0.1 0.02", (800.0, 800.0, (0.1, 0.02, 0, 0))),
+    ],
+)
+def test_simple_models_of_colmap(tmp_path: Path, line: str, expected: Any) -> None:
+    found = sensor(tmp_path, LENS, "cameras.txt", content=line).nominal_intrinsics()
+    assert (found.fx_px, found.fy_px, found.lens.coefficients) == expected
+    assert (found.cx_px, found.cy_px) == (320.0, 256.0)
+
+
+def test_a_model_of_colmap_without_a_lens_is_refused(tmp_path: Path) -> None:
+    text = told(tmp_path, LENS, "cameras.txt", content="1 FOV 640 512 800 800 320 256 0.9\n")
+    assert text.startswith("cameras.txt:1:1: MODEL: 'FOV' has no lens here; expected one of")
+
+
+def test_a_calibration_is_scaled_to_the_size_of_the_image(tmp_path: Path) -> None:
+    """Half the width: half of all numbers; the middle 240 of 256 rows."""
+    content = ROS % ("plumb_bob", 5, D5.tolist())
+    found = sensor(tmp_path, "size_px: [320, 240], " + LENS, content=content).nominal_intrinsics()
+
+    assert (found.fx_px, found.fy_px) == (406.2, 405.95)
+    assert (found.cx_px, found.cy_px) == pytest.approx((159.6, 259.8 / 2 - 8.0))
+
+
+def test_a_plan_holds_the_calibration_and_needs_no_file(tmp_path: Path) -> None:
+    (tmp_path / "camera.yaml").write_text(ROS % ("plumb_bob", 5, D5.tolist()), encoding="utf-8")
+    (tmp_path / "mine.yaml").write_text(CONFIG % LENS.replace("FILE", "camera.yaml"), "utf-8")
+    made = load_config(str(tmp_path / "mine.yaml"))
+    (tmp_path / "camera.yaml").unlink()
+    plan = canonical_json({"config": made.resolved, "name": "mine"})
+    (tmp_path / "plan.json").write_text(plan, encoding="utf-8")
+
+    assert load_config(str(tmp_path)).sensors == made.sensors
+
+
+def test_a_calibration_replaces_an_inherited_field_of_view(tmp_path: Path) -> None:
+    """Of the camera of a shipped configuration."""
+    (tmp_path / "camera.yaml").write_text(ROS % ("plumb_bob", 5, D5.tolist()), encoding="utf-8")
+    (tmp_path / "mine.yaml").write_text(
+        "extends: bin_picking.yaml\nsensors:\n"
+        "  - {name: gantry, lens: {model: calibrated, file: camera.yaml}}\n", "utf-8"
+    )  # fmt: skip
+    found = load_config(str(tmp_path / "mine.yaml")).sensors[0].nominal_intrinsics()  # type: ignore[attr-defined]
+    assert found.fx_px == 812.4
+
+
+@pytest.mark.parametrize(
+    ("text", "content", "fact"),
+    [
+        (LENS, "", "there is no file 'camera.yaml'"),
+        (LENS, "a: 1\n", "camera.yaml:1:1: no camera found; expected a camera matrix"),
+        (
+            LENS + ", hfov_deg: 60",
+            "a: 1",
+            "hfov_deg: the file that lens names gives it: leave it out",
+        ),
+        (LENS, ROS % ("thin", 5, D5.tolist()), "'thin' is no lens here; expected one of plumb_bob"),
+        (LENS, ROS % ("plumb_bob", 5, D5.tolist()) + "k: [\n", "not valid YAML"),
+        (LENS, (ROS % ("plumb_bob", 5, D5.tolist())).replace("812.4, 0,", "812.4, 2,"), "skew 2"),
+        (LENS.replace("file", "fil"), "a: 1\n", "unknown key 'fil'"),
+        (LENS.replace("}", ", fishy: 1}"), "a: 1\n", "unknown key 'fishy'"),
+    ],
+)
+def test_a_bad_file_is_refused(tmp_path: Path, text: str, content: str, fact: str) -> None:
+    assert fact in told(tmp_path, text, content=content)
+
+
+# --- places on a rig ---
+
+
+def rig_pose(found: Any) -> Array:
+    """``T_rig_camera`` of a sensor, camera axes, as a matrix."""
+    axes = SE3((0.0, 0.0, 0.0), (0.5, -0.5, 0.5, -0.5))
+    return np.asarray((found.T_rig_sensor @ axes).matrix())
+
+
+def mounted(folder: Path, text: str, name: str, content: str) -> Any:
+    return sensor(folder, f"rig: r, mounting: {{file: FILE, {text}}}", name, content=content)
+
+
+OPTICAL = np.array([[0, 0, 1.0, 0], [-1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
+"""``T_body_optical``: columns are right, down and forward in forward, left, up."""
+T_C1_C0 = np.array([[0.9998, -0.0199986667, 0, -0.06], [0.0199986667, 0.9998, 0, 0.001],
+                    [0, 0, 1, -0.002], [0, 0, 0, 1]])  # fmt: skip
+
+
+def test_a_kalibr_chain_places_cameras_from_the_first(tmp_path: Path) -> None:
+    """``T_cn_cnm1`` is inverted; the rig's axes are the first camera's, turned to X forward."""
+    zero = mounted(tmp_path, "frame: cam0", "chain.yaml", KALIBR)
+    one = mounted(tmp_path, "frame: cam1", "chain.yaml", KALIBR)
+
+    np.testing.assert_allclose(rig_pose(zero), OPTICAL, atol=1e-9)
+    np.testing.assert_allclose(rig_pose(one), OPTICAL @ np.linalg.inv(T_C1_C0), atol=1e-6)
+
+
+IMU = """\
+  T_cam_imu:
+  - [0.0, -1.0, 0.0, 0.01]
+  - [0.0, 0.0, -1.0, 0.02]
+  - [1.0, 0.0, 0.0, 0.03]
+  - [0.0, 0.0, 0.0, 1.0]
+"""
+
+
+def test_a_kalibr_chain_places_cameras_from_the_imu(tmp_path: Path) -> None:
+    """An IMU X forward, Y left, Z up: the camera is 3 cm behind it, 1 cm left, 2 cm up."""
+    content = KALIBR.replace("  resolution: [640, 512]\n", "  resolution: [640, 512]\n" + IMU)
+    found = mounted(tmp_path, "frame: cam0, relative_to: imu", "chain.yaml", content)
+
+    assert found.offset_m == pytest.approx((-0.03, 0.01, 0.02))
+    assert (found.yaw_deg, found.pitch_deg, found.roll_deg) == pytest.approx((0.0, 0.0, 0.0))
+
+
+def test_a_pair_of_opencv_is_placed_by_r_and_t(tmp_path: Path) -> None:
+    """``stereoCalibrate``: points of camera 2 are R times those of 1, plus T; here in mm."""
+    R, _ = cv2.Rodrigues(np.array([0.01, -0.02, 0.03]))
+    T = np.array([[-60.0], [0.5], [1.5]])
+    more = {"M1": K, "D1": D5, "M2": K, "D2": D5, "R": R, "T": T}
+    path = tmp_path / "pair.yml"
+    storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_WRITE)
+    for key, value in more.items():
+        storage.write(key, value)
+    storage.release()
+    found = mounted(tmp_path, "frame: '2', unit: mm", "pair.yml", path.read_text())
+
+    T_2_1 = np.eye(4)
+    T_2_1[:3, :3], T_2_1[:3, 3] = R, T[:, 0] / 1000
+    np.testing.assert_allclose(rig_pose(found), OPTICAL @ np.linalg.inv(T_2_1), atol=1e-6)
+
+
+TF = """\
+transforms:
+- header: {stamp: {sec: 0, nanosec: 0}, frame_id: base_link}
+  child_frame_id: camera_link
+  transform: {translation: {x: 1.0, y: 0.2, z: 0.5}, rotation: {x: 0.0, y: 0.0, z: 0.6, w: 0.8}}
+- header: {stamp: {sec: 0, nanosec: 0}, frame_id: camera_link}
+  child_frame_id: camera_optical_frame
+  transform: {translation: {x: 0.0, y: 0.0, z: 0.0}, rotation: {x: -0.5, y: 0.5, z: -0.5, w: 0.5}}
+---
+"""
+URDF = """\
+<robot name="r"><link name="base_link"/><link name="camera_link"/>
+<link name="camera_optical_frame"/>
+<joint name="a" type="fixed"><parent link="base_link"/><child link="camera_link"/>
+<origin xyz="1.0 0.2 0.5" rpy="0.1 0.2 0.3"/></joint>
+<joint name="b" type="fixed"><parent link="camera_link"/><child link="camera_optical_frame"/>
+<origin xyz="0 0 0" rpy="-1.57079632679 0 -1.57079632679"/></joint></robot>
+"""
+
+
+@pytest.mark.parametrize("frame", ["camera_link", "camera_optical_frame"])
+def test_frames_of_ros_are_optical_by_their_names(tmp_path: Path, frame: str) -> None:
+    """Either frame places the camera alike: 2 atan2(0.6, 0.8) to the left."""
+    found = mounted(tmp_path, f"frame: {frame}", "tf.yaml", TF)
+
+    assert found.offset_m == pytest.approx((1.0, 0.2, 0.5))
+    yaw_deg = 2.0 * math.degrees(math.atan2(0.6, 0.8))
+    assert (found.yaw_deg, found.pitch_deg, found.roll_deg) == pytest.approx((yaw_deg, 0, 0))
+
+
+@pytest.mark.parametrize("frame", ["camera_link", "camera_optical_frame"])
+def test_links_of_a_urdf_are_placed_by_roll_pitch_and_yaw(tmp_path: Path, frame: str) -> None:
+    """``Rz(yaw) Ry(pitch) Rx(roll)``: a positive pitch looks down."""
+    found = mounted(tmp_path, f"frame: {frame}", "robot.urdf", URDF)
+
+    assert found.offset_m == pytest.approx((1.0, 0.2, 0.5))
+    angles = np.degrees([0.3, -0.2, 0.1])
+    assert (found.yaw_deg, found.pitch_deg, found.roll_deg) == pytest.approx(tuple(angles))
+
+
+def test_axes_can_be_stated_where_a_name_misleads(tmp_path: Path) -> None:
+    content = TF.replace("camera_optical_frame", "camera_eye")
+    found = mounted(tmp_path, "frame: camera_eye, axes: optical", "tf.yaml", content)
+    assert found.pitch_deg == pytest.approx(0.0)
+    assert mounted(tmp_path, "frame: camera_eye", "tf.yaml", content).roll_deg == pytest.approx(-90)
+
+
+def test_a_camera_of_nuscenes_is_placed_on_the_ego_vehicle(tmp_path: Path) -> None:
+    """A camera that looks ahead: the rotation takes Z forward to X forward."""
+    (tmp_path / "sensor.json").write_text(json.dumps([
+        {"token": "s", "channel": "CAM_FRONT", "modality": "camera"},
+        {"token": "l", "channel": "LIDAR_TOP", "modality": "lidar"},
+    ]), "utf-8")  # fmt: skip
+    records = [
+        {"token": "a", "sensor_token": "s", "translation": [1.7, 0.016, 1.51],
+         "rotation": [0.5, -0.5, 0.5, -0.5],
+         "camera_intrinsic": [[1266.4, 0, 816.3], [0, 1266.4, 491.5], [0, 0, 1]]},
+        {"token": "b", "sensor_token": "l", "translation": [0.94, 0.0, 1.84],
+         "rotation": [math.sqrt(0.5), 0, 0, -math.sqrt(0.5)], "camera_intrinsic": []},
+    ]  # fmt: skip
+    text = ("size_px: [1600, 900], rig: r,"
+            " lens: {model: calibrated, file: FILE, camera: CAM_FRONT},"
+            " mounting: {file: FILE, frame: CAM_FRONT}")  # fmt: skip
+    (tmp_path / "c.json").write_text(json.dumps(records), "utf-8")
+    found = sensor(tmp_path, text, "c.json")
+
+    assert found.offset_m == (1.7, 0.016, 1.51)
+    assert (found.yaw_deg, found.pitch_deg, found.roll_deg) == (0.0, 0.0, 0.0)
+    assert found.nominal_intrinsics() == Intrinsics(1600, 900, 1266.4, 1266.4, 816.8, 492.0)
+    scanner = mounted(tmp_path, "frame: LIDAR_TOP", "c.json", json.dumps(records))
+    # Its frame has Y ahead: facing -90 degrees, Y is the vehicle's X.
+    assert (scanner.yaw_deg, scanner.pitch_deg, scanner.roll_deg) == (0.0, 0.0, 0.0)
+
+
+OBJECT = """\
+P0: 721.5 0 609.5 0 0 721.5 172.8 0 0 0 1 0
+P2: 721.5 0 609.5 44.85728 0 721.5 172.8 0.2163791 0 0 1 0.002745884
+R0_rect: 1 0 0 0 1 0 0 0 1
+Tr_velo_to_cam: 0 -1 0 -0.004 0 0 -1 -0.076 1 0 0 -0.27
+
+"""
+
+
+def test_a_calibration_of_kitti_places_cameras_from_the_scanner(tmp_path: Path) -> None:
+    """Points of the scanner through Tr, R0_rect and P2 are where the placed camera sees them."""
+    text = ("size_px: [1242, 375], lens: {model: calibrated, file: FILE, camera: camera_2}, rig: r,"
+            " mounting: {file: FILE, frame: camera_2, relative_to: velodyne}")  # fmt: skip
+    found = sensor(tmp_path, text, "000000.txt", content=OBJECT)
+
+    points = np.array([[12.0, 1.5, -0.5, 1.0], [30.0, -4.0, 0.2, 1.0]])
+    P = np.array([721.5, 0, 609.5, 44.85728, 0, 721.5, 172.8, 0.2163791, 0, 0, 1, 0.002745884])
+    Tr = np.array([0, -1, 0, -0.004, 0, 0, -1, -0.076, 1, 0, 0, -0.27, 0, 0, 0, 1.0])
+    image = points @ (P.reshape(3, 4) @ Tr.reshape(4, 4)).T
+    eye = np.linalg.inv(rig_pose(found)) @ points.T
+    np.testing.assert_allclose(
+        found.nominal_intrinsics().project(eye[:3].T),
+        image[:, :2] / image[:, 2:] + 0.5,
+        atol=0.01,
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "name", "content", "fact"),
+    [
+        ("frame: cam9", "chain.yaml", KALIBR, "has no frame 'cam9'; expected one of cam0, cam1"),
+        ("frame: cam1, relative_to: imu", "chain.yaml", KALIBR, "has no frame 'imu'"),
+        ("frame: cam1, axes: sideways", "chain.yaml", KALIBR, "expected one of optical, body"),
+        ("frame: cam1", "chain.yaml", KALIBR.replace("0.9998", "0.7"), "T_cn_cnm1: is no rotation"),
+        ("frame: a", "tf.yaml", TF.replace("w: 0.8", "w: 1.8"), "is no unit quaternion"),
+        ("frame: a", "r.urdf", URDF.replace('rpy="0.1', 'rpy="'), "expected three numbers"),
+        ("frame: a", "r.urdf", "<sdf/>", "its root element is <sdf>, not <opencv_storage>"),
+    ],
+)
+def test_a_bad_place_is_refused(
+    tmp_path: Path, text: str, name: str, content: str, fact: str
+) -> None:
+    message = told(tmp_path, f"rig: r, mounting: {{file: FILE, {text}}}", name, content=content)
+    assert fact in message
+
+
+def test_a_place_from_a_file_excludes_one_by_hand(tmp_path: Path) -> None:
+    text = "offset_m: [0, 0, 1], mounting: {file: FILE, frame: cam1}"
+    assert "offset_m: the file that mounting names gives it" in told(tmp_path, text, content=KALIBR)
