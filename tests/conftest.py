@@ -6,9 +6,11 @@ With ``GEN_DATA_CI`` set, a skipped test is a failed one: what skips everywhere 
 from __future__ import annotations
 
 import atexit
+import importlib
 import os
 import resource
 import shutil
+import sys
 import tempfile
 import time
 from collections.abc import Generator
@@ -36,6 +38,33 @@ SKIPS_ALLOWED_IN_CI = (
     "numpy's type hints are older and vaguer on Python 3.10",  # CI has 3.11
 )
 """Reasons that depend on where CI runs, and not on what ``.ci/run`` installs."""
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
+    """As many processes as this one may use cores and 2 GB each; none for single files.
+
+    One thread each: a second one of OpenMP or BLAS would spin while it waits for a core.
+    """
+    if all(argument.partition("::")[0].endswith(".py") for argument in config.args):
+        return 0
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    cores = len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1
+    memory_gb = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") / 1e9
+    return max(1, min(cores, int(memory_gb / 2.0)))
+
+
+@pytest.fixture(scope="session")
+def open3d() -> Any:
+    """The package; tests that use it are skipped, with the remedy, where it cannot be loaded."""
+    try:
+        return importlib.import_module("open3d")
+    except (ImportError, OSError) as error:
+        pytest.skip(
+            f"open3d ({error}): pip install open3d; "
+            "apt-get install libusb-1.0-0 libgl1 libegl1 libx11-6 libidn2-0 libgomp1"
+        )
 
 
 @pytest.hookimpl(wrapper=True)

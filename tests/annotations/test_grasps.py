@@ -1,4 +1,4 @@
-"""Grasps and suctions of a settled scene, held against Open3D's rays and sampled surfaces."""
+"""Grasps and suctions of a settled scene, held against rays and sampled surfaces."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from gen_data.generator.assemble.config import load_config
 from gen_data.generator.assemble.pipeline_factory import open_pipeline
 from gen_data.generator.core.sample import EgoTruth
 from gen_data.generator.core.scene import Scene
-from tests.annotations.test_relations import raycaster
+from tests.embree import RayCaster
 
 SETTINGS = Grasps(tried=48, most=4)
 
@@ -37,10 +37,9 @@ def settled() -> tuple[Scene, EgoTruth, dict[int, trimesh.Trimesh]]:
 
 
 def cast(mesh: trimesh.Trimesh, origin: Any, direction: Any) -> tuple[float, Any]:
-    """Distance to the first surface along a ray, and its normal, by Open3D."""
-    ray = np.concatenate([origin, direction])[None].astype(np.float32)
-    hit = raycaster(mesh).cast_rays(ray)
-    return float(hit["t_hit"].numpy()[0]), hit["primitive_normals"].numpy()[0]
+    """Distance to the first surface along a ray, and its normal, by Embree."""
+    hit = RayCaster((mesh.vertices, mesh.faces)).cast(origin, direction)
+    return float(hit.distance), hit.normal
 
 
 def test_every_grasp_is_antipodal_and_its_score_is_the_friction_it_needs() -> None:

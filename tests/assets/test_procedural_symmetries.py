@@ -6,12 +6,12 @@ import math
 from typing import Any
 
 import numpy as np
-import open3d as o3d
 import pytest
 
 from gen_data.generator.assets.library import Library, open_library
 from gen_data.generator.core.asset_types import MeshData, Symmetry
 from gen_data.generator.core.se3 import SE3
+from tests.distances import distances_m
 
 TOLERANCE = 0.005
 """Share of an object's diagonal; polygons stand for circles with 8 to 48 corners."""
@@ -67,17 +67,11 @@ def deviation(mesh: MeshData, symmetry: Symmetry) -> float:
     corners_m = mesh.vertices_m[mesh.faces].astype(np.float64)
     worst_m = 0.0
     for slot in np.unique(mesh.face_slots):
-        faces = mesh.faces[mesh.face_slots == slot]
-        scene = o3d.t.geometry.RaycastingScene()
-        scene.add_triangles(
-            o3d.core.Tensor(mesh.vertices_m.astype(np.float32)),
-            o3d.core.Tensor(faces.astype(np.uint32)),
-        )
         mine_m = corners_m[mesh.face_slots == slot]
         # Corners and centres of triangles: long thin ones bend away from a circle in the middle.
         points_m = np.concatenate([mine_m.reshape(-1, 3), mine_m.mean(axis=1)])
-        query = o3d.core.Tensor(turned(points_m, symmetry).astype(np.float32))
-        worst_m = max(worst_m, float(scene.compute_distance(query).numpy().max()))
+        points_m = np.unique(points_m, axis=0)
+        worst_m = max(worst_m, distances_m(turned(points_m, symmetry), mine_m).max())
     return worst_m / float(np.linalg.norm(np.ptp(corners_m.reshape(-1, 3), axis=0)))
 
 

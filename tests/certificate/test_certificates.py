@@ -27,10 +27,10 @@ from gen_data.generator.core.errors import (
 )
 from gen_data.generator.runner.verify import verify
 from tests.certificate.sealing import SMALL, edit_lines, reseal
+from tests.wheels import needs_open3d
 
 # pycocotools' decoder predates numpy 2's __array__(copy=...).
 pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
-pytest.importorskip("open3d", reason="certificates cast rays with open3d")
 
 QUICK = {"samples": 2, "rays": 400, "scenes": 0}
 """A scope for claims that need no scene drawn again."""
@@ -57,6 +57,7 @@ def failed(certificate: Certificate) -> set[str]:
     return {claim.name for claim, _ in certificate.findings(Status.FAILED)}
 
 
+@needs_open3d
 def test_a_good_data_set_passes_every_claim(certified: Path) -> None:
     """Also the one on distributions, whose false-alarm rate is 0.001 for any seed."""
     certificate = json.loads((certified / "CERTIFICATE.json").read_bytes())
@@ -87,6 +88,7 @@ def test_a_good_data_set_passes_every_claim(certified: Path) -> None:
     )
 
 
+@needs_open3d
 def test_figures_say_how_much_was_checked(certified: Path) -> None:
     """Four images of 200 pixels; the images of all 64 samples in COCO, which score 1."""
     plain = json.loads((certified / "CERTIFICATE.json").read_bytes())
@@ -190,6 +192,7 @@ def test_a_box_that_is_not_its_masks_is_named(damaged: Callable[[], Path]) -> No
     assert "sample 19, color" in findings(certificate)["boxes and masks"].evidence[0]
 
 
+@needs_open3d
 def test_scaled_depth_is_named(damaged: Callable[[], Path]) -> None:
     """Two per cent are more than any tolerance."""
     copy = damaged()
@@ -216,6 +219,7 @@ def exchange_photographs(copy: Path) -> None:
     reseal(copy)
 
 
+@pytest.mark.slow
 def test_exchanged_photographs_are_named(damaged: Callable[[], Path]) -> None:
     """Without the log of the run, only generating them again tells each is the other's picture."""
     copy = damaged()
@@ -281,6 +285,7 @@ def test_a_picture_that_is_another_one_in_an_export_is_named(damaged: Callable[[
     )
 
 
+@needs_open3d
 def test_exchanged_instances_are_named(damaged: Callable[[], Path]) -> None:
     """Ids are compared, and not only depths."""
     copy = damaged()
@@ -292,6 +297,7 @@ def test_exchanged_instances_are_named(damaged: Callable[[], Path]) -> None:
     assert "pixels" in failed(gen_data.certify(copy, **QUICK))
 
 
+@needs_open3d
 def test_moved_laser_points_are_named(damaged: Callable[[], Path]) -> None:
     """By three centimetres towards the sky of the scanner."""
     copy = damaged()

@@ -22,10 +22,10 @@ from tests.certificate.sealing import SMALL, edit_lines, reseal
 
 pytestmark = [
     pytest.mark.slow,
+    pytest.mark.usefixtures("open3d"),
     # pycocotools' decoder predates numpy 2's __array__(copy=...).
     pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning"),
 ]
-pytest.importorskip("open3d", reason="certificates cast rays with open3d")
 
 N = 24
 SHARD = "shards/000000"

@@ -14,6 +14,7 @@ from tests.contracts.asset_digests import (
 )
 
 
+@pytest.mark.slow
 def test_families_with_other_bytes_have_another_version(tmp_path: Path) -> None:
     """Else raise ``version`` in its table, then ``python -m tests.contracts.asset_digests``."""
     stored_numerics, stored = read_stored()

@@ -23,8 +23,11 @@ from gen_data.generator.core.scene import Body, Scene
 from gen_data.generator.core.scene_time import place_sensors
 from gen_data.generator.core.serialization import canonical_json
 from gen_data.generator.core.streams import Streams
+from tests.tiers import cases, slow
 
 CONFIGS = sorted(path.stem for path in Path(configs.__path__[0]).glob("*.yaml"))
+QUICK = ("bin_picking", "kitti_stereo", "shelf", "street", "tabletop")
+"""Configurations of which the default run draws scenes."""
 TEMPLATES = sorted(path.stem for path in Path(scene_templates.__path__[0]).glob("*.yaml"))
 
 
@@ -71,6 +74,7 @@ def randomized(name: str, streams: Streams) -> Scene | None:
     return scene
 
 
+@slow
 def test_every_template_is_used_by_a_configuration() -> None:
     """Shipped files can be loaded."""
     assert {spec(name).general.template for name in CONFIGS} == set(TEMPLATES)
@@ -120,7 +124,7 @@ def test_configuration_satisfies_the_schema_that_editors_check_it_against(name: 
     assert not errors
 
 
-@pytest.mark.parametrize("name", CONFIGS)
+@pytest.mark.parametrize("name", cases(CONFIGS, QUICK))
 def test_nominal_objects_stand_on_their_surfaces_inside_the_room(name: str) -> None:
     """Over one of the group's rectangles, at its height or higher, below its ceiling."""
     scene = scene_of(name)
@@ -142,7 +146,7 @@ def test_nominal_objects_stand_on_their_surfaces_inside_the_room(name: str) -> N
         assert (high <= scene.interior_m[1] + np.array([0.15, 0.15, 0.15])).all()
 
 
-@pytest.mark.parametrize("name", CONFIGS)
+@pytest.mark.parametrize("name", cases(CONFIGS, QUICK))
 def test_nominal_scene_is_the_same_every_time(name: str) -> None:
     """Built twice, from two libraries."""
     again = nominal_scene(spec(name), spec(name).probes[0], open_library(()))
@@ -150,7 +154,7 @@ def test_nominal_scene_is_the_same_every_time(name: str) -> None:
     assert canonical_json(again) == canonical_json(scene_of(name))
 
 
-@pytest.mark.parametrize("name", CONFIGS)
+@pytest.mark.parametrize("name", cases(CONFIGS, QUICK))
 def test_randomizers_draw_valid_scenes(name: str) -> None:
     """Three scenes: unique names and ids, cameras and lamps in the room, few refused attempts."""
     attempts = 0

@@ -14,6 +14,7 @@ import yaml
 from gen_data.generator.assemble.config import load_config
 from gen_data.generator.assemble.pipeline_factory import PipelineFactory
 from gen_data.generator.cli.main import cli
+from tests.tiers import slow
 
 ROOT = Path(__file__).parents[2]
 PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *ROOT.glob("examples/**/*.md")])
@@ -47,10 +48,13 @@ def completed(text: str, props: Path) -> str:
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize(
     ("page", "text"),
-    [pytest.param(page, text, id=f"{page.name}-{number}") for page, number, text in EXAMPLES],
+    [
+        pytest.param(page, text, id=f"{page.name}-{number}", marks=slow if number else ())
+        for page, number, text in EXAMPLES
+    ],
 )
 def test_configurations_are_valid(page: Path, text: str, tmp_path: Path) -> None:
-    """Every field is known and in range, no word is old, and all names are defined."""
+    """Every field is known and in range, no word is old; the first example of a page is quick."""
     props = tmp_path / "props"
     props.mkdir()
     (props / "one.obj").write_text(

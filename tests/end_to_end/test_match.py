@@ -34,14 +34,27 @@ randomizers: [{name: orbit, distance_m: {uniform: [0.6, 1.0]}}]
 """
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A configuration, recordings of another one, and the result of a fit."""
-    place = tmp_path_factory.mktemp("match")
+def record(place: Path, n: int) -> Path:
+    """A configuration, and recordings of another one."""
     (place / "configs").mkdir()
     (place / "configs" / "base.yaml").write_text(BASE, encoding="utf-8")
     (place / "configs" / "real.yaml").write_text(REAL, encoding="utf-8")
-    gen_data.generate(place / "configs" / "real.yaml", n=20, out=place / "real", workers=0)
+    only_train = ("splits={train: 1, val: 0, test: 0}",)
+    real = place / "configs" / "real.yaml"
+    gen_data.generate(real, n=n, out=place / "real", workers=0, overrides=only_train)
+    return place
+
+
+@pytest.fixture(scope="module")
+def unmatched(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Too few recordings for a fit."""
+    return record(tmp_path_factory.mktemp("unmatched"), 1)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Recordings, and the result of a fit."""
+    place = record(tmp_path_factory.mktemp("match"), 20)
     arguments = ("real", "configs/base.yaml", "--out", "fits/a.yaml", "--scenes", "10")
     done = run("match", *arguments, cwd=place, COLUMNS="200")
     assert done.returncode == 0, done.stderr
@@ -49,6 +62,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return place
 
 
+@pytest.mark.slow
 def test_the_fitted_configuration_extends_the_given_one(folder: Path) -> None:
     """Wherever it lies; it differs in the fitted fields only, each under its interval."""
     text = (folder / "fits" / "a.yaml").read_text(encoding="utf-8")
@@ -63,6 +77,7 @@ def test_the_fitted_configuration_extends_the_given_one(folder: Path) -> None:
     assert camera.size_px == (192, 144)
 
 
+@pytest.mark.slow
 def test_the_report_has_the_same_figures_in_all_forms(folder: Path) -> None:
     """The terminal, JSON and the page; known values lie in the intervals, wide for ten scenes."""
     figures = json.loads((folder / "fits" / "a.json").read_text(encoding="utf-8"))
@@ -83,6 +98,7 @@ def test_the_report_has_the_same_figures_in_all_forms(folder: Path) -> None:
     assert level["apart_after"] < level["apart_before"]
 
 
+@pytest.mark.slow
 def test_a_fitted_configuration_can_be_planned(folder: Path) -> None:
     """As any other."""
     done = run("plan", "fits/a.yaml", "--n", "4", cwd=folder)
@@ -103,12 +119,12 @@ def test_a_fitted_configuration_can_be_planned(folder: Path) -> None:
     ],
 )  # fmt: skip
 def test_wrong_arguments_are_one_line(
-    folder: Path, arguments: tuple[str, ...], message: str
+    unmatched: Path, arguments: tuple[str, ...], message: str
 ) -> None:
     """And nothing is written."""
-    done = run("match", *arguments, cwd=folder)
+    done = run("match", *arguments, cwd=unmatched)
 
     assert done.returncode in (2, 4)
     assert message in done.stderr
     assert len(done.stderr.splitlines()) == 1
-    assert not (folder / "matched.yaml").exists()
+    assert not (unmatched / "matched.yaml").exists()

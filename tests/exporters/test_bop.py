@@ -1,4 +1,4 @@
-"""BOP export: models rendered again by Open3D under the written poses, as bop_toolkit does it."""
+"""BOP export: models rendered again by Embree under the written poses, as bop_toolkit does it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from typing import Any
 
 import cv2
 import numpy as np
-import open3d as o3d
 import pytest
 import trimesh
 from pycocotools import mask as coco_mask
@@ -28,6 +27,7 @@ from gen_data.generator.core.asset_types import Symmetry
 from gen_data.generator.core.errors import AssetError, ConfigError
 from gen_data.generator.core.scene import Articulation
 from gen_data.generator.core.se3 import IDENTITY, SE3
+from tests.embree import RayCaster
 
 pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
 
@@ -51,22 +51,16 @@ class Renderer:
         self._scenes = {}
         for path in folder.glob("obj_*.ply"):
             mesh = trimesh.load(path, process=False)
-            scene = o3d.t.geometry.RaycastingScene(nthreads=1)
-            scene.add_triangles(
-                np.asarray(mesh.vertices, np.float32), np.asarray(mesh.faces, np.uint32)
-            )
-            self._scenes[int(path.stem[4:])] = scene
+            self._scenes[int(path.stem[4:])] = RayCaster((mesh.vertices, mesh.faces))
 
     def depth(self, gt: Any, camera: Any, width: int, height: int) -> Any:
         k = np.array(camera["cam_K"]).reshape(3, 3)
         rotation = np.array(gt["cam_R_m2c"]).reshape(3, 3)
         u, v = np.meshgrid(np.arange(-width, 2 * width) + 0.5, np.arange(-height, 2 * height) + 0.5)
         rays = np.stack([(u - k[0, 2]) / k[0, 0], (v - k[1, 2]) / k[1, 1], np.ones_like(u)], -1)
-        origin = np.broadcast_to(-np.array(gt["cam_t_m2c"]) @ rotation, rays.shape)
         # Rays have a unit of depth per unit of length, so that distances are depths.
-        cast = np.concatenate([origin, rays @ rotation], -1).astype(np.float32)
-        hits = self._scenes[gt["obj_id"]].cast_rays(o3d.core.Tensor(cast), nthreads=1)["t_hit"]
-        depth = hits.numpy()
+        eye = -np.array(gt["cam_t_m2c"]) @ rotation
+        depth = self._scenes[gt["obj_id"]].cast(eye, rays @ rotation).distance
         return np.where(np.isfinite(depth), depth, 0.0)
 
 

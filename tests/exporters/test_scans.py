@@ -29,6 +29,7 @@ from gen_data.generator.core.asset_types import SURFACES
 from gen_data.generator.core.capture import POINT
 from gen_data.generator.core.errors import ConfigError, StorageError
 from gen_data.generator.core.motion import Twist
+from tests.wheels import needs_open3d
 
 POINT_FIELDS = [
     *("x", "y", "z", "intensity", "time", "ring", "instance", "category", "surface"),
@@ -220,17 +221,15 @@ def test_things_under_way_have_moving_classes(world: Any) -> None:
     assert set(classes[points["instance_id"] == 2]) == {30}
 
 
+@needs_open3d
 @pytest.mark.parametrize("kind", ["ply", "pcd"])
-def test_open3d_reads_point_clouds(kind: str, world: Any, tmp_path: Path) -> None:
+def test_open3d_reads_point_clouds(kind: str, world: Any, open3d: Any, tmp_path: Path) -> None:
     """All positions and all scalar fields, as written."""
-    o3d = pytest.importorskip(
-        "open3d", reason="Open3D needs system libraries", exc_type=(ImportError, OSError)
-    )
     info = world.info(7, lidars=("top",))
     folder = world.export(PointClouds(format=kind), info, world.samples, tmp_path)
     points = world.samples[2].capture.clouds["top"].points
 
-    read = o3d.t.io.read_point_cloud(str(folder / f"top/000000002.{kind}"))
+    read = open3d.t.io.read_point_cloud(str(folder / f"top/000000002.{kind}"))
 
     np.testing.assert_array_equal(read.point["positions"].numpy(), points["position_m"])
     for name, field in (("intensity", "intensity"), ("instance", "instance_id")):
@@ -250,6 +249,23 @@ def test_a_ply_file_is_what_its_header_says(world: Any, tmp_path: Path) -> None:
 
     assert list(dtype.names or ()) == POINT_FIELDS
     records = np.frombuffer(body, dtype)
+    np.testing.assert_array_equal(records["category"], points["category_id"])
+    np.testing.assert_array_equal(records["z"], points["position_m"][:, 2])
+
+
+def test_a_pcd_file_is_what_its_header_says(world: Any, tmp_path: Path) -> None:
+    """Parsed by hand by PCL's description: sizes, types and number of points."""
+    info = world.info(7, lidars=("top",))
+    folder = world.export(PointClouds(format="pcd"), info, world.samples, tmp_path)
+    header, body = (folder / "top/000000000.pcd").read_bytes().split(b"DATA binary\n", 1)
+    lines = dict(line.split(" ", 1) for line in header.decode("ascii").splitlines())
+    kinds = zip(lines["TYPE"].lower().split(), lines["SIZE"].split(), strict=True)
+    points = world.samples[0].capture.clouds["top"].points
+
+    assert lines["FIELDS"].split() == POINT_FIELDS
+    dtype = np.dtype(list(zip(POINT_FIELDS, (f"<{t}{n}" for t, n in kinds), strict=True)))
+    records = np.frombuffer(body, dtype)
+    assert len(records) == int(lines["POINTS"]) == len(points)
     np.testing.assert_array_equal(records["category"], points["category_id"])
     np.testing.assert_array_equal(records["z"], points["position_m"][:, 2])
 

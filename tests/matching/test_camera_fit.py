@@ -57,6 +57,7 @@ def row(part: Part, name: str) -> FittedQuantity:
         ("noise", 3000.0, 1000.0),
     ],
 )
+@pytest.mark.slow
 def test_known_parameters_are_recovered(
     fitted: Part, name: str, truth: float, tolerance: float
 ) -> None:
@@ -101,6 +102,7 @@ def test_read_noise_is_recovered() -> None:
     assert "image_pipeline.image_sensor.read_noise_e" in fields
 
 
+@pytest.mark.slow
 def test_a_spread_of_exposures_becomes_a_distribution(fitted: Part) -> None:
     """Its deviation of 0.4 stops is told from that of scenes; blur, which has none, is a number."""
     found = row(fitted, "exposure")
@@ -110,6 +112,7 @@ def test_a_spread_of_exposures_becomes_a_distribution(fitted: Part) -> None:
     assert row(fitted, "blur").value == pytest.approx(1.0, abs=0.06)
 
 
+@pytest.mark.slow
 def test_qualities_of_jpeg_are_found_in_decoded_pixels(fitted: Part) -> None:
     """Each of the two qualities, as often as it occurred."""
     found = row(fitted, "JPEG quality").value["choice"]
@@ -118,6 +121,7 @@ def test_qualities_of_jpeg_are_found_in_decoded_pixels(fitted: Part) -> None:
     assert sum(found.values()) == 30
 
 
+@pytest.mark.slow
 def test_simulated_pictures_come_nearer_to_the_real_ones(fitted: Part) -> None:
     """Means of every fitted statistic, in units of the distance before; means have errors."""
     for one in fitted.statistics[:6]:

@@ -14,6 +14,7 @@ from gen_data.generator.core.sample import Sample
 from gen_data.generator.core.scene import Scene
 from gen_data.generator.core.serialization import canonical_json
 from gen_data.randomizers.arm_task_table import tasks
+from tests.tiers import cases
 
 SMALL = ("sensors.color.size_px=[96,72]", "sensors.wrist.size_px=[96,72]")
 OWN = """nudge:
@@ -43,7 +44,10 @@ def demonstrated(task: str, scene_index: int = 0, failures: str = "{}") -> Scene
         return pipeline.accepted_scene(scene_index).scene
 
 
-@pytest.mark.parametrize("task", sorted(tasks()))
+QUICK = ("bin_picking_suction", "open_drawer", "pick_and_place", "stack")
+
+
+@pytest.mark.parametrize("task", cases(sorted(tasks()), QUICK))
 def test_every_task_is_demonstrated_with_success(task: str) -> None:
     """Its phases are those of the program; things are named in the instruction, not braced."""
     scene = demonstrated(task)

@@ -1,4 +1,4 @@
-"""Depth and ids against Intel Embree (Open3D), on constructed and on shipped scenes."""
+"""Depth and ids against Intel Embree, on constructed and on shipped scenes."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from gen_data.generator.core.scene import Body, Camera, Scene
 from gen_data.generator.core.se3 import SE3
 from gen_data.generator.pipeline import Pipeline
 from gen_data.generator.renderers.warp.renderer import WarpRenderer
-from tests.renderers.embree import cast, near_edges, open3d_or_skip
+from tests.renderers.embree import cast, near_edges
 from tests.renderers.fake_library import FakeLibrary, box_mesh, camera_at, room_mesh, sphere_mesh
 
 LABELS = frozenset({Channel.Z_DEPTH, Channel.INSTANCE})
@@ -67,14 +67,12 @@ def random_scene(seed: int) -> tuple[Scene, Camera]:
 @pytest.mark.parametrize("seed", range(3))
 def test_bodies_that_cut_each_other_agree_with_embree(seed: int) -> None:
     """Scaled, rotated, interpenetrating bodies: nothing is assumed about scenes."""
-    open3d_or_skip()
     assert_agrees_with_embree(WarpRenderer(LIBRARY, "cpu"), LIBRARY, *random_scene(seed))
 
 
 @pytest.fixture(scope="module")
 def tabletop() -> Iterator[Pipeline]:
     """Random scenes of the shipped tabletop, one view each."""
-    open3d_or_skip()
     spec = load_config("tabletop.yaml", seed=3, overrides=("views_per_scene=1",))
     with open_pipeline(spec) as pipeline:
         yield pipeline

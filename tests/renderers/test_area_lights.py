@@ -22,7 +22,7 @@ from gen_data.generator.renderers.warp.scene.kernels.brdf import make_brdf, spec
 from gen_data.generator.renderers.warp.scene.light_selection import main_lamps
 from gen_data.generator.renderers.warp.scene.scene_packing import lamp_records
 from gen_data.generator.renderers.warp.settings import RenderSettings
-from tests.renderers.embree import open3d_or_skip
+from tests.embree import RayCaster, placed
 from tests.renderers.fake_library import DARK, MATTE, FakeLibrary, box_mesh, camera_at, plane_mesh
 
 PLAIN = RenderSettings(ambient_occlusion_radius_m=0.0, antialias=1)
@@ -257,7 +257,6 @@ def test_shadows_of_panels_are_as_soft_as_their_shape_says(light: Light) -> None
     all parts of a panel for equally bright, while the nearer ones give more: hence errors of 5 % of
     the unshaded light, towards the dark.
     """
-    o3d = open3d_or_skip()
     library = FakeLibrary({"plane": plane_mesh(20.0, (MATTE,)), "box": box_mesh()})
     block = Body("b", "box", SE3.about_z(0.5, (0.1, 0.1, 0.15)), 0.3)
     scene = Scene("t", (Body("p", "plane"), block), lights=(light,), environment=DARK)
@@ -269,19 +268,12 @@ def test_shadows_of_panels_are_as_soft_as_their_shape_says(light: Light) -> None
         camera.intrinsics.unproject(np.ones((240, 320), np.float32)).reshape(240, 320, 3)
     )[::8, ::8].reshape(-1, 3)
     p = np.asarray(camera.T_world_camera.translation_m) + d * (-6.0 / d[..., 2:])
-    mesh = library.mesh("box")
-    caster = o3d.t.geometry.RaycastingScene(nthreads=1)
-    vertices = block.T_world_body.apply(mesh.vertices_m.astype(np.float64) * 0.3)
-    caster.add_triangles(
-        o3d.core.Tensor(vertices.astype(np.float32)), o3d.core.Tensor(mesh.faces.astype(np.uint32))
-    )
     q, _ = points_on(light, 40)
-    ways = q[None] - p[:, None]
-    rays = np.concatenate([np.broadcast_to(p[:, None], ways.shape), ways], axis=-1)
-    hit = caster.test_occlusions(o3d.core.Tensor(rays.astype(np.float32)), tnear=1e-4, tfar=1.0)
+    caster = RayCaster(placed(block, library))
+    hidden = caster.is_blocked(p[:, None], q[None] - p[:, None], near=1e-4, far=1.0)
     on_block = np.abs(block.T_world_body.inverse().apply(p)[:, :2]).max(axis=1) < 0.21
     n = np.tile((0.0, 0.0, 1.0), (len(p), 1))
-    expected = summed_lux(light, p, n, ~hit.numpy())
+    expected = summed_lux(light, p, n, ~hidden)
     unshaded = summed_lux(light, p, n)
     error = ((measured.reshape(-1) - expected) / unshaded)[~on_block]
     shaded = (expected < 0.9 * unshaded)[~on_block]

@@ -20,7 +20,7 @@ from gen_data.generator.renderers.warp.scene.kernels.ray_queries import (
 )
 from gen_data.generator.renderers.warp.scene.kernels.records import HOLES, World
 from gen_data.generator.renderers.warp.scene.scene_packing import pack_world
-from tests.renderers.embree import open3d_or_skip
+from tests.embree import NOTHING, RayCaster, placed
 from tests.renderers.fake_library import FakeLibrary, box_mesh, forward_camera, sphere_mesh
 
 WIDTH = 8
@@ -268,7 +268,6 @@ def test_no_ray_leaves_a_closed_mesh() -> None:
 
 @pytest.mark.parametrize("count", [1, 8, 60])
 def test_rays_meet_the_body_that_embree_finds(count: int) -> None:
-    o3d = open3d_or_skip()
     rng = np.random.default_rng(count)
     library = FakeLibrary({"box": box_mesh((0.2, 0.3, 0.1)), "ball": sphere_mesh(0.15, rings=17)})
     bodies = []
@@ -291,18 +290,9 @@ def test_rays_meet_the_body_that_embree_finds(count: int) -> None:
     wp.launch(trace_world, 4000, [world.record, o, d, REACH], out, device=device)
     t, body, blocked = (a.numpy() for a in out)
 
-    caster = o3d.t.geometry.RaycastingScene(nthreads=1)
-    for placed in bodies:
-        mesh = library.mesh(placed.asset)
-        vertices = placed.T_world_body.apply(mesh.vertices_m.astype(np.float64) * placed.scale)
-        caster.add_triangles(
-            o3d.core.Tensor(vertices.astype(np.float32)),
-            o3d.core.Tensor(mesh.faces.astype(np.uint32)),
-        )
-    shot = np.concatenate([origins, ways], axis=-1).astype(np.float32)
-    hit = caster.cast_rays(o3d.core.Tensor(shot))
-    expected, number = hit["t_hit"].numpy(), hit["geometry_ids"].numpy().astype(np.int64)
-    number[~np.isfinite(expected) | (expected > REACH)] = -1
+    hits = RayCaster(*(placed(body, library) for body in bodies)).cast(origins, ways)
+    expected = hits.distance
+    number = np.where(expected > REACH, NOTHING, hits.mesh)
 
     # All but rays through edges.
     assert (body == number).mean() >= 0.999

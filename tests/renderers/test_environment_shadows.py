@@ -21,7 +21,7 @@ from gen_data.generator.renderers.warp.scene.environment_maps import (
     upload_split,
 )
 from gen_data.generator.renderers.warp.settings import RenderSettings
-from tests.renderers.embree import open3d_or_skip
+from tests.embree import RayCaster, placed
 from tests.renderers.fake_library import (
     MATTE,
     FakeLibrary,
@@ -207,7 +207,6 @@ def test_a_block_throws_the_shadow_that_the_panorama_implies(name: str, yaw_rad:
 
     The rest of the sky is taken as unshaded on both sides: it throws no shadow here.
     """
-    o3d = open3d_or_skip()
     block = Body("b", "box", SE3.about_z(0.3, (0.0, 0.0, 0.15)), 0.3)
     scene, library = scene_under(Environment(name, MEAN_CD_M2, yaw_rad=yaw_rad), block)
 
@@ -222,17 +221,8 @@ def test_a_block_throws_the_shadow_that_the_panorama_implies(name: str, yaw_rad:
     weights = luminance[bright] * solid[bright] * np.maximum(towards[:, 2], 0.0)
     on_ground = (p[..., 2] < 1e-3).reshape(-1)
     ground = p.reshape(-1, 3)[on_ground]
-    mesh = library.mesh("box")
-    caster = o3d.t.geometry.RaycastingScene(nthreads=1)
-    vertices = block.T_world_body.apply(mesh.vertices_m.astype(np.float64) * 0.3)
-    caster.add_triangles(
-        o3d.core.Tensor(vertices.astype(np.float32)), o3d.core.Tensor(mesh.faces.astype(np.uint32))
-    )
-    shape = (len(ground), len(towards), 3)
-    rays = np.concatenate(
-        [np.broadcast_to(ground[:, None], shape), np.broadcast_to(towards, shape)], axis=-1
-    )
-    hidden = caster.test_occlusions(o3d.core.Tensor(rays.astype(np.float32)), tnear=1e-3).numpy()
+    caster = RayCaster(placed(block, library))
+    hidden = caster.is_blocked(ground[:, None], towards[None], near=1e-3)
     whole = irradiance(image, np.array([[0.0, 0.0, 1.0]]))[0] @ LUMINANCE
     expected = (whole - hidden @ weights) / whole
     measured = (lit.reshape(-1, 3)[on_ground] @ LUMINANCE) / (whole * MEAN_CD_M2 * 0.5 / math.pi)

@@ -23,7 +23,8 @@ from gen_data.generator.renderers.warp.scene.kernels.records import View
 from gen_data.generator.renderers.warp.scene.scene_packing import pack_view
 from gen_data.generator.renderers.warp.visibility.amodal import bounding_cone
 from gen_data.generator.renderers.warp.visibility.kernels.distortion import project_to_pixel
-from tests.renderers.embree import near_edges, open3d_or_skip
+from tests.embree import RayCaster, placed
+from tests.renderers.embree import near_edges
 from tests.renderers.fake_library import DARK, FakeLibrary, box_mesh, room_mesh, sphere_mesh
 
 BARREL = Lens(
@@ -148,7 +149,6 @@ def test_a_pinhole_has_no_table_of_directions() -> None:
 @pytest.mark.parametrize("name", CAMERAS)
 def test_ranges_are_embrees_along_opencvs_directions(name: str) -> None:
     """Boxes and balls before and beside the camera: 0.1 mm and equal ids on 99.9 % of pixels."""
-    o3d = open3d_or_skip()
     rng = np.random.default_rng(8)
     spots = rng.uniform((-2.0, -2.0, 0.8), (2.0, 2.0, 3.0), (24, 3))
     bodies = [Body("room", "room", SE3((0.0, 0.0, -0.5)))]
@@ -160,16 +160,9 @@ def test_ranges_are_embrees_along_opencvs_directions(name: str) -> None:
     rays = opencv_rays(k)
     trusted = np.abs(opencv_places(k, rays) - pixel_centres(k)).max(axis=1) < 1e-3
     trusted = trusted.reshape(k.height_px, k.width_px)
-    caster = o3d.t.geometry.RaycastingScene(nthreads=1)
-    for body in bodies:
-        mesh = MESHES[body.asset]
-        vertices = body.T_world_body.apply(mesh.vertices_m.astype(np.float64) * body.scale)
-        caster.add_triangles(
-            o3d.core.Tensor(vertices.astype(np.float32)), o3d.core.Tensor(mesh.faces.astype("u4"))
-        )
-    six = np.concatenate([np.zeros_like(rays), rays], axis=-1).astype(np.float32)
-    hit = caster.cast_rays(o3d.core.Tensor(six))
-    expected_m, numbers = hit["t_hit"].numpy(), hit["geometry_ids"].numpy()
+    library = FakeLibrary(MESHES)
+    hits = RayCaster(*(placed(body, library) for body in bodies)).cast((0.0, 0.0, 0.0), rays)
+    expected_m, numbers = hits.distance, hits.mesh
 
     channels = rendered(scene_of(*bodies), ahead(k)).channels
 

@@ -337,6 +337,7 @@ def test_converged_images_are_those_of_mitsuba(name: str) -> None:
         assert worst_p(own, theirs) > FAMILY_LEVEL
 
 
+@pytest.mark.slow
 def test_a_closed_box_looks_as_in_mitsuba() -> None:
     """Few samples: the same mean radiance to three standard errors, no pixel off beyond chance."""
     pytest.importorskip("mitsuba")

@@ -1,0 +1,33 @@
+"""Which cases of a test the default run has, and which only CI (``pytest -m slow``)."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable
+from typing import Any
+
+import pytest
+
+slow = pytest.mark.slow
+"""Takes more than about 3 s of processor time, or repeats a quick test for more cases."""
+
+
+def cases(values: Iterable[Any], quick: Collection[Any]) -> list[Any]:
+    """Parameters of a test: all but the quick ones are slow."""
+    return [value if value in quick else _slow(value) for value in values]
+
+
+first_and_all = pytest.mark.parametrize(
+    "how_many", ["first", pytest.param("all", marks=slow)], ids=str
+)
+"""A test of few members of each kind, and a slow one of all."""
+
+
+def seeds(quick: int, count: int) -> pytest.MarkDecorator:
+    """A test of the first seeds, and a slow one of the others, as its argument ``seeds``."""
+    first, others = range(quick), range(quick, count)
+    named = [pytest.param(first, id="first"), pytest.param(others, id="others", marks=slow)]
+    return pytest.mark.parametrize("seeds", named)
+
+
+def _slow(value: Any) -> Any:
+    return pytest.param(*(value if isinstance(value, tuple) else (value,)), marks=slow)
