@@ -219,7 +219,8 @@ class FileLibrary:
         self, owner: str, one: IndexedAsset, folder: Folder, name: str, channels: str
     ) -> UInt8:
         """Pixels of an image, embedded in a mesh file or beside it."""
-        if one.kind == "object" and name in (images := self.imported(owner).images):
+        has_mesh = one.kind == "object" or owner != one.asset_id
+        if has_mesh and name in (images := self.imported(owner).images):
             return images[name]
         pixels: UInt8 = self._decode_cached(folder, name, channels)
         return pixels

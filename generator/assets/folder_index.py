@@ -219,8 +219,9 @@ class MeshEntry(Origin):
     """Axis of the file that points forward and becomes +X; instead of yaw_deg."""
     yaw_deg: float = 0.0
     """Rotation about the vertical that turns the front to +X."""
-    origin: Literal["center", "floor"] = "center"
-    """Origin of the asset: centre of the bounding box, or of its bottom face (furniture)."""
+    origin: Literal["center", "floor", "file"] = "center"
+    """Origin of the asset: centre of the bounding box, of its bottom face (furniture), or the
+    file's own, to which poses of CAD models and of real data sets refer."""
     mass_kg: Annotated[float, Field(ge=0.0)] = 0.0
     stackable: bool = False
     collision: str = ""
