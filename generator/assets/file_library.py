@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import lru_cache
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -31,8 +32,10 @@ from gen_data.generator.assets.folder_index import (
     read_index,
     user_folder,
 )
+from gen_data.generator.assets.image_decoding import DECODER_VERSION
 from gen_data.generator.assets.importer import (
     VERSION,
+    FileRemarks,
     ImportedMesh,
 )
 from gen_data.generator.assets.installed_packs import RECORD_NAME, pack_assets
@@ -85,7 +88,7 @@ class FileLibrary:
     ) -> None:
         self._packs = packs
         self._user_roots = tuple(user_roots)
-        self._store = store
+        self._store, self._disk = store, disk
         self._digests = ContentHashes(disk)
         self._listed: dict[str, IndexedAsset] | None = None
         self._urdfs: dict[str, Urdf] = {}
@@ -147,8 +150,56 @@ class FileLibrary:
         if isinstance(entry, RobotEntry) and not part:
             links = ", ".join(f"{asset_id}/{n}" for n in list(self._urdf(one).links)[:2])
             raise AssetError(f"asset '{asset_id}': is a robot; its meshes are {links}, ...")
-        key = content_key({"asset": self._key(one), "link": name})
-        return self._store.get(key, compute, unpack_imported)
+        return self._store.get(self._mesh_key(one, name), compute, unpack_imported)
+
+    def _mesh_key(self, one: IndexedAsset, part: str) -> str:
+        return content_key({"asset": self._key(one), "link": part})
+
+    def remarks(self, asset_id: str, *, read: bool) -> tuple[FileRemarks, ...] | None:
+        """What was seen in an asset's files and not used.
+
+        Args:
+            asset_id: An asset, also of another kind than an object.
+            read: Whether to import an asset whose geometry is not stored.
+
+        Returns:
+            The remarks with whole paths; None if it is not stored and shall not be read.
+
+        Raises:
+            AssetError: if it cannot be imported.
+        """
+        part = self._part(asset_id)
+        one = part[0] if part else self._entries()[asset_id]
+        if part:
+            names = [part[1]]
+        elif one.kind == "robot":
+            names = list(self._urdf(one).links)
+        else:
+            names = [""] if one.kind == "object" else []
+        found = [self._remarks_of(one, name, read) for name in names]
+        known = [remarks for remarks in found if remarks is not None]
+        if len(known) < len(found):
+            return None
+        return tuple(
+            replace(remarks, file=str(one.root / remarks.file))
+            for remarks in dict.fromkeys(chain(*known))
+        )
+
+    def _remarks_of(
+        self, one: IndexedAsset, part: str, read: bool
+    ) -> tuple[FileRemarks, ...] | None:
+        """Remarks on an object, one link or one piece; see ``remarks``."""
+        stored = self._disk.find(self._mesh_key(one, part))
+        if stored is not None:
+            return unpack_imported(stored).remarks
+        name = f"{one.asset_id}/{part}" if part else one.asset_id
+        return self.imported(name).remarks if read else None
+
+    def is_user(self, asset_id: str) -> bool:
+        """Whether an asset, link or piece comes from one of the user's folders."""
+        part = self._part(asset_id)
+        one = part[0] if part else self._entries().get(asset_id)
+        return one is not None and one.root in self._user_roots
 
     def lanes(self, asset_id: str) -> tuple[Lane, ...]:
         """Lanes of a road network; empty for anything else."""
@@ -252,7 +303,11 @@ class FileLibrary:
                 f"{folder.root / name}: no such image; add it or correct the reference to it"
             )
         digests = self._digests.of(folder, name)
-        key: dict[str, object] = {"format": FORMAT, "image": digests[name]}
+        key: dict[str, object] = {
+            "format": FORMAT,
+            "decoder": DECODER_VERSION,
+            "image": digests[name],
+        }
         if channels == "rgba":
             key["channels"] = channels
         return self._store.get(
@@ -270,9 +325,10 @@ class FileLibrary:
             self._listed = {}
             for one in _list_everything(self._packs, self._user_roots):
                 if one.asset_id in self._listed:
+                    other = self._listed[one.asset_id]
                     raise AssetError(
-                        f"asset '{one.asset_id}': defined in {self._listed[one.asset_id].root} and "
-                        f"in {one.root}; rename one of them"
+                        f"asset '{one.asset_id}': defined by {other.place()} and by {one.place()}; "
+                        "rename one of them, or give it another id in an assets.yaml"
                     )
                 self._listed[one.asset_id] = one
         return self._listed
