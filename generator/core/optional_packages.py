@@ -6,6 +6,7 @@ from importlib.util import find_spec
 
 EXTRAS = {
     "OpenEXR": ("OpenEXR", "exr"),
+    "cascadio": ("cascadio", "step"),
     "foxglove_schemas_protobuf": ("foxglove-schemas-protobuf", "formats"),
     "google_crc32c": ("google-crc32c", "formats"),
     "gymnasium": ("gymnasium", "env"),

@@ -94,7 +94,11 @@ def read_gltf(folder: Folder, relative: str, materials: bool) -> MeshSource:
         AssetError: if it is malformed, states more data than it holds, or requires an unsupported
             extension.
     """
-    data = folder.read(relative)
+    return read_gltf_bytes(folder, relative, folder.read(relative), materials)
+
+
+def read_gltf_bytes(folder: Folder, relative: str, data: bytes, materials: bool) -> MeshSource:
+    """Read a glTF file from its bytes; see ``read_gltf``."""
     try:
         document = parse_document(folder, relative, data)
         described = document.list_of("materials")

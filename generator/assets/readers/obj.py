@@ -211,8 +211,7 @@ def _parse_positions(lines: list[str]) -> tuple[Float64, Float64 | None]:
     if not colored:
         return table.reshape(-1, 3), None
     srgb = np.array([[float(x) for x in rows[k][3:6]] for k in colored], dtype=np.float64)
-    if not np.isfinite(srgb).all():
-        raise ValueError("a colour that is not finite")
+    srgb = np.where(np.isfinite(srgb), srgb, 1.0)
     if srgb.max() > 1.0:
         # Some exporters count to 255.
         srgb = srgb / 255.0

@@ -144,7 +144,7 @@ def _read_elements(header: _Header, data: bytes) -> Iterator[tuple[str, _Columns
     """Yield the columns of every element that has any."""
     if not header.order:
         # A text becomes binary numbers, in the same order.
-        words = np.array(data[header.end :].split() or [b"0"])
+        words = np.array(_ascii_words(header, data[header.end :]) or [b"0"])
         numbers, at = words.astype(np.float64).view(np.uint8), 0
         for name, count, properties in header.elements:
             wide = tuple(_Property(p.name, "f8", p.counted and "f8") for p in properties)
@@ -159,6 +159,31 @@ def _read_elements(header: _Header, data: bytes) -> Iterator[tuple[str, _Columns
     for name, count, properties in header.elements:
         columns, at = _read_rows(bytes_, at, count, properties, header.order)
         yield name, columns
+
+
+def _ascii_words(header: _Header, body: bytes) -> list[bytes]:
+    """Words of the elements of a text: one element per line, of which exporters write more words.
+
+    Where lines are shorter than their elements, all words in sequence.
+    """
+    lines = [words for line in body.split(b"\n") if (words := line.split())]
+    found: list[bytes] = []
+    at = 0
+    for _, count, properties in header.elements:
+        rows, at = lines[at : at + count], at + count
+        lists = [k for k, p in enumerate(properties) if p.counted]
+        for row in rows:
+            used = len(properties)
+            try:
+                for k in lists:
+                    # Words before this list, of lists before it, are counted already.
+                    used += int(float(row[k + used - len(properties)]))
+            except IndexError:
+                return body.split()
+            if used > len(row):
+                return body.split()
+            found += row[:used]
+    return found
 
 
 def _read_rows(
@@ -282,7 +307,7 @@ def _build_soup(
     uvs = _read_uvs(vertex, face, faces, fans, corner) if images else None
     textured = uvs is not None
     colors = None if textured else _read_colors(vertex, face, corner, polygon, remarks)
-    if textured and any(_columns(of, names) is not None for of in (vertex, face) for names in _COLORS):
+    if textured and (_varies(_srgb(vertex)) or _varies(_srgb(face))):
         remarks.append("vertex and face colours are not used beside an image")
     if images and not textured:
         remarks.append(f"the image {images[0]} is not used: there are no texture coordinates")
@@ -344,11 +369,16 @@ def _read_colors(
 ) -> Float64 | None:
     """Linear RGB [m, 3, 3] of vertices or, without them, of faces."""
     by_vertex, by_face = _srgb(vertex), _srgb(face)
-    if by_vertex is not None:
-        if by_face is not None:
+    if by_vertex is not None and (by_face is None or not _varies(by_face) or _varies(by_vertex)):
+        if by_face is not None and _varies(by_face):
             remarks.append("face colours are not used beside vertex colours")
         return by_vertex[corner]
     return None if by_face is None else np.repeat(by_face[polygon][:, None], 3, axis=1)
+
+
+def _varies(colors: Float64 | None) -> bool:
+    """Whether there is more than one colour."""
+    return colors is not None and bool(np.ptp(colors, axis=0).any())
 
 
 def _srgb(element: _Columns) -> Float64 | None:
@@ -357,8 +387,7 @@ def _srgb(element: _Columns) -> Float64 | None:
         table = _columns(element, names)
         if table is None:
             continue
-        if not np.isfinite(table).all():
-            raise ValueError("a colour that is not finite")
+        table = np.where(np.isfinite(table), table, 1.0)
         first = element[names[0]]
         assert isinstance(first, np.ndarray)
         if first.dtype.kind in "iu":
