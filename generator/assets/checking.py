@@ -164,6 +164,8 @@ def _describe_unit(one: IndexedAsset) -> str:
         return "size_m"
     if entry.scale != 1.0:
         return f"{entry.scale:g} m"
+    if entry.file.lower().endswith((".3mf", ".step", ".stp", ".usdz", ".usda", ".usdc", ".usd")):
+        return entry.unit or "of the file"
     return entry.unit or "m (assumed)"
 
 

@@ -124,8 +124,8 @@ def _bake(
     chosen = np.isin(soup.face_slots, numbers)
     count = int(chosen.sum())
     side = _CELL_PX if count <= _MAX_FINE_CELLS else _SMALL_CELL_PX
-    columns = 1 << (max(count - 1, 1).bit_length() + 1) // 2
-    rows = -(-count // columns)
+    bits = max(count - 1, 1).bit_length()
+    columns, rows = 1 << (bits + 1) // 2, 1 << bits // 2
     width, height = columns * side, rows * side
     j, i = np.mgrid[0:side, 0:side].reshape(2, -1)
     s, t = i / (side - 1.0), j / (side - 1.0)
@@ -139,13 +139,14 @@ def _bake(
         p0, p1, p2 = np.moveaxis(soup.corners[chosen], 1, 0)[:, :, None]
         texels = _nearest_colors(original, p0 + a * (p1 - p0) + b * (p2 - p0))
     encoded = np.rint(srgb_encode(np.clip(texels, 0.0, 1.0)) * 255.0).astype(np.uint8)
-    cells = np.zeros((rows * columns, side, side, 3), np.uint8)
-    cells[:count] = encoded.reshape(count, side, side, 3)
-    image = np.ascontiguousarray(
-        cells.reshape(rows, columns, side, side, 3).swapaxes(1, 2).reshape(height, width, 3)
-    )
-    cell = np.arange(count)
-    left, top = cell % columns * side + 0.5, cell // columns * side + 0.5
+    column, row = _cells(soup.corners[chosen].mean(axis=1))
+    cells = np.zeros((rows, columns, side, side, 3), np.uint8)
+    # Free cells look like the last one, so that coarse levels of the image have no dark rims.
+    last = int(np.argmax(_interleave((column, row))))
+    cells[:] = encoded[last].reshape(side, side, 3)
+    cells[row, column] = encoded.reshape(count, side, side, 3)
+    image = np.ascontiguousarray(cells.swapaxes(1, 2).reshape(height, width, 3))
+    left, top = column * side + 0.5, row * side + 0.5
     x = np.stack([left, left + side - 1.0, left], axis=1) / width
     y = np.stack([top, top, top + side - 1.0], axis=1) / height
     uvs = np.zeros((len(soup), 3, 2)) if soup.uvs is None else soup.uvs.copy()
@@ -157,6 +158,39 @@ def _bake(
         for k, slot in enumerate(soup.slots)
     )
     return replace(soup, uvs=uvs, slots=slots, colors=None), image
+
+
+def _cells(centers: Float64) -> tuple[Int64, Int64]:
+    """Column and row of the cell of each point [n, 3].
+
+    Along a Z-order curve (Morton 1966) in both spaces: cells side by side belong to neighbours,
+    which coarse levels of the image mix.
+    """
+    low, size = centers.min(axis=0), max(float(np.ptp(centers, axis=0).max()), 1e-12)
+    steps = np.floor((centers - low) / size * 1023.0).astype(np.int64)
+    rank = np.zeros(len(centers), np.int64)
+    rank[np.argsort(_interleave(tuple(steps.T)), kind="stable")] = np.arange(len(centers))
+    return _every_second_bit(rank), _every_second_bit(rank >> 1)
+
+
+def _interleave(axes: tuple[Int64, ...]) -> Int64:
+    """Numbers whose bits are those of all axes in turn, the first axis lowest."""
+    code = np.zeros_like(axes[0])
+    for bit in range(_BITS):
+        for k, values in enumerate(axes):
+            code |= (values >> bit & 1) << (len(axes) * bit + k)
+    return code
+
+
+def _every_second_bit(codes: Int64) -> Int64:
+    """Numbers of bits 0, 2, 4, ... of codes."""
+    values = np.zeros_like(codes)
+    for bit in range(_BITS):
+        values |= (codes >> 2 * bit & 1) << bit
+    return values
+
+
+_BITS = 16
 
 
 def _nearest_colors(soup: TriangleSoup, points: Float64) -> Float64:
