@@ -57,8 +57,9 @@ def _parse_ascii(data: bytes, place: str) -> Float64:
             continue
         try:
             if words[0] == b"vertex":
-                x, y, z = (float(word) for word in words[1:4])
-                rows.append([x, y, z])
+                rows.append([float(word) for word in words[1:4]])
+                if len(rows[-1]) != 3:
+                    raise ValueError("a vertex without three numbers")
             elif words[0] == b"facet":
                 facets += 1
             elif words[0] in (b"endfacet", b"endloop", b"endsolid") and len(rows) != 3 * facets:
