@@ -29,7 +29,10 @@ def collect_remarks(
 
 
 def warn_of_remarks(
-    library: Library, asset_ids: Iterable[str], read_max: int = READ_MAX, told: Set[str] = frozenset()
+    library: Library,
+    asset_ids: Iterable[str],
+    read_max: int = READ_MAX,
+    told: Set[str] = frozenset(),
 ) -> frozenset[str]:
     """Warn once per file with an AssetWarning; return the files told of, with those before."""
     remarks = collect_remarks(library, asset_ids, read_max)

@@ -157,7 +157,9 @@ def read_exr(data: bytes, place: str) -> Float32:
             raise AssetError(f"{place}: unreadable OpenEXR image ({reason})") from None
     names = _color_channels(tuple(channels))
     if not names:
-        raise AssetError(f"{place}: has no channels R, G, B, but {', '.join(sorted(channels))[:80]}")
+        raise AssetError(
+            f"{place}: has no channels R, G, B, but {', '.join(sorted(channels))[:80]}"
+        )
     return np.stack([channels[name].pixels for name in names], axis=-1).astype(np.float32)
 
 
@@ -237,9 +239,7 @@ def _split_radiance(
         )
     if b"xyze" in data[: found.start()]:
         raise AssetError(f"{place}: holds CIE XYZ; save it again with FORMAT=32-bit_rle_rgbe")
-    (first, rows), (second, columns) = (
-        (found[k].decode(), int(found[k + 1])) for k in (1, 3)
-    )
+    (first, rows), (second, columns) = ((found[k].decode(), int(found[k + 1])) for k in (1, 3))
     if first[1] == second[1]:
         raise AssetError(f"{place}: names the axis {first[1]} twice; save it again")
     return ((first, rows), (second, columns)), data[found.end() :]

@@ -52,12 +52,12 @@ def resolve_colors(soup: TriangleSoup, max_faces: int) -> ColoredSoup:
     """
     if soup.colors is None:
         return ColoredSoup(soup)
-    remarks, graded = [], []
+    colors, remarks, graded = soup.colors, list[str](), list[int]()
     for k, slot in enumerate(soup.slots):
         chosen = soup.face_slots == k
         if not chosen.any():
             continue
-        own = soup.colors[chosen]
+        own = colors[chosen]
         whole = own.reshape(-1, 3)
         flat = bool((np.ptp(own, axis=1) < _SAME).all())
         codes = np.rint(own[:, 0] * 1024.0).astype(np.int64)
@@ -96,9 +96,7 @@ def _tint(soup: TriangleSoup, number: int, color: Float64) -> TriangleSoup:
 
 def _tinted(slot: MaterialSlot, color: Float64) -> MaterialSlot:
     # Rounded, because powers of arrays differ in their last bits between processors.
-    r, g, b = (
-        round(float(a * c), 6) for a, c in zip(slot.material.base_color, color, strict=True)
-    )
+    r, g, b = (round(float(a * c), 6) for a, c in zip(slot.material.base_color, color, strict=True))
     return replace(slot, material=replace(slot.material, base_color=(r, g, b)), from_file=True)
 
 

@@ -98,9 +98,7 @@ def read_primitive(prim: Any, place: str) -> MeshPrim:
     triangles = np.arange(3 * count).reshape(-1, 3)
     polygon = np.arange(count)
     topology = _Topology(triangles.reshape(-1), triangles, polygon, count)
-    read = MeshPrim(
-        corners, None, None, np.zeros(count, np.int64), materials, remarks=remarks
-    )
+    read = MeshPrim(corners, None, None, np.zeros(count, np.int64), materials, remarks=remarks)
     return _paint(prim, read, topology)
 
 
@@ -207,7 +205,7 @@ def _read_normals(mesh: Any, topology: _Topology) -> Array | None:
     values = _read_primvar(mesh.GetPrim(), "normals", topology)
     given = mesh.GetNormalsAttr().Get(Usd.TimeCode.EarliestTime())
     if values is None and given:
-        directions = np.array(given, dtype=np.float64)
+        directions = np.array(given, dtype=np.float64).reshape(-1, 3)
         values = _expand_to_corners(directions, mesh.GetNormalsInterpolation(), topology)
     return None if values is None or values.shape[1] != 3 else np.asarray(values[topology.fans])
 

@@ -48,14 +48,15 @@ def primitive_corners(prim: Any, place: str) -> Array:
         corners = _revolve([(0.0, -half), (radius, -half), (top, half), (0.0, half)])
     axis = prim.GetAttribute("axis").Get() if kind not in ("Cube", "Sphere") else "Z"
     # Cyclic, so that shapes keep their winding.
-    return np.roll(corners, {"Z": 0, "X": 1, "Y": 2}[str(axis)], axis=2)
+    return np.asarray(np.roll(corners, {"Z": 0, "X": 1, "Y": 2}[str(axis)], axis=2))
 
 
 def _box(size: float) -> Array:
     half = 0.5 * size
     points = np.array([(i * half, j * half, k * half)
                        for k in (-1, 1) for j in (-1, 1) for i in (-1, 1)])  # fmt: skip
-    return points[np.array([t for q in _QUADS for t in (q[:3], (q[0], *q[2:]))])]
+    triangles = np.array([t for q in _QUADS for t in (q[:3], (q[0], *q[2:]))])
+    return np.asarray(points[triangles], np.float64)
 
 
 def _plane(width: float, length: float) -> Array:
@@ -64,7 +65,9 @@ def _plane(width: float, length: float) -> Array:
     return np.array([(a, b, c), (a, c, d)])
 
 
-def _arc(radius: float, height: float, low_deg: float, high_deg: float) -> list[tuple[float, float]]:
+def _arc(
+    radius: float, height: float, low_deg: float, high_deg: float
+) -> list[tuple[float, float]]:
     """(radius, height) along a circle, by elevation."""
     steps = round(SEGMENTS * (high_deg - low_deg) / 360.0)
     turns = [math.radians(low_deg + (high_deg - low_deg) * k / steps) for k in range(steps + 1)]

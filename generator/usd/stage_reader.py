@@ -11,7 +11,6 @@ import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from itertools import repeat
 from pathlib import Path
 from typing import Any
 
@@ -103,7 +102,7 @@ class OpenStage:
         from pxr import UsdGeom
 
         taken: set[str] = set()
-        found = []
+        found: list[StagePart] = []
         for prim in self._visible():
             if prim.IsA(UsdGeom.PointInstancer):
                 found += self._instances(prim, taken)
@@ -120,7 +119,11 @@ class OpenStage:
         self.remarks[text.partition(",")[0]] = text
 
     def _instances(self, prim: Any, taken: set[str]) -> Iterator[StagePart]:
-        """Yield the meshes of every copy of an instancer. Raises AssetError if they are too many."""
+        """Yield the meshes of every copy of an instancer.
+
+        Raises:
+            AssetError: if they are too many, or a prototype is missing.
+        """
         from pxr import Usd, UsdGeom
 
         time = Usd.TimeCode.EarliestTime()
@@ -129,12 +132,13 @@ class OpenStage:
             time, time, UsdGeom.PointInstancer.IncludeProtoXform, UsdGeom.PointInstancer.ApplyMask
         )
         mask = instancer.ComputeMaskAtTime(time)
-        kinds = [k for k, kept in zip(
-            instancer.GetProtoIndicesAttr().Get(time) or [], mask or repeat(True)) if kept]
-        roots = [prim.GetStage().GetPrimAtPath(p) for p in instancer.GetPrototypesRel().GetTargets()]
-        if len(matrices) > _MAX_INSTANCES or any(not 0 <= k < len(roots) for k in kinds):
+        numbers = list(instancer.GetProtoIndicesAttr().Get(time) or [])
+        kinds = [k for place, k in enumerate(numbers) if not mask or mask[place]]
+        stage = prim.GetStage()
+        roots = [stage.GetPrimAtPath(p) for p in instancer.GetPrototypesRel().GetTargets()]
+        if len(kinds) > _MAX_INSTANCES or any(not 0 <= k < len(roots) for k in kinds):
             raise AssetError(
-                f"{self.place}: {prim.GetPath()} has {len(matrices)} copies of {len(roots)} "
+                f"{self.place}: {prim.GetPath()} has {len(kinds)} copies of {len(roots)} "
                 f"prototypes; at most {_MAX_INSTANCES} copies are read, correct it"
             )
         to_stage = self._pose(prim)

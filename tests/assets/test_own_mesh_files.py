@@ -69,7 +69,9 @@ def test_obj_white_space_and_spelling_keep_faces_and_materials(
     assert material_of(tmp_path).base_color == (1.0, 0.0, 0.0)
 
 
-@pytest.mark.parametrize("encodings", [("latin-1", "utf-8"), ("latin-1", "latin-1"), ("utf-16", "utf-8")])
+@pytest.mark.parametrize(
+    "encodings", [("latin-1", "utf-8"), ("latin-1", "latin-1"), ("utf-16", "utf-8")]
+)
 def test_obj_names_match_across_encodings(tmp_path: Path, encodings: tuple[str, str]) -> None:
     """``röt`` in the OBJ and in the MTL, as programs of different systems write it."""
     obj, mtl = encodings
@@ -82,7 +84,9 @@ def test_a_material_that_the_mtl_lacks_is_refused_by_name(tmp_path: Path) -> Non
     """The message names the file, the material, the MTL, and what it has."""
     (tmp_path / "a.obj").write_text(f"mtllib a.mtl\n{TRIANGLE}usemtl rod\nf 1 2 3\n")
     (tmp_path / "a.mtl").write_text("newmtl rot\nKd 1 0 0\n")
-    with pytest.raises(AssetError, match=r"a\.obj: material 'rod' is not defined in a\.mtl .*'rot'"):
+    with pytest.raises(
+        AssetError, match=r"a\.obj: material 'rod' is not defined in a\.mtl .*'rot'"
+    ):
         imported(tmp_path, "a.obj")
 
 
@@ -209,7 +213,7 @@ def test_colours_of_a_dense_scan_survive_its_decimation(tmp_path: Path) -> None:
     quads = np.stack([cell, cell + 1, cell + n + 1, cell, cell + n + 1, cell + n], 1).reshape(-1, 3)
     face = np.zeros(len(quads), [("n", "u1"), ("v", "<i4", 3)])
     face["n"], face["v"] = 3, quads
-    head = "ply\nformat binary_little_endian 1.0\nelement vertex %d\n" % len(vertex)
+    head = f"ply\nformat binary_little_endian 1.0\nelement vertex {len(vertex)}\n"
     head += "".join(f"property float {a}\n" for a in "xyz")
     head += "".join(f"property uchar {c}\n" for c in ("red", "green", "blue"))
     head += f"element face {len(face)}\nproperty list uchar int vertex_indices\nend_header\n"
@@ -337,13 +341,17 @@ def test_3mf_builds_components_in_their_unit_with_their_colours(tmp_path: Path) 
     soup = read_mesh(Folder(tmp_path), "a.3mf").soup
     assert soup.corners.reshape(-1, 3).max(axis=0) == pytest.approx((30 * 0.0254, 0.254, 0.254))
     assert soup.colors is not None
-    assert soup.colors[:, 0].tolist() == [[1, 0, 0]] * 3 + [[0, 0, 1]] + [[1, 0, 0]] * 3 + [[0, 0, 1]]
+    assert soup.colors[:, 0].tolist() == [[1, 0, 0]] * 3 + [[0, 0, 1]] + [[1, 0, 0]] * 3 + [
+        [0, 0, 1]
+    ]
 
 
 def test_step_is_meshed_in_metres(tmp_path: Path) -> None:
     """A file without a shape is one clear error; see benchmarks/own_meshes.py for whole files."""
     pytest.importorskip("cascadio")
-    (tmp_path / "a.step").write_text("ISO-10303-21;\nHEADER;\nENDSEC;\nDATA;\nENDSEC;\nEND-ISO-10303-21;\n")
+    (tmp_path / "a.step").write_text(
+        "ISO-10303-21;\nHEADER;\nENDSEC;\nDATA;\nENDSEC;\nEND-ISO-10303-21;\n"
+    )
     with pytest.raises(AssetError, match=r"a\.step: "):
         opened(tmp_path, tmp_path).mesh("user/a")
 

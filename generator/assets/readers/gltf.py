@@ -7,7 +7,7 @@ Triangles are read with colours, instances, skins and morph targets at rest, and
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
@@ -44,6 +44,9 @@ from gen_data.generator.core.asset_types import UInt8
 from gen_data.generator.core.errors import AssetError
 
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
+_REPEAT = 10497
+_BEYOND = 0.01
+"""Texture coordinates outside of [0, 1] by less hardly show another part of an image."""
 _REFERENCES = (
     ("pbrMetallicRoughness", "baseColorTexture"),
     ("extensions", "KHR_materials_pbrSpecularGlossiness", "diffuseTexture"),
@@ -81,10 +84,11 @@ class _Placement:
 
 @dataclass(frozen=True)
 class _Look:
-    """A material, and the place of its images."""
+    """A material, the place of its images, and whether they end at their border."""
 
     slot: MaterialSlot
     placement: _Placement = _Placement()
+    ends: bool = False
 
 
 def read_gltf(folder: Folder, relative: str, materials: bool) -> MeshSource:
@@ -181,6 +185,8 @@ def _read_uvs(
             document.remarks.append(f"material '{look.slot.name}': its image needs {name}")
         return None
     uvs = look.placement.apply(uvs) if look.placement != _Placement() else uvs
+    if look.ends and (uvs.min() < -_BEYOND or uvs.max() > 1.0 + _BEYOND):
+        document.remarks.append(f"material '{look.slot.name}': images repeat beyond their borders")
     # glTF measures V from the top of the image.
     return np.stack([uvs[:, 0], 1.0 - uvs[:, 1]], axis=1)
 
@@ -292,7 +298,29 @@ def _make_look(document: Document, description: Mapping[str, Any]) -> _Look:
     except ValueError as error:
         raise ValueError(f"material '{name[:40]}': {error}") from None
     document.remarks += [f"material '{name[:40]}': {text}" for text in unused]
-    return _Look(MaterialSlot(name, material, from_file=True), placement)
+    ends = bool(material.texture) and any(_ends(document, r) for _, r in _references(described))
+    return _Look(MaterialSlot(name, material, from_file=True), placement, ends)
+
+
+def _ends(document: Document, reference: Mapping[str, Any]) -> bool:
+    """Whether a texture does not repeat."""
+    texture = document.item("textures", reference["index"], "texture")
+    if "sampler" not in texture:
+        return False
+    sampler = document.item("samplers", texture["sampler"], "sampler")
+    return any(sampler.get(key, _REPEAT) != _REPEAT for key in ("wrapS", "wrapT"))
+
+
+def _references(
+    description: Mapping[str, Any],
+) -> Iterator[tuple[tuple[str, ...], Mapping[str, Any]]]:
+    """Yield path and reference of the textures that a material maps to the surface."""
+    for path in _REFERENCES:
+        reference: Any = description
+        for key in path:
+            reference = reference.get(key, {})
+        if reference:
+            yield path, reference
 
 
 def _place_images(
@@ -302,13 +330,7 @@ def _place_images(
 
     A mesh has one set of texture coordinates here.
     """
-    placements: dict[tuple[str, ...], _Placement] = {}
-    for path in _REFERENCES:
-        reference: Any = description
-        for key in path:
-            reference = reference.get(key, {})
-        if reference:
-            placements[path] = _read_placement(reference)
+    placements = {path: _read_placement(found) for path, found in _references(description)}
     chosen = next(iter(placements.values()), _Placement())
     for path, placement in placements.items():
         if placement != chosen:

@@ -53,9 +53,7 @@ def gltf_material(
     pbr = description.get("pbrMetallicRoughness", {})
     if glossy is not None:
         pbr = _specular_glossiness(glossy, images)
-    unused = tuple(
-        f"{key} {_UNUSED[key]}" for key in sorted(further) if key in _UNUSED
-    )
+    unused = tuple(f"{key} {_UNUSED[key]}" for key in sorted(further) if key in _UNUSED)
     *color, alpha = (float(c) for c in pbr.get("baseColorFactor", (1.0, 1.0, 1.0, 1.0)))
     passed, transmitted = _read_diffuse_transmission(further, pbr, images)
     # What a thin sheet transmits is missing in its reflection.
@@ -128,7 +126,7 @@ def _specular_glossiness(glossy: Mapping[str, Any], images: Images) -> dict[str,
     base = _mean_color(_image_name(glossy, "diffuseTexture", images), images)
     whole = [a * b for a, b in zip(diffuse[:3], base, strict=True)]
     metallic = _solve_metallic(_brightness(whole), _brightness(specular), 1.0 - max(specular))
-    described = {
+    described: dict[str, Any] = {
         "baseColorFactor": diffuse,
         "metallicFactor": 0.0,
         "roughnessFactor": round(1.0 - gloss, 4),
@@ -136,8 +134,9 @@ def _specular_glossiness(glossy: Mapping[str, Any], images: Images) -> dict[str,
     if metallic > 0.5:
         # A metal: its colour is that of its reflection.
         return {**described, "baseColorFactor": [*specular, diffuse[3]], "metallicFactor": 1.0}
-    textures = {"baseColorTexture": glossy[k] for k in ("diffuseTexture",) if k in glossy}
-    return {**described, **textures}
+    if "diffuseTexture" in glossy:
+        described["baseColorTexture"] = glossy["diffuseTexture"]
+    return described
 
 
 def _brightness(color: Sequence[float]) -> float:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import PurePosixPath
@@ -55,9 +54,7 @@ def split_fans(sizes: Int64) -> Int64:
     return np.stack([first, first + step + 1, first + step + 2], axis=1)
 
 
-def locate_file(
-    folder: Folder, base: str, reference: str, remarks: list[str] | None = None
-) -> str:
+def locate_file(folder: Folder, base: str, reference: str, remarks: list[str] | None = None) -> str:
     """Path of a file that ``base`` refers to, as it is written where it exists.
 
     Else a file of that name beside ``base``, or of that name in other case, is taken: files are
@@ -91,7 +88,7 @@ def _candidates(folder: Folder, base: str, path: str, name: str) -> Iterator[str
         yield wanted
         parent = PurePosixPath(wanted).parent
         try:
-            entries = sorted(os.listdir(folder.path(str(parent))))
+            entries = sorted(path.name for path in folder.path(str(parent)).iterdir())
         except (OSError, AssetError):
             continue
         key = PurePosixPath(wanted).name.casefold()

@@ -11,7 +11,7 @@ import codecs
 import math
 import re
 import unicodedata
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import PurePosixPath
 from typing import Any
@@ -82,7 +82,7 @@ def read_obj(folder: Folder, relative: str, materials: bool) -> MeshSource:
 
 
 def decode_text(data: bytes) -> str:
-    """Text of a file whose encoding is not stated, with ``\\n`` at the end of every line.
+    """Text of a file whose encoding is not stated, with line feeds at the ends of its lines.
 
     It is UTF-8 or, where a byte order mark says so, UTF-16; Latin-1 if it is neither.
     """
@@ -104,7 +104,7 @@ _COMMENT = re.compile(r"^[ \t]*#[^\n]*", re.MULTILINE)
 _CONTINUED = re.compile(r"\\[ \t]*\n")
 
 
-def _parse_statements(text: str) -> _Statements:
+def _parse_statements(text: str) -> _Statements:  # noqa: PLR0912  (a branch per statement)
     s = _Statements()
     material = 0
     s.materials[""] = 0
@@ -287,37 +287,41 @@ def _read_slots(
             else:
                 missing = path
     folded = {_fold(name): name for name in reversed(defined)}
-    used, slots, transforms = set(s.polygon_materials), list[MaterialSlot](), {}
+    used, slots = set(s.polygon_materials), list[MaterialSlot]()
+    transforms: dict[int, UvTransform] = {}
     for number, name in enumerate(s.materials):
         known = name if name in defined else folded.get(_fold(name), "")
-        if known and known != name:
-            remarks.append(f"material '{name}' is not defined; '{known}' of another spelling is used")
         if known:
-            definition = defined[known]
-            material = definition.build_material()
-            transforms |= {number: t for t in [definition.placement] if t != _UNPLACED}
-            slot = MaterialSlot(
-                name, _drop_tint(material), from_file=True, declared_color=material.base_color
+            material = defined[known].build_material()
+            tint = material.base_color
+            slots.append(
+                MaterialSlot(name, _drop_tint(material), from_file=True, declared_color=tint)
             )
-        elif _fold(name) in _NO_MATERIAL:
-            slot = MaterialSlot(name)
-        elif number not in used:
-            slot = MaterialSlot(name)
-        elif missing:
-            slot = MaterialSlot(name, missing=f"belongs to the missing file {missing}")
-        elif found:
-            near = did_you_mean(name, defined)
-            slot = MaterialSlot(name, missing=f"is not defined in {', '.join(found)}{near}")
-        else:
-            slot = MaterialSlot(name)
-            if not s.libraries:
+            if defined[known].placement != _UNPLACED:
+                transforms[number] = defined[known].placement
+            if known != name:
+                remarks.append(f"material '{name}' is not defined; '{known}' is used instead")
+            continue
+        reason = ""
+        if number in used and _fold(name) not in _NO_MATERIAL:
+            reason = _why_missing(name, missing, found, defined)
+            if not reason:
                 remarks.append(f"material '{name}' is not defined: no mtllib is given")
-        slots.append(slot)
+        slots.append(MaterialSlot(name, missing=reason))
     if used and all(slots[k].material.opacity == 0.0 for k in used):
         # Some exporters write the transparency where the opacity belongs.
         slots = [replace(x, material=replace(x.material, opacity=1.0)) for x in slots]
         remarks.append("all its materials are fully transparent (d 0); they are read as opaque")
     return tuple(slots), transforms, tuple(dict.fromkeys(remarks))
+
+
+def _why_missing(name: str, missing: str, found: list[str], defined: Iterable[str]) -> str:
+    """Why a material is not defined; empty if the file names no library."""
+    if missing:
+        return f"belongs to the missing file {missing}"
+    if not found:
+        return ""
+    return f"is not defined in {', '.join(found)}{did_you_mean(name, defined)}"
 
 
 _NO_MATERIAL = frozenset({"", "none", "(null)", "null"})

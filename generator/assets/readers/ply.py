@@ -125,19 +125,23 @@ def _parse_header(data: bytes) -> _Header:
         elif words[0] == "property":
             if not elements:
                 raise ValueError("a property before any element in its header")
-            kinds = words[2:4] if words[1:2] == ["list"] else words[1:2]
-            if len(words) != len(kinds) + (3 if len(kinds) == 2 else 2) or not kinds:
-                raise ValueError(f"an incomplete line in its header: '{line[:40]}'")
-            unknown = next((kind for kind in kinds if kind.lower() not in _TYPES), "")
-            if unknown:
-                raise ValueError(f"unknown type or property '{unknown[:40]}' in its header")
-            *counted, kind = (_TYPES[kind.lower()] for kind in kinds)
-            elements[-1][2].append(_Property(words[-1], kind, *counted))
+            elements[-1][2].append(_parse_property(words, line))
         elif words[0] not in ("comment", "obj_info"):
             raise ValueError(f"an unknown or incomplete line in its header: '{line[:40]}'")
     if order is None:
         raise ValueError("its header states no format")
     return _Header(order, tuple((n, c, tuple(p)) for n, c, p in elements), tuple(images), end)
+
+
+def _parse_property(words: list[str], line: str) -> _Property:
+    kinds = words[2:4] if words[1:2] == ["list"] else words[1:2]
+    if len(words) != len(kinds) + (3 if len(kinds) == 2 else 2) or not kinds:
+        raise ValueError(f"an incomplete line in its header: '{line[:40]}'")
+    unknown = next((kind for kind in kinds if kind.lower() not in _TYPES), "")
+    if unknown:
+        raise ValueError(f"unknown type or property '{unknown[:40]}' in its header")
+    *counted, kind = (_TYPES[kind.lower()] for kind in kinds)
+    return _Property(words[-1], kind, *counted)
 
 
 def _read_elements(header: _Header, data: bytes) -> Iterator[tuple[str, _Columns]]:
@@ -150,10 +154,13 @@ def _read_elements(header: _Header, data: bytes) -> Iterator[tuple[str, _Columns
             wide = tuple(_Property(p.name, "f8", p.counted and "f8") for p in properties)
             columns, at = _read_rows(numbers, at, count, wide, "=")
             kinds = {p.name: p.kind for p in properties if not p.counted}
-            yield name, {
-                key: column.astype(kinds[key]) if isinstance(column, np.ndarray) else column
-                for key, column in columns.items()
-            }
+            yield (
+                name,
+                {
+                    key: column.astype(kinds[key]) if isinstance(column, np.ndarray) else column
+                    for key, column in columns.items()
+                },
+            )
         return
     bytes_, at = np.frombuffer(data, np.uint8), header.end
     for name, count, properties in header.elements:
@@ -311,7 +318,8 @@ def _build_soup(
         remarks.append("vertex and face colours are not used beside an image")
     if images and not textured:
         remarks.append(f"the image {images[0]} is not used: there are no texture coordinates")
-    slots = (MaterialSlot() if colors is None else MaterialSlot(material=WHITE, from_file=True),)
+    plain = MaterialSlot() if colors is None else MaterialSlot(material=WHITE, from_file=True)
+    slots: tuple[MaterialSlot, ...] = (plain,)
     numbers = np.zeros(len(fans), np.int64)
     if textured:
         slots = tuple(
@@ -392,7 +400,7 @@ def _srgb(element: _Columns) -> Float64 | None:
         assert isinstance(first, np.ndarray)
         if first.dtype.kind in "iu":
             wide = first.dtype.itemsize > 1 and float(table.max(initial=0.0)) > 255.0
-            table = table / (np.iinfo(first.dtype).max if wide else 255.0)
+            table = table / (float(np.iinfo(first.dtype.str).max) if wide else 255.0)
         elif table.max(initial=0.0) > 1.0:
             # Floating-point colours count to 1, but for some exporters' that count to 255.
             table = table / 255.0

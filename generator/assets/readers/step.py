@@ -43,5 +43,4 @@ def read_step(folder: Folder, relative: str, materials: bool) -> MeshSource:
         )
         if failed or not target.is_file():
             raise AssetError(f"{place}: holds no shape that can be meshed; export it again")
-        read = read_gltf_bytes(folder, relative, target.read_bytes(), materials)
-    return read
+        return read_gltf_bytes(folder, relative, target.read_bytes(), materials)

@@ -66,7 +66,9 @@ def _parse_ascii(data: bytes, place: str) -> Float64:
                 raise ValueError("a facet without three vertices")
             solids += (words[0] == b"solid") - (words[0] == b"endsolid")
         except ValueError as error:
-            raise AssetError(f"{place}:{number}: malformed STL ({error}); export it again") from None
+            raise AssetError(
+                f"{place}:{number}: malformed STL ({error}); export it again"
+            ) from None
     if len(rows) != 3 * facets or solids > 0:
         raise AssetError(f"{place}: cut off: 'endsolid' is missing; export it again")
     return np.array(rows, dtype=np.float64).reshape(-1, 3, 3)

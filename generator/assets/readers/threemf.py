@@ -156,9 +156,7 @@ def _transform(element: Element) -> Float64:
     return matrix
 
 
-def _collect(
-    package: _Package, model: _Model, object_id: str, matrix: Float64, depth: int
-) -> None:
+def _collect(package: _Package, model: _Model, object_id: str, matrix: Float64, depth: int) -> None:
     """Add the triangles of an object and of its components to the package."""
     if not depth or len(package.soups) > _MAX_PARTS:
         raise ValueError(f"more than {_MAX_DEPTH} levels or {_MAX_PARTS} parts")
@@ -199,10 +197,10 @@ def _read_mesh(
 
 def _corner_colors(model: _Model, element: Element, triangle: Element) -> Float64 | None:
     """Linear RGB [3, 3] of a triangle's corners; None if it has no colours."""
-    colors = model.colors.get(triangle.get("pid") or element.get("pid", ""))
+    colors = model.colors.get(triangle.get("pid") or element.get("pid") or "")
     if colors is None:
         return None
-    first = triangle.get("p1") or element.get("pindex", "0")
+    first = triangle.get("p1") or element.get("pindex") or "0"
     numbers = [int(first), *(int(triangle.get(key) or first) for key in ("p2", "p3"))]
     if min(numbers) < 0:
         raise ValueError("a negative index of a colour")

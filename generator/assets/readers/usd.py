@@ -1,7 +1,8 @@
 """OpenUSD: text and binary layers, and usdz archives.
 
 Supported are meshes, primitive shapes, subsets, UsdPreviewSurface with images, display colours,
-transforms, instances, unit and up axis. Nothing outside the asset folder is opened: references of layers are checked beforehand.
+transforms, instances, unit and up axis. Nothing outside the asset folder is opened: references of
+layers are checked beforehand.
 """
 
 from __future__ import annotations
