@@ -205,7 +205,10 @@ def _read_normals(mesh: Any, topology: _Topology) -> Array | None:
     values = _read_primvar(mesh.GetPrim(), "normals", topology)
     given = mesh.GetNormalsAttr().Get(Usd.TimeCode.EarliestTime())
     if values is None and given:
-        directions = np.array(given, dtype=np.float64).reshape(-1, 3)
+        directions = np.array(given, dtype=np.float64)
+        if directions.ndim != 2:
+            # Of another type than the schema's, as the type of an attribute may be.
+            return None
         values = _expand_to_corners(directions, mesh.GetNormalsInterpolation(), topology)
     return None if values is None or values.shape[1] != 3 else np.asarray(values[topology.fans])
 
