@@ -117,7 +117,9 @@ def _parse_header(data: bytes) -> _Header:
                 raise ValueError(f"unknown format '{words[1][:40]}'")
         elif words[0] == "comment" and len(words) > 2 and words[1].lower() == "texturefile":
             images.append(line.split(None, 2)[2].strip().strip('"'))
-        elif words[0] == "element" and len(words) == 3:
+        elif words[0] == "element":
+            if len(words) != 3:
+                raise ValueError(f"an incomplete line in its header: '{line[:40]}'")
             # Every element takes at least one byte, so a larger count is false.
             if not words[2].isdigit() or len(words[2]) > 12 or int(words[2]) > len(data):
                 raise ValueError("its header states more elements than it holds")
@@ -126,8 +128,6 @@ def _parse_header(data: bytes) -> _Header:
             if not elements:
                 raise ValueError("a property before any element in its header")
             elements[-1][2].append(_parse_property(words, line))
-        elif words[0] not in ("comment", "obj_info"):
-            raise ValueError(f"an unknown or incomplete line in its header: '{line[:40]}'")
     if order is None:
         raise ValueError("its header states no format")
     return _Header(order, tuple((n, c, tuple(p)) for n, c, p in elements), tuple(images), end)
