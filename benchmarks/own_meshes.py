@@ -190,7 +190,7 @@ def _measure_usd(path: Path) -> Measured | None:
     stage = Usd.Stage.Open(str(path))
     scale = UsdGeom.GetStageMetersPerUnit(stage)
     is_y_up = UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.y
-    cache, found = UsdGeom.XformCache(), []
+    cache, found = UsdGeom.XformCache(Usd.TimeCode.EarliestTime()), []
     shapes = (UsdGeom.PointInstancer, UsdGeom.Sphere, UsdGeom.Cube, UsdGeom.Cylinder,
               UsdGeom.Cone, UsdGeom.Capsule, UsdGeom.Plane)  # fmt: skip
     for prim in Usd.PrimRange.Stage(stage, Usd.TraverseInstanceProxies()):
