@@ -609,9 +609,7 @@ def _index_files(root: Path) -> FolderIndex:
             for name in files
             if name not in used
         ),
-        environments=tuple(
-            ImageEntry(file=glob.escape(name)) for name in panoramas
-        ),
+        environments=tuple(ImageEntry(file=glob.escape(name)) for name in panoramas),
     )
 
 

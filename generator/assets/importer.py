@@ -210,12 +210,18 @@ def import_link(
     link = urdf.links[link_name]
     place = f"{folder.root / entry.file}: link '{link_name}'"
     mesh = collision = None
+    images: dict[str, UInt8] = {}
+    remarks: tuple[FileRemarks, ...] = ()
     if link.visuals:
         soup = join_soups([_make_shape_soup(folder, shape, SE3()) for shape in link.visuals])
         if entry.palette:
             soup = _palette_colors(folder, soup)
-        soup = _apply_finishes(soup, entry.materials, place, robot_id)
-        mesh = normal_form(soup, place, max_faces=entry.max_faces)
+        colored = resolve_colors(soup, entry.max_faces)
+        images = {} if colored.image is None else {IMAGE: colored.image}
+        remarks = _remarks_of(entry.file, colored.remarks)
+        owner = f"{robot_id}/{link_name}" if images else robot_id
+        soup = _apply_finishes(colored.soup, entry.materials, place, owner)
+        mesh = normal_form(soup, place, max_faces=max(entry.max_faces, len(soup) if images else 0))
     if link.collisions:
         solids = [_make_shape_soup(folder, s, SE3(), materials=False) for s in link.collisions]
         check_coordinates(join_soups(solids), place)
@@ -225,7 +231,7 @@ def import_link(
             for s in solids
         ]
         collision = ConvexParts(tuple(part for hull in hulls for part in hull.parts_m))
-    return ImportedMesh(mesh, collision, {})
+    return ImportedMesh(mesh, collision, images, remarks=remarks)
 
 
 def _read_geometry(

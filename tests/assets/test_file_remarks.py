@@ -173,3 +173,13 @@ def test_bop_models_state_the_files_origin(folder: Path) -> None:
         model = build_model([Piece(f"user/a_{origin}", 1.0, IDENTITY)], opened(folder))
         assert model.info["file_origin_mm"] == offset
         assert float(model.vertices["x"].min()) == low
+
+
+@pytest.mark.parametrize("name", ["part[1].obj", "a b.obj", "ü.obj", f"{'long' * 40}.obj"])
+def test_any_name_of_a_file_is_listed(tmp_path: Path, name: str) -> None:
+    """Names that are patterns, hold spaces or accents, or are longer than an id in an index."""
+    root = tmp_path / "props"
+    root.mkdir()
+    (root / name).write_text(TRIANGLE + FACE)
+    (found,) = findings(root).values()
+    assert (found.triangles, found.error) == (1, "")

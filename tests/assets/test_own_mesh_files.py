@@ -384,3 +384,24 @@ def test_origin_file_keeps_coordinates_and_other_origins_state_their_shift(tmp_p
         assert read.shift_m == pytest.approx(shift)
         low = read.mesh.vertices_m.min(axis=0) - np.array(read.shift_m)
         assert low == pytest.approx((0.03, 0.02, 0.01), abs=1e-7)
+
+
+def test_links_of_robots_keep_colours_of_vertices(tmp_path: Path) -> None:
+    """A link with a gradient has an image of its own; one of one colour a base colour."""
+    root = tmp_path / "robots"
+    root.mkdir()
+    (root / "square.ply").write_bytes(ply_text())
+    links = "".join(
+        f'<link name="{name}"><visual><geometry><mesh filename="square.ply"/></geometry>'
+        "</visual></link>"
+        for name in ("base", "tip")
+    )
+    (root / "arm.urdf").write_text(
+        f'<robot name="arm">{links}<joint name="j" type="fixed"><parent link="base"/>'
+        '<child link="tip"/></joint></robot>'
+    )
+    (root / "assets.yaml").write_text("robots: [{id: arm, file: arm.urdf}]\n")
+    library = opened(tmp_path, root)
+    (material,) = library.mesh("user/arm/tip").materials
+    albedo = library.texture(material.texture).albedo
+    assert set(SRGB) <= {tuple(color) for color in albedo.reshape(-1, 3).tolist()}
