@@ -405,3 +405,30 @@ def test_links_of_robots_keep_colours_of_vertices(tmp_path: Path) -> None:
     (material,) = library.mesh("user/arm/tip").materials
     albedo = library.texture(material.texture).albedo
     assert set(SRGB) <= {tuple(color) for color in albedo.reshape(-1, 3).tolist()}
+
+
+MODEL_3MF = (
+    '<model unit="meter" xmlns="http://schemas.microsoft.com/3dmanufacturing/core/2015/02">'
+    '<resources><object id="1">{}</object></resources><build><item objectid="1"/></build></model>'
+)
+
+
+@pytest.mark.hostile
+@pytest.mark.parametrize(
+    ("model", "reason"),
+    [
+        (MODEL_3MF.format('<components><component objectid="1"/></components>'), "16 levels"),
+        (MODEL_3MF.format('<components><component objectid="9"/></components>'), "missing '9'"),
+        ('<!DOCTYPE a [<!ENTITY b "c">]><model/>', "declares a document type"),
+        (" " * 100_000_000, "malformed XML"),
+    ],
+    ids=["cycle", "missing object", "entities", "a bomb of blanks"],
+)
+def test_hostile_3mf_is_one_clear_error(tmp_path: Path, model: str, reason: str) -> None:
+    """Whatever its archive unpacks to."""
+    root = tmp_path / "props"
+    root.mkdir()
+    with zipfile.ZipFile(root / "a.3mf", "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("3D/3dmodel.model", model)
+    with pytest.raises(AssetError, match=reason):
+        opened(tmp_path, root).mesh("user/a")
