@@ -1,8 +1,7 @@
 """Meshes of rigid objects as files, with their size and symmetries.
 
 A model is the geometry of an instance in millimetres: all its bodies, in an object frame whose axes
-are the instance's and whose origin is the centre of the bounding box, or that of the user's file
-that the asset keeps (``origin: file``). Instances with equal bodies,
+are the instance's and whose origin is the centre of the bounding box. Instances with equal bodies,
 at equal scales and poses, share a model. An articulated robot has none.
 
 Sources: Turk, "The PLY Polygon File Format", 1994; ``models_info.json`` of Hodan et al., "BOP:
@@ -136,6 +135,11 @@ def build_model(pieces: Sequence[Piece], assets: AssetLibrary) -> Model:
         info["file_origin_mm"] = offset_mm.tolist()
     x, y, z = (float(value) for value in center_m)
     return Model((x, y, z), rows, np.concatenate(faces).astype(np.int32), info)
+
+
+def _scaled(symmetry: Symmetry, scale: float) -> Symmetry:
+    x, y, z = symmetry.offset_m
+    return replace(symmetry, offset_m=(scale * x, scale * y, scale * z))
 
 
 def _samples(pieces: Sequence[Piece], assets: AssetLibrary, count: int, shift: float) -> Samples:

@@ -69,35 +69,20 @@ def plan(
 def _rows(config: Config, n: int) -> Iterator[tuple[str, str]]:
     from gen_data.generator.assemble.pipeline_factory import PipelineFactory
     from gen_data.generator.assemble.size_estimate import estimate_image_bytes
-<<<<<<< HEAD
-    from gen_data.generator.config.schema import docstring_summary
-    from gen_data.generator.pipeline.splits import split_of
-    from gen_data.generator.runner.durable_files import format_bytes
-=======
     from gen_data.generator.assets.file_remarks import collect_remarks
     from gen_data.generator.config.schema import docstring_summary
     from gen_data.generator.pipeline.splits import split_of
+    from gen_data.generator.runner.durable_files import format_bytes
     from gen_data.generator.runner.identity import possible_assets
->>>>>>> c16d60fc (List what files hold and is not used; open images in checks; keep the frame of files; read turned and deep pictures)
 
     general = config.general
     per_scene = general.views_per_scene * general.steps_per_scene
     scenes = -(-n // per_scene)
     factory = PipelineFactory(config, n)
-<<<<<<< HEAD
     factory.check()
     info = factory.info
     exporters = {exporter.type: exporter for exporter in config.exporters}
     yield "scenes", _product(scenes, general.views_per_scene, general.steps_per_scene)
-=======
-    info = dataset_info(config, n, factory.categories)
-    # Refused here as in a run: formats that cannot hold the data set.
-    exporters = ready_exporters(config, info, factory.library)
-    yield (
-        "scenes",
-        f"{scenes} of {general.views_per_scene} views, {general.steps_per_scene} instants",
-    )
->>>>>>> c16d60fc (List what files hold and is not used; open images in checks; keep the frame of files; read turned and deep pictures)
     yield "shards", f"{-(-n // general.shard_size)} of {general.shard_size} samples"
     counted = min(scenes, 10_000)
     splits = Counter(
@@ -114,8 +99,10 @@ def _rows(config: Config, n: int) -> Iterator[tuple[str, str]]:
     yield "categories", f"{len(info.categories)}: {', '.join(info.categories)}"
     yield from _class_rows(config, factory)
     for name, exporter in exporters.items():
-<<<<<<< HEAD
         yield f"export {name}", docstring_summary(type(exporter))
+    used = [asset.asset_id for asset in possible_assets(factory)]
+    for remarks in collect_remarks(factory.library, used):
+        yield f"not used in {remarks.file}", "; ".join(remarks.unused)
     yield "size, estimated", f"{format_bytes(estimate_image_bytes(config, info) * n)} of images"
 
 
@@ -134,14 +121,6 @@ def _product(scenes: int, views: int, steps: int) -> str:
     """Factors of the number of samples: ``4 scenes x 3 views x 1 instant``."""
     counts = ((scenes, "scene"), (views, "view"), (steps, "instant"))
     return " x ".join(f"{count:,} {noun}{'' if count == 1 else 's'}" for count, noun in counts)
-=======
-        own = next(e for e in config.exporters if e.type == exporter.type)
-        yield f"export {name}", docstring_summary(type(own))
-    used = [asset.asset_id for asset in possible_assets(factory)]
-    for remarks in collect_remarks(factory.library, used):
-        yield f"not used in {remarks.file}", "; ".join(remarks.unused)
-    yield "size, estimated", f"{estimate_image_bytes(config, info) * n / 1e9:.2f} GB of images"
->>>>>>> c16d60fc (List what files hold and is not used; open images in checks; keep the frame of files; read turned and deep pictures)
 
 
 def _measure(choice: ConfigurationOptions, count: int) -> Probe:
