@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from fnmatch import fnmatchcase
 from typing import ClassVar, TypeVar, get_args
+
+from pydantic import Field, model_validator
 
 from gen_data.generator.config.base_model import Strict
 from gen_data.generator.core.capture import Channel, ImageFormat
-from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.errors import ConfigError, did_you_mean, list_names
 from gen_data.generator.core.interfaces import AssetLibrary, DatasetInfo, Exporter
 from gen_data.generator.core.optional_packages import missing_packages
 from gen_data.generator.core.scene import Scene
@@ -18,8 +22,44 @@ ANY_FORMAT: frozenset[str] = frozenset(get_args(ImageFormat))
 E = TypeVar("E", bound="ExporterBase")
 
 
+class Rectify(Strict):
+    """Images of bent lenses rectified to pinholes of the same size and pose.
+
+    By default the widest pinhole of less than 150 degrees with a centred principal point and the
+    aspect of the pixels, whose every pixel the original shows.
+
+    Attributes:
+        hfov_deg: Horizontal field of view instead, of square pixels; pixels that the original does
+            not show are black and without labels.
+        keep_focal: Take focal lengths and principal point of the lens, without its distortion;
+            pixels that the original does not show are black and without labels.
+    """
+
+    hfov_deg: float | None = Field(None, gt=0.0, lt=175.0)
+    keep_focal: bool = False
+
+    @model_validator(mode="after")
+    def _has_one_choice(self) -> Rectify:
+        if self.keep_focal and self.hfov_deg is not None:
+            raise ValueError("give hfov_deg or keep_focal, not both")
+        return self
+
+
 class ExporterBase(Strict):
-    """An exporter that needs no annotator and no geometry, and accepts any data set."""
+    """An exporter that needs no annotator and no geometry, and accepts any data set.
+
+    Attributes:
+        cameras: Names of the cameras to export, or patterns such as ``front_*``; empty = all.
+        sensors: Names or patterns of the other sensors to export: laser scanners, radars, IMUs;
+            empty = all.
+        rectify: Replace images and labels of bent lenses by those of pinholes: ``true``, or
+            ``{hfov_deg: 90}`` for a horizontal field of view [degrees], or ``{keep_focal: true}``
+            for the focal lengths of the lens. Texts about images cannot be rectified.
+    """
+
+    cameras: tuple[str, ...] = ()
+    sensors: tuple[str, ...] = ()
+    rectify: bool | Rectify = False
 
     image_formats: ClassVar[frozenset[str]] = PNG_ONLY
     """Formats of photographs that it can hold; see ``check_image_formats``."""
@@ -71,6 +111,29 @@ def check_image_formats(exporter: Exporter, info: DatasetInfo) -> None:
                 f"exporter takes {', '.join(sorted(known))} only; change rgb_encoding of the "
                 "sensor, or export in a format that takes them, such as coco, yolo or huggingface"
             )
+
+
+def select_names(patterns: Sequence[str], known: Sequence[str], place: str) -> tuple[str, ...]:
+    """Names that fit some pattern, in the order of the patterns; all if there is no pattern.
+
+    Args:
+        patterns: Names, or patterns with ``*``, ``?`` and ``[...]``.
+        known: Names to select from.
+        place: The field, for messages.
+
+    Raises:
+        ConfigError: a pattern fits no name.
+    """
+    found: dict[str, None] = {}
+    for pattern in patterns:
+        fitting = [name for name in known if fnmatchcase(name, pattern)]
+        if not fitting:
+            raise ConfigError(
+                f"{place}: '{pattern}' fits no sensor of the data set; expected some of: "
+                f"{list_names(known) or 'none'}{did_you_mean(pattern, known)}"
+            )
+        found |= dict.fromkeys(fitting)
+    return tuple(found if patterns else known)
 
 
 def check_installed(exporter: str, *modules: str) -> None:

@@ -87,6 +87,7 @@ from gen_data.exporters.base import ANY_FORMAT, ExporterBase
 from gen_data.exporters.fragments import fragment_lines, fragment_rows, image_splits, write_fragment
 from gen_data.exporters.ignored_regions import each_class
 from gen_data.exporters.image_files import link_or_copy
+from gen_data.exporters.lens_fields import lens_fields
 from gen_data.exporters.mask_polygons import drawable_polygons
 from gen_data.exporters.rle import encode_rle
 from gen_data.exporters.sensor_selection import check_channels, instant_s, rgb_cameras
@@ -96,7 +97,6 @@ from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.interfaces import DatasetInfo
 from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.lens import COEFFICIENTS, Lens
 from gen_data.generator.core.motion import Twist
 from gen_data.generator.core.sample import (
     ANNOTATION_STRIDE,
@@ -359,7 +359,7 @@ def _image(info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
         "view": sample.view_index,
         "sensor": sensor,
         "K": _rows(camera.intrinsics.matrix()),
-        **_lens(camera.intrinsics.lens),
+        **lens_fields(camera.intrinsics.lens),
         **_shutter(camera.shutter),
         "T_world_camera": _rows(camera.T_world_camera.matrix()),
         "attributes": dict(sample.scene.shared),
@@ -370,18 +370,6 @@ def _image(info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
         row["frame_id"] = sample.index % info.steps_per_scene
         row["time_s"] = round(instant_s(sample, sensor), DECIMALS)
     return row
-
-
-def _lens(lens: Lens) -> dict[str, Any]:
-    """Key of a lens; empty for a pinhole."""
-    if lens.model == "pinhole":
-        return {}
-    names = COEFFICIENTS[lens.model]
-    known: dict[str, Any] = {"model": lens.model, "coefficients": list(names)}
-    if names:
-        known["distortion"] = list(lens.coefficients)
-        known["half_field_rad"] = lens.half_field_rad
-    return {"lens": known}
 
 
 def _shutter(shutter: Shutter) -> dict[str, Any]:

@@ -9,7 +9,9 @@
 
 Record sets: ``images`` (a line of ``images.csv`` with the pixels as ``content``), ``objects``
 (a line of ``objects.csv``) and ``categories``. Ids and boxes equal those of the exporter ``coco``;
-``fx fy cx cy`` are for image coordinates in which pixel ``i`` covers ``[i, i + 1)``.
+``fx fy cx cy`` are for image coordinates in which pixel ``i`` covers ``[i, i + 1)``. Data sets with
+a camera that is no pinhole have the columns ``lens``, its model, and ``distortion``: coefficients
+in the order of OpenCV's functions, separated by spaces, to be applied before ``fx fy cx cy``.
 
 Title, licence and creators are those of the section ``dataset`` of the configuration; without a
 licence, those of the assets in the scenes are stated. Every data set has a ``croissant.json`` of
@@ -39,6 +41,7 @@ from gen_data.exporters.croissant_metadata import (
 )
 from gen_data.exporters.fragments import fragment_rows, write_fragment
 from gen_data.exporters.image_files import link_or_copy
+from gen_data.exporters.lens_fields import has_bent_camera
 from gen_data.exporters.sensor_selection import rgb_camera, rgb_cameras
 from gen_data.exporters.sequences import write_text
 from gen_data.generator.core.capture import Channel
@@ -67,6 +70,8 @@ IMAGE_COLUMNS = {
     "cy": "sc:Float",
 }
 """Columns of ``images.csv`` with their data types."""
+LENS_COLUMNS = {"lens": "sc:Text", "distortion": "sc:Text"}
+"""Further columns of ``images.csv``, of data sets with a camera that is no pinhole."""
 OBJECT_COLUMNS = {
     "object_id": "sc:Integer",
     "image_id": "sc:Integer",
@@ -129,7 +134,7 @@ class Croissant(ExporterBase):
         """Write tables and metadata, and link the images."""
         dataset_dir.mkdir(parents=True, exist_ok=True)
         with (
-            _CsvFile(dataset_dir / "images.csv", IMAGE_COLUMNS) as images,
+            _CsvFile(dataset_dir / "images.csv", _image_columns(info)) as images,
             _CsvFile(dataset_dir / "objects.csv", OBJECT_COLUMNS) as objects,
             _CsvFile(dataset_dir / "categories.csv", CATEGORY_COLUMNS) as categories,
         ):
@@ -144,9 +149,8 @@ class Croissant(ExporterBase):
                 target = dataset_dir / "images" / image["split"] / image["file_name"]
                 link_or_copy(source, target)
         tables = [table.described() for table in (images, objects, categories)]
-        document = croissant_document(
-            info, self._asset_licences(shard_dirs), [*tables, _image_files(info)], _record_sets()
-        )
+        licences, files = self._asset_licences(shard_dirs), [*tables, _image_files(info)]
+        document = croissant_document(info, licences, files, _record_sets(info))
         text = json.dumps(document, indent=2, ensure_ascii=False) + "\n"
         write_text(dataset_dir / "croissant.json", text)
 
@@ -214,6 +218,9 @@ def _row(info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
         "cx": camera.cx_px,
         "cy": camera.cy_px,
     }
+    if has_bent_camera(info):
+        image["lens"] = camera.lens.model
+        image["distortion"] = " ".join(map(repr, camera.lens.coefficients))
     objects = [
         {
             "object_id": sample.annotation_id(sensor, thing.instance.instance_id),
@@ -233,6 +240,11 @@ def _row(info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
     return {"image": image, "objects": objects}
 
 
+def _image_columns(info: DatasetInfo) -> dict[str, str]:
+    """Columns of ``images.csv`` with their data types."""
+    return IMAGE_COLUMNS | (LENS_COLUMNS if has_bent_camera(info) else {})
+
+
 def _image_files(info: DatasetInfo) -> dict[str, Any]:
     """All photographs; ``check`` makes sure that they have one ending."""
     suffix = info.encoding(rgb_cameras(info)[0], Channel.RGB).suffix
@@ -241,13 +253,13 @@ def _image_files(info: DatasetInfo) -> dict[str, Any]:
     )
 
 
-def _record_sets() -> list[dict[str, Any]]:
+def _record_sets(info: DatasetInfo) -> list[dict[str, Any]]:
     """Images with their pixels, objects and categories."""
     images = record_set(
         "images",
         "Images with the intrinsics of their cameras.",
         {
-            **_columns("images", IMAGE_COLUMNS),
+            **_columns("images", _image_columns(info)),
             "content": ("sc:ImageObject", extract("image-files", {"fileProperty": "content"})),
         },
     )

@@ -23,6 +23,10 @@ campose                    JSON                   list of one: ``cam2world_matri
                                                   Z backwards, as in Blender), ``location``,
                                                   ``cam_K``, ``fov_x``, ``fov_y`` [rad]
 K                          float64 [3, 3]         intrinsics
+lens                       JSON                   of other lenses than a pinhole, before ``K``:
+                                                  ``model``, ``distortion`` with the names
+                                                  ``coefficients`` in OpenCV's order,
+                                                  ``half_field_rad``
 T_world_camera             float64 [4, 4]         pose; X right, Y down, Z forward
 =========================  =====================  ================================================
 
@@ -48,11 +52,13 @@ from numpy.typing import NDArray
 from gen_data.exporters.base import ANY_FORMAT, ExporterBase
 from gen_data.exporters.fragments import fragment_rows, write_fragment
 from gen_data.exporters.image_files import link_or_copy, read_image
+from gen_data.exporters.lens_fields import lens_fields
 from gen_data.exporters.npz import npz_bytes
 from gen_data.exporters.sequences import write_text
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.interfaces import DatasetInfo
+from gen_data.generator.core.intrinsics import Intrinsics
 from gen_data.generator.core.optional_packages import missing_packages
 from gen_data.generator.core.sample import ImageTruth, ObjectTruth, Sample
 from gen_data.generator.core.se3 import Array
@@ -196,6 +202,7 @@ def _camera_arrays(truth: ImageTruth) -> dict[str, NDArray[Any]]:
         "instance_attribute_maps": _text([background, *(_attributes(thing) for thing in seen)]),
         "campose": _text([_camera_pose(truth, T_world_camera)]),
         "K": _intrinsics(truth),
+        **{key: _text(lens) for key, lens in lens_fields(truth.camera.intrinsics.lens).items()},
         "T_world_camera": T_world_camera,
     }
 
@@ -228,13 +235,32 @@ def _camera_pose(truth: ImageTruth, T_world_camera: Array) -> dict[str, Any]:
     camera = truth.camera.intrinsics
     pose = T_world_camera.copy()
     pose[:3, :3] *= BLENDER_AXES
+    fov_x, fov_y = fields_rad(camera)
     return {
         "cam2world_matrix": (pose + 0.0).tolist(),
         "location": pose[:3, 3].tolist(),
         "cam_K": _intrinsics(truth).tolist(),
-        "fov_x": round(2.0 * math.atan(0.5 * camera.width_px / camera.fx_px), 9),
-        "fov_y": round(2.0 * math.atan(0.5 * camera.height_px / camera.fy_px), 9),
+        "fov_x": round(fov_x, 9),
+        "fov_y": round(fov_y, 9),
     }
+
+
+def fields_rad(camera: Intrinsics) -> tuple[float, float]:
+    """Horizontal and vertical field of view.
+
+    For a pinhole as BlenderProc has them, as if its principal point were centred. For other lenses
+    the angles that the row and the column of the principal point see, within the lens's field.
+    """
+    width, height = camera.width_px, camera.height_px
+    if camera.straight:
+        half = (0.5 * width / camera.fx_px, 0.5 * height / camera.fy_px)
+        return 2.0 * math.atan(half[0]), 2.0 * math.atan(half[1])
+    # The edge of a panorama is the seam, which rounding may put outside of the model.
+    u, v = (np.linspace(1e-7, size - 1e-7, 4 * size + 1) for size in (width, height))
+    row = camera.rays(np.column_stack([u, np.full_like(u, camera.cy_px)]))
+    column = camera.rays(np.column_stack([np.full_like(v, camera.cx_px), v]))
+    across, down = np.arctan2(row[:, 0], row[:, 2]), np.arctan2(column[:, 1], column[:, 2])
+    return float(np.nanmax(across) - np.nanmin(across)), float(np.nanmax(down) - np.nanmin(down))
 
 
 def _text(value: Any) -> NDArray[np.bytes_]:

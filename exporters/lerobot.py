@@ -38,7 +38,7 @@ from typing import Any, ClassVar, Literal
 
 from pydantic import PrivateAttr
 
-from gen_data.exporters.base import ANY_FORMAT, ExporterBase, check_installed
+from gen_data.exporters.base import ANY_FORMAT, ExporterBase, check_installed, select_names
 from gen_data.exporters.fragments import fragment_rows
 from gen_data.exporters.lerobot_files import LABELS, LAYOUTS, RobotFiles
 from gen_data.exporters.lerobot_statistics import image_sums
@@ -70,7 +70,6 @@ class LeRobot(ExporterBase):
 
     Attributes:
         arm: Name of the arm; empty = the first one.
-        cameras: Names of the cameras; empty = all with the rgb channel.
         version: Format: ``v3.0`` for LeRobot 0.4 and later, ``v2.1`` for earlier releases.
     """
 
@@ -78,7 +77,6 @@ class LeRobot(ExporterBase):
 
     image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
     arm: str = ""
-    cameras: tuple[str, ...] = ()
     version: Literal["v3.0", "v2.1"] = "v3.0"
 
     _assets: AssetLibrary | None = PrivateAttr(None)
@@ -148,7 +146,8 @@ class LeRobot(ExporterBase):
     def _cameras(self, info: DatasetInfo) -> tuple[str, ...]:
         if not self.cameras:
             return rgb_cameras(info) or (rgb_camera(info, "", self.type),)
-        return tuple(rgb_camera(info, name, self.type) for name in self.cameras)
+        names = select_names(self.cameras, info.cameras, f"exporter '{self.type}': cameras")
+        return tuple(rgb_camera(info, name, self.type) for name in names)
 
     def _row(self, info: DatasetInfo, sample: Sample, shard_dir: Path) -> dict[str, Any]:
         assert self._assets is not None, "call with_assets first"

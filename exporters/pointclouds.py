@@ -52,7 +52,11 @@ PCD_TYPES = {"<f4": ("4", "F"), "<u2": ("2", "U"), "|u1": ("1", "U")}
 
 
 class PointClouds(ExporterBase):
-    """PLY or PCD files of every laser scan."""
+    """PLY or PCD files of every laser scan.
+
+    Attributes:
+        format: Binary PLY, or binary PCD of the Point Cloud Library.
+    """
 
     type: Literal["pointclouds"] = "pointclouds"
 

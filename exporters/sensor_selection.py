@@ -68,8 +68,9 @@ def check_pinholes(info: DatasetInfo, cameras: Iterable[str], exporter: str) -> 
     ]
     if bent:
         raise ConfigError(
-            f"exporter '{exporter}': {', '.join(bent)}, but the format holds rectified images; "
-            "use a pinhole, or export such images as coco"
+            f"exporter '{exporter}': {', '.join(bent)}, but the format holds rectified images; add "
+            "rectify: true to the exporter, list the others in its cameras:, use a pinhole, or "
+            "export such images as coco"
         )
 
 

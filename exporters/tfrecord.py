@@ -16,7 +16,10 @@ and by object
 An image without objects has the same keys, with empty lists. Additional keys:
 ``image/depth/encoded`` and the like, PNG files of the camera's other channels;
 ``image/sensor``, ``image/sample``, ``image/scene``, ``image/intrinsics`` (3 x 3) and
-``image/T_world_camera`` (4 x 4), row by row; ``image/object/instance_id``.
+``image/T_world_camera`` (4 x 4), row by row; ``image/object/instance_id``. Images of other lenses
+than a pinhole have ``image/lens/model``, ``image/lens/distortion`` (coefficients in the order of
+OpenCV's functions, to be applied before the intrinsics) and ``image/lens/half_field_rad``, the
+angle to the axis at which the image ends. In the intrinsics the centre of pixel i is i + 0.5.
 
 A record is its length (uint64), the masked CRC32C of the length, the data, and the masked CRC32C of
 the data. Feature maps are written sorted by key, so that the same values give the same bytes.
@@ -29,6 +32,7 @@ tensorflow/models, research/object_detection/core/standard_fields.py (TfExampleF
 from __future__ import annotations
 
 import json
+import math
 import struct
 from collections import Counter
 from collections.abc import Collection, Iterable, Mapping, Sequence
@@ -42,11 +46,13 @@ from pydantic import Field
 from gen_data.exporters.base import PNG_OR_JPEG, ExporterBase, check_installed
 from gen_data.exporters.fragments import fragment_rows, numbered_stem, write_fragment
 from gen_data.exporters.ignored_regions import each_class
+from gen_data.exporters.lens_fields import lens_fields
 from gen_data.exporters.png import RowFilter, encode_png
 from gen_data.exporters.sensor_selection import rgb_camera, rgb_cameras
 from gen_data.exporters.sequences import write_bytes, write_text
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.interfaces import DatasetInfo
+from gen_data.generator.core.lens import Lens
 from gen_data.generator.core.sample import ImageTruth, ObjectTruth, Sample
 
 IMAGES = "images"
@@ -61,6 +67,8 @@ FLOATS = frozenset(
         "image/object/area",
         "image/intrinsics",
         "image/T_world_camera",
+        "image/lens/distortion",
+        "image/lens/half_field_rad",
     }
 )
 """Keys whose values are floats."""
@@ -169,8 +177,21 @@ def _image_labels(info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, F
         "image/sensor": [sensor.encode()],
         "image/sample": [sample.index],
         "image/scene": [sample.scene_index],
+        **_lens_labels(camera.intrinsics.lens),
         "image/intrinsics": camera.intrinsics.matrix().ravel().tolist(),
         "image/T_world_camera": camera.T_world_camera.matrix().ravel().tolist(),
+    }
+
+
+def _lens_labels(lens: Lens) -> dict[str, Feature]:
+    """Keys of a lens; none for a pinhole."""
+    known = lens_fields(lens).get("lens")
+    if known is None:
+        return {}
+    return {
+        "image/lens/model": [known["model"].encode()],
+        "image/lens/distortion": known.get("distortion", []),
+        "image/lens/half_field_rad": [known.get("half_field_rad", math.pi)],
     }
 
 

@@ -12,9 +12,15 @@ Only the names in ``__all__`` are public; everything else may change between rel
 
 from __future__ import annotations
 
+import os
 from importlib import import_module
 
-from gen_data.generator import __version__
+_folder = __path__[0]
+if not os.path.isdir(f"{_folder}/generator"):  # noqa: PTH112  pathlib takes longer than this module
+    # A checkout without symbolic links: the packages are the folders beside this one.
+    __path__.append(os.path.dirname(_folder))  # noqa: PTH120
+
+from gen_data.generator import __version__  # noqa: E402
 
 # ``typing`` would delay the moment from which the command line handles Ctrl-C.
 TYPE_CHECKING = False

@@ -51,7 +51,16 @@ class Thing(Strict):
 
 
 class Joint(Strict):
-    """A joint of a thing; see ``BodyJoint``."""
+    """A joint of a thing; see ``BodyJoint``.
+
+    Attributes:
+        kind: ``prismatic`` slides, ``revolute`` turns.
+        axis: Direction of the motion, in the frame of the thing.
+        anchor_m: A point on the axis, in the frame of the thing.
+        limits: Smallest and largest position [m or degrees].
+        friction: Force or torque that moves it at least [N or N m].
+        stiffness: Of a spring that returns it to 0 [N/m or N m/rad].
+    """
 
     kind: Literal["prismatic", "revolute"]
     axis: Vec3
@@ -110,7 +119,17 @@ class Step(Strict):
 
 
 class Success(Strict):
-    """A condition of success; see ``Condition``. Angles of ``tilt`` and ``travel`` in radians."""
+    """A condition of success; see ``Condition``.
+
+    Attributes:
+        measure: ``distance`` between the middles of two boxes, its horizontal part ``offset``,
+            ``height`` of the body above the other, ``gap`` between surfaces [m]; ``tilt`` of the
+            body from its first rotation [rad]; ``travel`` of its joint [m or rad].
+        body: Name of the thing that is measured; ``hand`` = the grasp frame's origin.
+        other: Name of the thing that it is measured from.
+        ever: Whether one instant is enough; else it must hold at the end.
+        at_least, at_most: Bounds, inclusive; null = unbounded.
+    """
 
     measure: Measure
     body: str

@@ -12,7 +12,7 @@ from pydantic import Field
 from gen_data.generator.config.base_model import NAME_PATTERN, Strict
 from gen_data.generator.core.asset_types import Asset, Material
 from gen_data.generator.core.bounded_cache import ObjectCache
-from gen_data.generator.core.errors import ConfigError, LayoutRejected, Rejection, did_you_mean
+from gen_data.generator.core.errors import ConfigError, LayoutRejected, Rejection, one_of
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Body, Scene
 from gen_data.generator.core.se3 import Vec3
@@ -122,9 +122,7 @@ class SurfaceRandomizer(RandomizerBase):
 def check_known(name: str, known: Collection[str], fault: str) -> None:
     """Raise ConfigError with a text that begins with ``fault`` if a name is not among the known."""
     if name not in known:
-        raise ConfigError(
-            f"{fault} '{name}'; expected one of {', '.join(known)}{did_you_mean(name, known)}"
-        )
+        raise ConfigError(f"{fault} '{name}'; {one_of(name, known)}")
 
 
 def body_materials(body: Body, assets: AssetIndex) -> tuple[Material, ...]:
@@ -143,7 +141,7 @@ def _set_materials(
 
 
 def find_textures(assets: AssetIndex, names: tuple[str, ...], field: str) -> tuple[str, ...]:
-    """Find all textures with any of these tags or families; sorted ids.
+    """Find all textures with any of these ids, tags or families; sorted ids.
 
     Raises:
         ConfigError: a name matches no texture.
@@ -166,10 +164,10 @@ def find_texture_files(assets: AssetIndex, textures: tuple[str, ...]) -> tuple[s
 
 
 def _by_word(textures: tuple[Asset, ...]) -> Mapping[str, tuple[str, ...]]:
-    """Ids of textures by tag and by family."""
+    """Ids of textures by id, tag and family."""
     by_word: dict[str, list[str]] = {}
     for texture in textures:
-        for word in {_family(texture.asset_id), *texture.tags}:
+        for word in {texture.asset_id, _family(texture.asset_id), *texture.tags}:
             by_word.setdefault(word, []).append(texture.asset_id)
     return {word: tuple(ids) for word, ids in by_word.items()}
 

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Literal
+
+import numpy as np
 
 from gen_data.generator.assets.asset_ids import AssetId
 from gen_data.generator.assets.interiors.fixtures import DRAIN, TAP
 from gen_data.generator.config import distributions as dist
+from gen_data.generator.core.asset_types import RobotModel
 from gen_data.generator.core.boxes import overlap_of
 from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.scene import Body, Scene
+from gen_data.generator.core.kinematics import link_poses, position_limits, positions_of
+from gen_data.generator.core.scene import Body, Instance, Scene
 from gen_data.generator.core.se3 import SE3, Vec3
 from gen_data.generator.core.streams import Rng
 from gen_data.generator.rooms.bodies import JOINTS, LEADS_OUT, Joint, keypoint_m, part_pose
@@ -31,6 +35,10 @@ class ObjectStates(RandomizerBase):
 
     Labels carry ``open``, from 0 to 1, ``joint``: the turn [rad] or way [m] of the part, and
     ``state``: on or off, of screens and taps. Doors that lead out of all rooms stay closed.
+
+    Things with joints of a user (element ``prop``) move, too. Labels carry, for a joint ``j``,
+    ``open_j`` from 0 to 1, its position ``joint_j`` [rad or m], ``joint_j_type``, its limits
+    ``joint_j_limits``, and its axis in the frame of the thing, ``joint_j_axis``.
 
     Attributes:
         is_open: Whether a part is open at all.
@@ -60,6 +68,10 @@ class ObjectStates(RandomizerBase):
             attributes.setdefault(part.instance_id, []).extend(
                 [("joint", way), ("open", f"{share:.3g}")]
             )
+        for thing in _jointed_things(scene, assets):
+            moved_bodies, stated = self._move(scene, assets, thing, rng)
+            scene = scene.with_bodies(*moved_bodies)
+            attributes.setdefault(thing.instance_id, []).extend(stated)
         changed = []
         streams = []
         for body in scene.bodies:
@@ -89,6 +101,83 @@ class ObjectStates(RandomizerBase):
         scene = scene.with_bodies(*changed)
         scene = replace(scene, bodies=(*scene.bodies, *streams))
         return add_attributes(scene, attributes)
+
+    def _move(
+        self, scene: Scene, assets: AssetIndex, thing: Instance, rng: Rng
+    ) -> tuple[tuple[Body, ...], list[tuple[str, str]]]:
+        """The bodies of a thing with its joints drawn, and what labels state of each joint.
+
+        A joint opens from its home position towards its farther limit.
+        """
+        model = assets.robot(thing.asset)
+        home = {j.name: q for j, q in zip(model.movable, model.home, strict=True)}
+        own = {b.name: b for b in scene.bodies if b.instance_id == thing.instance_id}
+        T_world_base = _base_pose(thing, model, own)
+        stated: list[tuple[str, str]] = []
+        positions = {name: home[name] for name in home}
+        for joint in model.movable:
+            if joint.mimic:
+                continue
+            is_open, opening = self.is_open.draw(rng), self.opening.draw(rng)
+            low, high = position_limits(joint, model)
+            start = home[joint.name]
+            limit = high if high - start >= start - low else low
+            for step in (*_STEPS, 0.0):
+                share = round(opening * step, 3) if is_open else 0.0
+                positions[joint.name] = round(start + share * (limit - start), 6)
+                tried = _placed(thing, model, T_world_base, positions, own)
+                if share == 0.0 or all(
+                    _is_free(scene, assets, body, next(iter(own.values())), body.T_world_body)
+                    for body in tried
+                    if body != own[body.name]
+                ):
+                    break
+            own = {body.name: body for body in _placed(thing, model, T_world_base, positions, own)}
+            stated.append((f"open_{joint.name}", f"{share:.3g}"))
+        poses = link_poses(model, SE3(), positions_of(model.joints, positions))
+        values = zip(model.movable, positions_of(model.joints, positions), strict=True)
+        for joint, value in values:
+            name = f"joint_{joint.name}"
+            axis = poses[joint.child].rotate(np.array(joint.axis))
+            stated += [
+                (name, f"{value:.4g}"),
+                (f"{name}_type", joint.kind),
+                (f"{name}_limits", f"{joint.lower:.4g} {joint.upper:.4g}"),
+                (f"{name}_axis", " ".join(f"{v + 0.0:.4g}" for v in np.round(axis, 6))),
+            ]
+        return tuple(own.values()), stated
+
+
+def _jointed_things(scene: Scene, assets: AssetIndex) -> Iterator[Instance]:
+    """Yield the instances that are made of links, but no robots that goals move."""
+    robots = {a.instance_id for a in scene.articulations}
+    for thing in scene.instances:
+        jointed = thing.parts and thing.instance_id not in robots and thing.asset
+        if jointed and assets.get(thing.asset).kind == "robot":
+            yield thing
+
+
+def _base_pose(thing: Instance, model: RobotModel, own: Mapping[str, Body]) -> SE3:
+    """``T_world_base`` of a thing in its home position."""
+    poses = link_poses(model, SE3(), model.home)
+    name, body = next(iter(own.items()))
+    link = name.removeprefix(f"{thing.name}/")
+    return body.T_world_body @ poses[link].inverse()
+
+
+def _placed(
+    thing: Instance,
+    model: RobotModel,
+    T_world_base: SE3,
+    positions: Mapping[str, float],
+    own: Mapping[str, Body],
+) -> tuple[Body, ...]:
+    """The bodies of a thing at joint positions [rad or m]."""
+    poses = link_poses(model, T_world_base, positions_of(model.joints, positions))
+    return tuple(
+        replace(body, T_world_body=poses[name.removeprefix(f"{thing.name}/")].rounded())
+        for name, body in own.items()
+    )
 
 
 def _stream(piece: Body, mouth_m: Vec3, assets: AssetIndex) -> Body:

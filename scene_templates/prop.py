@@ -1,23 +1,31 @@
-"""Single static objects."""
+"""Single static objects, and things with joints."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Literal
 
+import numpy as np
 from pydantic import Field, model_validator
 
 from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.scene import Scene
+from gen_data.generator.core.kinematics import link_poses, rigid_group
+from gen_data.generator.core.scene import Body, Instance, Scene
+from gen_data.generator.core.se3 import SE3
 from gen_data.scene_templates.element import (
     PlacedElement,
     add_background,
     add_static,
+    next_instance_id,
     stand_upright,
 )
 
 
 class Prop(PlacedElement):
     """A static asset, such as a gantry, a plinth or a tray.
+
+    A thing with joints, listed under ``robots`` of an asset folder with a category such as
+    ``cabinet``, is one instance whose parts are its links; ``object_states`` moves its joints.
 
     Attributes:
         asset: Id of the asset, such as ``gantry?size_m=1.6,1,1.8``.
@@ -39,7 +47,40 @@ class Prop(PlacedElement):
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
         """Add a static body and, unless it is background, its instance."""
+        if assets.get(self.asset).kind == "robot":
+            return self._add_jointed(scene, assets)
         pose = stand_upright(assets, self.asset, self.pose(scene))
         if self.hollow:
             return add_background(scene, assets, self.name, self.asset, pose)
         return add_static(scene, assets, self.name, self.asset, pose, annotated=self.annotate)
+
+    def _add_jointed(self, scene: Scene, assets: AssetIndex) -> Scene:
+        """Add a body per visible link at the home positions; the lowest one stands there."""
+        thing, number = assets.robot(self.asset), next_instance_id(scene)
+        poses = link_poses(thing, SE3(), thing.home)
+        lowest_m = min(
+            poses[link].apply(assets.vertices_m(mesh).astype(np.float64))[:, 2].min()
+            for link, mesh in thing.visuals.items()
+        )
+        T_world_base = (self.pose(scene) @ SE3((0.0, 0.0, -float(lowest_m)))).rounded()
+        parts = tuple(link for link in thing.links if link in thing.visuals)
+        # The frame of an instance is that of its first body, which should not move with a joint.
+        rigid = rigid_group(thing, thing.links[0])
+        bodies = tuple(
+            Body(
+                f"{self.name}/{link}",
+                thing.visuals[link],
+                (T_world_base @ poses[link]).rounded(),
+                instance_id=number,
+                part_id=parts.index(link) + 1,
+                collides=link in thing.collisions and not self.hollow,
+            )
+            for link in sorted(parts, key=lambda link: link not in rigid)
+        )
+        category = assets.get(self.asset).category
+        instance = Instance(
+            number, self.name, category, 0, self.asset, annotated=self.annotate, parts=parts
+        )
+        return replace(
+            scene, bodies=(*scene.bodies, *bodies), instances=(*scene.instances, instance)
+        )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Mapping, Sequence
 from os import PathLike, fspath
 from pathlib import Path
@@ -36,10 +37,12 @@ def load_config(
     """
     from gen_data.generator.assemble.config import load_config, parse_config
 
+    if seed is not None:
+        check_whole("seed", seed)
     choice: dict[str, Any] = {"seed": seed, "overrides": overrides, "without": without}
     if isinstance(config, Mapping):
         return parse_config(_yaml_text(config), "<config>", "config", **choice)
-    return load_config(fspath(config), **choice)
+    return load_config(path_text("config", config), **choice)
 
 
 def read_document(source: ConfigLike, title: str) -> Node:
@@ -52,7 +55,7 @@ def read_document(source: ConfigLike, title: str) -> Node:
 
     if isinstance(source, Mapping):
         return parse_yaml(_yaml_text(source), f"<{title}>")
-    return load_yaml(Path(source))
+    return load_yaml(Path(path_text(title, source)))
 
 
 def read_model(document: Node, model: type[Model]) -> Model:
@@ -71,12 +74,42 @@ def read_model(document: Node, model: type[Model]) -> Model:
     return loaded
 
 
+def check_whole(name: str, value: object, least: int | None = None) -> None:
+    """Refuse an argument that is no whole number of at least ``least``; None = any.
+
+    Raises:
+        ConfigError: it is none; True and False are none either.
+    """
+    try:
+        whole = operator.index(value)  # type: ignore[arg-type]
+    except TypeError:
+        whole = None
+    if whole is None or isinstance(value, bool):
+        raise ConfigError(f"{name}: {value!r}; expected a whole number")
+    if least is not None and whole < least:
+        raise ConfigError(f"{name}: {whole}; expected at least {least}")
+
+
+def path_text(name: str, value: object) -> str:
+    """The text of an argument that is a path, URL or shipped name.
+
+    Raises:
+        ConfigError: it is none.
+    """
+    text = fspath(value) if isinstance(value, PathLike) else value
+    if not isinstance(text, str) or "\0" in text:
+        raise ConfigError(f"{name}: {value!r}; expected a path, as a text or a pathlib.Path")
+    return text
+
+
 def count_workers(workers: int | None) -> int:
     """Number of worker processes; None = one per core, or 0 where the system has none (Windows).
 
     Raises:
         ConfigError: it is negative, or the system has no workers.
     """
+    if workers is not None:
+        check_whole("workers", workers)
     if workers is None:
         return usable_cores() if CAN_PASS_FILES else 0
     if workers > 0 and not CAN_PASS_FILES:

@@ -16,12 +16,13 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeVar, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.api.config import ConfigLike, load_config
+from gen_data.generator.api.config import ConfigLike, check_whole, load_config, path_text
 from gen_data.generator.api.relabelling import LabelMapLike, RelabelledSamples, load_label_map
 from gen_data.generator.api.sample import Sample, SampleRecord
 from gen_data.generator.core.errors import (
     ConfigError,
     ConfigWarning,
+    IndexKindError,
     SampleIndexError,
     UnknownNameError,
     did_you_mean,
@@ -93,7 +94,7 @@ class SampleSequence(Sequence[Sample], AbstractContextManager["SampleSequence", 
         Raises:
             SampleIndexError: the index is out of range; it is also an IndexError.
             SampleError: the sample cannot be generated.
-            TypeError: the index is no whole number.
+            IndexKindError: the index is no whole number; it is also a TypeError.
         """
         if isinstance(index, slice):
             part = copy.copy(self)
@@ -316,10 +317,10 @@ class SplitIndices(Sequence[int]):
 
 
 def _check_index(index: Any) -> None:
-    """Raise TypeError if an index is no whole number; for a name, the text has the remedy."""
-    if not hasattr(index, "__index__"):
+    """Refuse an index that is no whole number; for a name, the text has the remedy."""
+    if not hasattr(index, "__index__") or isinstance(index, bool):
         remedy = f"; .split({index!r}) has the samples of a split" if isinstance(index, str) else ""
-        raise TypeError(f"{index!r} is no index; expected a whole number or a slice{remedy}")
+        raise IndexKindError(f"index: {index!r}; expected a whole number or a slice{remedy}")
 
 
 class Dataset(SampleSequence):
@@ -359,8 +360,8 @@ class Dataset(SampleSequence):
         channels: Sequence[str] = (),
         split: str = "",
     ) -> None:
-        if n is not None and n < 0:
-            raise ConfigError(f"n: {n} is negative; expected 0 or more")
+        if n is not None:
+            check_whole("n", n, least=0)
         loaded = load_config(config, seed=seed, overrides=overrides, without=without)
         indices = UNBOUNDED if n is None else range(n)
         super().__init__(GeneratedSamples(loaded, _parse_channels(channels)), indices)
@@ -496,7 +497,7 @@ def open_dataset(folder: str | PathLike[str], split: str = "") -> StoredDataset:
         StorageError: the folder holds no finished data set.
         UnknownNameError: its configuration has no such split.
     """
-    return StoredDataset(folder, split)
+    return StoredDataset(path_text("folder", folder), split)
 
 
 def _parse_channels(names: Sequence[str]) -> frozenset[Channel]:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Mapping, Sequence
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,6 +18,9 @@ from gen_data.generator.core.errors import ConfigError
 if TYPE_CHECKING:
     from gen_data.generator.assemble.config import Config
     from gen_data.generator.runner.progress import RunProgress, Summary
+
+_EXCERPT = re.compile(r"\s+\d*\s*\|")
+"""Lines of messages that quote the source."""
 
 Format = str | Mapping[str, Any]
 """Name of an exporter, or its entry of a configuration: ``{"type": "coco", "amodal": False}``."""
@@ -60,7 +65,7 @@ def export(  # noqa: PLR0913  (keywords of one front door)
 
     from gen_data.generator.assemble.config import load_config
     from gen_data.generator.assemble.pipeline_factory import check_scene, ready_exporters
-    from gen_data.generator.assets.library import open_library
+    from gen_data.generator.packs.provision import open_assets
     from gen_data.generator.runner.exports import export as write_exports
     from gen_data.generator.runner.stored import StoredSamples
 
@@ -72,10 +77,11 @@ def export(  # noqa: PLR0913  (keywords of one front door)
     if label_map is not None:
         overrides.append(label_map_override(Path(label_map), stored.categories))
     source = os.fspath(folder)
-    config = load_config(source, overrides=overrides)
-    _check_annotations(load_config(source), config)
-    exporters = ready_exporters(config, stored.info, open_library(config.asset_folders))
-    check_scene(config, stored.sample(0).scene)
+    with _named_formats():
+        config = load_config(source, overrides=overrides)
+        _check_annotations(load_config(source), config)
+        exporters = ready_exporters(config, stored.info, open_assets(config.asset_folders))
+        check_scene(config, stored.sample(0).scene)
     summary = write_exports(
         stored,
         config,
@@ -87,6 +93,20 @@ def export(  # noqa: PLR0913  (keywords of one front door)
         force=force,
     )
     return check_label_gaps(summary)
+
+
+@contextmanager
+def _named_formats() -> Iterator[None]:
+    """Name the formats in errors, rather than the override that they become."""
+    try:
+        yield
+    except ConfigError as error:
+        text = re.sub(r"^(\s*)--set:1:\d+: exporters\[", r"\1formats[", str(error), flags=re.M)
+        if text == str(error):
+            raise
+        # What was typed is short, and quoted by the shell: no excerpt.
+        kept = [line for line in text.splitlines() if not _EXCERPT.match(line)]
+        raise ConfigError("\n".join(kept)) from None
 
 
 def label_map_override(path: Path, categories: Sequence[str]) -> str:
@@ -108,10 +128,12 @@ def label_map_override(path: Path, categories: Sequence[str]) -> str:
 
 def _check_annotations(made: Config, wanted: Config) -> None:
     """Reject exporters that read annotations which the data set was made without."""
-    exported: set[str] = set().union(*(e.needs for e in made.exporters))
+    from gen_data.generator.pipeline.exporter_views import needs_of
+
+    exported: set[str] = set().union(*map(needs_of, made.exporters))
     known = {*made.annotations, *exported, *made.general.labels.map.needs}
     for exporter in wanted.exporters:
-        missing = sorted(exporter.needs - known)
+        missing = sorted(needs_of(exporter) - known)
         if missing:
             raise ConfigError(
                 f"exporter '{exporter.type}' reads the annotations {', '.join(missing)}, which the "

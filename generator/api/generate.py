@@ -9,7 +9,7 @@ from os import PathLike, fspath
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gen_data.generator.api.config import ConfigLike, count_workers, load_config
+from gen_data.generator.api.config import ConfigLike, check_whole, count_workers, load_config
 from gen_data.generator.api.label_gaps import check_label_gaps
 from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.urls import is_url
@@ -167,6 +167,7 @@ def _check_arguments(
     """Refuse wrong numbers, repair at a URL, and a folder in which another run writes."""
     from gen_data.generator.runner.object_store import open_store
 
+    check_whole("n", n)
     if n < 1:
         raise ConfigError(f"n: {n} samples cannot be made; expected at least 1")
     count_workers(workers)
@@ -184,9 +185,15 @@ def _make_factory(loaded: Config, n: int) -> PipelineFactory:
     from gen_data.generator.pipeline.splits import warn_of_empty_splits
     from gen_data.generator.sensors.mounting import warn_of_early_readings
 
-    general = loaded.general
+    general, stated = loaded.general, loaded.document.get("splits")
     scenes = -(-n // (general.views_per_scene * general.steps_per_scene))
-    warn_of_empty_splits(scenes, loaded.split_shares, general.splits.assign, general.seed)
+    warn_of_empty_splits(
+        scenes,
+        loaded.split_shares,
+        general.splits.assign,
+        general.seed,
+        stated=stated is not None and bool(stated.content),
+    )
     warn_of_early_readings(loaded.sensors, general.steps_per_scene)
     factory = PipelineFactory(loaded, n)
     factory.check()

@@ -18,6 +18,7 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from gen_data.generator.api.config import check_whole
 from gen_data.generator.api.dataset import SampleSequence
 from gen_data.generator.api.sample import Sample
 from gen_data.generator.core.errors import ConfigError, SampleError
@@ -80,8 +81,9 @@ class Loader(Generic[T]):
             ("mixed_scenes", mixed_scenes, 1),
             ("world_size", world_size, 1),
         ):
-            if value < least:
-                raise ConfigError(f"{name}: {value}; expected at least {least}")
+            check_whole(name, value, least)
+        check_whole("rank", rank)
+        check_whole("seed", seed)
         if not 0 <= rank < world_size:
             raise ConfigError(f"rank: {rank}; expected 0 to {world_size - 1}")
         if samples.is_bounded == (epoch_size is not None):
@@ -131,8 +133,15 @@ class Loader(Generic[T]):
         """Continue where another loader with the same arguments was.
 
         Raises:
-            ConfigError: the other loader had another seed.
+            ConfigError: the other loader had another seed, or this is no state of a loader.
         """
+        if set(state) != set(self.state_dict()):
+            raise ConfigError(
+                f"state: has the keys {', '.join(map(str, state)) or 'none'}; expected those of "
+                f"state_dict: {', '.join(self.state_dict())}"
+            )
+        for name in ("epoch", "position"):
+            check_whole(name, state[name], 0)
         if state["seed"] != self._seed:
             raise ConfigError(
                 f"seed: the state is of a loader with the seed {state['seed']}, this one has "

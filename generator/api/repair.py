@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gen_data.generator.api.config import count_workers
-from gen_data.generator.core.errors import StorageError
+from gen_data.generator.core.errors import StorageError, no_folder
 
 if TYPE_CHECKING:
     from gen_data.generator.runner.plan import Plan
@@ -49,6 +49,8 @@ def repair(
     from gen_data.generator.runner.store import LocalStore
 
     path = Path(folder)
+    if not path.exists():
+        raise StorageError(no_folder(path))
     data = read_declared_plan(LocalStore(path.absolute()))
     if data is None:
         raise StorageError(

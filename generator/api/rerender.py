@@ -105,11 +105,11 @@ def _with_fitting_exporters(
         ConfigWarning: an exporter is left out; the text has the reason.
     """
     from gen_data.generator.assemble.pipeline_factory import dataset_info, ready_exporters
-    from gen_data.generator.assets.library import open_library
+    from gen_data.generator.packs.provision import open_assets
 
     if now.general.labels.map.faults(stored.categories):
         return now  # Refused by the run, whatever the exporters are.
-    library = open_library(now.asset_folders)
+    library = open_assets(now.asset_folders)
     info = dataset_info(now, stored.n, stored.categories)
     kept = []
     for exporter, entry in zip(now.exporters, now.resolved["exporters"], strict=True):

@@ -19,7 +19,7 @@ from gen_data.generator.assemble.preflight import (
     far_sensors,
     unrectified_pairs,
 )
-from gen_data.generator.assets.library import Library, open_library
+from gen_data.generator.assets.library import Library
 from gen_data.generator.config.error_positions import located_errors
 from gen_data.generator.config.problems import Problems, refuse
 from gen_data.generator.config.yaml_tree import find_text
@@ -40,8 +40,10 @@ from gen_data.generator.core.interfaces import (
 from gen_data.generator.core.path_names import CATEGORY_MAX, check_name
 from gen_data.generator.core.plates import has_plate
 from gen_data.generator.core.scene import LABEL_IDS_MAX, Scene, SharedValue
+from gen_data.generator.packs.provision import open_assets
 from gen_data.generator.physics import missing_engine, open_engine
 from gen_data.generator.pipeline import Pipeline
+from gen_data.generator.pipeline.exporter_views import ExporterView, needs_of, view_of
 from gen_data.generator.pipeline.pipeline import PipelineConfig, SceneSource
 from gen_data.generator.sensors.camera.plate_camera import PlateCamera
 from gen_data.generator.sensors.mounting import check_not_buried, stride, within_steps
@@ -89,7 +91,7 @@ class PipelineFactory:
     @cached_property
     def library(self) -> Library:
         """Assets, of this process: opening them takes as long as building a simple scene."""
-        return open_library(self.config.asset_folders)
+        return open_assets(self.config.asset_folders)
 
     @cached_property
     def nominal(self) -> tuple[Scene, ...]:
@@ -375,7 +377,7 @@ def annotators_of(config: Config) -> Sequence[AnyAnnotator]:
     """Annotators of the configuration, then the others that exporters need."""
     annotators = dict(config.annotations)
     label_map = config.general.labels.map
-    for needs in (label_map.needs, *(exporter.needs for exporter in config.exporters)):
+    for needs in (label_map.needs, *map(needs_of, config.exporters)):
         for name in sorted(needs - annotators.keys()):
             annotators[name] = default_plugin(ANNOTATIONS, name)
     return list(annotators.values())
@@ -392,6 +394,9 @@ def check_scene(config: Config, scene: Scene) -> None:
         if isinstance(exporter, ExporterBase):
             with refused.collected(), located_errors(config.document):
                 exporter.check_scene(scene)
+                view = view_of(exporter, exporter, config.general.labels)
+                if isinstance(view, ExporterView):
+                    view.check_scene(scene)
     refused.raise_if_any()
 
 
@@ -418,10 +423,12 @@ def ready_exporters(config: Config, info: DatasetInfo, library: Library) -> dict
         _check_label_map(config, info.categories)
     for own in config.exporters:
         exporter = own if label_map.is_identity else MappedExporter(own, label_map)
+        exporter = view_of(own, exporter, config.general.labels)
         if exporter.type in exporters:
             raise ConfigError(f"exporters: '{exporter.type}' is listed twice")
         with refused.collected(), located_errors(config.document):
-            check_image_formats(own, info)
+            if not isinstance(exporter, ExporterView):
+                check_image_formats(own, info)
         with refused.collected(), located_errors(config.document):
             exporter.check(info)
         exporters[exporter.type] = exporter.with_assets(library)

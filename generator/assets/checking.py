@@ -174,7 +174,7 @@ def _describe_up(one: IndexedAsset) -> str:
     entry = one.entry
     if not isinstance(entry, MeshEntry):
         return "z"
-    if entry.up is None and Path(entry.file).suffix.lower().startswith(".usd"):
+    if entry.up is None and Path(entry.file).suffix.lower().startswith((".usd", ".dae")):
         return ""
     return entry.up or f"{entry.up_axis()} (assumed)"
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import re
 import time
 from collections.abc import Iterator
 from hashlib import sha256
@@ -18,12 +19,16 @@ from urllib.parse import unquote
 
 from gen_data.generator.assets.asset_cache import DiskCache
 from gen_data.generator.assets.asset_folder import Folder
-from gen_data.generator.assets.parsing import parse_layer_references, unpack_value
+from gen_data.generator.assets.parsing import (
+    parse_described_files,
+    parse_layer_references,
+    unpack_value,
+)
 from gen_data.generator.assets.readers.mesh_source import locate_file
 from gen_data.generator.assets.readers.obj import mtl_references, obj_references
 from gen_data.generator.assets.readers.ply import ply_references
+from gen_data.generator.assets.robot_formats import is_description, is_foreign, read_description
 from gen_data.generator.assets.sandbox import run_sandboxed
-from gen_data.generator.assets.urdf import read_urdf
 from gen_data.generator.core.errors import AssetError
 from gen_data.generator.usd.stage_reader import SUFFIXES
 
@@ -31,6 +36,7 @@ _NAME = "digests.json"
 _MISSING = ""
 _TICK_NS = 2_000_000_000
 """Coarsest resolution of a file system's time stamps (FAT: two seconds)."""
+_DAE_IMAGE = re.compile(rb"<(?:init_from|ref)>([^<]{1,1024})")
 _MAX_FILES = 2000
 _ASSETS_KEPT = 4000
 """Above this number of recorded assets, those whose files are gone are dropped.
@@ -129,7 +135,7 @@ def find_referenced_files(folder: Folder, relative: str) -> tuple[str, ...]:
     """Find a file and all existing files it refers to, directly or not, sorted by name.
 
     Raises:
-        AssetError: if the file itself is missing, or an unreadable URDF.
+        AssetError: if the file itself is missing, or an unreadable description of a robot.
     """
     return tuple(name for name, exists in find_references(folder, relative).items() if exists)
 
@@ -138,7 +144,7 @@ def find_references(folder: Folder, relative: str) -> dict[str, bool]:
     """Find a file and everything it refers to: ``{name: whether it exists}``, sorted by name.
 
     Raises:
-        AssetError: if the file itself is missing, or an unreadable URDF.
+        AssetError: if the file itself is missing, or an unreadable description of a robot.
     """
     found: dict[str, bool] = {}
     pending = [relative]
@@ -153,6 +159,9 @@ def find_references(folder: Folder, relative: str) -> dict[str, bool]:
             raise AssetError(
                 f"{folder.root / relative}: refers to more than {_MAX_FILES} files; split it"
             )
+        if is_description(name) and name != relative:
+            # Part of the description that includes it, which has named all its files.
+            continue
         for reference in _references(folder, name):
             # References that leave the folder are skipped here; the reader refuses those it needs.
             with contextlib.suppress(AssetError):
@@ -164,9 +173,14 @@ def find_references(folder: Folder, relative: str) -> dict[str, bool]:
 
 def _references(folder: Folder, name: str) -> Iterator[str]:
     suffix = PurePosixPath(name).suffix.lower()
-    if suffix == ".urdf":
+    if is_description(name):
         depth = len(PurePosixPath(name).parent.parts)
-        yield from ("../" * depth + file for file in read_urdf(folder, name).files())
+        if is_foreign(name):
+            arrays = run_sandboxed(parse_described_files, folder.root, {name: _MISSING}, name)
+            files = unpack_value(tuple[str, ...], arrays)
+        else:
+            files = read_description(folder, name).files()
+        yield from ("../" * depth + file for file in files)
     elif suffix == ".obj":
         yield from obj_references(folder.read(name))
     elif suffix == ".mtl":
@@ -175,6 +189,11 @@ def _references(folder: Folder, name: str) -> Iterator[str]:
         yield from ply_references(folder.read(name))
     elif suffix == ".gltf":
         yield from (unquote(uri) for uri in _uris(folder.read(name)))
+    elif suffix == ".dae":
+        found = (
+            uri.strip().decode("utf-8", "replace") for uri in _DAE_IMAGE.findall(folder.read(name))
+        )
+        yield from (unquote(uri.removeprefix("file://")) for uri in found)
     elif suffix in SUFFIXES:
         arrays = run_sandboxed(parse_layer_references, folder.root, {name: _MISSING}, name)
         yield from unpack_value(tuple[str, ...], arrays)

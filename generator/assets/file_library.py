@@ -46,15 +46,17 @@ from gen_data.generator.assets.parsing import (
     parse_object,
     parse_plate,
     parse_road_network,
+    parse_robot,
     parse_stage,
     parse_surroundings,
     unpack_value,
 )
-from gen_data.generator.assets.robot_models import robot_model, robot_urdf
+from gen_data.generator.assets.robot_description import DescriptionParts, RobotDescription
+from gen_data.generator.assets.robot_formats import is_description, is_foreign
+from gen_data.generator.assets.robot_models import describe_robot, robot_model
 from gen_data.generator.assets.robot_tools import VERSION as TOOLS_VERSION
 from gen_data.generator.assets.sandbox import run_sandboxed
 from gen_data.generator.assets.texture_maps import compose_texture, find_maps
-from gen_data.generator.assets.urdf import Urdf
 from gen_data.generator.assets.usd_stages import is_stage
 from gen_data.generator.core.asset_types import (
     Asset,
@@ -84,14 +86,20 @@ class FileLibrary:
     """
 
     def __init__(
-        self, packs: Path, user_roots: Sequence[Path], disk: DiskCache, store: Store
+        self,
+        packs: Path,
+        user_roots: Sequence[Path],
+        disk: DiskCache,
+        store: Store,
+        provide: Callable[[Path], object] | None = None,
     ) -> None:
         self._packs = packs
         self._user_roots = tuple(user_roots)
         self._store, self._disk = store, disk
+        self._provide = provide
         self._digests = ContentHashes(disk)
         self._listed: dict[str, IndexedAsset] | None = None
-        self._urdfs: dict[str, Urdf] = {}
+        self._robots: dict[str, RobotDescription] = {}
         self._stages: dict[str, StageModel] = {}
         self._hashed: dict[str, dict[str, str]] = {}
         self._keys: dict[str, str] = {}
@@ -106,21 +114,24 @@ class FileLibrary:
 
     def is_missing(self, asset_id: str) -> bool:
         """Whether the files of a known asset are neither installed with pybullet nor as a pack."""
-        name = asset_id.partition("#")[0]
         return _pybullet_data(self._packs) is None and any(
-            name == one.asset_id or name.startswith(f"{one.asset_id}/")
-            for one in _list_pybullet(Path())
+            _is_of(asset_id, one) for one in _list_pybullet(Path())
         )
 
     def __contains__(self, asset_id: str) -> bool:
         """Whether the id names an asset, a robot's link or a stage's piece."""
+        self._provide_pybullet(lambda one: _is_of(asset_id, one))
         return asset_id in self._entries() or self._part(asset_id) is not None
 
     def find(self, tags: frozenset[str], kind: str) -> Iterator[Asset]:
         """Yield all assets of a kind that have every tag."""
-        for one in self._entries().values():
-            if one.kind == kind and tags.issubset(one.tags()):
-                yield self._asset(one)
+
+        def fits(one: IndexedAsset) -> bool:
+            return one.kind == kind and tags.issubset(one.tags())
+
+        self._provide_pybullet(fits)
+        for one in filter(fits, self._entries().values()):
+            yield self._asset(one)
         self._digests.save()
 
     def get(self, asset_id: str) -> Asset:
@@ -148,7 +159,7 @@ class FileLibrary:
             raise AssetError(f"asset '{asset_id}': is of kind {one.kind}, not an object")
 
         if isinstance(entry, RobotEntry) and not part:
-            links = ", ".join(f"{asset_id}/{n}" for n in list(self._urdf(one).links)[:2])
+            links = ", ".join(f"{asset_id}/{n}" for n in list(self._robot(one).links)[:2])
             raise AssetError(f"asset '{asset_id}': is a robot; its meshes are {links}, ...")
         return self._store.get(self._mesh_key(one, name), compute, unpack_imported)
 
@@ -173,16 +184,19 @@ class FileLibrary:
         if part:
             names = [part[1]]
         elif one.kind == "robot":
-            names = list(self._urdf(one).links)
+            names = list(self._robot(one).links)
         else:
             names = [""] if one.kind == "object" else []
         found = [self._remarks_of(one, name, read) for name in names]
         known = [remarks for remarks in found if remarks is not None]
         if len(known) < len(found):
             return None
+        has_links = not part and one.kind in ("object", "robot")
+        described = self._described_remarks(one) if has_links else ()
+        own = (FileRemarks(one.entry.file, described),) if described else ()
         return tuple(
             replace(remarks, file=str(one.root / remarks.file))
-            for remarks in dict.fromkeys(chain(*known))
+            for remarks in dict.fromkeys((*own, *chain(*known)))
         )
 
     def _remarks_of(
@@ -212,12 +226,20 @@ class FileLibrary:
             lambda arrays: unpack_value(tuple[Lane, ...], arrays),
         )
 
+    def _described_remarks(self, one: IndexedAsset) -> tuple[str, ...]:
+        """What a description of links and joints has and nothing uses; empty for other assets."""
+        if not isinstance(one.entry, RobotEntry):
+            if not is_description(one.entry.file):
+                return ()
+            one = replace(one, entry=RobotEntry(file=one.entry.file))
+        return self._robot(one).remarks
+
     def robot(self, asset_id: str) -> RobotModel:
         """Kinematics of a robot."""
         one = self._entries()[asset_id]
         if not isinstance(one.entry, RobotEntry):
             raise AssetError(f"asset '{asset_id}': is of kind {one.kind}, not a robot")
-        return robot_model(asset_id, self._urdf(one), one.entry, str(one.root / one.entry.file))
+        return robot_model(asset_id, self._robot(one), one.entry, str(one.root / one.entry.file))
 
     def stage(self, asset_id: str) -> StageModel:
         """Pieces, lights and cameras of a stage."""
@@ -320,6 +342,16 @@ class FileLibrary:
         """Call a function of ``parsing`` for the files of an asset."""
         return run_sandboxed(parse, one.root, self._files(one), *arguments)
 
+    def _provide_pybullet(self, is_wanted: Callable[[IndexedAsset], bool]) -> None:
+        """Provide the files of pybullet if they are not here and one of its assets is wanted."""
+        if self._provide is None:
+            return
+        if _pybullet_data(self._packs) is not None:
+            self._provide = None
+        elif any(map(is_wanted, _list_pybullet(Path()))):
+            self._provide(self._packs)
+            self._provide = self._listed = None
+
     def _entries(self) -> dict[str, IndexedAsset]:
         if self._listed is None:
             self._listed = {}
@@ -340,16 +372,27 @@ class FileLibrary:
         if one is None or asset_id in self._entries():
             return None
         if one.kind == "robot":
-            return (one, part) if part in self._urdf(one).links else None
+            return (one, part) if part in self._robot(one).links else None
         if not is_stage(one.entry):
             return None
         return (one, part) if part in {p.name for p in self.stage(whole).pieces} else None
 
-    def _urdf(self, one: IndexedAsset) -> Urdf:
-        if one.asset_id not in self._urdfs:
-            assert isinstance(one.entry, RobotEntry)
-            self._urdfs[one.asset_id] = robot_urdf(Folder(one.root), one.entry)
-        return self._urdfs[one.asset_id]
+    def _robot(self, one: IndexedAsset) -> RobotDescription:
+        if one.asset_id not in self._robots:
+            entry = one.entry
+            assert isinstance(entry, RobotEntry)
+            if any(
+                is_foreign(file) for file in (entry.file, entry.tool.file if entry.tool else "")
+            ):
+                parts: DescriptionParts = self._store.get(
+                    content_key({"asset": self._key(one), "part": "robot"}),
+                    lambda: self._parse(one, parse_robot, entry),
+                    lambda arrays: unpack_value(DescriptionParts, arrays),
+                )
+                self._robots[one.asset_id] = parts.whole()
+            else:
+                self._robots[one.asset_id] = describe_robot(Folder(one.root), entry)
+        return self._robots[one.asset_id]
 
     def _asset(self, one: IndexedAsset) -> Asset:
         entry = one.entry
@@ -411,6 +454,12 @@ def _convert_symmetries(entry: MeshEntry) -> tuple[Symmetry, ...]:
 
 def _is_road_network(entry: Entry) -> bool:
     return isinstance(entry, MeshEntry) and entry.file.lower().endswith(ROAD_SUFFIX)
+
+
+def _is_of(asset_id: str, one: IndexedAsset) -> bool:
+    """Whether an id names an asset, or a part or an image of it."""
+    name = asset_id.partition("#")[0]
+    return name == one.asset_id or name.startswith(f"{one.asset_id}/")
 
 
 def _list_everything(packs: Path, user_roots: Sequence[Path]) -> Iterator[IndexedAsset]:

@@ -8,6 +8,7 @@ by its folder.
 from __future__ import annotations
 
 import glob
+import re
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
@@ -28,6 +29,13 @@ from gen_data.generator.assets.asset_folder import (
     sanitize_word,
 )
 from gen_data.generator.assets.readers import MESH_SUFFIXES
+from gen_data.generator.assets.robot_formats import (
+    LISTED_SUFFIXES,
+    MJCF_SUFFIX,
+    is_description,
+    is_foreign,
+    read_description,
+)
 from gen_data.generator.assets.texture_maps import TextureMaps as Maps
 from gen_data.generator.config.base_model import Strict
 from gen_data.generator.config.problems import Problems
@@ -283,9 +291,11 @@ class GripperEntry(Strict):
 
 
 class ToolEntry(Strict):
-    """A gripper made by code, on the flange of an arm; see ``robot_tools``."""
+    """A gripper on the flange of an arm: made by code (see ``robot_tools``), or from a file."""
 
-    kind: Literal["fingers", "suction"]
+    kind: Literal["fingers", "suction", "file"]
+    file: str = ""
+    """Description of the gripper, of kind ``file``; ``gripper`` states how it holds."""
     flange: str
     """Link whose Z points out of the arm."""
     offset_m: float = 0.0
@@ -295,20 +305,26 @@ class ToolEntry(Strict):
     instead_of: str = ""
     """Link that is left out, with all below it; empty = none."""
 
+    @model_validator(mode="after")
+    def _has_a_file(self) -> ToolEntry:
+        if (self.kind == "file") != bool(self.file):
+            raise ValueError("expected file with kind: file, and with no other kind")
+        return self
+
 
 class RobotEntry(Origin):
     """A robot."""
 
     id: Id | None = None
     file: str
-    """URDF file, relative to the folder."""
+    """URDF, MJCF or SDF file, relative to the folder."""
     category: Category = "robot"
     tags: tuple[Word, ...] = ()
     home: dict[str, float] = Field(default_factory=dict)
     """Position [rad or m] per joint; by default 0, or mid-range if 0 is outside the limits."""
     gripper: GripperEntry | None = None
     tool: ToolEntry | None = None
-    """Instead of a gripper in its URDF."""
+    """Instead of a gripper in its description."""
     workspace_from_m: Annotated[float, Field(ge=0.0)] = WORKSPACE_FROM_M
     """Horizontal distance from the base to where its workspace on a table begins: the things of
     tasks lie so much nearer or farther."""
@@ -322,13 +338,15 @@ class RobotEntry(Origin):
 
     @model_validator(mode="after")
     def _has_one_hand(self) -> RobotEntry:
-        if self.gripper is not None and self.tool is not None:
-            raise ValueError("expected either gripper or tool")
+        made = self.tool is not None and self.tool.kind != "file"
+        if self.gripper is not None and made:
+            raise ValueError("expected either gripper or a tool made by code")
         return self
 
     def files(self) -> tuple[str, ...]:
         """The files that it names."""
-        return _unique_files(self.file, *(finish.maps for finish in self.materials.values()))
+        tool = self.tool.file if self.tool else ""
+        return _unique_files(self.file, tool, *(f.maps for f in self.materials.values()))
 
 
 class TextureEntry(Origin):
@@ -441,6 +459,7 @@ class FolderIndex(Origin):
     plates: tuple[PlateEntry, ...] = ()
 
 
+_FILE_NAME = re.compile(rb"""\bfile\s*=\s*["']([^"'<>]{1,500})["']""")
 Model = TypeVar("Model", bound=Strict)
 Entry = MeshEntry | RobotEntry | TextureEntry | ImageEntry | PlateEntry
 Kind = Literal["object", "robot", "texture", "environment", "plate"]
@@ -592,10 +611,14 @@ def _count_by_suffix(files: tuple[str, ...]) -> str:
 def _index_files(root: Path) -> FolderIndex:
     """Index a folder's files, except for meshes that a URDF uses."""
     suffixes = {name: PurePosixPath(name).suffix.lower() for name in list_files(root)}
-    meshes = {*MESH_SUFFIXES, ".urdf", ROAD_SUFFIX}
-    files = [name for name, suffix in suffixes.items() if suffix in meshes]
+    meshes = {*MESH_SUFFIXES, *LISTED_SUFFIXES, ROAD_SUFFIX}
+    files = [
+        name
+        for name, suffix in suffixes.items()
+        if suffix in meshes and (suffix != MJCF_SUFFIX or _is_mjcf(root, name))
+    ]
     panoramas = [name for name, suffix in suffixes.items() if suffix in PANORAMA_SUFFIXES]
-    used = {f for name in files if name.lower().endswith(".urdf") for f in _urdf_meshes(root, name)}
+    used = {f for name in files if is_description(name) for f in _described_files(root, name)}
     return FolderIndex(
         licence="unknown",
         author="unknown",
@@ -622,13 +645,23 @@ def _category(root: Path, name: str) -> str:
         return sanitize_word(category)
 
 
-def _urdf_meshes(root: Path, urdf: str) -> tuple[str, ...]:
-    from gen_data.generator.assets.urdf import read_urdf
+def _is_mjcf(root: Path, file: str) -> bool:
+    """Whether an XML file is a whole MJCF with bodies."""
+    data = Folder(root).read(file)
+    return b"<mujoco" in data and b"<worldbody" in data
 
+
+def _described_files(root: Path, description: str) -> tuple[str, ...]:
+    """Files that belong to a description, and are no assets themselves."""
     try:
-        return read_urdf(Folder(root), urdf).files()
+        if is_foreign(description):
+            # Its own reader starts a process: the names of its files are enough here.
+            names = set(_FILE_NAME.findall(Folder(root).read(description)))
+            parts = {PurePosixPath(name.decode("utf-8", "replace")).name for name in names}
+            return tuple(file for file in list_files(root) if PurePosixPath(file).name in parts)
+        return read_description(Folder(root), description).files()
     except AssetError:
-        # The URDF is listed nevertheless; its import reports the fault.
+        # It is listed nevertheless; its import reports the fault.
         return ()
 
 

@@ -25,17 +25,16 @@ from gen_data.generator.assets.readers import read_mesh
 from gen_data.generator.assets.readers.mesh_source import MeshSource, srgb_to_linear
 from gen_data.generator.assets.readers.usd import open_stage
 from gen_data.generator.assets.roads.network_surface import network_solid
+from gen_data.generator.assets.robot_description import RobotDescription, Shape
+from gen_data.generator.assets.robot_formats import is_description, read_description
+from gen_data.generator.assets.robot_shapes import read_shape
 from gen_data.generator.assets.texture_maps import texel_indices, trim_unreached_holes
 from gen_data.generator.assets.triangle_soup import (
     Float64,
     MaterialSlot,
     TriangleSoup,
-    box,
-    cylinder,
     join_soups,
-    sphere,
 )
-from gen_data.generator.assets.urdf import Shape, Urdf, read_urdf
 from gen_data.generator.assets.vertex_colors import IMAGE, resolve_colors
 from gen_data.generator.core.asset_types import ConvexParts, Keypoint, Material, MeshData, UInt8
 from gen_data.generator.core.errors import AssetError
@@ -44,7 +43,7 @@ from gen_data.generator.core.se3 import SE3, Vec3
 from gen_data.generator.roads.opendrive import Network, read_opendrive
 from gen_data.generator.roads.opendrive_lanes import network_lanes
 
-VERSION = 7
+VERSION = 8
 """Increased whenever the same files are imported as different geometry."""
 SIZE_TOLERANCE = 0.05
 """Largest deviation of a mesh's edges from the stated ones, as a share of the longest edge."""
@@ -115,13 +114,11 @@ def import_object(folder: Folder, entry: MeshEntry, asset_id: str, piece: str = 
     if piece:
         source = _read_piece(folder, entry, piece)
         looks, collides, images = [source.soup], list[TriangleSoup](), source.images
-        remarks = _remarks_of(entry.file, source.remarks)
+        remarks, up = _remarks_of(entry.file, source.remarks), ""
         entry = entry.model_copy(update={"origin": "center"})
     else:
-        looks, collides, images, remarks = _read_geometry(folder, entry)
-    decoded = {
-        name: decode_image(data, f"{place}#{name}", alpha=True) for name, data in images.items()
-    }
+        looks, collides, images, up, remarks = _read_geometry(folder, entry)
+    decoded = _decode_all(images, place)
 
     def image(name: str) -> UInt8:
         if name in decoded:
@@ -135,7 +132,7 @@ def import_object(folder: Folder, entry: MeshEntry, asset_id: str, piece: str = 
     soup = _apply_finishes(colored.soup, entry.materials, place, owner)
     soup, hidden = _drop_transparent(soup, place)
     remarks = (*remarks, *_remarks_of(entry.file, (*colored.remarks, *hidden)))
-    matrix = upright_transform(entry)
+    matrix = upright_transform(entry, up)
     soup = soup.transformed(matrix)
     scale, shift = scale_and_shift(soup, entry, place)
     scaling = np.concatenate([scale * np.eye(3), shift[:, None]], axis=1)
@@ -204,26 +201,32 @@ def _bounds_without_mirrors(soup: TriangleSoup, mesh: MeshData) -> tuple[Vec3, V
 
 
 def import_link(
-    folder: Folder, entry: RobotEntry, robot_id: str, urdf: Urdf, link_name: str
+    folder: Folder, entry: RobotEntry, robot_id: str, robot: RobotDescription, link_name: str
 ) -> ImportedMesh:
     """Import one link of a robot, in the link's frame. Raises AssetError if it is unusable."""
-    link = urdf.links[link_name]
+    link = robot.links[link_name]
     place = f"{folder.root / entry.file}: link '{link_name}'"
     mesh = collision = None
     images: dict[str, UInt8] = {}
     remarks: tuple[FileRemarks, ...] = ()
     if link.visuals:
-        soup = join_soups([_make_shape_soup(folder, shape, SE3()) for shape in link.visuals])
+        sources = [read_shape(folder, shape, SE3()) for shape in link.visuals]
+        soup = join_soups([source.soup for source in sources])
+        for source in sources:
+            images |= _decode_all(source.images, place)
         if entry.palette:
             soup = _palette_colors(folder, soup)
         colored = resolve_colors(soup, entry.max_faces)
-        images = {} if colored.image is None else {IMAGE: colored.image}
-        remarks = _remarks_of(entry.file, colored.remarks)
+        images |= {} if colored.image is None else {IMAGE: colored.image}
+        unused = (*(text for source in sources for text in source.remarks), *colored.remarks)
+        remarks = _remarks_of(entry.file, unused)
+        # Images inside mesh files are those of the link, all others those of the robot.
         owner = f"{robot_id}/{link_name}" if images else robot_id
         soup = _apply_finishes(colored.soup, entry.materials, place, owner)
-        mesh = normal_form(soup, place, max_faces=max(entry.max_faces, len(soup) if images else 0))
+        budget = max(entry.max_faces, 0 if colored.image is None else len(soup))
+        mesh = normal_form(soup, place, max_faces=budget)
     if link.collisions:
-        solids = [_make_shape_soup(folder, s, SE3(), materials=False) for s in link.collisions]
+        solids = [read_shape(folder, s, SE3(), materials=False).soup for s in link.collisions]
         check_coordinates(join_soups(solids), place)
         # One hull per element and group, as simulators treat the collision meshes of a URDF.
         hulls = [
@@ -236,28 +239,37 @@ def import_link(
 
 def _read_geometry(
     folder: Folder, entry: MeshEntry
-) -> tuple[list[TriangleSoup], list[TriangleSoup], Mapping[str, bytes], tuple[FileRemarks, ...]]:
-    """Visual soups, collision soups (empty = the visual ones), embedded images, and remarks."""
-    remarks: tuple[FileRemarks, ...] = ()
+) -> tuple[
+    list[TriangleSoup], list[TriangleSoup], Mapping[str, bytes], str, tuple[FileRemarks, ...]
+]:
+    """Geometry of an entry.
+
+    Returns:
+        Visual soups, collision soups (empty = the visual ones), embedded images, the axis that the
+        file states as up (empty = none), and remarks.
+    """
+    up = ""
     images: Mapping[str, bytes] = {}
     collides: list[TriangleSoup] = []
-    if entry.file.lower().endswith(".urdf"):
-        urdf = read_urdf(folder, entry.file)
-        poses = urdf.poses_at_zero()
-        visuals = [(s, poses[n]) for n, link in urdf.links.items() for s in link.visuals]
-        solids = [(s, poses[n]) for n, link in urdf.links.items() for s in link.collisions]
+    if is_description(entry.file):
+        thing = read_description(folder, entry.file)
+        poses = thing.poses_at_zero()
+        visuals = [(s, poses[n]) for n, link in thing.links.items() for s in link.visuals]
+        solids = [(s, poses[n]) for n, link in thing.links.items() for s in link.collisions]
         if not visuals:
             raise AssetError(f"{folder.root / entry.file}: no visual geometry; give it a <visual>")
-        looks = [_make_shape_soup(folder, shape, pose) for shape, pose in visuals]
+        sources = [read_shape(folder, shape, pose) for shape, pose in visuals]
+        looks = [source.soup for source in sources]
+        images = {name: data for s in sources for name, data in s.images.items()}
         if [_geometry_key(s) for s in solids] != [_geometry_key(v) for v in visuals]:
-            collides = [_make_shape_soup(folder, s, pose, materials=False) for s, pose in solids]
+            collides = [read_shape(folder, s, pose, materials=False).soup for s, pose in solids]
     else:
-        source = read_mesh(folder, entry.file)
-        looks, images = [source.soup], source.images
-        remarks = _remarks_of(entry.file, source.remarks)
+        sources = [read_mesh(folder, entry.file)]
+        looks, images, up = [sources[0].soup], sources[0].images, sources[0].up
+    remarks = _remarks_of(entry.file, tuple(text for s in sources for text in s.remarks))
     if entry.collision:
         collides = [read_mesh(folder, entry.collision, materials=False).soup]
-    return looks, collides, images, remarks
+    return looks, collides, images, up, remarks
 
 
 def _read_piece(folder: Folder, entry: MeshEntry, name: str) -> MeshSource:
@@ -269,46 +281,15 @@ def _read_piece(folder: Folder, entry: MeshEntry, name: str) -> MeshSource:
         return stage.source(pieces)
 
 
+def _decode_all(images: Mapping[str, bytes], place: str) -> dict[str, UInt8]:
+    return {
+        name: decode_image(data, f"{place}#{name}", alpha=True) for name, data in images.items()
+    }
+
+
 def _geometry_key(placed: tuple[Shape, SE3]) -> tuple[object, ...]:
     shape, pose = placed
     return (shape.kind, shape.file, shape.size, shape.T_link_shape, pose)
-
-
-def _make_shape_soup(
-    folder: Folder, shape: Shape, T_root_link: SE3, *, materials: bool = True
-) -> TriangleSoup:
-    """Read or make the triangles of a URDF element, in the root frame and its colour."""
-    matrix = (T_root_link @ shape.T_link_shape).matrix()[:3]
-    if shape.kind == "mesh":
-        source = read_mesh(folder, shape.file, materials=materials)
-        if source.images:
-            raise AssetError(
-                f"{folder.root / shape.file}: has embedded images, which a URDF's meshes may not; "
-                "export it with images as files"
-            )
-        soup = source.soup
-        matrix[:, :3] = matrix[:, :3] * np.array(shape.size)
-    elif shape.kind == "box":
-        soup = TriangleSoup.of(box(shape.size))
-    elif shape.kind == "cylinder":
-        soup = TriangleSoup.of(cylinder(shape.size[0], shape.size[1]))
-    else:
-        soup = TriangleSoup.of(sphere(shape.size[0]))
-    slots = tuple(_apply_color(slot, shape) for slot in soup.slots)
-    return replace(soup, slots=slots).transformed(matrix)
-
-
-def _apply_color(slot: MaterialSlot, shape: Shape) -> MaterialSlot:
-    """Apply the material of a URDF element to a slot without texture.
-
-    White is the usual placeholder in descriptions; it does not replace the mesh's own colours.
-    """
-    if shape.color is None or slot.material.texture:
-        return slot
-    if slot.from_file and min(shape.color) > 0.99:
-        return slot
-    color = srgb_to_linear(shape.color)
-    return MaterialSlot(shape.material or slot.name, replace(slot.material, base_color=color), True)
 
 
 def _apply_finishes(
@@ -423,10 +404,22 @@ def _palette_colors(folder: Folder, soup: TriangleSoup) -> TriangleSoup:
     return replace(soup, slots=tuple(slots), uvs=None)
 
 
-def upright_transform(entry: MeshEntry) -> Float64:
-    """Affine map [3, 4] that turns the file's up axis to Z and its front to +X."""
-    up = _axis_vector(entry.up_axis())
-    front = _axis_vector(entry.front or _DEFAULT_FRONT[entry.up_axis()])
+def upright_transform(entry: MeshEntry, stated_up: str = "") -> Float64:
+    """Affine map [3, 4] that turns the file's up axis to Z and its front to +X.
+
+    ``stated_up`` is the axis that the file itself states, which ``up`` of the entry overrides.
+
+    Raises:
+        AssetError: if the entry's front is the axis that the file states as up.
+    """
+    axis = entry.up or stated_up or entry.up_axis()
+    if entry.front is not None and entry.front[-1] == axis:
+        raise AssetError(
+            f"{entry.file}: front is {entry.front}, but {axis} of the file points up; correct "
+            "front, or give up"
+        )
+    up = _axis_vector(axis)
+    front = _axis_vector(entry.front or _DEFAULT_FRONT[axis])
     axes = np.stack([front, np.cross(up, front), up]) + 0.0
     yaw = math.radians(entry.yaw_deg)
     c, s = round(math.cos(yaw), 12), round(math.sin(yaw), 12)

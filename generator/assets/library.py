@@ -43,7 +43,10 @@ _BOUNDS = "bounds 1"
 
 
 def open_library(
-    user_roots: Sequence[Path] = (), cache_dir: Path | None = None, packs: Path | None = None
+    user_roots: Sequence[Path] = (),
+    cache_dir: Path | None = None,
+    packs: Path | None = None,
+    provide: Callable[[Path], object] | None = None,
 ) -> Library:
     """Open a library of procedural assets, pybullet's, installed packs', and the user's own.
 
@@ -53,9 +56,11 @@ def open_library(
         user_roots: Folders with or without an ``assets.yaml``; their ids start with ``user/``.
         cache_dir: Folder of cached normal forms; by default the user's cache folder.
         packs: Folder of installed packs; by default the user's.
+        provide: Called with that folder when files of pybullet are wanted and not here; it may
+            install their pack. ``packs.provision.open_assets`` passes such a function.
     """
     roots = tuple(Path(root) for root in user_roots)
-    return Library(roots, cache_dir or default_cache_dir(), packs or packs_dir())
+    return Library(roots, cache_dir or default_cache_dir(), packs or packs_dir(), provide)
 
 
 Bounds = tuple[Vec3, Vec3]
@@ -79,12 +84,18 @@ class Library:
     whose files change while a process runs keeps the content read first.
     """
 
-    def __init__(self, user_roots: tuple[Path, ...], cache_dir: Path, packs: Path) -> None:
+    def __init__(
+        self,
+        user_roots: tuple[Path, ...],
+        cache_dir: Path,
+        packs: Path,
+        provide: Callable[[Path], object] | None = None,
+    ) -> None:
         disk = DiskCache(cache_dir)
         store = Store(disk)
         self._disk = disk
         self._generated = ProceduralLibrary(store)
-        self._files = FileLibrary(packs, user_roots, disk, store)
+        self._files = FileLibrary(packs, user_roots, disk, store, provide)
         self._entries: CountCache[Asset] = CountCache(_ENTRIES)
         self._found: dict[tuple[frozenset[str], str], tuple[Asset, ...]] = {}
         self._summaries: CountCache[_MeshSummary] = CountCache(_SUMMARIES)

@@ -23,7 +23,8 @@ from gen_data.generator.assets.importer import (
     import_road_network,
     road_network_lanes,
 )
-from gen_data.generator.assets.robot_models import robot_urdf
+from gen_data.generator.assets.robot_formats import read_description
+from gen_data.generator.assets.robot_models import describe_robot
 from gen_data.generator.assets.usd_stages import stage_model
 from gen_data.generator.core.errors import AssetError
 from gen_data.generator.core.plates import Plate
@@ -44,12 +45,27 @@ def parse_object(
     return _checked(folder, digests, pack_imported(import_object(folder, entry, asset_id, piece)))
 
 
+def parse_robot(root: Path, digests: Digests, entry: RobotEntry) -> Arrays:
+    """Read ``RobotDescription.parts`` of a robot, for ``unpack_value``."""
+    folder = Folder(root)
+    return _checked(folder, digests, _pack_value(describe_robot(folder, entry).parts()))
+
+
+def parse_described_files(root: Path, digests: Digests, file: str) -> Arrays:
+    """List the files that a description of links and joints consists of, for ``unpack_value``.
+
+    They are hashed after it; ``digests`` has none yet.
+    """
+    del digests
+    return _pack_value(read_description(Folder(root), file).files())
+
+
 def parse_link(root: Path, digests: Digests, entry: RobotEntry, robot_id: str, link: str) -> Arrays:
     """Import a link of a robot (``importer.import_link``)."""
     folder = Folder(root)
-    urdf = robot_urdf(folder, entry)
+    robot = describe_robot(folder, entry)
     return _checked(
-        folder, digests, pack_imported(import_link(folder, entry, robot_id, urdf, link))
+        folder, digests, pack_imported(import_link(folder, entry, robot_id, robot, link))
     )
 
 

@@ -1,4 +1,4 @@
-"""Robot models from a URDF and its index entry."""
+"""Robot models from a description and its index entry."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from itertools import combinations
 
 from gen_data.generator.assets.asset_folder import Folder
 from gen_data.generator.assets.folder_index import RobotEntry
+from gen_data.generator.assets.robot_description import RobotDescription
+from gen_data.generator.assets.robot_formats import read_description
 from gen_data.generator.assets.robot_tools import tool_gripper, with_tool
-from gen_data.generator.assets.urdf import Urdf, read_urdf
 from gen_data.generator.core.asset_types import Gripper, RobotModel
 from gen_data.generator.core.errors import AssetError, did_you_mean
 from gen_data.generator.core.kinematics import POSITION_DECIMALS, finger_links, positions_of
@@ -18,30 +19,35 @@ _TOLERANCE = 10.0**-POSITION_DECIMALS
 """Tolerance when comparing positions [rad or m]."""
 
 
-def robot_urdf(folder: Folder, entry: RobotEntry) -> Urdf:
+def describe_robot(folder: Folder, entry: RobotEntry) -> RobotDescription:
     """Links and joints of a robot with its tool.
 
     Raises:
         AssetError: its description is malformed, or has no such flange.
     """
-    urdf = read_urdf(folder, entry.file)
-    return with_tool(urdf, entry.tool, str(folder.root / entry.file)) if entry.tool else urdf
+    arm = read_description(folder, entry.file)
+    if entry.tool is None:
+        return arm
+    hand = read_description(folder, entry.tool.file) if entry.tool.file else None
+    return with_tool(arm, entry.tool, str(folder.root / entry.file), hand)
 
 
-def robot_model(robot_id: str, urdf: Urdf, entry: RobotEntry, place: str) -> RobotModel:
+def robot_model(
+    robot_id: str, described: RobotDescription, entry: RobotEntry, place: str
+) -> RobotModel:
     """Kinematics of a robot; asset ``<robot id>/l`` is the geometry of link ``l``.
 
     Raises:
         AssetError: if the entry names unknown joints or links, or a position outside its joint's
             limits.
     """
-    _check_names(urdf, entry, place)
+    _check_names(described, entry, place)
     robot = RobotModel(
-        links=tuple(urdf.links),
-        joints=urdf.joints,
-        visuals={n: f"{robot_id}/{n}" for n, link in urdf.links.items() if link.visuals},
-        collisions={n: f"{robot_id}/{n}" for n, link in urdf.links.items() if link.collisions},
-        home=_home_positions(urdf, entry, place),
+        links=tuple(described.links),
+        joints=described.joints,
+        visuals={n: f"{robot_id}/{n}" for n, link in described.links.items() if link.visuals},
+        collisions={n: f"{robot_id}/{n}" for n, link in described.links.items() if link.collisions},
+        home=_home_positions(described, entry, place),
         gripper=_make_gripper(entry),
         no_collide=frozenset(),
         workspace_from_m=entry.workspace_from_m,
@@ -49,8 +55,8 @@ def robot_model(robot_id: str, urdf: Urdf, entry: RobotEntry, place: str) -> Rob
     return replace(robot, no_collide=frozenset(_permanent_contacts(robot) | set(entry.touching)))
 
 
-def _check_names(urdf: Urdf, entry: RobotEntry, place: str) -> None:
-    joints, links = [j.name for j in urdf.joints if j.movable], list(urdf.links)
+def _check_names(described: RobotDescription, entry: RobotEntry, place: str) -> None:
+    joints, links = [j.name for j in described.joints if j.movable], list(described.links)
     named = [(name, joints, "movable joint") for name in entry.home]
     if entry.gripper:
         named += [(name, joints, "movable joint") for name in entry.gripper.finger_joints]
@@ -65,18 +71,21 @@ def _check_names(urdf: Urdf, entry: RobotEntry, place: str) -> None:
             )
 
 
-def _home_positions(urdf: Urdf, entry: RobotEntry, place: str) -> tuple[float, ...]:
+def _home_positions(
+    described: RobotDescription, entry: RobotEntry, place: str
+) -> tuple[float, ...]:
     """Home position of every movable joint; mimic joints follow their leaders.
 
     Raises:
         AssetError: if a position is outside its joint's limits, or the entry gives a mimic joint a
             position that contradicts its leader's.
     """
-    movable = [joint for joint in urdf.joints if joint.movable]
+    movable = [joint for joint in described.joints if joint.movable]
     middles = ((j, 0.5 * (j.lower + j.upper)) for j in movable)
     middle = {j.name: 0.0 if j.lower <= 0.0 <= j.upper else m for j, m in middles}
-    given = {j.name: entry.home.get(j.name, middle[j.name]) for j in movable if not j.mimic}
-    positions = positions_of(urdf.joints, given)
+    wanted = {**middle, **described.home, **entry.home}
+    given = {j.name: wanted[j.name] for j in movable if not j.mimic}
+    positions = positions_of(described.joints, given)
     for joint, position in zip(movable, positions, strict=True):
         correct = f"correct the entry '{entry.id}' of the asset index"
         if not joint.lower - _TOLERANCE <= position <= joint.upper + _TOLERANCE:
@@ -94,7 +103,7 @@ def _home_positions(urdf: Urdf, entry: RobotEntry, place: str) -> tuple[float, .
 
 def _make_gripper(entry: RobotEntry) -> Gripper | None:
     gripper = entry.gripper
-    if entry.tool is not None:
+    if entry.tool is not None and not entry.tool.file:
         return tool_gripper(entry.tool)
     if gripper is None:
         return None

@@ -10,7 +10,13 @@ import math
 from dataclasses import replace
 
 from gen_data.generator.assets.folder_index import ToolEntry
-from gen_data.generator.assets.urdf import Link, Shape, Urdf
+from gen_data.generator.assets.robot_description import (
+    FORMAT_ROOTS,
+    Link,
+    Look,
+    RobotDescription,
+    Shape,
+)
 from gen_data.generator.core.asset_types import Gripper, Joint, SuctionCup
 from gen_data.generator.core.errors import AssetError, did_you_mean
 from gen_data.generator.core.se3 import SE3, Vec3
@@ -37,31 +43,62 @@ _DARK: Vec3 = (0.34, 0.34, 0.35)
 _RUBBER: Vec3 = (0.12, 0.16, 0.3)
 
 
-def with_tool(urdf: Urdf, tool: ToolEntry, place: str) -> Urdf:
+def with_tool(
+    arm: RobotDescription, tool: ToolEntry, place: str, hand: RobotDescription | None = None
+) -> RobotDescription:
     """The robot with a tool on its flange; its links come last.
+
+    Args:
+        arm: The robot.
+        tool: Where the tool is, and its kind.
+        place: Name of the robot in error messages.
+        hand: Description of a tool of the kind ``file``.
 
     Raises:
         AssetError: there is no such flange, or it or a link of the tool's names exists already.
     """
     for name in (tool.flange, *([tool.instead_of] if tool.instead_of else [])):
-        if name not in urdf.links:
+        if name not in arm.links:
             raise AssetError(
-                f"{place}: no link '{name}'{did_you_mean(name, list(urdf.links))}; correct the "
+                f"{place}: no link '{name}'{did_you_mean(name, list(arm.links))}; correct the "
                 "entry 'tool' of the asset index"
             )
-    kept = _without(urdf, tool.instead_of)
+    kept = _without(arm, tool.instead_of)
     if tool.flange not in kept.links:
         raise AssetError(
             f"{place}: 'instead_of: {tool.instead_of}' removes the flange '{tool.flange}' too; "
             "correct the entry 'tool' of the asset index"
         )
     T_flange_tool = SE3.about_z(math.radians(tool.yaw_deg), (0.0, 0.0, tool.offset_m))
-    base = _fixed_joint(tool.flange, BASE, T_flange_tool)
-    links, joints = _suction_cup() if tool.kind == "suction" else _fingers()
+    if hand is None:
+        links, joints = _suction_cup() if tool.kind == "suction" else _fingers()
+    else:
+        links, joints = _with_own_root(hand)
+        kept = replace(
+            kept,
+            home={**kept.home, **hand.home},
+            included=(*kept.included, *hand.included),
+            remarks=(*kept.remarks, *hand.remarks),
+        )
+    base = _fixed_joint(tool.flange, links[0].name, T_flange_tool)
     taken = sorted({*kept.links} & {link.name for link in links})
+    taken += sorted({j.name for j in kept.joints} & {j.name for j in joints})
     if taken:
-        raise AssetError(f"{place}: it has a link '{taken[0]}' already; rename that link")
-    return Urdf({**kept.links, **{x.name: x for x in links}}, (*kept.joints, base, *joints))
+        raise AssetError(
+            f"{place}: it has a link or joint '{taken[0]}', as its tool has; rename one of them"
+        )
+    every = {**kept.links, **{x.name: x for x in links}}
+    return replace(kept, links=every, joints=(*kept.joints, base, *joints))
+
+
+def _with_own_root(hand: RobotDescription) -> tuple[list[Link], list[Joint]]:
+    """Links and joints of a tool; a root that only its format has is called ``tool``."""
+    links, joints = list(hand.links.values()), list(hand.joints)
+    root = links[0].name
+    if root in FORMAT_ROOTS:
+        links[0] = replace(links[0], name=BASE)
+        joints = [replace(j, parent=BASE) if j.parent == root else j for j in joints]
+    return links, joints
 
 
 def tool_gripper(tool: ToolEntry) -> Gripper:
@@ -75,14 +112,15 @@ def tool_gripper(tool: ToolEntry) -> Gripper:
     return Gripper(BASE, between, tuple(f"{name}_joint" for name in FINGERS), STROKE_M)
 
 
-def _without(urdf: Urdf, link: str) -> Urdf:
+def _without(arm: RobotDescription, link: str) -> RobotDescription:
     """The robot without a link and all below it."""
     gone = {link}
-    for joint in urdf.joints:
+    for joint in arm.joints:
         if joint.parent in gone:
             gone.add(joint.child)
-    joints = tuple(joint for joint in urdf.joints if joint.child not in gone)
-    return Urdf({name: x for name, x in urdf.links.items() if name not in gone}, joints)
+    joints = tuple(joint for joint in arm.joints if joint.child not in gone)
+    links = {name: x for name, x in arm.links.items() if name not in gone}
+    return replace(arm, links=links, joints=joints)
 
 
 def _fingers() -> tuple[list[Link], list[Joint]]:
@@ -111,22 +149,20 @@ def _suction_cup() -> tuple[list[Link], list[Joint]]:
         "",
         (_TUBE_RADIUS_M, _TUBE_M, 0.0),
         SE3((0.0, 0.0, 0.5 * _TUBE_M)),
-        "tool",
-        _DARK,
+        Look("tool", _DARK),
     )
     lip = Shape(
         "cylinder",
         "",
         (_CUP_RADIUS_M + 0.002, _LIP_M, 0.0),
         SE3((0.0, 0.0, _TUBE_M + 0.5 * _LIP_M)),
-        "rubber",
-        _RUBBER,
+        Look("rubber", _RUBBER),
     )
     return [_link(BASE, tube, lip)], []
 
 
 def _box(size_m: Vec3, middle_m: Vec3) -> Shape:
-    return Shape("box", "", size_m, SE3(middle_m), "tool", _DARK)
+    return Shape("box", "", size_m, SE3(middle_m), Look("tool", _DARK))
 
 
 def _link(name: str, *shapes: Shape) -> Link:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
+from typing import Any
 from urllib.parse import quote, unquote
 
 import numpy as np
@@ -61,6 +62,14 @@ class TextureMaps:
     def images(self) -> tuple[str, ...]:
         """Names of the images, each once, sorted."""
         return tuple(sorted({image.partition("!")[0] for image in self._given().values()}))
+
+    def renamed(self, names: Mapping[str, str]) -> TextureMaps:
+        """The same maps, whose images have other names, ``{old: new}``."""
+        changes: dict[str, Any] = {}
+        for key, image in self._given().items():
+            file, mark, channel = image.partition("!")
+            changes[key] = names.get(file, file) + mark + channel
+        return replace(self, **changes)
 
     def _given(self) -> dict[str, str]:
         images = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "cutoff"}

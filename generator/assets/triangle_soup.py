@@ -195,6 +195,14 @@ def cylinder(radius_m: float, length_m: float) -> Float64:
                       (radius_m, 0.5 * length_m), (0.0, 0.5 * length_m)])  # fmt: skip
 
 
+def capsule(radius_m: float, length_m: float) -> Float64:
+    """Triangles [m, 3, 3] of a cylinder about Z with half spheres beyond its ends."""
+    steps = SEGMENTS // 4
+    angles = [0.5 * math.pi * (k / steps) for k in range(steps + 1)]
+    cap = [(radius_m * math.cos(a), 0.5 * length_m + radius_m * math.sin(a)) for a in angles]
+    return _revolve([*((r, -z) for r, z in reversed(cap)), *cap])
+
+
 def sphere(radius_m: float) -> Float64:
     """Triangles [m, 3, 3] of a sphere centred at the origin."""
     steps = SEGMENTS // 2

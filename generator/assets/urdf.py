@@ -1,220 +1,253 @@
 """URDF reader: links, joints and geometry.
 
 Source: ROS wiki, urdf/XML. Document type declarations are refused, so that no entity is ever
-expanded. Elements that describe neither kinematics nor geometry are ignored.
+expanded. Inertia is not used: arms move as planned, and masses of objects have their own field.
 """
 
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import PurePosixPath
 from xml.etree.ElementTree import Element
 
 from gen_data.generator.assets.asset_folder import Folder
+from gen_data.generator.assets.robot_description import (
+    MAX_LINKS,
+    Link,
+    Look,
+    MisplacedJoint,
+    RobotDescription,
+    Shape,
+    sort_links,
+)
+from gen_data.generator.assets.robot_files import resolve_uri
 from gen_data.generator.core.asset_types import Joint
 from gen_data.generator.core.errors import AssetError
 from gen_data.generator.core.kinematics import leader_of
 from gen_data.generator.core.safe_xml import format_position, parse_xml
-from gen_data.generator.core.se3 import SE3, Vec3
+from gen_data.generator.core.se3 import SE3, Quaternion, Vec3
 
 _MAX_ELEMENTS = 50_000
-_MAX_LINKS = 500
 _KINDS = {"fixed", "revolute", "continuous", "prismatic"}
+_HELD = {"floating", "planar"}
+"""Kinds that have no single position; such a joint stays where the file places it."""
+_ENDLESS_RAD = 100.0
+"""Revolute joints with limits beyond this turn without end."""
+_UNUSED = ("gazebo", "transmission", "sensor", "ros2_control")
 
 
-@dataclass(frozen=True)
-class Shape:
-    """One visual or collision element.
+class _Fault(ValueError):
+    """What is wrong with an element."""
 
-    Attributes:
-        kind: ``mesh``, ``box``, ``cylinder`` or ``sphere``.
-        file: Mesh file relative to the folder; empty for primitives.
-        size: Scale of a mesh; edges of a box; (radius, length, 0); (radius, 0, 0).
-        T_link_shape: Its pose.
-        material: Name of the material; empty = unnamed.
-        color: sRGB of the material; None = not given.
-    """
-
-    kind: str
-    file: str
-    size: Vec3
-    T_link_shape: SE3
-    material: str = ""
-    color: Vec3 | None = None
+    def __init__(self, element: Element, reason: str) -> None:
+        super().__init__(reason)
+        self.element = element
 
 
-@dataclass(frozen=True)
-class Link:
-    """A rigid link and its geometry."""
-
-    name: str
-    visuals: tuple[Shape, ...]
-    collisions: tuple[Shape, ...]
-
-
-@dataclass(frozen=True)
-class Urdf:
-    """A robot description.
-
-    Attributes:
-        links: ``{name: link}``, root first, each after its parent.
-        joints: In the order of their child links.
-    """
-
-    links: dict[str, Link]
-    joints: tuple[Joint, ...]
-
-    def files(self) -> tuple[str, ...]:
-        """Every mesh file it refers to, sorted and without duplicates."""
-        shapes = [s for link in self.links.values() for s in (*link.visuals, *link.collisions)]
-        return tuple(sorted({s.file for s in shapes if s.file}))
-
-    def poses_at_zero(self) -> dict[str, SE3]:
-        """``T_root_link`` of every link with all joints at position 0."""
-        poses = {next(iter(self.links)): SE3()}
-        for joint in self.joints:
-            poses[joint.child] = poses[joint.parent] @ joint.T_parent_joint
-        return poses
-
-
-class _MisplacedJoint(ValueError):
-    """A joint that keeps links from forming a tree."""
-
-    def __init__(self, joint: Joint, reason: str) -> None:
-        super().__init__(f"joint '{joint.name[:40]}' {reason}")
-        self.joint = joint
-
-
-def read_urdf(folder: Folder, relative: str) -> Urdf:
+def read_urdf(folder: Folder, relative: str) -> RobotDescription:
     """Read a URDF file.
 
     Raises:
-        AssetError: if it is malformed, its links form no tree, or it refers outside the folder.
+        AssetError: if it is malformed, an xacro file, its links form no tree, or it refers outside
+            the folder.
     """
     place = str(folder.root / relative)
     root = parse_xml(folder.read(relative), place, "robot", "a URDF", _MAX_ELEMENTS)
+    _refuse_xacro(root, place)
+    remarks: list[str] = []
     at = root
     try:
-        colors = dict(_named_colors(root))
+        looks = dict(_named_looks(folder, relative, root))
         links: dict[str, Link] = {}
         for name, at in _iterate_unique(root, "link"):
-            shapes = (
-                tuple(_read_shapes(folder, relative, at, tag, colors))
+            visuals, collisions = (
+                tuple(_read_shapes(folder, relative, at, tag, looks, remarks))
                 for tag in ("visual", "collision")
             )
-            links[name] = Link(name, *shapes)
+            link = _link_name(name)
+            links[link] = Link(link, visuals, collisions)
         elements = [element for _, element in _iterate_unique(root, "joint")]
         joints = []
         for at in elements:
-            joints.append(_read_joint(at))
+            joints.append(_read_joint(at, remarks))
         for k, joint in enumerate(joints):
             at = elements[k]
             leader_of(joint, joints)
+        joints = [
+            _follow_limits(joint, joints, element)
+            for joint, element in zip(joints, elements, strict=True)
+        ]
         at = root
-        return _sort_links(links, joints)
-    except _MisplacedJoint as error:
-        at = elements[joints.index(error.joint)]
+        described = sort_links(links, joints)
+    except MisplacedJoint as error:
+        at = next(e for e in elements if e.get("name") == error.joint.name)
         raise AssetError(
             f"{place}{format_position(at)}: malformed URDF ({error}); correct it"
         ) from None
     except (ValueError, KeyError) as error:
         reason = f"missing {error}" if isinstance(error, KeyError) else error
+        at = error.element if isinstance(error, _Fault) else at
         raise AssetError(
             f"{place}{format_position(at)}: malformed URDF ({reason}); correct it"
         ) from None
+    counts = Counter(element.tag for element in root if element.tag in _UNUSED)
+    if counts:
+        remarks.append("not used: " + ", ".join(f"{n} <{tag}>" for tag, n in counts.items()))
+    return replace(described, remarks=tuple(remarks))
+
+
+def _refuse_xacro(root: Element, place: str) -> None:
+    """Raise AssetError at the first macro, expression or include."""
+    for element in root.iter():
+        macro = element.tag.startswith("xacro:")
+        if macro or any("${" in text or "$(" in text for text in element.attrib.values()):
+            found = f"<{element.tag[:40]}>" if macro else "an expression in ${} or $()"
+            name = PurePosixPath(place).name
+            stem = name.removesuffix(".xacro").removesuffix(".urdf")
+            source = name if name.endswith(".xacro") else f"{stem}.urdf.xacro"
+            raise AssetError(
+                f"{place}{format_position(element)}: {found} is xacro, which is a program and not "
+                f"yet a robot; expand it: pip install xacro; xacro {source} > {stem}.urdf"
+            )
 
 
 def _iterate_unique(root: Element, tag: str) -> Iterator[tuple[str, Element]]:
     """Yield name and element of every child of a kind. Raises ValueError for duplicate names."""
     seen: set[str] = set()
     for element in root.findall(tag):
-        name = element.attrib["name"]
-        if name in seen or not name:
-            raise ValueError(f"two {tag}s named '{name[:40]}'")
+        name = element.get("name", "")
+        if not name:
+            raise _Fault(element, f"a {tag} without a name")
+        if name in seen:
+            raise _Fault(element, f"two {tag}s named '{name[:40]}'")
         seen.add(name)
         yield name, element
-    if len(seen) > _MAX_LINKS:
-        raise ValueError(f"more than {_MAX_LINKS} {tag}s")
+    if len(seen) > MAX_LINKS:
+        raise ValueError(f"more than {MAX_LINKS} {tag}s")
 
 
-def _named_colors(root: Element) -> Iterator[tuple[str, Vec3]]:
-    """Yield name and sRGB of all named materials; the first definition comes last and wins."""
-    for material in reversed(root.findall(".//material")):
-        color = material.find("color")
-        if color is not None and material.get("name"):
-            yield material.attrib["name"], _parse_numbers(color.attrib["rgba"], 4)[:3]  # type: ignore[misc]
+def _link_name(name: str) -> str:
+    """Name of a link in ids of assets, where a slash separates it from its robot."""
+    return name.replace("/", "_")
+
+
+def _named_looks(folder: Folder, relative: str, root: Element) -> Iterator[tuple[str, Look]]:
+    """Yield all named materials; the last one of a name wins.
+
+    That is the robot's own, as in urdfdom, else the first definition inside a link.
+    """
+    shared = root.findall("material")
+    for material in reversed([*shared, *root.findall("*//material")]):
+        look = _read_look(folder, relative, material)
+        if look.name and look != Look(look.name):
+            yield look.name, look
+
+
+def _read_look(folder: Folder, relative: str, material: Element) -> Look:
+    """A material as its element defines it. Raises _Fault."""
+    color, texture = material.find("color"), material.find("texture")
+    look = Look(material.get("name", ""))
+    try:
+        if color is not None:
+            red, green, blue, alpha = _parse_numbers(color.attrib["rgba"], 4)
+            look = replace(look, color=(red, green, blue), opacity=min(max(alpha, 0.0), 1.0))
+        if texture is not None and texture.get("filename"):
+            look = replace(look, texture=resolve_uri(folder, relative, texture.attrib["filename"]))
+    except (ValueError, KeyError) as error:
+        reason = f"missing {error}" if isinstance(error, KeyError) else error
+        raise _Fault(material, f"material '{look.name[:40]}': {reason}") from None
+    return look
 
 
 def _read_shapes(
-    folder: Folder, relative: str, link: Element, tag: str, colors: dict[str, Vec3]
+    folder: Folder,
+    relative: str,
+    link: Element,
+    tag: str,
+    looks: dict[str, Look],
+    remarks: list[str],
 ) -> Iterator[Shape]:
+    """Yield the shapes of a link that there is something of; remark on the others."""
     for element in link.findall(tag):
         geometry = element.find("geometry")
+        where = f"link '{link.get('name', '')[:40]}'{format_position(element)}: <{tag}>"
         if geometry is None or not len(geometry):
+            remarks.append(f"{where} without geometry is left out")
             continue
-        shape = _read_shape(folder, relative, geometry[0], _read_pose(element.find("origin")))
-        material = element.find("material")
-        if material is not None:
-            color = material.find("color")
-            name = material.get("name", "")
-            own = None
-            if color is not None:
-                own = _parse_vector(color.attrib["rgba"].rsplit(None, 1)[0])
-            shape = replace(shape, material=name, color=own or colors.get(name))
-        yield shape
+        try:
+            shape = _read_shape(folder, relative, geometry[0], _read_pose(element.find("origin")))
+            material = element.find("material")
+            if material is not None:
+                look = _read_look(folder, relative, material)
+                if look == Look(look.name):
+                    look = looks.get(look.name, look)
+                shape = replace(shape, look=look)
+        except (ValueError, KeyError) as error:
+            at = error.element if isinstance(error, _Fault) else element
+            reason = f"missing {error}" if isinstance(error, KeyError) else error
+            name = link.get("name", "")[:40]
+            raise _Fault(at, f"link '{name}': <{tag}>: {reason}") from None
+        zeros = shape.size[: _EXTENTS.get(shape.kind, 0)].count(0.0)
+        # A flat box is seen: decals and markers.
+        if zeros > (tag == "visual" and shape.kind == "box"):
+            remarks.append(f"{where} is a {shape.kind} of size 0 and is left out")
+        elif tag == "visual" and shape.look.opacity == 0.0:
+            remarks.append(f"{where} is invisible (alpha 0) and is left out")
+        else:
+            yield shape
+
+
+_EXTENTS = {"box": 3, "cylinder": 2, "capsule": 1, "sphere": 1}
+"""Number of sizes that must not be 0."""
 
 
 def _read_shape(folder: Folder, relative: str, element: Element, pose: SE3) -> Shape:
     get = element.attrib
     if element.tag == "mesh":
-        file = _resolve_mesh(folder, relative, get["filename"])
+        file = resolve_uri(folder, relative, get["filename"])
         scale = get.get("scale", "1 1 1").split()
         size = _parse_vector(" ".join(scale * 3 if len(scale) == 1 else scale))
+        if 0.0 in size:
+            raise ValueError(f"scale '{get['scale'][:40]}' is 0 along an axis")
         return Shape("mesh", file, size, pose)
     if element.tag == "box":
-        return Shape("box", "", _parse_vector(get["size"]), pose)
-    if element.tag in ("cylinder", "capsule"):
-        return Shape("cylinder", "", (float(get["radius"]), float(get["length"]), 0.0), pose)
-    if element.tag == "sphere":
-        return Shape("sphere", "", (float(get["radius"]), 0.0, 0.0), pose)
-    raise ValueError(f"unknown geometry <{element.tag[:40]}>")
+        size = _parse_vector(get["size"])
+    elif element.tag in ("cylinder", "capsule"):
+        size = (_parse_number(get["radius"]), _parse_number(get["length"]), 0.0)
+    elif element.tag == "sphere":
+        size = (_parse_number(get["radius"]), 0.0, 0.0)
+    else:
+        raise ValueError(f"unknown geometry <{element.tag[:40]}>")
+    if min(size) < 0.0:
+        raise ValueError(f"<{element.tag}> of negative size {min(size):g}")
+    return Shape(element.tag, "", size, pose)
 
 
-def _resolve_mesh(folder: Folder, relative: str, name: str) -> str:
-    """Resolve ``package://x/y`` or a relative path to a file below the folder.
-
-    A package is the folder of that name beside or above the URDF. Older descriptions omit the
-    package's name, so the path is also tried unchanged.
-    """
-    if not name.startswith("package://"):
-        return folder.refer(relative, name)
-    path = name.removeprefix("package://")
-    base = PurePosixPath(relative).parent
-    candidates = []
-    for ancestor in (base, *base.parents):
-        at = str(ancestor / "x.urdf")
-        candidates.append(folder.refer(at, path))
-        if ancestor.name == PurePosixPath(path).parts[0]:
-            candidates.append(folder.refer(at, "/".join(PurePosixPath(path).parts[1:])))
-    return next((c for c in candidates if folder.exists(c)), candidates[0])
-
-
-def _read_joint(element: Element) -> Joint:
+def _read_joint(element: Element, remarks: list[str]) -> Joint:
     name, kind = element.attrib["name"], element.attrib["type"]
+    if kind in _HELD:
+        remarks.append(
+            f"joint '{name[:40]}'{format_position(element)} is {kind} and stays at its origin"
+        )
+        kind = "fixed"
     if kind not in _KINDS:
-        raise ValueError(f"joint '{name[:40]}' is of type '{kind[:40]}', not {sorted(_KINDS)}")
+        raise ValueError(
+            f"joint '{name[:40]}' is of type '{kind[:40]}', not {sorted(_KINDS | _HELD)}"
+        )
     limit, axis, mimic = element.find("limit"), element.find("axis"), element.find("mimic")
     lower = upper = 0.0
-    if kind == "continuous":
-        lower, upper = -math.pi, math.pi
-    elif kind != "fixed":
-        if limit is None:
-            raise ValueError(f"joint '{name[:40]}' has no limits")
+    if kind in ("revolute", "prismatic") and limit is not None:
         lower, upper = float(limit.get("lower", 0.0)), float(limit.get("upper", 0.0))
         if not lower <= upper:
             raise ValueError(f"joint '{name[:40]}' has lower limit {lower} above upper {upper}")
+        if kind == "revolute" and max(-lower, upper) > _ENDLESS_RAD:
+            remarks.append(f"joint '{name[:40]}': limits of {lower:g} and {upper:g} rad are none")
+            kind = "continuous"
+    if kind == "continuous":
+        lower, upper = -math.pi, math.pi
     return Joint(
         name=name,
         kind=kind,  # type: ignore[arg-type]
@@ -233,38 +266,31 @@ def _read_joint(element: Element) -> Joint:
     )
 
 
+def _follow_limits(joint: Joint, joints: list[Joint], element: Element) -> Joint:
+    """The joint with limits: a joint that mimics another may leave them to that one.
+
+    Raises:
+        _Fault: it has no limits.
+    """
+    limit = element.find("limit")
+    stated = limit is not None and ("lower" in limit.attrib or "upper" in limit.attrib)
+    if joint.kind in ("fixed", "continuous") or stated or (limit is not None and not joint.mimic):
+        return joint
+    if not joint.mimic:
+        raise _Fault(
+            element,
+            f"joint '{joint.name[:40]}' has no limits; give it a <limit>, or the type 'continuous'",
+        )
+    leader, multiplier, offset = leader_of(joint, joints)
+    ends = (multiplier * leader.lower + offset, multiplier * leader.upper + offset)
+    return replace(joint, lower=min(ends), upper=max(ends))
+
+
 def _linked_name(element: Element, tag: str) -> str:
     child = element.find(tag)
     if child is None:
         raise ValueError(f"joint '{element.attrib['name'][:40]}' has no {tag}")
-    return child.attrib["link"]
-
-
-def _sort_links(links: dict[str, Link], joints: list[Joint]) -> Urdf:
-    """Sort links depth first from the root. Raises ValueError if they form no tree."""
-    by_parent: dict[str, list[Joint]] = {}
-    for joint in joints:
-        if joint.parent not in links or joint.child not in links:
-            raise _MisplacedJoint(joint, "refers to a missing link")
-        by_parent.setdefault(joint.parent, []).append(joint)
-    children = [joint.child for joint in joints]
-    for k, joint in enumerate(joints):
-        if joint.child in children[:k]:
-            reason = f"closes a loop: link '{joint.child[:40]}' has another parent already"
-            raise _MisplacedJoint(joint, reason)
-    roots = [name for name in links if name not in set(children)]
-    if len(roots) != 1:
-        raise ValueError(f"its links form no tree: {len(roots)} of them have no parent")
-    order, ordered_joints, pending = [roots[0]], [], list(reversed(by_parent.get(roots[0], [])))
-    while pending:
-        joint = pending.pop()
-        ordered_joints.append(joint)
-        order.append(joint.child)
-        pending += reversed(by_parent.get(joint.child, []))
-    if len(order) != len(links):
-        loop = next(joint for joint in joints if joint.child not in order)
-        raise _MisplacedJoint(loop, "is part of a loop")
-    return Urdf({name: links[name] for name in order}, tuple(ordered_joints))
+    return _link_name(child.attrib["link"])
 
 
 def _read_pose(origin: Element | None) -> SE3:
@@ -272,11 +298,11 @@ def _read_pose(origin: Element | None) -> SE3:
         return SE3()
     return SE3(
         _parse_vector(origin.get("xyz", "0 0 0")),
-        _quaternion(*_parse_vector(origin.get("rpy", "0 0 0"))),
+        rpy_to_quaternion(*_parse_vector(origin.get("rpy", "0 0 0"))),
     )
 
 
-def _quaternion(roll: float, pitch: float, yaw: float) -> tuple[float, float, float, float]:
+def rpy_to_quaternion(roll: float, pitch: float, yaw: float) -> Quaternion:
     """Quaternion (w, x, y, z) of fixed-axis roll, pitch, yaw [rad].
 
     Rounded, because the last bits of sine and cosine differ between C libraries.

@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gen_data.generator.assemble.config import Config, load_config
-from gen_data.generator.assets.library import Library, open_library
+from gen_data.generator.assets.library import Library
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.errors import GenDataError
 from gen_data.generator.core.sample import Sample
 from gen_data.generator.core.streams import Rng, Streams
+from gen_data.generator.packs.provision import open_assets
 from gen_data.generator.pipeline.finalize_scene import Timeline
 from gen_data.generator.report.drawn_parameters import Replay, replay_scenes
 from gen_data.generator.report.stored_labels import ImageLabels, read_images
@@ -61,7 +62,7 @@ class Examined:
     @cached_property
     def library(self) -> Library:
         """The assets of its configuration on this machine."""
-        return open_library(self.config.asset_folders)
+        return open_assets(self.config.asset_folders)
 
     @cached_property
     def replay(self) -> Replay:

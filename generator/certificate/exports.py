@@ -54,6 +54,8 @@ def _unable(examined: Examined, exporter: Exporter, reader: Reader | None) -> st
         return "the export has no files"
     if not examined.config.general.labels.map.is_identity:
         return "a label map changes the classes of all exports: labels and exports differ by design"
+    if getattr(exporter, "cameras", ()) or getattr(exporter, "rectify", False):
+        return "its fields cameras or rectify give it other images than the labels have, by design"
     if getattr(exporter, "bbox", "visible") != "visible":
         return "its boxes are those of whole silhouettes, which labels of visible pixels are not"
     return reader.missing()

@@ -11,7 +11,6 @@ from gen_data.exporters.image_files import DEPTH_UNITS_MAX
 from gen_data.generator.certificate.examined import Examined
 from gen_data.generator.certificate.finding import Finding, not_checked
 from gen_data.generator.certificate.ray_casting import (
-    MISSING,
     UNSTATED,
     Agreement,
     RayCaster,
@@ -19,6 +18,7 @@ from gen_data.generator.certificate.ray_casting import (
     has_holes,
 )
 from gen_data.generator.core.capture import Channel, SensorReading
+from gen_data.generator.core.distribution import install_command
 from gen_data.generator.core.plates import has_plate
 from gen_data.generator.core.sample import ImageTruth, Sample
 from gen_data.generator.core.se3 import Array
@@ -42,7 +42,10 @@ def check_pixels(examined: Examined) -> Iterator[Finding]:
             for name in sorted(sample.capture.readings):
                 _compare(examined, sample, name, judged[name])
     except ImportError as error:
-        yield from (not_checked(name, f"{MISSING} ({error})") for name in judged)
+        yield from (
+            not_checked(name, f"install open3d: {install_command('certify')} ({error})")
+            for name in judged
+        )
         return
     for name, agreement in judged.items():
         if agreement.rays:

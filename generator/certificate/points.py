@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from gen_data.generator.certificate.examined import Examined
 from gen_data.generator.certificate.finding import Finding, not_checked
 from gen_data.generator.certificate.ray_casting import (
-    MISSING,
     Agreement,
     RayCaster,
     Seen,
@@ -23,6 +22,7 @@ from gen_data.generator.certificate.ray_casting import (
 )
 from gen_data.generator.core.asset_types import SURFACES
 from gen_data.generator.core.capture import PointCloud
+from gen_data.generator.core.distribution import install_command
 from gen_data.generator.core.interfaces import Sensor
 from gen_data.generator.core.sample import Sample
 from gen_data.generator.core.scene import Scene
@@ -60,7 +60,10 @@ def check_points(examined: Examined) -> Iterator[Finding]:
                 cloud = sample.capture.clouds[name]
                 _compare(examined, sample, cloud, sensors[name], judged[name])
     except ImportError as error:
-        yield from (not_checked(name, f"{MISSING} ({error})") for name in sorted(judged))
+        yield from (
+            not_checked(name, f"install open3d: {install_command('certify')} ({error})")
+            for name in sorted(judged)
+        )
         return
     for name, agreement in sorted(judged.items()):
         yield agreement.finding(name, "scans", "points")

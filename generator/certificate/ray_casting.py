@@ -23,7 +23,6 @@ from gen_data.generator.core.interfaces import AssetLibrary
 from gen_data.generator.core.scene import Scene
 from gen_data.generator.core.se3 import Array
 
-MISSING = "install open3d: pip install 'gen-data[certify]'"
 DISAGREEING_SHARE = 0.001
 """Largest share of rays that may disagree: rays through edges, where either surface is right."""
 UNSTATED = -1

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from gen_data.generator.core.errors import AssetError, ConfigError
+from gen_data.generator.core.errors import AssetError, ConfigError, did_you_mean
 
 if TYPE_CHECKING:
     from gen_data.generator.assets.checking import Finding
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 FOLDER = click.Path(path_type=Path, exists=True, file_okay=False)
 TILE_PX = 256
 _EVERY = "all"
+_KINDS = ("object", "robot", "texture", "environment", "plate")
 
 
 @click.group()
@@ -92,9 +93,9 @@ def list_(tags: tuple[str, ...], folders: tuple[Path, ...]) -> None:
 @click.option("--folder", "folders", multiple=True, type=FOLDER, help="A folder of your assets.")
 def show(asset_id: str, folders: tuple[Path, ...]) -> None:
     """Show an asset of the library: category, tags, licence, author, size."""
-    from gen_data.generator.assets.library import open_library
+    from gen_data.generator.packs.provision import open_assets
 
-    library = open_library(folders)
+    library = open_assets(folders)
     asset = library.get(asset_id)
     for name, value in _describe_asset(asset).items():
         click.echo(f"{name:<12} {value}")
@@ -142,7 +143,9 @@ def check(folder: Path, sheet: Path | None, overlays: Path | None) -> None:
         plates = [f.asset_id for f in findings if f.kind == "plate" and not f.error]
         _write_overlays(library, plates, overlays)
     if not findings:
-        raise AssetError(f"{folder}: has no assets; expected OBJ, GLB, PLY, STL, URDF or USD files")
+        raise AssetError(
+            f"{folder}: has no assets; expected OBJ, GLB, PLY, STL, DAE, USD, URDF, MJCF, SDF"
+        )
     unusable = [finding for finding in findings if finding.error]
     if unusable:
         raise AssetError(f"{folder}: {len(unusable)} of {len(findings)} assets cannot be used")
@@ -210,12 +213,23 @@ def _warm_cache(pack: str) -> None:
 
 
 def _list_assets(tags: tuple[str, ...], folders: tuple[Path, ...]) -> None:
-    from gen_data.generator.assets.library import open_library
+    from gen_data.generator.packs.provision import open_assets
 
-    library = open_library(folders)
-    for kind in ("object", "robot", "texture", "environment", "plate"):
-        for asset in library.find(tags, kind):
-            click.echo(f"{asset.asset_id}  {asset.category}  [{' '.join(asset.tags)}]")
+    library = open_assets(folders)
+    found = [asset for kind in _KINDS for asset in library.find(tags, kind)]
+    if not found:
+        raise AssetError(_nothing_has(tags, library))
+    for asset in found:
+        click.echo(f"{asset.asset_id}  {asset.category}  [{' '.join(asset.tags)}]")
+
+
+def _nothing_has(tags: tuple[str, ...], library: Library) -> str:
+    """Why a list is empty: a tag that no asset has, with the nearest, or tags that never meet."""
+    known = {tag for kind in _KINDS for asset in library.find((), kind) for tag in asset.tags}
+    for tag in tags:
+        if tag not in known:
+            return f"no asset has the tag '{tag}'{did_you_mean(tag, known)}"
+    return f"no asset has all of the tags {', '.join(tags)}; each of them has some"
 
 
 def _print_findings(findings: Sequence[Finding]) -> None:

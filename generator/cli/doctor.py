@@ -19,7 +19,7 @@ from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass
 from importlib import import_module
-from importlib.metadata import version
+from importlib.metadata import packages_distributions, version
 from importlib.util import find_spec
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -28,6 +28,7 @@ from typing import Any
 import click
 
 from gen_data.generator import __version__
+from gen_data.generator.core.distribution import DISTRIBUTION, install_command
 from gen_data.generator.core.errors import GenDataError, SampleError
 from gen_data.generator.core.optional_packages import missing_packages
 from gen_data.generator.core.processes import silence_stdio
@@ -38,7 +39,6 @@ FILES_MIN = 64
 MEMORY_MIN_BYTES = 2_000_000_000
 BENCHMARK_S = 3.0
 """Duration of the benchmark."""
-EXTRA = "pip install 'gen-data[{}]'"
 REINSTALL = "reinstall it: pip install --force-reinstall --no-deps {}"
 
 
@@ -119,6 +119,13 @@ def _try_python() -> str:
     _expect(float(np.arange(5.0).sum()) == 10.0, "NumPy cannot add")
     ours = f"gen-data {__version__}"
     return f"{ours}, Python {platform.python_version()}, NumPy {np.__version__}"
+
+
+def _try_name() -> str:
+    """Look for other projects that install ``gen_data`` too; pip lets them overwrite its files."""
+    others = {*packages_distributions().get("gen_data", ())} - {DISTRIBUTION}
+    _expect(not others, f"gen_data is also installed by {' and '.join(sorted(others))}")
+    return f"no other distribution than {DISTRIBUTION} installs gen_data"
 
 
 def _try_cache() -> str:
@@ -318,7 +325,14 @@ def _is_installed(module: str) -> bool:
 
 
 CHECKS = (
-    Check("python", _try_python, REINSTALL.format("gen-data numpy")),
+    Check("python", _try_python, REINSTALL.format(f"{DISTRIBUTION} numpy")),
+    Check(
+        "name",
+        _try_name,
+        f"uninstall it and {DISTRIBUTION}, then install {DISTRIBUTION} again: one has overwritten "
+        "files of the other",
+        required=False,
+    ),
     Check("cache", _try_cache, "make the folder writable, or point XDG_CACHE_HOME elsewhere"),
     Check("limits", _try_limits, "raise them with ulimit -n, -v and -f"),
     Check("renderer", _try_renderer, REINSTALL.format("warp-lang")),
@@ -327,12 +341,12 @@ CHECKS = (
     ),
     Check("meshes", _try_meshes, REINSTALL.format("scipy trimesh fast-simplification")),
     Check("images", _try_images, REINSTALL.format("opencv-python-headless deflate pillow")),
-    Check("openexr", _try_openexr, EXTRA.format("exr"), _is_installed("OpenEXR")),
+    Check("openexr", _try_openexr, install_command("exr"), _is_installed("OpenEXR")),
     Check("coco", _try_coco, REINSTALL.format("pycocotools")),
-    Check("usd", _try_usd, EXTRA.format("usd"), _is_installed("pxr")),
-    Check("preview", _try_preview, EXTRA.format("preview"), _is_installed("rerun")),
+    Check("usd", _try_usd, install_command("usd"), _is_installed("pxr")),
+    Check("preview", _try_preview, install_command("preview"), _is_installed("rerun")),
     Check("sample", _try_sample, "if the checks above pass, delete ~/.cache/warp and try again"),
     Check("speed", _try_speed, "see the check of the sample", required=False),
-    Check("denoiser", _try_denoiser, EXTRA.format("denoise"), required=False),
+    Check("denoiser", _try_denoiser, install_command("denoise"), required=False),
     Check("packs", _try_packs, "gen-data assets list shows the available packs", required=False),
 )

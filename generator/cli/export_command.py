@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import click
+
+from gen_data.generator.core.errors import ConfigError
 
 HELP = """Write a finished data set in other formats, without rendering it again.
 
@@ -50,7 +54,7 @@ def export(
     from gen_data.generator.cli.generate_command import print_summary, progress_bar
     from gen_data.generator.runner.stored import StoredSamples
 
-    with progress_bar(StoredSamples(folder).n) as show:
+    with _named_options(formats), progress_bar(StoredSamples(folder).n) as show:
         summary = write_exports(
             folder,
             [_parse_format(text) for text in formats],
@@ -62,6 +66,20 @@ def export(
             resume_command=shlex.join(["gen-data", *sys.argv[1:]]),
         )
     print_summary(summary)
+
+
+@contextmanager
+def _named_options(formats: Sequence[str]) -> Iterator[None]:
+    """Name the options in errors about formats: ``formats[1].rectify`` is part of the second."""
+    try:
+        yield
+    except ConfigError as error:
+
+        def option(found: re.Match[str]) -> str:
+            return f"--format {shlex.quote(formats[int(found[1])])}:"
+
+        text = re.sub(r"formats\[(\d+)\](?:\.type)?:", option, str(error))
+        raise ConfigError(re.sub(r"formats\[(\d+)\]\.", lambda m: f"{option(m)} ", text)) from error
 
 
 def _parse_format(text: str) -> str | Mapping[str, Any]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import json
+import textwrap
 from pathlib import Path
 
 import click
@@ -12,24 +13,29 @@ import click
 @click.command()
 @click.argument("name", required=False)
 def describe(name: str | None) -> None:
-    """Explain a plug-in, distribution, template or configuration; without NAME, list them all."""
-    from gen_data.generator.assemble.plugin_tables import TABLES, find_plugin
-    from gen_data.generator.config.describe import describe as text_of
+    """Explain a plug-in, section, distribution, template or configuration.
+
+    NAME may be that of a nested mapping: labels.map, rgb_camera.lens, brown_conrady. Without NAME,
+    all are listed.
+    """
+    from gen_data.generator.assemble.descriptions import (
+        describe_name,
+        list_names_of,
+        section_names,
+    )
+    from gen_data.generator.assemble.plugin_tables import TABLES
 
     shipped = _shipped_texts()
     if name is None:
-        for kind, table in TABLES.items():
-            click.echo(f"{kind}: {', '.join(table)}")
-        for kind, texts in shipped.items():
-            click.echo(f"{kind}: {', '.join(texts)}")
+        click.echo(list_names_of({**TABLES, "section": section_names(), **shipped}))
         return
+    name = name.removesuffix(".yaml")
     # A name may be that of a template and of the configuration that uses it.
     found = [(kind, texts[name]) for kind, texts in shipped.items() if name in texts]
     for kind, text in found:
         click.echo(f"{kind} {name}\n{text}")
     if not found:
-        kind, plugin = find_plugin(name)
-        click.echo(f"{kind} {name}\n{text_of(plugin)}")
+        click.echo(describe_name(name))
 
 
 def _shipped_texts() -> dict[str, dict[str, str]]:
@@ -53,11 +59,13 @@ def _shipped_texts() -> dict[str, dict[str, str]]:
 def formats() -> None:
     """List the output formats."""
     from gen_data.exporters import TABLE
+    from gen_data.generator.config.describe import TEXT_WIDTH
     from gen_data.generator.config.schema import docstring_summary
 
-    width = max(map(len, TABLE))
+    width = max(map(len, TABLE)) + 2
     for name in TABLE:
-        click.echo(f"{name:<{width}}  {docstring_summary(TABLE.load(name))}")
+        line = f"{name:<{width}}{docstring_summary(TABLE.load(name))}"
+        click.echo(textwrap.fill(line, TEXT_WIDTH, subsequent_indent=" " * width))
     click.echo("\ngen-data describe NAME lists the fields of a format.")
 
 

@@ -6,6 +6,7 @@ Imports are few here: each command imports its modules when it runs.
 from __future__ import annotations
 
 import os
+import shlex
 import sys
 import warnings
 from collections.abc import Callable
@@ -36,6 +37,7 @@ from gen_data.generator.core.errors import (
     GenDataError,
     Interrupted,
     OutOfMemory,
+    did_you_mean,
     is_out_of_memory,
 )
 from gen_data.generator.core.processes import SINGLE_THREADED
@@ -125,8 +127,10 @@ class LazyCommands(click.Group):
         """Find the command; refuses URLs in the place of folders.
 
         Raises:
-            ConfigError: the command reads or writes folders only.
+            ConfigError: there is no such command, or it reads or writes folders only.
         """
+        if args[0] not in self.modules:
+            raise ConfigError(_no_command(args, list(self.modules)))
         name, command, rest = super().resolve_command(ctx, args)
         urls = [argument for argument in rest if is_url(argument)]
         if urls and name in FOLDERS_ONLY:
@@ -138,6 +142,24 @@ class LazyCommands(click.Group):
         del ctx
         with formatter.section("Commands"):
             formatter.write_dl(list(self.summaries.items()))
+
+
+GENERATING = frozenset({"generate", "run", "gen", "create", "make", "build"})
+"""Words that stand for generating elsewhere; here it is what a configuration does."""
+
+
+def _no_command(args: list[str], known: list[str]) -> str:
+    """Message for a command line whose first word is no command."""
+    from importlib.resources import files
+
+    word = args[0]
+    rest = args[1:] if word in GENERATING else args
+    shipped = files("gen_data.configs") / f"{word.removesuffix('.yaml')}.yaml"
+    if word in GENERATING or word.endswith((".yaml", ".yml")) or shipped.is_file():
+        named = [*([] if "--config" in rest or "-c" in rest else ["--config"]), *rest]
+        return f"there is no command '{word}'; did you mean: {shlex.join(['gen-data', *named])}"
+    hint = did_you_mean(word, known)
+    return f"there is no command '{word}'{hint}; see: gen-data --help"
 
 
 HELP = """Generate a labelled synthetic data set.

@@ -130,7 +130,7 @@ def write_assets(meshes: Sequence[OwnMesh], folder: Path) -> None:
         AssetError: an asset cannot be used; the text names each of them.
     """
     from gen_data.generator.assets.checking import check_folder
-    from gen_data.generator.assets.library import open_library
+    from gen_data.generator.packs.provision import open_assets
 
     for mesh in meshes:
         for source, place in mesh.files():
@@ -140,7 +140,7 @@ def write_assets(meshes: Sequence[OwnMesh], folder: Path) -> None:
     sources = {mesh.asset_id: mesh.root / mesh.file for mesh in meshes}
     faults = [
         f"{sources.get(one.asset_id, one.asset_id)}: {one.error.replace(f'{folder}/', '')}"
-        for one in check_folder(folder, open_library([folder]))
+        for one in check_folder(folder, open_assets([folder]))
         if one.error
     ]
     if faults:

@@ -21,9 +21,9 @@ from gen_data.generator.config.schema import (
 )
 from gen_data.generator.config.yaml_scalars import to_flow_yaml
 
-_TEXT_WIDTH = 100
+TEXT_WIDTH = 80
+"""Columns of a terminal, also where the output is piped."""
 _EXAMPLES = {"integer": 1, "number": 1, "string": "example", "boolean": True}
-_HEADINGS = ("field", "type", "default")
 
 
 class FieldRow(NamedTuple):
@@ -48,11 +48,11 @@ def describe(model: type) -> str:
     A plug-in without parameters, such as most annotators, has its summary only.
     """
     if not issubclass(model, BaseModel):
-        return docstring_summary(model) + "\n"
+        return _wrapped(docstring_summary(model)) + "\n"
     rows = describe_fields(model)
-    parts = [docstring_summary(model)]
+    parts = [_wrapped(docstring_summary(model))]
     if rows:
-        parts.append("\n".join(_table(rows)))
+        parts.append("\n".join(_entries(rows)))
     example = make_example(model)
     if example:
         parts.append(f"Example:\n{textwrap.indent(_block(example), '  ')}")
@@ -60,8 +60,9 @@ def describe(model: type) -> str:
 
 
 def describe_fields(model: type[BaseModel]) -> tuple[FieldRow, ...]:
-    """Fields of a model in their order, with the descriptions of its docstrings."""
+    """Fields of a model with the descriptions of its docstrings, its own before inherited ones."""
     attributes, schema = documented_attributes(model), FieldSchema.of(model)
+    own = sorted(model.model_fields.items(), key=lambda item: item[0] not in model.__annotations__)
     return tuple(
         FieldRow(
             name,
@@ -69,7 +70,7 @@ def describe_fields(model: type[BaseModel]) -> tuple[FieldRow, ...]:
             "required" if info.is_required() else to_flow_yaml(plain_default(info)),
             " ".join((info.description or attributes.get(name, "")).split()),
         )
-        for name, info in model.model_fields.items()
+        for name, info in own
     )
 
 
@@ -94,16 +95,24 @@ def plain_default(info: FieldInfo) -> Any:
     return to_plain_yaml(info.get_default(call_default_factory=True, validated_data={}))
 
 
-def _table(rows: Sequence[FieldRow]) -> Iterator[str]:
-    widths = [max(len(row[i]) for row in (*rows, _HEADINGS)) for i in range(3)]
-    yield "  ".join(h.ljust(width) for h, width in zip(_HEADINGS, widths, strict=True)).rstrip()
-    yield "  ".join("-" * width for width in widths)
+def _entries(rows: Sequence[FieldRow]) -> Iterator[str]:
+    """Name, type and default of each field, and below them its description."""
     for row in rows:
-        yield "  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=False)).rstrip()
-        if row[3]:
-            yield textwrap.fill(
-                row[3], _TEXT_WIDTH, initial_indent="    ", subsequent_indent="    "
-            )
+        default = row.default if row.default == "required" else f"default {row.default}"
+        facts = row.words if row.words == row.default else f"{row.words}; {default}"
+        yield _wrapped(f"{row.name}: {facts}", first="", others="        ")
+        if row.text:
+            yield _wrapped(row.text, first="    ", others="    ")
+
+
+def _wrapped(text: str, first: str = "", others: str = "") -> str:
+    return textwrap.fill(
+        text,
+        TEXT_WIDTH,
+        initial_indent=first,
+        subsequent_indent=others,
+        break_on_hyphens=False,
+    )
 
 
 def _example_fields(model: FieldSchema) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -145,5 +154,15 @@ def _clamp_inside(value: float, limits: Bounds) -> float:
 
 
 def _block(example: Mapping[str, Any]) -> str:
-    """A mapping as YAML, one key per line."""
-    return "\n".join(f"{key}: {to_flow_yaml(value)}" for key, value in example.items())
+    """A mapping as YAML, one key per line; long values go on in the next line, as YAML allows."""
+    lines = (f"{key}: {to_flow_yaml(value)}" for key, value in example.items())
+    return "\n".join(
+        textwrap.fill(
+            line,
+            TEXT_WIDTH - 2,
+            subsequent_indent="    ",
+            break_on_hyphens=False,
+            break_long_words=False,
+        )
+        for line in lines
+    )

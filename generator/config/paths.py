@@ -69,7 +69,7 @@ def find_path(
     elif name and not is_folder and path.is_dir():
         fact = f"'{abbreviate(str(path), 300)}' is a folder; expected a file with a {kind}"
     elif by_name:
-        fact += f"; shipped are {', '.join(by_name)}{did_you_mean(name, by_name)}"
+        fact += f"{did_you_mean(name, by_name)}; gen-data describe lists the shipped ones"
     raise _error(position, field, fact)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import inspect
 import math
 import re
@@ -10,6 +11,7 @@ from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from enum import Enum
 from functools import cache
+from itertools import pairwise
 from typing import Any
 
 from pydantic import BaseModel
@@ -88,12 +90,30 @@ def docstring_summary(model: type) -> str:
 
 
 def documented_attributes(model: type[BaseModel]) -> dict[str, str]:
-    """``{field: text}`` of the Attributes sections of a class and its bases."""
+    """``{field: text}`` of a class and its bases.
+
+    Texts are those of the section ``Attributes:`` and of docstrings below fields.
+    """
     found: dict[str, str] = {}
     for base in reversed(model.__mro__):
-        if issubclass(base, BaseModel) and base is not BaseModel and base.__doc__:
-            found |= dict(_attributes_section(inspect.cleandoc(base.__doc__)))
+        if issubclass(base, BaseModel) and base is not BaseModel:
+            found |= dict(_attribute_docstrings(base))
+            found |= dict(_attributes_section(inspect.cleandoc(base.__doc__ or "")))
     return found
+
+
+def _attribute_docstrings(model: type) -> Iterator[tuple[str, str]]:
+    """Fields with a docstring below them; none for a class without source, as in a notebook."""
+    try:
+        (tree,) = ast.parse(textwrap.dedent(inspect.getsource(model))).body
+    except (OSError, SyntaxError):
+        return
+    body = tree.body if isinstance(tree, ast.ClassDef) else []
+    for field, after in pairwise(body):
+        if isinstance(field, ast.AnnAssign) and isinstance(field.target, ast.Name):
+            match after:
+                case ast.Expr(value=ast.Constant(value=str(text))):
+                    yield field.target.id, " ".join(text.split())
 
 
 def _attributes_section(docstring: str) -> Iterator[tuple[str, str]]:

@@ -7,6 +7,7 @@ import errno
 from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 
@@ -31,6 +32,10 @@ class UnknownNameError(ConfigError, KeyError):
 
 class SampleIndexError(ConfigError, IndexError):
     """The index of a sample that the data set does not have."""
+
+
+class IndexKindError(ConfigError, TypeError):
+    """An index of samples that is no whole number."""
 
 
 class ConfigWarning(UserWarning):
@@ -226,6 +231,28 @@ def list_names(names: Collection[str], most: int = 12) -> str:
 
 
 def did_you_mean(wrong: str, known: Iterable[str]) -> str:
-    """`` (did you mean 'x'?)`` when something known is near, else the empty string."""
-    near = difflib.get_close_matches(wrong, list(known), n=1, cutoff=0.6)
-    return f" (did you mean '{near[0]}'?)" if near else ""
+    """`` (did you mean 'x'?)`` when something known is near, else the empty string.
+
+    Endings of files, such as ``.yaml``, make no names similar.
+    """
+    stems = {name.removesuffix(".yaml"): name for name in known}
+    near = difflib.get_close_matches(wrong.removesuffix(".yaml"), stems, n=1, cutoff=0.6)
+    return f" (did you mean '{stems[near[0]]}'?)" if near else ""
+
+
+def one_of(wrong: str, known: Collection[str], most: int = 12) -> str:
+    """``expected one of a, b (did you mean 'a'?)``; of more than ``most`` the nearest five."""
+    if len(known) <= most:
+        return f"expected one of {', '.join(known)}{did_you_mean(wrong, known)}"
+    near = difflib.get_close_matches(wrong, known, n=5, cutoff=0.0)
+    some = f"expected one of {len(known)} names, such as {', '.join(near)}"
+    return f"{some}{did_you_mean(wrong, known)}"
+
+
+def no_folder(folder: Path) -> str:
+    """``there is no folder 'x' (did you mean 'y'?)``, of what is in the same folder."""
+    try:
+        beside = [path.name for path in folder.parent.iterdir() if path.is_dir()]
+    except OSError:
+        beside = []
+    return f"there is no folder '{folder}'{did_you_mean(folder.name, sorted(beside))}"

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from importlib.util import find_spec
 
+from gen_data.generator.core.distribution import install_command
+
 EXTRAS = {
     "OpenEXR": ("OpenEXR", "exr"),
     "cascadio": ("cascadio", "step"),
@@ -27,5 +29,4 @@ def missing_packages(*modules: str) -> str:
         return ""
     noun = "package" if len(absent) == 1 else "packages"
     names = ", ".join(sorted(package for package, _ in absent))
-    extras = ",".join(sorted({extra for _, extra in absent}))
-    return f"needs the {noun} {names}: pip install 'gen-data[{extras}]'"
+    return f"needs the {noun} {names}: {install_command(*{extra for _, extra in absent})}"

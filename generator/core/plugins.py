@@ -9,7 +9,7 @@ from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any, Generic, TypeVar
 
-from gen_data.generator.core.errors import ConfigError, did_you_mean
+from gen_data.generator.core.errors import ConfigError, one_of
 
 P = TypeVar("P")
 """The Protocol that the plug-ins of a table implement."""
@@ -54,10 +54,7 @@ class PluginTable(Generic[P]):
         """
         if name not in self:
             known = self.names()
-            raise ConfigError(
-                f"unknown {self.kind} {name[:60]!r}; expected one of {', '.join(known)}"
-                f"{did_you_mean(name, known)}"
-            )
+            raise ConfigError(f"unknown {self.kind} {name[:60]!r}; {one_of(name, known)}")
         path = self.entries.get(name) or third_party(self.kind)[name].value
         plugin: type[P] = loaded(path, f"{self.kind} '{name}'")
         fault = self._fault(plugin, name)

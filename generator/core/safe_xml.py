@@ -23,8 +23,10 @@ def format_position(element: Element) -> str:
     return f":{element.line}:{element.column}" if isinstance(element, PlacedElement) else ""
 
 
-def parse_xml(data: bytes, place: str, root_tag: str, kind: str, max_elements: int) -> Element:
-    """Parse a document and return its root element.
+def parse_xml(
+    data: bytes, place: str, root_tag: str, kind: str, max_elements: int, *, text: bool = False
+) -> Element:
+    """Parse a document and return its root element, with the text in elements only on demand.
 
     ``place`` and ``kind`` name the file and its kind in error messages.
 
@@ -54,6 +56,8 @@ def parse_xml(data: bytes, place: str, root_tag: str, kind: str, max_elements: i
         raise ValueError("it declares a document type, which is not allowed; remove it")
 
     parser.StartElementHandler, parser.EndElementHandler = start, end
+    if text:
+        parser.CharacterDataHandler = builder.data
     parser.StartDoctypeDeclHandler = parser.EntityDeclHandler = refuse
     try:
         parser.Parse(data, True)

@@ -111,5 +111,6 @@ def _command(pack: Pack) -> list[str]:
 def _client_error(pack: Pack, command: list[str], what: str) -> AssetError:
     return AssetError(
         f"pack '{pack.name}': '{' '.join([Path(command[0]).name, *command[1:]])}' {what}\n"
-        f"  Fetch {pack.source} elsewhere and give it with --from FILE; nothing was installed"
+        f"  Nothing was installed. Fetch {pack.source} elsewhere and give it with: "
+        f"gen-data assets install {pack.name} --from FILE"
     )

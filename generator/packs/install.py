@@ -10,13 +10,13 @@ import contextlib
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from gen_data.generator.assets.installed_packs import RECORD_NAME, Record, StoredFile, read_record
 from gen_data.generator.core.errors import AssetError, GenDataError, StorageError, VerificationError
 from gen_data.generator.core.serialization import canonical_json
-from gen_data.generator.core.system_calls import try_lock
+from gen_data.generator.core.system_calls import try_lock, wait_for_lock
 from gen_data.generator.packs.archives import extract
 from gen_data.generator.packs.fetch import check_archive, fetch, file_digest
 from gen_data.generator.packs.pack_table import Pack
@@ -41,26 +41,49 @@ def install(pack: Pack, folder: Path, archive: Path | None = None) -> Record:
         StorageError: if the folder cannot be written, or another process is installing.
     """
     with _storage(folder), _scratch(folder) as scratch:
-        if archive is None:
-            archive = fetch(pack, _make_folder(scratch / "archive"))
-        check_archive(pack, archive)
-        source, target = _make_folder(scratch / "source"), _make_folder(scratch / "target")
-        extract(archive, pack.wanted, source)
-        pack.convert(source, target)
-        record = Record(
-            name=pack.name,
-            version=pack.version,
-            revision=pack.revision,
-            archive_sha256=pack.sha256,
-            licence=pack.licence,
-            source=pack.source,
-            files=_list_files(target),
-        )
-        (target / RECORD_NAME).write_text(canonical_json(record) + "\n", encoding="utf-8")
-        # Without a sync, a power cut after the rename may leave a pack of empty files.
-        if hasattr(os, "sync"):
-            os.sync()
-        _exchange(target, folder / pack.name, scratch / "old")
+        return _install(pack, folder, archive, scratch)
+
+
+def install_once(pack: Pack, folder: Path, announce: Callable[[], object]) -> None:
+    """Install a pack unless it is installed; wait while another process installs one.
+
+    Args:
+        pack: Entry of the table.
+        folder: Folder of installed packs; created if missing.
+        announce: Called before it is fetched.
+
+    Raises:
+        AssetError: if it cannot be fetched, is not the pinned archive, or cannot be converted.
+        StorageError: if the folder cannot be written.
+    """
+    with _storage(folder), _scratch(folder, wait=True) as scratch:
+        if not is_installed(pack, folder):
+            announce()
+            _install(pack, folder, None, scratch)
+
+
+def _install(pack: Pack, folder: Path, archive: Path | None, scratch: Path) -> Record:
+    """Fetch, convert and install a pack, by way of an empty folder."""
+    if archive is None:
+        archive = fetch(pack, _make_folder(scratch / "archive"))
+    check_archive(pack, archive)
+    source, target = _make_folder(scratch / "source"), _make_folder(scratch / "target")
+    extract(archive, pack.wanted, source)
+    pack.convert(source, target)
+    record = Record(
+        name=pack.name,
+        version=pack.version,
+        revision=pack.revision,
+        archive_sha256=pack.sha256,
+        licence=pack.licence,
+        source=pack.source,
+        files=_list_files(target),
+    )
+    (target / RECORD_NAME).write_text(canonical_json(record) + "\n", encoding="utf-8")
+    # Without a sync, a power cut after the rename may leave a pack of empty files.
+    if hasattr(os, "sync"):
+        os.sync()
+    _exchange(target, folder / pack.name, scratch / "old")
     return record
 
 
@@ -130,11 +153,13 @@ def _exchange(new: Path, final: Path, old: Path) -> None:
 
 
 @contextlib.contextmanager
-def _scratch(folder: Path) -> Iterator[Path]:
+def _scratch(folder: Path, wait: bool = False) -> Iterator[Path]:
     """Scratch folder on the same file system, for one process at a time."""
     folder.mkdir(parents=True, exist_ok=True)
     with (folder / _LOCK).open("a") as lock:
-        if not try_lock(lock.fileno()):
+        if wait:
+            wait_for_lock(lock.fileno())
+        elif not try_lock(lock.fileno()):
             raise StorageError(
                 f"{folder}: another process is installing or removing packs; wait for it"
             )

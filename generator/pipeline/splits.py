@@ -25,10 +25,13 @@ class Splits(Strict):
     """Shares of the scenes; all views of a scene are in one split."""
 
     train: float = Field(
-        0.8, ge=0, le=1, description="Share of the scenes; 0 if only other shares are given."
+        0.8,
+        ge=0,
+        le=1,
+        description="Share of the scenes for training; 0 if only other shares are given.",
     )
-    val: float = Field(0.1, ge=0, le=1, description="As train.")
-    test: float = Field(0.1, ge=0, le=1, description="As train.")
+    val: float = Field(0.1, ge=0, le=1, description="Share for validation during training.")
+    test: float = Field(0.1, ge=0, le=1, description="Share for tests after training.")
     assign: Assignment = Field(
         "random",
         description="random: every scene draws its split; round_robin: splits take turns, so that "
@@ -84,15 +87,27 @@ def split_of(
 
 
 def warn_of_empty_splits(
-    scene_count: int, shares: Mapping[str, float], assignment: Assignment, seed: int
+    scene_count: int, shares: Mapping[str, float], assignment: Assignment, seed: int, stated: bool
 ) -> None:
-    """Warn with a ConfigWarning if a split with a share has no scene."""
+    """Warn with a ConfigWarning if a split that should have a scene has none.
+
+    Args:
+        scene_count: Of the data set.
+        shares: See ``split_of``, as the next two.
+        assignment: Method of assignment.
+        seed: Of the data set.
+        stated: Whether the user has asked for splits: then each should have a scene, otherwise
+            those whose share is a whole scene.
+    """
+    expected = {name for name, share in shares.items() if stated or share * scene_count >= 1.0}
     used: set[str] = set()
     for scene_index in range(scene_count):
+        if expected <= used:
+            break
         used.add(split_of(scene_index, shares, assignment, seed))
-        if len(used) == len(shares):
-            return
-    empty = " and ".join(name for name in shares if name not in used)
+    if expected <= used:
+        return
+    empty = " and ".join(name for name in shares if name in expected - used)
     remedy = "" if assignment == "round_robin" else ", splits.assign: round_robin"
     message = (
         f"splits: {scene_count} {'scene leaves' if scene_count == 1 else 'scenes leave'} {empty} "

@@ -19,7 +19,7 @@ from gen_data.generator.sensors.lidar import pseudo_lidar
 
 GAP_PX = 4
 BACKGROUND = 24
-CAPTION_PX = 18
+CAPTION_PX = 22
 """Height of the caption below a tile."""
 INK = (225, 225, 225)
 
@@ -38,6 +38,7 @@ def make_tiles(
     *,
     labels: bool,
     devices: bool = False,
+    width_px: int = 0,
 ) -> Iterator[Tile]:
     """Yield one tile per sample, camera and channel, and two per scan.
 
@@ -46,6 +47,7 @@ def make_tiles(
         channels: Channels of every camera.
         labels: Whether to draw labels on colour images.
         devices: Whether to add tiles of radars and event cameras.
+        width_px: Width of a tile, for lines and names of a legible size; 0 = that of the image.
     """
     for sample in samples:
         aspect = 1.0
@@ -55,7 +57,8 @@ def make_tiles(
             for channel in shown:
                 caption = name if len(shown) == 1 else f"{name} {channel.value}"
                 if labels and channel is Channel.RGB:
-                    yield Tile(caption, draw_labels(reading, sample.truth[name]))
+                    unit = reading.camera.intrinsics.width_px / width_px if width_px else 1.0
+                    yield Tile(caption, draw_labels(reading, sample.truth[name], unit))
                 else:
                     yield Tile(caption, channel_image(reading, channel))
         for name, cloud in sorted(sample.capture.clouds.items()):
@@ -125,7 +128,7 @@ def write_sheet(sheet: Image, path: Path) -> None:
 def _add_caption(image: Image, caption: str) -> Image:
     strip: Image = np.full((CAPTION_PX, image.shape[1], 3), BACKGROUND, np.uint8)
     face = cv2.FONT_HERSHEY_SIMPLEX
-    cv2.putText(strip, caption, (4, CAPTION_PX - 5), face, 0.42, INK, 1, cv2.LINE_AA)
+    cv2.putText(strip, caption, (5, CAPTION_PX - 6), face, 0.5, INK, 1, cv2.LINE_AA)
     return np.concatenate([image, strip])
 
 

@@ -1,4 +1,4 @@
-"""Drawing of labels on images: tinted masks, boxes, skeletons and names."""
+"""Drawing of labels on images: tinted or outlined masks, boxes, skeletons and names."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.core.boxes import OrientedBox
+from gen_data.generator.core.boxes import BoxPx, OrientedBox
 from gen_data.generator.core.capture import Channel, SensorReading
 from gen_data.generator.core.intrinsics import Intrinsics
 from gen_data.generator.core.sample import ImageTruth, KeypointTruth, ObjectTruth
@@ -33,24 +33,48 @@ BOX_EDGES = (
 
 PIECES = 32
 """Number of pieces of an edge that a lens bends."""
+SURROUNDINGS = frozenset({"wall", "floor", "ceiling"})
+"""Categories that are outlined, as all that is in the scene stands before them."""
+SURROUNDING_SHARE = 0.2
+"""Share of the image from which any object is outlined."""
+FONT_SIZE = 0.42
+"""Of OpenCV: capitals of 9 px."""
 NEAR_M = 0.01
 """Edges are clipped at this distance from the camera plane."""
 
 
-def draw_labels(reading: SensorReading, truth: ImageTruth) -> Image:
-    """Draw every label on the RGB image, uint8 [h, w, 3]."""
+def draw_labels(reading: SensorReading, truth: ImageTruth, unit: float = 1.0) -> Image:
+    """Draw every label on the RGB image, uint8 [h, w, 3].
+
+    What surrounds the scene, walls and floors, is outlined and named only.
+
+    Args:
+        reading: Of the camera.
+        truth: Its labels.
+        unit: Width of lines [px]; names have ten times its height. For an image that is shown at a
+            third of its size, 3.
+    """
     image: Image = np.array(reading.channels[Channel.RGB], np.uint8, order="C")
-    for item in truth.objects:
+    width = max(1, round(unit))
+    around = [item for item in truth.objects if _surrounds(image, item)]
+    things = [item for item in truth.objects if not _surrounds(image, item)]
+    for item in things:
         _tint(image, item)
-    for item in truth.objects:
+    for item in around:
+        _outline(image, item, width)
+    for item in things:
         color = id_color(item.instance.instance_id)
         if item.box3d_camera is not None:
-            draw_box3d(image, item.box3d_camera, truth.camera.intrinsics, color)
+            draw_box3d(image, item.box3d_camera, truth.camera.intrinsics, color, width)
         if item.box is not None:
             b = item.box
-            cv2.rectangle(image, (b.x_min, b.y_min), (b.x_max - 1, b.y_max - 1), color, 1)
-            _write(image, item.instance.category, (b.x_min, b.y_min), color)
+            cv2.rectangle(image, (b.x_min, b.y_min), (b.x_max - 1, b.y_max - 1), color, width)
         draw_keypoints(image, item.keypoints or (), _lighter(color))
+    places: list[BoxPx] = []
+    # Names of things first: those of their surroundings make room.
+    for item in (*things, *around):
+        if item.box is not None:
+            _write(image, item, unit, places)
     return image
 
 
@@ -97,21 +121,23 @@ _SHOWN: Mapping[Channel, Callable[[NDArray[Any]], Image]] = {
 """Conversions of channels to visible images; all other channels are ids."""
 
 
-def draw_box3d(image: Image, box: OrientedBox, intrinsics: Intrinsics, color: Rgb) -> None:
+def draw_box3d(
+    image: Image, box: OrientedBox, intrinsics: Intrinsics, color: Rgb, width: int = 1
+) -> None:
     """Draw the edges of a box given in the camera frame into ``image``, in place."""
     corners = box.corners()
     if not intrinsics.straight:
         for a, b in BOX_EDGES:
-            _draw_bent(image, corners[a], corners[b], intrinsics, color)
+            _draw_bent(image, corners[a], corners[b], intrinsics, color, width)
         return
     for a, b in BOX_EDGES:
         segment = _in_front(corners[a], corners[b])
         if segment is not None:
-            _draw_line(image, intrinsics.project(segment), color)
+            _draw_line(image, intrinsics.project(segment), color, width)
 
 
 def _draw_bent(
-    image: Image, a: NDArray[Any], b: NDArray[Any], intrinsics: Intrinsics, color: Rgb
+    image: Image, a: NDArray[Any], b: NDArray[Any], intrinsics: Intrinsics, color: Rgb, width: int
 ) -> None:
     """Draw a segment in pieces, without pieces outside of the lens's field or across a seam."""
     share = np.linspace(0.0, 1.0, PIECES + 1)[:, None]
@@ -119,12 +145,12 @@ def _draw_bent(
     for start, end in pairwise(places):
         shown = np.isfinite([start, end]).all() and np.abs(end - start).max() < image.shape[1] / 2
         if shown:
-            _draw_line(image, np.array([start, end]), color)
+            _draw_line(image, np.array([start, end]), color, width)
 
 
-def _draw_line(image: Image, ends_px: NDArray[Any], color: Rgb) -> None:
+def _draw_line(image: Image, ends_px: NDArray[Any], color: Rgb, width: int) -> None:
     (ua, va), (ub, vb) = np.clip(ends_px, -1e4, 1e4)
-    cv2.line(image, (round(ua), round(va)), (round(ub), round(vb)), color, 1, cv2.LINE_AA)
+    cv2.line(image, (round(ua), round(va)), (round(ub), round(vb)), color, width, cv2.LINE_AA)
 
 
 def draw_keypoints(image: Image, points: Sequence[KeypointTruth], color: Rgb) -> None:
@@ -166,6 +192,12 @@ def _in_front(a: NDArray[Any], b: NDArray[Any]) -> NDArray[Any] | None:
     return np.stack([a, b])
 
 
+def _surrounds(image: Image, item: ObjectTruth) -> bool:
+    """Whether a tint would colour the scene rather than a thing in it."""
+    fills = item.visible_px > SURROUNDING_SHARE * image.shape[0] * image.shape[1]
+    return fills or item.instance.category in SURROUNDINGS
+
+
 def _tint(image: Image, item: ObjectTruth) -> None:
     if item.mask is None:
         return
@@ -176,7 +208,37 @@ def _tint(image: Image, item: ObjectTruth) -> None:
     window[item.mask.pixels] = tinted.astype(np.uint8)
 
 
-def _write(image: Image, text: str, corner: tuple[int, int], color: Rgb) -> None:
-    x, y = corner[0], max(corner[1] - 3, 10)
-    cv2.putText(image, text, (x, y), cv2.FONT_HERSHEY_SIMPLEX, 0.4, (0, 0, 0), 3, cv2.LINE_AA)
-    cv2.putText(image, text, (x, y), cv2.FONT_HERSHEY_SIMPLEX, 0.4, color, 1, cv2.LINE_AA)
+def _outline(image: Image, item: ObjectTruth, width: int) -> None:
+    """Draw the edge of a mask inside it, in place."""
+    if item.mask is None:
+        return
+    # Zeros around it: what is outside the mask's box is outside the mask.
+    mask = np.pad(item.mask.pixels.astype(np.uint8), width)
+    inner = cv2.erode(mask, np.ones((2 * width + 1, 2 * width + 1), np.uint8))
+    edge = (mask > inner)[width:-width, width:-width]
+    window = image[item.mask.y_px :, item.mask.x_px :][: edge.shape[0], : edge.shape[1]]
+    window[edge] = id_color(item.instance.instance_id)
+
+
+def _write(image: Image, item: ObjectTruth, unit: float, places: list[BoxPx]) -> None:
+    """Write the category of an object above its box, below the names at the same place."""
+    assert item.box is not None
+    text, size, pen = item.instance.category, FONT_SIZE * unit, max(1, round(unit))
+    (width, height), base = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, size, pen)
+    pad = max(1, round(2 * unit))
+    width, height = width + 2 * pad, height + base // 2 + 2 * pad
+    x = min(max(item.box.x_min, 0), max(image.shape[1] - width, 0))
+    y = max(item.box.y_min - height, 0)
+    place = BoxPx(x, y, x + width, y + height)
+    while (hidden := _overlapping(place, places)) and hidden.y_max + height <= image.shape[0]:
+        place = BoxPx(x, hidden.y_max, x + width, hidden.y_max + height)
+    places.append(place)
+    plate = image[place.window()]
+    plate[:] = plate // 4
+    at = (x + pad, place.y_max - pad - base // 2)
+    color = _lighter(id_color(item.instance.instance_id))
+    cv2.putText(image, text, at, cv2.FONT_HERSHEY_SIMPLEX, size, color, pen, cv2.LINE_AA)
+
+
+def _overlapping(place: BoxPx, places: Sequence[BoxPx]) -> BoxPx | None:
+    return next((other for other in places if not place.intersection(other).is_empty), None)

@@ -34,12 +34,18 @@ from gen_data.generator.preview.sensor_views import PointColors, point_colors
 TIMELINE = "sample"
 TIME = "time"
 APPLICATION = "gen-data"
-IN_IMAGE = {Channel.RGB, Channel.Z_DEPTH, Channel.MEASURED_DEPTH, Channel.CATEGORY}
+IN_IMAGE = {Channel.RGB, Channel.Z_DEPTH, Channel.MEASURED_DEPTH}
 """Channels that are overlaid in one view; each other channel has its own view."""
 AXES_M = 0.5
 """Length of the axes of rigs and devices."""
 
 
+IMAGE_PLANE_M = 0.15
+"""Distance of a camera's image from the camera in the 3D view."""
+EYE_M = 0.25
+"""Distance before the first camera at which the 3D view opens: its image does not fill the view."""
+TARGET_M = 2.0
+"""Distance from there of the point that the view turns around."""
 WAY_M = 0.1
 """Shortest trajectory to show."""
 LIFT_M = 0.05
@@ -63,12 +69,12 @@ class Recorder:
     _sent: dict[str, tuple[Any, ...]] = field(default_factory=dict)
     _skeletons: dict[int, Skeleton] = field(default_factory=dict)
     _sequence: int = -1
+    _is_open: bool = False
 
     def start(self) -> None:
-        """Log values common to all samples: axes, category names, layout of the views."""
+        """Log values common to all samples: axes and category names."""
         self._name_classes()
         self.stream.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-        self.stream.send_blueprint(_layout(self.info))
 
     def _name_classes(self) -> None:
         """Log names, colours and known skeletons of categories."""
@@ -103,6 +109,9 @@ class Recorder:
 
     def record(self, sample: Sample) -> None:
         """Log one sample at its time."""
+        if not self._is_open:
+            self._is_open = True
+            self.stream.send_blueprint(_layout(self.info, sample))
         self._learn_skeletons(sample.scene.instances)
         self._set_time(sample, sample.scene.time_s)
         self._record_bodies(sample.scene)
@@ -182,8 +191,7 @@ class Recorder:
                 shown = np.where(np.isfinite(data), data, 0).astype(np.float32)
                 self.stream.log(f"{path}/image/{channel.value}", rr.DepthImage(shown, meter=1.0))
             elif channel is Channel.CATEGORY:
-                categories = rr.SegmentationImage(data, opacity=0.4)
-                self.stream.log(f"{path}/image/category", categories)
+                self.stream.log(f"channels/{name}/category", rr.SegmentationImage(data))
             else:
                 colored = rr.Image(channel_image(reading, channel)).compress(90)
                 self.stream.log(f"channels/{name}/{channel.value}", colored)
@@ -262,10 +270,20 @@ def _record_all(recorder: Recorder, samples: Iterable[Sample]) -> None:
         recorder.record(sample)
 
 
-def _layout(info: DatasetInfo) -> rrb.Blueprint:
-    world = rrb.Spatial3DView(origin="world", name="scene")
+def _layout(info: DatasetInfo, first: Sample) -> rrb.Blueprint:
+    world = rrb.Spatial3DView(origin="world", name="scene", eye_controls=_eye(first))
     cameras = rrb.Vertical(*(_camera_view(info, name) for name in info.cameras))
     return rrb.Blueprint(rrb.Horizontal(world, cameras), collapse_panels=True)
+
+
+def _eye(sample: Sample) -> rrb.EyeControls3D | None:
+    """An eye that sees what the first camera sees: from outside, a closed room shows its walls."""
+    if not sample.capture.readings:
+        return None
+    _, reading = min(sample.capture.readings.items())
+    ahead = np.array([[0.0, 0.0, EYE_M], [0.0, 0.0, EYE_M + TARGET_M]])
+    position, target = reading.camera.T_world_camera.apply(ahead)
+    return rrb.EyeControls3D(position=position, look_target=target, eye_up=(0.0, 0.0, 1.0))
 
 
 def _camera_view(info: DatasetInfo, name: str) -> rrb.Spatial2DView | rrb.Tabs:
@@ -295,7 +313,7 @@ def pinhole(camera: Intrinsics) -> rr.Pinhole:
         width=camera.width_px,
         height=camera.height_px,
         camera_xyz=rr.ViewCoordinates.RDF,
-        image_plane_distance=0.15,
+        image_plane_distance=IMAGE_PLANE_M,
     )
 
 

@@ -19,7 +19,7 @@ from pydantic import BaseModel
 
 from gen_data.generator.assemble.config import Config, load_config
 from gen_data.generator.assemble.pipeline_factory import scene_source
-from gen_data.generator.assets.library import Library, open_library
+from gen_data.generator.assets.library import Library
 from gen_data.generator.config.distributions import Constant, Distribution, Numeric
 from gen_data.generator.config.shared_values import Shared, read_shared
 from gen_data.generator.config.yaml_scalars import to_flow_yaml
@@ -29,6 +29,7 @@ from gen_data.generator.core.scene import Scene
 from gen_data.generator.core.scene_time import place_sensors
 from gen_data.generator.core.serialization import canonical_json, to_plain
 from gen_data.generator.core.streams import Rng, Streams
+from gen_data.generator.packs.provision import open_assets
 from gen_data.generator.physics import open_engine
 from gen_data.generator.pipeline.finalize_scene import finalize_scene
 from gen_data.generator.runner.plan import differences
@@ -124,7 +125,7 @@ def replay_scenes(stored: StoredSamples, scenes_max: int) -> Replay:
         ConfigError, AssetError: the configuration or an asset of the data set is not available.
     """
     config = load_config(str(stored.folder))
-    library = open_library(config.asset_folders)
+    library = open_assets(config.asset_folders)
     replay = Replay(stored, config, library)
     count = -(-stored.n // replay.per_scene)
     chosen = sorted({k * count // scenes_max for k in range(scenes_max)}) if scenes_max else []

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gen_data.exporters.kitti import occlusion_level, official_type
-from gen_data.generator.core.errors import StorageError
+from gen_data.generator.core.errors import StorageError, no_folder
 from gen_data.generator.core.scene import Instance
 from gen_data.generator.core.se3 import Vec3
 
@@ -99,6 +99,8 @@ def read_records(folder: Path) -> Iterator[Picture | Label | Points]:
         if (root / "training" / "label_2").is_dir():
             yield from _read_kitti(root)
             return
+    if not folder.exists():
+        raise StorageError(no_folder(folder))
     raise StorageError(
         f"{folder}: there are no labels in coco/annotations or kitti/training/label_2; expected "
         "the folder of a data set exported as coco or kitti"

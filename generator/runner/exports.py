@@ -67,10 +67,10 @@ class StoredPipeline:
         # Sensors with an offset see the scene of another instant, which files do not hold.
         ids = {name: number for number, name in enumerate(self.info.categories, 1)}
         # Loads all kinds of assets, which most exports do without.
-        from gen_data.generator.assets.library import open_library
+        from gen_data.generator.packs.provision import open_assets
         from gen_data.generator.pipeline.finalize_scene import Timeline
 
-        timeline = Timeline(sample.scene, open_library(self.asset_folders), ids)
+        timeline = Timeline(sample.scene, open_assets(self.asset_folders), ids)
         return replace(sample, instants={name: timeline.at(t) for name, t in apart.items()})
 
     def __call__(self) -> StoredPipeline:

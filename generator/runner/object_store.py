@@ -20,6 +20,7 @@ from os import PathLike, fspath
 from pathlib import Path
 from typing import Any
 
+from gen_data.generator.core.distribution import install_command
 from gen_data.generator.core.errors import ConfigError, GenDataError, StorageError
 from gen_data.generator.core.path_names import check_inner_path
 from gen_data.generator.core.urls import is_url
@@ -83,9 +84,13 @@ class ObjectFolder:
         except (ImportError, ValueError) as error:
             raise ConfigError(
                 f"{self.url}: cannot be opened ({error}); expected s3://, gs://, az:// or another "
-                "URL of fsspec, and its library: pip install 'gen-data[cloud]' for s3://, "
+                f"URL of fsspec, and its library: {install_command('cloud')} for s3://, "
                 "gcsfs for gs://, adlfs for az://"
             ) from None
+        except Exception as error:
+            # Some file systems connect at once.
+            fact = " ".join(str(error).split()) or type(error).__name__
+            raise StorageError(f"{self.url}: {fact} ({type(error).__name__})") from error
         return opened
 
     def __getstate__(self) -> dict[str, str]:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from gen_data.generator.core.errors import StorageError
+from gen_data.generator.core.errors import StorageError, no_folder
 from gen_data.generator.core.serialization import canonical_json, from_plain, to_plain
 from gen_data.generator.runner.durable_files import write_durably
 
@@ -88,6 +88,8 @@ def load_plan(folder: Path) -> Plan:
     try:
         data = path.read_bytes()
     except (FileNotFoundError, NotADirectoryError):
+        if not folder.exists():
+            raise StorageError(no_folder(folder)) from None
         raise StorageError(f"{path}: missing; {folder} is not a gen-data data set") from None
     except OSError as error:
         raise StorageError(f"{path}: cannot be read ({error.strerror})") from None

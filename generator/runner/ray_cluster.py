@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from gen_data.generator.core.distribution import install_command
 from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.runner.termination_signals import SIGNALS
 
@@ -56,7 +57,7 @@ class RayCluster:
             import ray
         except ImportError:
             raise ConfigError(
-                "runner ray: Ray is not installed; expected: pip install 'gen-data[ray]'"
+                f"runner ray: Ray is not installed; expected: {install_command('ray')}"
             ) from None
         if ray.is_initialized():
             yield

@@ -11,7 +11,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from gen_data.generator.core.errors import StorageError, VerificationError
+from gen_data.generator.core.errors import StorageError, VerificationError, no_folder
 from gen_data.generator.runner.durable_files import (
     IRREGULAR,
     Contents,
@@ -119,8 +119,11 @@ def scan_finished(folder: Path) -> Contents:
     """Files and empty folders of a data set, without ``run`` and certificates.
 
     Raises:
-        VerificationError: the folder has no finished data set.
+        StorageError: there is no such folder.
+        VerificationError: it has no finished data set.
     """
+    if not folder.exists():
+        raise StorageError(no_folder(folder))
     if not (folder / MANIFEST_NAME).is_file():
         raise VerificationError(
             f"{folder}: not a finished data set: {MANIFEST_NAME} is missing. "

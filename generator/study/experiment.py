@@ -22,6 +22,7 @@ from typing import Any
 from gen_data.generator.api.config import load_config
 from gen_data.generator.api.dataset import Dataset
 from gen_data.generator.api.generate import generate
+from gen_data.generator.core.distribution import install_command
 from gen_data.generator.core.errors import ConfigError, SampleError, StorageError, list_names
 from gen_data.generator.core.processes import SINGLE_THREADED, interrupts_blocked, tie
 from gen_data.generator.core.serialization import canonical_json
@@ -153,7 +154,7 @@ def require_torch(command: str) -> None:
     The extra ``all`` leaves it out: it is larger than everything else together.
     """
     if find_spec("torch") is None:
-        raise ConfigError(f"{command} needs the package torch: pip install 'gen-data[study]'")
+        raise ConfigError(f"{command} needs the package torch: {install_command('study')}")
 
 
 def prepare(experiment: Experiment) -> Prepared:

@@ -100,7 +100,10 @@ def has_no_bound(decorator: ast.expr) -> bool:
 
 
 def test_only_the_command_line_prints_and_reads_the_environment() -> None:
-    """Library code has no hidden inputs and no output of its own; packs say where they are."""
+    """Library code has no hidden inputs and no output of its own.
+
+    Packs say where they are and whether they may be fetched, and a fetch announces itself.
+    """
     offenders = [
         f"{path.relative_to(ROOT)}: {node.attr}"
         for path in python_files(*OURS)

@@ -8,7 +8,9 @@ import pytest
 
 from gen_data.generator.assemble.config import load_config
 from gen_data.generator.assemble.pipeline_factory import PipelineFactory
+from gen_data.generator.assets.library import open_library
 from gen_data.generator.core.errors import ConfigError
+from gen_data.randomizers.base import find_textures
 
 HEAD = (
     "template: tabletop\n"
@@ -97,3 +99,18 @@ def test_all_unknown_names_are_told_at_once(tmp_path: Path) -> None:
     )
 
     assert message.index("mine.yaml:4:") < message.index("mine.yaml:5:")
+
+
+def test_textures_are_named_by_id_tag_or_family() -> None:
+    """An id is one texture; a tag or a family is several."""
+    library = open_library(())
+    one, *_ = (a.asset_id for a in library.find((), kind="texture"))
+    assert find_textures(library, (one,), "textures") == (one,)
+    assert len(find_textures(library, ("wood",), "textures")) > 1
+
+
+def test_of_many_textures_the_nearest_are_listed(tmp_path: Path) -> None:
+    """Not all 123."""
+    text = refusal(tmp_path, "{type: textures, name: t, textures: [wod]}")
+    assert "did you mean 'wood'?" in text
+    assert len(text.splitlines()[0]) < 250

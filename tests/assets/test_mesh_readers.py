@@ -17,7 +17,6 @@ from gen_data.generator.assets.asset_folder import Folder
 from gen_data.generator.assets.library import open_library
 from gen_data.generator.assets.readers import read_mesh
 from gen_data.generator.assets.triangle_soup import box, sphere
-from gen_data.generator.core.errors import AssetError
 
 CUBE_OBJ = """mtllib cube.mtl
 v 0 0 0
@@ -164,25 +163,30 @@ def test_glb_comes_upright_with_its_embedded_image(tmp_path: Path) -> None:
     assert again.texture(material.texture).albedo.shape == (2, 4, 3)
 
 
-def test_images_inside_the_meshes_of_a_urdf_are_refused(tmp_path: Path) -> None:
-    """A link cannot provide them; collision meshes may have them, since they are invisible."""
+def test_images_inside_the_meshes_of_a_robot_are_those_of_its_links(tmp_path: Path) -> None:
+    """Of a robot's link and of a rigid object; two mesh files keep their images apart."""
     tree, binary = textured_triangle(tmp_path)
     folder = tmp_path / "assets"
     folder.mkdir()
     (folder / "flag.glb").write_bytes(glb(tree, binary))
-    mesh = '<geometry><mesh filename="flag.glb"/></geometry>'
-    for name, visual, collision in (
-        ("seen", mesh, mesh),
-        ("felt", '<geometry><box size="1 1 1"/></geometry>', mesh),
-    ):
-        (folder / f"{name}.urdf").write_text(
-            f'<robot name="r"><link name="a"><visual>{visual}</visual>'
-            f"<collision>{collision}</collision></link></robot>"
-        )
-    library = open_library([folder], cache_dir=tmp_path / "cache")
-    with pytest.raises(AssetError, match="has embedded images"):
-        library.mesh("user/seen")
-    assert len(library.convex_parts("user/felt").parts_m) == 1
+    (folder / "other.glb").write_bytes(glb(tree, binary))
+    visuals = "".join(
+        f'<visual><origin xyz="0 0 {z}"/><geometry><mesh filename="{name}.glb"/></geometry>'
+        "</visual>"
+        for z, name in enumerate(("flag", "other"))
+    )
+    text = f'<robot name="r"><link name="a">{visuals}</link></robot>'
+    (folder / "r.urdf").write_text(text)
+    (folder / "assets.yaml").write_text(
+        "robots: [{id: robot, file: r.urdf}]\nassets: [{id: thing, file: r.urdf, category: flag}]\n"
+    )
+    for asset_id in ("user/robot/a", "user/thing"):
+        library = open_library([folder], cache_dir=tmp_path / "cache")
+        textures = {material.texture for material in library.mesh(asset_id).materials}
+        assert {t.partition("#")[0] for t in textures} == {asset_id}
+        assert len(textures) == 2
+        for texture in textures:
+            assert library.texture(texture).albedo[0, 0].tolist() == [255, 0, 0]
 
 
 def test_gltf_with_separate_and_inline_buffers_agree(tmp_path: Path) -> None:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from gen_data.generator.assets.folder_index import RobotEntry
+from gen_data.generator.assets.robot_description import Link, RobotDescription
 from gen_data.generator.assets.robot_models import robot_model
-from gen_data.generator.assets.urdf import Link, Urdf
 from gen_data.generator.core.asset_types import Joint
 from gen_data.generator.core.se3 import SE3
 
@@ -24,7 +24,7 @@ def test_a_shell_fixed_to_a_link_may_touch_the_next_link_wherever_it_is_listed()
     )
     entry = RobotEntry(id="arm", file="arm.urdf")
 
-    allowed = robot_model("arm", Urdf(links, joints), entry, "arm.urdf").no_collide
+    allowed = robot_model("arm", RobotDescription(links, joints), entry, "arm.urdf").no_collide
 
     assert {("fore", "shell"), ("shell", "fore")} & allowed
     assert not {("hand", "shell"), ("shell", "hand")} & allowed

@@ -10,7 +10,7 @@ import pytest
 from pydantic import Field
 
 from gen_data.generator.config.base_model import Strict
-from gen_data.generator.config.describe import describe, make_example
+from gen_data.generator.config.describe import describe, describe_fields, make_example
 from gen_data.generator.config.distributions import (
     Bounds,
     Constant,
@@ -63,22 +63,21 @@ class Lighting(Strict):
 DESCRIPTION = """\
 Illuminance and azimuth of every directional light.
 
-field            type                                     default
----------------  ---------------------------------------  --------------------------
-type             lighting                                 lighting
-name             text                                     required
+type: lighting
+name: text; required
     Key of its random stream.
-illuminance_lux  number > 0 or a distribution             {log_uniform: [200, 2000]}
+illuminance_lux: number > 0 or a distribution; default {log_uniform: [200,
+        2000]}
     On a surface that faces the light [lux].
-azimuth_deg      number in [0, 360] or a distribution     {uniform: [0, 360]}
-    Where the light comes from; a long explanation that does not fit into one line of the table and
-    therefore has to be wrapped.
-tilt             rotation [w, x, y, z] or a distribution  so3
-    Where the light comes from; a long explanation that does not fit into one line of the table and
-    therefore has to be wrapped.
-falloff          none or square                           square
-size_px          list of 2 whole numbers                  [640, 480]
-tags             list of texts                            []
+azimuth_deg: number in [0, 360] or a distribution; default {uniform: [0, 360]}
+    Where the light comes from; a long explanation that does not fit into one
+    line of the table and therefore has to be wrapped.
+tilt: rotation [w, x, y, z] or a distribution; default so3
+    Where the light comes from; a long explanation that does not fit into one
+    line of the table and therefore has to be wrapped.
+falloff: none or square; default square
+size_px: list of 2 whole numbers; default [640, 480]
+tags: list of texts; default []
 
 Example:
   type: lighting
@@ -225,8 +224,38 @@ def test_a_default_may_be_any_value() -> None:
 
     rows = describe(Defaults).split("\n")
 
-    assert rows[4].split("  ")[-1] == "0.5"
-    assert rows[5].split("  ")[-1] == "[0, 0, 1]"
+    assert rows[2].endswith("; default 0.5")
+    assert rows[3].endswith("; default [0, 0, 1]")
+
+
+def test_fields_are_described_by_the_docstring_below_them() -> None:
+    """Or by the section of attributes, which goes first; inherited fields come last."""
+
+    class Format(Strict):
+        """A format."""
+
+        cameras: tuple[str, ...] = ()
+        """All of them if
+        empty."""
+
+    class Own(Format):
+        """Its own.
+
+        Attributes:
+            other: From the section.
+        """
+
+        boxes: bool = True
+        """Whether it has boxes."""
+        other: int = 0
+        """Overruled."""
+
+    rows = [(row.name, row.text) for row in describe_fields(Own)]
+    assert rows == [
+        ("boxes", "Whether it has boxes."),
+        ("other", "From the section."),
+        ("cameras", "All of them if empty."),
+    ]
 
 
 def test_models_that_a_field_tells_apart_are_told_by_it() -> None:

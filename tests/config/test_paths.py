@@ -83,7 +83,7 @@ def test_shipped_names_come_last_and_need_no_suffix(tmp_path: Path) -> None:
 
 
 def test_the_message_says_where_it_was_looked_for(tmp_path: Path) -> None:
-    """Place, path, and the shipped names."""
+    """Place, path, and the nearest shipped name."""
     document = tmp_path / "mine.yaml"
     document.touch()
 
@@ -92,7 +92,8 @@ def test_the_message_says_where_it_was_looked_for(tmp_path: Path) -> None:
 
     assert str(caught.value) == (
         f"{document}:2:5: template: there is no template 'stret'; "
-        f"looked for '{tmp_path / 'stret'}'; shipped are street.yaml (did you mean 'street.yaml'?)"
+        f"looked for '{tmp_path / 'stret'}' (did you mean 'street.yaml'?); gen-data describe lists "
+        "the shipped ones"
     )
 
 

@@ -13,6 +13,7 @@ from gen_data.exporters.usd import Usd
 from gen_data.generator.assets.image_decoding import read_exr
 from gen_data.generator.cli.main import cli
 from gen_data.generator.core import optional_packages
+from gen_data.generator.core.distribution import install_command
 from gen_data.generator.core.errors import AssetError, ConfigError
 from gen_data.generator.core.optional_packages import EXTRAS, missing_packages
 from gen_data.generator.usd.stage_reader import OpenStage
@@ -51,23 +52,23 @@ def test_what_is_installed_is_not_missing() -> None:
 def test_several_missing_packages_are_one_command(bare: None) -> None:
     """Sorted, with each extra once."""
     assert missing_packages("pxr", "h5py", "mcap") == (
-        "needs the packages h5py, mcap, usd-core: pip install 'gen-data[formats,usd]'"
+        "needs the packages h5py, mcap, usd-core: " + install_command("formats", "usd")
     )
 
 
 def test_exporters_are_refused_before_anything_is_rendered(bare: None) -> None:
     """By ``check``, which a run calls first."""
-    with pytest.raises(ConfigError, match=r"exporter 'usd' needs .*'gen-data\[usd\]'"):
+    with pytest.raises(ConfigError, match=r"exporter 'usd' needs .*\[usd\]'"):
         Usd().check(None)  # type: ignore[arg-type]
-    with pytest.raises(ConfigError, match=r"exporter 'rerun' needs .*'gen-data\[preview\]'"):
+    with pytest.raises(ConfigError, match=r"exporter 'rerun' needs .*\[preview\]'"):
         Rerun().check(None)  # type: ignore[arg-type]
 
 
 def test_files_that_cannot_be_read_name_themselves(bare: None, tmp_path: Path) -> None:
     """A stage and a panorama of a user."""
-    with pytest.raises(AssetError, match=r"mine\.usda: needs .*'gen-data\[usd\]'"):
+    with pytest.raises(AssetError, match=r"mine\.usda: needs .*\[usd\]'"):
         OpenStage(tmp_path / "mine.usda", "mine.usda")
-    with pytest.raises(AssetError, match=r"sky\.exr: needs .*'gen-data\[exr\]'"):
+    with pytest.raises(AssetError, match=r"sky\.exr: needs .*\[exr\]'"):
         read_exr(b"", "sky.exr")
 
 
@@ -76,5 +77,5 @@ def test_the_preview_names_its_extra_and_what_works_without(bare: None) -> None:
     done = CliRunner().invoke(cli, ["preview", "tabletop.yaml"])
 
     assert isinstance(done.exception, ConfigError)
-    assert "gen-data[preview]" in str(done.exception)
+    assert install_command("preview") in str(done.exception)
     assert "contact-sheet" in str(done.exception)

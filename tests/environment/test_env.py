@@ -17,6 +17,7 @@ from gymnasium.utils.env_checker import check_env
 import gen_data
 from gen_data.generator.api.config import read_model
 from gen_data.generator.config.yaml_tree import parse_yaml
+from gen_data.generator.core.distribution import install_command
 from gen_data.generator.core.errors import ConfigError, SceneRejected
 from gen_data.generator.environment.env import ENV_ID, Env, make_vec
 from gen_data.generator.environment.settings import EnvSettings
@@ -248,7 +249,7 @@ def test_without_gymnasium_the_extra_is_named() -> None:
         "except gen_data.ConfigError as error: print(error)"
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, check=True)
-    expected = "gen_data.Env needs the package gymnasium: pip install 'gen-data[env]'"
+    expected = f"gen_data.Env needs the package gymnasium: {install_command('env')}"
     assert done.stdout.decode().strip() == expected
 
 

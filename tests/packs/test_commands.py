@@ -7,7 +7,10 @@ import sys
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
+from gen_data.generator.cli.main import cli
+from gen_data.generator.core.errors import AssetError
 from tests.end_to_end import running
 
 
@@ -37,6 +40,24 @@ def test_list_finds_assets_by_tags(tmp_path: Path) -> None:
     """All tags must fit."""
     done = gen_data("assets", "list", "pybullet", "toy", home=tmp_path)
     assert "pybullet/teddy" in done.stdout and "franka" not in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("tags", "said"),
+    [
+        (("hausehold",), "no asset has the tag 'hausehold' (did you mean 'household'?)"),
+        (("conveyor",), "no asset has the tag 'conveyor'"),
+        (("toy", "robot"), "no asset has all of the tags toy, robot; each of them has some"),
+        (("user",), "no asset has the tag 'user'"),
+    ],
+)
+def test_a_list_without_an_asset_tells_why(tags: tuple[str, ...], said: str) -> None:
+    """Instead of nothing, with which a misspelt tag looks like a thing that is not there."""
+    done = CliRunner().invoke(cli, ["assets", "list", *tags])
+
+    assert isinstance(done.exception, AssetError)
+    assert said in str(done.exception)
+    assert done.stdout == ""
 
 
 @pytest.mark.parametrize(

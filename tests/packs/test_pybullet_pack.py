@@ -27,17 +27,22 @@ def folder() -> Path:
     return Path(pybullet_data.getDataPath())
 
 
-@pytest.fixture
-def installed(tmp_path: Path) -> Path:
-    """The pack, made of a wheel with a part of the files, and of some that nobody asked for."""
-    wheel = tmp_path / "pybullet.whl"
+def pack_wheel(wheel: Path, kinds: tuple[str, ...] = ("",)) -> Path:
+    """Write a wheel with a part of pybullet's files, and with some that nobody asked for."""
     with zipfile.ZipFile(wheel, "w") as file:
         for path in sorted(folder().rglob("*")):
             name = path.relative_to(folder()).as_posix()
-            if path.is_file() and name.startswith(KINDS):
+            if path.is_file() and name.startswith(kinds):
                 file.write(path, f"pybullet_data/{name}")
         file.writestr("pybullet_data/policies/ppo.pb", b"never wanted")
         file.writestr("pybullet.so", b"never wanted")
+    return wheel
+
+
+@pytest.fixture
+def installed(tmp_path: Path) -> Path:
+    """The pack, with a part of its files."""
+    wheel = pack_wheel(tmp_path / "pybullet.whl", KINDS)
     pack = replace(find_pack("pybullet"), sha256=sha256(wheel.read_bytes()).hexdigest())
     install(pack, tmp_path / "packs", wheel)
     return tmp_path / "packs"
@@ -98,8 +103,9 @@ def test_without_pybullet_and_its_pack_everything_else_is_there(
 def test_the_tabletop_without_its_arm_names_the_pack(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Before anything is generated, with the place of the name."""
+    """Where nothing may be fetched: before anything is generated, with the place of the name."""
     without_pybullet(monkeypatch)
+    monkeypatch.setenv("GEN_DATA_OFFLINE", "1")
     monkeypatch.setenv("GEN_DATA_ASSETS", str(tmp_path))
 
     with pytest.raises(UnknownAsset, match=r"tabletop\.yaml:\d+:\d+.*assets install pybullet"):

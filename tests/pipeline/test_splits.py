@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from gen_data.generator.api.generate import _make_factory
 from gen_data.generator.assemble.config import load_config
 from gen_data.generator.core.errors import ConfigWarning
 from gen_data.generator.pipeline.splits import Assignment, split_of, warn_of_empty_splits
@@ -65,15 +66,42 @@ def test_an_empty_split_is_warned_of_with_a_remedy(
 ) -> None:
     """Before anything runs."""
     with pytest.warns(ConfigWarning, match=message):
-        warn_of_empty_splits(count, SHARES, assignment, 7)
+        warn_of_empty_splits(count, SHARES, assignment, 7, stated=True)
+
+
+def test_splits_that_nobody_asked_for_may_be_empty_below_a_whole_scene() -> None:
+    """A tenth of nine scenes is none; seed 7 draws neither of the two for the first nine."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        warn_of_empty_splits(9, SHARES, "random", 7, stated=False)
+    with pytest.warns(ConfigWarning, match="9 scenes leave val and test empty"):
+        warn_of_empty_splits(9, SHARES, "random", 7, stated=True)
+    with pytest.warns(ConfigWarning, match="10 scenes leave val empty"):
+        warn_of_empty_splits(10, SHARES, "random", 7, stated=False)
+
+
+@pytest.mark.parametrize(
+    ("overrides", "warned"), [((), 0), (("splits={train: 0.6, val: 0.2, test: 0.2}",), 1)]
+)
+def test_a_short_run_of_a_shipped_configuration_warns_of_nothing(
+    overrides: tuple[str, ...], warned: int
+) -> None:
+    """The first command of the README; whoever sets shares is warned."""
+    config = load_config("tabletop", overrides=overrides)
+
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        _make_factory(config, 20)
+
+    assert len(caught) == warned
 
 
 def test_no_warning_where_every_split_has_a_scene() -> None:
     """Or where a split has no share."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        warn_of_empty_splits(10, SHARES, "round_robin", 7)
-        warn_of_empty_splits(1, {"train": 1.0}, "random", 7)
+        warn_of_empty_splits(10, SHARES, "round_robin", 7, stated=True)
+        warn_of_empty_splits(1, {"train": 1.0}, "random", 7, stated=True)
 
 
 def test_a_configuration_says_how_scenes_are_assigned() -> None:

@@ -19,7 +19,7 @@ from gen_data.generator.core.motion import Trajectory
 from gen_data.generator.core.sample import ImageTruth, KeypointTruth, ObjectTruth, Sample
 from gen_data.generator.core.scene import Body, Camera, Instance, Lidar, Rig, Scene
 from gen_data.generator.core.scene_time import scene_at
-from gen_data.generator.core.se3 import IDENTITY, SE3
+from gen_data.generator.core.se3 import IDENTITY, SE3, look_at
 from gen_data.generator.core.skeletons import PERSON
 from gen_data.generator.preview.contact_sheet import GAP_PX, arrange_tiles
 from gen_data.generator.preview.overlay import BOX_EDGES, draw_box3d, draw_keypoints
@@ -75,6 +75,7 @@ class _Stream:
     def __init__(self) -> None:
         self.logged: list[tuple[str, Any]] = []
         self.seconds: list[tuple[str, float | None]] = []
+        self.blueprints: list[Any] = []
         self._time_s: float | None = None
 
     def log(self, path: str, what: Any, *more: Any, static: bool = False) -> None:
@@ -88,8 +89,9 @@ class _Stream:
         if timeline == "time":
             self._time_s = duration
 
-    def send_blueprint(self, blueprint: object) -> None:
-        """Nor are views."""
+    def send_blueprint(self, blueprint: Any) -> None:
+        """Keep the layout of the views."""
+        self.blueprints.append(blueprint)
 
 
 def _info(**changes: Any) -> DatasetInfo:
@@ -181,8 +183,32 @@ def test_images_that_rerun_cannot_place_in_space_are_shown_by_themselves() -> No
         assert len(logged) == pinholes
 
 
+def test_the_scene_opens_where_the_first_camera_is() -> None:
+    """Inside a closed room, just before the camera's image; sent with the first sample."""
+    pose = look_at((1.0, 2.0, 1.5), (1.0, 6.0, 1.5))
+    camera = Camera("color", pose, Intrinsics(8, 4, 8.0, 8.0, 4.0, 2.0))
+    capture = Capture({"color": SensorReading("color", camera, {})})
+    stream = _Stream()
+    recorder = Recorder(stream, None, _info())  # type: ignore[arg-type]
+    recorder.start()
+    for index in (0, 1):
+        truth = {"color": ImageTruth(camera, ())}
+        recorder.record(Sample(index, 0, 0, "train", Scene("s"), capture, truth))
+
+    (blueprint,) = stream.blueprints
+    world = blueprint.root_container.contents[0]
+    eye = world.properties["EyeControls3D"]
+    (at,), (to,), (up,) = (
+        batch.as_arrow_array().to_pylist() for batch in (eye.position, eye.look_target, eye.eye_up)
+    )
+    np.testing.assert_allclose(at, (1.0, 2.25, 1.5), atol=1e-6)
+    np.testing.assert_allclose(np.subtract(to, at)[[0, 2]], 0.0, atol=1e-6)
+    assert to[1] > at[1]
+    assert up == [0.0, 0.0, 1.0]
+
+
 def test_every_channel_of_a_camera_is_in_the_recording() -> None:
-    """Colour, depth and categories lie over the image; what else there is has its own picture."""
+    """Colour and depth lie over one another; a tint of classes would cover both."""
     camera = Camera("color", IDENTITY, Intrinsics(8, 4, 8.0, 8.0, 4.0, 2.0))
     depth_m = np.full((4, 8), 2.0, np.float32)
     ids = np.ones((4, 8), np.uint16)
@@ -203,9 +229,9 @@ def test_every_channel_of_a_camera_is_in_the_recording() -> None:
     recorder.record(Sample(0, 0, 0, "train", Scene("s"), capture, truth))
 
     logged = {path for path, _ in stream.logged}
-    for name in ("rgb", "depth", "measured_depth", "category"):
+    for name in ("rgb", "depth", "measured_depth"):
         assert f"world/cameras/color/image/{name}" in logged
-    for name in ("instance", "normals", "disparity"):
+    for name in ("category", "instance", "normals", "disparity"):
         assert f"channels/color/{name}" in logged
 
 

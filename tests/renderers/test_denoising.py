@@ -48,5 +48,5 @@ def test_without_its_package_the_error_says_what_to_install(
     """Before anything is traced."""
     monkeypatch.setitem(sys.modules, "pyoidn", None)
 
-    with pytest.raises(ConfigError, match=r"render\.denoise .*gen-data\[denoise\]"):
+    with pytest.raises(ConfigError, match=r"render\.denoise .*pip install .*\[denoise\]"):
         WarpRenderer(FakeLibrary({}), "cpu", DENOISED)

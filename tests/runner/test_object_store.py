@@ -173,7 +173,7 @@ def test_foreign_places_and_unknown_schemes_are_refused(memory: str) -> None:
     fsspec.filesystem("memory").pipe_file(f"{memory}/notes.txt", b"mine")
     with pytest.raises(StorageError, match="not empty and not a gen-data data set"):
         make_at(memory)
-    with pytest.raises(ConfigError, match="pip install 'gen-data\\[cloud\\]'"):
+    with pytest.raises(ConfigError, match=r"pip install .*\[cloud\]'"):
         make_at("nosuch://bucket/set")
 
 

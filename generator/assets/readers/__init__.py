@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import PurePosixPath
 
 from gen_data.generator.assets.asset_folder import Folder
+from gen_data.generator.assets.readers.dae import read_dae
 from gen_data.generator.assets.readers.gltf import read_gltf
 from gen_data.generator.assets.readers.mesh_source import MeshSource, check_face_count
 from gen_data.generator.assets.readers.obj import read_obj
@@ -19,6 +20,7 @@ from gen_data.generator.core.errors import AssetError, did_you_mean
 __all__ = ["MESH_SUFFIXES", "MeshSource", "read_mesh"]
 
 _READERS: dict[str, Callable[[Folder, str, bool], MeshSource]] = {
+    ".dae": read_dae,
     **dict.fromkeys((".glb", ".gltf"), read_gltf),
     ".obj": read_obj,
     ".ply": read_ply,

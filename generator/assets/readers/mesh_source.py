@@ -32,11 +32,13 @@ class MeshSource:
             key of ``images``.
         images: ``{key: encoded image}`` of images inside the file itself.
         remarks: What the file holds and the soup does not, one phrase each.
+        up: Axis that the file states as up, ``x``, ``y`` or ``z``; empty = it states none.
     """
 
     soup: TriangleSoup
     images: Mapping[str, bytes] = field(default_factory=dict)
     remarks: tuple[str, ...] = ()
+    up: str = ""
 
 
 def check_face_count(count: int, place: str) -> None:

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Protocol
 
 from gen_data.generator.certificate.labelled_images import Loaded
+from gen_data.generator.core.distribution import install_command
 from gen_data.generator.runner.stored import StoredSamples
 
 
@@ -65,7 +66,7 @@ class Reader:
     def missing(self) -> str:
         """What to install; empty if all packages are."""
         absent = sorted({self.package, *self.further} - {*self.versions()})
-        return f"install {' '.join(absent)}: pip install 'gen-data[certify]'" if absent else ""
+        return f"install {' '.join(absent)}: {install_command('certify')}" if absent else ""
 
 
 _HERE = "gen_data.generator.certificate.readers"

@@ -31,8 +31,12 @@ Hertz = Annotated[float, Field(gt=0, le=10_000)]
 class Block(Strict):
     """Lasers at equal steps of elevation [deg], including first and last.
 
-    ``heights_m``: where the beams of the first and the last laser cross the axis of rotation, above
-    the origin of the scanner's frame; even steps between them.
+    Attributes:
+        first: Elevation of the first laser [deg].
+        last: Elevation of the last laser [deg].
+        count: Number of lasers.
+        heights_m: Where the beams of the first and the last laser cross the axis of rotation, above
+            the origin of the scanner's frame; even steps between them.
     """
 
     first: float = Field(ge=-90, le=90)
@@ -42,14 +46,24 @@ class Block(Strict):
 
 
 class Prisms(Strict):
-    """Two rotating wedge prisms, one behind the other; each tilts the beam."""
+    """Two rotating wedge prisms, one behind the other; each tilts the beam.
+
+    Attributes:
+        tilt_deg: Tilt of the beam by each prism.
+        rotation_hz: Rotations of each prism per second; negative = the other way.
+    """
 
     tilt_deg: tuple[float, float]
     rotation_hz: tuple[float, float]
 
 
 class Sensitivity(Strict):
-    """A device's sensitivity: the matte surface, square on, that it detects half of the time."""
+    """A device's sensitivity: the matte surface, square on, that it detects half of the time.
+
+    Attributes:
+        reflectance: Of that surface.
+        range_m: Distance of that surface.
+    """
 
     reflectance: float = Field(gt=0, le=1)
     range_m: float = Field(gt=0)

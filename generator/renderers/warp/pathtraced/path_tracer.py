@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from gen_data.generator.core.asset_types import Float32
 from gen_data.generator.core.bounded_cache import ByteCache
 from gen_data.generator.core.colorimetry import luminance
+from gen_data.generator.core.distribution import install_command
 from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.scene import Camera, Scene
 from gen_data.generator.core.se3 import Array
@@ -42,8 +43,8 @@ def require_denoiser() -> None:
         import pyoidn  # noqa: F401
     except ImportError as error:
         raise ConfigError(
-            "render.denoise needs the package 'pyoidn', which cannot be loaded"
-            f" ({error}). Install it with: pip install 'gen-data[denoise]', or switch it off."
+            f"render.denoise needs the package 'pyoidn', which cannot be loaded ({error}). "
+            f"Install it with: {install_command('denoise')}, or switch it off."
         ) from error
 
 

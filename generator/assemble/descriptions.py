@@ -1,0 +1,168 @@
+"""Descriptions of everything that a configuration can contain, by name."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any, get_args
+
+from pydantic import BaseModel
+
+from gen_data.generator.assemble.config import GeneralSettings
+from gen_data.generator.assemble.plugin_tables import TABLES, find_plugin
+from gen_data.generator.config.describe import TEXT_WIDTH, describe
+from gen_data.generator.core.errors import ConfigError, did_you_mean
+
+SECTION = "section"
+"""Kind of the mappings of a configuration that are no plug-ins."""
+
+
+def describe_name(name: str) -> str:
+    """Kind, name and description of a plug-in, section, nested mapping or word that selects one.
+
+    Args:
+        name: ``coco``, ``exporter/coco``, ``labels``, ``labels.map``, ``rgb_camera.lens``,
+            ``brown_conrady``.
+
+    Raises:
+        ConfigError: there is nothing of that name; the message has the nearest.
+    """
+    first, *path = name.split(".")
+    found = [(first, model) for model in _start(first)]
+    for field in path:
+        below = [
+            (at, one)
+            for place, model in found
+            for at, all_ in _fields(place, model)
+            for one in all_
+        ]
+        found = [(at, one) for at, one in below if at.endswith(f".{field}")]
+        if not found:
+            ends = sorted({at.rpartition(".")[2] for at, _ in below})
+            raise ConfigError(
+                f"'{name}': there is no mapping '{field}' to describe; expected one of "
+                f"{', '.join(ends) or 'none'}{did_you_mean(field, ends)}"
+            )
+    if not found:
+        found = _selected_by(first)
+    if found:
+        return "\n".join(f"{_title(at, model)}\n{describe(model)}" for at, model in found)
+    try:
+        kind, plugin = find_plugin(first)
+    except ConfigError as error:
+        known = {*_sections(), *_words(), *(n for t in TABLES.values() for n in t)}
+        short = first.rpartition("/")[2]
+        if "several" in str(error):
+            raise
+        raise ConfigError(
+            f"there is nothing '{name}' to describe{did_you_mean(short, known)}; see: "
+            "gen-data describe"
+        ) from None
+    return f"{kind} {first}\n{describe(plugin)}"
+
+
+def described_models(kind: str) -> Iterator[tuple[str, type[BaseModel]]]:
+    """Paths and models of all plug-ins of a kind, or of all sections, with nested mappings."""
+    if kind == SECTION:
+        roots: Mapping[str, Any] = {f"{SECTION}/{name}": m for name, m in _sections().items()}
+    else:
+        roots = {f"{kind}/{name}": TABLES[kind].load(name) for name in TABLES[kind]}
+    for name, model in roots.items():
+        if isinstance(model, type) and issubclass(model, BaseModel):
+            yield from _tree(name, model, ())
+
+
+def list_names_of(names: Mapping[str, Iterable[str]]) -> str:
+    """Names by kind, wrapped."""
+    return "\n".join(
+        textwrap.fill(
+            f"{kind}: {', '.join(listed)}",
+            TEXT_WIDTH,
+            subsequent_indent="  ",
+            break_on_hyphens=False,
+        )
+        for kind, listed in names.items()
+    )
+
+
+def section_names() -> tuple[str, ...]:
+    """Names of the mappings of a configuration that are no plug-ins."""
+    return tuple(_sections())
+
+
+def _start(name: str) -> list[type[BaseModel]]:
+    """The model of a section or plug-in."""
+    kind, _, short = name.rpartition("/")
+    if kind in ("", SECTION) and short in _sections():
+        return [_sections()[short]]
+    hits = [k for k, t in TABLES.items() if short in t and kind in ("", k)]
+    plugins = [TABLES[hits[0]].load(short)] if len(hits) == 1 else []
+    return [p for p in plugins if isinstance(p, type) and issubclass(p, BaseModel)]
+
+
+def _sections() -> dict[str, type[BaseModel]]:
+    found = {}
+    for name, info in GeneralSettings.model_fields.items():
+        for model in _models(info.annotation):
+            found[name] = model
+    return found
+
+
+def _models(annotation: Any) -> Iterator[type[BaseModel]]:
+    """Models in a type, in order."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield annotation
+    for part in get_args(annotation):
+        yield from _models(part)
+
+
+def _fields(name: str, model: type[BaseModel]) -> Iterator[tuple[str, list[type[BaseModel]]]]:
+    """Paths and models of the fields that are mappings."""
+    for field, info in model.model_fields.items():
+        nested = list(_models(info.annotation))
+        if nested:
+            yield f"{name}.{field}", nested
+
+
+def _tree(
+    name: str, model: type[BaseModel], above: tuple[type, ...]
+) -> Iterator[tuple[str, type[BaseModel]]]:
+    yield name, model
+    for path, nested in _fields(name, model):
+        for one in nested:
+            if one not in above:
+                yield from _tree(path, one, (*above, model))
+
+
+def _tags(model: type[BaseModel]) -> list[str]:
+    """Values of a model's fields that have one value: words that select it."""
+    constants = (get_args(info.annotation) for info in model.model_fields.values())
+    return [values[0] for values in constants if len(values) == 1 and isinstance(values[0], str)]
+
+
+def _words() -> dict[str, dict[type[BaseModel], str]]:
+    """Nested models and their paths by the words that select them."""
+    words: dict[str, dict[type[BaseModel], str]] = {}
+    for kind in (*TABLES, SECTION):
+        for path, model in described_models(kind):
+            if "." in path:
+                for word in _tags(model):
+                    words.setdefault(word, {}).setdefault(model, path)
+    return words
+
+
+def _selected_by(word: str) -> list[tuple[str, type[BaseModel]]]:
+    if any(word in table for table in TABLES.values()) or "/" in word:
+        return []
+    return [(path, model) for model, path in _words().get(word, {}).items()]
+
+
+def _title(path: str, model: type[BaseModel]) -> str:
+    """Kind and name of a section or plug-in, or the path of a nested mapping."""
+    kind, _, name = path.rpartition("/")
+    if kind or "." in name:
+        words = _tags(model) if "." in name else []
+        return f"{path}{f' ({words[0]})' if words else ''}"
+    if name in _sections():
+        return f"{SECTION} {name}"
+    return f"{find_plugin(name)[0]} {name}"

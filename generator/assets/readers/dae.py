@@ -1,0 +1,176 @@
+"""COLLADA 1.4 and 1.5 (``.dae``), by pycollada.
+
+Geometry of the scene's nodes in metres, in the axes of the file; ``MeshSource.up`` names the
+axis that it states as up. Animations, skins, lights and cameras are not read.
+"""
+
+from __future__ import annotations
+
+import io
+import warnings
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+from urllib.parse import unquote, urlsplit
+from xml.etree.ElementTree import fromstring, tostring
+
+import numpy as np
+
+from gen_data.generator.assets.asset_folder import Folder
+from gen_data.generator.assets.readers.mesh_source import MeshSource, srgb_to_linear
+from gen_data.generator.assets.triangle_soup import Float64, MaterialSlot, TriangleSoup, join_soups
+from gen_data.generator.core.asset_types import Material
+from gen_data.generator.core.errors import AssetError
+from gen_data.generator.core.safe_xml import parse_xml
+from gen_data.generator.core.se3 import Vec3
+
+_MAX_ELEMENTS = 1_000_000
+_UP = {"X_UP": "x", "Y_UP": "y", "Z_UP": "z"}
+_LINEAR_WRITER = "Blender"
+"""Blender writes linear colours; other tools write what they show, which is sRGB."""
+
+
+def read_dae(folder: Folder, relative: str, materials: bool) -> MeshSource:
+    """Read the triangles of a COLLADA file with their colours and diffuse images.
+
+    Raises:
+        AssetError: if it is malformed, or refers outside the folder.
+    """
+    data, place = folder.read(relative), str(folder.root / relative)
+    # Checked first, because pycollada's parser would expand entities.
+    parse_xml(data, place, "COLLADA", "a COLLADA file", _MAX_ELEMENTS)
+    from collada import Collada
+    from collada.common import DaeBrokenRefError, DaeError, DaeUnsupportedError
+
+    try:
+        with warnings.catch_warnings():
+            # It multiplies by numpy.matrix, and sets the shapes of arrays.
+            for category in (PendingDeprecationWarning, DeprecationWarning):
+                warnings.simplefilter("ignore", category)
+            tolerated = [DaeUnsupportedError, DaeBrokenRefError]
+            document = Collada(io.BytesIO(data), ignore=tolerated)
+            if document.errors:
+                mended = _without_broken_materials(data, {m.id for m in document.materials})
+                document = Collada(io.BytesIO(mended), ignore=tolerated)
+            soups = [
+                _make_soup(folder, relative, document, *part, materials=materials)
+                for part in enumerate(_placed_geometries(document))
+            ]
+    except (DaeError, ValueError, LookupError, TypeError, AttributeError) as error:
+        reason = str(error).strip().split("\n")[0][:200] or type(error).__name__
+        raise AssetError(f"{place}: malformed COLLADA ({reason}); export it again") from None
+    parts = [soup for group in soups for soup in group]
+    if not parts:
+        raise AssetError(f"{place}: holds no triangles; export it again with its faces")
+    return MeshSource(join_soups(parts), up=_UP.get(str(document.assetInfo.upaxis), "y"))
+
+
+def _without_broken_materials(data: bytes, known: set[str]) -> bytes:
+    """The file without uses of unknown materials: pycollada drops the geometry that uses one."""
+    root = fromstring(data)
+    for parent in list(root.iter()):
+        for child in list(parent):
+            use = str(child.tag).endswith("}instance_material")
+            if use and child.get("target", "").removeprefix("#") not in known:
+                parent.remove(child)
+    return tostring(root)
+
+
+def _placed_geometries(document: Any) -> Iterator[tuple[Any, Float64, dict[str, Any]]]:
+    """Yield geometry, its affine map [3, 4] to the scene and its materials by symbol."""
+    if document.scene is None:
+        for geometry in document.geometries:
+            yield geometry, np.eye(4)[:3], {}
+        return
+    for bound in document.scene.objects("geometry"):
+        nodes = {symbol: node.target for symbol, node in bound.materialnodebysymbol.items()}
+        yield bound.original, np.asarray(bound.matrix, np.float64)[:3], nodes
+
+
+def _make_soup(
+    folder: Folder,
+    relative: str,
+    document: Any,
+    number: int,
+    placed: tuple[Any, Float64, dict[str, Any]],
+    *,
+    materials: bool,
+) -> list[TriangleSoup]:
+    """Soups of one geometry's sets of polygons; they are one group."""
+    from collada.polylist import Polylist
+    from collada.triangleset import TriangleSet
+
+    geometry, matrix, bound = placed
+    matrix = matrix * float(document.assetInfo.unitmeter or 1.0)
+    soups = []
+    for primitive in geometry.primitives:
+        # Polygons derive from polylists; other primitives are stray lines.
+        triangles = primitive.triangleset() if isinstance(primitive, Polylist) else primitive
+        if not isinstance(triangles, TriangleSet) or not len(triangles):
+            continue
+        slot = MaterialSlot()
+        target = bound.get(triangles.material)
+        if materials and target is not None:
+            linear = any(
+                _LINEAR_WRITER in (c.authoring_tool or "") for c in document.assetInfo.contributors
+            )
+            slot = _read_material(folder, relative, target, linear=linear)
+        soup = TriangleSoup.of(_rows(triangles.vertex, triangles.vertex_index), slot)
+        uvs = normals = None
+        if triangles.texcoordset:
+            uvs = _rows(triangles.texcoordset[0], triangles.texcoord_indexset[0])[..., :2]
+        if triangles.normal is not None:
+            normals = _rows(triangles.normal, triangles.normal_index)
+        name = str(geometry.name or geometry.id or f"geometry_{number}")
+        soup = replace(soup, uvs=uvs, normals=normals, group_names=(name,))
+        soups.append(soup.transformed(matrix))
+    if len(soups) < 2:
+        return soups
+    joined = join_soups(soups)
+    one = np.zeros_like(joined.face_groups)
+    return [replace(joined, face_groups=one, group_names=soups[0].group_names)]
+
+
+def _rows(table: Any, indices: Any) -> Float64:
+    """Rows of a table by corner, [m, 3, k]."""
+    values, numbers = np.asarray(table, np.float64), np.asarray(indices)
+    if numbers.size and (numbers.min() < 0 or numbers.max() >= len(values)):
+        raise ValueError(f"an index out of range 0..{len(values) - 1}")
+    rows: Float64 = values[numbers]
+    return rows
+
+
+def _read_material(folder: Folder, relative: str, target: Any, *, linear: bool) -> MaterialSlot:
+    """Diffuse colour or image, and opacity, of a material."""
+    effect = target.effect
+    name = str(target.name or target.id or "")
+    material = Material(opacity=_read_opacity(effect))
+    image = getattr(effect.diffuse, "sampler", None)
+    if image is not None:
+        path = unquote(urlsplit(image.surface.image.path.replace("\\", "/")).path)
+        material = replace(
+            material, base_color=(1.0, 1.0, 1.0), texture=folder.refer(relative, path)
+        )
+    elif isinstance(effect.diffuse, tuple):
+        red, green, blue = (round(min(max(float(c), 0.0), 1.0), 6) for c in effect.diffuse[:3])
+        color: Vec3 = (red, green, blue)
+        material = replace(material, base_color=color if linear else srgb_to_linear(color))
+    return MaterialSlot(name, material, from_file=True)
+
+
+def _read_opacity(effect: Any) -> float:
+    """Share of the background that a material hides.
+
+    Source: COLLADA 1.5, chapter 8, "Determining transparency". Many exporters write the factor or
+    the colour inverted, which makes all of a material vanish: such a material is opaque.
+    """
+    factor = 1.0 if effect.transparency is None else float(effect.transparency)
+    color = effect.transparent
+    if not isinstance(color, tuple) or len(color) < 4:
+        opacity = factor
+    elif effect.opaque_mode == "RGB_ZERO":
+        opacity = 1.0 - (0.2126 * color[0] + 0.7152 * color[1] + 0.0722 * color[2]) * factor
+    else:
+        opacity = float(color[3]) * factor
+    opacity = round(min(max(opacity, 0.0), 1.0), 6)
+    return opacity if opacity > 0.0 else 1.0

@@ -1,0 +1,231 @@
+"""Links, joints and geometry of a robot or another thing with joints, whatever file describes it.
+
+Readers: ``urdf``, ``mjcf``, ``sdf``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+from gen_data.generator.core.asset_types import Joint
+from gen_data.generator.core.kinematics import joint_transform
+from gen_data.generator.core.se3 import SE3, Vec3
+
+MAX_LINKS = 500
+FORMAT_ROOTS = ("world", "__model__")
+"""Root links of MJCF and SDF, which no body of the file stands for."""
+
+
+@dataclass(frozen=True)
+class Look:
+    """Material that a description gives to a shape.
+
+    Attributes:
+        name: Its name; empty = unnamed.
+        color: sRGB; None = not given.
+        opacity: Share in (0, 1] of the background that it hides.
+        texture: Image, relative to the folder; empty = none.
+        roughness, metallic: In [0, 1]; None = not given.
+        whole: Whether materials of the mesh file itself have no effect.
+    """
+
+    name: str = ""
+    color: Vec3 | None = None
+    opacity: float = 1.0
+    texture: str = ""
+    roughness: float | None = None
+    metallic: float | None = None
+    whole: bool = False
+
+
+@dataclass(frozen=True)
+class Shape:
+    """One visual or collision element.
+
+    Attributes:
+        kind: ``mesh``, ``box``, ``cylinder``, ``capsule``, ``sphere`` or ``ellipsoid``.
+        file: Mesh file relative to the folder; empty for primitives.
+        size: Scale of a mesh; edges of a box; (radius, length, 0), of a capsule without its caps;
+            (radius, 0, 0); radii of an ellipsoid.
+        T_link_shape: Its pose.
+        look: Its material.
+    """
+
+    kind: str
+    file: str
+    size: Vec3
+    T_link_shape: SE3
+    look: Look = Look()
+
+
+@dataclass(frozen=True)
+class Link:
+    """A rigid link and its geometry."""
+
+    name: str
+    visuals: tuple[Shape, ...]
+    collisions: tuple[Shape, ...]
+
+
+@dataclass(frozen=True)
+class DescriptionParts:
+    """A ``RobotDescription`` without mappings, whose order JSON would lose."""
+
+    links: tuple[Link, ...]
+    joints: tuple[Joint, ...]
+    home: tuple[tuple[str, float], ...]
+    included: tuple[str, ...]
+    remarks: tuple[str, ...]
+
+    def whole(self) -> RobotDescription:
+        """The description."""
+        links, home = {link.name: link for link in self.links}, dict(self.home)
+        return RobotDescription(links, self.joints, home, self.included, self.remarks)
+
+
+@dataclass(frozen=True)
+class RobotDescription:
+    """Content of a description.
+
+    Attributes:
+        links: ``{name: link}``, root first, each after its parent.
+        joints: In the order of their child links.
+        home: Positions [rad or m] by joint that the file itself proposes.
+        included: Further files of the description, relative to the folder.
+        remarks: What the file has and nothing here uses, for the user.
+    """
+
+    links: dict[str, Link]
+    joints: tuple[Joint, ...]
+    home: dict[str, float] = field(default_factory=dict)
+    included: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()
+
+    def parts(self) -> DescriptionParts:
+        """Itself, to be stored."""
+        links, home = tuple(self.links.values()), tuple(self.home.items())
+        return DescriptionParts(links, self.joints, home, self.included, self.remarks)
+
+    def files(self) -> tuple[str, ...]:
+        """Every other file that it consists of, sorted and without duplicates."""
+        shapes = [s for link in self.links.values() for s in (*link.visuals, *link.collisions)]
+        return tuple(
+            sorted({f for s in shapes for f in (s.file, s.look.texture) if f} | {*self.included})
+        )
+
+    def poses_at_zero(self) -> dict[str, SE3]:
+        """``T_root_link`` of every link with all joints at position 0."""
+        poses = {next(iter(self.links)): SE3()}
+        for joint in self.joints:
+            poses[joint.child] = poses[joint.parent] @ joint.T_parent_joint
+        return poses
+
+
+class MisplacedJoint(ValueError):
+    """A joint that keeps links from forming a tree."""
+
+    def __init__(self, joint: Joint, reason: str) -> None:
+        super().__init__(f"joint '{joint.name[:40]}' {reason}")
+        self.joint = joint
+
+
+def sort_links(links: Mapping[str, Link], joints: Sequence[Joint]) -> RobotDescription:
+    """Sort links depth first from the root.
+
+    Raises:
+        MisplacedJoint: a joint closes a loop, or refers to a missing link.
+        ValueError: not exactly one link has no parent.
+    """
+    by_parent: dict[str, list[Joint]] = {}
+    for joint in joints:
+        if joint.parent not in links or joint.child not in links:
+            raise MisplacedJoint(joint, "refers to a missing link")
+        by_parent.setdefault(joint.parent, []).append(joint)
+    children = [joint.child for joint in joints]
+    for k, joint in enumerate(joints):
+        if joint.child in children[:k]:
+            reason = f"closes a loop: link '{joint.child[:40]}' has another parent already"
+            raise MisplacedJoint(joint, reason)
+    roots = [name for name in links if name not in set(children)]
+    if len(roots) != 1:
+        raise ValueError(f"its links form no tree: {len(roots)} of them have no parent")
+    order, ordered_joints, pending = [roots[0]], [], list(reversed(by_parent.get(roots[0], [])))
+    while pending:
+        joint = pending.pop()
+        ordered_joints.append(joint)
+        order.append(joint.child)
+        pending += reversed(by_parent.get(joint.child, []))
+    if len(order) != len(links):
+        loop = next(joint for joint in joints if joint.child not in order)
+        raise MisplacedJoint(loop, "is part of a loop")
+    return RobotDescription({name: links[name] for name in order}, tuple(ordered_joints))
+
+
+@dataclass(frozen=True)
+class PlacedJoint:
+    """A joint of a format that gives axes apart from the frames of links.
+
+    Attributes:
+        joint: Without ``T_parent_joint`` and ``axis``.
+        anchor_m: A point on its axis, in the frame of the root.
+        axis: Unit axis in the frame of the root.
+        position: Its position [rad or m] in the poses of the links.
+    """
+
+    joint: Joint
+    anchor_m: Vec3
+    axis: Vec3
+    position: float = 0.0
+
+
+def jointed(
+    links: Mapping[str, Link], poses: Mapping[str, SE3], joints: Sequence[PlacedJoint]
+) -> RobotDescription:
+    """A description from poses ``T_root_link`` and joints in the frame of the root.
+
+    A turning link's frame moves to its joint's anchor, and keeps the directions of its axes.
+
+    Raises:
+        ValueError: as ``sort_links``.
+    """
+    frames = dict(poses)
+    for placed in joints:
+        if placed.joint.kind in ("revolute", "continuous"):
+            child = placed.joint.child
+            frames[child] = SE3(placed.anchor_m, poses[child].quaternion_wxyz)
+    finished = []
+    for placed in joints:
+        parent, child = placed.joint.parent, placed.joint.child
+        if parent not in frames or child not in frames:
+            raise MisplacedJoint(placed.joint, "refers to a missing link")
+        axis = _rounded(frames[child].inverse().rotate(placed.axis))  # type: ignore[arg-type]
+        joint = replace(placed.joint, axis=axis)
+        T_parent_child = frames[parent].inverse() @ frames[child]
+        if placed.position:
+            T_parent_child = T_parent_child @ joint_transform(joint, -placed.position)
+        finished.append(replace(joint, T_parent_joint=T_parent_child.rounded(_DECIMALS)))
+    moved = {
+        name: _moved(link, frames[name].inverse() @ poses[name]) for name, link in links.items()
+    }
+    return sort_links(moved, finished)
+
+
+_DECIMALS = 9
+"""Of lengths [m] and axes that another library computed: its last bits depend on the processor."""
+
+
+def _moved(link: Link, T_frame_link: SE3) -> Link:
+    """A link whose geometry is stated in another frame."""
+    visuals, collisions = (
+        tuple(
+            replace(s, T_link_shape=(T_frame_link @ s.T_link_shape).rounded(_DECIMALS)) for s in k
+        )
+        for k in (link.visuals, link.collisions)
+    )
+    return Link(link.name, visuals, collisions)
+
+
+def _rounded(vector: Sequence[float]) -> Vec3:
+    x, y, z = (round(float(v), _DECIMALS) + 0.0 for v in vector)
+    return (x, y, z)

@@ -1,0 +1,133 @@
+"""Triangles of the shapes of a description, with its materials."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from gen_data.generator.assets.asset_folder import Folder
+from gen_data.generator.assets.readers import read_mesh
+from gen_data.generator.assets.readers.mesh_source import MeshSource, srgb_to_linear
+from gen_data.generator.assets.robot_description import Look, Shape
+from gen_data.generator.assets.texture_maps import find_maps
+from gen_data.generator.assets.triangle_soup import (
+    Float64,
+    MaterialSlot,
+    TriangleSoup,
+    box,
+    capsule,
+    cylinder,
+    face_crosses,
+    sphere,
+)
+from gen_data.generator.core.se3 import SE3
+
+
+def read_shape(
+    folder: Folder, shape: Shape, T_root_link: SE3, *, materials: bool = True
+) -> MeshSource:
+    """Read or make the triangles of a shape, in the root frame and its colour.
+
+    The name of an image inside a mesh file is preceded by that of the file.
+
+    Raises:
+        AssetError: if its mesh is unusable.
+    """
+    matrix = (T_root_link @ shape.T_link_shape).matrix()[:3]
+    if shape.kind == "mesh":
+        own = materials and not shape.look.whole
+        source = _with_named_images(read_mesh(folder, shape.file, materials=own), shape.file)
+        matrix[:, :3] = matrix[:, :3] * np.array(shape.size)
+    else:
+        source = MeshSource(TriangleSoup.of(_primitive(shape)))
+        if shape.look.texture and materials:
+            uvs = _wrapped(shape.kind, source.soup.corners)
+            source = replace(source, soup=replace(source.soup, uvs=uvs))
+    soup = source.soup
+    extent = float(np.ptp(soup.corners.reshape(-1, 3), axis=0).max()) if soup.uvs is None else 0.0
+    slots = tuple(_apply_look(slot, shape.look, extent) for slot in soup.slots)
+    return replace(source, soup=replace(soup, slots=slots).transformed(matrix))
+
+
+def _with_named_images(source: MeshSource, file: str) -> MeshSource:
+    """The source with unique names of its images: a link may have several mesh files."""
+    if not source.images:
+        return source
+    known = {name: f"{file}/{name}" for name in source.images}
+
+    def renamed(texture: str) -> str:
+        maps = find_maps(texture)
+        if maps is None:
+            return known.get(texture, texture)
+        return maps.renamed(known).name()
+
+    slots = tuple(
+        replace(slot, material=replace(slot.material, texture=renamed(slot.material.texture)))
+        for slot in source.soup.slots
+    )
+    images = {known[name]: data for name, data in source.images.items()}
+    return replace(source, soup=replace(source.soup, slots=slots), images=images)
+
+
+def _primitive(shape: Shape) -> Float64:
+    if shape.kind == "box":
+        return box(shape.size)
+    if shape.kind == "cylinder":
+        return cylinder(shape.size[0], shape.size[1])
+    if shape.kind == "capsule":
+        return capsule(shape.size[0], shape.size[1])
+    if shape.kind == "ellipsoid":
+        stretched: Float64 = sphere(1.0) * np.array(shape.size)
+        return stretched
+    return sphere(shape.size[0])
+
+
+def _apply_look(slot: MaterialSlot, look: Look, extent_m: float) -> MaterialSlot:
+    """Apply the material of a description to a slot without texture.
+
+    White is the usual placeholder in descriptions; it does not replace the mesh's own colours.
+    Where there are no texture coordinates, the image is projected from three sides, once over the
+    ``extent_m``.
+    """
+    changes: dict[str, object] = {}
+    if look.opacity < 1.0:
+        changes["opacity"] = look.opacity
+    for name in ("roughness", "metallic"):
+        if getattr(look, name) is not None:
+            changes[name] = getattr(look, name)
+    placeholder = slot.from_file and look.color is not None and min(look.color) > 0.99
+    replaced = not slot.material.texture and not placeholder
+    if look.texture and not slot.material.texture:
+        changes |= {"texture": look.texture, "base_color": (1.0, 1.0, 1.0)}
+        changes["texture_scale_m"] = round(extent_m, 6)
+    if look.color is not None and replaced:
+        changes["base_color"] = srgb_to_linear(look.color)
+    if not changes:
+        return slot
+    material = replace(slot.material, **changes)  # type: ignore[arg-type]
+    named = look.name if (look.color is not None and replaced) or look.texture else ""
+    return MaterialSlot(named or slot.name, material, True)
+
+
+def _wrapped(kind: str, corners: Float64) -> Float64:
+    """Texture coordinates [m, 3, 2] of a primitive.
+
+    The whole image is upright on each face of a box, and goes once around anything else.
+    """
+    low, high = corners.reshape(-1, 3).min(axis=0), corners.reshape(-1, 3).max(axis=0)
+    shares = (corners - low) / (high - low)
+    if kind != "box":
+        around = np.arctan2(corners[..., 1], corners[..., 0]) / (2.0 * math.pi)
+        # Triangles across the seam continue beyond 1; at the poles any direction will do.
+        first = around[:, :1]
+        around = around + np.rint(first - around)
+        return np.round(np.stack([around, shares[..., 2]], axis=-1), 6)
+    normals = face_crosses(corners)
+    axis = np.abs(normals).argmax(axis=1)
+    sign = np.sign(np.take_along_axis(normals, axis[:, None], axis=1))
+    x, y, z = (shares[..., k] - 0.5 for k in range(3))
+    right = np.where(axis[:, None] == 0, sign * y, sign * np.where(axis[:, None] == 1, -x, x))
+    up = np.where(axis[:, None] == 2, y, z)
+    return np.stack([right + 0.5, up + 0.5], axis=-1)

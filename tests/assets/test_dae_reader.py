@@ -1,0 +1,158 @@
+"""COLLADA files: units, up axis, nodes, polygons, colours and images as the file states them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gen_data.generator.assets.asset_folder import Folder
+from gen_data.generator.assets.library import open_library
+from gen_data.generator.assets.readers import read_mesh
+from gen_data.generator.core.errors import AssetError
+
+HEAD = """<?xml version="1.0" encoding="utf-8"?>
+<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
+<asset><contributor><authoring_tool>{tool}</authoring_tool></contributor>
+<unit name="centimeter" meter="0.01"/><up_axis>{up}</up_axis></asset>
+<library_images><image id="wood"><init_from>my%20wood.png</init_from></image></library_images>
+<library_effects>
+<effect id="paint-fx"><profile_COMMON><technique sid="common"><phong>
+<diffuse><color>0.5 0.25 1 1</color></diffuse>{transparency}
+</phong></technique></profile_COMMON></effect>
+<effect id="wood-fx"><profile_COMMON>
+<newparam sid="s"><surface type="2D"><init_from>wood</init_from></surface></newparam>
+<newparam sid="t"><sampler2D><source>s</source></sampler2D></newparam>
+<technique sid="common"><lambert>
+<diffuse><texture texture="t" texcoord="UV0"/></diffuse>
+</lambert></technique></profile_COMMON></effect>
+</library_effects>
+<library_materials>
+<material id="paint" name="paint"><instance_effect url="#paint-fx"/></material>
+<material id="wood" name="wood"><instance_effect url="#wood-fx"/></material>
+</library_materials>
+<library_geometries><geometry id="plate" name="plate"><mesh>
+<source id="p"><float_array id="pa" count="12">0 0 0 100 0 0 100 50 0 0 50 0</float_array>
+<technique_common><accessor source="#pa" count="4" stride="3"><param name="X" type="float"/>
+<param name="Y" type="float"/><param name="Z" type="float"/></accessor></technique_common></source>
+<source id="u"><float_array id="ua" count="8">0 0 1 0 1 1 0 1</float_array>
+<technique_common><accessor source="#ua" count="4" stride="2"><param name="S" type="float"/>
+<param name="T" type="float"/></accessor></technique_common></source>
+<vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
+<polylist count="1" material="look"><input semantic="VERTEX" source="#v" offset="0"/>
+<input semantic="TEXCOORD" source="#u" offset="1" set="0"/>
+<vcount>4</vcount><p>0 0 1 1 2 2 3 3</p></polylist>
+</mesh></geometry></library_geometries>
+<library_visual_scenes><visual_scene id="scene"><node id="top"><translate>0 0 200</translate>
+<node id="a"><scale>{scale}</scale><instance_geometry url="#plate"><bind_material>
+<technique_common><instance_material symbol="look" target="#{material}"/></technique_common>
+</bind_material></instance_geometry></node>{second}</node></visual_scene></library_visual_scenes>
+<scene><instance_visual_scene url="#scene"/></scene></COLLADA>
+"""
+SECOND = """<node id="b"><translate>0 0 100</translate><instance_geometry url="#plate"/></node>"""
+
+
+def folder_of(tmp_path: Path, **changes: str) -> Folder:
+    """A folder with ``a.dae``."""
+    values = {"tool": "Some CAD", "up": "Z_UP", "scale": "1 1 1", "material": "paint",
+              "second": "", "transparency": ""} | changes  # fmt: skip
+    (tmp_path / "a.dae").write_text(HEAD.format(**values))
+    return Folder(tmp_path)
+
+
+def test_nodes_place_geometry_and_the_unit_makes_metres(tmp_path: Path) -> None:
+    """A plate of 100 x 50 cm, 200 cm up, and a second one 100 cm above it."""
+    soup = read_mesh(folder_of(tmp_path, second=SECOND), "a.dae").soup
+    assert len(soup) == 4
+    points = soup.corners.reshape(-1, 3)
+    assert points.min(axis=0) == pytest.approx([0.0, 0.0, 2.0])
+    assert points.max(axis=0) == pytest.approx([1.0, 0.5, 3.0])
+    assert soup.face_groups.tolist() == [0, 0, 1, 1]
+
+
+def test_a_mirrored_node_keeps_its_front_outside(tmp_path: Path) -> None:
+    """Scaled by -1 along X, the quad still faces +Z."""
+    soup = read_mesh(folder_of(tmp_path, scale="-1 1 1"), "a.dae").soup
+    a, b, c = soup.corners[0]
+    assert np.cross(b - a, c - a)[2] > 0.0
+    assert soup.corners[..., 0].min() == pytest.approx(-1.0)
+
+
+@pytest.mark.parametrize(("tool", "red"), [("Some CAD", 0.214041), ("Blender 3.6", 0.5)])
+def test_colours_are_srgb_but_for_blenders(tmp_path: Path, tool: str, red: float) -> None:
+    """SRGB 0.5 is 0.214041 linear (IEC 61966-2-1); Blender writes linear values."""
+    slot = read_mesh(folder_of(tmp_path, tool=tool), "a.dae").soup.slots[0]
+    assert slot.name == "paint"
+    assert slot.material.base_color[0] == pytest.approx(red, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("text", "opacity"),
+    [
+        ("<transparency><float>0.3</float></transparency>", 0.3),
+        ("<transparent opaque='A_ONE'><color>1 1 1 0.4</color></transparent>", 0.4),
+        (
+            "<transparent opaque='RGB_ZERO'><color>0.5 0.5 0.5 1</color></transparent>"
+            "<transparency><float>0.5</float></transparency>",
+            0.75,
+        ),
+        ("<transparency><float>0</float></transparency>", 1.0),
+    ],
+)
+def test_transparency_is_that_of_the_specification(
+    tmp_path: Path, text: str, opacity: float
+) -> None:
+    """A_ONE: alpha times factor; RGB_ZERO: 1 - luminance times factor; never invisible."""
+    slot = read_mesh(folder_of(tmp_path, transparency=text), "a.dae").soup.slots[0]
+    assert slot.material.opacity == pytest.approx(opacity)
+
+
+def test_diffuse_images_have_paths_beside_the_file_and_coordinates(tmp_path: Path) -> None:
+    """``my%20wood.png`` is a URI; (0, 0) is the image's bottom left in COLLADA, too."""
+    soup = read_mesh(folder_of(tmp_path, material="wood"), "a.dae").soup
+    assert soup.slots[0].material.texture == "my wood.png"
+    assert soup.uvs is not None
+    assert soup.uvs[0].tolist() == [[0, 0], [1, 0], [1, 1]]
+
+
+def test_alone_a_file_stands_as_its_up_axis_states(tmp_path: Path) -> None:
+    """The plate lies in XY for Z up, and stands for Y up."""
+    heights = {}
+    for up in ("Z_UP", "Y_UP"):
+        (tmp_path / up).mkdir()
+        library = open_library(
+            [folder_of(tmp_path / up, up=up, second=SECOND).root], tmp_path / "cache", tmp_path
+        )
+        heights[up] = float(np.ptp(library.mesh("user/a").vertices_m[:, 2]))
+    assert heights == {"Z_UP": pytest.approx(1.0), "Y_UP": pytest.approx(0.5)}
+
+
+def test_geometry_with_a_broken_material_is_kept(tmp_path: Path) -> None:
+    """A sampler without its surface, as in ANYmal's foot: the triangles are there, in grey."""
+    folder = folder_of(tmp_path, material="wood")
+    text = (tmp_path / "a.dae").read_text().replace("<source>s</source>", "<source>x</source>")
+    (tmp_path / "a.dae").write_text(text)
+    soup = read_mesh(folder, "a.dae").soup
+    assert len(soup) == 2
+    assert soup.slots[0].material.base_color == (0.6, 0.6, 0.6)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "reason"),
+    [
+        ('utf-8"?>', "utf-8\"?><!DOCTYPE a [<!ENTITY b 'c'>]>", "declares a document type"),
+        ("3 3</p>", "9 3</p>", "malformed COLLADA"),
+        ("<p>0 0", "<p>x 0", "malformed COLLADA"),
+        ("COLLADA", "Collada", "its root element is <Collada>"),
+    ],
+)
+def test_malformed_files_are_refused_by_name(
+    tmp_path: Path, old: str, new: str, reason: str
+) -> None:
+    """One error with the file's name and what is wrong."""
+    folder = folder_of(tmp_path)
+    text = (tmp_path / "a.dae").read_text().replace(old, new)
+    (tmp_path / "a.dae").write_text(text)
+    with pytest.raises(AssetError, match=rf"a\.dae: .*{reason}"):
+        read_mesh(folder, "a.dae")

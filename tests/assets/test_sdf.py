@@ -1,0 +1,240 @@
+"""SDF models: frames, joints, models inside models, materials and files of Gazebo."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from gen_data.generator.assets.asset_folder import Folder
+from gen_data.generator.assets.library import open_library
+from gen_data.generator.assets.robot_description import RobotDescription
+from gen_data.generator.assets.sdf import read_sdf
+from gen_data.generator.core.errors import AssetError
+from gen_data.generator.core.kinematics import joint_transform
+from gen_data.generator.core.se3 import SE3
+
+TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
+BOX = "<geometry><box><size>0.2 0.4 0.6</size></box></geometry>"
+
+
+def link(name: str, pose: str = "", extra: str = "") -> str:
+    """A link that shows and collides with a box."""
+    return (
+        f'<link name="{name}">{pose}<visual name="v">{BOX}{extra}</visual>'
+        f'<collision name="c">{BOX}</collision></link>'
+    )
+
+
+def read(tmp_path: Path, *parts: str) -> RobotDescription:
+    """Read a model of these elements, one a line."""
+    text = "\n".join(['<sdf version="1.9"><model name="m">', *parts, "</model></sdf>"])
+    (tmp_path / "a.sdf").write_text(text)
+    return read_sdf(Folder(tmp_path), "a.sdf")
+
+
+def poses_at(described: RobotDescription, **positions: float) -> dict[str, SE3]:
+    """``T_root_link`` at joint positions."""
+    poses = {next(iter(described.links)): SE3()}
+    for joint in described.joints:
+        pose = poses[joint.parent] @ joint.T_parent_joint
+        poses[joint.child] = (
+            pose @ joint_transform(joint, positions.get(joint.name, 0.0)) if joint.movable else pose
+        )
+    return poses
+
+
+def middle(described: RobotDescription, link_name: str, **positions: float) -> list[float]:
+    """Middle of the first visual of a link in the root's frame."""
+    (shape,) = described.links[link_name].visuals
+    pose = poses_at(described, **positions)[link_name] @ shape.T_link_shape
+    return [round(v, 6) + 0.0 for v in pose.translation_m]
+
+
+HINGED = (
+    link("frame", "<pose>0 0 0.5 0 0 0</pose>"),
+    link("door", '<pose relative_to="frame">1 0 0 0 0 1.5707963267948966</pose>'),
+    '<joint name="hinge" type="revolute"><parent>frame</parent><child>door</child>'
+    "<pose>0 -0.5 0 0 0 0</pose><axis><xyz>0 0 1</xyz>"
+    "<limit><lower>0</lower><upper>1.5</upper></limit></axis></joint>",
+)
+
+
+def test_a_door_turns_about_its_hinge(tmp_path: Path) -> None:
+    """The door's frame is turned by 90 degrees, so that -0.5 along its Y is +0.5 along X.
+
+    The hinge is at x = 1.5; half a metre before it the door's middle is at 1.0, and after a
+    quarter turn at (1.5, -0.5).
+    """
+    described = read(tmp_path, *HINGED)
+    assert middle(described, "door") == [1.0, 0.0, 0.5]
+    assert middle(described, "door", hinge=math.pi / 2) == [1.5, -0.5, 0.5]
+    (hinge,) = (j for j in described.joints if j.movable)
+    assert (hinge.kind, hinge.lower, hinge.upper) == ("revolute", 0.0, 1.5)
+
+
+@pytest.mark.parametrize(
+    ("axis", "expected"),
+    [
+        ("<xyz>0 1 0</xyz>", [0.9, 0.0, 0.5]),
+        ('<xyz expressed_in="__model__">0 1 0</xyz>', [1.0, 0.1, 0.5]),
+        ('<xyz expressed_in="frame">1 0 0</xyz>', [1.1, 0.0, 0.5]),
+        ("<xyz>0 1 0</xyz><use_parent_model_frame>true</use_parent_model_frame>", [1.0, 0.1, 0.5]),
+    ],
+)
+def test_axes_are_in_the_frame_that_they_name(
+    tmp_path: Path, axis: str, expected: list[float]
+) -> None:
+    """By default in the joint's own, which here has Y along the model's -X."""
+    slide = HINGED[2].replace("revolute", "prismatic").replace("<xyz>0 0 1</xyz>", axis)
+    described = read(tmp_path, *HINGED[:2], slide)
+    assert middle(described, "door", hinge=0.1) == pytest.approx(expected)
+
+
+def test_poses_follow_frames_degrees_and_quaternions(tmp_path: Path) -> None:
+    """A frame 1 m along X and turned by 90 degrees about Z; 1 m along its X is (1, 1, 0)."""
+    described = read(
+        tmp_path,
+        link("base"),
+        '<frame name="f" attached_to="base"><pose degrees="true">1 0 0 0 0 90</pose></frame>',
+        link("a", '<pose relative_to="f">1 0 0 0 0 0</pose>'),
+        link("b", f'<pose relative_to="f" rotation_format="quat_xyzw">0 2 0 0 0 {0.5**0.5} '
+             f"{0.5**0.5}</pose>"),
+    )  # fmt: skip
+    assert middle(described, "a") == [1.0, 1.0, 0.0]
+    assert middle(described, "b") == [-1.0, 0.0, 0.0]
+    x = poses_at(described)["b"].rotate(np.array([1.0, 0.0, 0.0]))
+    assert x == pytest.approx([-1.0, 0.0, 0.0], abs=1e-9)
+
+
+def test_models_inside_models_have_prefixed_names_and_their_own_frames(tmp_path: Path) -> None:
+    """Included from a model folder with ``model.config``, 2 m up, and joined to the outer one."""
+    (tmp_path / "hand").mkdir()
+    (tmp_path / "hand/model.config").write_text(
+        '<model><name>hand</name><sdf version="1.5">old.sdf</sdf><sdf version="1.9">new.sdf</sdf>'
+        "</model>"
+    )
+    (tmp_path / "hand/new.sdf").write_text(
+        '<sdf version="1.9"><model name="hand"><pose>9 9 9 0 0 0</pose>'
+        f"{link('palm', '<pose>0 0 1 0 0 0</pose>')}</model></sdf>"
+    )
+    described = read(
+        tmp_path,
+        link("arm"),
+        "<include><uri>model://hand</uri><name>left</name><pose>0 0 2 0 0 0</pose></include>",
+        '<joint name="wrist" type="fixed"><parent>arm</parent><child>left::palm</child></joint>',
+    )
+    assert list(described.links) == ["__model__", "arm", "left::palm"]
+    assert middle(described, "left::palm") == [0.0, 0.0, 3.0]
+    assert described.included == ("hand/model.config", "hand/new.sdf")
+
+
+def test_meshes_materials_and_textures_of_gazebo(tmp_path: Path) -> None:
+    """Diffuse colours replace those of a mesh; sRGB 0.5 is 0.214041 linear (IEC 61966-2-1)."""
+    (tmp_path / "meshes").mkdir()
+    (tmp_path / "meshes/a.obj").write_text(TETRAHEDRON)
+    Image.new("RGB", (4, 4), (0, 255, 0)).save(tmp_path / "meshes/a.png")
+    materials = {
+        "half": "<material><diffuse>0.5 0 0 1</diffuse></material>"
+                "<transparency>0.25</transparency>",
+        "named": "<material><script><name>Gazebo/Red</name></script></material>",
+        "image": "<material><pbr><metal><albedo_map>meshes/a.png</albedo_map><roughness>0.3"
+                 "</roughness><metalness>1</metalness></metal></pbr></material>",
+    }  # fmt: skip
+    mesh = ("<geometry><mesh><uri>model://thing/meshes/a.obj</uri><scale>0.1 0.1 0.1</scale></mesh>"
+            "</geometry>")  # fmt: skip
+    for name, extra in materials.items():
+        text = link("a", extra=extra).replace(BOX, mesh)
+        (tmp_path / f"{name}.sdf").write_text(
+            f'<sdf version="1.9"><model name="m">{text}</model></sdf>'
+        )
+    library = open_library([tmp_path], tmp_path / "cache", tmp_path)
+    found = {name: library.materials(f"user/{name}")[0] for name in materials}
+    assert (found["half"].base_color, found["half"].opacity) == ((0.214041, 0.0, 0.0), 0.75)
+    assert found["named"].base_color == (0.85, 0.0, 0.0)
+    assert (found["image"].roughness, found["image"].metallic) == (0.3, 1.0)
+    assert library.texture(found["image"].texture).albedo[0, 0].tolist() == [0, 255, 0]
+    assert library.bounds_m("user/half")[1] == pytest.approx((0.05, 0.05, 0.05))
+
+
+def test_a_mimic_follows_its_leader_from_a_reference(tmp_path: Path) -> None:
+    """2 (x - 0.1) + 0.3 = 2 x + 0.1 (SDF 1.11)."""
+    second = (
+        HINGED[2]
+        .replace("hinge", "other")
+        .replace("<child>door", "<child>leaf")
+        .replace(
+            "</limit>",
+            "</limit><mimic joint='hinge'><multiplier>2</multiplier><offset>0.3</offset>"
+            "<reference>0.1</reference></mimic>",
+        )
+    )
+    described = read(tmp_path, *HINGED, link("leaf"), second)
+    (other,) = (j for j in described.joints if j.name == "other")
+    assert (other.mimic, other.mimic_multiplier, other.mimic_offset) == ("hinge", 2.0, 0.1)
+
+
+def test_a_static_model_does_not_move(tmp_path: Path) -> None:
+    """Its joints have no positions."""
+    described = read(tmp_path, "<static>true</static>", *HINGED)
+    assert not any(joint.movable for joint in described.joints)
+    assert middle(described, "door") == [1.0, 0.0, 0.5]
+
+
+def test_what_is_not_used_is_named(tmp_path: Path) -> None:
+    """Sensors, plugins, joints of several positions, and geometry without a surface."""
+    described = read(
+        tmp_path,
+        *HINGED[:2],
+        HINGED[2].replace("revolute", "ball"),
+        '<plugin name="p" filename="x.so"/>',
+        '<link name="eye"><sensor name="s" type="camera"/><visual name="v"><geometry><plane>'
+        "<normal>0 0 1</normal></plane></geometry></visual></link>",
+    )
+    assert described.remarks == (
+        "not used: 1 ball joint (it stays at its origin)",
+        "not used: 1 plane geometry",
+        "not used: 1 plugin",
+        "not used: 1 sensor",
+    )
+
+
+@pytest.mark.parametrize(
+    ("part", "reason"),
+    [
+        ('<joint name="j" type="magic"><parent>frame</parent><child>door</child></joint>',
+         r":2:1: .*joint 'j': its type is 'magic'"),
+        ('<joint name="j" type="fixed"><parent>frame</parent><child>dor</child></joint>',
+         "there is no link or frame 'dor'"),
+        (link("x", '<pose relative_to="y">0 0 0 0 0 0</pose>'), "there is no frame 'y'"),
+        (link("x", '<pose relative_to="x">0 0 0 0 0 0</pose>'), "relative to itself"),
+        (link("x", "<pose>0 0 0</pose>"), r":2:\d+: .*link 'x': '0 0 0' is not 6 numbers"),
+        (link("x").replace("0.2 0.4 0.6", "0.2 -0.4 0.6"), r":2:\d+: .*<box> has a negative"),
+        (link("frame"), "link 'frame': its name is missing or used twice"),
+        ("<include><uri>model://../../etc</uri></include>", "outside"),
+        ("<include><uri>a.sdf</uri></include>", "includes itself"),
+    ],
+)  # fmt: skip
+def test_faults_have_one_clear_error(tmp_path: Path, part: str, reason: str) -> None:
+    """With the file, the line of the element, and its name."""
+    with pytest.raises(AssetError, match=rf"a\.sdf.*{reason}"):
+        read(tmp_path, part, *HINGED[:2])
+
+
+def test_entities_are_never_expanded(tmp_path: Path) -> None:
+    """A document type is refused."""
+    (tmp_path / "a.sdf").write_text("<!DOCTYPE a [<!ENTITY b 'c'>]><sdf><model name='&b;'/></sdf>")
+    with pytest.raises(AssetError, match=r"a\.sdf: .*declares a document type"):
+        read_sdf(Folder(tmp_path), "a.sdf")
+
+
+def test_a_file_with_two_models_is_refused(tmp_path: Path) -> None:
+    """Nobody knows which one is meant."""
+    (tmp_path / "a.sdf").write_text(
+        '<sdf version="1.9"><world name="w"><model name="a"/><model name="b"/></world></sdf>'
+    )
+    with pytest.raises(AssetError, match=r"a\.sdf: holds 2 models"):
+        read_sdf(Folder(tmp_path), "a.sdf")

@@ -1,0 +1,57 @@
+"""Tables on terminals: 80 columns, whole words."""
+
+from __future__ import annotations
+
+import io
+from typing import Any
+
+import pytest
+from rich.console import Console
+
+from gen_data.generator.cli.tables import print_tables
+
+
+def printed(table: dict[str, Any], columns: int = 80) -> str:
+    file = io.StringIO()
+    print_tables(Console(file=file, width=columns), [{"title": "t", "note": "", **table}])
+    return file.getvalue()
+
+
+HEADER = ["category", "visible", "occluded", "truncated", "visibility", "distance [m]", "area [px]",
+          "aspect", "difficult", "moderate"]  # fmt: skip
+ROWS = [[f"name_{k}", *[f"{k}.{c:02d}" for c in range(9)]] for k in range(3)]
+
+
+@pytest.mark.parametrize("columns", [80, 120, 200])
+def test_no_word_of_a_wide_table_is_cut(columns: int) -> None:
+    """Its columns continue below, beside the first one again."""
+    text = printed({"header": HEADER, "rows": ROWS}, columns)
+    assert max(map(len, text.splitlines())) <= columns
+    assert "…" not in text
+    words = set(text.split())
+    for word in (*" ".join(HEADER).split(), *(cell for row in ROWS for cell in row)):
+        assert word in words
+    if columns == 200:
+        assert text.count("name_0") == 1
+    if columns == 80:
+        assert text.count("name_0") == 2
+
+
+def test_long_remarks_are_wrapped_between_words() -> None:
+    """In a column of their own, wide enough to be read."""
+    remark = "narrower with more --scenes; the interval of a recording of 20 pictures is this only"
+    header = ["quantity", "value", "from", "to", "unit", "remark"]
+    rows = [["exposure compensation", "1.375", "0.58", "1.02", "EV", remark]]
+    text = printed({"header": header, "rows": rows})
+    assert max(map(len, text.splitlines())) <= 80
+    assert "…" not in text
+    assert set(remark.split()) <= set(text.split())
+    assert len(text.splitlines()) < 16
+
+
+def test_a_word_longer_than_the_terminal_is_folded() -> None:
+    """Nothing is lost: paths can be copied in pieces."""
+    path = "/very/long" * 12
+    text = printed({"header": ["file", "n"], "rows": [[path, "1"]]})
+    assert path in "".join(line.strip().split(" ")[0] for line in text.splitlines())
+    assert "…" not in text
