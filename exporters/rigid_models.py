@@ -29,7 +29,7 @@ from gen_data.exporters.symmetry_search import (
 from gen_data.generator.core.asset_types import Material, MeshData, Symmetry
 from gen_data.generator.core.colorimetry import srgb_decode, srgb_encode
 from gen_data.generator.core.errors import AssetError
-from gen_data.generator.core.interfaces import AssetLibrary
+from gen_data.generator.core.interfaces import AssetLibrary, FileFrames
 from gen_data.generator.core.scene import Body, Instance, Scene
 from gen_data.generator.core.se3 import IDENTITY, SE3, Array, Vec3
 from gen_data.generator.core.serialization import canonical_json
@@ -115,6 +115,10 @@ def build_model(pieces: Sequence[Piece], assets: AssetLibrary) -> Model:
         count += len(vertices)
     points_m, normals, colors = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
     center_m = 0.5 * (points_m.min(axis=0) + points_m.max(axis=0))
+    origin_m = _file_origin_m(pieces, assets)
+    if origin_m is not None and not origin_m.any():
+        # An asset in the frame of its file keeps it, as ground truth of the same file does.
+        center_m = origin_m
     rows: NDArray[np.void] = np.zeros(count, VERTEX)
     for k, axis in enumerate("xyz"):
         rows[axis] = (points_m[:, k] - center_m[k]) * MM_PER_M
@@ -126,6 +130,9 @@ def build_model(pieces: Sequence[Piece], assets: AssetLibrary) -> Model:
     if not symmetries:
         symmetries += find_symmetries(*(_samples(pieces, assets, *share) for share in _SHARES))
     info = _size_info(rows) | _symmetry_info(symmetries, pieces[0].asset, center_m)
+    if origin_m is not None:
+        offset_mm = np.round((origin_m - center_m) * MM_PER_M, 6) + 0.0
+        info["file_origin_mm"] = offset_mm.tolist()
     x, y, z = (float(value) for value in center_m)
     return Model((x, y, z), rows, np.concatenate(faces).astype(np.int32), info)
 
@@ -157,6 +164,17 @@ def _samples(pieces: Sequence[Piece], assets: AssetLibrary, count: int, shift: f
         colors[own] = found
         first += len(corners)
     return Samples(points, colors)
+
+
+def _file_origin_m(pieces: Sequence[Piece], assets: AssetLibrary) -> Array | None:
+    """Origin of a user's file in the frame of its only piece, [3]; None for other objects."""
+    if len(pieces) != 1 or not isinstance(assets, FileFrames):
+        return None
+    shift_m = assets.file_shift_m(pieces[0].asset)
+    if shift_m is None:
+        return None
+    placed: Array = pieces[0].T_instance_body.apply(np.array([shift_m]) * pieces[0].scale)[0]
+    return placed
 
 
 def ply_bytes(model: Model) -> bytes:

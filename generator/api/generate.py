@@ -72,6 +72,7 @@ def generate(  # noqa: PLR0913  (keywords of one front door)
     Warns:
         ConfigWarning: ``n`` is so small that a split of the configuration stays empty; or a sensor,
             or a class of the label map, has no label.
+        AssetWarning: a file of the user holds something that is not used, such as a skeleton.
     """
     with _standby_worker(cluster, workers) as standby:
         _check_arguments(config, n, out, workers, repair)
@@ -79,11 +80,13 @@ def generate(  # noqa: PLR0913  (keywords of one front door)
         loaded = load_config(config, seed=seed, overrides=overrides, without=without)
 
         from gen_data.generator.assemble.size_estimate import estimate_sample_bytes
+        from gen_data.generator.assets.file_remarks import warn_of_remarks
         from gen_data.generator.runner.identity import format_licences, make_plan
         from gen_data.generator.runner.run import Settings, run
 
         factory = _make_factory(loaded, n)
         plan = make_plan(factory)
+        told = warn_of_remarks(factory.library, plan.assets)
         with _opened(cluster, workers, standby) as (pool, count), _folder(loaded, out) as folder:
             summary = run(
                 plan,
@@ -102,6 +105,8 @@ def generate(  # noqa: PLR0913  (keywords of one front door)
                 ),
                 progress=on_progress,
             )
+        # Of files that workers were the first to read.
+        warn_of_remarks(factory.library, plan.assets, read_max=0, told=told)
         return check_label_gaps(summary)
 
 

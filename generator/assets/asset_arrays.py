@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 
 from gen_data.generator.assets.asset_cache import Arrays
-from gen_data.generator.assets.importer import ImportedMesh
+from gen_data.generator.assets.importer import FileRemarks, ImportedMesh
 from gen_data.generator.core.asset_types import (
     ConvexParts,
     Keypoint,
@@ -40,6 +40,10 @@ def pack_imported(imported: ImportedMesh) -> Arrays:
         arrays["keypoints"] = encode_text(canonical_json(imported.keypoints))
     if imported.body_bounds_m is not None:
         arrays["body_bounds_m"] = np.array(imported.body_bounds_m, dtype=np.float64)
+    if imported.shift_m != (0.0, 0.0, 0.0):
+        arrays["shift_m"] = np.array(imported.shift_m, dtype=np.float64)
+    if imported.remarks:
+        arrays["remarks"] = encode_text(canonical_json(imported.remarks))
     return arrays
 
 
@@ -67,7 +71,11 @@ def unpack_imported(arrays: Arrays) -> ImportedMesh:
     bounds_m = None
     if "body_bounds_m" in arrays:
         bounds_m = from_plain(tuple[Vec3, Vec3], arrays["body_bounds_m"].tolist())
-    return ImportedMesh(mesh, collision, images, keypoints, bounds_m)
+    x, y, z = arrays["shift_m"].tolist() if "shift_m" in arrays else (0.0, 0.0, 0.0)
+    remarks: tuple[FileRemarks, ...] = ()
+    if "remarks" in arrays:
+        remarks = from_plain(tuple[FileRemarks, ...], json.loads(arrays["remarks"].tobytes()))
+    return ImportedMesh(mesh, collision, images, keypoints, bounds_m, (x, y, z), remarks)
 
 
 @lru_cache(maxsize=_MATERIALS_KEPT)

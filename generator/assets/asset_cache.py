@@ -71,8 +71,7 @@ class DiskCache:
 
     def arrays(self, key: str, compute: Callable[[], Arrays]) -> Arrays:
         """Load the arrays of a content key, read-only; compute and store them if missing."""
-        # Versions of this program that store other arrays may share the folder.
-        path = self.folder / f"format-{FORMAT}" / key[:2] / f"{key}.arrays"
+        path = self._path(key)
         stored = _load(path, key, self._intact)
         if stored is not None:
             return stored
@@ -83,6 +82,14 @@ class DiskCache:
             if sum(array.nbytes for array in arrays.values()) >= _MAPPED_BYTES_MIN:
                 return _load(path, key, self._intact) or arrays
         return arrays
+
+    def find(self, key: str) -> Arrays | None:
+        """Load the arrays of a content key; None if they are not stored."""
+        return _load(self._path(key), key, self._intact)
+
+    def _path(self, key: str) -> Path:
+        # Versions of this program that store other arrays may share the folder.
+        return self.folder / f"format-{FORMAT}" / key[:2] / f"{key}.arrays"
 
     def load_json(self, name: str) -> dict[str, Any]:
         """Load a JSON object by name; empty if it is missing or damaged."""

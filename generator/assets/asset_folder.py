@@ -155,8 +155,26 @@ def asset_id_from_path(file: str) -> str:
 
 
 def category_from_path(root: Path, file: str) -> str:
-    """Name of the folder that holds a file."""
-    return PurePosixPath(file).parent.name or root.resolve().name
+    """Name of the folder that holds a file.
+
+    Folders that only sort files (``meshes``, ``google_16k``, ``visual``) and hashes are passed over
+    in favour of the folder above, as in YCB, Google Scanned Objects and ShapeNet; in folders of BOP
+    models, every ``obj_000001`` is a category.
+    """
+    path = PurePosixPath(file)
+    if _BOP_MODEL.fullmatch(path.stem):
+        return path.stem
+    names = [part for part in reversed(path.parent.parts) if not _SORTING.fullmatch(part.lower())]
+    return next(iter(names), "") or path.parent.name or root.resolve().name
+
+
+_BOP_MODEL = re.compile(r"obj_\d{6}")
+_SORTING = re.compile(
+    r"mesh(es)?|models?(_\w+)?|google_\d+k|poisson|tsdf|clouds|visuals?|collisions?|textures?|"
+    r"materials|assets|obj|stl|ply|dae|glb|gltf|usd|usdz|textured(_\w+)?|nontextured|"
+    r"(?=\w*\d)[0-9a-f]{24,40}"
+)
+"""Names of folders that say nothing of what is in them."""
 
 
 def sanitize_word(text: str) -> str:

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 
-from gen_data.generator.assets.file_library import describe_unused
 from gen_data.generator.assets.folder_index import (
     METRES_PER_UNIT,
     IndexedAsset,
@@ -22,6 +21,7 @@ from gen_data.generator.core.kinematics import link_poses
 from gen_data.generator.core.plates import ground_rectangle, horizon_px
 from gen_data.generator.core.se3 import SE3, Vec3
 
+NO_LICENCE = "no licence is given"
 _SMALLEST_M, _LARGEST_M = 0.001, 20.0
 """Longest edges outside this range suggest a wrong unit."""
 
@@ -69,11 +69,16 @@ def check_folder(root: Path, library: Library) -> Iterator[Finding]:
             yield _inspect(one, library)
         except AssetError as error:
             yield Finding(one.asset_id, one.kind, one.category(), error=str(error))
+        except RuntimeError as error:
+            # A reader failed in its process; the other files are still checked.
+            reason = (str(error).strip().splitlines() or ["unknown"])[-1][:200]
+            text = f"{one.place()}: its reader failed ({reason}); export it again"
+            yield Finding(one.asset_id, one.kind, one.category(), error=text)
 
 
 def _inspect(one: IndexedAsset, library: Library) -> Finding:
     """Import an asset. Raises AssetError if it cannot be used."""
-    origin = () if one.origin.licence not in ("", "unknown") else ("no licence is given",)
+    origin = () if one.origin.licence not in ("", "unknown") else (NO_LICENCE,)
     if one.kind == "plate":
         return _inspect_plate(one, library, origin)
     if one.kind in ("texture", "environment"):
@@ -82,12 +87,29 @@ def _inspect(one: IndexedAsset, library: Library) -> Finding:
     measure = _measure_robot if one.kind == "robot" else _measure_object
     triangles, low, high = measure(one, library)
     size_m = (high[0] - low[0], high[1] - low[1], high[2] - low[2])
-    unused = library.unused_elements(one.asset_id) if one.kind != "robot" else ()
-    left_out = (describe_unused(unused),) if unused else ()
-    remarks = (*library.remarks(one.asset_id), *left_out)
-    warnings = (*_find_doubts(one, max(size_m)), *remarks, *origin)
+    _open_images(one, library)
+    seen = (
+        f"{remarks.file}: {text}"
+        for remarks in library.remarks(one.asset_id) or ()
+        for text in remarks.unused
+    )
+    warnings = (*_find_doubts(one, max(size_m)), *seen, *origin)
     found = (triangles, size_m, _describe_unit(one), _describe_up(one))
     return Finding(one.asset_id, one.kind, one.category(), *found, warnings=warnings)
+
+
+def _open_images(one: IndexedAsset, library: Library) -> None:
+    """Open every image of an asset's materials. Raises AssetError if one is missing or unreadable.
+
+    Textures are read when something is rendered, which may be hours after the start of a run.
+    """
+    if one.kind == "robot":
+        names = sorted(library.robot(one.asset_id).visuals.values())
+    else:
+        names = [one.asset_id]
+    for name in names:
+        for texture in sorted({m.texture for m in library.materials(name)} - {""}):
+            library.texture(texture)
 
 
 def _inspect_plate(one: IndexedAsset, library: Library, doubts: tuple[str, ...]) -> Finding:
@@ -142,6 +164,8 @@ def _describe_unit(one: IndexedAsset) -> str:
         return "size_m"
     if entry.scale != 1.0:
         return f"{entry.scale:g} m"
+    if entry.file.lower().endswith((".3mf", ".step", ".stp", ".usdz", ".usda", ".usdc", ".usd")):
+        return entry.unit or "of the file"
     return entry.unit or "m (assumed)"
 
 

@@ -24,6 +24,9 @@ from gen_data.generator.assets.parsing import (
     parse_layer_references,
     unpack_value,
 )
+from gen_data.generator.assets.readers.mesh_source import locate_file
+from gen_data.generator.assets.readers.obj import mtl_references, obj_references
+from gen_data.generator.assets.readers.ply import ply_references
 from gen_data.generator.assets.robot_formats import is_description, is_foreign, read_description
 from gen_data.generator.assets.sandbox import run_sandboxed
 from gen_data.generator.core.errors import AssetError
@@ -33,9 +36,6 @@ _NAME = "digests.json"
 _MISSING = ""
 _TICK_NS = 2_000_000_000
 """Coarsest resolution of a file system's time stamps (FAT: two seconds)."""
-# Each matches the rest of its line as a whole: splitting it in the pattern takes quadratic time.
-_MTLLIB = re.compile(rb"^[ \t]*mtllib[ \t]([^\n]*)", re.MULTILINE)
-_MAP = re.compile(rb"^[ \t]*(?:map_\w+|norm|bump)[ \t]([^\n]*)", re.MULTILINE)
 _DAE_IMAGE = re.compile(rb"<(?:init_from|ref)>([^<]{1,1024})")
 _MAX_FILES = 2000
 _ASSETS_KEPT = 4000
@@ -165,6 +165,8 @@ def find_references(folder: Folder, relative: str) -> dict[str, bool]:
         for reference in _references(folder, name):
             # References that leave the folder are skipped here; the reader refuses those it needs.
             with contextlib.suppress(AssetError):
+                # The file that is named may appear later; another one may stand in for it.
+                pending.append(locate_file(folder, name, reference))
                 pending.append(folder.refer(name, reference))
     return dict(sorted(found.items()))
 
@@ -179,14 +181,12 @@ def _references(folder: Folder, name: str) -> Iterator[str]:
         else:
             files = read_description(folder, name).files()
         yield from ("../" * depth + file for file in files)
-    elif suffix in (".obj", ".mtl"):
-        data = folder.read(name)
-        if suffix == ".obj":
-            references = [rest.strip() for rest in _MTLLIB.findall(data)]
-        else:
-            # Options precede the file's name.
-            references = [rest.split()[-1] for rest in _MAP.findall(data) if rest.strip()]
-        yield from (reference.decode("utf-8", errors="replace") for reference in references)
+    elif suffix == ".obj":
+        yield from obj_references(folder.read(name))
+    elif suffix == ".mtl":
+        yield from mtl_references(folder.read(name))
+    elif suffix == ".ply":
+        yield from ply_references(folder.read(name))
     elif suffix == ".gltf":
         yield from (unquote(uri) for uri in _uris(folder.read(name)))
     elif suffix == ".dae":

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import importlib.util
 import math
-import warnings
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import lru_cache
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -32,9 +32,11 @@ from gen_data.generator.assets.folder_index import (
     read_index,
     user_folder,
 )
+from gen_data.generator.assets.image_decoding import DECODER_VERSION
 from gen_data.generator.assets.importer import (
     ROADS_VERSION,
     VERSION,
+    FileRemarks,
     ImportedMesh,
     RoadNetworkContent,
 )
@@ -66,7 +68,7 @@ from gen_data.generator.core.asset_types import (
     TextureData,
     UInt8,
 )
-from gen_data.generator.core.errors import AssetError, ConfigWarning
+from gen_data.generator.core.errors import AssetError
 from gen_data.generator.core.plates import Plate
 from gen_data.generator.core.scene import Lane, StageModel
 
@@ -95,7 +97,7 @@ class FileLibrary:
     ) -> None:
         self._packs = packs
         self._user_roots = tuple(user_roots)
-        self._store = store
+        self._store, self._disk = store, disk
         self._provide = provide
         self._digests = ContentHashes(disk)
         self._listed: dict[str, IndexedAsset] | None = None
@@ -161,43 +163,81 @@ class FileLibrary:
         if isinstance(entry, RobotEntry) and not part:
             links = ", ".join(f"{asset_id}/{n}" for n in list(self._robot(one).links)[:2])
             raise AssetError(f"asset '{asset_id}': is a robot; its meshes are {links}, ...")
-        key = content_key({"asset": self._key(one), "link": name})
-        return self._store.get(key, compute, unpack_imported)
+        return self._store.get(self._mesh_key(one, name), compute, unpack_imported)
+
+    def _mesh_key(self, one: IndexedAsset, part: str) -> str:
+        return content_key({"asset": self._key(one), "link": part})
+
+    def remarks(self, asset_id: str, *, read: bool) -> tuple[FileRemarks, ...] | None:
+        """What was seen in an asset's files and not used.
+
+        Args:
+            asset_id: An asset, also of another kind than an object.
+            read: Whether to import an asset whose geometry is not stored.
+
+        Returns:
+            The remarks with whole paths; None if it is not stored and shall not be read.
+
+        Raises:
+            AssetError: if it cannot be imported.
+        """
+        part = self._part(asset_id)
+        one = part[0] if part else self._entries()[asset_id]
+        if part:
+            names = [part[1]]
+        elif one.kind == "robot":
+            names = list(self._robot(one).links)
+        else:
+            names = [""] if one.kind == "object" else []
+        found = [self._remarks_of(one, name, read) for name in names]
+        known = [remarks for remarks in found if remarks is not None]
+        if len(known) < len(found):
+            return None
+        has_links = not part and one.kind in ("object", "robot")
+        described = self._described_remarks(one) if has_links else ()
+        own = (FileRemarks(one.entry.file, described),) if described else ()
+        return tuple(
+            replace(remarks, file=str(one.root / remarks.file))
+            for remarks in dict.fromkeys((*own, *chain(*known)))
+        )
+
+    def _remarks_of(
+        self, one: IndexedAsset, part: str, read: bool
+    ) -> tuple[FileRemarks, ...] | None:
+        """Remarks on an object, one link or one piece; see ``remarks``."""
+        stored = self._disk.find(self._mesh_key(one, part))
+        if stored is not None:
+            return unpack_imported(stored).remarks
+        name = f"{one.asset_id}/{part}" if part else one.asset_id
+        return self.imported(name).remarks if read else None
+
+    def is_user(self, asset_id: str) -> bool:
+        """Whether an asset, link or piece comes from one of the user's folders."""
+        part = self._part(asset_id)
+        one = part[0] if part else self._entries().get(asset_id)
+        return one is not None and one.root in self._user_roots
 
     def lanes(self, asset_id: str) -> tuple[Lane, ...]:
         """Lanes of a road network; empty for anything else."""
         content = self._road_network(asset_id)
         return content.lanes if content else ()
 
-    def unused_elements(self, asset_id: str) -> tuple[tuple[str, int], ...]:
-        """Elements of a road network without effect, and their number; empty for anything else."""
-        content = self._road_network(asset_id)
-        return content.unused if content else ()
-
     def _road_network(self, asset_id: str) -> RoadNetworkContent | None:
-        """Content of a road network; warns of what it leaves out when the file is first read."""
+        """Content of a road network; None for anything else."""
         one = self._entries().get(asset_id)
         if one is None or not _is_road_network(one.entry):
             return None
-
-        def parse() -> Arrays:
-            arrays = self._parse(one, parse_lanes, one.entry.file)
-            unused = unpack_value(RoadNetworkContent, arrays).unused
-            if unused:
-                place = one.root / one.entry.file
-                message = f"{place}: {describe_unused(unused)}"
-                warnings.warn(message, ConfigWarning, stacklevel=2)
-            return arrays
-
         return self._store.get(
             content_key({"asset": self._key(one), "part": "lanes"}),
-            parse,
+            lambda: self._parse(one, parse_lanes, one.entry.file),
             lambda arrays: unpack_value(RoadNetworkContent, arrays),
         )
 
-    def remarks(self, asset_id: str) -> tuple[str, ...]:
-        """What a description of links and joints has and nothing uses; empty for other assets."""
-        one = self._entries()[asset_id]
+    def _described_remarks(self, one: IndexedAsset) -> tuple[str, ...]:
+        """What a description of links and joints, or a map, has and nothing uses; else empty."""
+        network = self._road_network(one.asset_id)
+        if network is not None:
+            return (describe_unused(network.unused),) if network.unused else ()
         if not isinstance(one.entry, RobotEntry):
             if not is_description(one.entry.file):
                 return ()
@@ -295,7 +335,11 @@ class FileLibrary:
                 f"{folder.root / name}: no such image; add it or correct the reference to it"
             )
         digests = self._digests.of(folder, name)
-        key: dict[str, object] = {"format": FORMAT, "image": digests[name]}
+        key: dict[str, object] = {
+            "format": FORMAT,
+            "decoder": DECODER_VERSION,
+            "image": digests[name],
+        }
         if channels == "rgba":
             key["channels"] = channels
         return self._store.get(
@@ -323,9 +367,10 @@ class FileLibrary:
             self._listed = {}
             for one in _list_everything(self._packs, self._user_roots):
                 if one.asset_id in self._listed:
+                    other = self._listed[one.asset_id]
                     raise AssetError(
-                        f"asset '{one.asset_id}': defined in {self._listed[one.asset_id].root} and "
-                        f"in {one.root}; rename one of them"
+                        f"asset '{one.asset_id}': defined by {other.place()} and by {one.place()}; "
+                        "rename one of them, or give it another id in an assets.yaml"
                     )
                 self._listed[one.asset_id] = one
         return self._listed

@@ -7,11 +7,13 @@ by its folder.
 
 from __future__ import annotations
 
+import glob
 import re
 from collections import Counter
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
 from functools import partial
+from itertools import chain, count
 from pathlib import Path, PurePosixPath
 from typing import Annotated, Literal, TypeVar
 
@@ -227,8 +229,9 @@ class MeshEntry(Origin):
     """Axis of the file that points forward and becomes +X; instead of yaw_deg."""
     yaw_deg: float = 0.0
     """Rotation about the vertical that turns the front to +X."""
-    origin: Literal["center", "floor"] = "center"
-    """Origin of the asset: centre of the bounding box, or of its bottom face (furniture)."""
+    origin: Literal["center", "floor", "file"] = "center"
+    """Origin of the asset: centre of the bounding box, of its bottom face (furniture), or the
+    file's own, to which poses of CAD models and of real data sets refer."""
     mass_kg: Annotated[float, Field(ge=0.0)] = 0.0
     stackable: bool = False
     collision: str = ""
@@ -484,6 +487,10 @@ class IndexedAsset:
     origin: Origin
     common_tags: tuple[str, ...] = ()
 
+    def place(self) -> str:
+        """Path of its file."""
+        return str(self.root / self.entry.file)
+
     def tags(self) -> tuple[str, ...]:
         """Its own tags, its folder's, and its category as one word."""
         own = {*self.entry.tags, *self.common_tags, self.category().replace(" ", "_")} - {""}
@@ -540,7 +547,27 @@ def user_folder(root: Path) -> Iterator[IndexedAsset]:
         raise AssetError(f"{root}: no such folder; create it or correct the list of asset folders")
     path = root / INDEX_NAME
     index = _user_index(root, path) if path.exists() else _index_files(root)
-    yield from list_assets(index, root, "user/", (USER_TAG,))
+    yield from _tell_apart(list_assets(index, root, _USER, (USER_TAG,)))
+
+
+_USER = "user/"
+
+
+def _tell_apart(listed: Iterable[IndexedAsset]) -> Iterator[IndexedAsset]:
+    """Yield assets; files whose paths differ in their suffixes only keep it in their ids."""
+    assets = list(listed)
+    counts = Counter(one.asset_id for one in assets)
+    taken = {name for name, number in counts.items() if number == 1}
+    for one in assets:
+        derived = f"{_USER}{asset_id_from_path(one.entry.file)}"
+        if counts[one.asset_id] > 1 and one.asset_id == derived:
+            suffix = sanitize_word(PurePosixPath(one.entry.file).suffix.lstrip("."))
+            whole = f"{derived}.{suffix}"
+            candidates = chain([whole], (f"{whole}_{k}" for k in count(2)))
+            chosen = next(name for name in candidates if name not in taken)
+            taken.add(chosen)
+            one = replace(one, asset_id=chosen)  # noqa: PLW2901
+        yield one
 
 
 def _user_index(root: Path, path: Path) -> FolderIndex:
@@ -598,18 +625,24 @@ def _index_files(root: Path) -> FolderIndex:
         source=str(root.resolve().name),
         assets=tuple(
             MeshEntry(
-                id=asset_id_from_path(name),
-                file=name,
-                category=(category := category_from_path(root, name)),
+                file=glob.escape(name),
+                category=(category := _category(root, name)),
                 tags=(sanitize_word(category),),
             )
             for name in files
             if name not in used
         ),
-        environments=tuple(
-            ImageEntry(id=asset_id_from_path(name), file=name) for name in panoramas
-        ),
+        environments=tuple(ImageEntry(file=glob.escape(name)) for name in panoramas),
     )
+
+
+def _category(root: Path, name: str) -> str:
+    """Category of a file by its folder, as labels and names of files may hold it."""
+    category = category_from_path(root, name)[:CATEGORY_MAX]
+    try:
+        return check_name(category)
+    except ValueError:
+        return sanitize_word(category)
 
 
 def _is_mjcf(root: Path, file: str) -> bool:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import io
 import math
+import re
 import tempfile
 import warnings
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +17,8 @@ from gen_data.generator.core.colorimetry import luminance
 from gen_data.generator.core.errors import AssetError
 from gen_data.generator.core.optional_packages import missing_packages
 
+DECODER_VERSION = 2
+"""Increased whenever the same file is decoded to other pixels."""
 MAX_SIDE_PX = 16_384
 MAX_PIXELS = 64_000_000
 _EXR_MAGIC = b"\x76\x2f\x31\x01"
@@ -25,7 +29,9 @@ _WITH_ALPHA = ("RGBA", "LA", "PA")
 
 
 def decode_image(data: bytes, place: str, *, alpha: bool = False) -> UInt8:
-    """Decode an image to sRGB, uint8 [height, width, 3].
+    """Decode an image to sRGB, uint8 [height, width, 3], upright as its EXIF orientation says.
+
+    Sixteen bits per channel become eight; floating-point values count to 1.
 
     Args:
         data: An encoded PNG, JPEG, BMP, TIFF, WebP or TGA.
@@ -35,13 +41,17 @@ def decode_image(data: bytes, place: str, *, alpha: bool = False) -> UInt8:
     Raises:
         AssetError: if it is unreadable, or larger than 16,384 pixels a side or 64 megapixels.
     """
-    from PIL import Image
+    from PIL import Image, ImageOps
 
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             with Image.open(io.BytesIO(data), formats=_FORMATS) as image:
                 _check_size(image.width, image.height, place)
+                if image.getexif().get(_ORIENTATION, 1) != 1:
+                    ImageOps.exif_transpose(image, in_place=True)
+                if image.mode in _DEEP:
+                    return _to_eight_bits(np.asarray(image), image.mode)
                 if alpha and (image.mode in _WITH_ALPHA or "transparency" in image.info):
                     pixels = np.array(image.convert("RGBA"), dtype=np.uint8)
                     return pixels if pixels[..., 3].min() < 255 else pixels[..., :3].copy()
@@ -53,9 +63,50 @@ def decode_image(data: bytes, place: str, *, alpha: bool = False) -> UInt8:
     except AssetError:
         raise
     except Exception as error:
+        deep = _decode_deep(data)
+        if deep is not None:
+            return deep
         raise AssetError(
             f"{place}: unreadable image ({type(error).__name__}); save it again as PNG or JPEG"
         ) from None
+
+
+_ORIENTATION = 0x0112
+"""EXIF tag."""
+_DEEP = ("I;16", "I;16L", "I;16B", "I;16N", "I", "F")
+"""Modes of single channels with more than eight bits, which a conversion to RGB would clip."""
+
+
+def _to_eight_bits(values: NDArray[Any], mode: str = "") -> UInt8:
+    """Eight bits of single-channel or colour images with more, as three channels."""
+    if values.dtype.kind == "f":
+        scaled = np.where(np.isfinite(values), values, 0.0) * 255.0
+    else:
+        # Images of mode I hold 8, 16 or 32 bits.
+        top = int(values.max(initial=0))
+        deep = mode != "I" or top > 255
+        scaled = values / (257.0 if top < 1 << 16 else float(1 << 24)) if deep else values * 1.0
+    level = np.rint(np.clip(scaled, 0.0, 255.0)).astype(np.uint8)
+    return np.repeat(level[..., None], 3, axis=2) if level.ndim == 2 else level
+
+
+def _decode_deep(data: bytes) -> UInt8 | None:
+    """Decode a TIFF of colours with 16 bits or floating point, which Pillow cannot; else None."""
+    import cv2
+
+    if data[:4] not in (b"II*\0", b"MM\0*"):
+        return None
+    try:
+        image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+    except cv2.error:
+        return None
+    if image is None or image.ndim != 3 or image.shape[2] not in (3, 4):
+        return None
+    if max(image.shape[:2]) > MAX_SIDE_PX or image.shape[0] * image.shape[1] > MAX_PIXELS:
+        return None
+    if image.dtype.kind != "f" and image.dtype != np.uint16:
+        return None
+    return np.ascontiguousarray(_to_eight_bits(image[..., 2::-1]))
 
 
 def decode_radiance(data: bytes, place: str) -> Float32:
@@ -100,30 +151,61 @@ def read_exr(data: bytes, place: str) -> Float32:
             window = OpenEXR.File(file.name, header_only=True).header()["dataWindow"]
             (x0, y0), (x1, y1) = (corner.tolist() for corner in window)
             _check_size(x1 - x0 + 1, y1 - y0 + 1, place)
-            channels = OpenEXR.File(file.name).channels()
+            channels = OpenEXR.File(file.name, separate_channels=True).channels()
         except (RuntimeError, ValueError, OSError, KeyError) as error:
             reason = str(error).replace(file.name, "it").strip() or type(error).__name__
             raise AssetError(f"{place}: unreadable OpenEXR image ({reason})") from None
-    for name in ("RGB", "RGBA"):
-        if name in channels:
-            return np.ascontiguousarray(channels[name].pixels[..., :3], dtype=np.float32)
-    if not {"R", "G", "B"} <= set(channels):
-        raise AssetError(f"{place}: has no channels R, G, B")
-    return np.stack([channels[name].pixels for name in "RGB"], axis=-1).astype(np.float32)
+    names = _color_channels(tuple(channels))
+    if not names:
+        raise AssetError(
+            f"{place}: has no channels R, G, B, but {', '.join(sorted(channels))[:80]}"
+        )
+    return np.stack([channels[name].pixels for name in names], axis=-1).astype(np.float32)
+
+
+def _color_channels(names: tuple[str, ...]) -> tuple[str, ...]:
+    """Names of red, green and blue, also in a layer or in lower case, or of grey; empty = none.
+
+    Of several layers, one without a name or the combined one is taken, else the first.
+    """
+    layers: dict[str, dict[str, str]] = {}
+    for name in names:
+        layer, _, channel = name.rpartition(".")
+        layers.setdefault(layer, {})[channel.upper()] = name
+    whole = [layer for layer, found in layers.items() if {"R", "G", "B"} <= found.keys()]
+    grey = [layer for layer, found in layers.items() if "Y" in found]
+    for candidates, channels in ((whole, "RGB"), (grey, "YYY")):
+        preferred = [
+            layer
+            for layer in candidates
+            if not layer or layer.lower().endswith(("combined", "rgb", "rgba", "beauty"))
+        ]
+        if candidates:
+            chosen = layers[(preferred or candidates)[0]]
+            return tuple(chosen[channel] for channel in channels)
+    return ()
 
 
 def _read_radiance(data: bytes, place: str) -> Float32:
     """Decode a Radiance image to RGB, float32 [height, width, 3]."""
     import cv2
 
-    width, height = _radiance_size(data, place)
+    header, pixels = _split_radiance(data, place)
+    (first, rows), (second, columns) = header
+    # Scan lines in the usual order, top to bottom and left to right, are all that OpenCV reads.
+    width, height = (columns, rows) if first[1] == "Y" else (rows, columns)
     _check_size(width, height, place)
+    head = f"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y {rows} +X {columns}\n".encode()
     try:
-        bgr = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+        bgr = cv2.imdecode(np.frombuffer(head + pixels, np.uint8), cv2.IMREAD_UNCHANGED)
     except cv2.error:
         bgr = None
     if bgr is None or bgr.ndim != 3 or bgr.shape[2] != 3 or bgr.dtype != np.float32:
         raise AssetError(f"{place}: unreadable panorama; save it again as Radiance .hdr")
+    if first[1] == "X":
+        bgr = bgr.swapaxes(0, 1)
+    bgr = bgr[::-1] if "+Y" in (first, second) else bgr
+    bgr = bgr[:, ::-1] if "-X" in (first, second) else bgr
     # OpenCV decodes to BGR. The centre column is the front, +X, as everywhere in this project.
     return np.ascontiguousarray(bgr[..., ::-1])
 
@@ -142,16 +224,29 @@ def _check_texels(rgb: NDArray[np.float64], place: str) -> None:
         raise AssetError(f"{place}: black; save it again from its source")
 
 
-def _radiance_size(data: bytes, place: str) -> tuple[int, int]:
-    """Width and height stated in a Radiance header."""
-    lines = data[:4096].split(b"\n")
-    for line in lines if data[:2] == b"#?" else ():
-        words = line.split()
-        if len(words) == 4 and words[0] == b"-Y" and words[2] == b"+X":
-            if words[1].isdigit() and words[3].isdigit():
-                return int(words[3]), int(words[1])
-            break
-    raise AssetError(f"{place}: neither Radiance nor OpenEXR; save the panorama as .hdr or .exr")
+def _split_radiance(
+    data: bytes, place: str
+) -> tuple[tuple[tuple[str, int], tuple[str, int]], bytes]:
+    """Both axes of a Radiance image, slowest first, as (sign and axis, pixels); and its scan lines.
+
+    Raises:
+        AssetError: if it is no Radiance image, or of another kind of colours than RGB.
+    """
+    found = _RESOLUTION.search(data[:_MAX_HEADER_BYTES])
+    if data[:2] != b"#?" or found is None:
+        raise AssetError(
+            f"{place}: neither Radiance nor OpenEXR; save the panorama as .hdr or .exr"
+        )
+    if b"xyze" in data[: found.start()]:
+        raise AssetError(f"{place}: holds CIE XYZ; save it again with FORMAT=32-bit_rle_rgbe")
+    (first, rows), (second, columns) = ((found[k].decode(), int(found[k + 1])) for k in (1, 3))
+    if first[1] == second[1]:
+        raise AssetError(f"{place}: names the axis {first[1]} twice; save it again")
+    return ((first, rows), (second, columns)), data[found.end() :]
+
+
+_RESOLUTION = re.compile(rb"\n([-+][XY]) +(\d{1,6}) +([-+][XY]) +(\d{1,6})\r?\n")
+_MAX_HEADER_BYTES = 4096
 
 
 def _mean_luminance(rgb: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> float:

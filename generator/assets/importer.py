@@ -35,6 +35,7 @@ from gen_data.generator.assets.triangle_soup import (
     TriangleSoup,
     join_soups,
 )
+from gen_data.generator.assets.vertex_colors import IMAGE, resolve_colors
 from gen_data.generator.core.asset_types import ConvexParts, Keypoint, Material, MeshData, UInt8
 from gen_data.generator.core.errors import AssetError
 from gen_data.generator.core.scene import Lane
@@ -42,7 +43,7 @@ from gen_data.generator.core.se3 import SE3, Vec3
 from gen_data.generator.roads.opendrive import Network, read_opendrive
 from gen_data.generator.roads.opendrive_lanes import network_lanes
 
-VERSION = 7
+VERSION = 8
 """Increased whenever the same files are imported as different geometry."""
 ROADS_VERSION = 1
 """The same for road networks."""
@@ -53,6 +54,19 @@ _PROTRUSION = re.compile("mirror|antenna|aerial", re.IGNORECASE)
 """Names of parts that 3D boxes of vehicles leave out."""
 _MAX_ALBEDO = 0.85
 """Upper bound on diffuse albedo, that of fresh snow; files often use 1 for white."""
+
+
+@dataclass(frozen=True)
+class FileRemarks:
+    """What was seen in a file and not used, or used otherwise than the file says.
+
+    Attributes:
+        file: Path in the folder.
+        unused: One phrase each: colours, texture sets, skins, animations, extensions, ...
+    """
+
+    file: str
+    unused: tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +81,9 @@ class ImportedMesh:
             of the folder, or to several images (``gen_data.generator.assets.texture_maps``).
         keypoints: Named points in the asset's frame.
         body_bounds_m: Bounds of the mesh without a vehicle's exterior mirrors; None if it has none.
+        shift_m: What was added to the coordinates of the file, scaled and turned upright, to reach
+            the asset's origin.
+        remarks: What its files hold and it does not, per file.
     """
 
     mesh: MeshData | None
@@ -74,6 +91,8 @@ class ImportedMesh:
     images: Mapping[str, UInt8]
     keypoints: tuple[Keypoint, ...] = ()
     body_bounds_m: tuple[Vec3, Vec3] | None = None
+    shift_m: Vec3 = (0.0, 0.0, 0.0)
+    remarks: tuple[FileRemarks, ...] = ()
 
     @property
     def nbytes(self) -> int:
@@ -97,11 +116,10 @@ def import_object(folder: Folder, entry: MeshEntry, asset_id: str, piece: str = 
     if piece:
         source = _read_piece(folder, entry, piece)
         looks, collides, images = [source.soup], list[TriangleSoup](), source.images
-        up = ""
-        asset_id = f"{asset_id}/{piece}" if images else asset_id
+        remarks, up = _remarks_of(entry.file, source.remarks), ""
         entry = entry.model_copy(update={"origin": "center"})
     else:
-        looks, collides, images, up = _read_geometry(folder, entry)
+        looks, collides, images, up, remarks = _read_geometry(folder, entry)
     decoded = _decode_all(images, place)
 
     def image(name: str) -> UInt8:
@@ -110,13 +128,20 @@ def import_object(folder: Folder, entry: MeshEntry, asset_id: str, piece: str = 
         return decode_image(folder.read(name), str(folder.root / name), alpha=True)
 
     whole = trim_unreached_holes(join_soups(looks), image)
-    soup = _apply_finishes(whole, entry.materials, place, asset_id)
+    colored = resolve_colors(whole, entry.max_faces)
+    decoded |= {} if colored.image is None else {IMAGE: colored.image}
+    owner = f"{asset_id}/{piece}" if piece and decoded else asset_id
+    soup = _apply_finishes(colored.soup, entry.materials, place, owner)
+    soup, hidden = _drop_transparent(soup, place)
+    remarks = (*remarks, *_remarks_of(entry.file, (*colored.remarks, *hidden)))
     matrix = upright_transform(entry, up)
     soup = soup.transformed(matrix)
     scale, shift = scale_and_shift(soup, entry, place)
     scaling = np.concatenate([scale * np.eye(3), shift[:, None]], axis=1)
-    soup = _split_regions(soup.transformed(scaling), entry.regions, place, asset_id)
-    mesh = normal_form(soup, place, max_faces=entry.max_faces)
+    soup = _split_regions(soup.transformed(scaling), entry.regions, place, owner)
+    # An image of colours has a cell per triangle: such a soup is decimated already.
+    budget = max(entry.max_faces, 0 if colored.image is None else len(soup))
+    mesh = normal_form(soup, place, max_faces=budget)
     if collides:
         solid = join_soups(collides).transformed(matrix).transformed(scaling)
         check_coordinates(solid, place)
@@ -126,7 +151,39 @@ def import_object(folder: Folder, entry: MeshEntry, asset_id: str, piece: str = 
         solid = decimate(solid, entry.max_faces) if len(solid) > entry.max_faces else solid
     collision = convex_parts(solid, place, entry.parts)
     keypoints = tuple(Keypoint(p.name, p.position_m, p.radius_m) for p in entry.keypoints)
-    return ImportedMesh(mesh, collision, decoded, keypoints, _bounds_without_mirrors(soup, mesh))
+    x, y, z = shift.tolist()
+    return ImportedMesh(
+        mesh,
+        collision,
+        decoded,
+        keypoints,
+        _bounds_without_mirrors(soup, mesh),
+        (x + 0.0, y + 0.0, z + 0.0),
+        remarks,
+    )
+
+
+def _remarks_of(file: str, unused: tuple[str, ...]) -> tuple[FileRemarks, ...]:
+    """The remarks on one file; empty if there are none."""
+    return (FileRemarks(file, tuple(dict.fromkeys(unused))),) if unused else ()
+
+
+def _drop_transparent(soup: TriangleSoup, place: str) -> tuple[TriangleSoup, tuple[str, ...]]:
+    """Leave out triangles that nobody sees, such as shadow planes, and remark on them.
+
+    Raises:
+        AssetError: if no triangle is left.
+    """
+    unseen = np.array(
+        [s.material.opacity == 0.0 and s.material.transmission == 0.0 for s in soup.slots]
+    )[soup.face_slots]
+    if not unseen.any():
+        return soup, ()
+    if unseen.all():
+        raise AssetError(f"{place}: all its materials are fully transparent; give one an opacity")
+    names = sorted({soup.slots[k].name or "unnamed" for k in np.unique(soup.face_slots[unseen])})
+    remark = f"{int(unseen.sum())} fully transparent triangles are left out ({', '.join(names)})"
+    return soup.select(~unseen), (remark,)
 
 
 def _bounds_without_mirrors(soup: TriangleSoup, mesh: MeshData) -> tuple[Vec3, Vec3] | None:
@@ -153,6 +210,7 @@ def import_link(
     place = f"{folder.root / entry.file}: link '{link_name}'"
     mesh = collision = None
     images: dict[str, UInt8] = {}
+    remarks: tuple[FileRemarks, ...] = ()
     if link.visuals:
         sources = [read_shape(folder, shape, SE3()) for shape in link.visuals]
         soup = join_soups([source.soup for source in sources])
@@ -160,10 +218,15 @@ def import_link(
             images |= _decode_all(source.images, place)
         if entry.palette:
             soup = _palette_colors(folder, soup)
+        colored = resolve_colors(soup, entry.max_faces)
+        images |= {} if colored.image is None else {IMAGE: colored.image}
+        unused = (*(text for source in sources for text in source.remarks), *colored.remarks)
+        remarks = _remarks_of(entry.file, unused)
         # Images inside mesh files are those of the link, all others those of the robot.
         owner = f"{robot_id}/{link_name}" if images else robot_id
-        soup = _apply_finishes(soup, entry.materials, place, owner)
-        mesh = normal_form(soup, place, max_faces=entry.max_faces)
+        soup = _apply_finishes(colored.soup, entry.materials, place, owner)
+        budget = max(entry.max_faces, 0 if colored.image is None else len(soup))
+        mesh = normal_form(soup, place, max_faces=budget)
     if link.collisions:
         solids = [read_shape(folder, s, SE3(), materials=False).soup for s in link.collisions]
         check_coordinates(join_soups(solids), place)
@@ -173,17 +236,19 @@ def import_link(
             for s in solids
         ]
         collision = ConvexParts(tuple(part for hull in hulls for part in hull.parts_m))
-    return ImportedMesh(mesh, collision, images)
+    return ImportedMesh(mesh, collision, images, remarks=remarks)
 
 
 def _read_geometry(
     folder: Folder, entry: MeshEntry
-) -> tuple[list[TriangleSoup], list[TriangleSoup], Mapping[str, bytes], str]:
+) -> tuple[
+    list[TriangleSoup], list[TriangleSoup], Mapping[str, bytes], str, tuple[FileRemarks, ...]
+]:
     """Geometry of an entry.
 
     Returns:
-        Visual soups, collision soups (empty = the visual ones), embedded images, and the axis that
-        the file states as up (empty = none).
+        Visual soups, collision soups (empty = the visual ones), embedded images, the axis that the
+        file states as up (empty = none), and remarks.
     """
     up = ""
     images: Mapping[str, bytes] = {}
@@ -201,11 +266,12 @@ def _read_geometry(
         if [_geometry_key(s) for s in solids] != [_geometry_key(v) for v in visuals]:
             collides = [read_shape(folder, s, pose, materials=False).soup for s, pose in solids]
     else:
-        source = read_mesh(folder, entry.file)
-        looks, images, up = [source.soup], source.images, source.up
+        sources = [read_mesh(folder, entry.file)]
+        looks, images, up = [sources[0].soup], sources[0].images, sources[0].up
+    remarks = _remarks_of(entry.file, tuple(text for s in sources for text in s.remarks))
     if entry.collision:
         collides = [read_mesh(folder, entry.collision, materials=False).soup]
-    return looks, collides, images, up
+    return looks, collides, images, up, remarks
 
 
 def _read_piece(folder: Folder, entry: MeshEntry, name: str) -> MeshSource:
@@ -235,10 +301,10 @@ def _apply_finishes(
     slots = []
     for slot in soup.slots:
         finish = _find_finish(slot.name, finishes)
-        if slot.missing_library and not slot.from_file and finish is None:
+        if slot.missing and not slot.from_file and finish is None:
             raise AssetError(
-                f"{place}: material '{slot.name}' belongs to the missing file "
-                f"{slot.missing_library}; add it, or give 'materials' in the asset index"
+                f"{place}: material '{slot.name}' {slot.missing}; add it, or give 'materials' in "
+                "the asset index"
             )
         material = slot.material
         if material.texture:
@@ -383,7 +449,9 @@ def scale_and_shift(soup: TriangleSoup, entry: MeshEntry, place: str) -> tuple[f
     if entry.size_m is not None:
         scale = _scale_to_size(high - low, entry.size_m, place)
     anchor = 0.5 * (low + high)
-    if entry.origin == "floor":
+    if entry.origin == "file":
+        anchor = np.zeros(3)
+    elif entry.origin == "floor":
         anchor[2] = low[2]
     return scale, -scale * anchor
 

@@ -11,7 +11,7 @@ import numpy as np
 from gen_data.generator.assets.asset_cache import Arrays, DiskCache, Store, content_key
 from gen_data.generator.assets.asset_ids import parse_asset_id
 from gen_data.generator.assets.file_library import FileLibrary
-from gen_data.generator.assets.importer import ImportedMesh
+from gen_data.generator.assets.importer import FileRemarks, ImportedMesh
 from gen_data.generator.assets.paths import packs_dir
 from gen_data.generator.assets.procedural_library import ProceduralLibrary
 from gen_data.generator.core.asset_types import (
@@ -167,19 +167,27 @@ class Library:
         """Lanes of a road network (``.xodr``), in its own frame; empty for other assets."""
         return () if self._is_generated(asset_id) else self._files.lanes(asset_id)
 
-    def unused_elements(self, asset_id: str) -> tuple[tuple[str, int], ...]:
-        """Elements of a road network without effect, and their number; empty for other assets."""
-        return () if self._is_generated(asset_id) else self._files.unused_elements(asset_id)
+    def remarks(self, asset_id: str, *, read: bool = True) -> tuple[FileRemarks, ...] | None:
+        """What was seen in an asset's files and not used; see ``FileLibrary.remarks``.
+
+        Empty for generated assets.
+        """
+        return () if self._is_generated(asset_id) else self._files.remarks(asset_id, read=read)
+
+    def file_shift_m(self, asset_id: str) -> Vec3 | None:
+        """What was added to the coordinates of a user's file, scaled and upright, on import [m].
+
+        None for assets that are not of a user's folder.
+        """
+        if self._is_generated(asset_id) or not self._files.is_user(asset_id):
+            return None
+        return self._imported(asset_id).shift_m
 
     def robot(self, asset_id: str) -> RobotModel:
         """Kinematics of a robot. Raises AssetError if the asset is not a robot."""
         if self._is_generated(asset_id):
             raise AssetError(f"asset '{asset_id}': is not a robot")
         return self._files.robot(asset_id)
-
-    def remarks(self, asset_id: str) -> tuple[str, ...]:
-        """What the files of an asset of a folder have and nothing uses, for its owner."""
-        return self._files.remarks(asset_id)
 
     def stage(self, asset_id: str) -> StageModel:
         """Content of an OpenUSD stage. Raises AssetError if the asset is not a stage."""

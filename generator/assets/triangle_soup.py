@@ -31,14 +31,14 @@ class MaterialSlot:
         from_file: Whether the mesh file itself defines the material; otherwise a file that refers
             to the mesh may define it.
         declared_color: Linear RGB that the file gives beside an image, where it has no effect.
-        missing_library: Missing file that should define the material; empty = none.
+        missing: Why a material that the file names is not defined; empty = it is.
     """
 
     name: str = ""
     material: Material = _PLAIN
     from_file: bool = False
     declared_color: Vec3 = (1.0, 1.0, 1.0)
-    missing_library: str = ""
+    missing: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +54,8 @@ class TriangleSoup:
         slots: One per value of ``face_slots``.
         group_names: Names of the groups in the file, by number; the names of further groups are
             not known.
+        colors: float64 [m, 3, 3]: linear RGB in [0, 1] at each corner, a factor on the base colour;
+            None = none.
     """
 
     corners: Float64
@@ -63,12 +65,15 @@ class TriangleSoup:
     face_groups: Int64
     slots: tuple[MaterialSlot, ...]
     group_names: tuple[str, ...] = ()
+    colors: Float64 | None = None
 
     @classmethod
-    def of(cls, corners: Float64, slot: MaterialSlot | None = None) -> TriangleSoup:
+    def of(
+        cls, corners: Float64, slot: MaterialSlot | None = None, colors: Float64 | None = None
+    ) -> TriangleSoup:
         """Make a soup of one slot without UVs and normals from corners [m, 3, 3]."""
         zeros = np.zeros(len(corners), dtype=np.int64)
-        return cls(corners, None, None, zeros, zeros, (slot or MaterialSlot(),))
+        return cls(corners, None, None, zeros, zeros, (slot or MaterialSlot(),), (), colors)
 
     def __len__(self) -> int:
         """Number of triangles."""
@@ -94,6 +99,7 @@ class TriangleSoup:
             corners=self.corners[:, ::-1],
             uvs=None if self.uvs is None else self.uvs[:, ::-1],
             normals=None if self.normals is None else -self.normals[:, ::-1],
+            colors=None if self.colors is None else self.colors[:, ::-1],
         )
 
     def select(self, chosen: Bools) -> TriangleSoup:
@@ -105,6 +111,7 @@ class TriangleSoup:
             normals=None if self.normals is None else self.normals[chosen],
             face_slots=self.face_slots[chosen],
             face_groups=self.face_groups[chosen],
+            colors=None if self.colors is None else self.colors[chosen],
         )
 
 
@@ -119,7 +126,8 @@ def apply_affine(matrix: Float64, points: Float64) -> Float64:
 def join_soups(soups: list[TriangleSoup]) -> TriangleSoup:
     """Concatenate soups; their slots and groups stay separate.
 
-    If any soup has UVs, missing ones become zero. Normals are kept only if all soups have them.
+    If any soup has UVs, missing ones become zero; missing colours become white. Normals are kept
+    only if all soups have them.
     """
     if len(soups) == 1:
         return soups[0]
@@ -134,6 +142,8 @@ def join_soups(soups: list[TriangleSoup]) -> TriangleSoup:
     has_uvs = any(s.uvs is not None for s in soups)
     uvs = [np.zeros((len(s), 3, 2)) if s.uvs is None else s.uvs for s in soups]
     normals = [s.normals for s in soups if s.normals is not None]
+    has_colors = any(s.colors is not None for s in soups)
+    colors = [np.ones((len(s), 3, 3)) if s.colors is None else s.colors for s in soups]
     return TriangleSoup(
         corners=np.concatenate([s.corners for s in soups]),
         uvs=np.concatenate(uvs) if has_uvs else None,
@@ -142,6 +152,7 @@ def join_soups(soups: list[TriangleSoup]) -> TriangleSoup:
         face_groups=np.concatenate(groups),
         slots=tuple(slot for s in soups for slot in s.slots),
         group_names=tuple(names) if any(names) else (),
+        colors=np.concatenate(colors) if has_colors else None,
     )
 
 

@@ -110,6 +110,13 @@ def show(asset_id: str, folders: tuple[Path, ...]) -> None:
     click.echo(f"{'materials':<12} {len(mesh.materials)}, roles: {', '.join(roles) or 'none'}")
     points = ", ".join(point.name for point in library.keypoints(asset_id))
     click.echo(f"{'keypoints':<12} {points or 'none'}")
+    shift_m = library.file_shift_m(asset_id)
+    if shift_m is not None:
+        shown = ", ".join(f"{value:.6g}" for value in shift_m)
+        click.echo(f"{'shift_m':<12} {shown} (added to the file's coordinates, scaled and upright)")
+    for remarks in library.remarks(asset_id) or ():
+        for text in remarks.unused:
+            click.echo(f"{'not used':<12} {remarks.file}: {text}")
 
 
 @assets.command()
@@ -231,10 +238,13 @@ def _print_findings(findings: Sequence[Finding]) -> None:
     from rich.table import Table
     from rich.text import Text
 
+    from gen_data.generator.assets.checking import NO_LICENCE
+
     table = Table("id", "kind", "category", "triangles", "size [m]", "unit", "up", "state")
     for one in findings:
         size = " x ".join(f"{edge:.3g}" for edge in one.size_m) if one.size_m else ""
-        state = "cannot be used" if one.error else "doubtful" if one.warnings else "ok"
+        doubts = set(one.warnings) - {NO_LICENCE}
+        state = "cannot be used" if one.error else "doubtful" if doubts else "ok"
         cells = (one.asset_id, one.kind, one.category, str(one.triangles or ""), size, one.unit)
         table.add_row(*(Text(cell) for cell in (*cells, one.up, state)))
     # A fixed width for log files; a terminal uses its own.
@@ -242,8 +252,11 @@ def _print_findings(findings: Sequence[Finding]) -> None:
     Console(width=None if console.is_terminal else 160).print(table)
     for one in findings:
         for problem in (one.error, one.note, *one.warnings):
-            if problem:
+            if problem and problem != NO_LICENCE:
                 click.echo(f"{one.asset_id}: {problem}")
+    unlicensed = sum(NO_LICENCE in one.warnings for one in findings)
+    if unlicensed:
+        click.echo(f"{unlicensed} of {len(findings)} assets: {NO_LICENCE}")
 
 
 def _write_thumbnails(library: Library, asset_ids: Sequence[str], path: Path) -> None:

@@ -61,11 +61,25 @@ def init(template: str, paths: tuple[Path, ...], categories: tuple[str, ...], ou
         _move(staging, out)
     config = out / next(iter(files))
     written = [*files, *([f"{ASSETS}/"] if meshes else [])]
-    click.echo(f"wrote {', '.join(str(out / name) for name in written)}\n\nnext:")
+    click.echo(f"wrote {', '.join(str(out / name) for name in written)}")
+    if meshes:
+        _echo_remarks(out / ASSETS)
+    click.echo("\nnext:")
     if meshes:
         _echo_command("assets", "check", out / ASSETS)
     _echo_command("contact-sheet", config, "--n", 6)
     _echo_command("--config", config, "--n", 100)
+
+
+def _echo_remarks(folder: Path) -> None:
+    """Print what the meshes hold and is not used."""
+    from gen_data.generator.assets.file_remarks import collect_remarks
+    from gen_data.generator.assets.folder_index import user_folder
+    from gen_data.generator.assets.library import open_library
+
+    ids = [one.asset_id for one in user_folder(folder)]
+    for remarks in collect_remarks(open_library([folder]), ids):
+        click.echo(f"{remarks.file}: not used as it is: {'; '.join(remarks.unused)}")
 
 
 def _echo_command(*arguments: object) -> None:

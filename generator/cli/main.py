@@ -30,6 +30,7 @@ from gen_data.generator.cli.stop_signals import (
     is_stop_requested,
 )
 from gen_data.generator.core.errors import (
+    AssetWarning,
     CacheWarning,
     ConfigError,
     ConfigWarning,
@@ -283,7 +284,7 @@ def _show_warning(
     **options: Any,
 ) -> None:
     """Print our own warnings as plain messages; those of libraries as usual."""
-    if category in (FutureWarning, ConfigWarning, CacheWarning):
+    if category in (FutureWarning, AssetWarning, ConfigWarning, CacheWarning):
         click.echo(f"gen-data: warning: {message}", err=True)
     else:
         show_others(message, category, *place, **options)

@@ -69,9 +69,11 @@ def plan(
 def _rows(config: Config, n: int) -> Iterator[tuple[str, str]]:
     from gen_data.generator.assemble.pipeline_factory import PipelineFactory
     from gen_data.generator.assemble.size_estimate import estimate_image_bytes
+    from gen_data.generator.assets.file_remarks import collect_remarks
     from gen_data.generator.config.schema import docstring_summary
     from gen_data.generator.pipeline.splits import split_of
     from gen_data.generator.runner.durable_files import format_bytes
+    from gen_data.generator.runner.identity import possible_assets
 
     general = config.general
     per_scene = general.views_per_scene * general.steps_per_scene
@@ -98,6 +100,9 @@ def _rows(config: Config, n: int) -> Iterator[tuple[str, str]]:
     yield from _class_rows(config, factory)
     for name, exporter in exporters.items():
         yield f"export {name}", docstring_summary(type(exporter))
+    used = [asset.asset_id for asset in possible_assets(factory)]
+    for remarks in collect_remarks(factory.library, used):
+        yield f"not used in {remarks.file}", "; ".join(remarks.unused)
     yield "size, estimated", f"{format_bytes(estimate_image_bytes(config, info) * n)} of images"
 
 

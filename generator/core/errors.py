@@ -46,6 +46,10 @@ class CacheWarning(UserWarning):
     """A cache was damaged and repaired."""
 
 
+class AssetWarning(UserWarning):
+    """A file of the user holds something that is not used, or used otherwise."""
+
+
 class AssetError(GenDataError):
     """An asset is missing, unreadable or unfit."""
 

@@ -159,6 +159,18 @@ class AssetLibrary(AssetIndex, Protocol):
 
 
 @runtime_checkable
+class FileFrames(Protocol):
+    """An AssetLibrary with assets from files of the user."""
+
+    def file_shift_m(self, asset_id: str) -> Vec3 | None:
+        """What was added to the coordinates of a file, scaled and upright, on import [m].
+
+        None for assets that are not of a user's file.
+        """
+        ...
+
+
+@runtime_checkable
 class DerivedArrays(Protocol):
     """An AssetLibrary that also stores arrays computed from its assets.
 

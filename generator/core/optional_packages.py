@@ -8,6 +8,7 @@ from gen_data.generator.core.distribution import install_command
 
 EXTRAS = {
     "OpenEXR": ("OpenEXR", "exr"),
+    "cascadio": ("cascadio", "step"),
     "foxglove_schemas_protobuf": ("foxglove-schemas-protobuf", "formats"),
     "google_crc32c": ("google-crc32c", "formats"),
     "gymnasium": ("gymnasium", "env"),

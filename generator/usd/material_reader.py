@@ -31,6 +31,8 @@ class BoundMaterial:
         cutoff: Coverage below which there is a hole.
         uv_name: Primvar of its texture coordinates.
         uv_matrix: Affine map [2, 3] of the texture coordinates.
+        color_name: Primvar that is its colour; empty = it has a colour.
+        unused: What the material holds and is not used.
     """
 
     name: str = ""
@@ -46,6 +48,8 @@ class BoundMaterial:
     cutoff: float = 0.5
     uv_name: str = "st"
     uv_matrix: Array = field(default_factory=lambda: _IDENTITY)
+    color_name: str = ""
+    unused: tuple[str, ...] = ()
 
     @property
     def has_images(self) -> bool:
@@ -56,11 +60,12 @@ class BoundMaterial:
         return any(whole) or any(name for name, _ in (*channels, *cover))
 
 
-PLAIN = BoundMaterial()
+PLAIN = BoundMaterial(color_name="displayColor")
+"""Of meshes without a material."""
 
 
-def read_bound_material(prim: Any, mesh: Any, place: str) -> BoundMaterial:
-    """Read the bound material of a mesh or subset, or else the mesh's display colour.
+def read_bound_material(prim: Any, place: str) -> BoundMaterial:
+    """Read the bound material of a mesh or subset; ``PLAIN`` if there is none.
 
     Raises:
         AssetError: if the material is not a UsdPreviewSurface, an image is missing, or a value is
@@ -70,7 +75,7 @@ def read_bound_material(prim: Any, mesh: Any, place: str) -> BoundMaterial:
 
     material = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()[0]
     if not material:
-        return replace(PLAIN, material=_read_display_color(mesh))
+        return PLAIN
     surface = material.ComputeSurfaceSource()[0]
     where = f"{place}: material {material.GetPath()}"
     kind = surface.GetIdAttr().Get() if surface else None
@@ -89,7 +94,12 @@ def _read_preview_surface(name: str, surface: Any, where: str) -> BoundMaterial:
     ior = numbers["ior"]
     if not 1.0 <= ior < math.inf:
         raise AssetError(f"{where}: ior is {ior:g}, expected at least 1; correct it")
-    color, image = _read_color(surface, "diffuseColor", (0.18, 0.18, 0.18), where)
+    primvar = _color_primvar(surface)
+    color, image = (
+        ((1.0, 1.0, 1.0), None)
+        if primvar
+        else _read_color(surface, "diffuseColor", (0.18, 0.18, 0.18), where)
+    )
     glow, glow_image = _read_color(surface, "emissiveColor", (0.0, 0.0, 0.0), where)
     if not all(0.0 <= c < math.inf for c in glow):
         raise AssetError(f"{where}: emissiveColor is {glow}, negative or not finite; correct it")
@@ -97,7 +107,9 @@ def _read_preview_surface(name: str, surface: Any, where: str) -> BoundMaterial:
     is_cutout = numbers["opacityThreshold"] > 0.0
     # Without a threshold, opacity means transmission or, in mode "presence", coverage.
     opacity = 1.0 if is_cutout else numbers["opacity"]
-    present = _find_source(surface, "opacityMode")[0] == "presence"
+    # Glass states its refractive index; without one, opacity 0 hides a helper.
+    hidden = opacity == 0.0 and _find_source(surface, "ior") == (None, None)
+    present = hidden or _find_source(surface, "opacityMode")[0] == "presence"
     material = Material(
         base_color=_clamp_color(color),
         roughness=round(numbers["roughness"], 4),
@@ -122,13 +134,20 @@ def _read_preview_surface(name: str, surface: Any, where: str) -> BoundMaterial:
         normal_image=_image_path(bump, where),
         emission_image=_image_path(glow_image, where),
         cutoff=numbers["opacityThreshold"] if is_cutout else 0.5,
+        color_name=primvar,
     )
-    others = (_find_source(surface, key)[1] for key in _IMAGED)
-    first = next((node for node in (image, *others) if _is_image(node)), None)
-    if first is None:
+    nodes = {"diffuseColor": image} | {key: _find_source(surface, key)[1] for key in _IMAGED}
+    placed = {key: _read_coordinates(node) for key, node in nodes.items() if _is_image(node)}
+    if not placed:
         return look
-    uv_name, uv_matrix = _read_coordinates(first)
-    return replace(look, uv_name=uv_name, uv_matrix=uv_matrix)
+    uv_name, uv_matrix = next(iter(placed.values()))
+    unused = tuple(
+        f"material '{name}': the texture coordinates of {key} differ from those of "
+        f"{next(iter(placed))} and are not used"
+        for key, (other, matrix) in placed.items()
+        if other != uv_name or not np.array_equal(matrix, uv_matrix)
+    )
+    return replace(look, uv_name=uv_name, uv_matrix=uv_matrix, unused=unused)
 
 
 _NUMBERS = {
@@ -183,6 +202,14 @@ def _read_color(surface: Any, name: str, default: Vec3, where: str) -> tuple[Vec
     return (red, green, blue), None
 
 
+def _color_primvar(surface: Any) -> str:
+    """Primvar that the diffuse colour is read from; empty = none."""
+    node = _find_source(surface, "diffuseColor")[1]
+    if node is None or not str(node.GetIdAttr().Get()).startswith("UsdPrimvarReader_float"):
+        return ""
+    return str(_find_source(node, "varname")[0] or "displayColor")
+
+
 def _is_image(node: Any) -> bool:
     return node is not None and node.GetIdAttr().Get() == "UsdUVTexture"
 
@@ -218,15 +245,6 @@ def _read_coordinates(image: Any) -> tuple[str, Array]:
     if node is None or node.GetIdAttr().Get() != "UsdPrimvarReader_float2":
         return "st", matrix
     return str(_find_source(node, "varname")[0] or "st"), matrix
-
-
-def _read_display_color(mesh: Any) -> Material:
-    from pxr import UsdGeom
-
-    colors = UsdGeom.Gprim(mesh).GetDisplayColorAttr().Get()
-    if not colors:
-        return Material()
-    return Material(base_color=_clamp_color(colors[0]))
 
 
 def _clamp_color(color: Any) -> Vec3:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from gen_data.generator.core.errors import AssetError
 from gen_data.generator.core.se3 import Array
 from gen_data.generator.usd.material_reader import PLAIN, BoundMaterial, read_bound_material
+from gen_data.generator.usd.primitives import primitive_corners
 
 Int64 = NDArray[np.int64]
 
@@ -24,6 +25,9 @@ class MeshPrim:
         uvs: float64 [m, 3, 2] as the materials use them; None = none.
         normals: float64 [m, 3, 3]; None = none.
         face_slots: int64 [m], indices into ``materials``.
+        colors: float64 [m, 3, 3]: linear RGB at each corner, white where a material has colours;
+            None = none.
+        remarks: What the prim holds and is not used.
     """
 
     corners: Array
@@ -31,6 +35,8 @@ class MeshPrim:
     normals: Array | None
     face_slots: Int64
     materials: tuple[BoundMaterial, ...]
+    colors: Array | None = None
+    remarks: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,12 +70,79 @@ def read_mesh_prim(prim: Any, place: str) -> MeshPrim:
     topology = _read_topology(mesh, len(points), where)
     slots, materials = _read_materials(prim, topology.polygons, place)
     face_slots = slots[topology.polygon]
-    return MeshPrim(
+    read = MeshPrim(
         corners=points[topology.points[topology.fans]],
         uvs=_read_uvs(prim, topology, face_slots, materials),
         normals=_read_normals(mesh, topology),
         face_slots=face_slots,
         materials=materials,
+        remarks=_find_unused(mesh, materials),
+    )
+    return _paint(prim, read, topology)
+
+
+def read_primitive(prim: Any, place: str) -> MeshPrim:
+    """Read a sphere, cube or another primitive shape.
+
+    Raises:
+        AssetError: if a length is not positive, or its material is unsupported.
+    """
+    corners = primitive_corners(prim, place)
+    count = len(corners)
+    materials = (read_bound_material(prim, place),)
+    remarks = tuple(
+        f"material '{m.name}': a {prim.GetTypeName()} has no texture coordinates for its image"
+        for m in materials
+        if m.has_images
+    )
+    triangles = np.arange(3 * count).reshape(-1, 3)
+    polygon = np.arange(count)
+    topology = _Topology(triangles.reshape(-1), triangles, polygon, count)
+    read = MeshPrim(corners, None, None, np.zeros(count, np.int64), materials, remarks=remarks)
+    return _paint(prim, read, topology)
+
+
+def _find_unused(mesh: Any, materials: tuple[BoundMaterial, ...]) -> tuple[str, ...]:
+    from pxr import UsdSkel
+
+    remarks = [text for material in materials for text in material.unused]
+    scheme = str(mesh.GetSubdivisionSchemeAttr().Get())
+    if scheme != "none":
+        remarks.append(f"subdivision surfaces ({scheme}) are read as their cages")
+    if mesh.GetPrim().HasAPI(UsdSkel.BindingAPI):
+        remarks.append("skinned meshes are read as they are bound, without their skeleton's pose")
+    if mesh.GetPointsAttr().ValueMightBeTimeVarying():
+        remarks.append("points that move over time are read at the earliest time")
+    return tuple(remarks)
+
+
+def _paint(prim: Any, mesh: MeshPrim, topology: _Topology) -> MeshPrim:
+    """Give the display colour to triangles whose material asks for it, or is missing."""
+    colors = np.ones((len(mesh.corners), 3, 3))
+    materials, remarks, found = list(mesh.materials), list(mesh.remarks), False
+    for slot, material in enumerate(mesh.materials):
+        values = _read_primvar(prim, material.color_name, topology) if material.color_name else None
+        if values is None or values.shape[1] != 3:
+            continue
+        chosen = mesh.face_slots == slot
+        colors[chosen] = np.clip(values[topology.fans[chosen]], 0.0, 1.0)
+        white = replace(material.material, base_color=(1.0, 1.0, 1.0))
+        materials[slot] = replace(material, material=white)
+        found = True
+    opacity = _read_primvar(prim, "displayOpacity", topology)
+    if opacity is not None and opacity.shape[1] == 1:
+        whole = round(float(np.clip(opacity, 0.0, 1.0).mean()), 4)
+        for slot, material in enumerate(materials):
+            if not material.name:
+                seen = replace(material.material, opacity=whole)
+                materials[slot] = replace(material, material=seen)
+        if np.ptp(opacity) > 1e-3:
+            remarks.append("only the mean of displayOpacity is used")
+    return replace(
+        mesh,
+        materials=tuple(materials),
+        colors=colors if found else None,
+        remarks=tuple(remarks),
     )
 
 
@@ -106,7 +179,7 @@ def _read_materials(
         prims.append(subset.GetPrim())
     used = set(np.unique(slots).tolist())
     return slots, tuple(
-        read_bound_material(p, prim, place) if k in used else PLAIN for k, p in enumerate(prims)
+        read_bound_material(p, place) if k in used else PLAIN for k, p in enumerate(prims)
     )
 
 
@@ -133,6 +206,9 @@ def _read_normals(mesh: Any, topology: _Topology) -> Array | None:
     given = mesh.GetNormalsAttr().Get(Usd.TimeCode.EarliestTime())
     if values is None and given:
         directions = np.array(given, dtype=np.float64)
+        if directions.ndim != 2:
+            # Of another type than the schema's, as the type of an attribute may be.
+            return None
         values = _expand_to_corners(directions, mesh.GetNormalsInterpolation(), topology)
     return None if values is None or values.shape[1] != 3 else np.asarray(values[topology.fans])
 
@@ -145,7 +221,9 @@ def _read_primvar(prim: Any, name: str, topology: _Topology) -> Array | None:
     if not primvar or not primvar.HasValue():
         return None
     values = np.array(primvar.ComputeFlattened(Usd.TimeCode.EarliestTime()), dtype=np.float64)
-    if values.ndim != 2:
+    if values.ndim == 1:
+        values = values[:, None]
+    if values.ndim != 2 or not len(values):
         return None
     return _expand_to_corners(values, primvar.GetInterpolation(), topology)
 

@@ -1,7 +1,8 @@
 """Import of stages: meshes with materials, lights and cameras, in metres, Z up.
 
 Everything is read at the earliest time code. Meshes are read as polygons, whatever their
-subdivision scheme; invisible prims, guides and proxies are skipped.
+subdivision scheme, and primitive shapes and copies of instancers as meshes; invisible prims,
+guides and proxies are skipped.
 """
 
 from __future__ import annotations
@@ -21,12 +22,16 @@ from gen_data.generator.core.scene import Light
 from gen_data.generator.core.se3 import SE3, Array
 from gen_data.generator.usd.cameras import read_camera_pose
 from gen_data.generator.usd.lights import check_light, read_light
-from gen_data.generator.usd.mesh_reader import MeshPrim, read_mesh_prim
+from gen_data.generator.usd.mesh_reader import MeshPrim, read_mesh_prim, read_primitive
+from gen_data.generator.usd.primitives import KINDS
 from gen_data.generator.usd.prims import unique_name
 
 SUFFIXES = (".usd", ".usda", ".usdc")
 """Suffixes of layers; ``.usdz`` is an archive of layers."""
-_UNSUPPORTED = ("PointInstancer", "Cube", "Sphere", "Cylinder", "Cone", "Capsule", "BasisCurves")
+_MAX_INSTANCES = 5_000
+"""Bound on the copies of a PointInstancer: each is a piece with a name."""
+_OLD_LABEL = re.compile(r"semantic:(.+):params:semanticType")
+"""Attribute of the label schema before UsdSemantics (``SemanticsAPI``, Isaac Sim up to 4)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,6 +74,7 @@ class OpenStage:
         from pxr import Tf, Usd, UsdGeom
 
         self.place = place
+        self.remarks: dict[str, str] = {}
         try:
             with _collect_warnings():
                 self._stage = Usd.Stage.Open(str(path))
@@ -88,27 +94,67 @@ class OpenStage:
         return tuple(str(x.realPath) for x in self._stage.GetUsedLayers() if x.realPath)
 
     def pieces(self) -> tuple[StagePart, ...]:
-        """Every visible mesh, in the stage's order.
+        """Every visible mesh and primitive shape, in the stage's order.
 
         Raises:
-            AssetError: if there is none, or unsupported geometry.
+            AssetError: if there is none.
         """
         from pxr import UsdGeom
 
         taken: set[str] = set()
-        found = []
+        found: list[StagePart] = []
         for prim in self._visible():
-            if prim.GetTypeName() in _UNSUPPORTED:
-                raise AssetError(
-                    f"{self.place}: {prim.GetPath()} is of type {prim.GetTypeName()}, which is not "
-                    "supported; export it as meshes"
-                )
-            if prim.IsA(UsdGeom.Mesh):
+            if prim.IsA(UsdGeom.PointInstancer):
+                found += self._instances(prim, taken)
+            elif prim.IsA(UsdGeom.Mesh) or prim.GetTypeName() in KINDS:
                 name = unique_name(_flat_name(prim), taken)
                 found.append(StagePart(name, _find_label(prim), prim, self._pose(prim)))
+            elif prim.IsA(UsdGeom.Gprim):
+                self._remark(f"{prim.GetTypeName()} is not read, such as {prim.GetPath()}")
         if not found:
             raise AssetError(f"{self.place}: holds no mesh; export it with its meshes")
         return tuple(found)
+
+    def _remark(self, text: str) -> None:
+        self.remarks[text.partition(",")[0]] = text
+
+    def _instances(self, prim: Any, taken: set[str]) -> Iterator[StagePart]:
+        """Yield the meshes of every copy of an instancer.
+
+        Raises:
+            AssetError: if they are too many, or a prototype is missing.
+        """
+        from pxr import Usd, UsdGeom
+
+        time = Usd.TimeCode.EarliestTime()
+        instancer = UsdGeom.PointInstancer(prim)
+        matrices = instancer.ComputeInstanceTransformsAtTime(
+            time, time, UsdGeom.PointInstancer.IncludeProtoXform, UsdGeom.PointInstancer.ApplyMask
+        )
+        mask = instancer.ComputeMaskAtTime(time)
+        numbers = list(instancer.GetProtoIndicesAttr().Get(time) or [])
+        kinds = [k for place, k in enumerate(numbers) if not mask or mask[place]]
+        stage = prim.GetStage()
+        roots = [stage.GetPrimAtPath(p) for p in instancer.GetPrototypesRel().GetTargets()]
+        if len(kinds) > _MAX_INSTANCES or any(not 0 <= k < len(roots) for k in kinds):
+            raise AssetError(
+                f"{self.place}: {prim.GetPath()} has {len(kinds)} copies of {len(roots)} "
+                f"prototypes; at most {_MAX_INSTANCES} copies are read, correct it"
+            )
+        to_stage = self._pose(prim)
+        cache = UsdGeom.XformCache(time)
+        for kind, rows in zip(kinds, matrices, strict=False):
+            root = roots[kind]
+            place = np.einsum("ij,jk->ik", to_stage, np.array(rows).T, optimize=False)
+            for part in Usd.PrimRange(root, Usd.TraverseInstanceProxies()):
+                if not (part.IsA(UsdGeom.Mesh) or part.GetTypeName() in KINDS):
+                    continue
+                relative, _ = cache.ComputeRelativeTransform(part, root)
+                own = np.eye(4) if part == root else np.array(relative).T
+                matrix = np.einsum("ij,jk->ik", place, own, optimize=False)
+                name = unique_name(f"{_flat_name(prim)}_{_flat_name(part)}", taken)
+                label = _find_label(part) or _find_label(prim)
+                yield StagePart(name, label, part, matrix)
 
     def mesh(self, piece: StagePart) -> MeshPrim:
         """Triangles and materials of a piece, in its prim's own frame and unit.
@@ -117,7 +163,8 @@ class OpenStage:
             AssetError: if they are inconsistent, or its material is unsupported.
         """
         with _collect_warnings():
-            return read_mesh_prim(piece.prim, self.place)
+            read = read_primitive if piece.prim.GetTypeName() in KINDS else read_mesh_prim
+            return read(piece.prim, self.place)
 
     def lights(self) -> tuple[Light, ...]:
         """Sphere, panel and distant lights; domes and other kinds are skipped.
@@ -142,9 +189,13 @@ class OpenStage:
         from pxr import Usd, UsdGeom
 
         tokens = UsdGeom.Tokens
-        for prim in Usd.PrimRange.Stage(self._stage, Usd.TraverseInstanceProxies()):
+        prims = iter(Usd.PrimRange.Stage(self._stage, Usd.TraverseInstanceProxies()))
+        for prim in prims:
             if not prim.IsA(UsdGeom.Imageable):
                 continue
+            if prim.IsA(UsdGeom.PointInstancer):
+                # Prototypes below it are seen in its copies only.
+                prims.PruneChildren()
             imageable = UsdGeom.Imageable(prim)
             hidden = imageable.ComputeVisibility(Usd.TimeCode.EarliestTime()) == tokens.invisible
             if not hidden and imageable.ComputePurpose() in (tokens.default_, tokens.render):
@@ -221,5 +272,19 @@ def _find_label(prim: Any) -> Label | None:
             labels = UsdSemantics.LabelsAPI(prim, chosen[0]).GetLabelsAttr().Get()
             if labels:
                 return Label(_flat_name(prim), str(labels[0]))
+        old = _find_old_label(prim)
+        if old:
+            return Label(_flat_name(prim), old)
         prim = prim.GetParent()
     return None
+
+
+def _find_old_label(prim: Any) -> str:
+    """Label of the schema before UsdSemantics, of the type class or category; empty = none."""
+    for attribute in prim.GetAuthoredPropertiesInNamespace("semantic"):
+        found = _OLD_LABEL.fullmatch(attribute.GetName())
+        if found and str(attribute.Get()) in ("class", "category"):
+            data = prim.GetAttribute(f"semantic:{found[1]}:params:semanticData").Get()
+            if data:
+                return str(data)
+    return ""

@@ -63,7 +63,7 @@ def test_obj_groups_follow_its_objects(tmp_path: Path) -> None:
 
 
 def test_obj_texture_options_and_odd_line_ends(tmp_path: Path) -> None:
-    """``-s 2 2 1`` before the file name, spaces in it, and CR LF."""
+    """``-s 2 2 1`` before the file name, which repeats it twice, spaces in it, and CR LF."""
     (tmp_path / "a.mtl").write_bytes(b"newmtl m\r\nmap_Kd -s 2 2 1 -clamp on maps/my wood.png\r\n")
     (tmp_path / "a.obj").write_bytes(
         b"mtllib a.mtl\r\nusemtl m\r\nv 0 0 0\r\nv 1 0 0\r\nv 0 1 0\r\n"
@@ -72,7 +72,7 @@ def test_obj_texture_options_and_odd_line_ends(tmp_path: Path) -> None:
     soup = read_mesh(Folder(tmp_path), "a.obj").soup
     assert soup.slots[int(soup.face_slots[0])].material.texture == "maps/my wood.png"
     assert soup.uvs is not None
-    assert soup.uvs[0].tolist() == [[0, 0], [1, 0], [0, 1]]
+    assert soup.uvs[0].tolist() == [[0, 0], [2, 0], [0, 2]]
 
 
 @pytest.mark.parametrize("suffix", ["stl", "stl_ascii", "ply", "obj"])

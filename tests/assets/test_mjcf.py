@@ -195,7 +195,8 @@ def test_what_is_not_used_is_named(tmp_path: Path) -> None:
     (tmp_path / "assets.yaml").write_text("robots: [{id: arm, file: arm.xml, licence: MIT}]\n")
     library = open_library([tmp_path], tmp_path / "cache", tmp_path)
     (finding,) = check_folder(tmp_path, library)
-    assert finding.warnings == described.remarks
+    place = tmp_path / "arm.xml"
+    assert finding.warnings == tuple(f"{place}: {text}" for text in described.remarks)
 
 
 def test_a_height_field_is_named_and_its_file_not_opened(tmp_path: Path) -> None:

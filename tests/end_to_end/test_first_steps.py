@@ -151,7 +151,7 @@ def test_the_comments_of_init_tell_how_to_leave_the_robot_out(
     [
         (("--template", "tabeltop"), 2, "unknown configuration.*did you mean 'tabletop'"),
         (("--mesh", "none.stl"), 3, "none.stl: no such file"),
-        (("--mesh", "junk.stl"), 3, "junk.stl: holds no triangles"),
+        (("--mesh", "junk.stl"), 3, "junk.stl: cut off"),
         (("--mesh", "junk.xyz"), 3, "junk.xyz: is no mesh that can be read; expected one of .*obj"),
         (("--mesh", "box.off"), 3, "box.off: is no mesh that can be read"),
         (("--mesh", "empty"), 3, "empty: has no mesh"),

@@ -229,8 +229,8 @@ def broken(folder: Path, kind: str) -> None:
     stage = new_stage(folder / "bad.usda")
     if kind == "no mesh":
         UsdLux.SphereLight.Define(stage, "/Lamp")
-    elif kind == "not supported":
-        UsdGeom.Cube.Define(stage, "/Cube")
+    elif kind == "radius is -1":
+        UsdGeom.Sphere.Define(stage, "/Ball").CreateRadiusAttr(-1.0)
     else:
         mesh = add_quad(stage, "/Quad")
         if kind == "is missing":
@@ -264,7 +264,7 @@ def broken(folder: Path, kind: str) -> None:
     "fault",
     [
         "no mesh",
-        "not supported",
+        "radius is -1",
         "is missing",
         "UsdPreviewSurface",
         "roughness is 1.5,",

@@ -38,7 +38,7 @@ from gen_data.generator.core.plates import (
 from gen_data.generator.core.scene import Lane
 from gen_data.generator.core.se3 import Vec3
 
-_EXIF_IFD, _ORIENTATION, _FOCAL_35MM = 0x8769, 0x0112, 0xA405
+_EXIF_IFD, _FOCAL_35MM = 0x8769, 0xA405
 _FILM_DIAGONAL_MM = math.hypot(36.0, 24.0)
 _SMALL_PX = 512
 """Long side of the image from which colours are measured."""
@@ -55,7 +55,7 @@ def import_plate(folder: Folder, entry: PlateEntry) -> Plate:
     data = folder.read(entry.file)
     rgb = decode_image(data, place)
     height_px, width_px = rgb.shape[:2]
-    focal_px = _focal_px(entry, data, width_px, height_px, place)
+    focal_px = _focal_px(entry, data, width_px, height_px)
     try:
         zenith, focal_px, estimate = _find_zenith(entry, rgb, focal_px)
         pose = upright_pose(zenith, entry.camera_height_m)
@@ -81,23 +81,12 @@ def import_plate(folder: Folder, entry: PlateEntry) -> Plate:
     return surroundings(replace(plate, lanes=lanes, ground_color=color), rgb)[0]
 
 
-def _focal_px(
-    entry: PlateEntry, data: bytes, width_px: int, height_px: int, place: str
-) -> float | None:
-    """Focal length by the entry or the photograph's EXIF data; None = neither has it.
-
-    Raises:
-        AssetError: the photograph is stored on its side.
-    """
+def _focal_px(entry: PlateEntry, data: bytes, width_px: int, height_px: int) -> float | None:
+    """Focal length by the entry or the photograph's EXIF data; None = neither has it."""
     from PIL import Image
 
     with Image.open(io.BytesIO(data)) as image:
         exif = image.getexif()
-    if exif.get(_ORIENTATION, 1) not in (0, 1):
-        raise AssetError(
-            f"{place}: is stored turned or mirrored (EXIF orientation {exif[_ORIENTATION]}); "
-            "save it upright, so that its pixels are where its entry counts them"
-        )
     if entry.hfov_deg is not None:
         return 0.5 * width_px / math.tan(math.radians(0.5 * entry.hfov_deg))
     film_mm = float(exif.get_ifd(_EXIF_IFD).get(_FOCAL_35MM, 0) or 0)

@@ -11,7 +11,9 @@ from gen_data.generator.assets.readers.gltf import read_gltf
 from gen_data.generator.assets.readers.mesh_source import MeshSource, check_face_count
 from gen_data.generator.assets.readers.obj import read_obj
 from gen_data.generator.assets.readers.ply import read_ply
+from gen_data.generator.assets.readers.step import read_step
 from gen_data.generator.assets.readers.stl import read_stl
+from gen_data.generator.assets.readers.threemf import read_3mf
 from gen_data.generator.assets.readers.usd import read_usd
 from gen_data.generator.core.errors import AssetError, did_you_mean
 
@@ -23,6 +25,8 @@ _READERS: dict[str, Callable[[Folder, str, bool], MeshSource]] = {
     ".obj": read_obj,
     ".ply": read_ply,
     ".stl": read_stl,
+    ".3mf": read_3mf,
+    **dict.fromkeys((".step", ".stp"), read_step),
     **dict.fromkeys((".usd", ".usda", ".usdc", ".usdz"), read_usd),
 }
 MESH_SUFFIXES = frozenset(_READERS)

@@ -1,28 +1,38 @@
 """glTF 2.0, text and binary (Khronos, "glTF 2.0 specification", 2021).
 
-Triangles, the first UV set and materials (see ``gltf_materials``) are read. Morph targets, skins,
-animations, cameras and lights are ignored; compressed geometry is refused.
+Triangles are read with colours, instances, skins and morph targets at rest, and materials (see
+``gltf_materials``). Animations, cameras and lights are ignored; compressed geometry is refused.
 """
 
 from __future__ import annotations
 
-import base64
-import binascii
-import json
-import struct
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 from urllib.parse import unquote
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gen_data.generator.assets.asset_folder import Folder
 from gen_data.generator.assets.image_decoding import decode_image
+from gen_data.generator.assets.readers.gltf_document import (
+    Document,
+    get_item,
+    parse_document,
+    read_accessor,
+    read_uri,
+    view_bytes,
+)
 from gen_data.generator.assets.readers.gltf_materials import Images, gltf_material
-from gen_data.generator.assets.readers.mesh_source import MAX_FACES, MeshSource
+from gen_data.generator.assets.readers.gltf_nodes import MAX_PARTS, PlacedMesh, placed_meshes
+from gen_data.generator.assets.readers.mesh_source import (
+    MAX_FACES,
+    WHITE,
+    MeshSource,
+    locate_file,
+)
 from gen_data.generator.assets.triangle_soup import (
     Float64,
     Int64,
@@ -33,32 +43,52 @@ from gen_data.generator.assets.triangle_soup import (
 from gen_data.generator.core.asset_types import UInt8
 from gen_data.generator.core.errors import AssetError
 
-_JSON_CHUNK, _BINARY_CHUNK = 0x4E4F534A, 0x004E4942
-_COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
-_WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
-_MAX_PARTS = 50_000
-"""Bound on nodes, and on primitives of all nodes: each takes about 0.1 ms."""
-_NAME_MAX = 400
-"""Bound on the characters kept of names of nodes."""
-_SUPPORTED_EXTENSIONS = (
-    "KHR_materials_",
-    "KHR_texture_transform",
-    "KHR_mesh_quantization",
-    "KHR_lights_",
+_REPEAT = 10497
+_BEYOND = 0.01
+"""Texture coordinates outside of [0, 1] by less hardly show another part of an image."""
+_REFERENCES = (
+    ("pbrMetallicRoughness", "baseColorTexture"),
+    ("extensions", "KHR_materials_pbrSpecularGlossiness", "diffuseTexture"),
+    ("normalTexture",),
+    ("pbrMetallicRoughness", "metallicRoughnessTexture"),
+    ("emissiveTexture",),
+    ("occlusionTexture",),
 )
+"""Textures that are mapped to the surface, most important first."""
 
 
-@dataclass
-class _Document:
-    """A parsed file; buffers and embedded images are loaded on first use."""
+@dataclass(frozen=True)
+class _Placement:
+    """How the images of a material lie on a surface.
 
-    folder: Folder
-    relative: str
-    tree: dict[str, Any]
-    binary: bytes
-    buffers: dict[int, bytes] = field(default_factory=dict)
-    images: dict[str, bytes] = field(default_factory=dict)
+    Attributes:
+        set_index: Number of the set of texture coordinates.
+        offset, rotation, scale: Of KHR_texture_transform.
+    """
+
+    set_index: int = 0
+    offset: tuple[float, float] = (0.0, 0.0)
+    rotation: float = 0.0
+    scale: tuple[float, float] = (1.0, 1.0)
+
+    def apply(self, uvs: Float64) -> Float64:
+        """Transform coordinates [n, 2], V measured from the top.
+
+        Source: KHR_texture_transform: scaled, rotated counter-clockwise as seen, then moved.
+        """
+        c, s = round(math.cos(self.rotation), 12), round(math.sin(self.rotation), 12)
+        u, v = uvs[:, 0] * self.scale[0], uvs[:, 1] * self.scale[1]
+        return np.stack([c * u + s * v + self.offset[0], c * v - s * u + self.offset[1]], axis=1)
+
+
+@dataclass(frozen=True)
+class _Look:
+    """A material, the place of its images, and whether they end at their border."""
+
+    slot: MaterialSlot
+    placement: _Placement = _Placement()
+    ends: bool = False
 
 
 def read_gltf(folder: Folder, relative: str, materials: bool) -> MeshSource:
@@ -68,22 +98,22 @@ def read_gltf(folder: Folder, relative: str, materials: bool) -> MeshSource:
         AssetError: if it is malformed, states more data than it holds, or requires an unsupported
             extension.
     """
-    data = folder.read(relative)
+    return read_gltf_bytes(folder, relative, folder.read(relative), materials)
+
+
+def read_gltf_bytes(folder: Folder, relative: str, data: bytes, materials: bool) -> MeshSource:
+    """Read a glTF file from its bytes; see ``read_gltf``."""
     try:
-        document = _parse_document(folder, relative, data)
-        described = _get_list(document, "materials")
-        slots = (
-            *(_make_slot(document, m) if materials else MaterialSlot() for m in described),
-            MaterialSlot(),
+        document = parse_document(folder, relative, data)
+        described = document.list_of("materials")
+        looks = (
+            *(_make_look(document, m) if materials else _Look(MaterialSlot()) for m in described),
+            _Look(MaterialSlot()),
         )
-        meshes = _mesh_instances(document)
-        if sum(len(mesh["primitives"]) for _, mesh, _ in meshes) > _MAX_PARTS:
-            raise ValueError(f"more than {_MAX_PARTS} primitives; join them")
-        parts = [
-            part
-            for matrix, mesh, name in meshes
-            for part in _read_primitives(document, mesh, matrix, slots, name)
-        ]
+        meshes = placed_meshes(document)
+        if sum(len(placed.mesh["primitives"]) for placed in meshes) > MAX_PARTS:
+            raise ValueError(f"more than {MAX_PARTS} primitives; join them")
+        parts = [part for placed in meshes for part in _read_primitives(document, placed, looks)]
     except (ValueError, KeyError, IndexError, TypeError, AttributeError, RecursionError) as error:
         reason = f"missing {error}" if isinstance(error, KeyError) else str(error)[:120]
         raise AssetError(
@@ -91,127 +121,34 @@ def read_gltf(folder: Folder, relative: str, materials: bool) -> MeshSource:
         ) from None
     if not parts:
         raise AssetError(f"{folder.root / relative}: holds no triangles; export it with its mesh")
-    return MeshSource(join_soups(parts), document.images)
-
-
-def _parse_document(folder: Folder, relative: str, data: bytes) -> _Document:
-    text, binary = _split_chunks(data) if data[:4] == b"glTF" else (data, b"")
-    tree = json.loads(text.decode("utf-8"))
-    if not isinstance(tree, dict):
-        raise ValueError("not a JSON object")
-    for extension in tree.get("extensionsRequired", []):
-        if not str(extension).startswith(_SUPPORTED_EXTENSIONS):
-            raise ValueError(f"it requires the unsupported {extension}")
-    return _Document(folder, relative, tree, binary)
-
-
-def _split_chunks(data: bytes) -> tuple[bytes, bytes]:
-    _, version, length = struct.unpack_from("<4sII", data.ljust(12, b"\0"))
-    if version != 2 or length != len(data):
-        raise ValueError(f"its header says version {version}, {length} of {len(data)} bytes")
-    chunks: dict[int, bytes] = {}
-    offset = 12
-    while offset + 8 <= length:
-        size, kind = struct.unpack_from("<II", data, offset)
-        if offset + 8 + size > length:
-            raise ValueError("a chunk is longer than the file")
-        chunks.setdefault(kind, data[offset + 8 : offset + 8 + size])
-        offset += 8 + size
-    return chunks[_JSON_CHUNK], chunks.get(_BINARY_CHUNK, b"")
-
-
-def _get_list(document: _Document, key: str) -> list[Any]:
-    value = document.tree.get(key, [])
-    if not isinstance(value, list):
-        raise TypeError(f"'{key}' is not a list")
-    return value
-
-
-def _get_item(items: Sequence[Any], index: Any, what: str) -> Any:
-    if not isinstance(index, int) or not 0 <= index < len(items):
-        raise ValueError(f"{what} {index} does not exist")
-    return items[index]
-
-
-def _mesh_instances(document: _Document) -> list[tuple[Float64, Mapping[str, Any], str]]:
-    """``(matrix [4, 4], mesh, name)`` of the mesh nodes of the default scene, in document order.
-
-    The name consists of those of the node, its ancestors and its mesh.
-    """
-    nodes, meshes = _get_list(document, "nodes"), _get_list(document, "meshes")
-    if len(nodes) > _MAX_PARTS:
-        raise ValueError(f"{len(nodes)} nodes, at most {_MAX_PARTS}; join them")
-    scenes = _get_list(document, "scenes")
-    if scenes:
-        roots = list(_get_item(scenes, document.tree.get("scene", 0), "scene").get("nodes", []))
-    else:
-        children = {c for node in nodes for c in node.get("children", [])}
-        roots = [k for k in range(len(nodes)) if k not in children]
-    placed: list[tuple[Float64, Mapping[str, Any], str]] = []
-    visited: set[int] = set()
-    pending = [(index, np.eye(4), "") for index in reversed(roots)]
-    while pending:
-        index, parent, path = pending.pop()
-        node = _get_item(nodes, index, "node")
-        if index in visited:
-            raise ValueError(f"node {index} has two parents or is its own ancestor")
-        visited.add(index)
-        matrix = _product(parent, _local_matrix(node))
-        path = f"{path}/{str(node.get('name', ''))[:_NAME_MAX]}"[-_NAME_MAX:]
-        if "mesh" in node:
-            mesh = _get_item(meshes, node["mesh"], "mesh")
-            placed.append((matrix, mesh, f"{path}/{str(mesh.get('name', ''))[:_NAME_MAX]}"))
-        pending += [(child, matrix, path) for child in reversed(node.get("children", []))]
-    return placed
-
-
-def _local_matrix(node: Mapping[str, Any]) -> Float64:
-    if "matrix" in node:
-        rows: Float64 = np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T
-        return rows
-    x, y, z, w = (float(v) for v in node.get("rotation", (0.0, 0.0, 0.0, 1.0)))
-    rotation = np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )
-    matrix = np.eye(4)
-    matrix[:3, :3] = rotation * np.array(node.get("scale", (1.0, 1.0, 1.0)), dtype=np.float64)
-    matrix[:3, 3] = node.get("translation", (0.0, 0.0, 0.0))
-    return matrix
-
-
-def _product(a: Float64, b: Float64) -> Float64:
-    product: Float64 = np.einsum("ij,jk->ik", a, b, optimize=False)
-    return product
+    soup = join_soups(parts)
+    if not materials:
+        return MeshSource(replace(soup, colors=None))
+    return MeshSource(soup, document.images, tuple(dict.fromkeys(document.remarks)))
 
 
 def _read_primitives(
-    document: _Document,
-    mesh: Mapping[str, Any],
-    matrix: Float64,
-    slots: tuple[MaterialSlot, ...],
-    name: str,
+    document: Document, placed: PlacedMesh, looks: tuple[_Look, ...]
 ) -> list[TriangleSoup]:
     soups = []
-    for primitive in mesh["primitives"]:
+    for primitive in placed.mesh["primitives"]:
         if primitive.get("mode", _TRIANGLES) not in (_TRIANGLES, _STRIP, _FAN):
+            document.remarks.append("lines and points are not read")
             continue
-        slot = _get_item(slots, primitive.get("material", len(slots) - 1), "material")
-        soup = replace(_read_primitive(document, primitive, slot), group_names=(name,))
-        soups.append(soup.transformed(matrix[:3]))
+        look = get_item(looks, primitive.get("material", len(looks) - 1), "material")
+        soup = _read_primitive(document, primitive, look, placed)
+        soup = replace(soup, group_names=(placed.name,))
+        soups.append(soup if placed.joints is not None else soup.transformed(placed.matrix[:3]))
     return soups
 
 
 def _read_primitive(
-    document: _Document, primitive: Mapping[str, Any], slot: MaterialSlot
+    document: Document, primitive: Mapping[str, Any], look: _Look, placed: PlacedMesh
 ) -> TriangleSoup:
     attributes = primitive["attributes"]
-    positions = _read_accessor(document, attributes["POSITION"], 3).astype(np.float64)
+    positions = read_accessor(document, attributes["POSITION"], 3).astype(np.float64)
     if "indices" in primitive:
-        indices = _read_accessor(document, primitive["indices"], 1).astype(np.int64)[:, 0]
+        indices = read_accessor(document, primitive["indices"], 1).astype(np.int64)[:, 0]
     else:
         indices = np.arange(len(positions))
     faces = _index_triangles(indices, primitive.get("mode", _TRIANGLES))
@@ -219,11 +156,12 @@ def _read_primitive(
         raise ValueError(f"more than {MAX_FACES} triangles")
     if len(faces) and (faces.max() >= len(positions) or faces.min() < 0):
         raise ValueError("an index out of range")
-    uvs = _optional_attribute(document, attributes, "TEXCOORD_0", 2, len(positions))
     normals = _optional_attribute(document, attributes, "NORMAL", 3, len(positions))
-    if uvs is not None:
-        # glTF measures V from the top of the image.
-        uvs = np.stack([uvs[:, 0], 1.0 - uvs[:, 1]], axis=1)
+    positions, normals = _morph(document, primitive, placed.weights, positions, normals)
+    if placed.joints is not None:
+        positions, normals = _skin(document, attributes, placed.joints, positions, normals)
+    uvs = _read_uvs(document, attributes, look, len(positions))
+    slot, colors = _read_colors(document, attributes, look.slot, len(positions))
     zeros = np.zeros(len(faces), dtype=np.int64)
     return TriangleSoup(
         corners=positions[faces],
@@ -232,7 +170,95 @@ def _read_primitive(
         face_slots=zeros,
         face_groups=zeros,
         slots=(slot,),
+        colors=None if colors is None else colors[faces],
     )
+
+
+def _read_uvs(
+    document: Document, attributes: Mapping[str, Any], look: _Look, count: int
+) -> Float64 | None:
+    """Texture coordinates [count, 2] as the material uses them, V from the bottom."""
+    name = f"TEXCOORD_{look.placement.set_index}"
+    uvs = _optional_attribute(document, attributes, name, 2, count)
+    if uvs is None:
+        if look.slot.material.texture:
+            document.remarks.append(f"material '{look.slot.name}': its image needs {name}")
+        return None
+    uvs = look.placement.apply(uvs) if look.placement != _Placement() else uvs
+    if look.ends and (uvs.min() < -_BEYOND or uvs.max() > 1.0 + _BEYOND):
+        document.remarks.append(f"material '{look.slot.name}': images repeat beyond their borders")
+    # glTF measures V from the top of the image.
+    return np.stack([uvs[:, 0], 1.0 - uvs[:, 1]], axis=1)
+
+
+def _read_colors(
+    document: Document, attributes: Mapping[str, Any], slot: MaterialSlot, count: int
+) -> tuple[MaterialSlot, Float64 | None]:
+    """Linear RGB [count, 3] of COLOR_0, and the slot: the default material becomes white."""
+    if "COLOR_0" not in attributes:
+        return slot, None
+    accessor = document.item("accessors", attributes["COLOR_0"], "accessor")
+    width = 4 if accessor.get("type") == "VEC4" else 3
+    colors = _optional_attribute(document, attributes, "COLOR_0", width, count)
+    assert colors is not None
+    if accessor.get("componentType") != 5126 and not accessor.get("normalized"):
+        colors = colors / (255.0 if accessor.get("componentType") == 5121 else 65535.0)
+    if not np.isfinite(colors).all():
+        raise ValueError("a colour that is not finite")
+    if width == 4 and colors[:, 3].min() < 0.99:
+        document.remarks.append("the opacity of vertices (COLOR_0) is not used")
+    slot = slot if slot.from_file else replace(slot, material=WHITE, from_file=True)
+    return slot, np.clip(colors[:, :3], 0.0, 1.0)
+
+
+def _morph(
+    document: Document,
+    primitive: Mapping[str, Any],
+    weights: tuple[float, ...],
+    positions: Float64,
+    normals: Float64 | None,
+) -> tuple[Float64, Float64 | None]:
+    """Add the morph targets by their weights at rest."""
+    for weight, target in zip(weights, primitive.get("targets", ()), strict=False):
+        if weight == 0.0 or "POSITION" not in target:
+            continue
+        moved = read_accessor(document, target["POSITION"], 3)
+        if len(moved) != len(positions):
+            raise ValueError("a morph target of another size")
+        # The deformed surface gets normals of its triangles.
+        positions, normals = positions + weight * moved, None
+    return positions, normals
+
+
+def _skin(
+    document: Document,
+    attributes: Mapping[str, Any],
+    joints: Float64,
+    positions: Float64,
+    normals: Float64 | None,
+) -> tuple[Float64, Float64 | None]:
+    """Positions and normals [n, 3] moved by the joints, by up to eight weights each."""
+    total = np.zeros((len(positions), 4, 4))
+    for k in (0, 1):
+        if f"JOINTS_{k}" not in attributes:
+            continue
+        numbers = _optional_attribute(document, attributes, f"JOINTS_{k}", 4, len(positions))
+        weights = _optional_attribute(document, attributes, f"WEIGHTS_{k}", 4, len(positions))
+        if numbers is None or weights is None:
+            raise ValueError(f"JOINTS_{k} without WEIGHTS_{k}")
+        if numbers.min() < 0 or numbers.max() >= len(joints):
+            raise ValueError("a joint out of range")
+        for column in range(4):
+            chosen = numbers[:, column].astype(np.int64)
+            total += weights[:, column, None, None] * joints[chosen]
+    sums = total[:, 3, 3]
+    if not (np.abs(sums) > 1e-6).all():
+        raise ValueError("vertices of a skin without weights")
+    total = total / sums[:, None, None]
+    moved = np.einsum("nij,nj->ni", total[:, :3, :3], positions, optimize=False) + total[:, :3, 3]
+    if normals is not None:
+        normals = np.einsum("nij,nj->ni", total[:, :3, :3], normals, optimize=False)
+    return moved, normals
 
 
 def _index_triangles(indices: Int64, mode: int) -> Int64:
@@ -247,62 +273,17 @@ def _index_triangles(indices: Int64, mode: int) -> Int64:
 
 
 def _optional_attribute(
-    document: _Document, attributes: Mapping[str, Any], name: str, width: int, count: int
+    document: Document, attributes: Mapping[str, Any], name: str, width: int, count: int
 ) -> Float64 | None:
     if name not in attributes:
         return None
-    values = _read_accessor(document, attributes[name], width).astype(np.float64)
+    values = read_accessor(document, attributes[name], width).astype(np.float64)
     if len(values) != count:
         raise ValueError(f"{name} has {len(values)} entries for {count} positions")
     return values
 
 
-def _read_accessor(document: _Document, index: Any, width: int) -> NDArray[Any]:
-    """Values of an accessor [count, width]; normalized integers become floats."""
-    accessor = _get_item(_get_list(document, "accessors"), index, "accessor")
-    if "sparse" in accessor or "bufferView" not in accessor:
-        raise ValueError(f"accessor {index} is sparse or empty, which is not supported")
-    view = _get_item(_get_list(document, "bufferViews"), accessor["bufferView"], "buffer view")
-    data = _view_bytes(document, view)
-    dtype = np.dtype(_COMPONENTS[accessor["componentType"]])
-    if _WIDTHS.get(accessor["type"]) != width:
-        raise ValueError(f"accessor {index} has type {accessor['type']}")
-    offset, count = int(accessor.get("byteOffset", 0)), int(accessor["count"])
-    item = dtype.itemsize * width
-    stride = int(view.get("byteStride", 0)) or item
-    if count < 1 or offset < 0 or stride < item or offset + stride * (count - 1) + item > len(data):
-        raise ValueError(f"accessor {index} exceeds its buffer")
-    values: NDArray[Any] = np.ndarray((count, width), dtype, data, offset, (stride, dtype.itemsize))
-    if accessor.get("normalized") and dtype.kind in "iu":
-        values = np.maximum(values / np.iinfo(dtype).max, -1.0)
-    return values
-
-
-def _view_bytes(document: _Document, view: Mapping[str, Any]) -> bytes:
-    number = view["buffer"]
-    if number not in document.buffers:
-        buffer = _get_item(_get_list(document, "buffers"), number, "buffer")
-        document.buffers[number] = (
-            _read_uri(document, buffer["uri"]) if "uri" in buffer else document.binary
-        )
-    data = document.buffers[number]
-    offset, length = int(view.get("byteOffset", 0)), int(view["byteLength"])
-    if offset < 0 or length < 0 or offset + length > len(data):
-        raise ValueError("a buffer view exceeds its buffer")
-    return data[offset : offset + length]
-
-
-def _read_uri(document: _Document, uri: str) -> bytes:
-    if not uri.startswith("data:"):
-        relative = document.folder.refer(document.relative, unquote(uri))
-        return document.folder.read(relative)
-    try:
-        return base64.b64decode(uri.partition(",")[2], validate=True)
-    except binascii.Error:
-        raise ValueError("a data URI that is not base64") from None
-
-
-def _make_slot(document: _Document, description: Mapping[str, Any]) -> MaterialSlot:
+def _make_look(document: Document, description: Mapping[str, Any]) -> _Look:
     place = f"{document.folder.root / document.relative}"
 
     def pixels(name: str) -> UInt8:
@@ -312,22 +293,87 @@ def _make_slot(document: _Document, description: Mapping[str, Any]) -> MaterialS
     name = str(description.get("name", ""))
     images = Images(lambda reference: _image_name(document, reference), cache(pixels))
     try:
-        return MaterialSlot(name, gltf_material(description, images), from_file=True)
+        placement, described = _place_images(document, description)
+        material, unused = gltf_material(described, images)
     except ValueError as error:
         raise ValueError(f"material '{name[:40]}': {error}") from None
+    document.remarks += [f"material '{name[:40]}': {text}" for text in unused]
+    ends = bool(material.texture) and any(_ends(document, r) for _, r in _references(described))
+    return _Look(MaterialSlot(name, material, from_file=True), placement, ends)
 
 
-def _image_name(document: _Document, reference: Mapping[str, Any]) -> str:
+def _ends(document: Document, reference: Mapping[str, Any]) -> bool:
+    """Whether a texture does not repeat."""
+    texture = document.item("textures", reference["index"], "texture")
+    if "sampler" not in texture:
+        return False
+    sampler = document.item("samplers", texture["sampler"], "sampler")
+    return any(sampler.get(key, _REPEAT) != _REPEAT for key in ("wrapS", "wrapT"))
+
+
+def _references(
+    description: Mapping[str, Any],
+) -> Iterator[tuple[tuple[str, ...], Mapping[str, Any]]]:
+    """Yield path and reference of the textures that a material maps to the surface."""
+    for path in _REFERENCES:
+        reference: Any = description
+        for key in path:
+            reference = reference.get(key, {})
+        if reference:
+            yield path, reference
+
+
+def _place_images(
+    document: Document, description: Mapping[str, Any]
+) -> tuple[_Placement, Mapping[str, Any]]:
+    """Placement of a material's images, and the material without images that lie otherwise.
+
+    A mesh has one set of texture coordinates here.
+    """
+    placements = {path: _read_placement(found) for path, found in _references(description)}
+    chosen = next(iter(placements.values()), _Placement())
+    for path, placement in placements.items():
+        if placement != chosen:
+            description = _without(description, path)
+            document.remarks.append(
+                f"material '{str(description.get('name', ''))[:40]}': {path[-1]} is not used: it "
+                "has other texture coordinates than the first image"
+            )
+    return chosen, description
+
+
+def _without(tree: Mapping[str, Any], path: tuple[str, ...]) -> dict[str, Any]:
+    """A copy of a tree without the value at a path."""
+    if len(path) == 1:
+        return {key: value for key, value in tree.items() if key != path[0]}
+    return {**tree, path[0]: _without(tree[path[0]], path[1:])}
+
+
+def _read_placement(reference: Mapping[str, Any]) -> _Placement:
+    transform = reference.get("extensions", {}).get("KHR_texture_transform", {})
+    u, v = (float(x) for x in transform.get("offset", (0.0, 0.0)))
+    width, height = (float(x) for x in transform.get("scale", (1.0, 1.0)))
+    number = transform.get("texCoord", reference.get("texCoord", 0))
+    return _Placement(int(number), (u, v), float(transform.get("rotation", 0.0)), (width, height))
+
+
+def _image_name(document: Document, reference: Mapping[str, Any]) -> str:
     """Name of a texture reference's image: its path, or the number of an embedded image."""
-    texture = _get_item(_get_list(document, "textures"), reference["index"], "texture")
+    texture = document.item("textures", reference["index"], "texture")
     number = texture.get("source")
-    image = _get_item(_get_list(document, "images"), number, "image")
+    if number is None:
+        further = texture.get("extensions", {})
+        number = further.get("EXT_texture_webp", {}).get("source")
+        if number is None and further:
+            raise ValueError(f"an image of the unsupported kind {next(iter(further))}")
+    image = document.item("images", number, "image")
     if "uri" in image and not image["uri"].startswith("data:"):
-        return document.folder.refer(document.relative, unquote(image["uri"]))
+        uri = unquote(image["uri"])
+        return locate_file(document.folder, document.relative, uri, document.remarks)
     name = str(number)
     if "uri" in image:
-        document.images[name] = _read_uri(document, image["uri"])
+        document.images[name] = read_uri(document, image["uri"])
     else:
-        view = _get_item(_get_list(document, "bufferViews"), image["bufferView"], "buffer view")
-        document.images[name] = _view_bytes(document, view)
+        view = document.item("bufferViews", image["bufferView"], "buffer view")
+        document.images[name] = view_bytes(document, view)
     return name

@@ -1,14 +1,16 @@
 """Materials of glTF 2.0 and of the extensions that this project's materials can express.
 
 Supported are pbrMetallicRoughness, normal, occlusion and emissive textures, alpha modes, and
-KHR_materials_emissive_strength, _clearcoat, _transmission, _diffuse_transmission, _volume and _ior.
+KHR_materials_emissive_strength, _clearcoat, _transmission, _diffuse_transmission, _volume, _ior,
+_specular (its factor) and _pbrSpecularGlossiness.
 An extension's factor is multiplied by the mean of its image, if it has one. Uniform images become a
 number.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -38,14 +40,20 @@ class Images:
     pixels: Callable[[str], UInt8]
 
 
-def gltf_material(description: Mapping[str, Any], images: Images) -> Material:
-    """Convert a glTF material.
+def gltf_material(
+    description: Mapping[str, Any], images: Images
+) -> tuple[Material, tuple[str, ...]]:
+    """Convert a glTF material, and list what of it is not used.
 
     Raises:
         ValueError: if a value is out of range; the message names it.
     """
-    pbr = description.get("pbrMetallicRoughness", {})
     further = description.get("extensions", {})
+    glossy = further.get("KHR_materials_pbrSpecularGlossiness")
+    pbr = description.get("pbrMetallicRoughness", {})
+    if glossy is not None:
+        pbr = _specular_glossiness(glossy, images)
+    unused = tuple(f"{key} {_UNUSED[key]}" for key in sorted(further) if key in _UNUSED)
     *color, alpha = (float(c) for c in pbr.get("baseColorFactor", (1.0, 1.0, 1.0, 1.0)))
     passed, transmitted = _read_diffuse_transmission(further, pbr, images)
     # What a thin sheet transmits is missing in its reflection.
@@ -58,6 +66,9 @@ def gltf_material(description: Mapping[str, Any], images: Images) -> Material:
     coat = further.get("KHR_materials_clearcoat", {})
     clear = further.get("KHR_materials_transmission", {})
     thickness = float(further.get("KHR_materials_volume", {}).get("thicknessFactor", 0.0))
+    shine = fraction(
+        further.get("KHR_materials_specular", {}).get("specularFactor", 1.0), "specularFactor"
+    )
     ior = clamp_min(1.0, further.get("KHR_materials_ior", {}).get("ior", 1.5), "ior")
     maps = TextureMaps(
         albedo=_image_name(pbr, "baseColorTexture", images),
@@ -69,11 +80,11 @@ def gltf_material(description: Mapping[str, Any], images: Images) -> Material:
         emission=glow,
         cutoff=cutoff,
     )
-    return Material(
+    material = Material(
         base_color=(red, green, blue),
         roughness=roughness,
         metallic=metallic,
-        specular=round(min(((ior - 1.0) / (ior + 1.0)) ** 2 / 0.08, 1.0), 4),
+        specular=round(min(((ior - 1.0) / (ior + 1.0)) ** 2 / 0.08 * shine, 1.0), 4),
         texture=maps.name(),
         emission_cd_m2=emission,
         coat=_read_factor(coat, "clearcoat", 0.0, 0, images),
@@ -84,6 +95,64 @@ def gltf_material(description: Mapping[str, Any], images: Images) -> Material:
         opacity=opacity,
         diffuse_transmission=transmitted,
     )
+    return material, unused
+
+
+_UNUSED = {
+    "KHR_materials_anisotropy": "is not used",
+    "KHR_materials_dispersion": "is not used",
+    "KHR_materials_iridescence": "is not used",
+    "KHR_materials_sheen": "is not used",
+    "KHR_materials_unlit": "is not used: it is lit like other surfaces",
+}
+"""Extensions of materials that have no equivalent here."""
+
+
+def _specular_glossiness(glossy: Mapping[str, Any], images: Images) -> dict[str, Any]:
+    """The pbrMetallicRoughness that looks like a pbrSpecularGlossiness.
+
+    Source: Khronos, KHR_materials_pbrSpecularGlossiness, "convert between workflows": the metalness
+    solves the equality of brightness; images enter by their means.
+    """
+    diffuse = [float(c) for c in glossy.get("diffuseFactor", (1.0, 1.0, 1.0, 1.0))]
+    specular = [fraction(c, "specularFactor") for c in glossy.get("specularFactor", (1.0,) * 3)]
+    gloss = fraction(glossy.get("glossinessFactor", 1.0), "glossinessFactor")
+    image = _image_name(glossy, "specularGlossinessTexture", images)
+    if image:
+        pixels = images.pixels(image)
+        mean = _mean_color(image, images)
+        specular = [a * b for a, b in zip(specular, mean, strict=True)]
+        gloss *= float(pixels[..., 3].mean()) / 255.0 if pixels.shape[2] == 4 else 1.0
+    base = _mean_color(_image_name(glossy, "diffuseTexture", images), images)
+    whole = [a * b for a, b in zip(diffuse[:3], base, strict=True)]
+    metallic = _solve_metallic(_brightness(whole), _brightness(specular), 1.0 - max(specular))
+    described: dict[str, Any] = {
+        "baseColorFactor": diffuse,
+        "metallicFactor": 0.0,
+        "roughnessFactor": round(1.0 - gloss, 4),
+    }
+    if metallic > 0.5:
+        # A metal: its colour is that of its reflection.
+        return {**described, "baseColorFactor": [*specular, diffuse[3]], "metallicFactor": 1.0}
+    if "diffuseTexture" in glossy:
+        described["baseColorTexture"] = glossy["diffuseTexture"]
+    return described
+
+
+def _brightness(color: Sequence[float]) -> float:
+    """Perceived brightness (weights of Rec. 601), as in the source."""
+    r, g, b = color
+    return math.sqrt(0.299 * r * r + 0.587 * g * g + 0.114 * b * b)
+
+
+def _solve_metallic(diffuse: float, specular: float, kept: float) -> float:
+    """Metalness for brightnesses of both reflections and the share of light not reflected."""
+    dielectric = 0.04
+    if specular < dielectric:
+        return 0.0
+    b = diffuse * kept / (1.0 - dielectric) + specular - 2.0 * dielectric
+    root = math.sqrt(max(b * b - 4.0 * dielectric * (dielectric - specular), 0.0))
+    return min(max((-b + root) / (2.0 * dielectric), 0.0), 1.0)
 
 
 def _read_channel(
@@ -115,13 +184,13 @@ def _read_alpha(
     if mode == "MASK":
         # The threshold applies to image times factor; here the image alone is compared.
         needed = min(cutoff / max(factor, 1e-6), 1.0)
-        return (f"{name}!3" if seen else "", needed, 1.0)
+        return (f"{name}!3" if seen else "", needed, 1.0 if factor >= cutoff else 0.0)
     if mode != "BLEND":
         return "", 0.5, 1.0
     if cover is None or not seen:
         return "", 0.5, round(factor, 4)
     covered = cover[..., 3][cover[..., 3] >= _MIN_COVERAGE]
-    mean = float(covered.mean()) / 255.0 if covered.size else 1.0
+    mean = float(covered.mean()) / 255.0 if covered.size else 0.0
     holes = bool(covered.size < cover[..., 3].size)
     return (f"{name}!3" if holes else "", _MIN_COVERAGE / 255.0, round(factor * mean, 4))
 

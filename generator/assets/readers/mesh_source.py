@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from pathlib import PurePosixPath
 
-from gen_data.generator.assets.triangle_soup import TriangleSoup
+import numpy as np
+
+from gen_data.generator.assets.asset_folder import Folder
+from gen_data.generator.assets.triangle_soup import Int64, TriangleSoup
+from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.colorimetry import srgb_decode
 from gen_data.generator.core.errors import AssetError
 from gen_data.generator.core.se3 import Vec3
 
 MAX_FACES = 5_000_000
+WHITE = Material(base_color=(1.0, 1.0, 1.0))
+"""Material of geometry that has colours per vertex only."""
 EVEN = 3.0
 """Image channels with a smaller standard deviation [1/255] count as uniform."""
 
@@ -24,11 +31,13 @@ class MeshSource:
         soup: Its triangles. ``Material.texture`` is an image's path relative to the folder, or a
             key of ``images``.
         images: ``{key: encoded image}`` of images inside the file itself.
+        remarks: What the file holds and the soup does not, one phrase each.
         up: Axis that the file states as up, ``x``, ``y`` or ``z``; empty = it states none.
     """
 
     soup: TriangleSoup
     images: Mapping[str, bytes] = field(default_factory=dict)
+    remarks: tuple[str, ...] = ()
     up: str = ""
 
 
@@ -36,6 +45,56 @@ def check_face_count(count: int, place: str) -> None:
     """Raise AssetError if a file has more than ``MAX_FACES`` triangles."""
     if count > MAX_FACES:
         raise AssetError(f"{place}: {count} triangles, at most {MAX_FACES}; decimate it")
+
+
+def split_fans(sizes: Int64) -> Int64:
+    """Corner indices [m, 3] of the fan triangles of polygons with the given corner counts."""
+    starts = np.cumsum(sizes) - sizes
+    counts = np.maximum(sizes - 2, 0)
+    first = np.repeat(starts, counts)
+    step = np.arange(int(counts.sum())) - np.repeat(np.cumsum(counts) - counts, counts)
+    return np.stack([first, first + step + 1, first + step + 2], axis=1)
+
+
+def locate_file(folder: Folder, base: str, reference: str, remarks: list[str] | None = None) -> str:
+    """Path of a file that ``base`` refers to, as it is written where it exists.
+
+    Else a file of that name beside ``base``, or of that name in other case, is taken: files are
+    moved from computers with other paths, and some systems do not tell cases apart.
+
+    Raises:
+        AssetError: if it is a URL, absolute or outside, and no such file is beside ``base``.
+    """
+    name = PurePosixPath(reference.replace("\\", "/")).name
+    path, refusal = "", None
+    try:
+        path = folder.refer(base, reference)
+    except AssetError as error:
+        refusal = error
+    if not path or not folder.exists(path):
+        beside = next((p for p in _candidates(folder, base, path, name) if folder.exists(p)), "")
+        if beside and remarks is not None:
+            remarks.append(f"'{reference[:120]}' is not there; {beside} is used instead")
+        path = beside or path
+    if not path and refusal is not None:
+        raise refusal
+    return path
+
+
+def _candidates(folder: Folder, base: str, path: str, name: str) -> Iterator[str]:
+    """Paths to try for a missing file: in other case, then beside the file that refers to it."""
+    beside = str(PurePosixPath(base).parent / name) if name else ""
+    for wanted in dict.fromkeys((path, beside)):
+        if not wanted:
+            continue
+        yield wanted
+        parent = PurePosixPath(wanted).parent
+        try:
+            entries = sorted(path.name for path in folder.path(str(parent)).iterdir())
+        except (OSError, AssetError):
+            continue
+        key = PurePosixPath(wanted).name.casefold()
+        yield from (str(parent / entry) for entry in entries if entry.casefold() == key)
 
 
 def fraction(value: object, name: str) -> float:

@@ -1,7 +1,8 @@
 """OpenUSD: text and binary layers, and usdz archives.
 
-Supported are meshes, subsets, UsdPreviewSurface with images, transforms, instances, unit and up
-axis. Nothing outside the asset folder is opened: references of layers are checked beforehand.
+Supported are meshes, primitive shapes, subsets, UsdPreviewSurface with images, display colours,
+transforms, instances, unit and up axis. Nothing outside the asset folder is opened: references of
+layers are checked beforehand.
 """
 
 from __future__ import annotations
@@ -60,18 +61,26 @@ class StageFile:
     def source(self, pieces: tuple[StagePart, ...], *, materials: bool = True) -> MeshSource:
         """Read some of its meshes, each as a group."""
         images: dict[str, bytes] = {}
-        soups = []
+        soups, remarks = [], [*self.stage.remarks.values()]
         for piece in pieces:
             mesh = self.stage.mesh(piece)
+            remarks += mesh.remarks
             slots = tuple(
                 self._make_slot(k, images) if materials else MaterialSlot() for k in mesh.materials
             )
             zeros = np.zeros(len(mesh.corners), dtype=np.int64)
             soup = TriangleSoup(
-                mesh.corners, mesh.uvs, mesh.normals, mesh.face_slots, zeros, slots, (piece.name,)
+                corners=mesh.corners,
+                uvs=mesh.uvs,
+                normals=mesh.normals,
+                face_slots=mesh.face_slots,
+                face_groups=zeros,
+                slots=slots,
+                group_names=(piece.name,),
+                colors=mesh.colors if materials else None,
             )
             soups.append(soup.transformed(piece.T_stage_prim[:3]))
-        return MeshSource(join_soups(soups), images)
+        return MeshSource(join_soups(soups), images, tuple(dict.fromkeys(remarks)))
 
     def _make_slot(self, bound: BoundMaterial, images: dict[str, bytes]) -> MaterialSlot:
         roughness, rough_map = self._factor_or_channel(

@@ -1,0 +1,185 @@
+"""What is seen in a file and not used is told: by checks, plans, ``init`` and generation."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+from PIL import Image
+
+from gen_data.generator.assets.checking import NO_LICENCE, Finding, check_folder
+from gen_data.generator.assets.file_remarks import collect_remarks, warn_of_remarks
+from gen_data.generator.assets.importer import FileRemarks
+from gen_data.generator.assets.library import Library, open_library
+from gen_data.generator.cli.asset_commands import assets
+from gen_data.generator.core.errors import AssetError, AssetWarning
+
+TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\n"
+FACE = "f 1/1 2/2 3/3\n"
+STL = "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid a\n"  # noqa: E501
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A folder with an OBJ whose MTL has a height image, which is not used."""
+    root = tmp_path / "props"
+    root.mkdir()
+    (root / "a.obj").write_text(f"mtllib a.mtl\n{TRIANGLE}usemtl m\n{FACE}l 1 2\n")
+    (root / "a.mtl").write_text("newmtl m\nKd 1 0 0\nmap_Bump rough.png\n")
+    return root
+
+
+def opened(folder: Path) -> Library:
+    return open_library((folder,), folder.parent / "cache", folder.parent / "packs")
+
+
+def findings(folder: Path) -> dict[str, Finding]:
+    return {f.asset_id: f for f in check_folder(folder, opened(folder))}
+
+
+REMARKS = ("material 'm': map_Bump (a height image) is not used", "lines are not read")
+
+
+def test_remarks_name_the_file_and_survive_the_cache(folder: Path) -> None:
+    """A second library reads them from the cache, without the reader."""
+    expected = (FileRemarks(str(folder / "a.obj"), REMARKS),)
+    assert opened(folder).remarks("user/a", read=False) is None
+    assert opened(folder).remarks("user/a") == expected
+    assert opened(folder).remarks("user/a", read=False) == expected
+
+
+def test_check_lists_remarks_and_still_succeeds(folder: Path) -> None:
+    """The picture is right but for what is listed."""
+    result = CliRunner().invoke(assets, ["check", str(folder)])
+    assert result.exit_code == 0, result.output
+    for text in REMARKS:
+        assert f"{folder / 'a.obj'}: {text}" in result.output
+    assert NO_LICENCE in result.output
+
+
+@pytest.mark.parametrize(
+    ("files", "reason"),
+    [
+        ({"a.mtl": "newmtl m\nmap_Kd gone.png\n"}, "gone.png: no such image"),
+        ({"a.mtl": "newmtl m\nmap_Kd t.png\n", "t.png": "text"}, "t.png: unreadable image"),
+        ({"a.mtl": "newmtl other\nKd 1 0 0\n"}, "material 'm' is not defined in a.mtl"),
+    ],
+    ids=["missing image", "no image", "unknown material"],
+)
+def test_check_refuses_what_would_look_wrong(
+    folder: Path, files: dict[str, str], reason: str
+) -> None:
+    """Each is found without rendering anything, and ends with exit code 3."""
+    for name, text in files.items():
+        (folder / name).write_text(text)
+    result = CliRunner().invoke(assets, ["check", str(folder)])
+    assert isinstance(result.exception, AssetError)
+    assert reason in findings(folder)["user/a"].error
+
+
+def test_warnings_are_given_once_per_file(folder: Path) -> None:
+    """Not again for what was told before, and not for generated assets."""
+    library = opened(folder)
+    with pytest.warns(AssetWarning, match="map_Bump") as told:
+        known = warn_of_remarks(library, ["user/a", "mug?seed=3"])
+    assert len(told) == 1
+    assert known == {str(folder / "a.obj")}
+    assert warn_of_remarks(library, ["user/a"], told=known) == known
+
+
+def test_large_folders_are_not_read_for_their_remarks(folder: Path) -> None:
+    """With none to read, only what was imported before is known."""
+    assert collect_remarks(opened(folder), ["user/a"], read_max=0) == ()
+    opened(folder).mesh("user/a")
+    assert len(collect_remarks(opened(folder), ["user/a"], read_max=0)) == 1
+
+
+def test_files_of_one_stem_are_told_apart(folder: Path) -> None:
+    """YCB's folders: both have their suffix in their ids; the category is the object's folder."""
+    ycb = folder / "003_cracker_box" / "google_16k"
+    ycb.mkdir(parents=True)
+    (ycb / "textured.obj").write_text(TRIANGLE + FACE)
+    (ycb / "nontextured.stl").write_text(STL)
+    (ycb / "nontextured.ply").write_text("ply\nformat ascii 1.0\nend_header\n")
+    found = findings(folder)
+    base = "user/003_cracker_box/google_16k"
+    assert sorted(found) == [
+        f"{base}/nontextured.ply", f"{base}/nontextured.stl", f"{base}/textured", "user/a",
+    ]  # fmt: skip
+    assert [name for name, f in found.items() if f.error] == [f"{base}/nontextured.ply"]
+    assert {f.category for name, f in found.items() if name != "user/a"} == {"003_cracker_box"}
+    assert opened(folder).mesh(f"{base}/nontextured.stl").materials[0].texture == ""
+
+
+@pytest.mark.parametrize(
+    ("file", "category"),
+    [
+        ("Ecoforms_Pot/meshes/model.obj", "Ecoforms_Pot"),
+        ("ycbv/models/obj_000004.ply", "obj_000004"),
+        ("02876657/1071fa4cddb2da2fc8724d5673a063a6/models/model_normalized.obj", "02876657"),
+        ("tools/hammer.stl", "tools"),
+        ("meshes/hammer.stl", "meshes"),
+    ],
+    ids=["Google Scanned Objects", "BOP", "ShapeNet", "own", "only a sorting folder"],
+)
+def test_categories_of_published_layouts(tmp_path: Path, file: str, category: str) -> None:
+    """The nearest folder whose name says something."""
+    path = tmp_path / "props" / file
+    path.parent.mkdir(parents=True)
+    path.write_text(TRIANGLE + FACE if file.endswith(".obj") else STL)
+    (found,) = findings(tmp_path / "props").values()
+    assert found.category == category
+
+
+def test_ids_defined_in_two_folders_are_refused_with_both_files(folder: Path) -> None:
+    """Whose order in the configuration would otherwise decide."""
+    other = folder.parent / "more"
+    other.mkdir()
+    (other / "a.stl").write_text(STL)
+    library = open_library((folder, other), folder.parent / "cache", folder.parent / "packs")
+    with pytest.raises(AssetError, match=rf"{folder}/a\.obj and by {other}/a\.stl"):
+        library.mesh("user/a")
+
+
+def test_show_tells_the_shift_to_the_origin(folder: Path) -> None:
+    """The triangle's box has its middle at (0.5, 0.5, 0)."""
+    result = CliRunner().invoke(assets, ["show", "user/a", "--folder", str(folder)])
+    assert "shift_m      -0.5, -0.5, 0" in result.output
+    assert "not used" in result.output
+
+
+def test_digests_cover_images_with_spaces_and_other_case(folder: Path) -> None:
+    """A changed image changes the asset, however the MTL spells it."""
+    (folder / "a.mtl").write_text("newmtl m\nmap_Kd MY wood.PNG\n")
+    Image.new("RGB", (2, 2), (200, 0, 0)).save(folder / "my wood.png")
+    before = opened(folder).get("user/a").sha256
+    Image.new("RGB", (2, 2), (0, 200, 0)).save(folder / "my wood.png")
+    assert opened(folder).get("user/a").sha256 != before
+    texture = opened(folder).mesh("user/a").materials[0].texture
+    assert opened(folder).texture(texture).albedo[0, 0].tolist() == [0, 200, 0]
+
+
+def test_bop_models_state_the_files_origin(folder: Path) -> None:
+    """Added to the coordinates of the file; with ``origin: file``, models keep them."""
+    from gen_data.exporters.rigid_models import Piece, build_model
+    from gen_data.generator.core.se3 import IDENTITY
+
+    for origin, offset, low in (("center", [-500, -500, 0], -500), ("file", [0, 0, 0], 0)):
+        (folder / "assets.yaml").write_text(
+            json.dumps({"assets": [{"file": "a.obj", "id": f"a_{origin}", "origin": origin}]})
+        )
+        model = build_model([Piece(f"user/a_{origin}", 1.0, IDENTITY)], opened(folder))
+        assert model.info["file_origin_mm"] == offset
+        assert float(model.vertices["x"].min()) == low
+
+
+@pytest.mark.parametrize("name", ["part[1].obj", "a b.obj", "ü.obj", f"{'long' * 40}.obj"])
+def test_any_name_of_a_file_is_listed(tmp_path: Path, name: str) -> None:
+    """Names that are patterns, hold spaces or accents, or are longer than an id in an index."""
+    root = tmp_path / "props"
+    root.mkdir()
+    (root / name).write_text(TRIANGLE + FACE)
+    (found,) = findings(root).values()
+    assert (found.triangles, found.error) == (1, "")

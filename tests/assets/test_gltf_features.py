@@ -1,0 +1,297 @@
+"""glTF as its makers mean it: extensions, second texture sets, colours, skins, sparse values.
+
+Files are built here; expected values follow from the specification of glTF 2.0 and its extensions.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from PIL import Image
+
+from gen_data.generator.assets.asset_folder import Folder
+from gen_data.generator.assets.folder_index import MeshEntry
+from gen_data.generator.assets.importer import import_object
+from gen_data.generator.assets.readers import MeshSource, read_mesh
+from gen_data.generator.core.errors import AssetError
+
+POINTS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], "<f4")
+UVS = np.array([[0.0, 0.0], [0.25, 0.0], [0.0, 0.5]], "<f4")
+_TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
+_COMPONENTS = {"f4": 5126, "u1": 5121, "u2": 5123}
+
+
+class Builder:
+    """A glTF document of one triangle, with its buffer beside it."""
+
+    def __init__(self) -> None:
+        self.data = b""
+        self.tree: dict[str, Any] = {
+            "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}],
+            "nodes": [{"mesh": 0}], "bufferViews": [], "accessors": [],
+        }  # fmt: skip
+        self.attributes = {"POSITION": self.accessor(POINTS)}
+        self.primitive: dict[str, Any] = {"attributes": self.attributes}
+        self.tree["meshes"] = [{"primitives": [self.primitive]}]
+
+    def view(self, values: NDArray[Any]) -> int:
+        self.data += b"\0" * (-len(self.data) % 4)
+        view = {"buffer": 0, "byteOffset": len(self.data), "byteLength": values.nbytes}
+        self.data += values.tobytes()
+        self.tree["bufferViews"].append(view)
+        return len(self.tree["bufferViews"]) - 1
+
+    def accessor(self, values: NDArray[Any], **more: Any) -> int:
+        width = values.shape[1] if values.ndim == 2 else 1
+        self.tree["accessors"].append(
+            {"bufferView": self.view(values), "componentType": _COMPONENTS[values.dtype.str[1:]],
+             "count": len(values), "type": _TYPES[width], **more}
+        )  # fmt: skip
+        return len(self.tree["accessors"]) - 1
+
+    def textured(self, folder: Path, **reference: Any) -> dict[str, Any]:
+        """A material with an image of its own; returns it."""
+        Image.new("RGB", (2, 2), (200, 0, 0)).save(folder / "i.png")
+        self.tree |= {"images": [{"uri": "i.png"}], "textures": [{"source": 0}]}
+        pbr = {"baseColorTexture": {"index": 0, **reference}, "metallicFactor": 0}
+        return self.material(pbrMetallicRoughness=pbr)
+
+    def material(self, **content: Any) -> dict[str, Any]:
+        self.tree["materials"] = [{"name": "m", **content}]
+        self.primitive["material"] = 0
+        return self.tree["materials"][0]
+
+    def read(self, folder: Path) -> MeshSource:
+        self.write(folder)
+        return read_mesh(Folder(folder), "a.gltf")
+
+    def write(self, folder: Path) -> None:
+        self.tree["buffers"] = [{"byteLength": len(self.data), "uri": "a.bin"}]
+        (folder / "a.bin").write_bytes(self.data)
+        (folder / "a.gltf").write_text(json.dumps(self.tree))
+
+
+@pytest.fixture
+def builder() -> Builder:
+    return Builder()
+
+
+def test_texture_transforms_scale_turn_and_move(builder: Builder, tmp_path: Path) -> None:
+    """(u, v) from the top: scaled by (2, 4), a quarter turn counter-clockwise, moved by (0.1, 0.2).
+
+    A quarter turn in the image, whose V points down, takes +U to -V and +V to +U.
+    """
+    builder.attributes["TEXCOORD_0"] = builder.accessor(UVS)
+    transform = {"offset": [0.1, 0.2], "rotation": np.pi / 2, "scale": [2, 4]}
+    builder.textured(tmp_path, extensions={"KHR_texture_transform": transform})
+    builder.tree["extensionsRequired"] = ["KHR_texture_transform"]
+    uvs = builder.read(tmp_path).soup.uvs
+    assert uvs is not None
+    from_top = np.array([[0.1, 0.2], [0.1, 0.2 - 0.5], [0.1 + 2.0, 0.2]])
+    assert uvs[0] == pytest.approx(np.stack([from_top[:, 0], 1 - from_top[:, 1]], axis=1))
+
+
+def test_the_second_set_of_texture_coordinates(builder: Builder, tmp_path: Path) -> None:
+    """``texCoord: 1``; an occlusion image in set 0 is named and left out."""
+    builder.attributes["TEXCOORD_0"] = builder.accessor(UVS)
+    builder.attributes["TEXCOORD_1"] = builder.accessor(UVS + np.float32(0.5))
+    builder.textured(tmp_path, texCoord=1)["occlusionTexture"] = {"index": 0}
+    source = builder.read(tmp_path)
+    assert source.soup.uvs is not None
+    assert source.soup.uvs[0][:, 0] == pytest.approx([0.5, 0.75, 0.5])
+    assert source.soup.slots[0].material.texture == "i.png"
+    assert any("occlusionTexture is not used" in text for text in source.remarks)
+
+
+@pytest.mark.parametrize("kind", ["f4", "u1", "u2"])
+def test_vertex_colours_are_linear_and_may_be_integers(
+    builder: Builder, tmp_path: Path, kind: str
+) -> None:
+    """COLOR_0 red, green, blue."""
+    top = {"f4": 1, "u1": 255, "u2": 65535}[kind]
+    colors = (np.eye(4)[:3] * top).astype(f"<{kind}")
+    colors[:, 3] = top
+    builder.attributes["COLOR_0"] = builder.accessor(colors, normalized=kind != "f4")
+    soup = builder.read(tmp_path).soup
+    assert soup.colors is not None
+    assert soup.colors[0].tolist() == np.eye(3).tolist()
+    assert soup.slots[0].material.base_color == (1.0, 1.0, 1.0)
+
+
+def test_instances_are_placed_turned_and_scaled(builder: Builder, tmp_path: Path) -> None:
+    """Three copies; the last one is turned by half about Z and twice as large."""
+    moves = np.array([[0, 0, 0], [2, 0, 0], [4, 0, 0]], "<f4")
+    turns = np.array([[0, 0, 0, 1], [0, 0, 0, 1], [0, 0, 1, 0]], "<f4")
+    sizes = np.array([[1, 1, 1], [1, 1, 1], [2, 2, 2]], "<f4")
+    rows = {"TRANSLATION": moves, "ROTATION": turns, "SCALE": sizes}
+    attributes = {name: builder.accessor(values) for name, values in rows.items()}
+    builder.tree["nodes"][0]["extensions"] = {"EXT_mesh_gpu_instancing": {"attributes": attributes}}
+    builder.tree["extensionsUsed"] = ["EXT_mesh_gpu_instancing"]
+    corners = builder.read(tmp_path).soup.corners
+    assert corners[1] == pytest.approx(POINTS + np.array([2, 0, 0]))
+    assert corners[2] == pytest.approx(np.array([[4, 0, 0], [2, 0, 0], [4, -2, 0]]))
+
+
+def test_a_skin_takes_the_place_of_its_nodes_transform(builder: Builder, tmp_path: Path) -> None:
+    """Joint 1 moves by 1 in Y, its bind matrix halves; weights of 1/4 and 3/4 blend both joints."""
+    joints = np.array([[0, 1, 0, 0]] * 3, "<u1")
+    weights = np.array([[0.25, 0.75, 0, 0]] * 3, "<f4")
+    bind = np.stack([np.eye(4), np.diag([0.5, 0.5, 0.5, 1.0])]).astype("<f4")
+    builder.attributes |= {
+        "JOINTS_0": builder.accessor(joints),
+        "WEIGHTS_0": builder.accessor(weights),
+    }
+    matrices = builder.accessor(bind.reshape(-1, 16))
+    builder.tree["nodes"] = [{"mesh": 0, "skin": 0, "scale": [5, 5, 5]}, {"name": "a"},
+                             {"name": "b", "translation": [0, 1, 0]}]  # fmt: skip
+    builder.tree["scenes"] = [{"nodes": [0, 1, 2]}]
+    builder.tree["skins"] = [{"joints": [1, 2], "inverseBindMatrices": matrices}]
+    corners = builder.read(tmp_path).soup.corners[0]
+    assert corners == pytest.approx(0.25 * POINTS + 0.75 * (0.5 * POINTS + [0, 1, 0]))
+
+
+def test_morph_targets_apply_by_their_weights_at_rest(builder: Builder, tmp_path: Path) -> None:
+    """Half of a target that moves all points by 2 in Z."""
+    target = np.tile(np.array([0, 0, 2], "<f4"), (3, 1))
+    builder.primitive["targets"] = [{"POSITION": builder.accessor(target)}]
+    builder.tree["meshes"][0]["weights"] = [0.5]
+    assert builder.read(tmp_path).soup.corners[0][:, 2].tolist() == [1.0, 1.0, 1.0]
+
+
+def test_sparse_accessors_replace_single_values(builder: Builder, tmp_path: Path) -> None:
+    """Point 1 is replaced; without a buffer view, the others are zero."""
+    sparse = {
+        "count": 1,
+        "indices": {"bufferView": builder.view(np.array([1], "<u2")), "componentType": 5123},
+        "values": {"bufferView": builder.view(np.array([7, 8, 9], "<f4"))},
+    }
+    builder.tree["accessors"][0]["sparse"] = sparse
+    assert builder.read(tmp_path).soup.corners[0].tolist() == [[0, 0, 0], [7, 8, 9], [0, 1, 0]]
+    del builder.tree["accessors"][0]["bufferView"]
+    assert builder.read(tmp_path).soup.corners[0].tolist() == [[0, 0, 0], [7, 8, 9], [0, 0, 0]]
+
+
+def test_webp_images_and_hidden_nodes(builder: Builder, tmp_path: Path) -> None:
+    """EXT_texture_webp without a fallback; KHR_node_visibility hides a second triangle."""
+    builder.attributes["TEXCOORD_0"] = builder.accessor(UVS)
+    builder.textured(tmp_path)
+    Image.new("RGB", (2, 2), (200, 0, 0)).save(tmp_path / "i.webp")
+    builder.tree["images"] = [{"uri": "i.webp"}]
+    builder.tree["textures"] = [{"extensions": {"EXT_texture_webp": {"source": 0}}}]
+    hidden = {"mesh": 0, "extensions": {"KHR_node_visibility": {"visible": False}}}
+    builder.tree["nodes"].append(hidden)
+    builder.tree["scenes"] = [{"nodes": [0, 1]}]
+    soup = builder.read(tmp_path).soup
+    assert len(soup) == 1
+    assert soup.slots[0].material.texture == "i.webp"
+
+
+@pytest.mark.parametrize(
+    ("content", "expected"),
+    [
+        ({"diffuseFactor": [0.5, 0.2, 0.1, 1], "specularFactor": [0.04] * 3,
+          "glossinessFactor": 0.25}, ((0.5, 0.2, 0.1), 0.75, 0.0)),
+        # Black, with the reflection of gold: a metal of that colour.
+        ({"diffuseFactor": [0, 0, 0, 1], "specularFactor": [1.0, 0.77, 0.34],
+          "glossinessFactor": 1.0}, ((1.0, 0.77, 0.34), 0.0, 1.0)),
+    ],
+    ids=["plastic", "gold"],
+)  # fmt: skip
+def test_specular_glossiness(
+    builder: Builder, tmp_path: Path, content: dict[str, Any],
+    expected: tuple[tuple[float, float, float], float, float],
+) -> None:  # fmt: skip
+    """Colour, roughness and metalness that look the same."""
+    builder.material(extensions={"KHR_materials_pbrSpecularGlossiness": content})
+    builder.tree["extensionsRequired"] = ["KHR_materials_pbrSpecularGlossiness"]
+    material = builder.read(tmp_path).soup.slots[0].material
+    assert (material.base_color, material.roughness, material.metallic) == expected
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["KHR_materials_", "KHR_materials_sheen", "KHR_texture_transform2", "KHR_texture_basisu"],
+)
+def test_required_extensions_are_compared_by_their_whole_names(
+    builder: Builder, tmp_path: Path, name: str
+) -> None:
+    """What is not applied is refused if it is required, and named if it is used."""
+    builder.tree["extensionsUsed"] = [name]
+    assert builder.read(tmp_path).remarks == (f"the extension {name} is not used",)
+    builder.tree["extensionsRequired"] = [name]
+    with pytest.raises(AssetError, match=f"requires the unsupported {name}"):
+        builder.read(tmp_path)
+
+
+def test_bytes_after_a_binary_file(builder: Builder, tmp_path: Path) -> None:
+    """Padding behind the stated length is named; a file that is too short is refused."""
+    builder.tree["buffers"] = [{"byteLength": len(builder.data)}]
+    text = json.dumps(builder.tree).encode()
+    text += b" " * (-len(text) % 4)
+    chunks = struct.pack("<II", len(text), 0x4E4F534A) + text
+    chunks += struct.pack("<II", len(builder.data), 0x004E4942) + builder.data
+    whole = struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
+    (tmp_path / "a.glb").write_bytes(whole + b"\0\0\0")
+    assert read_mesh(Folder(tmp_path), "a.glb").remarks == ("3 bytes after its end are not read",)
+    (tmp_path / "a.glb").write_bytes(whole[:-1])
+    with pytest.raises(AssetError, match="its header says version 2"):
+        read_mesh(Folder(tmp_path), "a.glb")
+
+
+@pytest.mark.parametrize(
+    "material",
+    [
+        {"alphaMode": "BLEND", "pbrMetallicRoughness": {"baseColorFactor": [1, 0, 0, 0]}},
+        {"alphaMode": "MASK", "pbrMetallicRoughness": {"baseColorFactor": [1, 0, 0, 0.2]}},
+    ],
+    ids=["BLEND", "MASK"],
+)
+def test_what_nobody_sees_is_no_asset(
+    builder: Builder, tmp_path: Path, material: dict[str, Any]
+) -> None:
+    """Alpha 0, or below the threshold of a mask."""
+    builder.material(**material)
+    builder.write(tmp_path)
+    with pytest.raises(AssetError, match="all its materials are fully transparent"):
+        import_object(Folder(tmp_path), MeshEntry(file="a.gltf"), "user/a")
+
+
+def test_animations_lines_and_further_scenes_are_named(builder: Builder, tmp_path: Path) -> None:
+    """None of them changes the triangles at rest."""
+    builder.tree["animations"] = [{"channels": [], "samplers": []}]
+    builder.tree["scenes"].append({"nodes": []})
+    builder.tree["meshes"][0]["primitives"].append({"attributes": builder.attributes, "mode": 1})
+    assert builder.read(tmp_path).remarks == (
+        "1 animations are not used: it is read at rest",
+        "1 further scenes are not read",
+        "lines and points are not read",
+    )
+
+
+@pytest.mark.parametrize(
+    ("data", "reason"),
+    [
+        (b"\xcd\x00\x00\x00binary", "neither like JSON nor like a binary glTF"),
+        (b'{"asset": 3', "malformed glTF"),
+    ],
+)
+def test_files_of_another_kind_are_refused_in_words(
+    tmp_path: Path, data: bytes, reason: str
+) -> None:
+    """Not by the exception of a decoder."""
+    (tmp_path / "a.glb").write_bytes(data)
+    with pytest.raises(AssetError, match=reason):
+        read_mesh(Folder(tmp_path), "a.glb")
+
+
+def test_an_unknown_component_type_is_named(builder: Builder, tmp_path: Path) -> None:
+    """With its number and its accessor."""
+    builder.tree["accessors"][0]["componentType"] = 9999
+    with pytest.raises(AssetError, match="accessor 0 has the unknown componentType 9999"):
+        builder.read(tmp_path)
