@@ -65,6 +65,8 @@ def _start() -> None:
         wp.config.quiet = True
     wp.config.enable_backward = False
     wp.config.cpu_compiler_flags = _COMPILER_FLAGS
+    # Machine code instead of PTX, which each driver would compile again, in its own way.
+    wp.config.cuda_output = "cubin"
     keep_freed_memory()
     with silence_stdio():  # Warp warns about a missing CUDA driver
         wp.init()
@@ -101,9 +103,9 @@ _RECORD_BYTES = 64
 def compile_kernels(device: str) -> None:
     """Fill Warp's cache for a device with the kernels of ``EVERY_FRAME``, if they are missing.
 
-    On the CPU, a bundle of the distribution that fits these kernels, this version of Warp and this
-    platform has those of every frame and all others. Of several processes that find the cache
-    empty, one fills it and the others wait.
+    A bundle of the distribution that fits these kernels, this version of Warp and this platform has
+    those of every frame and all others, on the CPU and perhaps on some kinds of GPUs. Of several
+    processes that find the cache empty, one fills it and the others wait.
 
     Warns:
         CacheWarning: compiled kernels were damaged; they are compiled again.
@@ -120,16 +122,17 @@ def compile_kernels(device: str) -> None:
         if stamp.exists() and not damaged:
             return
         bundle = bundle_folder()
-        if device == "cpu" and bundle.is_dir():
+        if bundle.is_dir():
             copy_modules(bundle, folder)
-        elif cores < 2 or not compile_in_parallel(device, EVERY_FRAME, folder):
+        bundled = device == "cpu" and bundle.is_dir()
+        if not bundled and (cores < 2 or not compile_in_parallel(device, EVERY_FRAME, folder)):
             return
         stamp.touch()
         remove_damaged_modules(folder)
 
 
 def bundle_folder() -> Path:
-    """Folder of the CPU kernels compiled from these sources, by this Warp, on such a platform."""
+    """Folder of the kernels compiled from these sources, by this Warp, on such a platform."""
     _start()
     return BUNDLES / f"{_digest()}-{sys.platform}-{platform.machine().lower()}"
 
@@ -147,7 +150,8 @@ def compile_in_parallel(device: str, names: Sequence[str], folder: Path) -> bool
     """Let one process per core take modules from a pipe; returns whether all succeeded.
 
     Args:
-        device: Warp's name of the device.
+        device: Warp's name of the device; or ``sm_N``, which compiles for GPUs of this kind without
+            having one.
         names: Of the modules, below this package.
         folder: Cache that takes the compiled modules.
     """
@@ -175,7 +179,12 @@ def _compile_queued(device: str, folder: str) -> None:
     # Set afterwards: Warp appends its version to a folder that it starts with.
     wp.config.kernel_cache_dir = folder
     while record := os.read(sys.stdin.fileno(), _RECORD_BYTES):
-        load_kernels(device, [record.decode().strip()])
+        name = record.decode().strip()
+        if device.startswith("sm_"):
+            module = import_module(f"{__package__}.{name}")
+            wp.compile_aot_module(module, arch=int(device.removeprefix("sm_")), use_ptx=False)
+        else:
+            load_kernels(device, [name])
 
 
 def _digest() -> str:

@@ -11,7 +11,7 @@ import warp as wp
 
 from gen_data.generator.renderers.warp.scene.kernels.simd import SIMD
 
-wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 
 # Bounds of an empty lane, which no ray enters.
 NOWHERE = 1.0e30

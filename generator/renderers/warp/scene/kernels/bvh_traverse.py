@@ -16,7 +16,7 @@ import warp as wp
 from gen_data.generator.renderers.warp.scene.kernels.records import BodyRecord, Geometry
 from gen_data.generator.renderers.warp.scene.kernels.simd import SIMD
 
-wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 
 Found = wp.spatial_vectord
 """Intersection of a ray: parameter, weights of a face's first and second corner, face, body

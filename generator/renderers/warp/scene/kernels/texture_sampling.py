@@ -15,7 +15,7 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
     vertex_at,
 )
 
-wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 
 # Mask of every second byte: two bytes are weighted by one multiplication without overlapping.
 EVEN_BYTES = wp.constant(wp.uint32(0x00FF00FF))
