@@ -57,7 +57,7 @@ class Measured:
 def measure(arguments: argparse.Namespace) -> Measured:
     """Run the chosen parts one after another."""
     done = Measured(arguments.json)
-    device, dry = arguments.device, arguments.device == "cpu"
+    device, dry = arguments.device, arguments.device.startswith("cpu")
     limit_s = arguments.limit_s
 
     def one(name: str, function: str, *place: str, **values: Any) -> None:

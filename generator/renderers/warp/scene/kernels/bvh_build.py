@@ -17,7 +17,8 @@ wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll":
 NOWHERE = 1.0e30
 
 _GROW = (
-    "#ifndef __CUDA_ARCH__"  # Trees are built on the CPU; CUDA has Warp's own.
+    # Trees are built on the CPU; CUDA has Warp's own.
+    "#if !defined(__CUDA_ARCH__) && !defined(AS_ON_GPU)"
     + SIMD
     + f"""
     constexpr float NOWHERE = {NOWHERE}f;

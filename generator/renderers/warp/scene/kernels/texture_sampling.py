@@ -159,7 +159,7 @@ def texel_at(world: World, texture: int, s: Sampler, u: float, v: float, bumpy: 
 
 # Native code that samples a texture at four pixels at once, as ``texel_at``; on CUDA at one.
 SAMPLE_QUAD = """
-#ifdef __CUDA_ARCH__
+#if defined(__CUDA_ARCH__) || defined(AS_ON_GPU)
     constexpr int QUAD = 1;
     typedef float Floats;
     typedef int Ints;
