@@ -35,7 +35,7 @@ def open_device(name: str) -> wp.Device:
     """The Warp device named ``auto``, ``cpu``, ``cuda:N`` or, for the first one, ``cuda``.
 
     Raises:
-        ConfigError: the machine has no such device.
+        ConfigError: the machine has no such device, or Warp cannot compile for it.
     """
     _start()
     if name == "auto":
@@ -43,11 +43,42 @@ def open_device(name: str) -> wp.Device:
     name = "cuda:0" if name == "cuda" else name
     known = ["cpu", *(device.alias for device in wp.get_cuda_devices())]
     if name not in known:
+        reason = why_no_gpu()
         raise ConfigError(
-            f"render.device: '{name}' does not exist on this machine; it has {', '.join(known)}."
-            " Choose 'auto' or 'cpu', or install an NVIDIA driver."
+            f"render.device: '{name}' does not exist on this machine; it has {', '.join(known)}"
+            f"{reason and f' ({reason})'}. Choose 'auto' or 'cpu'."
         )
-    return wp.get_device(name)
+    device = wp.get_device(name)
+    toolkit = wp.get_cuda_toolkit_version()
+    if device.is_cuda and toolkit and toolkit >= _CUDA_13 and device.arch < _ARCH_MIN_OF_CUDA_13:
+        raise ConfigError(
+            f"render.device: '{name}' ({device.name}, sm_{device.arch}) is too old for this build"
+            f" of warp-lang; expected sm_{_ARCH_MIN_OF_CUDA_13} or newer. Choose 'cpu', or install"
+            " a build of warp-lang for CUDA 12."
+        )
+    return device
+
+
+_CUDA_13, _ARCH_MIN_OF_CUDA_13 = (13, 0), 75
+"""Turing; source: release notes of CUDA 13.0, "deprecated architectures"."""
+
+
+def why_no_gpu() -> str:
+    """Why Warp finds no GPU on this machine, and the remedy, on one line; empty if it finds one."""
+    _start()
+    if wp.get_cuda_devices():
+        return ""
+    toolkit, driver = wp.get_cuda_toolkit_version(), wp.get_cuda_driver_version()
+    if toolkit is None:
+        return "this build of warp-lang has no CUDA; install the one for Linux or Windows on x86_64"
+    # Drivers run programs of all minor versions of their CUDA.
+    needed = f"{toolkit[0]}.0"
+    if driver is None:
+        return f"no NVIDIA driver was found; install one for CUDA {needed} or newer"
+    if driver < (toolkit[0], 0):
+        known = f"{driver[0]}.{driver[1]}"
+        return f"its NVIDIA driver is for CUDA {known}, but warp-lang needs {needed}; update it"
+    return "the NVIDIA driver shows no device; compare nvidia-smi and CUDA_VISIBLE_DEVICES"
 
 
 def prepare_device(name: str) -> None:

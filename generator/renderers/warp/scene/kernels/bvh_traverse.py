@@ -200,7 +200,9 @@ _IN_MESH_ON_CUDA = """
 """
 
 # Warp 1.19 has an iterator for each kind of query; before, there was one for all.
-_HAS_KINDS = "bvh_query_ray_next" in Path(wp.__file__).with_name("native").joinpath("bvh.h").read_text()
+_HAS_KINDS = (
+    "bvh_query_ray_next" in Path(wp.__file__).with_name("native").joinpath("bvh.h").read_text()
+)
 
 _IN_SCENE_ON_CUDA = (
     f"constexpr auto next_body = wp::bvh_query{'_ray' * _HAS_KINDS}_next;"
