@@ -22,7 +22,7 @@ def machine(monkeypatch: pytest.MonkeyPatch) -> Any:
     open_device("cpu")
 
     def answer(toolkit: Any, driver: Any, *arches: int) -> None:
-        devices = [SimpleNamespace(alias=f"cuda:{i}", name="Old", arch=a, is_cuda=True)
+        devices = [SimpleNamespace(alias=f"cuda:{i}", name="Old", arch=a)
                    for i, a in enumerate(arches)]  # fmt: skip
         monkeypatch.setattr(wp, "get_cuda_toolkit_version", lambda: toolkit)
         monkeypatch.setattr(wp, "get_cuda_driver_version", lambda: driver)

@@ -48,9 +48,10 @@ def open_device(name: str) -> wp.Device:
             f"render.device: '{name}' does not exist on this machine; it has {', '.join(known)}"
             f"{reason and f' ({reason})'}. Choose 'auto' or 'cpu'."
         )
-    device = wp.get_device(name)
-    toolkit = wp.get_cuda_toolkit_version()
-    if device.is_cuda and toolkit and toolkit >= _CUDA_13 and device.arch < _ARCH_MIN_OF_CUDA_13:
+    device, toolkit = wp.get_device(name), wp.get_cuda_toolkit_version()
+    if name == "cpu" or toolkit is None or toolkit < _CUDA_13:
+        return device
+    if device.arch < _ARCH_MIN_OF_CUDA_13:
         raise ConfigError(
             f"render.device: '{name}' ({device.name}, sm_{device.arch}) is too old for this build"
             f" of warp-lang; expected sm_{_ARCH_MIN_OF_CUDA_13} or newer. Choose 'cpu', or install"
