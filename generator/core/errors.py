@@ -105,7 +105,7 @@ def lack_of_memory(error: BaseException) -> str:
         if _NO_MEMORY_ON_GPU.search(str(cause)):
             return (
                 "out of memory: the GPU has no more for this process; use fewer --workers, which "
-                "share it (about 1.5 GB each), smaller images, or --set render.device=cpu"
+                "share it (about 2.5 GB each), smaller images, or --set render.device=cpu"
             )
         if (
             isinstance(cause, MemoryError)

@@ -107,6 +107,20 @@ def test_modules_are_compiled_side_by_side_into_the_folder_given(tmp_path: Path)
     assert list(module.glob("*.o"))
 
 
+@pytest.mark.slow
+def test_modules_are_compiled_for_a_kind_of_gpu_without_one(tmp_path: Path) -> None:
+    """Machine code under the name by which Warp looks for it on such a GPU."""
+    name = "visibility.kernels.edge_detection"
+
+    assert compile_in_parallel("sm_90", [name], tmp_path)
+
+    (module,) = tmp_path.glob("*")
+    assert module.name.startswith(f"wp_{warp.__name__}.{name}_")
+    (code,) = module.glob("*.cubin")
+    assert code.name == f"{module.name}.sm90.cubin"
+    assert code.read_bytes().startswith(b"\x7fELF")
+
+
 def test_modules_are_copied_without_sources_and_never_over_others(tmp_path: Path) -> None:
     """Unfinished folders and those of other packages stay behind."""
     source, target = tmp_path / "source", tmp_path / "target"

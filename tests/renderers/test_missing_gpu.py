@@ -92,7 +92,7 @@ def test_a_full_gpu_is_an_error_that_names_workers_and_device(text: str) -> None
         raise RuntimeError(text)
     assert str(refused.value) == (
         "sample 3: out of memory: the GPU has no more for this process; use fewer --workers, which"
-        " share it (about 1.5 GB each), smaller images, or --set render.device=cpu"
+        " share it (about 2.5 GB each), smaller images, or --set render.device=cpu"
     )
 
 
