@@ -30,9 +30,10 @@ def _asked_by_warp() -> bool:
 
 def pretend() -> None:
     """Make this process take the path of a GPU, for good. No kernel may be loaded yet."""
-    device._COMPILER_FLAGS += _FLAGS
-    device.compile_kernels = _compile_on_first_use
-    device._start()
+    opened: Any = device
+    opened._COMPILER_FLAGS += _FLAGS
+    opened.compile_kernels = _compile_on_first_use
+    opened._start()
     # The CPU stays one to Warp, and is a GPU to the renderer.
     kind: Any = wp.Device
     kind.is_cpu = property(lambda _: _asked_by_warp())

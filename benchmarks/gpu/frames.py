@@ -6,6 +6,7 @@ import time
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from statistics import median
 from typing import Any
 
@@ -18,7 +19,7 @@ from gen_data.generator.assemble.config import load_config
 from gen_data.generator.assemble.pipeline_factory import open_pipeline
 from gen_data.generator.core.capture import LidarRays
 from gen_data.generator.renderers.warp.device import open_device
-from gen_data.generator.sensors.lidar.scan_pattern import lidar_model, make_sweep
+from gen_data.generator.sensors.lidar.scan_pattern import Sweep, lidar_model, make_sweep
 
 MODEL = "HDL-64E"
 MANY_RAYS = 4_000_000
@@ -31,9 +32,7 @@ def timed_activity(work: Callable[[], object], device: str) -> tuple[Spent, floa
     counts, spent_ms = Counter[str](), Counter[str]()
     if open_device(device).is_cpu:
         with timed_launches() as by_kernel:
-            started_s = time.perf_counter()
-            work()
-            wall_ms = 1e3 * (time.perf_counter() - started_s)
+            wall_ms = _wall_ms(work)
         return {name: (1, ms) for name, ms in by_kernel.items()}, wall_ms
     wp.timing_begin()
     started_s = time.perf_counter()
@@ -98,36 +97,32 @@ def time_sweeps(device: str, rays: int, repeats: int) -> dict[str, Any]:
         scene = pipeline.sample(0).scene
         renderer, lidar = pipeline.renderer, scene.lidar("velodyne")
         for name, copies in (("one sweep", 1), ("one launch of many", max(1, rays // count))):
-            order = None
-            if sweep.order is not None:
-                order = np.concatenate([sweep.order + k * count for k in range(copies)])
-                order = order.astype(np.int32)
-            beams = LidarRays(
-                np.tile(sweep.directions, (copies, 1)),
-                0.0,
-                1,
-                lidar_model(MODEL).range_m[1],
-                order=order,
-            )
-            scan = lambda: renderer.scan(scene, lidar, beams)  # noqa: B023, E731
-            scan()
-            spent_ms = []
-            for _ in range(repeats):
-                started_s = time.perf_counter()
-                scan()
-                spent_ms.append(1e3 * (time.perf_counter() - started_s))
-            anew = lambda: renderer.scan(replace(scene), lidar, beams)  # noqa: B023, E731
-            started_s = time.perf_counter()
-            anew()
-            packed_ms = 1e3 * (time.perf_counter() - started_s)
-            kernels, _ = timed_activity(scan, device)
+            beams = _repeated(sweep, copies)
+            anew = partial(renderer.scan, replace(scene), lidar, beams)
+            packed_ms = _wall_ms(anew)
+            kernels, _ = timed_activity(anew, device)
             figures[name] = {
                 "rays": count * copies,
-                "ms": median(spent_ms),
+                "ms": median(_wall_ms(anew) for _ in range(repeats)),
                 "with_packing_ms": packed_ms,
                 "kernels": sorted(((n, ms) for n, (_, ms) in kernels.items()), key=lambda r: -r[1]),
             }
     return figures
+
+
+def _repeated(sweep: Sweep, copies: int) -> LidarRays:
+    """The rays of several equal sweeps, one after another."""
+    count, order = len(sweep.directions), None
+    if sweep.order is not None:
+        order = np.concatenate([sweep.order + k * count for k in range(copies)]).astype(np.int32)
+    directions = np.tile(sweep.directions, (copies, 1))
+    return LidarRays(directions, 0.0, 1, lidar_model(MODEL).range_m[1], order=order)
+
+
+def _wall_ms(work: Callable[[], object]) -> float:
+    started_s = time.perf_counter()
+    work()
+    return 1e3 * (time.perf_counter() - started_s)
 
 
 def time_paths(device: str, size_px: tuple[int, int], samples: int) -> dict[str, Any]:

@@ -58,8 +58,8 @@ def measure_rates(
         for place in ("memory", "disk"):
             for count in (n for n in workers if n <= len(able)):
                 with _watched() as busy:
-                    answers = [one.ask(place, window_s) for one in able[:count]]
-                    answers = [answer() for answer in answers]
+                    waiting = [one.ask(place, window_s) for one in able[:count]]
+                    answers = [wait() for wait in waiting]
                 figures[place][str(count)] = sum(a["n"] / a["s"] for a in answers)
                 figures["busy"][f"{place} {count}"] = sum(busy) / max(len(busy), 1)
                 figures["stages"] = {
@@ -105,7 +105,12 @@ class _Worker:
         self.process.stdin.write(json.dumps([place, window_s]) + "\n")
         self.process.stdin.flush()
         stdout = self.process.stdout
-        return lambda: json.loads(stdout.readline())  # type: ignore[no-any-return]
+
+        def answer() -> dict[str, Any]:
+            figures: dict[str, Any] = json.loads(stdout.readline())
+            return figures
+
+        return answer
 
     def last_words(self) -> str:
         """End of its error output."""

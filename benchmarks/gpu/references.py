@@ -200,7 +200,7 @@ def _judge_digest(one: Any, other: Any, beside: str) -> str:
 
 def _judge_image(one: Any, other: Any, beside: str) -> str:
     del beside
-    a, b = (cv2.imdecode(values, cv2.IMREAD_COLOR).astype(np.int16) for values in (one, other))
+    a, b = (_levels(values) for values in (one, other))
     if a.shape != b.shape:
         return f"size {b.shape[:2]}, expected {a.shape[:2]}"
     gaps = np.abs(a - b).max(axis=2)
@@ -210,6 +210,11 @@ def _judge_image(one: Any, other: Any, beside: str) -> str:
     return (
         f"{100 * close:.2f} % of pixels within {LEVELS_MAX} level, up to {int(gaps.max())} levels"
     )
+
+
+def _levels(png: NDArray[np.uint8]) -> NDArray[np.int16]:
+    image: Any = cv2.imdecode(png, cv2.IMREAD_COLOR)
+    return np.asarray(image, np.int16)
 
 
 def _judge_points(one: Any, other: Any, beside: str) -> str:
@@ -243,7 +248,7 @@ _JUDGES = {
 def store_references(name: str, folder: str) -> str:
     """Write the references of a configuration to a file of a folder; returns its path."""
     path = Path(folder) / f"{name}.npz"
-    np.savez_compressed(path, **make_references(name))
+    _write(path, make_references(name))
     return str(path)
 
 
@@ -253,8 +258,13 @@ def write_references(path: Path, parts: Iterable[Path]) -> int:
     for part in parts:
         with np.load(part) as stored:
             merged |= {key: stored[key] for key in stored.files}
-    np.savez_compressed(path, **merged)
+    _write(path, merged)
     return path.stat().st_size
+
+
+def _write(path: Path, arrays: Arrays) -> None:
+    named: Any = arrays
+    np.savez_compressed(path, **named)
 
 
 def _packed(data: bytes) -> NDArray[np.uint8]:

@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -19,12 +20,12 @@ from benchmarks.gpu.report import format_report, reached
 ROOT = Path(__file__).parents[2]
 
 
-def png(image: np.ndarray) -> np.ndarray:
+def png(image: np.ndarray) -> Any:
     """An image as the bytes of a PNG file."""
     return cv2.imencode(".png", image)[1].reshape(-1)
 
 
-def facts(reference: dict[str, np.ndarray], found: dict[str, np.ndarray]) -> list[tuple[str, str]]:
+def facts(reference: dict[str, Any], found: dict[str, Any]) -> list[tuple[str, str]]:
     """Differences as pairs of place and fact."""
     return [(f.what, f.fact) for f in differences("sample 0", reference, found)]
 
