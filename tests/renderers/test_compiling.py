@@ -67,6 +67,14 @@ KERNEL_MODULES = sorted(
 )
 
 
+@pytest.mark.parametrize("name", KERNEL_MODULES)
+def test_no_module_fuses_multiplications_and_additions(name: str) -> None:
+    """Labels from a GPU would have other bytes; by default Warp fuses them there."""
+    module = importlib.import_module(f"{warp.__name__}.{name}")
+
+    assert wp.get_module_options(module)["fuse_fp"] is False
+
+
 @pytest.mark.slow
 def test_what_is_compiled_side_by_side_is_all_that_a_photograph_takes() -> None:
     """The first sample of a process loads the modules of every frame, and no other."""
