@@ -114,7 +114,7 @@ def test_the_report_ends_with_the_goals_and_what_is_missing() -> None:
 def measure(*words: str | Path) -> None:
     """The command, which fails if a part fails or a sample differs."""
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    command = [sys.executable, "-m", "benchmarks.gpu", *words]
+    command = [sys.executable, "-m", "benchmarks.gpu", *words, "--limit-s", "900"]
     subprocess.run(command, cwd=ROOT, env=environment, check=True)
 
 
@@ -140,7 +140,7 @@ def test_the_path_of_a_gpu_draws_what_the_cpu_draws(tmp_path: Path) -> None:
 
     measure("--make-references", references, "--configs", name)
     measure("--device", "cpu-as-gpu", "--references", references, "--configs", name,
-            "--parts", "correct", "--limit-s", "600", "--json", tmp_path / "gpu.json")  # fmt: skip
+            "--parts", "correct", "--json", tmp_path / "gpu.json")  # fmt: skip
 
     correct = json.loads((tmp_path / "gpu.json").read_text())["figures"]["correct"]
     assert correct == {name: {"compared": 22, "findings": [], "repeats": True}}
