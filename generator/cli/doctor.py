@@ -168,6 +168,21 @@ def _try_renderer() -> str:
     return f"Warp {version('warp-lang')} on {device}"
 
 
+def _try_gpu() -> str:
+    """The first GPU: what it is, and one computation on it."""
+    import warp as wp
+
+    from gen_data.generator.renderers.warp.device import open_device, why_no_gpu
+
+    _expect(not (reason := why_no_gpu()), reason)
+    device = open_device("cuda:0")
+    total = float(wp.full(1000, 2.0, dtype=float, device=device).numpy().sum())
+    _expect(total == 2000.0, f"{device}: an array of 1,000 twos has the sum {total}")
+    free, all_ = (size / 1e9 for size in (device.free_memory, device.total_memory))
+    driver = ".".join(map(str, wp.get_cuda_driver_version() or ()))
+    return f"{device.name}, sm_{device.arch}, {free:.1f} of {all_:.1f} GB free, CUDA {driver}"
+
+
 def _try_physics() -> str:
     import numpy as np
 
@@ -336,6 +351,7 @@ CHECKS = (
     Check("cache", _try_cache, "make the folder writable, or point XDG_CACHE_HOME elsewhere"),
     Check("limits", _try_limits, "raise them with ulimit -n, -v and -f"),
     Check("renderer", _try_renderer, REINSTALL.format("warp-lang")),
+    Check("gpu", _try_gpu, "images are rendered on the CPU", required=False),
     Check(
         "physics", _try_physics, REINSTALL.format("pybullet" if find_spec("pybullet") else "mujoco")
     ),

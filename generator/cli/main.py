@@ -38,7 +38,7 @@ from gen_data.generator.core.errors import (
     Interrupted,
     OutOfMemory,
     did_you_mean,
-    is_out_of_memory,
+    lack_of_memory,
 )
 from gen_data.generator.core.processes import SINGLE_THREADED
 from gen_data.generator.core.urls import is_url, needs_folder
@@ -316,8 +316,9 @@ def _exit_code() -> int:
         if is_stop_requested():
             click.echo("gen-data: interrupted", err=True)
             return Interrupted.exit_code
-        if not is_out_of_memory(error):
+        lacking = lack_of_memory(error)
+        if not lacking:
             raise
-        click.echo(f"gen-data: {OutOfMemory.text}", err=True)
+        click.echo(f"gen-data: {lacking}", err=True)
         return OutOfMemory.exit_code
     return 0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import errno
+import re
 from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -91,28 +92,42 @@ class SampleError(GenDataError):
 
 
 class OutOfMemory(SampleError):
-    """A process got no more memory from the system."""
-
-    text = (
-        "out of memory: the system refused more memory to this process; raise its limit "
-        "(ulimit -v), or use smaller images and --workers 1"
-    )
+    """A process got no more memory from the system, or from a GPU."""
 
 
-def is_out_of_memory(error: BaseException) -> bool:
-    """Whether lack of memory caused an error, also of a library that could not be loaded."""
+def lack_of_memory(error: BaseException) -> str:
+    """What lacks memory and the remedy, if that caused an error; else empty.
+
+    Also where a library could not be loaded.
+    """
     cause: BaseException | None = error
     while cause is not None:
-        if isinstance(cause, MemoryError) or getattr(cause, "errno", None) == errno.ENOMEM:
-            return True
-        if any(text in str(cause) for text in _NO_MEMORY):
-            return True
+        if _NO_MEMORY_ON_GPU.search(str(cause)):
+            return (
+                "out of memory: the GPU has no more for this process; use fewer --workers, which "
+                "share it (about 2.5 GB each), smaller images, or --set render.device=cpu"
+            )
+        if (
+            isinstance(cause, MemoryError)
+            or getattr(cause, "errno", None) == errno.ENOMEM
+            or any(text in str(cause) for text in _NO_MEMORY)
+        ):
+            return (
+                "out of memory: the system refused more memory to this process; raise its limit "
+                "(ulimit -v), or use smaller images and --workers 1"
+            )
         cause = cause.__cause__ or cause.__context__
-    return False
+    return ""
 
 
-_NO_MEMORY = ("failed to map segment from shared object", "Cannot allocate memory")
-"""Texts of the dynamic loader and of the C library."""
+_NO_MEMORY = (
+    "failed to map segment from shared object",
+    "Cannot allocate memory",
+    "bytes on device 'cpu'",
+)
+"""Texts of the dynamic loader, of the C library and of Warp."""
+_NO_MEMORY_ON_GPU = re.compile(r"Failed to allocate .* on device 'cuda|CUDA error 2\b")
+"""Texts of Warp; 2 is cudaErrorMemoryAllocation."""
 
 
 class WorkerLost(SampleError):

@@ -10,7 +10,7 @@ from gen_data.generator.core.errors import (
     GenDataError,
     OutOfMemory,
     SampleError,
-    is_out_of_memory,
+    lack_of_memory,
 )
 
 TRACE_LINES = 12
@@ -40,8 +40,8 @@ def unexpected_error(error: Exception, place: str, command: str = "") -> SampleE
 
     Lack of memory is one line: a traceback tells nothing about it.
     """
-    if is_out_of_memory(error):
-        return OutOfMemory(f"{place}: {OutOfMemory.text}")
+    if lacking := lack_of_memory(error):
+        return OutOfMemory(f"{place}: {lacking}")
     trace = "".join(traceback.format_exception(type(error), error, error.__traceback__))
     lines = [f"{place}: {type(error).__name__}: {error}"]
     lines += [f"  {line}" for line in trace.rstrip().splitlines()[-TRACE_LINES:]]

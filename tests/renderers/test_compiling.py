@@ -67,6 +67,14 @@ KERNEL_MODULES = sorted(
 )
 
 
+@pytest.mark.parametrize("name", KERNEL_MODULES)
+def test_no_module_fuses_multiplications_and_additions(name: str) -> None:
+    """Labels from a GPU would have other bytes; by default Warp fuses them there."""
+    module = importlib.import_module(f"{warp.__name__}.{name}")
+
+    assert wp.get_module_options(module)["fuse_fp"] is False
+
+
 @pytest.mark.slow
 def test_what_is_compiled_side_by_side_is_all_that_a_photograph_takes() -> None:
     """The first sample of a process loads the modules of every frame, and no other."""
@@ -105,6 +113,20 @@ def test_modules_are_compiled_side_by_side_into_the_folder_given(tmp_path: Path)
     (module,) = tmp_path.glob("*")
     assert module.name.startswith(f"wp_{warp.__name__}.{name}_")
     assert list(module.glob("*.o"))
+
+
+@pytest.mark.slow
+def test_modules_are_compiled_for_a_kind_of_gpu_without_one(tmp_path: Path) -> None:
+    """Machine code under the name by which Warp looks for it on such a GPU."""
+    name = "visibility.kernels.edge_detection"
+
+    assert compile_in_parallel("sm_90", [name], tmp_path)
+
+    (module,) = tmp_path.glob("*")
+    assert module.name.startswith(f"wp_{warp.__name__}.{name}_")
+    (code,) = module.glob("*.cubin")
+    assert code.name == f"{module.name}.sm90.cubin"
+    assert code.read_bytes().startswith(b"\x7fELF")
 
 
 def test_modules_are_copied_without_sources_and_never_over_others(tmp_path: Path) -> None:

@@ -35,7 +35,7 @@ def open_device(name: str) -> wp.Device:
     """The Warp device named ``auto``, ``cpu``, ``cuda:N`` or, for the first one, ``cuda``.
 
     Raises:
-        ConfigError: the machine has no such device.
+        ConfigError: the machine has no such device, or Warp cannot compile for it.
     """
     _start()
     if name == "auto":
@@ -43,11 +43,43 @@ def open_device(name: str) -> wp.Device:
     name = "cuda:0" if name == "cuda" else name
     known = ["cpu", *(device.alias for device in wp.get_cuda_devices())]
     if name not in known:
+        reason = why_no_gpu()
         raise ConfigError(
-            f"render.device: '{name}' does not exist on this machine; it has {', '.join(known)}."
-            " Choose 'auto' or 'cpu', or install an NVIDIA driver."
+            f"render.device: '{name}' does not exist on this machine; it has {', '.join(known)}"
+            f"{reason and f' ({reason})'}. Choose 'auto' or 'cpu'."
         )
-    return wp.get_device(name)
+    device, toolkit = wp.get_device(name), wp.get_cuda_toolkit_version()
+    if name == "cpu" or toolkit is None or toolkit < _CUDA_13:
+        return device
+    if device.arch < _ARCH_MIN_OF_CUDA_13:
+        raise ConfigError(
+            f"render.device: '{name}' ({device.name}, sm_{device.arch}) is too old for this build"
+            f" of warp-lang; expected sm_{_ARCH_MIN_OF_CUDA_13} or newer. Choose 'cpu', or install"
+            " a build of warp-lang for CUDA 12."
+        )
+    return device
+
+
+_CUDA_13, _ARCH_MIN_OF_CUDA_13 = (13, 0), 75
+"""Turing; source: release notes of CUDA 13.0, "deprecated architectures"."""
+
+
+def why_no_gpu() -> str:
+    """Why Warp finds no GPU on this machine, and the remedy, on one line; empty if it finds one."""
+    _start()
+    if wp.get_cuda_devices():
+        return ""
+    toolkit, driver = wp.get_cuda_toolkit_version(), wp.get_cuda_driver_version()
+    if toolkit is None:
+        return "this build of warp-lang has no CUDA; install the one for Linux or Windows on x86_64"
+    # Drivers run programs of all minor versions of their CUDA.
+    needed = f"{toolkit[0]}.0"
+    if driver is None:
+        return f"no NVIDIA driver was found; install one for CUDA {needed} or newer"
+    if driver < (toolkit[0], 0):
+        known = f"{driver[0]}.{driver[1]}"
+        return f"its NVIDIA driver is for CUDA {known}, but warp-lang needs {needed}; update it"
+    return "the NVIDIA driver shows no device; compare nvidia-smi and CUDA_VISIBLE_DEVICES"
 
 
 def prepare_device(name: str) -> None:
@@ -65,6 +97,8 @@ def _start() -> None:
         wp.config.quiet = True
     wp.config.enable_backward = False
     wp.config.cpu_compiler_flags = _COMPILER_FLAGS
+    # Machine code instead of PTX, which each driver would compile again, in its own way.
+    wp.config.cuda_output = "cubin"
     keep_freed_memory()
     with silence_stdio():  # Warp warns about a missing CUDA driver
         wp.init()
@@ -101,9 +135,9 @@ _RECORD_BYTES = 64
 def compile_kernels(device: str) -> None:
     """Fill Warp's cache for a device with the kernels of ``EVERY_FRAME``, if they are missing.
 
-    On the CPU, a bundle of the distribution that fits these kernels, this version of Warp and this
-    platform has those of every frame and all others. Of several processes that find the cache
-    empty, one fills it and the others wait.
+    A bundle of the distribution that fits these kernels, this version of Warp and this platform has
+    those of every frame and all others, on the CPU and perhaps on some kinds of GPUs. Of several
+    processes that find the cache empty, one fills it and the others wait.
 
     Warns:
         CacheWarning: compiled kernels were damaged; they are compiled again.
@@ -120,16 +154,17 @@ def compile_kernels(device: str) -> None:
         if stamp.exists() and not damaged:
             return
         bundle = bundle_folder()
-        if device == "cpu" and bundle.is_dir():
+        if bundle.is_dir():
             copy_modules(bundle, folder)
-        elif cores < 2 or not compile_in_parallel(device, EVERY_FRAME, folder):
+        bundled = device == "cpu" and bundle.is_dir()
+        if not bundled and (cores < 2 or not compile_in_parallel(device, EVERY_FRAME, folder)):
             return
         stamp.touch()
         remove_damaged_modules(folder)
 
 
 def bundle_folder() -> Path:
-    """Folder of the CPU kernels compiled from these sources, by this Warp, on such a platform."""
+    """Folder of the kernels compiled from these sources, by this Warp, on such a platform."""
     _start()
     return BUNDLES / f"{_digest()}-{sys.platform}-{platform.machine().lower()}"
 
@@ -147,7 +182,8 @@ def compile_in_parallel(device: str, names: Sequence[str], folder: Path) -> bool
     """Let one process per core take modules from a pipe; returns whether all succeeded.
 
     Args:
-        device: Warp's name of the device.
+        device: Warp's name of the device; or ``sm_N``, which compiles for GPUs of this kind without
+            having one.
         names: Of the modules, below this package.
         folder: Cache that takes the compiled modules.
     """
@@ -175,7 +211,12 @@ def _compile_queued(device: str, folder: str) -> None:
     # Set afterwards: Warp appends its version to a folder that it starts with.
     wp.config.kernel_cache_dir = folder
     while record := os.read(sys.stdin.fileno(), _RECORD_BYTES):
-        load_kernels(device, [record.decode().strip()])
+        name = record.decode().strip()
+        if device.startswith("sm_"):
+            module = import_module(f"{__package__}.{name}")
+            wp.compile_aot_module(module, arch=int(device.removeprefix("sm_")), use_ptx=False)
+        else:
+            load_kernels(device, [name])
 
 
 def _digest() -> str:

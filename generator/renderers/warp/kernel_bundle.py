@@ -1,6 +1,7 @@
 """Compile all CPU kernels into the source tree, for a wheel that is then built from it.
 
 ``python -m gen_data.generator.renderers.warp.kernel_bundle`` before ``python -m build --wheel``.
+Kinds of GPUs may follow, such as ``sm_80 sm_90``: their kernels are compiled too, without a GPU.
 The machine code fits every processor on which Warp compiles CPU kernels, because the compiler's
 flags name none; Warp's own names of the files contain its LLVM and the target triple.
 """
@@ -9,6 +10,7 @@ from __future__ import annotations
 
 import shutil
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -33,10 +35,15 @@ def kernel_modules() -> tuple[str, ...]:
     return (*rare, *EVERY_FRAME)
 
 
-def write_bundle() -> Path | None:
-    """Compile all modules anew and make them the only bundle; None if one fails to compile."""
+def write_bundle(kinds: Sequence[str] = ()) -> Path | None:
+    """Compile all modules anew and make them the only bundle; None if one fails to compile.
+
+    Args:
+        kinds: Of GPUs, ``sm_N``, beyond the CPU.
+    """
     with TemporaryDirectory() as cache:
-        if not compile_in_parallel("cpu", kernel_modules(), Path(cache)):
+        modules = kernel_modules()
+        if not all(compile_in_parallel(kind, modules, Path(cache)) for kind in ("cpu", *kinds)):
             return None
         bundle = bundle_folder()
         shutil.rmtree(BUNDLES, ignore_errors=True)
@@ -46,4 +53,4 @@ def write_bundle() -> Path | None:
 
 
 if __name__ == "__main__":
-    sys.exit(write_bundle() is None)
+    sys.exit(write_bundle(sys.argv[1:]) is None)

@@ -19,7 +19,7 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
     pixel_ray,
 )
 
-wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 
 # Asymmetry parameter of the phase function of fog droplets.
 FORWARD = wp.constant(0.75)

@@ -16,7 +16,7 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
     floor_int,
 )
 
-wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 
 # Albedo of fresh snow, slightly blue; old snow is darker, but snow in towns is rarely old.
 SNOW_RED = wp.constant(0.80)

@@ -44,7 +44,7 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
 from gen_data.generator.renderers.warp.scene.kernels.texture_sampling import make_sampler, texel_at
 from gen_data.generator.renderers.warp.visibility.kernels.distortion import project_to_pixel
 
-wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 
 # Length of reflected rays.
 MIRRORED_M = wp.constant(1.0e3)

@@ -36,7 +36,7 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
     surface_index,
 )
 
-wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 
 PI = wp.constant(3.14159265)
 # Reflectance of fresh and settled snow near 905 nm (Wiscombe and Warren, "A model for the spectral

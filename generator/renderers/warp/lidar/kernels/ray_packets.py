@@ -18,7 +18,7 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
 )
 from gen_data.generator.renderers.warp.scene.kernels.simd import SIMD
 
-wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 
 # Capacity of a list; a run that may hit more bodies tests all of them.
 LISTED_MAX = wp.constant(96)

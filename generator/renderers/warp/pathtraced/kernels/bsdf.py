@@ -25,7 +25,7 @@ from gen_data.generator.renderers.warp.scene.kernels.brdf import (
 )
 from gen_data.generator.renderers.warp.scene.kernels.records import fast_normalize
 
-wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 
 # Smallest roughness: alpha 0.002, as in ``brdf``.
 SMOOTHEST = wp.constant(0.045)

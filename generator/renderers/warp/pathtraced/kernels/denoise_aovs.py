@@ -18,7 +18,7 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
 )
 from gen_data.generator.renderers.warp.visibility.kernels.rasterizer import Z_NEAR_M
 
-wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 
 
 @wp.kernel

@@ -30,7 +30,7 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
     max_of_two,
 )
 
-wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 
 # Larger than any scene.
 AT_INFINITY = wp.constant(1.0e6)

@@ -93,7 +93,7 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
 from gen_data.generator.renderers.warp.visibility.kernels.label_resolve import face_viewer
 from gen_data.generator.renderers.warp.visibility.kernels.rasterizer import Z_NEAR_M
 
-wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 
 # Limit on straight passages, which are not counted as bounces.
 PASSAGES_MAX = wp.constant(64)

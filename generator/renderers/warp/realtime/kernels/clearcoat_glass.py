@@ -94,7 +94,7 @@ from gen_data.generator.renderers.warp.visibility.kernels.label_resolve import (
     point_at,
 )
 
-wp.set_module_options({"enable_backward": False, "max_unroll": 1})
+wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 1})
 
 # Ambient occlusion is traced only where a ray's end contributes more than this share of the pixel.
 AMBIENT_SHARE = wp.constant(0.2)

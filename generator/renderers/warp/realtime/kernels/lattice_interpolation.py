@@ -44,7 +44,7 @@ from gen_data.generator.renderers.warp.scene.kernels.texture_sampling import (
     patch_at,
 )
 
-wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 
 # Light of two points may be blended if their normals differ by less than eight degrees.
 SMOOTH_COSINE = wp.constant(0.99)

@@ -64,7 +64,7 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
     surface_index,
 )
 
-wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 
 # Lamps of a smaller radius over distance, such as the sun: their penumbrae do not matter on
 # surfaces too small for the lattice.

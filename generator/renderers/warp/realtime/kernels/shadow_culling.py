@@ -22,7 +22,7 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
     to_mesh_vector,
 )
 
-wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 
 # Lattice points along a tile's edge.
 TILE = wp.constant(8)

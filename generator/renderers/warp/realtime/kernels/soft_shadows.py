@@ -50,7 +50,7 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
 )
 from gen_data.generator.renderers.warp.scene.kernels.simd import SIMD
 
-wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 
 # Edge of the aligned blocks of lattice points. Kernels on blocks have up to a thread per point: the
 # last number of a thread and ``run`` tell its points. On the CPU one thread takes a whole block.

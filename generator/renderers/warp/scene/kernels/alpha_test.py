@@ -24,7 +24,7 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
     vertex_at,
 )
 
-wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 
 # Few bodies have holes: these functions are compiled once per module, not inlined at every call.
 OUT_OF_LINE = {"inline": False} if "inline" in inspect.signature(wp.func).parameters else {}

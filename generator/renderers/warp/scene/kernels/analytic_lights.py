@@ -15,7 +15,7 @@ import warp as wp
 from gen_data.generator.core.scene import LIGHT_KINDS
 from gen_data.generator.renderers.warp.scene.kernels.records import LightRecord, fast_normalize
 
-wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 
 SPOT = wp.constant(LIGHT_KINDS.index("spot"))
 SUN = wp.constant(LIGHT_KINDS.index("sun"))

@@ -9,7 +9,7 @@ import warp as wp
 
 from gen_data.generator.renderers.warp.scene.kernels.simd import SIMD
 
-wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 
 # Coordinate of the boxes that fill the last group [m].
 NOWHERE_M = 1.0e9

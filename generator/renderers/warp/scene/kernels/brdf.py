@@ -20,7 +20,7 @@ import warp as wp
 from gen_data.generator.core.colorimetry import REC709_LUMINANCE
 from gen_data.generator.renderers.warp.scene.kernels.records import fast_normalize
 
-wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 
 WEIGHTS = wp.constant(wp.vec3(*(float(weight) for weight in REC709_LUMINANCE)))
 

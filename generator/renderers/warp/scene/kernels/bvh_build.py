@@ -11,13 +11,14 @@ import warp as wp
 
 from gen_data.generator.renderers.warp.scene.kernels.simd import SIMD
 
-wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 
 # Bounds of an empty lane, which no ray enters.
 NOWHERE = 1.0e30
 
 _GROW = (
-    "#ifndef __CUDA_ARCH__"  # Trees are built on the CPU; CUDA has Warp's own.
+    # Trees are built on the CPU; CUDA has Warp's own.
+    "#if !defined(__CUDA_ARCH__) && !defined(AS_ON_GPU)"
     + SIMD
     + f"""
     constexpr float NOWHERE = {NOWHERE}f;

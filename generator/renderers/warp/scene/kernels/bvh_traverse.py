@@ -11,12 +11,14 @@ JCGT 2(1), 2013; Ize, "Robust BVH ray traversal", JCGT 2(2), 2013 (FARTHER).
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import warp as wp
 
 from gen_data.generator.renderers.warp.scene.kernels.records import BodyRecord, Geometry
 from gen_data.generator.renderers.warp.scene.kernels.simd import SIMD
 
-wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 
 Found = wp.spatial_vectord
 """Intersection of a ray: parameter, weights of a face's first and second corner, face, body
@@ -197,10 +199,20 @@ _IN_MESH_ON_CUDA = """
     const int body = search(mesh, o, d) ? 0 : -1;
 """
 
-_IN_SCENE_ON_CUDA = """
-    wp::bvh_query_t candidates = wp::bvh_query_ray(hierarchy, o, d, -1);
+# Warp 1.19 has an iterator for each kind of query; before, there was one for all.
+_HAS_KINDS = (
+    "bvh_query_ray_next" in Path(wp.__file__).with_name("native").joinpath("bvh.h").read_text()
+)
+
+_IN_SCENE_ON_CUDA = (
+    f"constexpr auto next_body = wp::bvh_query{'_ray' * _HAS_KINDS}_next;"
+    + """
+    // A tiny number instead of zero, as on the CPU: the slab test knows no 0 * inf.
+    auto not_zero = [](float x) { return x < 1.0e-20f && x > -1.0e-20f ? 1.0e-20f : x; };
+    const wp::vec3 way(not_zero(d[0]), not_zero(d[1]), not_zero(d[2]));
+    wp::bvh_query_t candidates = wp::bvh_query_ray(hierarchy, o, way, -1);
     int body = -1, b = 0;
-    while (!(ANY && body >= 0) && wp::bvh_query_next(candidates, b, strike.t)) {
+    while (!(ANY && body >= 0) && next_body(candidates, b, strike.t)) {
         const auto& placed = bodies.data[b];
         if (placed.cutouts & through)
             continue;
@@ -209,6 +221,7 @@ _IN_SCENE_ON_CUDA = """
             body = b;
     }
 """
+)
 
 _FOUND = """
     wp::vec_t<6, double> found;
@@ -241,7 +254,7 @@ def _snippet(cpu: str, cuda: str, told: str) -> str:
     """
     any_only = f"constexpr bool ANY = {str(told != _FOUND).lower()};"
     return f"""
-#ifdef __CUDA_ARCH__
+#if defined(__CUDA_ARCH__) || defined(AS_ON_GPU)
     {any_only}{_STRIKE_ON_CUDA}{cuda}{told}
 #else
     auto walked = [&]() __attribute__((noinline)) {{

@@ -38,7 +38,7 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
     to_mesh_vector,
 )
 
-wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 
 # Smallest offset of light rays: a fiftieth of a millimetre, below the rounding of meshes.
 OFFSET_M = wp.constant(2.0e-5)

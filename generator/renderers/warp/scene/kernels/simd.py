@@ -3,6 +3,7 @@
 On the CPU, a vector has eight lanes (LANES), a quad four (QUAD); both are extension types of the
 compiler that Warp ships: plain IEEE arithmetic, the same on every processor. On CUDA the same text
 compiles to one lane per thread. A native function begins with ``SIMD``; unused names cost nothing.
+Compiled with AS_ON_GPU, the CPU takes the text of CUDA too: tests do so without a GPU.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ LANES = 8
 longer than their contents."""
 
 SIMD = """
-#ifdef __CUDA_ARCH__
+#if defined(__CUDA_ARCH__) || defined(AS_ON_GPU)
     constexpr int LANES = 1, QUAD = 1;
     typedef float Floats, FloatQuad;
     typedef double Doubles, DoubleQuad;

@@ -15,7 +15,7 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
     vertex_at,
 )
 
-wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 
 # Mask of every second byte: two bytes are weighted by one multiplication without overlapping.
 EVEN_BYTES = wp.constant(wp.uint32(0x00FF00FF))
@@ -159,7 +159,7 @@ def texel_at(world: World, texture: int, s: Sampler, u: float, v: float, bumpy: 
 
 # Native code that samples a texture at four pixels at once, as ``texel_at``; on CUDA at one.
 SAMPLE_QUAD = """
-#ifdef __CUDA_ARCH__
+#if defined(__CUDA_ARCH__) || defined(AS_ON_GPU)
     constexpr int QUAD = 1;
     typedef float Floats;
     typedef int Ints;

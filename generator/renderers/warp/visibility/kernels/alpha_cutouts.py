@@ -20,7 +20,7 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
     vertex_at,
 )
 
-wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 
 
 @wp.struct

@@ -22,7 +22,7 @@ from gen_data.generator.renderers.warp.visibility.kernels.rasterizer import (
     pixel_box,
 )
 
-wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 
 
 @wp.kernel

@@ -16,7 +16,7 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
     fast_normalize,
 )
 
-wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 
 NEAR_M = wp.constant(0.05)
 

@@ -29,7 +29,7 @@ from gen_data.generator.renderers.warp.visibility.kernels.edge_detection import 
 )
 from gen_data.generator.renderers.warp.visibility.kernels.label_resolve import make_facet
 
-wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 
 Vector8 = wp.types.vector(length=8, dtype=wp.float32)
 Vector8i = wp.types.vector(length=8, dtype=wp.int32)

@@ -13,7 +13,7 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
 )
 from gen_data.generator.renderers.warp.scene.kernels.simd import SIMD
 
-wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 
 # Faces that meet at less than 25 degrees count as one surface.
 CREASE_COSINE = wp.constant(0.9)

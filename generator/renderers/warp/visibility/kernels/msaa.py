@@ -55,7 +55,7 @@ from gen_data.generator.renderers.warp.visibility.kernels.rasterizer import (
     window_in_image,
 )
 
-wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 
 # Larger than the nearness of any surface.
 UNLISTED = wp.constant(1.0e30)

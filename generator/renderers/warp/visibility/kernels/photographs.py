@@ -6,7 +6,7 @@ from typing import Any
 
 import warp as wp
 
-wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 
 # What a pixel's centre shows, by the number of its body plus one.
 EMPTY = wp.constant(0)

@@ -18,7 +18,7 @@ from gen_data.generator.renderers.warp.visibility.kernels.alpha_cutouts import (
     make_cutout,
 )
 
-wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 
 # Near plane; it keeps 1/z at most 100.
 Z_NEAR_M = wp.constant(0.01)

@@ -1,0 +1,1 @@
+"""Everything measured on a GPU, in one command: ``python -m benchmarks.gpu``."""

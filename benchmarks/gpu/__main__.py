@@ -1,0 +1,152 @@
+"""Everything measured on a GPU, in one command: ``python -m benchmarks.gpu``.
+
+    python -m benchmarks.gpu --make-references references.npz          (on any machine)
+    python -m benchmarks.gpu --references references.npz --json gpu.json
+
+About four minutes on a card of the class of an H100 with 16 cores, once kernels are compiled. Each
+part has a process and a limit of time; what fails or takes too long is named at the end.
+``--device cpu`` takes the same path with tiny sizes.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from benchmarks.gpu.parts import Result, run_part
+from benchmarks.gpu.references import config_names, write_references
+from benchmarks.gpu.report import format_report
+from gen_data.generator.core.system_calls import usable_cores
+
+PARTS = ("card", "modules", "correct", "kernels", "sweeps", "paths", "rates")
+
+
+class Measured:
+    """Figures and failures by part; written after each of them."""
+
+    def __init__(self, path: Path | None) -> None:
+        self.figures: dict[str, Any] = {}
+        self.failures: dict[str, str] = {}
+        self.seconds: dict[str, float] = {}
+        self._path = path
+
+    def add(self, result: Result, *place: str) -> None:
+        """Add the result of a part, at a place in the figures."""
+        print(f"{result.seconds:6.1f} s {result.name}: {result.failure or 'done'}", flush=True)
+        self.seconds[result.name] = result.seconds
+        if result.failure:
+            self.failures[result.name] = result.failure
+        else:
+            inner = self.figures
+            for key in place[:-1]:
+                inner = inner.setdefault(key, {})
+            inner[place[-1]] = result.value
+        if self._path is not None:
+            self._path.write_text(
+                json.dumps(vars(self) | {"_path": ""}, indent=1), encoding="utf-8"
+            )
+
+
+def measure(arguments: argparse.Namespace) -> Measured:
+    """Run the chosen parts one after another."""
+    done = Measured(arguments.json)
+    device, dry = arguments.device, arguments.device.startswith("cpu")
+    limit_s = arguments.limit_s
+
+    def one(name: str, function: str, *place: str, **values: Any) -> None:
+        done.add(run_part(name, function, limit_s, **values), *place)
+
+    chosen = set(arguments.parts)
+    if "card" in chosen:
+        one("card", "card:describe_card", "card", device=device)
+    if "modules" in chosen:
+        one("modules, compiled", "card:compile_modules", "compiled", device=device)
+        one("modules, loaded", "card:load_modules", "modules", device=device)
+    if "correct" in chosen and arguments.references is not None:
+        names = arguments.configs or config_names()
+        where = {"references": str(arguments.references.resolve()), "device": device}
+        for result in _side_by_side("references:compare", names, limit_s, where):
+            done.add(result, "correct", result.name)
+    if "kernels" in chosen:
+        for name in ("tabletop",) if dry else ("tabletop", "street"):
+            values = {"config": name, "device": device, "views": 1 if dry else 5, "small": dry}
+            one(f"kernels {name}", "frames:time_kernels", "kernels", name, **values)
+    if "sweeps" in chosen:
+        rays, repeats = (1, 1) if dry else (4_000_000, 9)
+        one("sweeps", "frames:time_sweeps", "sweeps", device=device, rays=rays, repeats=repeats)
+    if "paths" in chosen:
+        for where in dict.fromkeys((device, "cpu")):
+            size = (64, 48) if dry or where == "cpu" else (640, 480)
+            values = {"device": where, "size_px": size, "samples": 1 if dry else 16}
+            one(f"paths {where}", "frames:time_paths", "paths", where, **values)
+    if "rates" in chosen:
+        counts = [n for n in (1, 2, 4, 8, 16) if n <= usable_cores()]
+        for name in arguments.workloads or (
+            ("tabletop",) if dry else ("tabletop", "street", "rooms")
+        ):
+            values = {"config": name, "device": device, "workers": counts[:1] if dry else counts}
+            window_s = 0.1 if dry else 3.0
+            ready_s = limit_s - 2 * len(counts) * (window_s + 0.5) - 5.0
+            values |= {"window_s": window_s, "ready_s": ready_s, "small": dry}
+            one(f"rates {name}", "rates:measure_rates", "rates", name, **values)
+    return done
+
+
+def _side_by_side(
+    function: str, names: Sequence[str], limit_s: float, where: Mapping[str, str]
+) -> Sequence[Result]:
+    """Call a function for several configurations; all of them share the limit of time."""
+    deadline_s = time.perf_counter() + limit_s
+
+    def call(name: str) -> Result:
+        left_s = max(deadline_s - time.perf_counter(), 1.0)
+        return run_part(name, function, left_s, name=name, **where)
+
+    with ThreadPoolExecutor(max(1, usable_cores() - 2)) as pool:
+        return list(pool.map(call, names))
+
+
+def make_references(path: Path, names: Sequence[str], limit_s: float) -> int:
+    """Make references on the CPU; returns the number of configurations that failed."""
+    started_s = time.perf_counter()
+    with TemporaryDirectory() as folder:
+        where = {"folder": folder}
+        results = _side_by_side("references:store_references", names, limit_s, where)
+        for result in results:
+            print(f"{result.seconds:6.1f} s {result.name}: {result.failure or 'done'}")
+        size = write_references(path, [Path(r.value) for r in results if not r.failure])
+    print(f"{path}: {size / 1e6:.1f} MB in {time.perf_counter() - started_s:.0f} s")
+    return sum(bool(result.failure) for result in results)
+
+
+def main(words: Sequence[str] | None = None) -> int:
+    """Measure, or make references; returns the exit code."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.gpu", description=__doc__)
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.add_argument("--make-references", type=Path, metavar="FILE")
+    parser.add_argument("--references", type=Path, metavar="FILE")
+    parser.add_argument("--json", type=Path, metavar="OUT")
+    parser.add_argument("--device", default="cuda:0")
+    parser.add_argument("--configs", nargs="*", help="those to compare; all by default")
+    parser.add_argument("--workloads", nargs="*", help="some of tabletop, street, rooms")
+    parser.add_argument("--parts", nargs="*", default=PARTS, choices=PARTS)
+    parser.add_argument("--limit-s", type=float, default=120.0, help="of each part")
+    arguments = parser.parse_args(words)
+    if arguments.make_references is not None:
+        names = arguments.configs or config_names()
+        return int(make_references(arguments.make_references, names, arguments.limit_s) > 0)
+    done = measure(arguments)
+    print(format_report(done.figures, done.failures))
+    wrong = any(c["findings"] for c in done.figures.get("correct", {}).values())
+    return int(bool(done.failures) or wrong)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

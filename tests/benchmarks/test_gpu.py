@@ -1,0 +1,147 @@
+"""The measurement on a GPU: its comparison with references, its limits, and its path on a CPU."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+from benchmarks.gpu.parts import run_part
+from benchmarks.gpu.references import differences
+from benchmarks.gpu.report import format_report, reached
+
+ROOT = Path(__file__).parents[2]
+
+
+def png(image: np.ndarray) -> Any:
+    """An image as the bytes of a PNG file."""
+    return cv2.imencode(".png", image)[1].reshape(-1)
+
+
+def facts(reference: dict[str, Any], found: dict[str, Any]) -> list[tuple[str, str]]:
+    """Differences as pairs of place and fact."""
+    return [(f.what, f.fact) for f in differences("sample 0", reference, found)]
+
+
+def test_a_photograph_may_differ_by_one_level_and_in_one_pixel_of_a_thousand() -> None:
+    """100 x 100 pixels: ten may be far off, an eleventh not."""
+    one = np.full((100, 100, 3), 100, np.uint8)
+    near, at_bound, beyond = one + 1, one.copy(), one.copy()
+    at_bound[0, :10], beyond[0, :11] = 200, 200
+
+    assert facts({"image/color/rgb": png(one)}, {"image/color/rgb": png(near)}) == []
+    assert facts({"image/color/rgb": png(one)}, {"image/color/rgb": png(at_bound)}) == []
+    assert facts({"image/color/rgb": png(one)}, {"image/color/rgb": png(beyond)}) == [
+        ("sample 0, color/rgb", "99.89 % of pixels within 1 level, up to 100 levels")
+    ]
+
+
+def test_labels_with_other_bytes_are_found_and_counted() -> None:
+    """The digest decides; the values kept say by how much."""
+    ids = np.array([[0, 1], [2, 3]], np.uint16)
+    other = np.array([[0, 1], [2, 9]], np.uint16)
+    key = "color/instance"
+    reference = {f"digest/{key}": np.array([1], np.uint8), f"values/{key}": ids}
+    found = {f"digest/{key}": np.array([2], np.uint8), f"values/{key}": other}
+
+    assert facts(reference, reference) == []
+    assert facts(reference, found) == [
+        (f"sample 0, {key}", "other bytes (1 of 4 values kept differ)")
+    ]
+
+
+def test_a_point_may_be_a_tenth_of_a_millimetre_off() -> None:
+    """Along any axis; a missing point is a difference too."""
+    here = np.array([[1.0, 0.0, 0.0], [0.0, 2.0, 0.0]])
+    near, far = here.copy(), here.copy()
+    near[0, 2], far[1, 1] = 9e-5, 2.0002
+
+    assert facts({"points/top": here}, {"points/top": near}) == []
+    assert facts({"points/top": here}, {"points/top": far}) == [
+        ("sample 0, top", "1 of 2 points differ, by up to 0.0002 m")
+    ]
+    assert facts({"points/top": here}, {"points/top": here[:1]}) == [
+        ("sample 0, top", "another number of points")
+    ]
+    assert facts({"points/top": here}, {}) == [("sample 0, points/top", "only in one of the two")]
+
+
+def test_a_part_that_fails_names_file_line_kernel_and_error() -> None:
+    """And leaves the others alone."""
+    result = run_part("broken", "frames:time_kernels", 60.0, config="nowhere", device="cpu",
+                      views=1, small=True)  # fmt: skip
+
+    assert result.value is None
+    assert result.failure.startswith("benchmarks/gpu/rates.py:")
+    assert "kernel none: KeyError: 'nowhere'" in result.failure
+
+
+def test_a_part_that_takes_too_long_is_left_out() -> None:
+    """Its process is ended."""
+    result = run_part("slow", "frames:time_kernels", 0.05, config="tabletop", device="cpu",
+                      views=1, small=True)  # fmt: skip
+
+    assert result.failure == "left out: not finished within 0 s"
+
+
+def test_the_report_ends_with_the_goals_and_what_is_missing() -> None:
+    """Shares of 500 samples/s to disk, 2,000 in memory, and 1 billion rays per second."""
+    rate = {"ready": 1, "memory": {"1": 100.0, "2": 150.0}, "disk": {"1": 50.0}, "busy": {},
+            "device_mb": 600.0, "stages": {"render": 3.0}, "errors": []}  # fmt: skip
+    sweep = {"rays": 4_000_000, "ms": 8.0, "kernels": [["trace", 7.0]]}
+    figures = {"rates": {"tabletop": rate}, "sweeps": {"one": sweep}}
+
+    text = format_report(figures, {"paths": "left out"})
+
+    assert reached(figures) == {"disk": 50.0, "memory": 150.0, "rays": 5e8}
+    assert text.splitlines()[-6:] == [
+        "| 500 labelled samples/s to disk, tabletop | 50 | 10 % |",
+        "| 2e+03 labelled samples/s in memory, tabletop | 150 | 8 % |",
+        "| 1e+09 rays/s of one launch | 5e+08 | 50 % |",
+        "",
+        "Missing:",
+        "- paths: left out",
+    ]
+
+
+def measure(*words: str | Path) -> None:
+    """The command, which fails if a part fails or a sample differs."""
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    command = [sys.executable, "-m", "benchmarks.gpu", *words, "--limit-s", "900"]
+    subprocess.run(command, cwd=ROOT, env=environment, check=True)
+
+
+@pytest.mark.slow
+def test_the_measurement_runs_on_the_cpu_with_tiny_sizes(tmp_path: Path) -> None:
+    """Every part but the compilation of all kernels, and the comparison below."""
+    parts = ("card", "kernels", "sweeps", "paths", "rates")
+
+    measure("--device", "cpu", "--json", tmp_path / "gpu.json", "--parts", *parts)
+
+    found = json.loads((tmp_path / "gpu.json").read_text())
+    assert found["failures"] == {}
+    assert set(found["figures"]) == set(parts)
+
+
+@pytest.mark.slow
+def test_the_path_of_a_gpu_draws_what_the_cpu_draws(tmp_path: Path) -> None:
+    """One lane per thread, Warp's hierarchies, lists in another order: same labels, same images.
+
+    Left untested are the arithmetic of a GPU, and threads that run at the same time.
+    """
+    references, name = tmp_path / "references.npz", "tabletop"
+
+    measure("--make-references", references, "--configs", name)
+    measure("--device", "cpu-as-gpu", "--references", references, "--configs", name,
+            "--parts", "correct", "--json", tmp_path / "gpu.json")  # fmt: skip
+
+    correct = json.loads((tmp_path / "gpu.json").read_text())["figures"]["correct"]
+    assert correct == {name: {"compared": 22, "findings": [], "repeats": True}}
+    assert references.stat().st_size < 250_000
