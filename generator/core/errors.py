@@ -248,9 +248,12 @@ def list_names(names: Collection[str], most: int = 12) -> str:
 def did_you_mean(wrong: str, known: Iterable[str]) -> str:
     """`` (did you mean 'x'?)`` when something known is near, else the empty string.
 
-    Endings of files, such as ``.yaml``, make no names similar.
+    Endings of files, such as ``.yaml``, make no names similar. A name in another case is nearest.
     """
     stems = {name.removesuffix(".yaml"): name for name in known}
+    same = (name for name in stems.values() if name.casefold() == wrong.casefold())
+    for name in same:
+        return f" (did you mean '{name}'?)"
     near = difflib.get_close_matches(wrong.removesuffix(".yaml"), stems, n=1, cutoff=0.6)
     return f" (did you mean '{stems[near[0]]}'?)" if near else ""
 

@@ -65,8 +65,9 @@ def test_check_lists_remarks_and_still_succeeds(folder: Path) -> None:
         ({"a.mtl": "newmtl m\nmap_Kd gone.png\n"}, "gone.png: no such image"),
         ({"a.mtl": "newmtl m\nmap_Kd t.png\n", "t.png": "text"}, "t.png: unreadable image"),
         ({"a.mtl": "newmtl other\nKd 1 0 0\n"}, "material 'm' is not defined in a.mtl"),
+        ({"a.mtl": "newmtl M\nKd 1 0 0\n"}, "is not defined in a.mtl (did you mean 'M'"),
     ],
-    ids=["missing image", "no image", "unknown material"],
+    ids=["missing image", "no image", "unknown material", "another case"],
 )
 def test_check_refuses_what_would_look_wrong(
     folder: Path, files: dict[str, str], reason: str

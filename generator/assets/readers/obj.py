@@ -286,11 +286,11 @@ def _read_slots(
                 defined |= _read_mtl(folder, path, remarks)
             else:
                 missing = path
-    folded = {_fold(name): name for name in reversed(defined)}
+    composed = {_compose(name): name for name in reversed(defined)}
     used, slots = set(s.polygon_materials), list[MaterialSlot]()
     transforms: dict[int, UvTransform] = {}
     for number, name in enumerate(s.materials):
-        known = name if name in defined else folded.get(_fold(name), "")
+        known = name if name in defined else composed.get(_compose(name), "")
         if known:
             material = defined[known].build_material()
             tint = material.base_color
@@ -303,7 +303,7 @@ def _read_slots(
                 remarks.append(f"material '{name}' is not defined; '{known}' is used instead")
             continue
         reason = ""
-        if number in used and _fold(name) not in _NO_MATERIAL:
+        if number in used and name.casefold() not in _NO_MATERIAL:
             reason = _why_missing(name, missing, found, defined)
             if not reason:
                 remarks.append(f"material '{name}' is not defined: no mtllib is given")
@@ -328,9 +328,9 @@ _NO_MATERIAL = frozenset({"", "none", "(null)", "null"})
 """Names that exporters give to faces without a material."""
 
 
-def _fold(name: str) -> str:
-    """A name without case and without the form of its accents."""
-    return unicodedata.normalize("NFC", name).casefold()
+def _compose(name: str) -> str:
+    """A name without the form of its accents, which file systems and editors change."""
+    return unicodedata.normalize("NFC", name)
 
 
 def _library_files(folder: Folder, relative: str, names: str) -> tuple[str, ...]:
