@@ -474,7 +474,7 @@ class StoredDataset(SampleSequence):
 
     def __init__(self, folder: str | PathLike[str], split: str = "") -> None:
         stored = open_stored(folder)
-        super().__init__(ReadSamples(stored), range(stored.n))
+        super().__init__(ReadSamples(stored), stored.indices)
         self.folder = stored.folder
         self._select(split)
 

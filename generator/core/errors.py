@@ -91,6 +91,27 @@ class SampleError(GenDataError):
     exit_code = 6
 
 
+@contextmanager
+def in_stage(stage: str) -> Iterator[None]:
+    """Let an error of the block remember its stage; the innermost block counts."""
+    try:
+        yield
+    except BaseException as error:
+        if not hasattr(error, "stage"):
+            error.stage = stage  # type: ignore[attr-defined]
+        raise
+
+
+def stage_of(error: BaseException) -> str:
+    """Stage of an error or of its cause; ``sample`` if there is none."""
+    cause: BaseException | None = error
+    while cause is not None:
+        if stage := getattr(cause, "stage", ""):
+            return str(stage)
+        cause = cause.__cause__
+    return "sample"
+
+
 class OutOfMemory(SampleError):
     """A process got no more memory from the system, or from a GPU."""
 
@@ -160,6 +181,12 @@ class NoLabels(GenDataError):
         super().__init__(message)
 
 
+class SamplesSkipped(GenDataError):
+    """A data set is finished, without the samples that could not be made."""
+
+    exit_code = 10
+
+
 class Interrupted(GenDataError):
     """The user asked to stop; what was committed stays and the run can be resumed."""
 
@@ -192,6 +219,8 @@ class LayoutRejected(Exception):
 
 class SceneRejected(SampleError):
     """No valid layout of a scene was found within the bounded number of attempts."""
+
+    stage = "layout"
 
     def __init__(self, scene_index: int, rejections: tuple[Rejection, ...]) -> None:
         self.scene_index = scene_index

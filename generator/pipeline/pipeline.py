@@ -19,7 +19,13 @@ from gen_data.generator.core.capture import (
     PointCloud,
     SensorReading,
 )
-from gen_data.generator.core.errors import ConfigError, LayoutRejected, Rejection, SceneRejected
+from gen_data.generator.core.errors import (
+    ConfigError,
+    LayoutRejected,
+    Rejection,
+    SceneRejected,
+    in_stage,
+)
 from gen_data.generator.core.interfaces import (
     AssetLibrary,
     DatasetInfo,
@@ -351,9 +357,13 @@ def _count_lidar_points(
 
 @contextmanager
 def _timed(timings_s: dict[str, float], stage: str) -> Iterator[None]:
-    """Add the CPU time of a block to a stage. Timings are logged, never part of a data file."""
+    """Add the CPU time of a block to a stage. Timings are logged, never part of a data file.
+
+    An error of the block remembers the stage.
+    """
     started_s = time.process_time()
     try:
-        yield
+        with in_stage(stage):
+            yield
     finally:
         timings_s[stage] = timings_s.get(stage, 0.0) + time.process_time() - started_s
