@@ -222,7 +222,8 @@ class RunMonitor:
 
     def mean_cpu_s(self) -> dict[str, float]:
         """CPU seconds per sample by stage, in the order of the first run of each stage."""
-        return {stage: total / self._measured for stage, total in self._cpu_s.items()}
+        measured = max(self._measured, 1)
+        return {stage: total / measured for stage, total in self._cpu_s.items()}
 
     def _on_sample(self, event: SampleDone) -> None:
         self._count_in_flight(event)

@@ -172,17 +172,19 @@ class StoredSamples:
 
     def _line(self, name: str, index: int) -> bytes:
         lines = self._lines(self._folder_of(index) / name)
-        absent, first = self._absent, index - index % self.plan.shard_size
-        before = bisect_left(absent, index)
-        if before < len(absent) and absent[before] == index:
-            failure = self.failed[before]
+        # Failed samples have no lines.
+        first = index - index % self.plan.shard_size
+        before = bisect_left(self._absent, index) - bisect_left(self._absent, first)
+        return lines.line(index - first - before)
+
+    def _folder_of(self, index: int) -> Path:
+        place = bisect_left(self._absent, index)
+        if place < len(self._absent) and self._absent[place] == index:
+            failure = self.failed[place]
             raise SampleIndexError(
                 f"{self.folder}: sample {index} does not exist, as it could not be made "
                 f"({failure.stage}: {failure.error})"
             )
-        return lines.line(index - first - (before - bisect_left(absent, first)))
-
-    def _folder_of(self, index: int) -> Path:
         return self.shard_dir(index // self.plan.shard_size)
 
     @contextmanager
