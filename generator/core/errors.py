@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import errno
+import math
 import re
 from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager
@@ -200,10 +201,15 @@ class Rejection:
     Attributes:
         reason: A short noun phrase that equal rejections share, such as ``object fell off``.
         remedy: What to change, naming a field of the configuration.
+        detail: The objects concerned and by how much; empty = unknown.
+        excess: How far from valid, to compare rejections of one scene; the unit is that of the
+            reason.
     """
 
     reason: str
     remedy: str
+    detail: str = ""
+    excess: float = math.inf
 
 
 class LayoutRejected(Exception):
@@ -231,9 +237,14 @@ class SceneRejected(SampleError):
             counts[rejection.reason] = counts.get(rejection.reason, 0) + 1
             remedies[rejection.remedy] = None
         tally = ", ".join(f"{count} x {reason}" for reason, count in counts.items())
+        detailed = [(r.excess, number) for number, r in enumerate(rejections) if r.detail]
+        best = ""
+        if detailed:
+            _, number = min(detailed)
+            best = f"\n  Best: attempt {number + 1}: {rejections[number].detail}."
         tries = " ".join(f"{i}. {remedy}" for i, remedy in enumerate(remedies, 1))
         super().__init__(
-            f"scene {scene_index}: no valid layout in {len(rejections)} attempts ({tally}).\n"
+            f"scene {scene_index}: no valid layout in {len(rejections)} attempts ({tally}).{best}\n"
             f"  Try: {tries}"
         )
 

@@ -40,6 +40,7 @@ from gen_data.generator.core.sample import EgoTruth, ImageTruth, Sample
 from gen_data.generator.core.scene import LABEL_IDS_MAX, Scene
 from gen_data.generator.core.scene_time import place_sensors
 from gen_data.generator.core.streams import Streams
+from gen_data.generator.pipeline.checked_renderer import CheckedRenderer
 from gen_data.generator.pipeline.finalize_scene import Timeline, finalize_scene
 from gen_data.generator.pipeline.numerics import numerics_digests
 from gen_data.generator.pipeline.splits import Assignment, split_of
@@ -144,7 +145,7 @@ class Pipeline:
     @cached_property
     def renderer(self) -> Renderer:
         """The renderer, opened by the context or on first use; merging shards needs none."""
-        return self._open_renderer()
+        return CheckedRenderer(self._open_renderer())
 
     def __enter__(self) -> Pipeline:
         """Start the engines."""
