@@ -77,8 +77,8 @@ def _compare_datasets(one: Path, other: Path, semantic: bool) -> Comparison:
             continue
         if index in absent[0] or index in absent[1]:
             owner = other if index in absent[0] else one
-            found = Difference(index, "sample", f"only {owner} has it; in the other it failed")
-            return Comparison(n, changes, sample=found)
+            text = f"only {owner} has it; in the other it failed"
+            return Comparison(n, changes, sample=Difference(index, "sample", text))
         files = [
             SampleFiles(LocalStore(folder).shard_dir(index // plan.shard_size), index)
             for folder, plan in zip((one, other), plans, strict=True)
