@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -26,7 +25,7 @@ FAILS = 1
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Samples 0, 2 and 3 of a table; a plug-in fails on sample 1."""
     made = tmp_path_factory.mktemp("lacking") / "set"
     whole = Pipeline.sample
@@ -42,7 +41,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
             "tabletop.yaml", 4, out=made, workers=0, overrides=[*TINY, "skip_failed=true"]
         )
     assert [failure.index for failure in summary.failed] == [FAILS]
-    yield made
+    return made
 
 
 def test_the_plan_is_that_of_a_run_without_the_options(folder: Path) -> None:
