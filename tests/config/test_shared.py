@@ -204,4 +204,5 @@ def test_a_chain_of_selections_costs_in_proportion_to_its_length() -> None:
         assert len(set(drawn.values())) == 1
         return counted
 
-    assert calls(800) < 2.2 * calls(400)
+    # Quadratic cost would be a factor of 4; collections of garbage add some calls.
+    assert calls(1600) < 3 * calls(800)
