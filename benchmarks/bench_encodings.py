@@ -32,7 +32,7 @@ def main() -> None:
     camera = next(c for c in stored.info.cameras if Channel.RGB in stored.info.media[c])
     images = [
         stored.sample(index).capture.readings[camera].channels[Channel.RGB]
-        for index in range(min(args.n, stored.n))
+        for index in stored.indices[: args.n]
     ]
     print(f"{'per image of ' + 'x'.join(map(str, images[0].shape[1::-1])):<24}"
           f"{'kB':>8}{'encode ms':>11}{'decode ms':>11}{'PSNR dB':>9}")  # fmt: skip

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from bisect import insort
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from gen_data.generator.config import distributions as dist
 from gen_data.generator.core.errors import LayoutRejected, Rejection
@@ -58,12 +59,15 @@ class Floor:
 
     def top_under(self, x: float, y: float, radius_m: float) -> float:
         """Height of the objects below a disc [m]; 0 where the surface is bare."""
-        tops = [
-            top
-            for ox, oy, other_m, top in self.taken
-            if math.hypot(x - ox, y - oy) < radius_m + other_m + GAP_M
-        ]
-        return max(tops, default=0.0)
+        # Highest first: on a crowded surface, the first few decide.
+        for ox, oy, other_m, top in self.taken:
+            if math.hypot(x - ox, y - oy) < radius_m + other_m + GAP_M:
+                return top
+        return 0.0
+
+    def take(self, x: float, y: float, radius_m: float, top_m: float) -> None:
+        """Add an object."""
+        insort(self.taken, (x, y, radius_m, top_m), key=lambda disc: -disc[3])
 
     def is_closed(self, x: float, y: float, radius_m: float) -> bool:
         """Whether a disc touches a keep-out area."""
@@ -90,7 +94,7 @@ def find_floors(scene: Scene, group: ObjectGroup, assets: AssetIndex) -> list[Fl
             if body.motion == "dynamic":
                 cylinder = _cylinder(body, T_surface_world, assets)
                 if -GAP_M < cylinder[3] < surface.clearance_m:
-                    floor.taken.append(cylinder)
+                    floor.take(*cylinder)
         floors.append(floor)
     return floors
 
@@ -107,6 +111,25 @@ def lay_out(
     Raises:
         LayoutRejected: no free place was found, or an item is too high.
     """
+    before = sum(len(floor.taken) for floor in floors)
+    try:
+        return _place_all(group, items, floors, rng, upright)
+    except LayoutRejected as refused:
+        placed = sum(len(floor.taken) for floor in floors) - before
+        names = ", ".join(f"'{name}'" for name in group.surfaces)
+        detail = f"{placed} of {len(items)} objects of '{group.name}' found a place on {names}"
+        missing = float(len(items) - placed)
+        raise LayoutRejected(replace(refused.rejection, detail=detail, excess=missing)) from None
+
+
+def _place_all(
+    group: ObjectGroup,
+    items: Sequence[Item],
+    floors: list[Floor],
+    rng: Rng,
+    upright: Sequence[bool],
+) -> list[SE3]:
+    """Poses by the group's placement; see ``lay_out``."""
     if group.placement == "stack":
         return _stack(group, items, floors, rng)
     if group.placement == "grid":
@@ -133,7 +156,7 @@ def _drop(group: ObjectGroup, item: Item, floor: Floor, rng: Rng, upright: bool)
     z = top_m + half_height_m + fall_m
     if z + half_height_m > clearance_m:
         raise _no_place(group)
-    floor.taken.append((x, y, radius_m, z + half_height_m))
+    floor.take(x, y, radius_m, z + half_height_m)
     turn = _yaw(rng) if upright else SE3(quaternion_wxyz=dist.So3().draw(rng))
     return floor.surface.T_world_surface @ SE3((x, y, z)) @ turn
 
@@ -246,7 +269,7 @@ def _stand(item: Item, floor: Floor, place: Vec3, turn: SE3) -> SE3:
     top_m = z + 2 * item.half_m[2]
     if top_m > floor.surface.clearance_m:
         raise LayoutRejected(_TOO_HIGH)
-    floor.taken.append((x, y, item.radius_m, top_m))
+    floor.take(x, y, item.radius_m, top_m)
     center = SE3((x, y, z + item.half_m[2] + _LIFT_M))
     return floor.surface.T_world_surface @ center @ turn
 

@@ -266,15 +266,26 @@ class SplitTest:
         return self.splits.of_scene(number // self.samples_per_scene, self.seed) == self.split
 
 
+@dataclass(frozen=True)
+class IsPresent:
+    """Whether a sample did not fail; picklable."""
+
+    absent: frozenset[int]
+
+    def __call__(self, number: int) -> bool:
+        """Whether the sample exists."""
+        return number not in self.absent
+
+
 class SplitIndices(Sequence[int]):
-    """Those of some indices whose scenes are in one split; picklable, and possibly endless.
+    """Some of the indices, such as those of one split; picklable, and possibly endless.
 
     Args:
         indices: Numbers of samples.
-        is_in: Whether a sample is in the split.
+        is_in: Whether a sample is among them.
     """
 
-    def __init__(self, indices: range | SplitIndices, is_in: SplitTest) -> None:
+    def __init__(self, indices: range | SplitIndices, is_in: SplitTest | IsPresent) -> None:
         self._indices, self._is_in = indices, is_in
         self._found: list[int] = []
         self._sought = 0
@@ -474,7 +485,11 @@ class StoredDataset(SampleSequence):
 
     def __init__(self, folder: str | PathLike[str], split: str = "") -> None:
         stored = open_stored(folder)
-        super().__init__(ReadSamples(stored), range(stored.n))
+        every: range | SplitIndices = range(stored.plan.n)
+        if stored.failed:
+            absent = frozenset(failure.index for failure in stored.failed)
+            every = SplitIndices(every, IsPresent(absent))
+        super().__init__(ReadSamples(stored), every)
         self.folder = stored.folder
         self._select(split)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
@@ -35,6 +36,8 @@ def generate(  # noqa: PLR0913  (keywords of one front door)
     repair: bool = False,
     allow_mixed_numerics: bool = False,
     force: bool = False,
+    skip_failed: bool = False,
+    sample_timeout_s: float | None = None,
     shards: tuple[int, int] | None = None,
     cluster: RayCluster | None = None,
     on_progress: Callable[[RunProgress], None] | None = None,
@@ -54,6 +57,10 @@ def generate(  # noqa: PLR0913  (keywords of one front door)
         repair: Hash all existing files first, and restore what is damaged.
         allow_mixed_numerics: Go on on a machine that computes differently from the first one.
         force: Start although the disk is probably too small.
+        skip_failed: Go on without samples that fail; ``failed`` of the summary and of the manifest
+            names them, and only ``repair`` tries them again.
+        sample_timeout_s: Time after which a sample hangs [s]: no second try. None = that of the
+            configuration, or else 300 s and 3 tries. Not with ``workers=0``.
         shards: First shard and the one after the last, for a part of the data set in a folder of
             its own; ``merge`` gathers the parts. None = all.
         cluster: Ray cluster that generates the shards; None = processes of this machine.
@@ -76,13 +83,14 @@ def generate(  # noqa: PLR0913  (keywords of one front door)
     """
     with _standby_worker(cluster, workers) as standby:
         _check_arguments(config, n, out, workers, repair)
+        _check_time_limit(sample_timeout_s)
         # Before the imports below, so that errors of a configuration come at once.
         loaded = load_config(config, seed=seed, overrides=overrides, without=without)
 
         from gen_data.generator.assemble.size_estimate import estimate_sample_bytes
         from gen_data.generator.assets.file_remarks import warn_of_remarks
         from gen_data.generator.runner.identity import format_licences, make_plan
-        from gen_data.generator.runner.run import Settings, run
+        from gen_data.generator.runner.run import Limits, Settings, run
 
         factory = _make_factory(loaded, n)
         plan = make_plan(factory)
@@ -100,6 +108,8 @@ def generate(  # noqa: PLR0913  (keywords of one front door)
                     allow_mixed_numerics=allow_mixed_numerics,
                     sample_bytes=estimate_sample_bytes(loaded, factory.info),
                     is_forced=force,
+                    skip_failed=skip_failed or loaded.general.skip_failed,
+                    limits=Limits(sample_s=sample_timeout_s or loaded.general.sample_timeout_s),
                     open_pool=pool,
                     shards=None if shards is None else check_shards(shards, plan.shard_count),
                 ),
@@ -177,6 +187,13 @@ def _check_arguments(
             "without repair, which replaces damaged shards, or repair a copy"
         )
     open_store(_guess_folder(config, out)).check_unlocked()
+
+
+def _check_time_limit(limit_s: float | None) -> None:
+    if limit_s is not None and not 0.0 < limit_s < math.inf:
+        raise ConfigError(
+            f"sample_timeout_s: {limit_s:g} is no time limit; expected seconds above 0"
+        )
 
 
 def _make_factory(loaded: Config, n: int) -> PipelineFactory:

@@ -27,7 +27,8 @@ def repair(
     """Restore what is damaged or missing in a data set, byte for byte, from its own plan.
 
     Damaged shards are generated again, merged files are written again, and files that do not belong
-    to the data set are moved to ``run/quarantine``, where the damaged ones are, too.
+    to the data set are moved to ``run/quarantine``, where the damaged ones are, too. Samples that
+    failed are tried again; if they fail again, the data set stays without them.
 
     Args:
         folder: A data set; an unfinished one is finished.
@@ -84,7 +85,8 @@ def restore(  # noqa: PLR0913  (keywords of its callers)
     from threadpoolctl import threadpool_limits
 
     from gen_data.generator.runner.regeneration import plan_regeneration, refuse_changes
-    from gen_data.generator.runner.run import Settings, run
+    from gen_data.generator.runner.run import Settings, lacks_samples, run
+    from gen_data.generator.runner.store import LocalStore
 
     made = plan_regeneration(path, plan, source)
     refuse_changes(path, made.changes, "repair it" if repair else "finish it")
@@ -96,6 +98,10 @@ def restore(  # noqa: PLR0913  (keywords of its callers)
             workers=count_workers(workers),
             resume_command=resume_command,
             licences=made.licences,
-            settings=Settings(repair=repair, allow_mixed_numerics=allow_mixed_numerics),
+            settings=Settings(
+                repair=repair,
+                allow_mixed_numerics=allow_mixed_numerics,
+                skip_failed=repair and lacks_samples(LocalStore(path.absolute()), plan),
+            ),
             progress=on_progress,
         )

@@ -110,7 +110,7 @@ def _with_fitting_exporters(
     if now.general.labels.map.faults(stored.categories):
         return now  # Refused by the run, whatever the exporters are.
     library = open_assets(now.asset_folders)
-    info = dataset_info(now, stored.n, stored.categories)
+    info = dataset_info(now, stored.plan.n, stored.categories)
     kept = []
     for exporter, entry in zip(now.exporters, now.resolved["exporters"], strict=True):
         try:

@@ -65,6 +65,10 @@ DEFAULT_RENDERER = "warp"
 P = TypeVar("P")
 
 
+RUN_KEYS = frozenset({"skip_failed", "sample_timeout_s"})
+"""Keys that a plan leaves out: options of a run, like those of the command line."""
+
+
 class AssetFolders(Strict):
     """Assets of the user."""
 
@@ -120,6 +124,15 @@ class GeneralSettings(Strict):
     step_s: float = Field(0.1, gt=0, le=10, description="Time between two instants [s].")
     shard_size: int = Field(
         SHARD_SIZE, ge=1, le=100_000, description="Samples that are committed together."
+    )
+    skip_failed: bool = Field(
+        False, description="Go on without samples that cannot be made, as --skip-failed."
+    )
+    sample_timeout_s: float | None = Field(
+        None,
+        gt=0,
+        le=1e6,
+        description="Time after which a sample counts as hung [s], as --sample-timeout.",
     )
     depth_scale_m: float = Field(
         0.0001, gt=0, le=1, description="Metres per unit of 16-bit depth images."

@@ -30,6 +30,7 @@ from gen_data.generator.core.errors import AssetError, UnknownAsset, did_you_mea
 from gen_data.generator.core.plates import Plate
 from gen_data.generator.core.scene import Lane, StageModel
 from gen_data.generator.core.se3 import Vec3
+from gen_data.generator.core.serialization import find_not_finite, to_plain
 
 VEHICLES = frozenset(
     {"bus", "car", "caravan", "minibus", "motorcycle", "suv", "trailer", "tram", "truck", "van"}
@@ -239,8 +240,12 @@ class Library:
     def environment(self, environment_id: str) -> Float32:
         """Equirectangular relative radiance; see ``AssetLibrary.environment``."""
         if self._is_generated(environment_id):
-            return self._generated.environment(parse_asset_id(environment_id))
-        return self._files.environment(environment_id)
+            radiance = self._generated.environment(parse_asset_id(environment_id))
+        else:
+            radiance = self._files.environment(environment_id)
+        if not np.isfinite(radiance).all():
+            raise AssetError(f"asset '{environment_id}': its radiance is NaN or infinite somewhere")
+        return radiance
 
     def derived(self, asset_id: str, name: str, compute: Callable[[], Arrays]) -> Arrays:
         """Arrays computed from an asset alone; see ``DerivedArrays``.
@@ -277,6 +282,7 @@ class Library:
 
         def read() -> _MeshSummary:
             mesh, imported = self.mesh(asset_id), self._imported(asset_id)
+            check_finite(asset_id, mesh)
             return _MeshSummary(
                 mesh.bounds_m(), imported.body_bounds_m, mesh.materials, imported.keypoints
             )
@@ -324,3 +330,18 @@ def default_cache_dir() -> Path:
     from platformdirs import user_cache_path
 
     return user_cache_path("gen-data")
+
+
+def check_finite(asset_id: str, mesh: MeshData) -> None:
+    """Check that geometry and materials of a mesh are finite: no renderer or engine shows NaN.
+
+    Raises:
+        AssetError: a number is NaN or infinite.
+    """
+    for name in ("vertices_m", "normals", "uvs"):
+        values = getattr(mesh, name)
+        if not np.isfinite(values).all():
+            number = int(np.argwhere(~np.isfinite(values))[0, 0])
+            raise AssetError(f"asset '{asset_id}': {name}[{number}] is NaN or infinite")
+    if field := find_not_finite(to_plain(mesh.materials), "materials"):
+        raise AssetError(f"asset '{asset_id}': {field} is NaN or infinite")

@@ -112,7 +112,7 @@ class Examined:
         """Numbers of random samples, ascending; all if there are few."""
         count = min(self.scope.samples, self.stored.n)
         chosen = self.rng("samples").permutation(self.stored.n)[:count]
-        return sorted(int(index) for index in chosen)
+        return sorted(self.stored.indices[int(number)] for number in chosen)
 
     def chosen_samples(self) -> list[Sample]:
         """The samples of these numbers."""

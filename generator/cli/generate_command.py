@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from gen_data.generator.api.generate import generate
 from gen_data.generator.cli.options import ConfigurationOptions
+from gen_data.generator.core.errors import SamplesSkipped
 
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
@@ -28,6 +29,8 @@ def generate_with_progress(
     repair: bool = False,
     allow_mixed_numerics: bool = False,
     force: bool = False,
+    skip_failed: bool = False,
+    sample_timeout_s: float | None = None,
     shards: tuple[int, int] | None = None,
     cluster: RayCluster | None = None,
 ) -> None:
@@ -48,6 +51,8 @@ def generate_with_progress(
             repair=repair,
             allow_mixed_numerics=allow_mixed_numerics,
             force=force,
+            skip_failed=skip_failed,
+            sample_timeout_s=sample_timeout_s,
             shards=shards,
             cluster=cluster,
             on_progress=show,
@@ -106,7 +111,11 @@ def _make_bar() -> Progress:
 
 
 def print_summary(summary: Summary) -> None:
-    """Print the summary of a run as a table."""
+    """Print the summary of a run as a table.
+
+    Raises:
+        SamplesSkipped: the data set does not have all of its samples.
+    """
     from rich.console import Console
     from rich.table import Table
 
@@ -114,3 +123,8 @@ def print_summary(summary: Summary) -> None:
     for name, value in summary.rows():
         table.add_row(name, value)
     Console(stderr=True).print(table)
+    if summary.failed:
+        raise SamplesSkipped(
+            f"{len(summary.failed)} samples could not be made and were skipped; the first one: "
+            f"sample {summary.failed[0].index}. Texts of errors are in run/log.jsonl"
+        )

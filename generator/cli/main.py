@@ -171,7 +171,7 @@ gen-data --config tabletop.yaml --n 1000 --without colors --out ablation
 
 An interrupted run is resumed by the same command. Exit codes: 0 done, 2 configuration or usage,
 3 asset, 4 storage (resumable), 5 determinism, 6 sample, 7 verification, 8 certification,
-9 finished without any label, 130 interrupted.
+9 finished without any label, 10 finished without samples that failed, 130 interrupted.
 """
 
 
@@ -191,6 +191,15 @@ An interrupted run is resumed by the same command. Exit codes: 0 done, 2 configu
 )
 @click.option("--force", is_flag=True, help="Start although the disk is probably too small.")
 @click.option(
+    "--skip-failed", is_flag=True, help="Go on without samples that fail; exit code 10 then."
+)
+@click.option(
+    "--sample-timeout",
+    type=float,
+    metavar="SECONDS",
+    help="A sample that takes longer hangs; no second try [default: 300 s, 3 tries].",
+)
+@click.option(
     "--shards",
     callback=parse_shards,
     metavar="A:B",
@@ -209,6 +218,8 @@ def cli(
     repair: bool,
     allow_mixed_numerics: bool,
     force: bool,
+    skip_failed: bool,
+    sample_timeout: float | None,
     shards: tuple[int, int] | None,
     runner: str,
     address: str | None,
@@ -247,6 +258,8 @@ def cli(
         repair=repair,
         allow_mixed_numerics=allow_mixed_numerics,
         force=force,
+        skip_failed=skip_failed,
+        sample_timeout_s=sample_timeout,
         shards=shards,
         cluster=choose_cluster(runner, address, cpus, gpus),
     )

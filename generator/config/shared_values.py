@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from graphlib import CycleError, TopologicalSorter
 from typing import Any
 
 from gen_data.generator.config.distributions import (
@@ -45,8 +46,8 @@ _SEARCHED_SCENES = 400
 
 Shared = Mapping[str, SharedValue]
 
-_NEEDS: ObjectCache[dict[str, set[str]]] = ObjectCache(4)
-"""Names that each entry depends on, of the latest sections: all are drawn for every scene."""
+_ORDERS: ObjectCache[tuple[str, ...]] = ObjectCache(4)
+"""Orders in which the values of the latest sections are drawn, for every scene."""
 
 
 def refers(node: Node) -> bool:
@@ -171,19 +172,30 @@ def _evaluate(section: Node, streams: Streams, fixed: Shared) -> dict[str, Share
     if not isinstance(section.content, Mapping):
         fact = "expected a mapping of names to values or distributions"
         refuse(section.position, "shared", fact)
-    needs = _NEEDS.get(section, lambda: {n: names_in(node) for n, node in section.entries.items()})
     shared: dict[str, SharedValue] = {}
-    waiting = dict(section.content)
-    while waiting:
-        ready = [name for name in waiting if not needs[name] & waiting.keys()]
-        if not ready:
-            name, node = next(iter(waiting.items()))
-            fact = f"depends on itself: {', '.join(sorted(waiting))} need one another"
-            refuse(node.position, f"shared.{name}", fact)
-        for name in ready:
-            node = waiting.pop(name)
-            shared[name] = fixed[name] if name in fixed else _draw(name, node, shared, streams)
+    for name in _ORDERS.get(section, lambda: _order(section)):
+        given = name in fixed
+        shared[name] = fixed[name] if given else _draw(name, section.entries[name], shared, streams)
     return shared
+
+
+def _order(section: Node) -> tuple[str, ...]:
+    """Names of all values, each after those that it depends on.
+
+    Raises:
+        ConfigError: values depend on one another.
+    """
+    known = section.entries
+    sorter = TopologicalSorter(
+        {name: names_in(node) & known.keys() for name, node in known.items()}
+    )
+    try:
+        return tuple(sorter.static_order())
+    except CycleError as cycle:
+        names = set(cycle.args[1])
+        first = next(name for name in known if name in names)
+        fact = f"depends on itself: {', '.join(sorted(names))} need one another"
+        refuse(known[first].position, f"shared.{first}", fact)
 
 
 def _draw(name: str, node: Node, shared: Shared, streams: Streams) -> SharedValue:

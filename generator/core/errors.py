@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import errno
+import math
 import re
 from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager
@@ -91,6 +92,27 @@ class SampleError(GenDataError):
     exit_code = 6
 
 
+@contextmanager
+def in_stage(stage: str) -> Iterator[None]:
+    """Let an error of the block remember its stage; the innermost block counts."""
+    try:
+        yield
+    except BaseException as error:
+        if not hasattr(error, "stage"):
+            error.stage = stage  # type: ignore[attr-defined]
+        raise
+
+
+def stage_of(error: BaseException) -> str:
+    """Stage of an error or of its cause; ``sample`` if there is none."""
+    cause: BaseException | None = error
+    while cause is not None:
+        if stage := getattr(cause, "stage", ""):
+            return str(stage)
+        cause = cause.__cause__
+    return "sample"
+
+
 class OutOfMemory(SampleError):
     """A process got no more memory from the system, or from a GPU."""
 
@@ -160,6 +182,12 @@ class NoLabels(GenDataError):
         super().__init__(message)
 
 
+class SamplesSkipped(GenDataError):
+    """A data set is finished, without the samples that could not be made."""
+
+    exit_code = 10
+
+
 class Interrupted(GenDataError):
     """The user asked to stop; what was committed stays and the run can be resumed."""
 
@@ -173,10 +201,15 @@ class Rejection:
     Attributes:
         reason: A short noun phrase that equal rejections share, such as ``object fell off``.
         remedy: What to change, naming a field of the configuration.
+        detail: The objects concerned and by how much; empty = unknown.
+        excess: How far from valid, to compare rejections of one scene; the unit is that of the
+            reason.
     """
 
     reason: str
     remedy: str
+    detail: str = ""
+    excess: float = math.inf
 
 
 class LayoutRejected(Exception):
@@ -193,6 +226,8 @@ class LayoutRejected(Exception):
 class SceneRejected(SampleError):
     """No valid layout of a scene was found within the bounded number of attempts."""
 
+    stage = "layout"
+
     def __init__(self, scene_index: int, rejections: tuple[Rejection, ...]) -> None:
         self.scene_index = scene_index
         self.rejections = rejections
@@ -202,9 +237,14 @@ class SceneRejected(SampleError):
             counts[rejection.reason] = counts.get(rejection.reason, 0) + 1
             remedies[rejection.remedy] = None
         tally = ", ".join(f"{count} x {reason}" for reason, count in counts.items())
+        detailed = [(r.excess, number) for number, r in enumerate(rejections) if r.detail]
+        best = ""
+        if detailed:
+            _, number = min(detailed)
+            best = f"\n  Best: attempt {number + 1}: {rejections[number].detail}."
         tries = " ".join(f"{i}. {remedy}" for i, remedy in enumerate(remedies, 1))
         super().__init__(
-            f"scene {scene_index}: no valid layout in {len(rejections)} attempts ({tally}).\n"
+            f"scene {scene_index}: no valid layout in {len(rejections)} attempts ({tally}).{best}\n"
             f"  Try: {tries}"
         )
 

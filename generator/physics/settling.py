@@ -76,8 +76,8 @@ class Settling:
             if not loose:
                 break
             if any(self._homes[body.name] is None for body in loose):
-                return self._fell_off()
-        return self._fell_off() if loose else self._check_overlaps()
+                return self._fell_off(loose)
+        return self._fell_off(loose) if loose else self._check_overlaps()
 
     def _restart(self, body: Body, pull: float) -> None:
         """Put a body at its initial pose, moved by a share towards the middle of its surface."""
@@ -189,15 +189,20 @@ class Settling:
         return not surfaces or is_supported(surfaces, *self._world.bounds_m(body.name))
 
     def _check_overlaps(self) -> Rejection | None:
-        deepest = min((contact.gap_m for contact in self._world.contacts()), default=0.0)
-        if deepest >= -self._config.penetration_m_max:
+        worst = min(self._world.contacts(), key=lambda contact: contact.gap_m, default=None)
+        if worst is None or worst.gap_m >= -self._config.penetration_m_max:
             return None
         remedy = f"{self._fewer()}, a larger surface, or a larger physics.penetration_m_max"
-        return Rejection("objects interpenetrate", remedy)
+        detail = f"'{worst.one}' and '{worst.other}' overlap by {-1e3 * worst.gap_m:.1f} mm"
+        return Rejection("objects interpenetrate", remedy, detail, -worst.gap_m)
 
-    def _fell_off(self) -> Rejection:
+    def _fell_off(self, loose: Sequence[Body]) -> Rejection:
         guard = "" if self._config.guard_walls else ", or physics.guard_walls: true"
-        return Rejection("object fell off", f"{self._fewer()}, or a larger surface{guard}")
+        remedy = f"{self._fewer()}, or a larger surface{guard}"
+        others = f" and {len(loose) - 1} more" if len(loose) > 1 else ""
+        detail = f"'{loose[0].name}'{others} of {len(self._falling)} objects fell off"
+        # Worse than any overlap, which is less than a metre.
+        return Rejection("object fell off", remedy, detail, float(len(loose)))
 
     def _fewer(self) -> str:
         groups = ", ".join(sorted({f"'{body.group}'" for body in self._falling if body.group}))

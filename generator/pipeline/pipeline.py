@@ -19,7 +19,13 @@ from gen_data.generator.core.capture import (
     PointCloud,
     SensorReading,
 )
-from gen_data.generator.core.errors import ConfigError, LayoutRejected, Rejection, SceneRejected
+from gen_data.generator.core.errors import (
+    ConfigError,
+    LayoutRejected,
+    Rejection,
+    SceneRejected,
+    in_stage,
+)
 from gen_data.generator.core.interfaces import (
     AssetLibrary,
     DatasetInfo,
@@ -34,6 +40,7 @@ from gen_data.generator.core.sample import EgoTruth, ImageTruth, Sample
 from gen_data.generator.core.scene import LABEL_IDS_MAX, Scene
 from gen_data.generator.core.scene_time import place_sensors
 from gen_data.generator.core.streams import Streams
+from gen_data.generator.pipeline.checked_renderer import CheckedRenderer
 from gen_data.generator.pipeline.finalize_scene import Timeline, finalize_scene
 from gen_data.generator.pipeline.numerics import numerics_digests
 from gen_data.generator.pipeline.splits import Assignment, split_of
@@ -138,7 +145,7 @@ class Pipeline:
     @cached_property
     def renderer(self) -> Renderer:
         """The renderer, opened by the context or on first use; merging shards needs none."""
-        return self._open_renderer()
+        return CheckedRenderer(self._open_renderer())
 
     def __enter__(self) -> Pipeline:
         """Start the engines."""
@@ -351,9 +358,13 @@ def _count_lidar_points(
 
 @contextmanager
 def _timed(timings_s: dict[str, float], stage: str) -> Iterator[None]:
-    """Add the CPU time of a block to a stage. Timings are logged, never part of a data file."""
+    """Add the CPU time of a block to a stage. Timings are logged, never part of a data file.
+
+    An error of the block remembers the stage.
+    """
     started_s = time.process_time()
     try:
-        yield
+        with in_stage(stage):
+            yield
     finally:
         timings_s[stage] = timings_s.get(stage, 0.0) + time.process_time() - started_s

@@ -127,8 +127,11 @@ def replay_scenes(stored: StoredSamples, scenes_max: int) -> Replay:
     config = load_config(str(stored.folder))
     library = open_assets(config.asset_folders)
     replay = Replay(stored, config, library)
-    count = -(-stored.n // replay.per_scene)
-    chosen = sorted({k * count // scenes_max for k in range(scenes_max)}) if scenes_max else []
+    count = -(-stored.plan.n // replay.per_scene)
+    partial = {failure.index // replay.per_scene for failure in stored.failed}
+    whole = [scene for scene in range(count) if scene not in partial] if partial else range(count)
+    places = {k * len(whole) // scenes_max for k in range(scenes_max)} if whole else set()
+    chosen = [whole[place] for place in sorted(places)]
     with open_engine(library, config.general.physics) as physics:
         for scene in chosen:
             try:
@@ -186,14 +189,14 @@ class Replay:
                 raise LayoutRejected(settled.rejection)
             return finalize_scene(settled.scene, self._library, self._category_ids), observed
 
-        samples = range(first, min(first + self.per_scene, self._stored.n))
+        samples = range(first, min(first + self.per_scene, self._stored.plan.n))
         attempts = self._stored.kept_scene(first).attempts
         scene, observed = self._accept(attempts, settle, log, samples)
         views = []
         for view in range(min(info.views_per_scene, self._views_left(first))):
             index = number * info.views_per_scene + view
             begin = index * info.steps_per_scene
-            samples = range(begin, min(begin + info.steps_per_scene, self._stored.n))
+            samples = range(begin, min(begin + info.steps_per_scene, self._stored.plan.n))
             kept = self._stored.kept_scene(begin)
 
             def draw_view(attempt: int, view: int = view, index: int = index) -> Scene:
@@ -204,7 +207,7 @@ class Replay:
         self.differences += islice(filter(None, starmap(_first_difference, views)), 1)
 
     def _views_left(self, first: int) -> int:
-        return -(-(self._stored.n - first) // self._stored.info.steps_per_scene)
+        return -(-(self._stored.plan.n - first) // self._stored.info.steps_per_scene)
 
     def _accept(
         self, attempts: int, draw: Callable[[int], Any], log: list[Draw], samples: range

@@ -73,7 +73,7 @@ def find_label_gaps(stored: StoredSamples) -> LabelGaps:
     applied = AppliedLabelMap(label_map, stored.info)
     waiting = dict.fromkeys((*stored.info.cameras, *stored.info.lidars), 0)
     sensors = len(waiting)
-    for index in range(stored.n):
+    for index in stored.indices:
         if not waiting:
             break
         sample = stored.labelled(index)

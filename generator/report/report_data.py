@@ -157,6 +157,7 @@ def without_pictures(report: Json) -> Json:
 
 def _about(stored: StoredSamples) -> Json:
     info = stored.info
+    per_scene = info.views_per_scene * info.steps_per_scene
     return {
         "configuration": stored.plan.name,
         "template": str(stored.config.get("template", "")),
@@ -164,7 +165,7 @@ def _about(stored: StoredSamples) -> Json:
         "version": str(stored.plan.versions.get("gen-data", "")),
         "seed": info.seed,
         "samples": stored.n,
-        "scenes": -(-stored.n // (info.views_per_scene * info.steps_per_scene)),
+        "scenes": len({index // per_scene for index in stored.indices}),
         "views_per_scene": info.views_per_scene,
         "steps_per_scene": info.steps_per_scene,
         "sensors": [
@@ -252,7 +253,7 @@ def _measure(
     info = stored.info
     per_scene = info.views_per_scene * info.steps_per_scene
     files = []
-    for index in range(stored.n):
+    for index in stored.indices:
         folder = stored.shard_dir(index // stored.plan.shard_size)
         for camera, channels in info.media.items():
             path = media_path(folder, camera, Channel.RGB, index)

@@ -77,7 +77,7 @@ def browser_images(stored: StoredSamples, bytes_max: int) -> list[BrowserImage]:
     size = 0
     for number in evenly_spread(stored.n * len(cameras)):
         index, camera = divmod(number, len(cameras))
-        sample = stored.labelled(index)
+        sample = stored.labelled(stored.indices[index])
         name = cameras[camera]
         if name not in sample.truth:
             continue

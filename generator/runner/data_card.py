@@ -143,7 +143,7 @@ def data_card(facts: DatasetFacts) -> str:
     return _CARD.format(
         title=plain(title_of(info)),
         description=plain(describe_dataset(info)),
-        samples=info.n,
+        samples=_samples_text(facts),
         scenes=facts.scenes,
         views=info.views_per_scene,
         steps=_steps(info),
@@ -167,6 +167,14 @@ def data_card(facts: DatasetFacts) -> str:
         licence=_licence_text(facts),
         citation=_citation(info),
     )
+
+
+def _samples_text(facts: DatasetFacts) -> str:
+    samples = sum(count.samples for count in facts.splits)
+    if samples == facts.plan.n:
+        return str(samples)
+    gone = f"{facts.plan.n - samples} of {facts.plan.n} could not be made"
+    return f"{samples} (`failed` in [manifest.json](manifest.json): {gone})"
 
 
 def _label_limits(plan: Plan) -> Iterator[str]:

@@ -31,7 +31,8 @@ def find_invalid_samples(folder: Path) -> Iterator[Finding]:
     stored = StoredSamples(folder)
     for shard in range(stored.plan.shard_count):
         yield from _lax_json(stored, shard)
-        for index in stored.plan.samples_of(shard):
+        absent = {failure.index for failure in stored.failed}
+        for index in (i for i in stored.plan.samples_of(shard) if i not in absent):
             where = f"{SHARDS_NAME}/{stored.shard_dir(shard).name}"
             samples = f"sample {index}"
             try:
@@ -66,19 +67,21 @@ def _lax_json(stored: StoredSamples, shard: int) -> Iterator[Finding]:
 
 
 def choose_samples(folder: Path, count: int) -> list[int]:
-    """Indices of ``count`` samples, or of all if there are fewer; ascending.
+    """Indices of ``count`` samples, or of all that exist if there are fewer; ascending.
 
     They are others every time: repeated verification covers more and more of the data set.
 
     Raises:
         StorageError: the plan is missing or damaged.
     """
-    n = load_plan(folder).n
-    if count >= n:
-        return list(range(n))
+    plan, store = load_plan(folder), LocalStore(folder)
+    records = filter(None, map(store.record, range(plan.shard_count)))
+    absent = {failure.index for record in records for failure in record.failed}
+    if count >= plan.n - len(absent):
+        return [index for index in range(plan.n) if index not in absent]
     chosen: set[int] = set()
     while len(chosen) < count:
-        chosen.add(secrets.randbelow(n))
+        chosen |= {secrets.randbelow(plan.n)} - absent
     return sorted(chosen)
 
 

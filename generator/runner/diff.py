@@ -59,7 +59,7 @@ def compare(one: Path, other: Path, semantic: bool = False) -> Comparison:
             raise StorageError(
                 f"{folder}: no data set and no folder of a shard; expected two of the same kind"
             )
-    indices = [_first_index(one) + i for i in range(_count_lines(one / SCENES_NAME))]
+    indices = _indices(one)
     for index in indices:
         found = compare_samples(SampleFiles(one, index), SampleFiles(other, index), semantic)
         if found is not None:
@@ -71,7 +71,14 @@ def _compare_datasets(one: Path, other: Path, semantic: bool) -> Comparison:
     plans = load_plan(one), load_plan(other)
     changes = tuple(compare_plans(*plans))
     n = min(plan.n for plan in plans)
+    absent = [_failed(folder, plan) for folder, plan in zip((one, other), plans, strict=True)]
     for index in _samples_to_compare(one, other, plans, n):
+        if index in absent[0] and index in absent[1]:
+            continue
+        if index in absent[0] or index in absent[1]:
+            owner = other if index in absent[0] else one
+            text = f"only {owner} has it; in the other it failed"
+            return Comparison(n, changes, sample=Difference(index, "sample", text))
         files = [
             SampleFiles(LocalStore(folder).shard_dir(index // plan.shard_size), index)
             for folder, plan in zip((one, other), plans, strict=True)
@@ -119,14 +126,16 @@ def _are_equal(one: Path, other: Path) -> bool:
     return one.samefile(other) or filecmp.cmp(one, other, shallow=False)
 
 
-def _first_index(folder: Path) -> int:
+def _failed(folder: Path, plan: Plan) -> set[int]:
+    """Indices of the samples that a data set does not have."""
+    records = filter(None, map(LocalStore(folder).record, range(plan.shard_count)))
+    return {failure.index for record in records for failure in record.failed}
 
+
+def _indices(folder: Path) -> list[int]:
+    """Indices of the samples in the folder of a shard."""
     try:
         with (folder / LABELS_NAME).open("rb") as file:
-            return int(json.loads(file.readline())["index"])
+            return [int(json.loads(line)["index"]) for line in file]
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise StorageError(f"{folder / LABELS_NAME}: cannot be read ({error})") from None
-
-
-def _count_lines(path: Path) -> int:
-    return path.read_bytes().count(b"\n")

@@ -31,11 +31,12 @@ def explain_errors(place: str, command: str = "") -> Iterator[None]:
             raise
         reproduce = f"\n  Reproduce: {command}" if command else ""
         raise SampleError(f"{place}: {error}{reproduce}") from error
-    except Exception as error:
+    except (Exception, KeyboardInterrupt, SystemExit) as error:
+        # Requests to stop are Interrupted, so that the last two come from a plug-in.
         raise unexpected_error(error, place, command) from error
 
 
-def unexpected_error(error: Exception, place: str, command: str = "") -> SampleError:
+def unexpected_error(error: BaseException, place: str, command: str = "") -> SampleError:
     """Make a SampleError with the end of the traceback, which cannot be pickled itself.
 
     Lack of memory is one line: a traceback tells nothing about it.
@@ -43,7 +44,7 @@ def unexpected_error(error: Exception, place: str, command: str = "") -> SampleE
     if lacking := lack_of_memory(error):
         return OutOfMemory(f"{place}: {lacking}")
     trace = "".join(traceback.format_exception(type(error), error, error.__traceback__))
-    lines = [f"{place}: {type(error).__name__}: {error}"]
+    lines = [f"{place}: {type(error).__name__}: {str(error) or 'without a message'}"]
     lines += [f"  {line}" for line in trace.rstrip().splitlines()[-TRACE_LINES:]]
     if any(text in str(error) for text in CACHE_DAMAGE):
         lines.append(

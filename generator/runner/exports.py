@@ -142,7 +142,8 @@ class LinkedFiles:
 def _linked_sample_bytes(stored: StoredSamples) -> float:
     """Mean size of the files of a sample that exports link, in the first shard."""
     sizes = [file.bytes for file in _linked_files(stored, 0)]
-    return sum(sizes) / len(stored.plan.samples_of(0))
+    record = LocalStore(stored.folder).record(0)
+    return sum(sizes) / max(record.samples if record else 0, 1)
 
 
 def _linked_files(stored: StoredSamples, shard: int) -> list[FileRecord]:
@@ -212,5 +213,6 @@ def export(  # noqa: PLR0913  (keywords of one front door)
             sample_bytes=0.0 if linked else linked_bytes,
             linked_bytes=linked_bytes if linked else 0.0,
             is_forced=force,
+            failed=stored.failed,
         ),
     )

@@ -8,7 +8,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
-from gen_data.generator.core.errors import StorageError
+from gen_data.generator.core.errors import SampleError, StorageError
 from gen_data.generator.core.interfaces import DatasetInfo
 from gen_data.generator.core.serialization import canonical_json
 from gen_data.generator.runner.data_card import (
@@ -65,16 +65,24 @@ def finalize(
 
     Raises:
         StorageError: a shard is not committed, or a file cannot be written.
+        SampleError: every sample failed.
         DeterminismError: the result is not what was sealed before; nothing is sealed.
     """
     with store.errors():
         records = _all_records(plan, store)
+        failed = [failure for record in records for failure in record.failed]
+        if len(failed) == plan.n:
+            raise SampleError(
+                f"none of the {plan.n} samples could be made; sample {failed[0].index}: "
+                f"{failed[0].stage}: {failed[0].error}\n"
+                f"  Reproduce: {store.reproduce_command(failed[0].index)}"
+            )
         names = sorted(pipeline.exporters)
         # Only exporters link files of shards; without any, the files may be elsewhere.
         known = _inodes(store, records) if names else {}
         for name in names:
             with explain_errors(f"exporter {name}, merging"), store.errors():
-                _merge(plan, store, pipeline, name, known)
+                _merge(records, store, pipeline, name, known)
         scratch = store.scratch_dir()
         documents = _documents(plan, store, pipeline, records, licences)
         for name, data in documents.items():
@@ -113,11 +121,15 @@ def _inodes(store: LocalStore, records: list[ShardRecord]) -> dict[Inode, str]:
 
 
 def _merge(
-    plan: Plan, store: LocalStore, pipeline: PipelineLike, name: str, known: Mapping[Inode, str]
+    records: Sequence[ShardRecord],
+    store: LocalStore,
+    pipeline: PipelineLike,
+    name: str,
+    known: Mapping[Inode, str],
 ) -> None:
     """Let one exporter merge into a temporary folder, which then replaces the older one."""
     staging = store.scratch_dir()
-    shard_dirs = [store.shard_dir(shard) for shard in range(plan.shard_count)]
+    shard_dirs = [store.shard_dir(record.shard) for record in records if record.samples]
     pipeline.exporters[name].finalize(pipeline.info, shard_dirs, staging)
     sync_tree(staging, synced=known)
     target = store.root / name
@@ -203,7 +215,9 @@ def _manifest(
         "empty_folders": folders,
         "versions": plan.versions,
     }
-    return (canonical_json(manifest) + "\n").encode()
+    failed = [failure for record in records for failure in record.failed]
+    # Data sets that have every sample stay the same.
+    return (canonical_json(manifest | ({"failed": failed} if failed else {})) + "\n").encode()
 
 
 def _by_path(entry: Entry) -> str:

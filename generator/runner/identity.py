@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
 
 from gen_data.generator import __version__
+from gen_data.generator.assemble.config import RUN_KEYS
 from gen_data.generator.assemble.pipeline_factory import PipelineFactory, annotators_of
 from gen_data.generator.assemble.plugin_tables import third_party_packages
 from gen_data.generator.assets.installed_packs import TAG, installed_packs
@@ -53,11 +54,12 @@ def make_plan(factory: PipelineFactory) -> Plan:
     It names the physics engine even if that is this machine's default: on others it may not be.
     """
     config = factory.config
-    physics = config.resolved.get("physics") or {}
+    resolved = {key: v for key, v in config.resolved.items() if key not in RUN_KEYS}
+    physics = resolved.get("physics") or {}
     engine = {"engine": config.general.physics.engine}
     assets = possible_assets(factory)
     return Plan(
-        config={**config.resolved, "physics": {**physics, **engine}},
+        config={**resolved, "physics": {**physics, **engine}},
         name=config.name,
         seed=config.general.seed,
         n=factory.n,

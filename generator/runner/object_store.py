@@ -33,6 +33,7 @@ from gen_data.generator.runner.durable_files import (
     make_folder,
     tree_sizes,
 )
+from gen_data.generator.runner.failed_sample import FailedSample
 from gen_data.generator.runner.plan import PLAN_NAME, Plan, parse_plan, plan_bytes
 from gen_data.generator.runner.seal import parse_object
 from gen_data.generator.runner.shard_record import ShardRecord, parse_record
@@ -267,17 +268,23 @@ class ObjectStore(LocalStore):
                 else:
                     entry.unlink()
 
-    def scan(self, plan: Plan, full: bool = False) -> Scan:
+    def scan(self, plan: Plan, full: bool = False, whole_only: bool = False) -> Scan:
         """Read every record; with ``full``, also compare the sizes of all objects.
 
-        Shards that differ from their records count as missing.
+        Shards that differ from their records count as missing, and with ``whole_only`` those
+        without some of their samples.
         """
         sizes = self.objects.tree(SHARDS_NAME) if full else None
         missing, samples, size, rejections = [], 0, 0, 0
+        failed: list[FailedSample] = []
         records = self._pull_records(plan)
         for shard in range(plan.shard_count):
             record = records.get(shard)
-            if record is not None and sizes is not None and not _has_sizes(record, sizes):
+            is_damaged = record is not None and (
+                (sizes is not None and not _has_sizes(record, sizes))
+                or (whole_only and bool(record.failed))
+            )
+            if is_damaged:
                 # Without its record, the shard is not committed.
                 self.objects.remove([_record_name(shard)])
                 self.record_path(shard).unlink()
@@ -285,11 +292,14 @@ class ObjectStore(LocalStore):
             if record is None:
                 missing.append(shard)
                 continue
-            samples += record.end - record.first
+            samples += record.samples
+            failed += record.failed
             size += record.size_bytes
             rejections += record.rejections
         whole = range(plan.shard_count)
-        return Scan(whole if len(missing) == len(whole) else missing, samples, size, rejections)
+        if len(missing) == len(whole):
+            return Scan(whole)
+        return Scan(missing, samples, size, rejections, tuple(failed))
 
     def _pull_records(self, plan: Plan) -> dict[int, ShardRecord]:
         """Copy the records that are not staged; returns all that belong to the plan."""

@@ -175,8 +175,8 @@ class WorkerPool:
         elif isinstance(action, (Assign, Dismiss)) and action.worker in self._children:
             # The end of a worker arrives as Exited.
             with suppress(BrokenPipeError, ConnectionResetError):
-                shard = action.shard if isinstance(action, Assign) else None
-                self._children[action.worker].connection.send(shard)
+                work = (action.shard, action.failed) if isinstance(action, Assign) else None
+                self._children[action.worker].connection.send(work)
         elif isinstance(action, Kill) and action.worker in self._children:
             self._children[action.worker].process.kill()
 

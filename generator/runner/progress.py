@@ -20,12 +20,18 @@ from gen_data.generator.runner.worker_events import (
     Note,
     Ready,
     SampleDone,
+    SampleSkipped,
     ShardDone,
     Spawn,
 )
 
 if TYPE_CHECKING:
+    from gen_data.generator.runner.failed_sample import FailedSample
     from gen_data.generator.runner.store import LocalStore, Scan
+
+
+SKIPPED_SHOWN = 10
+"""Samples that the summary of a run names."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +69,7 @@ class Summary:
         worker_deaths: Processes that ended unexpectedly.
         rss_bytes_max: Largest resident memory of a worker after a shard; 0 if unknown.
         folder: Path of the data set; empty in the log of the run.
+        failed: Samples that the data set does not have; see ``Settings.skip_failed``.
         shards_left: Missing shards that this run was not to generate. Above 0, the data set is
             unfinished: ``dataset_id`` is empty, and ``samples`` counts the existing ones.
     """
@@ -78,6 +85,7 @@ class Summary:
     rss_bytes_max: int = 0
     already_complete: bool = False
     folder: str = ""
+    failed: tuple[FailedSample, ...] = ()
     shards_left: int = 0
 
     @property
@@ -93,6 +101,7 @@ class Summary:
                     "samples",
                     f"{self.samples} (all there, every sha256 equal; nothing to do)",
                 ),
+                *self._skipped_row(),
                 ("id", self.dataset_id[:16]),
             ]
         mean_bytes = self.bytes / max(self.samples, 1)
@@ -115,9 +124,18 @@ class Summary:
             rows.append(
                 ("worker deaths", f"{self.worker_deaths} (work repeated; see run/log.jsonl)")
             )
+        rows += self._skipped_row()
         if self.shards_left:
             return [*rows, ("unfinished", f"{self.shards_left} shards left to other runs")]
         return [*rows, ("id", self.dataset_id[:16])]
+
+    def _skipped_row(self) -> list[tuple[str, str]]:
+        if not self.failed:
+            return []
+        named = [f"{f.index} ({f.stage}: {f.error})" for f in self.failed[:SKIPPED_SHOWN]]
+        more = len(self.failed) - len(named)
+        note = f"\nand {more} more; see manifest.json" if more else ""
+        return [("skipped", f"{len(self.failed)} samples:\n" + "\n".join(named) + note)]
 
 
 class RunMonitor:
@@ -146,6 +164,7 @@ class RunMonitor:
         self.made = 0
         self.bytes = 0
         self.rejections = scan.rejections
+        self.failed = scan.failed
         self.worker_deaths = 0
         self.rss_bytes_max = 0
 
@@ -159,6 +178,9 @@ class RunMonitor:
         objection = None
         if isinstance(event, SampleDone):
             self._on_sample(event)
+        elif isinstance(event, SampleSkipped):
+            self._count_in_flight(event)
+            self.log({"skipped": event.failure, "text": event.text})
         elif isinstance(event, ShardDone):
             objection = self._on_shard(event)
         elif isinstance(event, Note):
@@ -184,7 +206,7 @@ class RunMonitor:
         self._report(
             RunProgress(
                 phase=phase,
-                done=self._scan.samples + new,
+                done=self._scan.samples + len(self.failed) + new,
                 total=self._total,
                 samples_per_s=new / self.seconds if new and self.seconds > 0 else 0.0,
                 rejections=self.rejections,
@@ -200,13 +222,17 @@ class RunMonitor:
 
     def mean_cpu_s(self) -> dict[str, float]:
         """CPU seconds per sample by stage, in the order of the first run of each stage."""
-        return {stage: total / self._measured for stage, total in self._cpu_s.items()}
+        measured = max(self._measured, 1)
+        return {stage: total / measured for stage, total in self._cpu_s.items()}
 
     def _on_sample(self, event: SampleDone) -> None:
-        _, before = self._in_flight.get(event.worker, (event.shard, 0))
-        self._in_flight[event.worker] = (event.shard, before + 1)
+        self._count_in_flight(event)
         self._measured += 1
         self._add_cpu_time(event.timings_s)
+
+    def _count_in_flight(self, event: SampleDone | SampleSkipped) -> None:
+        _, before = self._in_flight.get(event.worker, (event.shard, 0))
+        self._in_flight[event.worker] = (event.shard, before + 1)
 
     def _add_cpu_time(self, timings_s: Mapping[str, float]) -> None:
         for stage, seconds in timings_s.items():
@@ -216,6 +242,7 @@ class RunMonitor:
         self._in_flight.pop(event.worker, None)
         self.made += event.samples
         self.bytes += event.bytes
+        self.failed = tuple(sorted({*self.failed, *event.failed}, key=lambda f: f.index))
         self.rejections += event.rejections
         self._add_cpu_time(event.timings_s)
         self.rss_bytes_max = max(self.rss_bytes_max, event.rss_bytes)
@@ -230,8 +257,8 @@ class RunMonitor:
             }
         )
         samples = self._scan.samples + self.made
-        sample_bytes = (self._scan.bytes + self.bytes) / samples
-        return self._space.after_shard(sample_bytes, self._total - samples)
+        sample_bytes = (self._scan.bytes + self.bytes) / max(samples, 1)
+        return self._space.after_shard(sample_bytes, self._total - samples - len(self.failed))
 
 
 def _with_note(text: str, number: int, note: str) -> str:

@@ -95,7 +95,7 @@ class RayPool:
         if isinstance(action, Assign):
             name = f"shard {action.shard}"
             task = actor.handle.make.options(num_returns="streaming", name=name)
-            actor.stream = task.remote(action.shard)
+            actor.stream = task.remote(action.shard, action.failed)
         elif isinstance(action, Dismiss):
             actor.is_leaving = True
             actor.stream = actor.handle.leave.remote()

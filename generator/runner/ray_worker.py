@@ -22,12 +22,19 @@ from pathlib import Path
 from gen_data.generator.core.errors import NumericsError
 from gen_data.generator.core.sample import Sample
 from gen_data.generator.runner.durable_files import make_folder
+from gen_data.generator.runner.failed_sample import FailedSample
 from gen_data.generator.runner.identity import installation_differences
 from gen_data.generator.runner.numerics_guard import admit_numerics
 from gen_data.generator.runner.resident_memory import release_memory
 from gen_data.generator.runner.shard import Job, PipelineLike, make_shard
 from gen_data.generator.runner.worker import done_event, make_sendable
-from gen_data.generator.runner.worker_events import Event, Failed, Ready, SampleDone
+from gen_data.generator.runner.worker_events import (
+    Event,
+    Failed,
+    Ready,
+    SampleDone,
+    SampleSkipped,
+)
 
 BATCH_S = 1.0
 """Time between two batches of events [s]: a driver of a thousand workers reads so many per second.
@@ -67,9 +74,9 @@ class ShardWorker:
         yield [Placed(self._number, ray.get_runtime_context().get_node_id())]
         yield from self._stream(self._start)
 
-    def make(self, shard: int) -> Iterator[list[Event]]:
-        """Generate and commit one shard."""
-        yield from self._stream(lambda: self._make(shard))
+    def make(self, shard: int, failed: tuple[FailedSample, ...] = ()) -> Iterator[list[Event]]:
+        """Generate and commit one shard, without the samples in ``failed``."""
+        yield from self._stream(lambda: self._make(shard, failed))
 
     def leave(self) -> None:
         """Stop the engines, which removes their temporary files."""
@@ -117,11 +124,14 @@ class ShardWorker:
         admit_numerics(self._job, self._pipeline)
         self._events.put(Ready(self._number))
 
-    def _make(self, shard: int) -> None:
+    def _make(self, shard: int, failed: tuple[FailedSample, ...]) -> None:
         def report(sample: Sample) -> None:
             self._events.put(SampleDone(self._number, shard, sample.index, dict(sample.timings_s)))
 
-        made = make_shard(self._job, self._pipeline, shard, report)
+        def report_failure(failure: FailedSample, text: str) -> None:
+            self._events.put(SampleSkipped(self._number, shard, failure, text))
+
+        made = make_shard(self._job, self._pipeline, shard, report, report_failure, failed)
         self._events.put(done_event(self._number, made))
         release_memory()
 

@@ -26,6 +26,7 @@ from gen_data.generator.core.streams import Streams
 from gen_data.generator.pipeline import Pipeline
 from gen_data.generator.pipeline.finalize_scene import finalize_scene
 from gen_data.generator.pipeline.pipeline import DrawnView
+from gen_data.generator.runner.failed_sample import FailedSample
 from gen_data.generator.runner.identity import format_licences, make_plan
 from gen_data.generator.runner.plan import Plan
 from gen_data.generator.runner.progress import RunProgress, Summary
@@ -224,9 +225,21 @@ def rerender(  # noqa: PLR0913  (keywords of one front door)
         progress=progress,
         licences=lambda used: format_licences(maker.factory, used),
         settings=Settings(
-            sample_bytes=estimate_sample_bytes(now, maker.factory.info), is_forced=force
+            sample_bytes=estimate_sample_bytes(now, maker.factory.info),
+            is_forced=force,
+            failed=_absent(stored),
         ),
     )
+
+
+def _absent(stored: StoredSamples) -> tuple[FailedSample, ...]:
+    """Samples that cannot be rendered again: those without a scene at the first instant."""
+    absent = {failure.index: failure for failure in stored.failed}
+    steps = stored.info.steps_per_scene
+    for first in [index for index in absent if index % steps == 0]:
+        for index in range(first, min(first + steps, stored.plan.n)):
+            absent.setdefault(index, FailedSample(index, "scene", f"sample {first} does not exist"))
+    return tuple(absent[index] for index in sorted(absent))
 
 
 def rerender_plan(
@@ -247,7 +260,7 @@ def rerender_plan(
             ConfigWarning,
             stacklevel=2,
         )
-    factory = PipelineFactory(now, stored.n, known_categories=stored.categories)
+    factory = PipelineFactory(now, stored.plan.n, known_categories=stored.categories)
     maker = RerenderFactory(
         CheckedSamples(stored.folder),
         factory,

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from gen_data.generator.core.errors import GenDataError
 from gen_data.generator.core.sample import Sample
+from gen_data.generator.runner.failed_sample import FailedSample, parse_failed
 from gen_data.generator.runner.finalize import LicencesOf, finalize
 from gen_data.generator.runner.free_space import SpaceCheck
 from gen_data.generator.runner.numerics_guard import admit_numerics
@@ -34,7 +35,7 @@ from gen_data.generator.runner.store import FolderState, LocalStore, Scan
 from gen_data.generator.runner.supervisor import Limits, Supervisor
 from gen_data.generator.runner.termination_signals import Interruption
 from gen_data.generator.runner.worker import done_event
-from gen_data.generator.runner.worker_events import SampleDone
+from gen_data.generator.runner.worker_events import SampleDone, SampleSkipped
 
 __all__ = ["Limits", "RunProgress", "Settings", "Summary", "run"]
 
@@ -58,11 +59,17 @@ class Settings:
             missing. None = all.
         limits: Limits on silence, deaths and memory of workers.
         open_pool: Opens the pool of workers: processes of this machine, or a cluster.
-        allow_mixed_numerics, write_media, write_records, linked_digests: See ``Job``; picklable.
+        skip_failed: Record samples that cannot be made in the manifest, and go on without them.
+            Shards that earlier runs made without some samples are kept, but ``repair`` tries these
+            again. Errors of storage, lack of memory and exporters end the run as without it.
+        allow_mixed_numerics, failed, write_media, write_records, linked_digests: See ``Job``;
+            picklable.
     """
 
     repair: bool = False
     allow_mixed_numerics: bool = False
+    skip_failed: bool = False
+    failed: tuple[FailedSample, ...] = ()
     sample_bytes: float = 0.0
     is_forced: bool = False
     linked_bytes: float = 0.0
@@ -127,15 +134,34 @@ def run(  # noqa: PLR0913  (every argument is the choice of the caller)
                 settings.linked_digests,
                 # Bytes that must equal those sealed before need no other guard.
                 settings.allow_mixed_numerics or bool(_read_seal(store, plan).ids),
+                settings.skip_failed,
+                settings.failed,
             )
             run_ = _Run(job, workers, progress or _silent, settings, interruption)
             return replace(run_.execute(licences), folder=str(out))
 
 
+UNSEALED = SealedBefore(frozenset(), {})
+
+
+def read_failed(store: LocalStore) -> tuple[FailedSample, ...]:
+    """Samples that a finished data set does not have; none if its manifest is damaged."""
+    try:
+        return parse_failed(json.loads(store.read_manifest()))
+    except (OSError, ValueError):
+        return ()
+
+
+def lacks_samples(store: LocalStore, plan: Plan) -> bool:
+    """Whether samples of a data set, finished or not, failed."""
+    records = filter(None, map(store.record, range(plan.shard_count)))
+    return bool(read_failed(store)) or any(record.failed for record in records)
+
+
 def _read_seal(store: LocalStore, plan: Plan) -> SealedBefore:
     """Read the seal of this very data set, which repair must not change; it may have none."""
     same = read_or_empty(store.root / PLAN_NAME) == plan_bytes(plan)
-    return read_seal(store.root) if same else SealedBefore(frozenset(), {})
+    return read_seal(store.root) if same else UNSEALED
 
 
 @dataclass(frozen=True)
@@ -155,12 +181,13 @@ class _Run:
                 if state is FolderState.NEW:
                     self._space.before_start(self._count(range(plan.shard_count)))
                 finished = state is FolderState.FINISHED
-                if finished and store.is_intact(extra_matters=self.settings.repair):
+                retried = self.settings.repair and finished and read_failed(store)
+                if finished and not retried and store.is_intact(self.settings.repair):
                     return self._summarize_finished()
-                sealed_before = _read_seal(store, plan)
+                sealed_before = UNSEALED if retried else _read_seal(store, plan)
             store.prepare(plan)
             hashed = finished or self.settings.repair
-            whole = store.scan(plan, hashed)
+            whole = store.scan(plan, hashed, whole_only=self.settings.repair)
             scan = whole.within(self.settings.shards)
         samples = self._count(scan.missing)
         if scan.samples == 0:
@@ -216,6 +243,7 @@ class _Run:
             workers=self.workers,
             describe_sample=self.job.store.reproduce_command,
             limits=self.settings.limits,
+            skip_failed=self.settings.skip_failed,
         )
         open_pool = self.settings.open_pool
         run_supervisor(self.job, open_pool, supervisor, self.interruption, monitor.observe)
@@ -246,27 +274,34 @@ class _Run:
                 def on_sample(sample: Sample, shard: int = shard) -> None:
                     monitor.observe(SampleDone(IN_PROCESS, shard, sample.index, sample.timings_s))
 
-                made = make_shard(self.job, pipeline, shard, on_sample)
+                def on_failure(failed: FailedSample, text: str, shard: int = shard) -> None:
+                    monitor.observe(SampleSkipped(IN_PROCESS, shard, failed, text))
+
+                made = make_shard(self.job, pipeline, shard, on_sample, on_failure)
                 objection: GenDataError | None = monitor.observe(done_event(IN_PROCESS, made))
                 if objection is not None:
                     raise objection
 
     def _summarize_finished(self) -> Summary:
         manifest = json.loads(self.job.store.read_manifest())
+        failed = read_failed(self.job.store)
         return Summary(
             dataset_id=manifest["dataset_id"],
-            samples=self.job.plan.n,
+            samples=self.job.plan.n - len(failed),
             made=0,
             seconds=0.0,
             rejections=manifest["rejections"],
             bytes=manifest["bytes"],
             already_complete=True,
+            failed=failed,
         )
 
     def _summarize(self, dataset_id: str, scan: Scan, monitor: RunMonitor) -> Summary:
         summary = Summary(
             dataset_id=dataset_id,
-            samples=scan.samples + monitor.made if not dataset_id else self.job.plan.n,
+            samples=scan.samples + monitor.made
+            if not dataset_id
+            else self.job.plan.n - len(monitor.failed),
             made=monitor.made,
             seconds=monitor.seconds,
             rejections=monitor.rejections,
@@ -274,6 +309,7 @@ class _Run:
             cpu_s=monitor.mean_cpu_s(),
             worker_deaths=monitor.worker_deaths,
             rss_bytes_max=monitor.rss_bytes_max,
+            failed=monitor.failed,
         )
         monitor.log({"summary": summary})
         return summary

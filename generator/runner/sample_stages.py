@@ -128,8 +128,12 @@ class SampleFiles:
         path = self.folder / name
         try:
             lines = path.read_bytes().splitlines()
-            number = index - int(json.loads(lines[0])["index"])
+            number = min(index - int(json.loads(lines[0])["index"]), len(lines) - 1)
             plain: dict[str, Any] = json.loads(lines[number])
+            while number > 0 and plain["index"] > index:
+                # Samples that failed have no line.
+                number -= 1
+                plain = json.loads(lines[number])
             if plain["index"] != index:
                 raise ValueError(f"line {number + 1} is of sample {plain['index']}")
         except (OSError, ValueError, KeyError, TypeError, IndexError) as error:

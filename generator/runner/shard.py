@@ -10,12 +10,17 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from gen_data.generator.core.capture import Capture, SensorReading
-from gen_data.generator.core.errors import SampleError
+from gen_data.generator.core.errors import GenDataError, SampleError, in_stage
 from gen_data.generator.core.interfaces import DatasetInfo, Exporter
 from gen_data.generator.core.sample import Sample
 from gen_data.generator.core.serialization import find_not_finite, to_plain
 from gen_data.generator.runner.durable_files import Inode
 from gen_data.generator.runner.error_context import explain_errors
+from gen_data.generator.runner.failed_sample import (
+    FailedSample,
+    describe_failure,
+    may_be_skipped,
+)
 from gen_data.generator.runner.labels import LABELS_NAME, labels_line
 from gen_data.generator.runner.plan import Plan
 from gen_data.generator.runner.provenance import SCENES_NAME, scene_line
@@ -117,6 +122,8 @@ class Job:
         write_records: Adds scene and labels of one sample.
         linked_digests: Digests of files on disk that the two link into a shard, by inode.
         allow_mixed_numerics: Accept machines that compute differently; see ``admit_numerics``.
+        skip_failed: Go on without samples that cannot be made.
+        failed: Samples that are known not to exist, as in the source of an export.
     """
 
     plan: Plan
@@ -126,6 +133,8 @@ class Job:
     write_records: RecordWriter = write_records
     linked_digests: LinkedDigests = no_digests
     allow_mixed_numerics: bool = False
+    skip_failed: bool = False
+    failed: tuple[FailedSample, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -136,40 +145,76 @@ class MadeShard:
     timings_s: Mapping[str, float]
 
 
+def ignore_failure(failure: FailedSample, text: str) -> None:
+    """Report no failure."""
+    del failure, text
+
+
 def make_shard(
-    job: Job, pipeline: PipelineLike, shard: int, on_sample: Callable[[Sample], None]
+    job: Job,
+    pipeline: PipelineLike,
+    shard: int,
+    on_sample: Callable[[Sample], None],
+    on_failure: Callable[[FailedSample, str], None] = ignore_failure,
+    failed: Sequence[FailedSample] = (),
 ) -> MadeShard:
-    """Generate and commit one shard.
+    """Generate and commit one shard, without the samples in ``failed``.
 
     The images of each sample are written and dropped at once; exporters then receive all samples
     of the shard without pixels. Masks are tight crops, so that memory is bounded by the images of
     one sample and the labels of one shard.
 
     Raises:
-        GenDataError: a sample cannot be generated, or its files cannot be written.
+        GenDataError: a sample cannot be generated, unless it may be skipped, or its files cannot be
+            written.
     """
     indices = job.plan.samples_of(shard)
+    absent = {f.index: f for f in (*job.failed, *failed) if f.index in indices}
     with job.store.errors():
         folder = job.store.scratch_dir()
     try:
         samples: list[Sample] = []
         heap = HeapTrimmer()
-        for index in indices:
-            samples.append(_make_sample(job, pipeline, index, folder, samples, on_sample))
+        for index in (i for i in indices if i not in absent):
+            try:
+                samples.append(_make_sample(job, pipeline, index, folder, samples, on_sample))
+            except GenDataError as error:
+                if not job.skip_failed or not may_be_skipped(error):
+                    raise
+                absent[index] = describe_failure(index, error)
+                with job.store.errors():
+                    _remove_files(index, folder)
+                on_failure(absent[index], str(error))
             heap.trim_if_grown()
         started_s = time.process_time()
-        for name in sorted(pipeline.exporters):
+        # Exporters need not know shards without samples.
+        for name in sorted(pipeline.exporters) if samples else ():
             with explain_errors(f"shard {shard}, exporter {name}"), job.store.errors():
                 pipeline.exporters[name].write_shard(pipeline.info, samples, folder)
         with job.store.errors():
             linked = job.linked_digests(shard)
-            record = describe_shard(shard, indices, samples, folder, linked)
+            if not samples:
+                # A shard is never an empty folder.
+                for name in (SCENES_NAME, LABELS_NAME):
+                    (folder / name).touch()
+            gone = tuple(absent[index] for index in sorted(absent))
+            record = describe_shard(shard, indices, samples, folder, linked, gone)
             job.store.commit(folder, record, synced=linked)
         write_s = time.process_time() - started_s
     finally:
         # Frees the space after a failure; after a commit, the folder no longer exists.
         shutil.rmtree(folder, ignore_errors=True)
     return MadeShard(record, {"write": write_s})
+
+
+def _remove_files(index: int, folder: Path) -> None:
+    """Remove what a failed sample left in a shard folder, and folders that only it had."""
+    for path in folder.glob(f"*/*/{index:09d}.*"):
+        path.unlink()
+    for pattern in ("*/*", "*"):
+        for path in folder.glob(pattern):
+            if path.is_dir() and not any(path.iterdir()):
+                path.rmdir()
 
 
 def _make_sample(
@@ -187,7 +232,7 @@ def _make_sample(
     with explain_errors(f"sample {index}", job.store.reproduce_command(index)):
         sample = pipeline.sample(index)
         started_s = time.process_time()
-        with job.store.errors():
+        with job.store.errors(), in_stage("write"):
             job.write_media(pipeline.info, sample, folder)
             base = next((s for s in before if s.scene_index == sample.scene_index), None)
             job.write_records(sample, base, folder)

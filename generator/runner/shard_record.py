@@ -10,7 +10,7 @@ import hashlib
 import json
 from collections import Counter
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
 
@@ -18,7 +18,7 @@ from gen_data.generator.core.errors import StorageError
 from gen_data.generator.core.path_names import check_inner_path
 from gen_data.generator.core.sample import Sample
 from gen_data.generator.core.scene_assets import assets_in
-from gen_data.generator.core.serialization import canonical_json, from_plain, to_plain
+from gen_data.generator.core.serialization import SPARSE, canonical_json, from_plain, to_plain
 from gen_data.generator.runner.durable_files import (
     IRREGULAR,
     Inode,
@@ -27,6 +27,7 @@ from gen_data.generator.runner.durable_files import (
     hash_file,
     tree_sizes,
 )
+from gen_data.generator.runner.failed_sample import FailedSample
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +64,7 @@ class ShardRecord:
         assets: Ids of all objects, robots, textures and environments in its samples, sorted.
         files: Sorted by path.
         empty_folders: Folders without any file, relative to the shard's folder, sorted.
+        failed: Samples that the shard does not have, by index; left out of the file if none.
     """
 
     shard: int
@@ -74,11 +76,17 @@ class ShardRecord:
     assets: tuple[str, ...]
     files: tuple[FileRecord, ...]
     empty_folders: tuple[str, ...] = ()
+    failed: tuple[FailedSample, ...] = field(default=(), metadata={SPARSE: True})
 
     def __post_init__(self) -> None:
         """Refuse folders outside the shard's folder."""
         for folder in self.empty_folders:
             check_inner_path(folder)
+
+    @property
+    def samples(self) -> int:
+        """Number of its samples."""
+        return self.end - self.first - len(self.failed)
 
     @property
     def size_bytes(self) -> int:
@@ -122,10 +130,12 @@ def describe_shard(
     samples: Iterable[Sample],
     folder: Path,
     known: Mapping[Inode, str] = MappingProxyType({}),
+    failed: tuple[FailedSample, ...] = (),
 ) -> ShardRecord:
     """Make the record of a finished shard folder; hashes every file of unknown digest.
 
-    ``known`` are digests by inode, of files that are linked from a committed shard.
+    ``known`` are digests by inode, of files that are linked from a committed shard; ``failed`` are
+    the samples of the shard that could not be made, by index.
 
     Raises:
         StorageError: the folder contains something other than regular files and folders.
@@ -161,6 +171,7 @@ def describe_shard(
         tuple(sorted(assets)),
         files,
         empty_folders(folder),
+        failed,
     )
 
 

@@ -43,6 +43,7 @@ from gen_data.generator.runner.durable_files import (
     sync_tree,
     write_durably,
 )
+from gen_data.generator.runner.failed_sample import FailedSample
 from gen_data.generator.runner.plan import (
     PLAN_NAME,
     Plan,
@@ -84,12 +85,14 @@ class Scan:
     Attributes:
         missing: Shards to generate, ascending. A ``range`` for a new data set, to save memory.
         samples, bytes, rejections: Sums over the committed shards.
+        failed: Samples that these do not have.
     """
 
     missing: Sequence[int]
     samples: int = 0
     bytes: int = 0
     rejections: int = 0
+    failed: tuple[FailedSample, ...] = ()
 
     def within(self, shards: range | None) -> Scan:
         """The same result with those missing shards only that lie in a range; None = all."""
@@ -342,26 +345,29 @@ class LocalStore:
         path = self.record_path(shard)
         return parse_record(path.read_bytes()) if path.is_file() else None
 
-    def scan(self, plan: Plan, full: bool = False) -> Scan:
+    def scan(self, plan: Plan, full: bool = False, whole_only: bool = False) -> Scan:
         """Check every record and the sizes of its files, or their digests when ``full``.
 
-        Damaged shards are moved to ``run/quarantine`` and count as missing.
+        Damaged shards, and with ``whole_only`` those without some of their samples, are moved to
+        ``run/quarantine`` and count as missing.
         """
         with self.errors():
             if next(self._shards_dir.iterdir(), None) is None:
                 return Scan(missing=range(plan.shard_count))
             missing = array("q")
             samples, size, rejections = 0, 0, 0
+            failed: list[FailedSample] = []
             for shard in range(plan.shard_count):
                 record = self._intact_record(plan, shard, full)
-                if record is None:
+                if record is None or (whole_only and record.failed):
                     self.quarantine(shard)
                     missing.append(shard)
                 else:
-                    samples += record.end - record.first
+                    samples += record.samples
+                    failed += record.failed
                     size += record.size_bytes
                     rejections += record.rejections
-            return Scan(missing, samples, size, rejections)
+            return Scan(missing, samples, size, rejections, tuple(failed))
 
     def quarantine_damaged(self, plan: Plan, shards: Iterable[int]) -> list[int]:
         """Hash the files of these shards, and quarantine those that differ from their records.

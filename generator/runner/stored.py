@@ -5,7 +5,9 @@ from __future__ import annotations
 import json
 import re
 import shlex
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from array import array
+from bisect import bisect_left
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -23,7 +25,7 @@ from gen_data.generator.core.capture import (
     PointCloud,
     SensorReading,
 )
-from gen_data.generator.core.errors import StorageError
+from gen_data.generator.core.errors import SampleIndexError, StorageError
 from gen_data.generator.core.interfaces import DatasetInfo, cloud_path, table_path
 from gen_data.generator.core.path_names import check_name
 from gen_data.generator.core.sample import EgoTruth, ImageTruth, Sample
@@ -31,6 +33,7 @@ from gen_data.generator.core.scene import Scene
 from gen_data.generator.core.serialization import from_plain
 from gen_data.generator.core.urls import is_url, needs_folder
 from gen_data.generator.runner.durable_files import hash_file
+from gen_data.generator.runner.failed_sample import FailedSample, parse_failed
 from gen_data.generator.runner.labels import LABELS_NAME, Labels, parse_labels
 from gen_data.generator.runner.plan import DAMAGE, load_plan
 from gen_data.generator.runner.provenance import SCENES_NAME, KeptScene, parse_scene
@@ -70,6 +73,9 @@ class JsonLines:
 class StoredSamples:
     """Samples of a finished data set, by index.
 
+    Attributes:
+        failed: Samples that the data set does not have.
+
     Raises:
         StorageError: the folder holds no finished data set.
     """
@@ -82,14 +88,23 @@ class StoredSamples:
         manifest = self._read_manifest()
         self.info: DatasetInfo = manifest[0]
         self.dataset_id: str = manifest[1]
+        self.failed: tuple[FailedSample, ...] = manifest[2]
+        self._absent = sorted(failure.index for failure in self.failed)
         self._lines = lru_cache(2 * SHARDS_KEPT)(self._open_lines)
         # Views of one scene follow each other, and share most of it.
         self._base_scene = lru_cache(BASE_SCENES_KEPT)(self._read_base_scene)
 
     @property
     def n(self) -> int:
-        """Number of samples."""
-        return self.plan.n
+        """Number of samples that exist; their indices are in ``indices``."""
+        return self.plan.n - len(self.failed)
+
+    @cached_property
+    def indices(self) -> Sequence[int]:
+        """Indices of all samples, ascending: those of the plan without the failed ones."""
+        absent = set(self._absent)
+        every = range(self.plan.n)
+        return array("q", (i for i in every if i not in absent)) if absent else every
 
     @property
     def categories(self) -> tuple[str, ...]:
@@ -157,9 +172,19 @@ class StoredSamples:
 
     def _line(self, name: str, index: int) -> bytes:
         lines = self._lines(self._folder_of(index) / name)
-        return lines.line(index % self.plan.shard_size)
+        # Failed samples have no lines.
+        first = index - index % self.plan.shard_size
+        before = bisect_left(self._absent, index) - bisect_left(self._absent, first)
+        return lines.line(index - first - before)
 
     def _folder_of(self, index: int) -> Path:
+        place = bisect_left(self._absent, index)
+        if place < len(self._absent) and self._absent[place] == index:
+            failure = self.failed[place]
+            raise SampleIndexError(
+                f"{self.folder}: sample {index} does not exist, as it could not be made "
+                f"({failure.stage}: {failure.error})"
+            )
         return self.shard_dir(index // self.plan.shard_size)
 
     @contextmanager
@@ -204,8 +229,8 @@ class StoredSamples:
         """Folder of the files of a shard."""
         return self.folder / SHARDS_NAME / f"{shard:06d}"
 
-    def _read_manifest(self) -> tuple[DatasetInfo, str]:
-        """Facts about the data set, and its id."""
+    def _read_manifest(self) -> tuple[DatasetInfo, str, tuple[FailedSample, ...]]:
+        """Facts about the data set, its id, and the samples that it does not have."""
         path = self.folder / MANIFEST_NAME
         try:
             manifest = json.loads(path.read_bytes())
@@ -213,7 +238,7 @@ class StoredSamples:
             check_name(info.name)
             for name in (*info.categories, *(sensor.name for sensor in info.sensors)):
                 check_name(name)
-            return info, parse_dataset_id(manifest, path)
+            return info, parse_dataset_id(manifest, path), parse_failed(manifest)
         except FileNotFoundError:
             raise StorageError(
                 f"{path}: missing; the data set is unfinished: run the command that began it again"

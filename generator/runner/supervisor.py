@@ -20,6 +20,7 @@ from gen_data.generator.core.errors import (
     WorkerLost,
 )
 from gen_data.generator.core.system_calls import KILLED
+from gen_data.generator.runner.failed_sample import FailedSample
 from gen_data.generator.runner.worker_events import (
     Abort,
     Action,
@@ -32,6 +33,7 @@ from gen_data.generator.runner.worker_events import (
     Note,
     Queued,
     SampleDone,
+    SampleSkipped,
     ShardDone,
     Spawn,
     Tick,
@@ -44,6 +46,8 @@ class Limits:
 
     Attributes:
         silence_s: A worker that sends nothing for this long counts as hung and is killed.
+        sample_s: The same while it makes a sample, which then gets no second try; None = as
+            ``silence_s``, with ``shard_attempts``.
         start_s: The same for the start of its engines, in which kernels may be compiled.
         farewell_s: Time that a dismissed worker has to exit.
         shard_attempts: Deaths on one shard until it is abandoned.
@@ -56,6 +60,7 @@ class Limits:
     """
 
     silence_s: float = 300.0
+    sample_s: float | None = None
     start_s: float = 300.0
     farewell_s: float = 10.0
     shard_attempts: int = 3
@@ -82,6 +87,8 @@ class _Worker:
     shard: int = -1
     done: int = 0
     killed: str = ""
+    timed_out: bool = False
+    failed: tuple[FailedSample, ...] = ()
     first_rss_bytes: int | None = None
 
 
@@ -93,6 +100,8 @@ class Supervisor:
         shards: Shards to generate, in this order.
         samples_of: Sample indices of a shard.
         describe_sample: Command that generates one sample by itself, for messages.
+        skip_failed: Generate a shard without a sample that keeps killing its worker, or exceeds
+            ``limits.sample_s``, instead of abandoning the shard.
         error: The first error that ends the run, or else that of the first abandoned shard.
         given_up: Abandoned shards, which killed too many workers.
         deaths: Processes that ended unexpectedly.
@@ -103,6 +112,7 @@ class Supervisor:
     workers: int
     describe_sample: Callable[[int], str]
     limits: Limits = field(default_factory=Limits)
+    skip_failed: bool = False
     error: GenDataError | None = None
     given_up: list[int] = field(default_factory=list)
     deaths: int = 0
@@ -115,8 +125,9 @@ class Supervisor:
         self._next_number = 0
         self._cursor = 0
         self._again: deque[int] = deque()
-        self._deaths: dict[int, int] = {}
-        self._losses: dict[int, int] = {}
+        self._deaths: dict[tuple[int, int], int] = {}
+        self._losses: dict[tuple[int, int], int] = {}
+        self._failed: dict[int, tuple[FailedSample, ...]] = {}
         self._failed_starts = 0
         self._draining = False
 
@@ -136,7 +147,7 @@ class Supervisor:
 
     def handle(self, event: Event, now_s: float) -> list[Action]:
         """Return the actions for an event; events of processes that have ended are ignored."""
-        if isinstance(event, (SampleDone, Queued)):
+        if isinstance(event, (SampleDone, SampleSkipped, Queued)):
             # The most frequent events, which change no state: a thousand workers send many.
             self._hear(event, now_s)
             return []
@@ -163,12 +174,12 @@ class Supervisor:
             return self._recycle(event, worker)
         return []
 
-    def _hear(self, event: SampleDone | Queued, now_s: float) -> None:
+    def _hear(self, event: SampleDone | SampleSkipped | Queued, now_s: float) -> None:
         """Note a sign of life."""
         worker = self._alive.get(event.worker)
         if worker is not None:
             worker.heard_s = now_s
-            worker.done += isinstance(event, SampleDone)
+            worker.done += not isinstance(event, Queued)
 
     def _dispatch(self, now_s: float) -> list[Action]:
         """Assign shards to idle workers, start missing workers, dismiss superfluous ones."""
@@ -177,8 +188,8 @@ class Supervisor:
             if self._draining or self._waiting == 0:
                 break
             worker.state, worker.shard, worker.done = State.BUSY, self._next_shard(), 0
-            worker.heard_s = now_s
-            actions.append(Assign(number, worker.shard))
+            worker.heard_s, worker.failed = now_s, self._failed.get(worker.shard, ())
+            actions.append(Assign(number, worker.shard, worker.failed))
         open_shards = 0 if self._draining else self._waiting + len(self._workers_in(State.BUSY))
         if open_shards == 0:
             return actions + self._dismiss_idle(now_s)
@@ -211,17 +222,26 @@ class Supervisor:
     def _kill_silent(self, now_s: float) -> list[Action]:
         actions: list[Action] = []
         for number, worker in sorted(self._alive.items()):
-            patience_s = self._patience_s(worker.state)
+            patience_s = self._patience_s(worker)
             waits = worker.state is State.IDLE
             if not waits and not worker.killed and now_s - worker.heard_s > patience_s:
                 worker.killed = f"no sign of life for {patience_s:g} s"
+                worker.timed_out = self._has_sample_limit(worker)
                 actions += [Note(f"worker {number}: {worker.killed}"), Kill(number)]
         return actions
 
-    def _patience_s(self, state: State) -> float:
-        if state is State.LEAVING:
+    def _patience_s(self, worker: _Worker) -> float:
+        if worker.state is State.LEAVING:
             return self.limits.farewell_s
-        return self.limits.start_s if state is State.STARTING else self.limits.silence_s
+        if worker.state is State.STARTING:
+            return self.limits.start_s
+        limit_s = self.limits.sample_s if self._has_sample_limit(worker) else None
+        return self.limits.silence_s if limit_s is None else limit_s
+
+    def _has_sample_limit(self, worker: _Worker) -> bool:
+        """Whether the limit of a sample applies: not while engines start, or files are written."""
+        makes_sample = worker.state is State.BUSY and self._current_sample(worker) is not None
+        return makes_sample and self.limits.sample_s is not None
 
     def _abort(self, error: GenDataError) -> list[Action]:
         self._drain(error)
@@ -282,31 +302,38 @@ class Supervisor:
         shard = worker.shard
         counts = self._losses if event.machine_lost else self._deaths
         most = self.limits.machine_losses if event.machine_lost else self.limits.shard_attempts
-        counts[shard] = counts.get(shard, 0) + 1
-        place = self._in_flight(worker)
+        index = self._current_sample(worker)
+        # A sample that may be skipped is judged by its own deaths, else the shard by all of them.
+        key = (shard, -1 if index is None or not self.skip_failed else index)
+        counts[key] = counts.get(key, 0) + 1
+        place = "writing its files" if index is None else f"sample {index}"
         note = Note(f"worker {event.worker} {cause}; shard {shard}, {place}")
-        if counts[shard] < most:
+        if counts[key] < most and not worker.timed_out:
             self._again.append(shard)
             return [note]
+        if self.skip_failed and index is not None and not event.machine_lost:
+            error = "hang" if worker.killed else describe_exit(event)
+            skipped = FailedSample(index, "process", error)
+            self._failed[shard] = (*self._failed.get(shard, ()), skipped)
+            self._again.append(shard)
+            return [note, Note(f"sample {index} is skipped: {error}")]
         self.given_up.append(shard)
+        suspect = self.samples_of(shard)[-1] if index is None else index
         lost = WorkerLost(
-            f"shard {shard}: its worker process died {counts[shard]} times, "
+            f"shard {shard}: its worker process died {_times(counts[key])}, "
             f"at last in {place}: {cause}.\n"
-            f"  Reproduce: {self.describe_sample(self._suspect(worker))}"
+            f"  Reproduce: {self.describe_sample(suspect)}"
         )
         self.error = self.error or lost
         if len(self.given_up) >= self.limits.lost_shards:
             self._drain(self.error)
         return [note]
 
-    def _suspect(self, worker: _Worker) -> int:
-        indices = self.samples_of(worker.shard)
-        return indices[min(worker.done, len(indices) - 1)]
-
-    def _in_flight(self, worker: _Worker) -> str:
-        if worker.done < len(self.samples_of(worker.shard)):
-            return f"sample {self._suspect(worker)}"
-        return "writing its files"
+    def _current_sample(self, worker: _Worker) -> int | None:
+        """Sample that a busy worker makes; None while it writes the files of the shard."""
+        absent = {failure.index for failure in worker.failed}
+        made = [index for index in self.samples_of(worker.shard) if index not in absent]
+        return made[worker.done] if worker.done < len(made) else None
 
     def _recycle(self, event: ShardDone, worker: _Worker) -> list[Action]:
         cap, first = self.limits.rss_bytes, worker.first_rss_bytes
@@ -319,6 +346,10 @@ class Supervisor:
         worker.state = State.LEAVING
         text = f"worker {event.worker} holds {event.rss_bytes / 1e6:.0f} MB and is replaced"
         return [Note(text), Dismiss(event.worker)]
+
+
+def _times(count: int) -> str:
+    return "once" if count == 1 else f"{count} times"
 
 
 def describe_exit(event: Exited) -> str:

@@ -146,7 +146,9 @@ def summarize(folder: Path, full: bool = False, contents: Contents | None = None
     sizes, _ = contents or scan_finished(folder)
     manifest = parse_object(read_or_empty(folder / MANIFEST_NAME)) or {}
     identity, n = str(manifest.get("dataset_id", "")), manifest.get("n", 0)
-    return Report(identity, n, len(sizes), sum(sizes.values()), full)
+    return Report(
+        identity, n - len(manifest.get("failed", ())), len(sizes), sum(sizes.values()), full
+    )
 
 
 def describe_findings(folder: Path, found: Sequence[Finding]) -> str:

@@ -27,10 +27,17 @@ from gen_data.generator.core.errors import CacheWarning, ConfigWarning, GenDataE
 from gen_data.generator.core.processes import end_with_parent, forbid_core_dumps, ignore_interrupts
 from gen_data.generator.runner.error_context import unexpected_error
 from gen_data.generator.runner.resident_memory import release_memory, resident_bytes
-from gen_data.generator.runner.worker_events import Failed, Ready, SampleDone, ShardDone
+from gen_data.generator.runner.worker_events import (
+    Failed,
+    Ready,
+    SampleDone,
+    SampleSkipped,
+    ShardDone,
+)
 
 if TYPE_CHECKING:
     from gen_data.generator.core.sample import Sample
+    from gen_data.generator.runner.failed_sample import FailedSample
     from gen_data.generator.runner.shard import Job, MadeShard, PipelineLike
 
 
@@ -40,7 +47,8 @@ def main(number: int, connection_fd: int, job_fd: int, parent_pid: int) -> None:
     Args:
         number: Of the worker; negative = told together with the path of its log, when the job is
             ready.
-        connection_fd: Socket for shard numbers (in) and events (out).
+        connection_fd: Socket for shard numbers, each with the samples to leave out (in), and for
+            events (out).
         job_fd: File with a pickled Job.
         parent_pid: Process whose end also ends this one.
     """
@@ -145,8 +153,8 @@ def _make_shards(number: int, connection: Connection, job: Job, notices: list[st
 
         admit_numerics(job, pipeline)
         connection.send(Ready(number, tuple(notices)))
-        while (shard := connection.recv()) is not None:
-            _make_shard(number, connection, job, pipeline, shard)
+        while (assigned := connection.recv()) is not None:
+            _make_shard(number, connection, job, pipeline, *assigned)
             release_memory()
 
 
@@ -165,15 +173,23 @@ def _show_warning(
 
 
 def _make_shard(
-    number: int, connection: Connection, job: Job, pipeline: PipelineLike, shard: int
+    number: int,
+    connection: Connection,
+    job: Job,
+    pipeline: PipelineLike,
+    shard: int,
+    failed: tuple[FailedSample, ...],
 ) -> None:
     def report(sample: Sample) -> None:
         connection.send(SampleDone(number, shard, sample.index, dict(sample.timings_s)))
 
+    def report_failure(failure: FailedSample, text: str) -> None:
+        connection.send(SampleSkipped(number, shard, failure, text))
+
     # Imports numpy, therefore only after ``end_with_parent``.
     from gen_data.generator.runner.shard import make_shard
 
-    made = make_shard(job, pipeline, shard, report)
+    made = make_shard(job, pipeline, shard, report, report_failure, failed)
     connection.send(done_event(number, made))
 
 
@@ -183,10 +199,11 @@ def done_event(number: int, made: MadeShard) -> ShardDone:
     return ShardDone(
         number,
         record.shard,
-        record.end - record.first,
+        record.samples,
         record.size_bytes,
         record.rejections,
         resident_bytes(),
         made.timings_s,
         hashlib.sha256(record.to_bytes()).hexdigest(),
+        record.failed,
     )

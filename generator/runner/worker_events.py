@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import TypeAlias
 
 from gen_data.generator.core.errors import GenDataError
+from gen_data.generator.runner.failed_sample import FailedSample
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +40,20 @@ class SampleDone:
 
 
 @dataclass(frozen=True, slots=True)
+class SampleSkipped:
+    """A sample could not be made, and its shard goes on without it.
+
+    Attributes:
+        text: The whole error, for the log.
+    """
+
+    worker: int
+    shard: int
+    failure: FailedSample
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
 class ShardDone:
     """A shard is committed.
 
@@ -47,6 +62,7 @@ class ShardDone:
         record_sha256: Of its record; empty = unknown.
         rss_bytes: Memory of the worker's process, 0 if unknown.
         timings_s: CPU seconds of the shard as a whole, by stage.
+        failed: Samples that it does not have.
     """
 
     worker: int
@@ -57,6 +73,7 @@ class ShardDone:
     rss_bytes: int = 0
     timings_s: Mapping[str, float] = field(default_factory=dict)
     record_sha256: str = ""
+    failed: tuple[FailedSample, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +114,9 @@ class Abort:
     error: GenDataError
 
 
-Event: TypeAlias = Queued | Ready | SampleDone | ShardDone | Failed | Exited | Tick | Abort
+Event: TypeAlias = (
+    Queued | Ready | SampleDone | SampleSkipped | ShardDone | Failed | Exited | Tick | Abort
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,10 +128,11 @@ class Spawn:
 
 @dataclass(frozen=True, slots=True)
 class Assign:
-    """Let an idle worker generate a shard."""
+    """Let an idle worker generate a shard, without the samples that crashed or hung before."""
 
     worker: int
     shard: int
+    failed: tuple[FailedSample, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

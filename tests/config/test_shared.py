@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections import Counter
 
 import pytest
@@ -179,3 +180,29 @@ def test_order_of_a_choices_entries_moves_no_draw() -> None:
     assert [draw_shared(one, Streams(5, k)) for k in range(50)] == [
         draw_shared(other, Streams(5, k)) for k in range(50)
     ]
+
+
+def test_a_chain_of_selections_costs_in_proportion_to_its_length() -> None:
+    """Calls of functions are counted, of twice as many values."""
+
+    def calls(length: int) -> int:
+        links = [f"  v{k}: {{switch: v{k - 1}, a: a, b: b}}" for k in range(1, length)]
+        section = parse_yaml("\n".join(["s:", "  v0: {choice: [a, b]}", *links]), "x").entries["s"]
+        counted = 0
+
+        def count(frame: object, event: str, argument: object) -> None:
+            del frame, argument
+            nonlocal counted
+            counted += event in ("call", "c_call")
+
+        sys.setprofile(count)
+        try:
+            drawn = draw_shared(section, Streams(0, 0))
+        finally:
+            sys.setprofile(None)
+        assert len(drawn) == length
+        assert len(set(drawn.values())) == 1
+        return counted
+
+    # Quadratic cost would be a factor of 4; collections of garbage add some calls.
+    assert calls(1600) < 3 * calls(800)

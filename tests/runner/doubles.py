@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import os
 import shutil
 import signal
@@ -11,7 +12,7 @@ import tempfile
 import time
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -49,6 +50,9 @@ class Trouble:
         killed_once_at: The process kills itself the first time; ``marker`` remembers.
         hangs_once_at: The process stops making progress the first time.
         rejected_at, wrong_at, bug_at: It raises SceneRejected, SampleError, or ValueError.
+        hangs_at: It stops making progress every time.
+        errors: It raises these.
+        nan_at: The light of its scene is NaN, which is found when its images are written.
         start_fails: The pipeline's process dies before it is ready.
         ballast: Makes the description of the work larger.
     """
@@ -59,6 +63,9 @@ class Trouble:
     rejected_at: int = -1
     wrong_at: int = -1
     bug_at: int = -1
+    hangs_at: int = -1
+    errors: Mapping[int, BaseException] = field(default_factory=dict)
+    nan_at: int = -1
     start_fails: bool = False
     marker: str = ""
     delay_s: float = 0.0
@@ -125,7 +132,11 @@ class FakePipeline:
     def sample(self, index: int) -> Sample:
         """Sample number ``index``, or the trouble it is in."""
         self._make_trouble(index)
-        return fake_sample(index)
+        sample = fake_sample(index)
+        if index == self.trouble.nan_at:
+            light = replace(sample.scene.lights[0], illuminance_lux=math.nan)
+            sample = replace(sample, scene=replace(sample.scene, lights=(light,)))
+        return sample
 
     def _make_trouble(self, index: int) -> None:
         trouble = self.trouble
@@ -136,6 +147,10 @@ class FakePipeline:
             os.kill(os.getpid(), signal.SIGKILL)
         if index == trouble.hangs_once_at and first_time(trouble.marker):
             time.sleep(600)
+        if index == trouble.hangs_at:
+            time.sleep(600)
+        if index in trouble.errors:
+            raise trouble.errors[index]
         if index == trouble.rejected_at:
             raise SceneRejected(index // 2, (Rejection("object fell off", "fewer objects"),))
         if index == trouble.wrong_at:

@@ -22,7 +22,7 @@ def load_mcap(root: Path, stored: StoredSamples) -> Loaded:
             counts.update(schema.name for schema, _, _, _ in reader.iter_decoded_messages())
     kinds = {f"{name.rpartition('.')[2]} messages": k for name, k in sorted(counts.items())}
     expected: Counter[str] = Counter()
-    for index in range(stored.n):
+    for index in stored.indices:
         capture = stored.labelled(index).capture
         expected["foxglove.CompressedImage"] += sum(
             len(reading.channels) for reading in capture.readings.values()

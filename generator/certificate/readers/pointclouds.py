@@ -23,7 +23,7 @@ def load_pointclouds(root: Path, stored: StoredSamples) -> Loaded:
             faults.append(f"{path.relative_to(root)}: a coordinate is not finite")
     expected = sum(
         len(cloud.points)
-        for index in range(stored.n)
+        for index in stored.indices
         for cloud in stored.labelled(index).capture.clouds.values()
     )
     if points != expected:

@@ -18,7 +18,7 @@ def load_usd(root: Path, stored: StoredSamples) -> Loaded:
         stage = Usd.Stage.Open(str(path))
         meshes += sum(prim.IsA(UsdGeom.Mesh) for prim in stage.TraverseAll())
         faults += [f"{path.name}: {error}" for error in stage.GetCompositionErrors()]
-    expected = -(-stored.n // stored.info.steps_per_scene)
+    expected = len({index // stored.info.steps_per_scene for index in stored.indices})
     if len(paths) != expected:
         faults.append(f"there are {len(paths)} stages, expected {expected}")
     return Loaded(None, {"files": len(paths), "meshes": meshes}, faults)

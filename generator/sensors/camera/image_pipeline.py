@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
@@ -23,6 +24,7 @@ from gen_data.generator.config.distributions import (
 from gen_data.generator.config.yaml_tree import load_yaml
 from gen_data.generator.core.asset_types import Float32
 from gen_data.generator.core.capture import Channel, SensorReading
+from gen_data.generator.core.errors import SampleError
 from gen_data.generator.core.interfaces import FindTones, Renderer, Tones
 from gen_data.generator.core.scene import Camera, Scene, Weather
 from gen_data.generator.core.se3 import Array
@@ -293,11 +295,14 @@ def develop(
 
     Arguments are as in ``Shot``; the depth is needed only by a pipeline with a focus. ``rng`` draws
     the noise, and the settings too unless another camera's stream is given for them.
+
+    Raises:
+        SampleError: a stage makes NaN or infinite values.
     """
     noise_rng, rng = rng, (settings_rng or rng).of_sequence()
     ev100 = _set_or_metered(radiance, camera, pipeline)
-    wanted = ev100 - pipeline.exposure_compensation_ev.draw(rng)
-    wanted -= pipeline.exposure_error_ev.draw(rng)
+    wanted = ev100 - _draw(pipeline, "exposure_compensation_ev", rng)
+    wanted -= _draw(pipeline, "exposure_error_ev", rng)
     exposure = ExposureSettings(0.0, 1.0, wanted)
     if pipeline.image_sensor is not None:
         exposure = exposure_settings(wanted, pipeline.exposure_control)
@@ -305,6 +310,12 @@ def develop(
     light = Light(radiance, saturation_cd_m2(exposure.ev100))
     for stage in STAGES:
         light = stage(light, shot)
+    if not np.isfinite(light.values).all():
+        # The tone curve makes a bound of it.
+        raise SampleError(
+            f"{camera.name}.image_pipeline: a stage makes NaN or infinite values of finite "
+            f"radiance (exposure value {exposure.ev100:g}, gain {exposure.gain:g})"
+        )
     return Photograph(_compress(_tone(light, shot), shot), ev100)
 
 
@@ -330,6 +341,14 @@ def _meter(radiance: Float32, pipeline: ImagePipeline, limits_ev100: tuple[float
     return meter_mean_ev100(radiance, pipeline.metered_mean, pipeline.metered_clip, limits_ev100)
 
 
+def _draw(pipeline: ImagePipeline, field: str, rng: Rng) -> float:
+    """Draw a setting. Raises SampleError if it is no finite number, as of a faulty plug-in."""
+    drawn: float = getattr(pipeline, field).draw(rng)
+    if not math.isfinite(drawn):
+        raise SampleError(f"image_pipeline.{field}: drew {drawn}; expected a finite number")
+    return drawn
+
+
 def _lens_drops(light: Light, shot: Shot) -> Light:
     drops = lens_drops(shot.weather, shot.camera)
     return replace(light, values=refract_in_drops(light.values, drops)) if len(drops) else light
@@ -352,14 +371,14 @@ def _defocus(light: Light, shot: Shot) -> Light:
 
 
 def _flare(light: Light, shot: Shot) -> Light:
-    share = shot.pipeline.flare.draw(shot.rng)
+    share = _draw(shot.pipeline, "flare", shot.rng)
     if share <= 0.0:
         return light
     return replace(light, values=add_flare(light.values, share, light.white))
 
 
 def _vignetting(light: Light, shot: Shot) -> Light:
-    loss = shot.pipeline.vignetting.draw(shot.rng)
+    loss = _draw(shot.pipeline, "vignetting", shot.rng)
     values = optics.apply_vignetting(light.values, loss) if loss > 0.0 else light.values
     if shot.pipeline.natural_vignetting:
         falloff = optics.natural_falloff(shot.camera.intrinsics, shot.pipeline.fisheye_pupil)
@@ -384,7 +403,8 @@ def _image_sensor(light: Light, shot: Shot) -> Light:
     camera_from_srgb, srgb_from_camera = _color_matrices(pipeline)
     image = isp.transform_colors(light.values, camera_from_srgb / light.white)
     gains = np.ones(3, np.float32)
-    share, warmth_ev = pipeline.white_balance.draw(shot.rng), pipeline.warmth_ev.draw(shot.rng)
+    share = _draw(pipeline, "white_balance", shot.rng)
+    warmth_ev = _draw(pipeline, "warmth_ev", shot.rng)
     if sensor.pattern != "mono":
         gains = isp.white_balance_gains(_illuminant(image, pipeline), share, warmth_ev)
         # No gain is below 1, and the result is clipped: what saturates all channels stays white.
@@ -423,7 +443,8 @@ def _denoise(light: Light, shot: Shot) -> Light:
 def _white_balance(light: Light, shot: Shot) -> Light:
     """White balance of an ideal sensor, in the camera's colour space."""
     pipeline = shot.pipeline
-    share, warmth_ev = pipeline.white_balance.draw(shot.rng), pipeline.warmth_ev.draw(shot.rng)
+    share = _draw(pipeline, "white_balance", shot.rng)
+    warmth_ev = _draw(pipeline, "warmth_ev", shot.rng)
     if share == 0.0 and warmth_ev == 0.0:
         return light
     camera_from_srgb, srgb_from_camera = _color_matrices(pipeline)
@@ -453,7 +474,7 @@ def _effect(field: str, neutral: float, apply: Callable[[Float32, float], Float3
     is_length = field.endswith("_px")
 
     def stage(light: Light, shot: Shot) -> Light:
-        drawn = getattr(shot.pipeline, field).draw(shot.rng)
+        drawn = _draw(shot.pipeline, field, shot.rng)
         drawn = drawn / shot.pipeline.reduction if is_length else drawn
         return light if drawn == neutral else replace(light, values=apply(light.values, drawn))
 
@@ -481,8 +502,8 @@ def _tone(light: Light, shot: Shot) -> NDArray[np.uint8]:
     """Apply sharpening, on display values, and the tone curve."""
     pipeline, scale = shot.pipeline, 1.0 / light.white
     # On a grid, so that tables of bytes are used again.
-    contrast = round(pipeline.contrast.draw(shot.rng) * CONTRASTS) / CONTRASTS
-    amount = pipeline.sharpening.draw(shot.rng)
+    contrast = round(_draw(shot.pipeline, "contrast", shot.rng) * CONTRASTS) / CONTRASTS
+    amount = _draw(shot.pipeline, "sharpening", shot.rng)
     radius_px = pipeline.sharpening_px / pipeline.reduction
     is_sharpened = amount > 0.0 and radius_px >= _LEAST_SHARPENED_PX
     if pipeline.tone == "local":
