@@ -42,6 +42,7 @@ from pydantic import Field
 
 from gen_data.exporters.base import ANY_FORMAT, ExporterBase
 from gen_data.exporters.captions import caption
+from gen_data.exporters.conventions import ANY_LENS, Conventions
 from gen_data.exporters.fragments import fragment_rows
 from gen_data.exporters.id_colors import id_colors
 from gen_data.exporters.image_files import (
@@ -98,6 +99,7 @@ class ControlClips(ExporterBase):
     """
 
     type: Literal["control_clips"] = "control_clips"
+    conventions: ClassVar[Conventions] = Conventions(lens=ANY_LENS)
 
     image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
     camera: str = ""
