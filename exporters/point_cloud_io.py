@@ -63,7 +63,7 @@ def count_times_from(base: PointTime, points: NDArray[np.void], sweep_s: float) 
     """
     if base == "sweep_start":
         return points
-    moved = points.copy()
+    moved: NDArray[np.void] = points.copy()
     moved["time_s"] -= np.float32(0.5 * sweep_s)
     return moved
 
