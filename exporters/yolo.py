@@ -304,7 +304,7 @@ def _box(size: Array, box: BoxPx | None) -> str:
 
 
 def _coordinates(values: Array) -> str:
-    return " ".join([f"{value:.7f}" for value in values.ravel().tolist()])
+    return " ".join(["%.7f"] * values.size) % tuple(values.ravel().tolist())
 
 
 def _mirrored(name: str) -> str:
