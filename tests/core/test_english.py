@@ -87,9 +87,7 @@ def test_one_and_two_of_every_other_category() -> None:
     ours = {name: (count(name, 1), count(name, 2)) for name in regular}
 
     assert len(regular) > 200
-    assert ours == {
-        name: (engine.a(name), f"two {engine.plural_noun(name)}") for name in regular
-    }
+    assert ours == {name: (engine.a(name), f"two {engine.plural_noun(name)}") for name in regular}
 
 
 def test_no_category_is_a_plural_without_a_measure() -> None:
