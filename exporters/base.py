@@ -8,6 +8,7 @@ from typing import ClassVar, TypeVar, get_args
 
 from pydantic import Field, model_validator
 
+from gen_data.exporters.conventions import Conventions
 from gen_data.generator.config.base_model import Strict
 from gen_data.generator.core.capture import Channel, ImageFormat
 from gen_data.generator.core.errors import ConfigError, did_you_mean, list_names
@@ -60,6 +61,9 @@ class ExporterBase(Strict):
     cameras: tuple[str, ...] = ()
     sensors: tuple[str, ...] = ()
     rectify: bool | Rectify = False
+
+    conventions: ClassVar[Conventions]
+    """What its numbers mean; every exporter of the project states it."""
 
     image_formats: ClassVar[frozenset[str]] = PNG_ONLY
     """Formats of photographs that it can hold; see ``check_image_formats``."""

@@ -37,6 +37,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from gen_data.exporters.base import ANY_FORMAT, ExporterBase
+from gen_data.exporters.conventions import ANY_LENS, SAMPLE, Conventions
 from gen_data.exporters.image_files import link_or_copy
 from gen_data.exporters.png import RowFilter, encode_png
 from gen_data.exporters.sequences import write_text
@@ -60,6 +61,9 @@ class Birdseye(ExporterBase):
     """Bird's-eye layers, lanes and boxes around the ego, for map and BEV perception."""
 
     type: Literal["birdseye"] = "birdseye"
+    conventions: ClassVar[Conventions] = Conventions(
+        pixel_centre="i in `lanes`, i + 0.5 in `borders`", lens=ANY_LENS, time=SAMPLE
+    )
 
     image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
 

@@ -47,6 +47,7 @@ from numpy.typing import NDArray
 from pydantic import PrivateAttr
 
 from gen_data.exporters.base import PNG_OR_JPEG, ExporterBase
+from gen_data.exporters.conventions import PINHOLE, Conventions
 from gen_data.exporters.fragments import fragment_lines, fragment_rows, write_fragment
 from gen_data.exporters.image_files import link_or_copy, read_pixels
 from gen_data.exporters.mask_png import encode_mask
@@ -94,6 +95,11 @@ class Bop(ExporterBase):
     """
 
     type: Literal["bop"] = "bop"
+    conventions: ClassVar[Conventions] = Conventions(
+        pixel_centre="i + 0.5",
+        box="left, top, last - first column, last - first row (one less than COCO's)",
+        lens=PINHOLE,
+    )
 
     image_formats: ClassVar[frozenset[str]] = PNG_OR_JPEG
     camera: str = ""

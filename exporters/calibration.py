@@ -25,7 +25,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 from gen_data.exporters.base import ANY_FORMAT, ExporterBase
 from gen_data.exporters.calibration_texts import (
@@ -34,6 +34,7 @@ from gen_data.exporters.calibration_texts import (
     kalibr_text,
     opencv_text,
 )
+from gen_data.exporters.conventions import Conventions
 from gen_data.exporters.image_files import link_or_copy
 from gen_data.exporters.sensor_selection import rgb_cameras
 from gen_data.exporters.sequences import (
@@ -59,6 +60,9 @@ class CalibrationFiles(ExporterBase):
     """Calibration of every camera for OpenCV, ROS, Kalibr and COLMAP; poses for COLMAP."""
 
     type: Literal["calibration"] = "calibration"
+    conventions: ClassVar[Conventions] = Conventions(
+        pixel_centre="i; i + 0.5 in `colmap`", lens="any except panoramas"
+    )
     image_formats = ANY_FORMAT
 
     def check(self, info: DatasetInfo) -> None:

@@ -39,7 +39,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cache
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import cv2
 import numpy as np
@@ -49,6 +49,7 @@ from pydantic import PrivateAttr
 from gen_data.exporters.background_surfaces import SURFACES, UInt16, read_surfaces
 from gen_data.exporters.base import ExporterBase
 from gen_data.exporters.cityscapes_classes import city_classes
+from gen_data.exporters.conventions import PINHOLE, Conventions
 from gen_data.exporters.fragments import fragment_rows, write_fragment
 from gen_data.exporters.image_files import link_or_copy
 from gen_data.exporters.label_png import encode_label_png
@@ -82,6 +83,7 @@ class Cityscapes(ExporterBase):
     """Cityscapes' fine annotations of one camera."""
 
     type: Literal["cityscapes"] = "cityscapes"
+    conventions: ClassVar[Conventions] = Conventions(pixel_centre="i", lens=PINHOLE)
     camera: str = ""
     """Sensor of the images; empty = the first one, by name, with the rgb channel."""
     right: str = ""

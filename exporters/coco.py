@@ -84,6 +84,7 @@ from pathlib import Path
 from typing import Any, ClassVar, Literal
 
 from gen_data.exporters.base import ANY_FORMAT, ExporterBase
+from gen_data.exporters.conventions import EDGES, READING, Conventions
 from gen_data.exporters.fragments import fragment_lines, fragment_rows, image_splits, write_fragment
 from gen_data.exporters.ignored_regions import each_class
 from gen_data.exporters.image_files import link_or_copy
@@ -121,6 +122,9 @@ class Coco(ExporterBase):
     """COCO instances, one JSON file per split; images of all sensors with the rgb channel."""
 
     type: Literal["coco"] = "coco"
+    conventions: ClassVar[Conventions] = Conventions(
+        pixel_centre="i + 0.5", box=EDGES, lens="any; `images[].lens`", time=READING
+    )
 
     image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
     segmentation: Literal["polygon", "rle", "none"] = "polygon"
@@ -184,13 +188,14 @@ class Coco(ExporterBase):
         for split in splits:
             images = partial(fragment_lines, fragments, f"{split}.images")
             rows = fragment_lines(fragments, f"{split}.annotations")
-            header = dataset_header(info, _categories(info))
+            header = dataset_header(info, _categories(info), self.conventions)
             write_dataset(folder / f"instances_{split}.json", header, images(), rows)
             for category_id, skeleton in skeletons.items():
                 lines = fragment_lines(fragments, f"{split}.keypoints.{category_id}")
                 name = info.categories[category_id - 1]
                 path = folder / f"{'_'.join(name.split())}_keypoints_{split}.json"
-                header = dataset_header(info, [_keypoint_category(category_id, name, skeleton)])
+                category = _keypoint_category(category_id, name, skeleton)
+                header = dataset_header(info, [category], self.conventions)
                 write_dataset(path, header, images(), _keypoint_rows(lines, skeleton))
             for shard_dir, image in fragment_rows(shard_dirs, self.type, f"{split}.images"):
                 _link_images(info, image, split, shard_dir, dataset_dir)
@@ -442,7 +447,9 @@ def _keypoint_category(category_id: int, name: str, skeleton: Skeleton) -> dict[
     }
 
 
-def dataset_header(info: DatasetInfo, categories: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+def dataset_header(
+    info: DatasetInfo, categories: Sequence[Mapping[str, Any]], conventions: Conventions
+) -> dict[str, Any]:
     """Sections of a COCO file other than images and annotations."""
     return {
         "info": {
@@ -452,6 +459,7 @@ def dataset_header(info: DatasetInfo, categories: Sequence[Mapping[str, Any]]) -
             "depth_scale_m": info.depth_scale_m,
             "camera_frame": "X right, Y down, Z forward; metres",
             "pixel_centre": 0.5,
+            "conventions": conventions.facts(),
         },
         "licenses": [],
         "categories": list(categories),

@@ -37,6 +37,7 @@ from pydantic import PrivateAttr
 from gen_data.exporters.background_surfaces import SURFACES, UInt16, read_surfaces
 from gen_data.exporters.base import ANY_FORMAT, ExporterBase
 from gen_data.exporters.coco import box_xywh, dataset_header, image_name, write_dataset
+from gen_data.exporters.conventions import ANY_LENS, EDGES, Conventions
 from gen_data.exporters.fragments import fragment_lines, fragment_rows, image_splits, write_fragment
 from gen_data.exporters.image_files import link_or_copy
 from gen_data.exporters.label_colors import voc_palette
@@ -70,6 +71,9 @@ class CocoPanoptic(ExporterBase):
     """COCO panoptic segmentation of all cameras with the channels rgb and instance."""
 
     type: Literal["coco_panoptic"] = "coco_panoptic"
+    conventions: ClassVar[Conventions] = Conventions(
+        pixel_centre="i + 0.5", box=EDGES, lens=ANY_LENS
+    )
 
     image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
     _assets: AssetLibrary | None = PrivateAttr(None)
@@ -123,7 +127,7 @@ class CocoPanoptic(ExporterBase):
             path = dataset_dir / f"annotations/panoptic_{split}.json"
             write_dataset(
                 path,
-                dataset_header(info, categories),
+                dataset_header(info, categories, self.conventions),
                 map(_image_line, fragment_lines(folders, stem)),
                 _annotation_lines(fragment_lines(folders, stem), ids),
             )

@@ -42,6 +42,7 @@ from pydantic import Field
 
 from gen_data.exporters.base import ANY_FORMAT, ExporterBase
 from gen_data.exporters.captions import caption
+from gen_data.exporters.conventions import ANY_LENS, Conventions
 from gen_data.exporters.fragments import fragment_rows
 from gen_data.exporters.id_colors import id_colors
 from gen_data.exporters.image_files import (
@@ -98,6 +99,7 @@ class ControlClips(ExporterBase):
     """
 
     type: Literal["control_clips"] = "control_clips"
+    conventions: ClassVar[Conventions] = Conventions(lens=ANY_LENS)
 
     image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
     camera: str = ""
@@ -138,7 +140,8 @@ class ControlClips(ExporterBase):
         if info.steps_per_scene > 1 and self.near_m is None:
             raise ConfigError(
                 f"exporter '{self.type}': depth of a sequence needs a fixed range; "
-                "set near_m and far_m, such as near_m: 0.5, far_m: 100"
+                "set the nearest and farthest depth of your scenes, such as near_m: 0.5, far_m: 3 "
+                "(table), near_m: 0.6, far_m: 10 (room) or near_m: 3, far_m: 100 (street)"
             )
         check_frame_names(info, self.type)
 

@@ -32,6 +32,7 @@ from pydantic import PrivateAttr
 
 from gen_data.exporters.base import ANY_FORMAT, ExporterBase
 from gen_data.exporters.coco import image_name
+from gen_data.exporters.conventions import EDGES, Conventions
 from gen_data.exporters.croissant_metadata import (
     croissant_document,
     extract,
@@ -94,6 +95,9 @@ class Croissant(ExporterBase):
     """Tables of images and objects with Croissant metadata."""
 
     type: Literal["croissant"] = "croissant"
+    conventions: ClassVar[Conventions] = Conventions(
+        pixel_centre="i + 0.5", box=EDGES, lens="any; columns `lens`, `distortion`"
+    )
 
     image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
 

@@ -20,12 +20,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 from xml.sax.saxutils import escape, quoteattr
 
 import numpy as np
 
 from gen_data.exporters.coco import image_name
+from gen_data.exporters.conventions import ANY_LENS, Conventions
 from gen_data.exporters.fragments import fragment_rows, image_splits
 from gen_data.exporters.image_files import link_or_copy
 from gen_data.exporters.image_rows import ImageRowsExporter
@@ -43,6 +44,11 @@ class Cvat(ImageRowsExporter):
     """CVAT for images: objects of all cameras with the rgb channel, as shapes to be edited."""
 
     type: Literal["cvat"] = "cvat"
+    conventions: ClassVar[Conventions] = Conventions(
+        pixel_centre="i + 0.5",
+        box="left, top, right, bottom along the edges of pixels",
+        lens=ANY_LENS,
+    )
 
     shapes: Literal["mask", "polygon", "box"] = "mask"
     """Shape of every object."""

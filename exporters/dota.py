@@ -19,11 +19,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 from pydantic import Field
 
 from gen_data.exporters.coco import image_name
+from gen_data.exporters.conventions import ANY_LENS, Conventions
 from gen_data.exporters.fragments import fragment_rows, image_splits
 from gen_data.exporters.image_files import link_or_copy
 from gen_data.exporters.image_rows import ImageRowsExporter
@@ -44,6 +45,9 @@ class Dota(ImageRowsExporter):
     """
 
     type: Literal["dota"] = "dota"
+    conventions: ClassVar[Conventions] = Conventions(
+        pixel_centre="i + 0.5", box="corners along the edges of pixels", lens=ANY_LENS
+    )
 
     difficult_below: float = Field(0.4, ge=0, le=1)
 

@@ -21,12 +21,13 @@ from __future__ import annotations
 import io
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
 
 from gen_data.exporters.coco import image_name
+from gen_data.exporters.conventions import ANY_LENS, Conventions
 from gen_data.exporters.fragments import fragment_rows, image_splits
 from gen_data.exporters.image_files import link_or_copy
 from gen_data.exporters.image_rows import ImageRowsExporter
@@ -47,6 +48,7 @@ class GraspNet(ImageRowsExporter):
     """
 
     type: Literal["graspnet"] = "graspnet"
+    conventions: ClassVar[Conventions] = Conventions(lens=ANY_LENS)
 
     height_m: float = Field(0.02, gt=0)
     depth_m: float = Field(0.015, ge=0)

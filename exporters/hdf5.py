@@ -50,6 +50,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gen_data.exporters.base import ANY_FORMAT, ExporterBase
+from gen_data.exporters.conventions import Conventions
 from gen_data.exporters.fragments import fragment_rows, write_fragment
 from gen_data.exporters.image_files import link_or_copy, read_image
 from gen_data.exporters.lens_fields import lens_fields
@@ -96,6 +97,7 @@ class Hdf5(ExporterBase):
     """
 
     type: Literal["hdf5"] = "hdf5"
+    conventions: ClassVar[Conventions] = Conventions(pixel_centre="i", lens="any; `lens`")
 
     image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
     container: Literal["hdf5", "npz"] = "hdf5"
@@ -151,14 +153,29 @@ class Hdf5(ExporterBase):
         if self.container == "npz":
             path.write_bytes(npz_bytes(arrays, LEVEL if self.compression == "gzip" else 0))
         else:
-            write_hdf5(path, arrays, compressed=self.compression == "gzip")
+            compressed = self.compression == "gzip"
+            write_hdf5(path, arrays, self.conventions.facts(), compressed=compressed)
 
 
-def write_hdf5(path: Path, arrays: Mapping[str, NDArray[Any]], *, compressed: bool = True) -> None:
-    """Write arrays by name as an HDF5 file; compressed images are one chunk each."""
+def write_hdf5(
+    path: Path,
+    arrays: Mapping[str, NDArray[Any]],
+    attributes: Mapping[str, str] | None = None,
+    *,
+    compressed: bool = True,
+) -> None:
+    """Write arrays by name as an HDF5 file; compressed images are one chunk each.
+
+    Args:
+        path: File to write.
+        arrays: By key.
+        attributes: Of the file itself, by name.
+        compressed: Whether images are compressed.
+    """
     import h5py
 
     with h5py.File(path, "w", libver="earliest") as file:
+        file.attrs.update(attributes or {})
         for name, array in arrays.items():
             if array.size <= 16 or not compressed:
                 file.create_dataset(name, data=array)

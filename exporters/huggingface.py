@@ -42,6 +42,7 @@ import yaml
 from pydantic import Field
 
 from gen_data.exporters.base import ANY_FORMAT, ExporterBase, check_installed
+from gen_data.exporters.conventions import EDGES, READING, Conventions
 from gen_data.exporters.fragments import fragment_rows, numbered_stem, write_fragment
 from gen_data.exporters.lens_fields import has_bent_camera, lens_fields
 from gen_data.exporters.parquet_tables import (
@@ -89,6 +90,9 @@ class HuggingFace(ExporterBase):
     """
 
     type: Literal["huggingface"] = "huggingface"
+    conventions: ClassVar[Conventions] = Conventions(
+        pixel_centre="i + 0.5", box=EDGES, lens="any; column `lens`", time=READING
+    )
 
     image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
     rows_per_file: int = Field(1000, ge=1, le=1_000_000)
@@ -166,6 +170,7 @@ class HuggingFace(ExporterBase):
             categories=", ".join(info.categories),
             scale=info.depth_scale_m,
             lens=_LENS_LINE if has_bent_camera(info) else "",
+            conventions="\n".join(f"* {k}: {v}" for k, v in self.conventions.facts().items()),
         )
 
 
@@ -378,6 +383,10 @@ Categories: {categories}.
 | `objects.box3d` | camera frame: centre [m], size [m], quaternion w x y z |
 | `K` | 3 x 3, row by row; the centre of pixel i is i + 0.5 |{lens}
 | `T_world_camera` | 4 x 4, row by row; camera X right, Y down, Z forward; metres |
+
+Conventions:
+
+{conventions}
 
 Objects without a visible pixel are not listed. `LICENSES-ASSETS.md` of the data set lists the
 licences of the assets in its scenes.

@@ -45,13 +45,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Literal, Protocol
+from typing import ClassVar, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
 from gen_data.exporters.base import ExporterBase
+from gen_data.exporters.conventions import PINHOLE, Conventions
 from gen_data.exporters.image_files import link_or_copy
 from gen_data.exporters.kitti_boxes import UprightBox, members_in_box, upright_box
 from gen_data.exporters.point_cloud_io import T_camera_lidar, read_points, xyzi_bytes
@@ -105,6 +106,12 @@ class Kitti(ExporterBase):
     """KITTI object detection: the images of one camera, with labels in its frame."""
 
     type: Literal["kitti"] = "kitti"
+    conventions: ClassVar[Conventions] = Conventions(
+        pixel_centre="i",
+        box="first and last pixel (i), of the projected 3D box; `boxes: tight` of visible pixels",
+        lens=PINHOLE,
+        intensity="0 to 1",
+    )
     camera: str = ""
     """Sensor that becomes camera 2; empty = the first one, by name, with the rgb channel."""
     types: Literal["official", "category"] = "official"

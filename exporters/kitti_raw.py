@@ -27,7 +27,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from datetime import datetime, timedelta
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import cv2
 import numpy as np
@@ -35,6 +35,7 @@ from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
 from gen_data.exporters.base import ExporterBase
+from gen_data.exporters.conventions import PINHOLE, Conventions
 from gen_data.exporters.image_files import link_or_copy
 from gen_data.exporters.oxts import COLUMNS, navigation_mount, oxts_row, rig_motion
 from gen_data.exporters.png import RowFilter, encode_png
@@ -97,6 +98,12 @@ class KittiRaw(ExporterBase):
     """KITTI raw data: cameras, laser scanner, navigation and tracklets of every sequence."""
 
     type: Literal["kitti_raw"] = "kitti_raw"
+    conventions: ClassVar[Conventions] = Conventions(
+        pixel_centre="i",
+        lens=PINHOLE,
+        time="UTC from noon; a sweep has its start, middle and end",
+        intensity="0 to 1",
+    )
     date: Annotated[str, AfterValidator(_check_date)] = "2011_09_26"
     """Day of the recordings, as year_month_day."""
     image_02: str = ""

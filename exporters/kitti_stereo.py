@@ -25,12 +25,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Literal
+from typing import ClassVar, Literal
 
 import cv2
 import numpy as np
 
 from gen_data.exporters.base import ExporterBase
+from gen_data.exporters.conventions import PINHOLE, Conventions
 from gen_data.exporters.image_files import link_or_copy
 from gen_data.exporters.kitti_raw import cameras_text
 from gen_data.exporters.png import RowFilter, encode_png
@@ -61,6 +62,7 @@ class KittiStereo(ExporterBase):
     """KITTI's stereo benchmark: pairs of colour images, and the left one's disparities."""
 
     type: Literal["kitti_stereo"] = "kitti_stereo"
+    conventions: ClassVar[Conventions] = Conventions(pixel_centre="i", lens=PINHOLE)
     left: str = ""
     """Sensor that is image_2; empty = the first one, by name, that writes disparities."""
     right: str = ""

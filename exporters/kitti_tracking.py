@@ -22,12 +22,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
 
 from gen_data.exporters.base import ExporterBase
+from gen_data.exporters.conventions import PINHOLE, Conventions
 from gen_data.exporters.image_files import link_or_copy
 from gen_data.exporters.kitti import label_rows
 from gen_data.exporters.kitti_raw import Latitude, Longitude, projection
@@ -63,6 +64,13 @@ class KittiTracking(ExporterBase):
     """KITTI tracking: images, labels, scans and navigation of every sequence."""
 
     type: Literal["kitti_tracking"] = "kitti_tracking"
+    conventions: ClassVar[Conventions] = Conventions(
+        pixel_centre="i",
+        box="first and last pixel (i), of the projected 3D box",
+        lens=PINHOLE,
+        time="number of the frame",
+        intensity="0 to 1",
+    )
     camera: str = ""
     """Sensor that becomes camera 02; empty = the first one, by name, with the rgb channel."""
     right_camera: str = ""

@@ -25,7 +25,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 from urllib.parse import quote
 from xml.sax.saxutils import quoteattr
 
@@ -33,6 +33,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gen_data.exporters.coco import image_name
+from gen_data.exporters.conventions import ANY_LENS, Conventions
 from gen_data.exporters.fragments import fragment_rows, image_splits
 from gen_data.exporters.image_files import link_or_copy
 from gen_data.exporters.image_rows import ImageRowsExporter
@@ -66,6 +67,11 @@ class LabelStudio(ImageRowsExporter):
     """Label Studio: objects of all cameras with the rgb channel, as regions to be edited."""
 
     type: Literal["label_studio"] = "label_studio"
+    conventions: ClassVar[Conventions] = Conventions(
+        pixel_centre="i + 0.5",
+        box="left, top, width, height along the edges of pixels, in percent of the image",
+        lens=ANY_LENS,
+    )
 
     shapes: Shape = "polygon"
     """Shape of every object."""

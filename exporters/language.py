@@ -25,10 +25,11 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 from gen_data.exporters.captions import caption
 from gen_data.exporters.coco import box_xywh, image_name, scene_graph
+from gen_data.exporters.conventions import ANY_LENS, EDGES, Conventions
 from gen_data.exporters.fragments import fragment_rows, image_splits
 from gen_data.exporters.image_files import link_or_copy
 from gen_data.exporters.image_rows import ImageRowsExporter
@@ -46,6 +47,7 @@ class LanguageJsonl(ImageRowsExporter):
     """Text about every photograph as JSON lines, with masks of what it is about."""
 
     type: Literal["language"] = "language"
+    conventions: ClassVar[Conventions] = Conventions(box=EDGES, lens=ANY_LENS)
 
     @property
     def needs(self) -> frozenset[str]:

@@ -39,6 +39,7 @@ from typing import Any, ClassVar, Literal
 from pydantic import PrivateAttr
 
 from gen_data.exporters.base import ANY_FORMAT, ExporterBase, check_installed, select_names
+from gen_data.exporters.conventions import ANY_LENS, Conventions
 from gen_data.exporters.fragments import fragment_rows
 from gen_data.exporters.lerobot_files import LABELS, LAYOUTS, RobotFiles
 from gen_data.exporters.lerobot_statistics import image_sums
@@ -74,6 +75,9 @@ class LeRobot(ExporterBase):
     """
 
     type: Literal["lerobot"] = "lerobot"
+    conventions: ClassVar[Conventions] = Conventions(
+        lens=ANY_LENS, time="s from the episode's start"
+    )
 
     image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
     arm: str = ""

@@ -20,6 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import overload
 
 import numpy as np
@@ -35,6 +36,8 @@ Outline = NDArray[np.float64]
 INSET_PX = 0.02
 """Rasterisers that cut vertices to whole pixels draw exactly the mask; larger images lose less than
 with a larger inset."""
+TRACED_MASKS = 1024
+"""Masks whose outlines are kept: about those of a shard, which each format reads in turn."""
 
 
 def mask_polygons(mask: MaskPx) -> list[Polygon]:
@@ -60,9 +63,16 @@ def mask_polygons(mask: MaskPx) -> list[Polygon]:
     return polygons[::-1]
 
 
-def drawable_polygons(mask: MaskPx) -> list[Outline]:
-    """Trace a mask as ``mask_polygons``, with all edges moved inwards by ``INSET_PX``."""
-    return [_inset(polygon) for polygon in mask_polygons(mask)]
+@lru_cache(maxsize=TRACED_MASKS)
+def drawable_polygons(mask: MaskPx) -> tuple[Outline, ...]:
+    """Trace a mask as ``mask_polygons``, with all edges moved inwards by ``INSET_PX``.
+
+    The outlines are read-only: formats that are written one after the other share them.
+    """
+    outlines = tuple(_inset(polygon) for polygon in mask_polygons(mask))
+    for outline in outlines:
+        outline.setflags(write=False)
+    return outlines
 
 
 def _inset(polygon: Polygon) -> Outline:

@@ -18,7 +18,9 @@ topic                           message (Protobuf schema ``foxglove.*``)
 ==============================  =================================================================
 
 Every sequence starts at 0:00 UTC of 1 January 2020. Log times and times in messages are equal: each
-sensor has the instant of its reading. Messages are in order of time. Frames are called
+sensor has the instant of its reading, a scanner the middle of its sweep. ``time_s`` of points
+counts from there, so that stamp plus time is the instant of the pulse, or from the start of the
+sweep (``point_time``). Messages are in order of time. Frames are called
 ``camera/<name>`` (X right, Y down, Z forward), ``lidar/<name>`` and ``rig/<name>`` (X forward,
 Y left, Z up).
 
@@ -41,8 +43,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from gen_data.exporters.base import ANY_FORMAT, ExporterBase, check_installed
+from gen_data.exporters.conventions import POINT_TIME, Conventions
 from gen_data.exporters.fragments import fragment_rows
-from gen_data.exporters.point_cloud_io import read_points
+from gen_data.exporters.point_cloud_io import PointTime, count_times_from, read_points
 from gen_data.exporters.sequences import FRAMES, Frame, frame_facts, write_frames
 from gen_data.generator.core.boxes import OrientedBox
 from gen_data.generator.core.capture import POINT, Channel
@@ -83,12 +86,24 @@ class Mcap(ExporterBase):
 
     Attributes:
         compression: Of the files' chunks: ``zstd`` for smaller files, mostly because of points.
+        point_time: Instant from which ``time_s`` of points counts: the ``sweep_middle``, which is
+            that of the message's stamp, or the ``sweep_start``.
     """
 
     type: Literal["mcap"] = "mcap"
+    conventions: ClassVar[Conventions] = Conventions(
+        pixel_centre="i in calibrations, i + 0.5 in annotations",
+        box="corners along the edges of pixels",
+        lens="any; `distortion_model` and `D` of calibrations",
+        time="ns; sequences begin on 1 January 2020; middle of the exposure or sweep; "
+        f"{POINT_TIME}",
+        ring="highest laser",
+        intensity="0 to 1",
+    )
 
     image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
     compression: Literal["none", "zstd"] = "none"
+    point_time: PointTime = "sweep_middle"
 
     @property
     def needs(self) -> frozenset[str]:
@@ -122,7 +137,7 @@ class Mcap(ExporterBase):
             sequence = list(group)
             path = dataset_dir / sequence[0].row["split"] / f"{stem}-{number:06d}.mcap"
             path.parent.mkdir(parents=True, exist_ok=True)
-            _write_file(info, path, sequence, self.compression)
+            _write_file(info, path, sequence, self)
 
 
 def _frame_row(sample: Sample) -> dict[str, Any]:
@@ -147,7 +162,9 @@ def _frame_row(sample: Sample) -> dict[str, Any]:
             for (time_ns, child), (parent, pose) in sorted(unique.items(), key=_by_time_and_frame)
         ],
         "cameras": {n: _camera_row(sample.truth[n], time_s) for n, time_s in cameras.items()},
-        "lidars": {name: _ns(cloud.time_s) for name, cloud in sorted(clouds.items())},
+        "lidars": {
+            name: [_ns(cloud.time_s), cloud.lidar.sweep_s] for name, cloud in sorted(clouds.items())
+        },
         "objects": [_object_row(thing, box) for thing, box in world_boxes(sample)],
     }
 
@@ -253,27 +270,28 @@ def _events(frame: Frame) -> Iterator[_Event]:
         yield _Event(transform[0], frame, "transform", number)
     for name, camera in row["cameras"].items():
         yield _Event(camera["time_ns"], frame, "camera", name)
-    for name, time_ns in row["lidars"].items():
+    for name, (time_ns, _) in row["lidars"].items():
         yield _Event(time_ns, frame, "lidar", name)
     yield _Event(row["time_ns"], frame, "objects", None)
 
 
-def _write_file(info: DatasetInfo, path: Path, sequence: Sequence[Frame], compression: str) -> None:
+def _write_file(info: DatasetInfo, path: Path, sequence: Sequence[Frame], exporter: Mcap) -> None:
     """Write all messages of a sequence in order of time."""
     from mcap.writer import CompressionType, Writer
 
     # Sorting is stable: transforms stay before the messages that need them.
     events = sorted((e for f in sequence for e in _events(f)), key=lambda e: e.time_ns)
     with path.open("wb") as file:
-        writer = Writer(file, compression=CompressionType[compression.upper()])
+        writer = Writer(file, compression=CompressionType[exporter.compression.upper()])
         writer.start(profile="", library="gen-data")
         facts = {"name": info.name, "seed": str(info.seed)}
         facts["categories"] = canonical_json(info.categories)
         facts["depth_scale_m"] = repr(info.depth_scale_m)
+        facts |= {**exporter.conventions.facts(), "point_time": exporter.point_time}
         writer.add_metadata("gen-data", facts)
         channels = _Channels(writer)
         for event in events:
-            for topic, message in _messages(info, event):
+            for topic, message in _messages(info, event, exporter.point_time):
                 channels.write(topic, message, event.time_ns)
         writer.finish()
 
@@ -303,7 +321,9 @@ class _Channels:
         return self._schemas[name]
 
 
-def _messages(info: DatasetInfo, event: _Event) -> Iterator[tuple[str, Message]]:
+def _messages(
+    info: DatasetInfo, event: _Event, point_time: PointTime
+) -> Iterator[tuple[str, Message]]:
     """Yield topic and message of everything that an event stands for."""
     row = event.frame.row
     if event.kind == "transform":
@@ -311,7 +331,7 @@ def _messages(info: DatasetInfo, event: _Event) -> Iterator[tuple[str, Message]]
     elif event.kind == "camera":
         yield from _camera_messages(info, event)
     elif event.kind == "lidar":
-        yield f"/lidar/{event.key}/points", _cloud_message(event)
+        yield f"/lidar/{event.key}/points", _cloud_message(event, point_time)
     else:
         yield "/objects", _objects_message(row["objects"], event.time_ns)
 
@@ -385,10 +405,11 @@ def _annotations_message(boxes: Iterable[Sequence[Any]], time_ns: int) -> Messag
     return message
 
 
-def _cloud_message(event: _Event) -> Message:
+def _cloud_message(event: _Event, point_time: PointTime) -> Message:
     from foxglove_schemas_protobuf.PointCloud_pb2 import PointCloud
 
-    points = read_points(event.frame.shard_dir, event.key, event.frame.index)
+    stored = read_points(event.frame.shard_dir, event.key, event.frame.index)
+    points = count_times_from(point_time, stored, event.frame.row["lidars"][event.key][1])
     return PointCloud(
         timestamp=_timestamp(event.time_ns),
         frame_id=f"lidar/{event.key}",

@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gen_data.exporters.base import ANY_FORMAT, ExporterBase
+from gen_data.exporters.conventions import SAMPLE, Conventions
 from gen_data.exporters.sequences import write_text
 from gen_data.generator.core.capture import Measurements
 from gen_data.generator.core.errors import ConfigError, StorageError
@@ -43,6 +44,7 @@ class Tables(ExporterBase):
     """
 
     type: Literal["tables"] = "tables"
+    conventions: ClassVar[Conventions] = Conventions(time=SAMPLE)
 
     image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
     format: Literal["csv", "npy"] = "csv"

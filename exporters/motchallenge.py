@@ -23,6 +23,7 @@ from pathlib import Path
 from typing import Any, ClassVar, Literal
 
 from gen_data.exporters.base import ANY_FORMAT, ExporterBase
+from gen_data.exporters.conventions import ANY_LENS, Conventions
 from gen_data.exporters.image_files import link_or_copy
 from gen_data.exporters.sensor_selection import rgb_camera
 from gen_data.exporters.sequences import (
@@ -66,6 +67,9 @@ class MotChallenge(ExporterBase):
     """MOTChallenge: images and tracks of every sequence of one camera."""
 
     type: Literal["motchallenge"] = "motchallenge"
+    conventions: ClassVar[Conventions] = Conventions(
+        box="left + 1, top + 1, width, height", lens=ANY_LENS, time="number of the frame, from 1"
+    )
 
     image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
     camera: str = ""

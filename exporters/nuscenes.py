@@ -41,6 +41,7 @@ from typing import ClassVar, Literal
 from pydantic import Field
 
 from gen_data.exporters.base import PNG_OR_JPEG, ExporterBase
+from gen_data.exporters.conventions import PINHOLE, Conventions
 from gen_data.exporters.fragments import fragment_rows
 from gen_data.exporters.image_files import link_or_copy
 from gen_data.exporters.nuscenes_classes import detectable_categories
@@ -67,6 +68,13 @@ class NuScenes(ExporterBase):
     """nuScenes with lidarseg and panoptic labels: all cameras, laser scanners and radars."""
 
     type: Literal["nuscenes"] = "nuscenes"
+    conventions: ClassVar[Conventions] = Conventions(
+        pixel_centre="i",
+        lens=PINHOLE,
+        time="us; middle of the exposure or sweep",
+        ring="lowest laser",
+        intensity="0 to 255",
+    )
 
     image_formats: ClassVar[frozenset[str]] = PNG_OR_JPEG
     version: str = Field("v1.0-mini", pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$")

@@ -7,6 +7,7 @@ Exporters make their own files from these.
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,9 @@ from gen_data.generator.core.interfaces import cloud_path
 from gen_data.generator.core.sample import Sample
 from gen_data.generator.core.scene import Lidar
 from gen_data.generator.core.se3 import Array
+
+PointTime = Literal["sweep_middle", "sweep_start"]
+"""Instant from which times of points count."""
 
 
 def write_cloud(cloud: PointCloud, shard_dir: Path, index: int) -> None:
@@ -49,6 +53,19 @@ def read_points(shard_dir: Path, sensor: str, index: int) -> NDArray[np.void]:
     if points.dtype != POINT:
         raise StorageError(f"{path}: contains no laser points; generate the data set again")
     return points
+
+
+def count_times_from(base: PointTime, points: NDArray[np.void], sweep_s: float) -> NDArray[np.void]:
+    """Points whose ``time_s`` counts from an instant of the sweep; they are stored from its start.
+
+    Poses, boxes and stamps are at the middle: with ``sweep_middle``, which makes half of the times
+    negative, stamp plus time is the instant of the pulse.
+    """
+    if base == "sweep_start":
+        return points
+    moved: NDArray[np.void] = points.copy()
+    moved["time_s"] -= np.float32(0.5 * sweep_s)
+    return moved
 
 
 def xyzi_bytes(points: NDArray[np.void]) -> bytes:

@@ -3,7 +3,12 @@
 ::
 
     <lidar>/000000012.ply    binary little-endian, or 000000012.pcd, PCD 0.7 binary
-    <lidar>/poses.jsonl      {"index", "T_world_lidar", "boxes": [3D boxes in the lidar frame]}
+    <lidar>/poses.jsonl      {"index", "time_s", "sweep_s", "point_time", "T_world_lidar",
+                              "boxes": [3D boxes in the lidar frame]}
+
+Pose and boxes are at ``time_s``, the middle of the sweep, which lasts ``sweep_s``. ``time`` of a
+point counts from there, so that ``time_s + time`` is the instant of its pulse; with
+``point_time: sweep_start`` it counts from the start of the sweep. Comments in the files repeat it.
 
 Properties: ``x y z intensity time ring instance category surface return_number return_count``, as
 described at ``gen_data.generator.core.capture.POINT``. Open3D, PCL, CloudCompare and MeshLab read
@@ -14,7 +19,7 @@ References: Turk, "The PLY Polygon File Format", 1994; PCL, "The PCD file format
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
@@ -22,9 +27,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gen_data.exporters.base import ANY_FORMAT, ExporterBase
+from gen_data.exporters.conventions import POINT_TIME, READING, Conventions
 from gen_data.exporters.image_files import link_or_copy
-from gen_data.exporters.point_cloud_io import read_points, scanner_at_sweep
-from gen_data.exporters.sensor_selection import has_scans
+from gen_data.exporters.point_cloud_io import (
+    PointTime,
+    count_times_from,
+    read_points,
+    scanner_at_sweep,
+)
+from gen_data.exporters.sensor_selection import has_scans, instant_s
 from gen_data.generator.core.boxes import OrientedBox
 from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.interfaces import DatasetInfo
@@ -56,12 +67,20 @@ class PointClouds(ExporterBase):
 
     Attributes:
         format: Binary PLY, or binary PCD of the Point Cloud Library.
+        point_time: Instant from which ``time`` of points counts: the ``sweep_middle``, which is
+            that of poses and boxes, or the ``sweep_start``.
     """
 
     type: Literal["pointclouds"] = "pointclouds"
+    conventions: ClassVar[Conventions] = Conventions(
+        time=f"{READING}; {POINT_TIME}",
+        ring="highest laser",
+        intensity="0 to 1",
+    )
 
     image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
     format: Literal["ply", "pcd"] = "ply"
+    point_time: PointTime = "sweep_middle"
 
     @property
     def has_own_classes(self) -> bool:
@@ -89,11 +108,38 @@ class PointClouds(ExporterBase):
             folder.mkdir(parents=True, exist_ok=True)
             mine = [sample for sample in kept if has_scans(shard_dir, lidar, sample.index)]
             for sample in mine:
-                points = read_points(shard_dir, lidar, sample.index)
+                stored = read_points(shard_dir, lidar, sample.index)
+                sweep_s = scanner_at_sweep(sample, lidar).sweep_s
+                points = file_points(count_times_from(self.point_time, stored, sweep_s))
                 path = folder / f"{sample.index:09d}.{self.format}"
-                path.write_bytes(encoded(file_points(points)))
-            lines = "".join(canonical_json(_pose(sample, lidar)) + "\n" for sample in mine)
+                path.write_bytes(encoded(points, self._statements()))
+            lines = "".join(canonical_json(self._pose(sample, lidar)) + "\n" for sample in mine)
             (folder / "poses.jsonl").write_text(lines, encoding="utf-8", newline="\n")
+
+    def _statements(self) -> dict[str, str]:
+        """What the numbers in a file mean."""
+        return {**self.conventions.facts(), "point_time": self.point_time}
+
+    def _pose(self, sample: Sample, lidar: str) -> dict[str, Any]:
+        scanner = scanner_at_sweep(sample, lidar)
+        return {
+            "index": sample.index,
+            "time_s": instant_s(sample, lidar),
+            "sweep_s": scanner.sweep_s,
+            "point_time": self.point_time,
+            "model": scanner.model,
+            "T_world_lidar": scanner.T_world_lidar.matrix().tolist(),
+            "boxes": [
+                {
+                    "instance": thing.instance_id,
+                    "category": thing.category,
+                    "center_m": box.T_frame_box.translation_m,
+                    "size_m": box.size_m,
+                    "quaternion_wxyz": box.T_frame_box.quaternion_wxyz,
+                }
+                for thing, box in lidar_boxes(sample, lidar)
+            ],
+        }
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Link the files of all shards and join their lines."""
@@ -120,12 +166,13 @@ def file_points(points: NDArray[np.void]) -> NDArray[np.void]:
     return flat
 
 
-def ply_bytes(points: NDArray[np.void]) -> bytes:
-    """Encode ``FILE_POINT`` records as a binary PLY file."""
+def ply_bytes(points: NDArray[np.void], statements: Mapping[str, str]) -> bytes:
+    """Encode ``FILE_POINT`` records as a binary PLY file, with comments."""
     properties = [f"property {PLY_TYPES[_kind(name)]} {name}" for name in FILE_POINT.names or ()]
     header = [
         "ply",
         "format binary_little_endian 1.0",
+        *(f"comment {name}: {text}" for name, text in statements.items()),
         f"element vertex {len(points)}",
         *properties,
         "end_header",
@@ -133,11 +180,12 @@ def ply_bytes(points: NDArray[np.void]) -> bytes:
     return ("\n".join(header) + "\n").encode("ascii") + points.tobytes()
 
 
-def pcd_bytes(points: NDArray[np.void]) -> bytes:
-    """Encode ``FILE_POINT`` records as a binary PCD 0.7 file."""
+def pcd_bytes(points: NDArray[np.void], statements: Mapping[str, str]) -> bytes:
+    """Encode ``FILE_POINT`` records as a binary PCD 0.7 file, with comments."""
     names = FILE_POINT.names or ()
     header = [
         "# .PCD v0.7 - Point Cloud Data file format",
+        *(f"# {name}: {text}" for name, text in statements.items()),
         "VERSION 0.7",
         "FIELDS " + " ".join(names),
         "SIZE " + " ".join(PCD_TYPES[_kind(name)][0] for name in names),
@@ -158,25 +206,6 @@ def lidar_boxes(sample: Sample, lidar: str) -> list[tuple[Instance, OrientedBox]
     T_lidar_world = scanner_at_sweep(sample, lidar).T_world_lidar.inverse()
     things = sorted((i for i in scene.instances if i.annotated), key=lambda i: i.instance_id)
     return [(thing, thing.box3d.seen_from(T_lidar_world)) for thing in things]
-
-
-def _pose(sample: Sample, lidar: str) -> dict[str, Any]:
-    scanner = scanner_at_sweep(sample, lidar)
-    return {
-        "index": sample.index,
-        "model": scanner.model,
-        "T_world_lidar": scanner.T_world_lidar.matrix().tolist(),
-        "boxes": [
-            {
-                "instance": thing.instance_id,
-                "category": thing.category,
-                "center_m": box.T_frame_box.translation_m,
-                "size_m": box.size_m,
-                "quaternion_wxyz": box.T_frame_box.quaternion_wxyz,
-            }
-            for thing, box in lidar_boxes(sample, lidar)
-        ],
-    }
 
 
 def _kind(name: str) -> str:

@@ -36,6 +36,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from gen_data.exporters.base import PNG_OR_JPEG, ExporterBase, check_installed
+from gen_data.exporters.conventions import READING, Conventions
 from gen_data.exporters.fragments import fragment_rows, write_fragment
 from gen_data.exporters.image_files import read_pixels
 from gen_data.exporters.label_colors import voc_palette
@@ -60,6 +61,12 @@ class Rerun(ExporterBase):
     """
 
     type: Literal["rerun"] = "rerun"
+    conventions: ClassVar[Conventions] = Conventions(
+        pixel_centre="i + 0.5",
+        box="left, top, right, bottom along the edges of pixels",
+        lens="any; pinholes have a projection",
+        time=READING,
+    )
 
     image_formats: ClassVar[frozenset[str]] = PNG_OR_JPEG
     samples_per_file: int = Field(100, ge=1, le=10_000)

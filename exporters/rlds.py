@@ -27,11 +27,12 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from itertools import groupby
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 from pydantic import Field
 
 from gen_data.exporters.base import check_installed
+from gen_data.exporters.conventions import ANY_LENS, Conventions
 from gen_data.exporters.fragments import fragment_rows, numbered_stem
 from gen_data.exporters.lerobot import LeRobot
 from gen_data.exporters.sequences import FRAMES, Frame, write_text
@@ -73,6 +74,7 @@ class Rlds(LeRobot):
     """
 
     type: Literal["rlds"] = "rlds"  # type: ignore[assignment]
+    conventions: ClassVar[Conventions] = Conventions(lens=ANY_LENS)
     episodes_per_file: int = Field(100, ge=1)
 
     def check(self, info: DatasetInfo) -> None:

@@ -33,6 +33,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gen_data.exporters.base import PNG_OR_JPEG
+from gen_data.exporters.conventions import PINHOLE, Conventions
 from gen_data.exporters.image_files import encode_channel, link_or_copy, read_image, read_pixels
 from gen_data.exporters.label_map import public_classes
 from gen_data.exporters.label_png import encode_label_png
@@ -68,6 +69,7 @@ class ScanNet(RgbdExporter):
     image_formats: ClassVar[frozenset[str]] = PNG_OR_JPEG
     channels: ClassVar[tuple[Channel, ...]] = (Channel.Z_DEPTH, Channel.INSTANCE)
     type: Literal["scannet"] = "scannet"
+    conventions: ClassVar[Conventions] = Conventions(pixel_centre="i", lens=PINHOLE)
     classes: Literal["nyu40", "ade20k"] = "nyu40"
 
     @property

@@ -34,6 +34,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gen_data.exporters.base import ANY_FORMAT, ExporterBase
+from gen_data.exporters.conventions import PINHOLE, Conventions
 from gen_data.exporters.image_files import link_or_copy
 from gen_data.exporters.kitti import calib_matrices, matrix_lines
 from gen_data.exporters.point_cloud_io import read_points, xyzi_bytes
@@ -116,6 +117,9 @@ class SemanticKitti(ExporterBase):
     """SemanticKITTI: the scans of one laser scanner with a label per point."""
 
     type: Literal["semantickitti"] = "semantickitti"
+    conventions: ClassVar[Conventions] = Conventions(
+        pixel_centre="i", lens=PINHOLE, time="s; middle of the sweep", intensity="0 to 1"
+    )
 
     image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
     lidar: str = ""

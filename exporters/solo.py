@@ -34,6 +34,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from gen_data.exporters.base import PNG_OR_JPEG, ExporterBase
+from gen_data.exporters.conventions import EDGES, PINHOLE, READING, Conventions
 from gen_data.exporters.fragments import fragment_rows, write_fragment
 from gen_data.exporters.id_colors import id_color, id_colors
 from gen_data.exporters.image_files import link_or_copy
@@ -86,6 +87,9 @@ class Solo(ExporterBase):
     """Unity SOLO: images of all cameras with boxes and segmentation, one data set per split."""
 
     type: Literal["solo"] = "solo"
+    conventions: ClassVar[Conventions] = Conventions(
+        pixel_centre="i + 0.5", box=EDGES, lens=PINHOLE, time=READING
+    )
 
     image_formats: ClassVar[frozenset[str]] = PNG_OR_JPEG
 

@@ -19,7 +19,7 @@ An image without objects has the same keys, with empty lists. Additional keys:
 ``image/T_world_camera`` (4 x 4), row by row; ``image/object/instance_id``. Images of other lenses
 than a pinhole have ``image/lens/model``, ``image/lens/distortion`` (coefficients in the order of
 OpenCV's functions, to be applied before the intrinsics) and ``image/lens/half_field_rad``, the
-angle to the axis at which the image ends. In the intrinsics the centre of pixel i is i + 0.5.
+angle to the axis at which the image ends. ``image/conventions`` is JSON.
 
 A record is its length (uint64), the masked CRC32C of the length, the data, and the masked CRC32C of
 the data. Feature maps are written sorted by key, so that the same values give the same bytes.
@@ -44,6 +44,7 @@ import numpy as np
 from pydantic import Field
 
 from gen_data.exporters.base import PNG_OR_JPEG, ExporterBase, check_installed
+from gen_data.exporters.conventions import Conventions
 from gen_data.exporters.fragments import fragment_rows, numbered_stem, write_fragment
 from gen_data.exporters.ignored_regions import each_class
 from gen_data.exporters.lens_fields import lens_fields
@@ -54,6 +55,7 @@ from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.interfaces import DatasetInfo
 from gen_data.generator.core.lens import Lens
 from gen_data.generator.core.sample import ImageTruth, ObjectTruth, Sample
+from gen_data.generator.core.serialization import canonical_json
 
 IMAGES = "images"
 DIFFICULT = 0.25
@@ -95,6 +97,11 @@ class TfRecord(ExporterBase):
     """
 
     type: Literal["tfrecord"] = "tfrecord"
+    conventions: ClassVar[Conventions] = Conventions(
+        pixel_centre="i + 0.5",
+        box="edges of pixels as fractions of width and height",
+        lens="any; `image/lens/*`",
+    )
 
     image_formats: ClassVar[frozenset[str]] = PNG_OR_JPEG
     rows_per_file: int = Field(1000, ge=1)
@@ -180,6 +187,7 @@ def _image_labels(info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, F
         **_lens_labels(camera.intrinsics.lens),
         "image/intrinsics": camera.intrinsics.matrix().ravel().tolist(),
         "image/T_world_camera": camera.T_world_camera.matrix().ravel().tolist(),
+        "image/conventions": [canonical_json(TfRecord.conventions.facts()).encode()],
     }
 
 

@@ -22,8 +22,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
+from gen_data.exporters.conventions import PINHOLE, READING, Conventions
 from gen_data.exporters.image_files import link_or_copy
 from gen_data.exporters.measurement_tables import sequence_rows
 from gen_data.exporters.rgbd_sequences import RgbdExporter, depth_png, opencv_pinhole
@@ -52,6 +53,7 @@ class TumRgbd(RgbdExporter):
     """
 
     type: Literal["tum_rgbd"] = "tum_rgbd"
+    conventions: ClassVar[Conventions] = Conventions(pixel_centre="i", lens=PINHOLE, time=READING)
     imu: str = ""
 
     def check(self, info: DatasetInfo) -> None:

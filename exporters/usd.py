@@ -32,6 +32,7 @@ from numpy.typing import NDArray
 from pydantic import PrivateAttr
 
 from gen_data.exporters.base import ANY_FORMAT, ExporterBase, check_installed
+from gen_data.exporters.conventions import Conventions
 from gen_data.exporters.image_files import link_or_copy
 from gen_data.exporters.png import RowFilter, encode_png
 from gen_data.exporters.sequences import write_bytes, write_text
@@ -54,6 +55,11 @@ class Usd(ExporterBase):
     """
 
     type: Literal["usd"] = "usd"
+    conventions: ClassVar[Conventions] = Conventions(
+        pixel_centre="i + 0.5",
+        lens="any; `genData:lens:*`",
+        time="time code = step; s between steps in `stages.jsonl`",
+    )
 
     image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
     format: Literal["usdc", "usda"] = "usdc"

@@ -38,6 +38,7 @@ import numpy as np
 
 from gen_data.exporters.base import ANY_FORMAT, ExporterBase
 from gen_data.exporters.coco import image_name
+from gen_data.exporters.conventions import ANY_LENS, Conventions
 from gen_data.exporters.fragments import fragment_rows, write_fragment
 from gen_data.exporters.ignored_regions import each_class
 from gen_data.exporters.image_files import link_or_copy, read_pixels
@@ -72,6 +73,9 @@ class Voc(ExporterBase):
     """Pascal VOC boxes and label images of all cameras with the rgb channel."""
 
     type: Literal["voc"] = "voc"
+    conventions: ClassVar[Conventions] = Conventions(
+        box="first and last pixel, from 1", lens=ANY_LENS
+    )
 
     image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
     images: Literal["jpeg", "png"] = "jpeg"

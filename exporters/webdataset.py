@@ -40,6 +40,7 @@ from pydantic import Field
 
 from gen_data.exporters.base import ANY_FORMAT, ExporterBase
 from gen_data.exporters.coco import image_labels
+from gen_data.exporters.conventions import EDGES, READING, Conventions
 from gen_data.exporters.fragments import fragment_rows, write_fragment
 from gen_data.exporters.point_cloud_io import scanner_at_sweep
 from gen_data.exporters.sensor_selection import has_scans
@@ -60,6 +61,14 @@ class WebDataset(ExporterBase):
     """
 
     type: Literal["webdataset"] = "webdataset"
+    conventions: ClassVar[Conventions] = Conventions(
+        pixel_centre="i + 0.5",
+        box=EDGES,
+        lens="any; `lens` of cameras",
+        time=f"{READING}; `time_s` of points from the start of the sweep",
+        ring="highest laser",
+        intensity="0 to 1",
+    )
 
     image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
     samples_per_tar: int = Field(500, ge=1)
@@ -118,6 +127,7 @@ def sample_labels(info: DatasetInfo, sample: Sample) -> dict[str, Any]:
         "time_s": sample.scene.time_s,
         "categories": info.categories,
         "depth_scale_m": info.depth_scale_m,
+        "conventions": WebDataset.conventions.facts(),
         "cameras": {name: image_labels(info, sample, name) for name in sorted(sample.truth)},
         "lidars": {
             name: {

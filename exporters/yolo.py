@@ -39,6 +39,7 @@ from pydantic import Field
 
 from gen_data.exporters.base import ANY_FORMAT, ExporterBase
 from gen_data.exporters.coco import image_name
+from gen_data.exporters.conventions import ANY_LENS, Conventions
 from gen_data.exporters.fragments import fragment_lines, fragment_rows, write_fragment
 from gen_data.exporters.image_files import link_or_copy
 from gen_data.exporters.mask_polygons import (
@@ -67,6 +68,11 @@ class Yolo(ExporterBase):
     """YOLO data sets of all cameras with the rgb channel, one per task."""
 
     type: Literal["yolo"] = "yolo"
+    conventions: ClassVar[Conventions] = Conventions(
+        pixel_centre="i + 0.5",
+        box="centre and size along the edges of pixels, as fractions of width and height",
+        lens=ANY_LENS,
+    )
 
     image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
     tasks: tuple[Task, ...] = Field(("detect", "segment"), min_length=1)
@@ -298,7 +304,7 @@ def _box(size: Array, box: BoxPx | None) -> str:
 
 
 def _coordinates(values: Array) -> str:
-    return " ".join([f"{value:.7f}" for value in values.ravel().tolist()])
+    return " ".join(["%.7f"] * values.size) % tuple(values.ravel().tolist())
 
 
 def _mirrored(name: str) -> str:

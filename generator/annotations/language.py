@@ -23,7 +23,7 @@ from gen_data.generator.config.base_model import Strict
 from gen_data.generator.config.data_files import load_data
 from gen_data.generator.core.boxes import BoxPx
 from gen_data.generator.core.capture import Channel, SensorReading
-from gen_data.generator.core.english import article, count, join, plural
+from gen_data.generator.core.english import count, join, plural, singular
 from gen_data.generator.core.interfaces import AssetLibrary
 from gen_data.generator.core.sample import ImageTruth, ObjectTruth, Utterance, both_ways
 from gen_data.generator.core.scene import ObjectGroup, Scene
@@ -288,7 +288,7 @@ class View:
 
     def _exists(self, category: str) -> str:
         form: str = grammar()["questions"]["existence"]
-        return form.format(thing=f"{article(category)} {category}")
+        return form.format(thing=singular(category))
 
     def _candidates(self, category: str) -> tuple[Thing, ...]:
         """All things that someone may call by a category's name."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from gen_data.generator.api.config import load_config
 from gen_data.generator.api.dataset import SampleSequence, open_dataset
+from gen_data.generator.api.sample import Sample
 from gen_data.generator.config.yaml_scalars import to_flow_yaml
 from gen_data.generator.core.errors import ConfigError, StorageError, VerificationError
 from gen_data.generator.core.serialization import canonical_json
@@ -76,9 +77,9 @@ def adapt(
         config: The configuration of the data set: of the round before, or any at first.
         data: A finished data set of it, that the detector was judged by and did not train on.
         out: Folder of the curriculum.
-        results: Detections of any detector in its images, in COCO's format of results, with the
-            image and category ids of its COCO export; or an object with ``dataset``, its identity,
-            and ``results``.
+        results: Detections of any detector in the images of all its colour cameras, in COCO's
+            format of results, with the image and category ids of its COCO export; or an object with
+            ``dataset``, its identity, and ``results``.
         detector: Instead: a file of the small detector.
         strength: Exponent of the ratio of misses; see ``Dependence.factors``.
 
@@ -96,13 +97,13 @@ def adapt(
     with open_dataset(data) as stored:
         has_map = bool((stored.config.get("labels") or {}).get("map"))
         samples: SampleSequence = stored.relabelled() if has_map else stored
-        truth = _read_truth(samples, data)
+        truth, sample_of = _read_truth(samples, data, kept.info.cameras)
         if detector is not None:
             rows = _detect(detector, samples, truth)
         else:
             assert results is not None
             rows = _read_checked(results, kept, truth)
-    tallies = _count(truth, rows, len(kept.info.cameras))
+    tallies = _count(truth, rows, sample_of)
     replay = replay_scenes(kept, kept.n)
     if replay.differences:
         raise VerificationError(
@@ -116,7 +117,7 @@ def adapt(
 
 def _check_same(loaded: Config, data: Path) -> None:
     """Refuse a data set of another configuration; what plans add or exports change may differ."""
-    free = ("seed", "exporters", "physics")
+    free = ("seed", "exporters", "physics", "shard_size")
     stored = load_config(str(data))
     first, second = (
         {key: value for key, value in one.resolved.items() if key not in free}
@@ -130,12 +131,20 @@ def _check_same(loaded: Config, data: Path) -> None:
         )
 
 
-def _read_truth(samples: SampleSequence, data: Path) -> RealSet:
-    """Objects in the images of the first colour camera, under the image ids of COCO exports."""
-    pictures = []
+def _photographs(samples: SampleSequence) -> Iterator[tuple[Sample, str]]:
+    """Samples with each of their cameras that took a photograph."""
     for sample in samples:
-        names = sorted(sample.cameras)
-        camera = next(name for name in names if "rgb" in sample.cameras[name].channels)
+        for name in sorted(sample.cameras):
+            if "rgb" in sample.cameras[name].channels:
+                yield sample, name
+
+
+def _read_truth(
+    samples: SampleSequence, data: Path, cameras: Sequence[str]
+) -> tuple[RealSet, dict[int, int]]:
+    """Objects in all photographs, under the image ids of COCO exports, and samples by these ids."""
+    pictures, sample_of = [], {}
+    for sample, camera in _photographs(samples):
         image, target = detection_target(sample, camera)
         things = tuple(
             RealObject(samples.categories[int(label) - 1], _sides(box), bool(crowd))
@@ -143,10 +152,11 @@ def _read_truth(samples: SampleSequence, data: Path) -> RealSet:
                 target["boxes"], target["labels"], target["iscrowd"], strict=True
             )
         )
-        image_id = sample.index * len(names) + names.index(camera) + 1
+        image_id = sample.index * len(cameras) + cameras.index(camera) + 1
+        sample_of[image_id] = sample.index
         pictures.append(RealPicture(image_id, data, (image.shape[2], image.shape[1]), things))
     ids = {name: number for number, name in enumerate(samples.categories, 1)}
-    return RealSet(data, tuple(pictures), ids, {})
+    return RealSet(data, tuple(pictures), ids, {}), sample_of
 
 
 def _sides(box: NDArray[np.float32]) -> Box:
@@ -183,19 +193,21 @@ def _detect(path: Path, samples: SampleSequence, truth: RealSet) -> list[dict[st
     from gen_data.generator.study.training import detect_in_images
 
     images = (
-        (picture.image_id, detection_target(sample)[0].transpose(1, 2, 0))
-        for picture, sample in zip(truth.pictures, samples, strict=True)
+        (picture.image_id, detection_target(sample, camera)[0].transpose(1, 2, 0))
+        for picture, (sample, camera) in zip(truth.pictures, _photographs(samples), strict=True)
     )
     return detect_in_images(Detector.load(path), images, truth.category_ids)
 
 
-def _count(truth: RealSet, rows: Sequence[Mapping[str, Any]], cameras: int) -> dict[int, Tally]:
-    """Objects and misses by number of the sample."""
+def _count(
+    truth: RealSet, rows: Sequence[Mapping[str, Any]], sample_of: Mapping[int, int]
+) -> dict[int, Tally]:
+    """Objects and misses by number of the sample, in all of its photographs."""
     evaluation = evaluate(truth, rows)
-    counts = {(picture.image_id - 1) // cameras: [0, 0] for picture in truth.pictures}
+    counts = {number: [0, 0] for number in sample_of.values()}
     for match in evaluation.matches:
         if match.thing is not None:
-            number = (evaluation.pictures[match.picture].image_id - 1) // cameras
+            number = sample_of[evaluation.pictures[match.picture].image_id]
             counts[number][0] += 1
             counts[number][1] += match.box is None
     return {number: Tally(*pair) for number, pair in counts.items()}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -215,6 +216,24 @@ def test_the_range_of_one_image(depth: Any, pixels: Any, span: Any) -> None:
 
     assert found.tolist() == [pixels]
     assert used == span
+
+
+@pytest.mark.parametrize(
+    ("place", "nearest_m", "farthest_m"),
+    [("table", 0.6, 2.5), ("room", 0.7, 8.0), ("street", 4.0, 90.0)],
+)
+def test_the_suggested_range_of_a_sequence_uses_most_greys(
+    world: Any, place: str, nearest_m: float, farthest_m: float
+) -> None:
+    """Of usual depths in each kind of scene: at least 160 of 255 levels."""
+    with pytest.raises(ConfigError) as caught:
+        ControlClips().check(world.info(8, steps_per_scene=4))
+    (found,) = re.findall(rf"near_m: ([0-9.]+), far_m: ([0-9]+) \([^)]*{place}", str(caught.value))
+    near_m, far_m = map(float, found)
+
+    (dark, light), _ = inverse_depth(np.array([farthest_m, nearest_m], np.float32), (near_m, far_m))
+
+    assert int(light) - int(dark) >= 160
 
 
 @pytest.mark.parametrize(

@@ -275,7 +275,7 @@ def test_damaged_files_are_found(
         lambda row: [t.__setitem__(slice(6, 10), [t[9], *t[6:9]]) for t in row["transforms"]],
         lambda row: [o.update(size_m=[0.5 * s for s in o["size_m"]]) for o in row["objects"]],
         lambda row: row["cameras"]["left"]["boxes"][0].__setitem__(2, 1),
-        lambda row: row["lidars"].update(top=row["lidars"]["top"] + 1000),
+        lambda row: row["lidars"].update(top=[row["lidars"]["top"][0] + 1000, 0.0]),
     ],
     ids=["principal point", "quaternion w first", "half sizes", "box", "time"],
 )

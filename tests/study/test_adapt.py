@@ -173,7 +173,7 @@ def test_a_file_that_is_no_detector_is_refused(
 
 def test_a_folder_that_is_no_data_set_is_refused(config: Path, tmp_path: Path) -> None:
     """It is not looked for among configurations."""
-    with pytest.raises(StorageError, match="is not a gen-data data set"):
+    with pytest.raises(StorageError, match="there is no folder"):
         adapt(str(config), tmp_path / "none", tmp_path, results=tmp_path / "none.json")
 
 
@@ -196,3 +196,45 @@ def test_a_detector_that_misses_nothing_teaches_nothing(
 
     with pytest.raises(ConfigError, match=r"found all \d+ objects; expected misses to learn from"):
         adapt(str(config), data, tmp_path / "out", results=path)
+
+
+@pytest.fixture(scope="module")
+def pair(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """Configuration and twelve samples of two colour cameras and one without colours."""
+    config = tmp_path_factory.mktemp("pair") / "pair.yaml"
+    more = (
+        "  - {name: behind, type: rgb_camera, size_px: [64, 48], channels: [rgb]}\n"
+        "  - {name: ids, type: rgb_camera, size_px: [64, 48], channels: [instance]}\n"
+    )
+    config.write_text(CONFIG.replace("annotations:", f"{more}annotations:"))
+    out = config.parent / "data"
+    gen_data.generate(config, 12, out=out, workers=0)
+    return config, out
+
+
+def test_results_of_every_colour_camera_count(pair: tuple[Path, Path], tmp_path: Path) -> None:
+    """One camera finds all, the other nothing: the recall is the first one's share of objects."""
+    config, data = pair
+    truth = json.loads((data / "coco/annotations/instances_train.json").read_text())
+    sensors = {image["id"]: image["sensor"] for image in truth["images"]}
+    rows = [row | {"score": 1.0} for row in truth["annotations"]]
+    found = [row for row in rows if sensors[row["image_id"]] == "behind"]
+    path = tmp_path / "results.json"
+    path.write_text(json.dumps(found))
+
+    made = adapt(str(config), data, tmp_path / "out", results=path)
+
+    assert made.images == (len({row["image_id"] for row in found}), 24)
+    assert made.recall == pytest.approx(len(found) / len(rows))
+
+
+def test_the_size_of_shards_is_no_part_of_what_was_drawn(
+    config: Path, data: Path, results: Path, tmp_path: Path
+) -> None:
+    """A set of the same scenes in other shards is of the same configuration."""
+    other = tmp_path / "other.yaml"
+    other.write_text(f"extends: {config}\nshard_size: 7\n")
+
+    made = adapt(str(other), data, tmp_path / "out", results=results)
+
+    assert made.changed == ("orbit.distance_m",)
