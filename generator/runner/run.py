@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -18,7 +19,7 @@ from gen_data.generator.runner.plan import PLAN_NAME, Plan, plan_bytes
 from gen_data.generator.runner.processes import Pool, open_worker_pool, run_supervisor
 from gen_data.generator.runner.progress import RunMonitor, RunProgress, Summary
 from gen_data.generator.runner.repair import quarantine_extra, restore_plan
-from gen_data.generator.runner.seal import SealedBefore, read_or_empty, read_seal
+from gen_data.generator.runner.seal import SealedBefore, parse_seal
 from gen_data.generator.runner.shard import (
     EnteredPipeline,
     Job,
@@ -30,7 +31,13 @@ from gen_data.generator.runner.shard import (
     write_images,
     write_records,
 )
-from gen_data.generator.runner.store import FolderState, LocalStore, Scan
+from gen_data.generator.runner.store import (
+    MANIFEST_NAME,
+    SUMS_NAME,
+    FolderState,
+    LocalStore,
+    Scan,
+)
 from gen_data.generator.runner.supervisor import Limits, Supervisor
 from gen_data.generator.runner.termination_signals import Interruption
 from gen_data.generator.runner.worker import done_event
@@ -134,8 +141,13 @@ def run(  # noqa: PLR0913  (every argument is the choice of the caller)
 
 def _read_seal(store: LocalStore, plan: Plan) -> SealedBefore:
     """Read the seal of this very data set, which repair must not change; it may have none."""
-    same = read_or_empty(store.root / PLAN_NAME) == plan_bytes(plan)
-    return read_seal(store.root) if same else SealedBefore(frozenset(), {})
+    found = store.read_documents((PLAN_NAME, SUMS_NAME, MANIFEST_NAME))
+    seal = parse_seal(found[SUMS_NAME], found[MANIFEST_NAME])
+    bytes_of_plan = plan_bytes(plan)
+    same = found[PLAN_NAME] == bytes_of_plan or (
+        seal.sums.get(PLAN_NAME) == hashlib.sha256(bytes_of_plan).hexdigest()
+    )
+    return seal if same else SealedBefore(frozenset(), {})
 
 
 @dataclass(frozen=True)
@@ -155,7 +167,7 @@ class _Run:
                 if state is FolderState.NEW:
                     self._space.before_start(self._count(range(plan.shard_count)))
                 finished = state is FolderState.FINISHED
-                if finished and store.is_intact(extra_matters=self.settings.repair):
+                if finished and store.is_intact(self.settings.repair, self._show_checked):
                     return self._summarize_finished()
                 sealed_before = _read_seal(store, plan)
             store.prepare(plan)
@@ -186,6 +198,11 @@ class _Run:
             with suppress(OSError):
                 store.clear_scratch()
         return self._summarize(dataset_id, scan, monitor)
+
+    def _show_checked(self, share: float) -> None:
+        """Report how much of a finished data set was hashed."""
+        n = self.job.plan.n
+        self.progress(RunProgress("checking", int(share * n), n, 0.0, 0, 0))
 
     @property
     def _space(self) -> SpaceCheck:
