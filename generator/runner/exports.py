@@ -34,6 +34,9 @@ from gen_data.generator.runner.store import LICENCES_NAME, LocalStore
 from gen_data.generator.runner.stored import CheckedSamples, StoredSamples
 from gen_data.generator.runner.verify import check_source
 
+NEW_BYTES = 8_000.0
+"""Least size of what exports add to a sample: labels, and entries in records and sums."""
+
 if TYPE_CHECKING:
     from gen_data.generator.assemble.config import Config
 
@@ -208,8 +211,8 @@ def export(  # noqa: PLR0913  (keywords of one front door)
             write_media=files.link_media,
             write_records=files.link_records,
             linked_digests=files.digests,
-            # The size of the new files follows from the first shard.
-            sample_bytes=0.0 if linked else linked_bytes,
+            # The size of new files of later shards follows from the first one.
+            sample_bytes=NEW_BYTES + (0.0 if linked else linked_bytes),
             linked_bytes=linked_bytes if linked else 0.0,
             is_forced=force,
         ),

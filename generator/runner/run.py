@@ -12,7 +12,7 @@ from pathlib import Path
 from gen_data.generator.core.errors import GenDataError
 from gen_data.generator.core.sample import Sample
 from gen_data.generator.runner.finalize import LicencesOf, finalize
-from gen_data.generator.runner.free_space import SpaceCheck
+from gen_data.generator.runner.free_space import DOCUMENTS_BYTES, SpaceCheck
 from gen_data.generator.runner.numerics_guard import admit_numerics
 from gen_data.generator.runner.object_store import open_store
 from gen_data.generator.runner.plan import PLAN_NAME, Plan, plan_bytes
@@ -208,7 +208,12 @@ class _Run:
     def _space(self) -> SpaceCheck:
         chosen = self.settings
         return SpaceCheck(
-            self.job.store, chosen.sample_bytes, chosen.is_forced, chosen.linked_bytes
+            self.job.store,
+            chosen.sample_bytes,
+            chosen.is_forced,
+            chosen.linked_bytes,
+            # The plan and its copy.
+            2 * len(plan_bytes(self.job.plan)) + DOCUMENTS_BYTES,
         )
 
     def _count(self, shards: Sequence[int]) -> int:
