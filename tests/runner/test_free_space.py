@@ -98,7 +98,7 @@ def test_a_merge_that_will_not_fit_is_refused_before_anything_is_written(
     room = 1.05 * (shards + documents) + RESERVE_BYTES
     monkeypatch.setattr(merge, "_is_same_disk", lambda part, place: False)
     monkeypatch.setattr(store, "free_bytes", lambda path: room - 1)
-    with pytest.raises(StorageError, match="the parts need about .* here and .* are free"):
+    with pytest.raises(StorageError, match=r"the parts need about .* here and .* are free"):
         gather_shards(plan, [tmp_path / "part"], out, allow_mixed_numerics=False)
     assert not out.root.exists()
 
