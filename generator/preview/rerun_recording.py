@@ -24,10 +24,10 @@ from gen_data.generator.core.errors import StorageError
 from gen_data.generator.core.interfaces import AssetLibrary, DatasetInfo
 from gen_data.generator.core.intrinsics import Intrinsics
 from gen_data.generator.core.sample import ImageTruth, Sample
-from gen_data.generator.core.whole_files import whole_file
 from gen_data.generator.core.scene import Body, Instance, Scene
 from gen_data.generator.core.se3 import SE3
 from gen_data.generator.core.skeletons import Skeleton, find_skeleton
+from gen_data.generator.core.whole_files import whole_file
 from gen_data.generator.preview.overlay import channel_image
 from gen_data.generator.preview.palette import id_color
 from gen_data.generator.preview.sensor_views import PointColors, point_colors

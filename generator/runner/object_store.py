@@ -255,6 +255,20 @@ class ObjectStore(LocalStore):
         """The URL."""
         return self.objects.url
 
+    @contextmanager
+    def errors(self) -> Iterator[None]:
+        """Turn OSErrors of the staging folder into StorageErrors with a remedy."""
+        try:
+            with super().errors():
+                yield
+        except StorageError as error:
+            if not isinstance(error.__cause__, OSError):
+                raise
+            raise StorageError(
+                f"{str(error).splitlines()[0]} Shards are staged there; point XDG_CACHE_HOME to a "
+                f"folder with room and repeat:\n    {self.resume_command}"
+            ) from error.__cause__
+
     def free_bytes(self) -> int:
         """Object storage is never full; the staging folder needs room for shards in progress."""
         return 1 << 62

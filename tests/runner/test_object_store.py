@@ -330,3 +330,14 @@ def test_checking_a_finished_data_set_at_a_url_is_shown(memory: str) -> None:
     make_at(memory, progress=shown.append)
     assert {one.phase for one in shown} == {"checking"}
     assert shown[-1].done == shown[-1].total == 10
+
+
+def test_a_staging_folder_that_cannot_be_made_is_an_error_with_the_remedy(
+    tmp_path: Path, memory: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    make_at(memory)
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+    for use in (make_at, open_stored):
+        with pytest.raises(StorageError, match=r"file/gen-data.*oint XDG_CACHE_HOME to a folder"):
+            use(memory)
