@@ -46,10 +46,14 @@ def test_files_that_belong_together_are_replaced_together(tmp_path: Path, full_d
 
 
 def test_an_interrupted_file_leaves_nothing(tmp_path: Path) -> None:
-    with pytest.raises(KeyboardInterrupt), whole_file(tmp_path / "x.png") as unfinished:
-        unfinished.write_bytes(b"half")
-        assert unfinished.suffix == ".png"
-        raise KeyboardInterrupt
+    def interrupt() -> None:
+        with whole_file(tmp_path / "x.png") as unfinished:
+            unfinished.write_bytes(b"half")
+            assert unfinished.suffix == ".png"
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        interrupt()
     assert not list(tmp_path.iterdir())
 
 
