@@ -151,21 +151,47 @@ def _encode_photograph(image: NDArray[np.uint8], encoding: ImageEncoding) -> byt
     return data.tobytes()
 
 
-def read_image(path: Path, channel: Channel, depth_scale_m: float) -> NDArray[Any]:
+PIXELS = {
+    Channel.RGB: (np.uint8, 3),
+    Channel.NORMALS: (np.uint8, 3),
+    Channel.OBJECT_COORDINATES: (np.uint16, 3),
+    Channel.FLOW_FORWARD: (np.uint16, 3),
+    Channel.FLOW_BACKWARD: (np.uint16, 3),
+    Channel.FLOW_OCCLUDED_FORWARD: (np.uint8, 1),
+    Channel.FLOW_OCCLUDED_BACKWARD: (np.uint8, 1),
+    Channel.SCENE_FLOW: (np.uint16, 3),
+}
+"""Type and number of components of the pixels in a file; other channels: uint16, 1."""
+
+
+def read_image(
+    path: Path, channel: Channel, depth_scale_m: float, size_px: tuple[int, int] | None = None
+) -> NDArray[Any]:
     """Read one channel from its file (rounded): the inverse of ``encode_channel``.
 
     Args:
         path: Image file.
         channel: Channel of the image.
         depth_scale_m: Metres per unit of depth and range images.
+        size_px: Expected width and height; None = any.
 
     Returns:
         Array as listed at ``Channel``, including its values for "nothing".
 
     Raises:
-        StorageError: the file is missing or no image.
+        StorageError: the file is missing, no image, or one of another channel or size.
     """
-    return _decode_pixels(channel, read_pixels(path), depth_scale_m)
+    pixels = read_pixels(path)
+    kind, components = PIXELS.get(channel, (np.uint16, 1))
+    width_px, height_px = size_px or (pixels.shape[1], pixels.shape[0])
+    shape = (height_px, width_px) if components == 1 else (height_px, width_px, components)
+    if pixels.dtype != kind or pixels.shape != shape:
+        raise StorageError(
+            f"{path}: holds {pixels.dtype} pixels {list(pixels.shape)}; expected "
+            f"{np.dtype(kind)} {list(shape)} of channel "
+            f"{channel.value}; generate the data set again"
+        )
+    return _decode_pixels(channel, pixels, depth_scale_m)
 
 
 def read_pixels(path: Path) -> NDArray[Any]:

@@ -63,7 +63,7 @@ class Recording:
 
     def make(
         self,
-        out: Path,
+        out: Path | str,
         *,
         workers: int = 0,
         shards: range | None = None,
@@ -73,7 +73,7 @@ class Recording:
         """Make the data set, or the rest of it.
 
         Args:
-            out: Its folder.
+            out: Its folder or URL.
             workers: Processes; 0 = this one.
             shards: Range of shards; None = all.
             repair: See ``Settings``.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable
 from os import PathLike
 from pathlib import Path
@@ -50,8 +51,8 @@ def certify(
     from gen_data.generator.certificate.certificate import examine
     from gen_data.generator.certificate.examined import Scope
     from gen_data.generator.certificate.page import format_page
-    from gen_data.generator.runner.durable_files import storage_errors
-    from gen_data.generator.runner.store import CERTIFICATE_NAMES
+    from gen_data.generator.runner.durable_files import make_folder
+    from gen_data.generator.runner.store import CERTIFICATE_NAMES, LocalStore
 
     for name, value in (("samples", samples), ("rays", rays), ("scenes", scenes)):
         if value < 0:
@@ -63,7 +64,14 @@ def certify(
     with threadpool_limits(limits=1):
         certificate = examine(path, Scope(samples, rays, scenes, alpha), date, on_progress)
     documents = (certificate.to_bytes(), format_page(certificate).encode())
-    with storage_errors(path, ""):
-        for name, data in zip(CERTIFICATE_NAMES, documents, strict=True):
-            (path / name).write_bytes(data)
+    store = LocalStore(path)
+    with store.errors():
+        make_folder(store.scratch_root)
+        scratch = store.scratch_dir()
+        try:
+            # A page without its figures is none; figures without their page are complete.
+            for name, data in zip(CERTIFICATE_NAMES, documents, strict=True):
+                store.replace_file(name, data, scratch)
+        finally:
+            shutil.rmtree(scratch, ignore_errors=True)
     return certificate

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gen_data.generator.core.errors import ConfigError, StorageError
+from gen_data.generator.core.whole_files import write_whole
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -84,9 +85,7 @@ def match(  # noqa: PLR0913  (keywords of one front door)
         path.with_suffix(".html"): format_match_page(found, Path(source).stem),
     }
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        for target, text in files.items():
-            target.write_text(text, encoding="utf-8", newline="\n")
+        write_whole({target: text.encode() for target, text in files.items()})
     except OSError as error:
         raise StorageError(f"{error.filename}: {error.strerror}; choose another --out") from error
     # What is written must be a configuration.

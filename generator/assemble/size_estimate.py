@@ -19,8 +19,13 @@ BYTES_PER_PIXEL = {
 }
 """Sizes of PNG files, measured on tabletop and street; other channels are taken as 1."""
 
-RECORDS_BYTES = 8_000
-"""Scene and labels of a sample, and its share of exports, measured on tabletop at its least."""
+RECORDS_BYTES = 96_000
+"""Scene and labels of a sample, its entries in records, sums and exports.
+
+The largest that tabletop has, in a data set of few samples. Views of one scene share most of it.
+"""
+FILE_BYTES = 4_096
+"""Least space of a file: one block."""
 
 
 def estimate_image_bytes(config: Config, info: DatasetInfo) -> float:
@@ -31,7 +36,7 @@ def estimate_image_bytes(config: Config, info: DatasetInfo) -> float:
         if size_px is not None:
             channels = info.sensor(sensor.name).channels
             rates = (BYTES_PER_PIXEL.get(channel.value, 1.0) for channel in channels)
-            total += size_px[0] * size_px[1] * sum(rates)
+            total += size_px[0] * size_px[1] * sum(rates) + FILE_BYTES * len(channels)
     return total
 
 

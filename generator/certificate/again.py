@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from gen_data.generator.certificate.examined import Examined
 from gen_data.generator.certificate.finding import Contradictions, Finding, not_checked
 from gen_data.generator.certificate.ray_casting import share_limit
-from gen_data.generator.core.errors import GenDataError
+from gen_data.generator.core.errors import GenDataError, is_refused
 from gen_data.generator.runner.numerics_guard import is_admitted
 from gen_data.generator.runner.regeneration import compare_regenerated
 from gen_data.generator.runner.store import LocalStore
@@ -34,6 +34,8 @@ def check_again(examined: Examined) -> Iterator[Finding]:
             yield not_checked("", f"{reason}: see gen-data doctor")
             return
     except GenDataError as error:
+        if is_refused(error):
+            raise
         yield not_checked("", f"samples cannot be generated on this machine: {error}")
         return
     figures = {

@@ -19,7 +19,9 @@ from gen_data.generator.core.errors import (
     AssetError,
     ConfigError,
     GenDataError,
+    StorageError,
     VerificationError,
+    is_refused,
 )
 from gen_data.generator.core.serialization import from_plain
 from gen_data.generator.runner.plan import DAMAGE
@@ -118,7 +120,7 @@ def examine(
 
     Raises:
         VerificationError: the folder has no finished data set.
-        StorageError: its manifest or plan is damaged.
+        StorageError: its manifest or plan is damaged, or the file system refused to read or write.
     """
     scan_finished(folder)
     examined = Examined(StoredSamples(folder), scope)
@@ -218,12 +220,19 @@ def _describe(finding: Finding) -> str:
 
 
 def _check(claim: Claim, examined: Examined) -> tuple[Finding, ...]:
-    """Findings of a claim; damage that prevents a check fails it."""
+    """Findings of a claim; damage that prevents a check fails it.
+
+    Raises:
+        StorageError: the file system refused to read or write, which proves nothing.
+    """
     try:
         return tuple(claim.check(examined))
-    except (ConfigError, AssetError) as error:
-        return (not_checked("", f"not possible on this machine: {error}"),)
-    except (GenDataError, ValueError, KeyError, TypeError, IndexError) as error:
+    except (GenDataError, OSError, ValueError, KeyError, TypeError, IndexError) as error:
+        if is_refused(error):
+            fact = f"claim '{claim.name}' was not checked: {error}"
+            raise StorageError(f"{examined.stored.folder}: {fact}") from error
+        if isinstance(error, ConfigError | AssetError):
+            return (not_checked("", f"not possible on this machine: {error}"),)
         text = f"the data set cannot be read: {type(error).__name__}: {error}"
         return (Finding("", Status.FAILED, evidence=(text,)),)
 

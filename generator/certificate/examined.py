@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from gen_data.generator.assemble.config import Config, load_config
 from gen_data.generator.assets.library import Library
 from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.errors import GenDataError
+from gen_data.generator.core.errors import GenDataError, is_refused
 from gen_data.generator.core.sample import Sample
 from gen_data.generator.core.streams import Rng, Streams
 from gen_data.generator.packs.provision import open_assets
@@ -82,6 +82,8 @@ class Examined:
         try:
             changes = self.regeneration.changes
         except GenDataError as error:
+            if is_refused(error):
+                raise
             return f"the scenes cannot be drawn on this machine: {error}"
         listed = "; ".join(changes[:3]) + ("; ..." if len(changes) > 3 else "")
         return f"this installation differs from the one of the data set: {listed}" * bool(changes)

@@ -20,6 +20,7 @@ from gen_data.generator.certificate.labelled_images import (
 )
 from gen_data.generator.certificate.readers import READERS, Reader
 from gen_data.generator.certificate.scoring import average_precision
+from gen_data.generator.core.errors import is_refused
 from gen_data.generator.core.interfaces import Exporter
 
 PERFECT = 1.0 - 1e-9
@@ -76,6 +77,8 @@ def _check_export(
         return not_checked(root.name, f"{reader.package} cannot be loaded: {error}")
     # A reader may refuse a damaged file with an exception of any kind.
     except Exception as error:
+        if is_refused(error):
+            raise
         contradictions.add(f"{reader.package} refuses it: {type(error).__name__}: {error}")
         return contradictions.judge(root.name, figures)
     for fault in loaded.faults:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from gen_data.generator.certificate.examined import Examined
 from gen_data.generator.certificate.finding import Contradictions, Finding, not_checked
 from gen_data.generator.certificate.uniform_scores import uniform_scores
-from gen_data.generator.core.errors import GenDataError
+from gen_data.generator.core.errors import GenDataError, is_refused
 from gen_data.generator.report.drawn_parameters import Parameter
 
 CERTAINTY = 0.99
@@ -49,6 +49,8 @@ def check_draws(examined: Examined) -> Iterator[Finding]:
     try:
         replay = examined.replay
     except GenDataError as error:
+        if is_refused(error):
+            raise
         yield not_checked("", f"scenes cannot be drawn on this machine: {error}")
         return
     contradictions = Contradictions()

@@ -286,12 +286,13 @@ def _write_overlays(library: Library, plates: Sequence[str], folder: Path) -> No
     """Write every photograph with the geometry that is known of it, in full size."""
     from PIL import Image
 
+    from gen_data.generator.core.whole_files import whole_file
     from gen_data.generator.preview.plate_overlay import plate_overlay
 
-    folder.mkdir(parents=True, exist_ok=True)
     for asset_id in plates:
         shown = plate_overlay(library.plate(asset_id), library.texture(asset_id).albedo)
-        Image.fromarray(shown).save(folder / f"{asset_id.replace('/', '_')}.png")
+        with whole_file(folder / f"{asset_id.replace('/', '_')}.png") as unfinished:
+            Image.fromarray(shown).save(unfinished)
     click.echo(f"{folder}: {len(plates)} plates")
 
 

@@ -10,6 +10,7 @@ import click
 
 from gen_data.generator.cli.tables import print_tables
 from gen_data.generator.core.errors import ConfigError, StorageError
+from gen_data.generator.core.whole_files import write_whole
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -92,8 +93,6 @@ def _write(page: Path, sets: list[dict[str, Any]]) -> None:
     figures = [without_pictures(described) for described in sets]
     text = json.dumps({"sets": figures}, ensure_ascii=False, indent=1) + "\n"
     try:
-        page.parent.mkdir(parents=True, exist_ok=True)
-        for path, content in ((page, format_page(sets)), (page.with_suffix(".json"), text)):
-            path.write_text(content, encoding="utf-8", newline="\n")
+        write_whole({page: format_page(sets).encode(), page.with_suffix(".json"): text.encode()})
     except OSError as error:
         raise StorageError(f"{page}: {error.strerror}; choose another place with --html") from error

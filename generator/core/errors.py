@@ -152,6 +152,26 @@ _NO_MEMORY_ON_GPU = re.compile(r"Failed to allocate .* on device 'cuda|CUDA erro
 """Texts of Warp; 2 is cudaErrorMemoryAllocation."""
 
 
+def is_refused(error: BaseException) -> bool:
+    """Whether the file system, not the data, caused an error: full, read-only, not to be read."""
+    cause: BaseException | None = error
+    while cause is not None:
+        if isinstance(cause, OSError) and cause.errno in _REFUSALS:
+            return True
+        cause = cause.__cause__ or cause.__context__
+    return False
+
+
+_REFUSALS = frozenset(
+    getattr(errno, name)
+    for name in (
+        *("ENOSPC", "EDQUOT", "EROFS", "EACCES", "EPERM", "EIO", "ESTALE"),
+        *("EMFILE", "ENFILE", "ENOLCK", "ENOTCONN", "ETIMEDOUT"),
+    )
+    if hasattr(errno, name)
+)
+
+
 class WorkerLost(SampleError):
     """A worker process died repeatedly on the same shard."""
 

@@ -13,6 +13,7 @@ import numpy as np
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.errors import ConfigError, StorageError
 from gen_data.generator.core.sample import Sample
+from gen_data.generator.core.whole_files import write_whole
 from gen_data.generator.preview.overlay import Image, channel_image, draw_labels
 from gen_data.generator.preview.sensor_views import event_view, radar_view, range_view, top_view
 from gen_data.generator.sensors.lidar import pseudo_lidar
@@ -119,8 +120,7 @@ def write_sheet(sheet: Image, path: Path) -> None:
     if not done:
         raise StorageError(f"{path}: the contact sheet could not be encoded")
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(encoded.tobytes())
+        write_whole({path: encoded.tobytes()})
     except OSError as error:
         raise StorageError(f"{path}: {error.strerror}") from error
 

@@ -27,6 +27,7 @@ from gen_data.generator.core.sample import ImageTruth, Sample
 from gen_data.generator.core.scene import Body, Instance, Scene
 from gen_data.generator.core.se3 import SE3
 from gen_data.generator.core.skeletons import Skeleton, find_skeleton
+from gen_data.generator.core.whole_files import whole_file
 from gen_data.generator.preview.overlay import channel_image
 from gen_data.generator.preview.palette import id_color
 from gen_data.generator.preview.sensor_views import PointColors, point_colors
@@ -239,14 +240,14 @@ def save_recording(
         StorageError: the file cannot be written.
     """
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.touch()
+        with whole_file(path) as unfinished:
+            unfinished.touch()
+            stream = rr.RecordingStream(APPLICATION)
+            stream.save(unfinished)
+            _record_all(Recorder(stream, assets, info, points), samples)
+            stream.disconnect()
     except OSError as error:
-        raise StorageError(f"{path}: {error.strerror}") from error
-    stream = rr.RecordingStream(APPLICATION)
-    stream.save(path)
-    _record_all(Recorder(stream, assets, info, points), samples)
-    stream.disconnect()
+        raise StorageError(f"{path}: {error.strerror or error}") from error
 
 
 def send_samples(

@@ -168,9 +168,14 @@ def format_bytes(size: float) -> str:
 
 def free_bytes(path: Path) -> int:
     """Free bytes for this user on the file system of the nearest existing parent."""
+    return shutil.disk_usage(nearest_folder(path)).free
+
+
+def nearest_folder(path: Path) -> Path:
+    """The path, or its nearest parent that exists."""
     while not path.exists():
         path = path.parent
-    return shutil.disk_usage(path).free
+    return path
 
 
 @contextmanager

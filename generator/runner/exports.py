@@ -29,10 +29,14 @@ from gen_data.generator.runner.plan import FORMAT_VERSION
 from gen_data.generator.runner.progress import RunProgress, Summary
 from gen_data.generator.runner.provenance import SCENES_NAME
 from gen_data.generator.runner.run import Settings, run
+from gen_data.generator.runner.seal import read_sums
 from gen_data.generator.runner.shard_record import FileRecord
-from gen_data.generator.runner.store import LICENCES_NAME, LocalStore
+from gen_data.generator.runner.store import LICENCES_NAME, SUMS_NAME, LocalStore
 from gen_data.generator.runner.stored import CheckedSamples, StoredSamples
 from gen_data.generator.runner.verify import check_source
+
+NEW_BYTES = 8_000.0
+"""Least size of what exports add to a sample: labels, and entries in records and sums."""
 
 if TYPE_CHECKING:
     from gen_data.generator.assemble.config import Config
@@ -156,6 +160,20 @@ def _linked_files(stored: StoredSamples, shard: int) -> list[FileRecord]:
     ]
 
 
+def _read_licences(path: Path) -> str:
+    """The text that is copied into the export.
+
+    Raises:
+        StorageError: the file is damaged.
+    """
+    if hash_file(path) != read_sums(path.parent).digests.get(path.name):
+        raise StorageError(
+            f"{path}: its sha256 is not the one in {SUMS_NAME}.\n  Repair: "
+            f"gen-data repair {shlex.quote(str(path.parent))}"
+        )
+    return path.read_text("utf-8")
+
+
 def _is_same_disk(one: Path, other: Path) -> bool:
     """Whether hard links from one folder to another, which may not exist yet, are possible."""
     while not other.exists():
@@ -193,7 +211,7 @@ def export(  # noqa: PLR0913  (keywords of one front door)
     check_source(stored.folder)
     stored = CheckedSamples(stored.folder)
     licences = stored.folder / LICENCES_NAME
-    text = licences.read_text("utf-8") if licences.exists() else None
+    text = _read_licences(licences) if licences.exists() else None
     files = LinkedFiles(stored)
     linked_bytes = _linked_sample_bytes(stored)
     linked = _is_same_disk(stored.folder, out.absolute())
@@ -209,8 +227,8 @@ def export(  # noqa: PLR0913  (keywords of one front door)
             write_media=files.link_media,
             write_records=files.link_records,
             linked_digests=files.digests,
-            # The size of the new files follows from the first shard.
-            sample_bytes=0.0 if linked else linked_bytes,
+            # The size of new files of later shards follows from the first one.
+            sample_bytes=NEW_BYTES + (0.0 if linked else linked_bytes),
             linked_bytes=linked_bytes if linked else 0.0,
             is_forced=force,
             failed=stored.failed,

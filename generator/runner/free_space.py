@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -12,6 +14,8 @@ if TYPE_CHECKING:
     from gen_data.generator.runner.store import LocalStore
 
 MARGIN = 1.05
+DOCUMENTS_BYTES = 192 << 10
+"""Card, metadata, licences, sums, manifest and one record, of a data set of few samples."""
 RESERVE_BYTES = 64 << 10
 """Space that stays free, for the log of the run and the message about its end."""
 
@@ -23,6 +27,7 @@ class SpaceCheck:
     Attributes:
         estimate_bytes: Size of a sample, estimated from the configuration; 0 = unknown.
         is_forced: Whether only a full disk stops the run.
+        fixed_bytes: Size of the files whose number does not depend on that of the samples.
         linked_bytes: Of a sample, the size of files that are hard links and take no space.
     """
 
@@ -30,6 +35,7 @@ class SpaceCheck:
     estimate_bytes: float = 0.0
     is_forced: bool = False
     linked_bytes: float = 0.0
+    fixed_bytes: float = 0.0
 
     def before_start(self, samples: int) -> None:
         """Refuse a data set of this many samples that will not fit.
@@ -37,8 +43,8 @@ class SpaceCheck:
         Raises:
             StorageError: with the need, and all remedies.
         """
-        need = self.estimate_bytes * samples
-        if self.is_forced or need == 0.0:
+        need = self.estimate_bytes * samples + self.fixed_bytes
+        if self.is_forced or self.estimate_bytes == 0.0 or samples == 0:
             return
         free = self._free_bytes()
         if free < MARGIN * need + RESERVE_BYTES:
@@ -47,7 +53,7 @@ class SpaceCheck:
                 f"{format_bytes(free)} are free; expected {format_bytes(MARGIN * need)} or more.\n"
                 "  Make room, choose a folder on another disk with --out, reduce --n, or generate "
                 "until the disk is full with --force."
-            )
+            ) from full_disk()
 
     def after_shard(self, sample_bytes: float, samples: int) -> StorageError | None:
         """Error if the other samples will not fit, with the measured size of a sample."""
@@ -56,13 +62,20 @@ class SpaceCheck:
         free = self._free_bytes()
         if free >= need + RESERVE_BYTES or samples == 0:
             return None
-        return StorageError(
+        error = StorageError(
             f"{self.store.root}: the other {samples} samples need about "
             f"{format_bytes(new_bytes)} and {format_bytes(free)} are free; stopped "
             "before the disk is full.\n  After making room, resume with:\n"
             f"    {self.store.resume_command}"
         )
+        error.__cause__ = full_disk()
+        return error
 
     def _free_bytes(self) -> int:
         with self.store.errors():
             return self.store.free_bytes()
+
+
+def full_disk() -> OSError:
+    """The error that the disk would have given."""
+    return OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))

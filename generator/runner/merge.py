@@ -7,9 +7,16 @@ from pathlib import Path
 
 from gen_data.exporters.image_files import link_or_copy
 from gen_data.generator.core.errors import StorageError
+from gen_data.generator.runner.durable_files import format_bytes, nearest_folder
+from gen_data.generator.runner.free_space import (
+    DOCUMENTS_BYTES,
+    MARGIN,
+    RESERVE_BYTES,
+    full_disk,
+)
 from gen_data.generator.runner.numerics_guard import gather_numerics
-from gen_data.generator.runner.plan import Plan, compare_plans, load_plan
-from gen_data.generator.runner.store import LocalStore
+from gen_data.generator.runner.plan import Plan, compare_plans, load_plan, plan_bytes
+from gen_data.generator.runner.store import FolderState, LocalStore
 
 
 def common_plan(parts: Sequence[Path]) -> Plan:
@@ -43,11 +50,42 @@ def gather_shards(
     """
     with store.errors():
         store.state(plan)
+        _check_space(plan, parts, store)
     with store.locked():
         store.prepare(plan)
         gather_numerics([LocalStore(part).run_dir for part in parts], store, allow_mixed_numerics)
         for part in parts:
             _gather(plan, LocalStore(part.absolute()), store)
+
+
+def _check_space(plan: Plan, parts: Sequence[Path], store: LocalStore) -> None:
+    """Refuse a disk that is too small for the shards that cannot be linked.
+
+    Raises:
+        StorageError: with the need, and what is free.
+    """
+    place = nearest_folder(store.root)
+    copied = [LocalStore(part) for part in parts if not _is_same_disk(part, place)]
+    records = {
+        shard: record
+        for part in copied
+        for shard in range(plan.shard_count)
+        if (record := part.record(shard)) and store.record(shard) is None
+    }
+    need = sum(record.size_bytes for record in records.values())
+    if store.state(plan) is FolderState.NEW:
+        need += 2 * len(plan_bytes(plan)) + DOCUMENTS_BYTES
+    free = store.free_bytes()
+    if free < MARGIN * need + RESERVE_BYTES:
+        raise StorageError(
+            f"{store.root}: the parts need about {format_bytes(need)} here and "
+            f"{format_bytes(free)} are free.\n  Make room, or choose a folder on another disk "
+            "with --out; on the disk of the parts, their files are linked"
+        ) from full_disk()
+
+
+def _is_same_disk(part: Path, place: Path) -> bool:
+    return part.stat().st_dev == place.stat().st_dev
 
 
 def _gather(plan: Plan, part: LocalStore, store: LocalStore) -> None:

@@ -12,12 +12,13 @@ from __future__ import annotations
 
 import hashlib
 import shutil
-from collections.abc import Container, Iterable, Iterator
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
 from os import PathLike, fspath
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from gen_data.generator.core.distribution import install_command
@@ -35,8 +36,8 @@ from gen_data.generator.runner.durable_files import (
 )
 from gen_data.generator.runner.failed_sample import FailedSample
 from gen_data.generator.runner.plan import PLAN_NAME, Plan, parse_plan, plan_bytes
-from gen_data.generator.runner.seal import parse_object
-from gen_data.generator.runner.shard_record import ShardRecord, parse_record
+from gen_data.generator.runner.seal import parse_object, parse_sums
+from gen_data.generator.runner.shard_record import FileRecord, ShardRecord, parse_record
 from gen_data.generator.runner.store import (
     CERTIFICATE_NAME,
     CERTIFICATE_NAMES,
@@ -51,6 +52,8 @@ from gen_data.generator.runner.store import (
 
 BATCH = 1000
 """Number of objects that one request to ``fsspec`` reads or writes."""
+BATCH_BYTES = 256 << 20
+"""Size of the objects that are copied at a time to be hashed, unless one is larger."""
 
 
 def open_store(out: str | PathLike[str], resume_command: str = "") -> LocalStore:
@@ -195,6 +198,33 @@ class ObjectFolder:
             with self.errors() as system:
                 system.get([self.path(n) for n in batch], [str(files[name]) for name in batch])
 
+    def digests(
+        self,
+        sizes: Mapping[str, int],
+        scratch: Path,
+        on_progress: Callable[[float], None] = lambda _: None,
+    ) -> dict[str, str]:
+        """``{name: sha256}`` of objects; their bytes are read.
+
+        Args:
+            sizes: ``{name: bytes}`` of the objects.
+            scratch: Existing folder, in which copies of ``BATCH_BYTES`` at a time lie.
+            on_progress: Called with the share of bytes that were hashed.
+
+        Raises:
+            StorageError: an object cannot be read.
+        """
+        found: dict[str, str] = {}
+        total, done = sum(sizes.values()), 0
+        for batch in _batches_of_bytes(sizes):
+            with TemporaryDirectory(dir=scratch) as folder:
+                copies = {name: Path(folder, str(number)) for number, name in enumerate(batch)}
+                self.download(copies)
+                found |= {name: hash_file(path) for name, path in copies.items()}
+            done += sum(sizes[name] for name in batch)
+            on_progress(done / max(total, 1))
+        return found
+
     def copy(self, names: dict[str, str]) -> None:
         """Copy ``{new name: name}`` within the storage."""
         with self.errors() as system:
@@ -212,8 +242,8 @@ class ObjectFolder:
 class ObjectStore(LocalStore):
     """The objects of a data set at a URL; ``root`` is the folder in which they are staged.
 
-    A damaged shard is generated again over its objects: there is no quarantine at a URL. Records
-    are read when a run begins; the storage itself guards the bytes of objects.
+    A damaged shard loses its record and is generated again over its objects: there is no
+    quarantine at a URL.
 
     Attributes:
         objects: At the URL.
@@ -226,6 +256,20 @@ class ObjectStore(LocalStore):
         """The URL."""
         return self.objects.url
 
+    @contextmanager
+    def errors(self) -> Iterator[None]:
+        """Turn OSErrors of the staging folder into StorageErrors with a remedy."""
+        try:
+            with super().errors():
+                yield
+        except StorageError as error:
+            if not isinstance(error.__cause__, OSError):
+                raise
+            raise StorageError(
+                f"{str(error).splitlines()[0]} Shards are staged there; point XDG_CACHE_HOME to a "
+                f"folder with room and repeat:\n    {self.resume_command}"
+            ) from error.__cause__
+
     def free_bytes(self) -> int:
         """Object storage is never full; the staging folder needs room for shards in progress."""
         return 1 << 62
@@ -233,7 +277,7 @@ class ObjectStore(LocalStore):
     def state(self, plan: Plan) -> FolderState:
         """Determine the state of the URL; changes nothing."""
         names = self.objects.names()
-        if PLAN_NAME in names:
+        if PLAN_NAME in names or self._was_sealed_with(plan):
             grows = self._check_plan(plan)
             is_finished = MANIFEST_NAME in names and not grows
             return FolderState.FINISHED if is_finished else FolderState.STARTED
@@ -243,6 +287,14 @@ class ObjectStore(LocalStore):
                 "Choose another URL with --out, or empty this one."
             )
         return FolderState.NEW
+
+    def _was_sealed_with(self, plan: Plan) -> bool:
+        """Whether the sums are those of this plan, although ``plan.json`` may be damaged."""
+        sums = parse_sums(self.read_documents([SUMS_NAME])[SUMS_NAME])
+        return sums.digests.get(PLAN_NAME) == hashlib.sha256(plan_bytes(plan)).hexdigest()
+
+    def _check_plan(self, plan: Plan) -> bool:
+        return not self._was_sealed_with(plan) and super()._check_plan(plan)
 
     def _stored_plan(self) -> Plan:
         data = self.objects.read([PLAN_NAME])[PLAN_NAME]
@@ -254,7 +306,9 @@ class ObjectStore(LocalStore):
         self._clear_staging()
         super().prepare(plan)
         names = self.objects.names()
-        sealed = (MANIFEST_NAME, SUMS_NAME, *CERTIFICATE_NAMES)
+        sealed = [MANIFEST_NAME, *CERTIFICATE_NAMES]
+        if not self._was_sealed_with(plan):
+            sealed.append(SUMS_NAME)
         self.objects.remove(name for name in sealed if name in names)
         self.objects.put(PLAN_NAME, plan_bytes(plan))
 
@@ -269,22 +323,20 @@ class ObjectStore(LocalStore):
                     entry.unlink()
 
     def scan(self, plan: Plan, full: bool = False, whole_only: bool = False) -> Scan:
-        """Read every record; with ``full``, also compare the sizes of all objects.
+        """Read every record; with ``full``, also hash the objects of all shards.
 
         Shards that differ from their records count as missing, and with ``whole_only`` those
         without some of their samples.
         """
-        sizes = self.objects.tree(SHARDS_NAME) if full else None
-        missing, samples, size, rejections = [], 0, 0, 0
-        failed: list[FailedSample] = []
         records = self._pull_records(plan)
+        if full:
+            for shard in self._drop_damaged(records):
+                del records[shard]
+        failed: list[FailedSample] = []
+        missing, samples, size, rejections = [], 0, 0, 0
         for shard in range(plan.shard_count):
             record = records.get(shard)
-            is_damaged = record is not None and (
-                (sizes is not None and not _has_sizes(record, sizes))
-                or (whole_only and bool(record.failed))
-            )
-            if is_damaged:
+            if record is not None and whole_only and record.failed:
                 # Without its record, the shard is not committed.
                 self.objects.remove([_record_name(shard)])
                 self.record_path(shard).unlink()
@@ -342,9 +394,38 @@ class ObjectStore(LocalStore):
             self.objects.put(name, record.to_bytes())
 
     def quarantine_damaged(self, plan: Plan, shards: Iterable[int]) -> list[int]:
-        """Nothing: the storage guards its bytes, and files that are merged are hashed then."""
-        del plan, shards
-        return []
+        """Hash the objects of these shards, and remove the records of those that differ.
+
+        Returns:
+            The damaged shards.
+        """
+        chosen = frozenset(shards)
+        records = self._pull_records(plan)
+        return self._drop_damaged({s: record for s, record in records.items() if s in chosen})
+
+    def _drop_damaged(self, records: Mapping[int, ShardRecord]) -> list[int]:
+        """Remove the records of shards whose objects differ from them; returns the shards."""
+        sizes = self.objects.tree(SHARDS_NAME)
+        whole = {s: record for s, record in records.items() if _has_sizes(record, sizes)}
+        wanted = {
+            name: file.bytes
+            for record in whole.values()
+            for name, file in _objects_of(record).items()
+        }
+        with self.errors():
+            make_folder(self.scratch_root)
+            found = self.objects.digests(wanted, self.scratch_root)
+        damaged = [
+            shard
+            for shard, record in records.items()
+            if shard not in whole
+            or any(found[name] != file.sha256 for name, file in _objects_of(record).items())
+        ]
+        # Without its record, a shard is not committed.
+        self.objects.remove(map(_record_name, damaged))
+        for shard in damaged:
+            self.record_path(shard).unlink()
+        return damaged
 
     def fetch_shards(self, plan: Plan, with_files: bool) -> None:
         """Copy the records of all shards, and their files if wanted, to the staging folder.
@@ -383,15 +464,18 @@ class ObjectStore(LocalStore):
         self.objects.put(MANIFEST_NAME, self.manifest_path.read_bytes())
         self._clear_staging()
 
-    def is_intact(self, extra_matters: bool) -> bool:
-        """Whether documents and sizes of all objects agree."""
+    def is_intact(self, extra_matters: bool, on_progress: Callable[[float], None]) -> bool:
+        """Whether a finished data set is undamaged: every object is read and hashed."""
         from gen_data.generator.runner.verify import find_deviations
 
         make_folder(self.scratch_root)
         folder = self.scratch_dir()
         try:
-            copy_outline(self.objects, folder)
-            found = find_deviations(folder, full=False)
+            outline = folder / "outline"
+            copy_outline(self.objects, outline)
+            sizes = tree_sizes(outline, without=RUN_NAME)
+            digests = self.objects.digests(sizes, folder, on_progress)
+            found = find_deviations(outline, full=True, digests=digests)
         finally:
             shutil.rmtree(folder)
         return not found or (not extra_matters and all(f.kind == "extra" for f in found))
@@ -399,6 +483,11 @@ class ObjectStore(LocalStore):
     def read_manifest(self) -> bytes:
         """The bytes of the manifest of a finished data set."""
         return self.objects.read([MANIFEST_NAME])[MANIFEST_NAME]
+
+    def read_documents(self, names: Iterable[str]) -> dict[str, bytes]:
+        """``{name: bytes}`` of objects at the root of the data set; none of missing ones."""
+        wanted = list(names)
+        return {**dict.fromkeys(wanted, b""), **self.objects.read(wanted)}
 
     def read_run_file(self, name: str) -> bytes:
         """The bytes of an object about the run, which all machines share."""
@@ -433,8 +522,7 @@ def fetch_shard(objects: ObjectFolder, record: ShardRecord, folder: Path) -> Non
         if hash_file(folder / file.path) != file.sha256:
             raise StorageError(
                 f"{objects.url}/{prefix}/{file.path}: its sha256 is not that of the shard's "
-                "record; remove the record "
-                f"{prefix}.json, and run the command that made the data set again"
+                "record. The command that made the data set replaces the shard"
             )
 
 
@@ -465,8 +553,12 @@ def copy_outline(objects: ObjectFolder, folder: Path) -> None:
 
 
 def _has_sizes(record: ShardRecord, sizes: dict[str, int]) -> bool:
+    return all(sizes.get(name) == file.bytes for name, file in _objects_of(record).items())
+
+
+def _objects_of(record: ShardRecord) -> dict[str, FileRecord]:
     prefix = f"{SHARDS_NAME}/{record.shard:06d}"
-    return all(sizes.get(f"{prefix}/{file.path}") == file.bytes for file in record.files)
+    return {f"{prefix}/{file.path}": file for file in record.files}
 
 
 def _record_name(shard: int) -> str:
@@ -479,6 +571,20 @@ def _is_shard(name: str) -> bool:
 
 def _is_record(name: str) -> bool:
     return _is_shard(name) and name.count("/") == 1 and name.endswith(".json")
+
+
+def _batches_of_bytes(sizes: Mapping[str, int]) -> Iterator[list[str]]:
+    """Names of objects of ``BATCH_BYTES`` together, or of one that is larger."""
+    batch: list[str] = []
+    left = BATCH_BYTES
+    for name, size in sizes.items():
+        if batch and (size > left or len(batch) == BATCH):
+            yield batch
+            batch, left = [], BATCH_BYTES
+        batch.append(name)
+        left -= size
+    if batch:
+        yield batch
 
 
 def _batches(items: list[Any]) -> Iterator[list[Any]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -12,14 +13,14 @@ from gen_data.generator.core.errors import GenDataError
 from gen_data.generator.core.sample import Sample
 from gen_data.generator.runner.failed_sample import FailedSample, parse_failed
 from gen_data.generator.runner.finalize import LicencesOf, finalize
-from gen_data.generator.runner.free_space import SpaceCheck
+from gen_data.generator.runner.free_space import DOCUMENTS_BYTES, SpaceCheck
 from gen_data.generator.runner.numerics_guard import admit_numerics
 from gen_data.generator.runner.object_store import open_store
 from gen_data.generator.runner.plan import PLAN_NAME, Plan, plan_bytes
 from gen_data.generator.runner.processes import Pool, open_worker_pool, run_supervisor
 from gen_data.generator.runner.progress import RunMonitor, RunProgress, Summary
 from gen_data.generator.runner.repair import quarantine_extra, restore_plan
-from gen_data.generator.runner.seal import SealedBefore, read_or_empty, read_seal
+from gen_data.generator.runner.seal import SealedBefore, parse_seal
 from gen_data.generator.runner.shard import (
     EnteredPipeline,
     Job,
@@ -31,7 +32,13 @@ from gen_data.generator.runner.shard import (
     write_images,
     write_records,
 )
-from gen_data.generator.runner.store import FolderState, LocalStore, Scan
+from gen_data.generator.runner.store import (
+    MANIFEST_NAME,
+    SUMS_NAME,
+    FolderState,
+    LocalStore,
+    Scan,
+)
 from gen_data.generator.runner.supervisor import Limits, Supervisor
 from gen_data.generator.runner.termination_signals import Interruption
 from gen_data.generator.runner.worker import done_event
@@ -160,8 +167,13 @@ def lacks_samples(store: LocalStore, plan: Plan) -> bool:
 
 def _read_seal(store: LocalStore, plan: Plan) -> SealedBefore:
     """Read the seal of this very data set, which repair must not change; it may have none."""
-    same = read_or_empty(store.root / PLAN_NAME) == plan_bytes(plan)
-    return read_seal(store.root) if same else UNSEALED
+    found = store.read_documents((PLAN_NAME, SUMS_NAME, MANIFEST_NAME))
+    seal = parse_seal(found[SUMS_NAME], found[MANIFEST_NAME])
+    bytes_of_plan = plan_bytes(plan)
+    same = found[PLAN_NAME] == bytes_of_plan or (
+        seal.sums.get(PLAN_NAME) == hashlib.sha256(bytes_of_plan).hexdigest()
+    )
+    return seal if same else UNSEALED
 
 
 @dataclass(frozen=True)
@@ -182,7 +194,8 @@ class _Run:
                     self._space.before_start(self._count(range(plan.shard_count)))
                 finished = state is FolderState.FINISHED
                 retried = self.settings.repair and finished and read_failed(store)
-                if finished and not retried and store.is_intact(self.settings.repair):
+                is_checked = finished and not retried
+                if is_checked and store.is_intact(self.settings.repair, self._show_checked):
                     return self._summarize_finished()
                 sealed_before = UNSEALED if retried else _read_seal(store, plan)
             store.prepare(plan)
@@ -214,11 +227,21 @@ class _Run:
                 store.clear_scratch()
         return self._summarize(dataset_id, scan, monitor)
 
+    def _show_checked(self, share: float) -> None:
+        """Report how much of a finished data set was hashed."""
+        n = self.job.plan.n
+        self.progress(RunProgress("checking", int(share * n), n, 0.0, 0, 0))
+
     @property
     def _space(self) -> SpaceCheck:
         chosen = self.settings
         return SpaceCheck(
-            self.job.store, chosen.sample_bytes, chosen.is_forced, chosen.linked_bytes
+            self.job.store,
+            chosen.sample_bytes,
+            chosen.is_forced,
+            chosen.linked_bytes,
+            # The plan and its copy.
+            2 * len(plan_bytes(self.job.plan)) + DOCUMENTS_BYTES,
         )
 
     def _count(self, shards: Sequence[int]) -> int:

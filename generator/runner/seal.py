@@ -55,7 +55,12 @@ class Sums:
 
 def read_sums(folder: Path) -> Sums:
     """Read the sums of the data set in ``folder``."""
-    lines = read_or_empty(folder / SUMS_NAME).decode(errors="replace").splitlines()
+    return parse_sums(read_or_empty(folder / SUMS_NAME))
+
+
+def parse_sums(data: bytes) -> Sums:
+    """Parse the contents of ``SHA256SUMS``."""
+    lines = data.decode(errors="replace").splitlines()
     matches = [SUM_LINE.fullmatch(line) for line in lines]
     digests = {match[2]: match[1] for match in matches if match}
     others = "".join(f"{line}\n" for line in lines if not line.endswith(f"  {MANIFEST_NAME}"))
@@ -111,10 +116,10 @@ class SealedBefore:
         )
 
 
-def read_seal(folder: Path) -> SealedBefore:
-    """Read what manifest and sums of a data set declare; no ids if both are missing."""
-    sums = read_sums(folder)
-    manifest = parse_object(read_or_empty(folder / MANIFEST_NAME)) or {}
+def parse_seal(sums_data: bytes, manifest_data: bytes) -> SealedBefore:
+    """Parse what sums and manifest of a data set declare; no ids if both are empty."""
+    sums = parse_sums(sums_data)
+    manifest = parse_object(manifest_data) or {}
     ids = {str(manifest["dataset_id"])} if "dataset_id" in manifest else set()
     if sums.digests:
         ids.add(sums.dataset_id)

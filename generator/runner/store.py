@@ -23,7 +23,7 @@ import shlex
 import shutil
 import socket
 from array import array
-from collections.abc import Container, Iterable, Iterator, Sequence
+from collections.abc import Callable, Container, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, replace
 from enum import Enum
@@ -161,10 +161,14 @@ class LocalStore:
     def publish(self) -> None:
         """Put the merged and sealed data set in its place: it is there."""
 
-    def is_intact(self, extra_matters: bool) -> bool:
-        """Whether a finished data set is undamaged, with or without additional files."""
+    def is_intact(self, extra_matters: bool, on_progress: Callable[[float], None]) -> bool:
+        """Whether a finished data set is undamaged, with or without additional files.
+
+        ``on_progress`` is called with the share of bytes that were hashed, where it is known.
+        """
         from gen_data.generator.runner.verify import find_deviations
 
+        del on_progress
         found = find_deviations(self.root, full=True)
         return not found or (
             not extra_matters and all(finding.kind == "extra" for finding in found)
@@ -173,6 +177,11 @@ class LocalStore:
     def read_manifest(self) -> bytes:
         """The bytes of the manifest of a finished data set."""
         return self.manifest_path.read_bytes()
+
+    def read_documents(self, names: Iterable[str]) -> dict[str, bytes]:
+        """``{name: bytes}`` of files at the root of the data set; none of missing files."""
+        paths = {name: self.root / name for name in names}
+        return {name: path.read_bytes() if path.is_file() else b"" for name, path in paths.items()}
 
     def read_run_file(self, name: str) -> bytes:
         """The bytes of a file about the run; none if it does not exist."""

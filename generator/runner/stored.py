@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gen_data.generator.core.capture import (
+    POINT,
     Capture,
     Channel,
     Measurements,
@@ -27,9 +28,10 @@ from gen_data.generator.core.capture import (
 )
 from gen_data.generator.core.errors import SampleIndexError, StorageError
 from gen_data.generator.core.interfaces import DatasetInfo, cloud_path, table_path
+from gen_data.generator.core.measurement_dtypes import columns_dtype
 from gen_data.generator.core.path_names import check_name
 from gen_data.generator.core.sample import EgoTruth, ImageTruth, Sample
-from gen_data.generator.core.scene import Scene
+from gen_data.generator.core.scene import Camera, Scene
 from gen_data.generator.core.serialization import from_plain
 from gen_data.generator.core.urls import is_url, needs_folder
 from gen_data.generator.runner.durable_files import hash_file
@@ -205,7 +207,7 @@ class StoredSamples:
             name: SensorReading(
                 name,
                 labels.truth[name].camera,
-                ImageFiles(self.info, folder, name, index),
+                ImageFiles(self.info, folder, labels.truth[name].camera, index),
                 time_s=image.time_s,
                 ev100=image.ev100,
             )
@@ -214,11 +216,19 @@ class StoredSamples:
 
         def cloud(name: str) -> PointCloud:
             scan = labels.scans[name]
-            return PointCloud(name, scan.lidar, _load(cloud_path(folder, name, index)), scan.time_s)
+            path = cloud_path(folder, name, index)
+            points = _load(path, POINT)
+            if not np.isfinite(points["position_m"]).all():
+                raise StorageError(
+                    f"{path}: holds a position that is no finite number; generate the data set "
+                    "again"
+                )
+            return PointCloud(name, scan.lidar, points, scan.time_s)
 
         def table(name: str) -> Measurements:
             info = labels.tables[name]
-            rows = _load(table_path(folder, name, index))
+            columns = self.info.sensor(name).columns
+            rows = _load(table_path(folder, name, index), columns_dtype(columns))
             return Measurements(name, info.device, rows, info.time_s)
 
         return Capture(
@@ -355,17 +365,27 @@ class ReadOnAccess(Mapping[str, T], Generic[T]):
 class ImageFiles(Mapping[Channel, NDArray[Any]]):
     """Images of one reading by channel, decoded at each access."""
 
-    def __init__(self, info: DatasetInfo, folder: Path, sensor: str, index: int) -> None:
+    def __init__(self, info: DatasetInfo, folder: Path, camera: Camera, index: int) -> None:
+        name, intrinsics = camera.name, camera.intrinsics
         self._paths = {
-            c: info.media_path(folder, sensor, c, index) for c in info.sensor(sensor).channels
+            c: info.media_path(folder, name, c, index) for c in info.sensor(name).channels
         }
+        self._size_px = (intrinsics.width_px, intrinsics.height_px)
         self._depth_scale_m = info.depth_scale_m
+        self._categories = len(info.categories)
 
     def __getitem__(self, channel: Channel) -> NDArray[Any]:
         """Decode one image."""
         from gen_data.exporters.image_files import read_image
 
-        return read_image(self._paths[channel], channel, self._depth_scale_m)
+        path = self._paths[channel]
+        image = read_image(path, channel, self._depth_scale_m, self._size_px)
+        if channel is Channel.CATEGORY and image.max() > self._categories:
+            raise StorageError(
+                f"{path}: holds the category {image.max()}; expected 0 to {self._categories}; "
+                "generate the data set again"
+            )
+        return image
 
     def __iter__(self) -> Iterator[Channel]:
         """The channels, in order."""
@@ -380,11 +400,16 @@ class ImageFiles(Mapping[Channel, NDArray[Any]]):
         return len(self._paths)
 
 
-def _load(path: Path) -> NDArray[np.void]:
+def _load(path: Path, dtype: np.dtype[np.void]) -> NDArray[np.void]:
     try:
         records: NDArray[np.void] = np.load(path, allow_pickle=False)
     except (OSError, ValueError) as error:
         raise StorageError(
             f"{path}: cannot be read ({error}); generate the data set again"
         ) from error
+    if records.dtype != dtype or records.ndim != 1:
+        raise StorageError(
+            f"{path}: holds {records.dtype} records {list(records.shape)}; expected a list of "
+            f"{dtype}; generate the data set again"
+        )
     return records

@@ -54,12 +54,18 @@ class StoredObjects(StoredSamples):
         self._record_digests: Sequence[str] = manifest.get("shards", [])
         cache = url_cache_dir()
         folder = cache / parse_dataset_id(manifest, self.url)
-        (folder / SHARDS_NAME).mkdir(parents=True, exist_ok=True)
-        for name, data in documents.items():
-            unfinished = Path(mkdtemp(dir=cache)) / name
-            unfinished.write_bytes(data)
-            unfinished.replace(folder / name)
-            unfinished.parent.rmdir()
+        try:
+            (folder / SHARDS_NAME).mkdir(parents=True, exist_ok=True)
+            for name, data in documents.items():
+                unfinished = Path(mkdtemp(dir=cache)) / name
+                unfinished.write_bytes(data)
+                unfinished.replace(folder / name)
+                unfinished.parent.rmdir()
+        except OSError as error:
+            raise StorageError(
+                f"{error.filename or cache}: {error.strerror}; shards of {self.url} are copied "
+                "there. Point XDG_CACHE_HOME to a folder with room"
+            ) from error
         super().__init__(folder)
 
     def shard_dir(self, shard: int) -> Path:

@@ -161,14 +161,21 @@ def describe_findings(folder: Path, found: Sequence[Finding]) -> str:
 
 
 def find_deviations(
-    folder: Path, full: bool = False, contents: Contents | None = None
+    folder: Path,
+    full: bool = False,
+    contents: Contents | None = None,
+    digests: Mapping[str, str] | None = None,
 ) -> list[Finding]:
-    """Find all deviations, in order of discovery; ``contents`` saves a scan."""
+    """Find all deviations, in order of discovery.
+
+    ``contents`` saves a scan. With ``digests``, ``{path: sha256}``, no file is hashed: the folder
+    may be an outline (see ``copy_outline``).
+    """
     try:
         plan = load_plan(folder)
     except StorageError as error:
         return [Finding("inconsistent", PLAN_NAME, str(error).partition("\n")[0])]
-    return list(_Check(folder, plan, contents).run(full))
+    return list(_Check(folder, plan, contents, digests).run(full))
 
 
 def _is_manifest(value: Mapping[str, Any]) -> bool:
@@ -183,8 +190,15 @@ def _is_manifest(value: Mapping[str, Any]) -> bool:
 class _Check:
     """Comparison of the declared with the existing files of a data set."""
 
-    def __init__(self, folder: Path, plan: Plan, contents: Contents | None) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        plan: Plan,
+        contents: Contents | None,
+        digests: Mapping[str, str] | None,
+    ) -> None:
         self._contents = contents
+        self._digests = digests
         self._folder = folder
         self._plan = plan
         self._store = LocalStore(folder)
@@ -280,6 +294,8 @@ class _Check:
 
     def _digest(self, path: str) -> str:
         """SHA-256 of a file; hard links to one file are read once."""
+        if self._digests is not None:
+            return self._digests.get(path, "")
         inode = get_inode(self._folder / path)
         if inode not in self._hashed:
             self._hashed[inode] = hash_file(self._folder / path)

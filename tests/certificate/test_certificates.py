@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import json
+import os
 import shutil
 from collections.abc import Callable
 from dataclasses import replace
@@ -14,8 +16,9 @@ import numpy as np
 import pytest
 
 import gen_data
-from gen_data.generator.certificate import readers
+from gen_data.generator.certificate import certificate, readers
 from gen_data.generator.certificate.certificate import Certificate, describe_failures
+from gen_data.generator.certificate.claims import CLAIMS, Claim
 from gen_data.generator.certificate.finding import Finding, Status
 from gen_data.generator.cli.main import cli
 from gen_data.generator.core.distribution import install_command
@@ -507,3 +510,24 @@ def test_images_on_photographs_are_not_judged(tmp_path: Path) -> None:
 
     assert findings(certificate)["pixels: color"].status is Status.NOT_CHECKED
     assert certificate.holds
+
+
+@pytest.mark.parametrize("number", [errno.ENOSPC, errno.EIO, errno.EACCES, errno.EROFS])
+@pytest.mark.parametrize("claim", ["files", "samples", "written again"])
+def test_a_refusing_disk_says_nothing_about_the_data(
+    claim: str, number: int, dataset: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Neither a failed claim nor a certificate."""
+
+    def check(examined: object) -> list[Finding]:
+        try:
+            raise OSError(number, os.strerror(number), "disk")
+        except OSError as error:
+            raise StorageError("cannot be read") from error
+
+    chosen = [replace(one, place="x:y") for one in CLAIMS if one.name == claim]
+    monkeypatch.setattr(certificate, "CLAIMS", tuple(chosen))
+    monkeypatch.setattr(Claim, "check", lambda self, examined: check(examined))
+    with pytest.raises(StorageError, match=f"claim '{claim}' was not checked: cannot be read"):
+        gen_data.certify(dataset, **QUICK)
+    assert not (dataset / "CERTIFICATE.json").exists()

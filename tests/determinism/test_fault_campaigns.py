@@ -18,6 +18,10 @@ from benchmarks.faults.results import Result, Scale
 
 CHOSEN = [
     "bit_flips",
+    "objects",
+    "foreign",
+    "derived",
+    "caches",
     "samples_alone",
     "structured_configurations",
     "mutated_configurations",

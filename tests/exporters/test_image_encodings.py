@@ -99,7 +99,8 @@ def test_stored_images_are_found(
     shard = folder.parent / "shards/000000"
     assert (shard / f"color/rgb/000000000{encoding.suffix}").exists()
     assert (shard / "color/instance/000000000.png").exists()
-    stored, made = ImageFiles(info, shard, "color", 0), world.samples[0].capture.readings["color"]
+    made = world.samples[0].capture.readings["color"]
+    stored = ImageFiles(info, shard, made.camera, 0)
     np.testing.assert_array_equal(stored[Channel.INSTANCE], made.channels[Channel.INSTANCE])
     error = np.abs(stored[Channel.RGB].astype(int) - made.channels[Channel.RGB])
     assert error.mean() <= (0 if encoding is LOSSLESS else 4)

@@ -2,13 +2,23 @@
 
 from __future__ import annotations
 
+import errno
+import os
+import stat
 import struct
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from gen_data.generator.renderers.warp.kernel_cache import remove_damaged_modules
+from gen_data.generator.core.errors import CacheWarning, StorageError
+from gen_data.generator.renderers.warp.kernel_cache import (
+    fill_cache,
+    link_modules,
+    private_folder,
+    remove_damaged_modules,
+)
 
 MODULES = ("wp_gen_data.kernels.a_0123abc", "wp_gen_data.kernels.b_0123abc")
 
@@ -84,3 +94,97 @@ def test_sources_other_programs_and_compilations_in_progress_do_not_matter(folde
     assert remove_damaged_modules(folder) == ()
     assert unfinished.exists()
     assert others.exists()
+
+
+STAMP = "gen-data-0123-cpu"
+
+
+@pytest.fixture
+def temporary(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The folder of temporary files of this test alone."""
+    folder = tmp_path_factory.mktemp("temporary")
+    monkeypatch.setattr(tempfile, "tempdir", str(folder))
+    return folder
+
+
+def refusing(*refused: Path, number: int = errno.EROFS) -> Callable[[Path], None]:
+    """Fills a folder with a module, or fails as a folder that cannot be written."""
+
+    def fill(folder: Path) -> None:
+        if folder in refused or any(one in folder.parents for one in refused):
+            raise OSError(number, os.strerror(number), str(folder / "gen-data.lock"))
+        if not (folder / STAMP).exists():
+            (folder / "wp_gen_data.new").mkdir()
+            (folder / STAMP).touch()
+
+    return fill
+
+
+@pytest.mark.parametrize("number", [errno.EROFS, errno.EACCES, errno.ENOSPC, errno.EDQUOT])
+def test_a_filled_cache_that_cannot_be_written_is_linked_in_silence(
+    folder: Path, temporary: Path, number: int
+) -> None:
+    """Modules that are missing from it are compiled beside the links."""
+    remove_damaged_modules(folder)
+    (folder / STAMP).touch()
+
+    used = fill_cache(folder, STAMP, refusing(folder, number=number))
+
+    assert used.parent == temporary / f"gendata-kernels-{os.getuid()}"
+    assert stat.S_IMODE(used.parent.stat().st_mode) == 0o700
+    assert {path.name: path.readlink() for path in used.iterdir() if path.is_symlink()} == {
+        name: folder / name for name in MODULES
+    }
+    assert remove_damaged_modules(used) == ()
+
+
+def test_missing_and_damaged_kernels_of_such_a_cache_are_compiled_elsewhere(
+    folder: Path, temporary: Path
+) -> None:
+    remove_damaged_modules(folder)
+    (folder / STAMP).touch()
+    flip_bit(folder / MODULES[0] / "m.cpu27.o")
+
+    with pytest.warns(CacheWarning, match=rf"gen-data\.lock: Read-only .* into {temporary}") as got:
+        used = fill_cache(folder, STAMP, refusing(folder))
+
+    assert len(got) == 1
+    assert {path.name for path in used.iterdir()} == {MODULES[1], "wp_gen_data.new", STAMP}
+    # The second run is silent.
+    assert fill_cache(folder, STAMP, refusing(folder)) == used
+
+
+def test_a_filled_cache_suffices_where_nothing_can_be_written(
+    folder: Path, temporary: Path
+) -> None:
+    (folder / STAMP).touch()
+    assert fill_cache(folder, STAMP, refusing(folder, temporary)) == folder
+
+
+def test_kernels_that_can_be_kept_nowhere_are_an_error_with_the_remedy(
+    folder: Path, temporary: Path
+) -> None:
+    with pytest.warns(CacheWarning), pytest.raises(StorageError) as caught:
+        fill_cache(folder, STAMP, refusing(folder, temporary, number=errno.ENOSPC))
+    assert "No space left" in str(caught.value) and "\n" not in str(caught.value)
+    assert "WARP_CACHE_PATH or XDG_CACHE_HOME" in str(caught.value)
+
+
+def test_a_private_folder_that_others_can_write_is_not_used(temporary: Path) -> None:
+    """Machine code is run from it."""
+    private_folder().chmod(0o755)
+    with pytest.raises(PermissionError, match="not a folder of this user alone"):
+        private_folder()
+    private_folder_path = temporary / f"gendata-kernels-{os.getuid()}"
+    private_folder_path.rmdir()
+    private_folder_path.symlink_to(temporary)
+    with pytest.raises(PermissionError, match="not a folder of this user alone"):
+        private_folder()
+
+
+def test_links_to_removed_modules_are_removed(folder: Path, temporary: Path) -> None:
+    used = link_modules(folder)
+    (folder / MODULES[0]).rename(folder / "elsewhere")
+
+    assert link_modules(folder) == used
+    assert [path.name for path in used.iterdir()] == [MODULES[1]]

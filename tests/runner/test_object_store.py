@@ -6,8 +6,9 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,9 @@ from gen_data.generator.core.errors import (
     StorageError,
     VerificationError,
 )
+from gen_data.generator.runner import object_store
 from gen_data.generator.runner.object_store import ObjectFolder, copy_outline, open_store
+from gen_data.generator.runner.progress import RunProgress
 from gen_data.generator.runner.run import Settings, Summary, run
 from gen_data.generator.runner.stored import StoredSamples
 from gen_data.generator.runner.stored_objects import open_stored
@@ -54,7 +57,9 @@ def memory() -> Iterator[str]:
     system.pseudo_dirs[:] = [""]
 
 
-def make_at(url: str, n: int = 10, **changes: object) -> Summary:
+def make_at(
+    url: str, n: int = 10, progress: Callable[[RunProgress], None] | None = None, **changes: object
+) -> Summary:
     """A fake data set at a URL, made in this process."""
     return run(
         replace(fake_plan(n), **changes),
@@ -62,6 +67,7 @@ def make_at(url: str, n: int = 10, **changes: object) -> Summary:
         url,
         workers=0,
         resume_command="again",
+        progress=progress,
         licences=lambda assets: f"# Assets\n\n{', '.join(assets)}\n",
         settings=Settings(write_media=write_raw_images),
     )
@@ -241,3 +247,97 @@ def test_the_command_line_verifies_urls_and_names_them(
         cli.main(["report", memory], standalone_mode=False)
     with pytest.raises(ConfigError, match="cannot be repaired in place"):
         generate("tabletop.yaml", 10, out=memory, repair=True)
+
+
+def exchange(path: str) -> None:
+    """Change the first byte of an object in memory: its size stays."""
+    system = fsspec.filesystem("memory")
+    data = system.cat_file(path)
+    system.pipe_file(path, bytes([data[0] ^ 1]) + data[1:])
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "shards/000001/color/rgb/000000005.png",
+        "shards/000001/labels.jsonl",
+        "shards/000002.json",
+        "lines/all.jsonl",
+        "README.md",
+        "SHA256SUMS",
+        "manifest.json",
+        "plan.json",
+    ],
+)
+def test_the_command_that_made_a_data_set_repairs_an_object_of_equal_size(
+    name: str, tmp_path: Path, memory: str
+) -> None:
+    make(tmp_path / "here")
+    made = make_at(memory)
+    exchange(f"{memory}/{name}")
+
+    repaired = make_at(memory)
+
+    assert not repaired.already_complete and repaired.dataset_id == made.dataset_id
+    copy = download(memory, tmp_path / "copy")
+    assert tree_digest(copy) == tree_digest(tmp_path / "here")
+    assert find_deviations(copy, full=True) == []
+
+
+@pytest.mark.parametrize("lost", ["shards/000000/labels.jsonl", "manifest.json", "plan.json"])
+def test_damage_and_a_missing_object_are_repaired_by_one_command(
+    lost: str, tmp_path: Path, memory: str
+) -> None:
+    make(tmp_path / "here")
+    make_at(memory)
+    exchange(f"{memory}/shards/000001/color/rgb/000000005.png")
+    fsspec.filesystem("memory").rm_file(f"{memory}/{lost}")
+
+    make_at(memory)
+
+    assert tree_digest(download(memory, tmp_path / "copy")) == tree_digest(tmp_path / "here")
+
+
+def test_objects_are_hashed_in_batches_of_few_bytes_with_progress(
+    tmp_path: Path, memory: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    make_at(memory)
+    monkeypatch.setattr(object_store, "BATCH_BYTES", 1000)
+    objects, shown = ObjectFolder(memory), []
+    sizes = objects.tree()
+    batches: list[int] = []
+
+    def get(self: Any, paths: list[str], files: list[str]) -> None:
+        batches.append(sum(sizes[path.removeprefix(objects.path(""))] for path in paths))
+        for path, file in zip(paths, files, strict=True):
+            Path(file).write_bytes(self.cat_file(path))
+
+    monkeypatch.setattr(type(fsspec.filesystem("memory")), "get", get)
+    scratch = tmp_path / "scratch"
+    scratch.mkdir()
+    found = objects.digests(sizes, scratch, shown.append)
+
+    assert found == {n: sha256(data).hexdigest() for n, data in objects.read(sizes).items()}
+    assert len(batches) > 1 and sum(batches) == sum(sizes.values())
+    assert all(size <= 1000 or size in sizes.values() for size in batches)
+    assert shown == sorted(shown) and shown[-1] == 1.0
+    assert not list(scratch.iterdir())
+
+
+def test_checking_a_finished_data_set_at_a_url_is_shown(memory: str) -> None:
+    make_at(memory)
+    shown: list[RunProgress] = []
+    make_at(memory, progress=shown.append)
+    assert {one.phase for one in shown} == {"checking"}
+    assert shown[-1].done == shown[-1].total == 10
+
+
+def test_a_staging_folder_that_cannot_be_made_is_an_error_with_the_remedy(
+    tmp_path: Path, memory: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    make_at(memory)
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+    for use in (make_at, open_stored):
+        with pytest.raises(StorageError, match=r"(?s)/file.*oint XDG_CACHE_HOME to a folder"):
+            use(memory)

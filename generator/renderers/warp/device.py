@@ -24,7 +24,14 @@ import warp as wp
 from gen_data.generator.core.errors import CacheWarning, ConfigError
 from gen_data.generator.core.processes import interrupts_blocked, silence_stdio, tie
 from gen_data.generator.core.system_calls import keep_freed_memory, usable_cores, wait_for_lock
-from gen_data.generator.renderers.warp.kernel_cache import copy_modules, remove_damaged_modules
+from gen_data.generator.renderers.warp.kernel_cache import (
+    copy_modules,
+    fill_cache,
+    no_private_folder,
+    private_folder,
+    remove_damaged_modules,
+    require_space,
+)
 
 # Not -march=native: fused multiply-adds would change bytes between machines. The inlining threshold
 # saves a quarter of all ray time.
@@ -101,7 +108,12 @@ def _start() -> None:
     wp.config.cuda_output = "cubin"
     keep_freed_memory()
     with silence_stdio():  # Warp warns about a missing CUDA driver
-        wp.init()
+        try:
+            wp.init()
+        except OSError:  # It creates the folder of its cache.
+            with no_private_folder():
+                wp.config.kernel_cache_dir = str(private_folder())
+                wp.init()
 
 
 def kernel_folder() -> Path:
@@ -140,11 +152,23 @@ def compile_kernels(device: str) -> None:
     processes that find the cache empty, one fills it and the others wait.
 
     Warns:
-        CacheWarning: compiled kernels were damaged; they are compiled again.
+        CacheWarning: compiled kernels were damaged; they are compiled again. Or kernels are
+            missing, and the cache cannot be written; see ``fill_cache``.
+
+    Raises:
+        StorageError: kernels are missing and can be written nowhere.
     """
-    cores = usable_cores()
+    stamp = f"gen-data-{_digest()}-{device[:4]}"
     folder = Path(wp.config.kernel_cache_dir)
-    stamp = folder / f"gen-data-{_digest()}-{device[:4]}"
+    # Set afterwards, in any case: Warp compiles there what is missing when it is first used.
+    wp.config.kernel_cache_dir = str(
+        fill_cache(folder, stamp, lambda chosen: _fill(chosen, stamp, device))
+    )
+
+
+def _fill(folder: Path, stamp_name: str, device: str) -> None:
+    cores = usable_cores()
+    stamp = folder / stamp_name
     with (folder / "gen-data.lock").open("a") as lock:
         wait_for_lock(lock.fileno())
         damaged = remove_damaged_modules(folder)
@@ -153,6 +177,7 @@ def compile_kernels(device: str) -> None:
             warnings.warn(f"{fact} and are compiled again", CacheWarning, stacklevel=2)
         if stamp.exists() and not damaged:
             return
+        require_space(folder)
         bundle = bundle_folder()
         if bundle.is_dir():
             copy_modules(bundle, folder)

@@ -1,0 +1,40 @@
+"""Files that appear with all their bytes, or not at all: a full disk leaves no half of one."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+
+@contextmanager
+def whole_file(path: Path) -> Iterator[Path]:
+    """Provide the name of a new file beside ``path``, which it replaces after the block.
+
+    Missing folders are created. After an error, ``path`` is as it was.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    # The same suffix: encoders choose the format by it.
+    unfinished = path.with_name(f".{os.getpid()}-unfinished-{path.name}"[-255:])
+    try:
+        yield unfinished
+        unfinished.replace(path)
+    except BaseException:
+        with suppress(OSError):
+            unfinished.unlink(missing_ok=True)
+        raise
+
+
+def write_whole(files: Mapping[Path, bytes]) -> None:
+    """Write files that belong together; none is replaced unless all have their bytes.
+
+    Raises:
+        OSError: a file cannot be written.
+    """
+    if not files:
+        return
+    (path, data), *others = files.items()
+    with whole_file(path) as unfinished:
+        unfinished.write_bytes(data)
+        write_whole(dict(others))

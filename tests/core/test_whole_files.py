@@ -1,0 +1,75 @@
+"""Files are written as a whole, also on a full disk."""
+
+from __future__ import annotations
+
+import errno
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gen_data.generator.cli import report_command
+from gen_data.generator.core.errors import StorageError
+from gen_data.generator.core.whole_files import whole_file, write_whole
+from gen_data.generator.preview.contact_sheet import write_sheet
+
+
+@pytest.fixture
+def full_disk(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A disk with room for 100 bytes of each file."""
+
+    def write(self: Path, data: bytes) -> int:
+        with self.open("wb") as file:
+            file.write(data[:100])
+        if len(data) > 100:
+            raise OSError(errno.ENOSPC, "No space left on device", str(self))
+        return len(data)
+
+    def write_text(self: Path, text: str, **options: object) -> int:
+        return write(self, text.encode())
+
+    monkeypatch.setattr(Path, "write_bytes", write)
+    monkeypatch.setattr(Path, "write_text", write_text)
+
+
+def test_files_that_belong_together_are_replaced_together(tmp_path: Path, full_disk: None) -> None:
+    one, other = tmp_path / "new" / "one.json", tmp_path / "other.html"
+    other.write_bytes(b"old")
+    with pytest.raises(OSError, match="No space left"):
+        write_whole({one: b"new", other: bytes(1000)})
+
+    assert [path for path in tmp_path.rglob("*") if path.is_file()] == [other]
+    assert other.read_bytes() == b"old"
+
+    write_whole({one: b"new", other: b"newer"})
+    assert (one.read_bytes(), other.read_bytes()) == (b"new", b"newer")
+
+
+def test_an_interrupted_file_leaves_nothing(tmp_path: Path) -> None:
+    def interrupt() -> None:
+        with whole_file(tmp_path / "x.png") as unfinished:
+            unfinished.write_bytes(b"half")
+            assert unfinished.suffix == ".png"
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        interrupt()
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_full_disk_leaves_no_half_of_a_contact_sheet(tmp_path: Path, full_disk: None) -> None:
+    noise = np.random.default_rng(1).integers(0, 256, (64, 64, 3), np.uint8)
+    with pytest.raises(StorageError, match="No space left"):
+        write_sheet(noise, tmp_path / "sheet.png")
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_full_disk_leaves_no_half_of_a_report(
+    tmp_path: Path, full_disk: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(
+        "gen_data.generator.report.html_page.format_page", lambda sets: "<p>" * 1000
+    )
+    with pytest.raises(StorageError, match="No space left"):
+        report_command._write(tmp_path / "report.html", [])
+    assert not list(tmp_path.iterdir())
