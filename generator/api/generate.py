@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import partial
 from os import PathLike, fspath
 from pathlib import Path
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from gen_data.generator.runner.processes import Pool, StandbyWorker
     from gen_data.generator.runner.progress import RunProgress, Summary
     from gen_data.generator.runner.ray_cluster import RayCluster
+    from gen_data.generator.runner.run import Settings
     from gen_data.generator.runner.shard import Job
 
 
@@ -86,38 +88,65 @@ def generate(  # noqa: PLR0913  (keywords of one front door)
         _check_time_limit(sample_timeout_s)
         # Before the imports below, so that errors of a configuration come at once.
         loaded = load_config(config, seed=seed, overrides=overrides, without=without)
-
-        from gen_data.generator.assemble.size_estimate import estimate_sample_bytes
-        from gen_data.generator.assets.file_remarks import warn_of_remarks
-        from gen_data.generator.runner.identity import format_licences, make_plan
-        from gen_data.generator.runner.run import Limits, Settings, run
-
         factory = _make_factory(loaded, n)
-        plan = make_plan(factory)
-        told = warn_of_remarks(factory.library, plan.assets)
+        settings = replace(
+            _settings(factory, skip_failed, sample_timeout_s),
+            repair=repair,
+            allow_mixed_numerics=allow_mixed_numerics,
+            is_forced=force,
+        )
         with _opened(cluster, workers, standby) as (pool, count), _folder(loaded, out) as folder:
-            summary = run(
-                plan,
-                factory,
-                folder,
-                workers=count,
-                resume_command=resume_command,
-                licences=partial(format_licences, factory),
-                settings=Settings(
-                    repair=repair,
-                    allow_mixed_numerics=allow_mixed_numerics,
-                    sample_bytes=estimate_sample_bytes(loaded, factory.info),
-                    is_forced=force,
-                    skip_failed=skip_failed or loaded.general.skip_failed,
-                    limits=Limits(sample_s=sample_timeout_s or loaded.general.sample_timeout_s),
-                    open_pool=pool,
-                    shards=None if shards is None else check_shards(shards, plan.shard_count),
-                ),
-                progress=on_progress,
-            )
-        # Of files that workers were the first to read.
-        warn_of_remarks(factory.library, plan.assets, read_max=0, told=told)
+            settings = replace(settings, open_pool=pool)
+            summary = _run(factory, folder, count, shards, resume_command, settings, on_progress)
         return check_label_gaps(summary)
+
+
+def _run(
+    factory: PipelineFactory,
+    folder: Path | str,
+    workers: int,
+    shards: tuple[int, int] | None,
+    resume_command: str,
+    settings: Settings,
+    on_progress: Callable[[RunProgress], None] | None,
+) -> Summary:
+    """Run the plan of a factory, and name what files of the user hold and nothing uses."""
+    from gen_data.generator.assets.file_remarks import warn_of_remarks
+    from gen_data.generator.runner.identity import format_licences, make_plan
+    from gen_data.generator.runner.run import run
+
+    plan = make_plan(factory)
+    told = warn_of_remarks(factory.library, plan.assets)
+    if shards is not None:
+        settings = replace(settings, shards=check_shards(shards, plan.shard_count))
+    summary = run(
+        plan,
+        factory,
+        folder,
+        workers=workers,
+        resume_command=resume_command,
+        licences=partial(format_licences, factory),
+        settings=settings,
+        progress=on_progress,
+    )
+    # Of files that workers were the first to read.
+    warn_of_remarks(factory.library, plan.assets, read_max=0, told=told)
+    return summary
+
+
+def _settings(
+    factory: PipelineFactory, skip_failed: bool, sample_timeout_s: float | None
+) -> Settings:
+    """Settings that arguments and the configuration state together."""
+    from gen_data.generator.assemble.size_estimate import estimate_sample_bytes
+    from gen_data.generator.runner.run import Limits, Settings
+
+    general = factory.config.general
+    return Settings(
+        sample_bytes=estimate_sample_bytes(factory.config, factory.info),
+        skip_failed=skip_failed or general.skip_failed,
+        limits=Limits(sample_s=sample_timeout_s or general.sample_timeout_s),
+    )
 
 
 @contextmanager

@@ -19,6 +19,8 @@ from gen_data.generator.runner.plan import Plan
 BYTES_DEPEND_ON = {
     "OpenEXR": "OpenEXR",
     "PIL": "pillow",
+    "cascadio": "cascadio",
+    "collada": "pycollada",
     "cv2": "opencv-python-headless",
     "deflate": "deflate",
     "fast_simplification": "fast-simplification",

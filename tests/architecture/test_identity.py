@@ -16,7 +16,6 @@ from tests.architecture.test_rules import OURS, ROOT, python_files
 
 BYTES_DO_NOT_DEPEND_ON = {
     "click": "parses the command line",
-    "collada": "converts a pack once; plans name the digest of the result",
     "datasets": "reads exports for certificates",
     "fsspec": "copies finished files",
     "gymnasium": "calls environments, which write no data set",
