@@ -113,7 +113,7 @@ class _Reader:
         """Add the model of a file. ``outer`` may name the frame of ``pose`` and another name."""
         place = str(self.folder.root / file)
         data = self.folder.read(file)
-        root = parse_xml(data, place, "sdf", "an SDF file", _MAX_ELEMENTS, text=True)
+        root = parse_xml(data, place, "sdf", "an SDF file", _MAX_ELEMENTS)
         models = root.findall("model") or root.findall("world/model")
         if len(models) != 1:
             raise AssetError(f"{place}: holds {len(models)} models; give a file with one")
@@ -194,7 +194,7 @@ class _Reader:
             return str(base / "model.sdf")
         place = str(self.folder.root / config)
         data = self.folder.read(config)
-        root = parse_xml(data, place, "model", "a model.config", _MAX_ELEMENTS, text=True)
+        root = parse_xml(data, place, "model", "a model.config", _MAX_ELEMENTS)
         self.included.append(config)
         names = [(k.text or "").strip() for k in root.findall("sdf")]
         return self.folder.refer(config, names[-1] if names else "model.sdf")
