@@ -79,7 +79,8 @@ def test_nuscenes_cameras_are_released_as_the_scanner_passes_them() -> None:
     scanner = next(s for s in spec.sensors if isinstance(s, LidarSensor))
     cameras = [s for s in spec.sensors if isinstance(s, RgbCamera)]
     for camera in cameras:
-        looks_deg = scanner.yaw_deg - 360.0 * scanner.rotation_hz * camera.time_offset_s
+        after_s = camera.time_offset_s - scanner.time_offset_s
+        looks_deg = scanner.yaw_deg - 360.0 * scanner.rotation_hz * after_s
         assert abs(math.remainder(looks_deg - camera.yaw_deg, 360.0)) < 1.0
     assert len({camera.time_offset_s for camera in cameras}) == 6
 

@@ -35,6 +35,8 @@ CAMERA = Camera("color", IDENTITY, Intrinsics.from_hfov(WIDTH_PX, HEIGHT_PX, mat
 POINTS = np.zeros(3, POINT)
 POINTS["position_m"] = [(0, 0, 2), (0.1, 0.2, 4), (0, 0, -2)]
 HOSTILE = "</script><script>alert('x')</script><img src=x onerror=alert(1)>"
+HOSTILE_NAME = HOSTILE.replace("/", "")
+"""As a name of a category or a data set, which cannot have slashes."""
 
 
 def make_object(number: int, category: str, x_px: int = 20, side_px: int = 8) -> ObjectTruth:
@@ -113,19 +115,21 @@ def write_dataset(
         encoding="utf-8",
     )
     pngs = [cv2.imencode(".png", image)[1].tobytes() for image in images]
-    depth = np.full((HEIGHT_PX, WIDTH_PX), 20_000, np.uint16)  # of 0.1 mm
+    height_px, width_px = images[0].shape[:2]
+    camera = replace(CAMERA, intrinsics=Intrinsics.from_hfov(width_px, height_px, math.radians(60)))
+    depth = np.full((height_px, width_px), 20_000, np.uint16)  # of 0.1 mm
     depth_png = cv2.imencode(".png", depth)[1].tobytes()
     with (shard / "labels.jsonl").open("w", encoding="utf-8") as labels:
         for index, objects in enumerate(samples):
-            labels.write(labels_line(_sample(index, objects)) + "\n")
+            labels.write(labels_line(_sample(index, objects, camera)) + "\n")
             media_path(shard, "color", Channel.RGB, index).write_bytes(pngs[index % len(pngs)])
             media_path(shard, "color", Channel.Z_DEPTH, index).write_bytes(depth_png)
             np.save(cloud_path(shard, "top", index), POINTS)
     return folder
 
 
-def _sample(index: int, objects: Sequence[ObjectTruth]) -> Sample:
-    scene = Scene("hand", instances=tuple(o.instance for o in objects), cameras=(CAMERA,))
+def _sample(index: int, objects: Sequence[ObjectTruth], camera: Camera) -> Sample:
+    scene = Scene("hand", instances=tuple(o.instance for o in objects), cameras=(camera,))
     return Sample(
         index=index,
         scene_index=index,
@@ -133,8 +137,8 @@ def _sample(index: int, objects: Sequence[ObjectTruth]) -> Sample:
         split="train" if index % 4 else "val",
         scene=scene,
         capture=Capture(
-            {"color": SensorReading("color", CAMERA, {})},
+            {"color": SensorReading("color", camera, {})},
             {"top": PointCloud("top", Lidar("top", "color"), POINTS)},
         ),
-        truth={"color": ImageTruth(CAMERA, tuple(objects))},
+        truth={"color": ImageTruth(camera, tuple(objects))},
     )

@@ -12,7 +12,7 @@ import pytest
 
 from gen_data.generator.report.html_page import format_page
 from gen_data.generator.report.report_data import describe_dataset
-from tests.report.handmade import HOSTILE, make_image, make_object, write_dataset
+from tests.report.handmade import HOSTILE, HOSTILE_NAME, make_image, make_object, write_dataset
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
@@ -111,7 +111,9 @@ def test_the_page_fits_a_phone(opened: Opened) -> None:
 def test_the_policy_blocks_other_scripts_and_requests(opened: Opened, tmp_path: Path) -> None:
     """Names of a hostile data set are shown as text, and what is added to the file does not run."""
     image = make_image(np.random.default_rng(4))
-    hostile = write_dataset(tmp_path / "set", [[make_object(1, HOSTILE)]], (HOSTILE,), [image])
+    hostile = write_dataset(
+        tmp_path / "set", [[make_object(1, HOSTILE_NAME)]], (HOSTILE_NAME,), [image]
+    )
     text = format_page([describe_dataset(hostile, scenes_max=0)])
     added = "<script>window.added = 1</script><img src='http://127.0.0.1:9/x.png'>"
     path = tmp_path / "index.html"
@@ -133,6 +135,6 @@ def test_the_policy_blocks_other_scripts_and_requests(opened: Opened, tmp_path: 
     assert [url for url in answered if url[:5] != "data:"] == [path.as_uri()]
     assert failed == {"http://127.0.0.1:9/x.png": "csp"}  # refused before any connection
     assert dialogs == []
-    assert HOSTILE in page.inner_text("#balance")
+    assert HOSTILE_NAME in page.inner_text("#balance")
     assert HOSTILE in page.inner_text("#licences")
     page.close()

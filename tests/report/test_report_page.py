@@ -32,7 +32,7 @@ from gen_data.generator.report.report_data import describe_dataset, without_pict
 from gen_data.generator.report.sample_browser import evenly_spread
 from gen_data.generator.report.stored_labels import read_images
 from gen_data.generator.runner.stored import StoredSamples
-from tests.report.handmade import HOSTILE, make_image, make_object, write_dataset
+from tests.report.handmade import HOSTILE, HOSTILE_NAME, make_image, make_object, write_dataset
 
 Json = dict[str, Any]
 
@@ -42,16 +42,16 @@ def hand(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Five samples: the fourth is empty, the last has the image of the first, a little darker."""
     rng = np.random.default_rng(1)
     samples = [
-        [make_object(1, "car"), make_object(2, HOSTILE, 40, 4)],
+        [make_object(1, "car"), make_object(2, HOSTILE_NAME, 40, 4)],
         [make_object(1, "car", side_px=16)],
         [make_object(1, "car"), make_object(2, "car", 40)],
         [],
-        [make_object(1, HOSTILE)],
+        [make_object(1, HOSTILE_NAME)],
     ]
     images = [make_image(rng) for _ in samples]
     images[4] = (images[0] * 0.8).astype(np.uint8)
-    folder = tmp_path_factory.mktemp("hand") / HOSTILE.replace("/", "_")
-    return write_dataset(folder, samples, ("bus", "car", HOSTILE), images)
+    folder = tmp_path_factory.mktemp("hand") / HOSTILE_NAME
+    return write_dataset(folder, samples, ("bus", "car", HOSTILE_NAME), images)
 
 
 @pytest.fixture(scope="module")
@@ -65,10 +65,10 @@ def test_figures_are_those_of_the_labels(described: Json, hand: Path) -> None:
     assert described["counts"] == {"images": 5, "objects": 6}
     assert described["splits"] == {"val": 2, "train": 3}
     counted = {row["name"]: (row["objects"], row["images"]) for row in described["categories"]}
-    assert counted == {"bus": (0, 0), "car": (4, 3), HOSTILE: (2, 2)}
+    assert counted == {"bus": (0, 0), "car": (4, 3), HOSTILE_NAME: (2, 2)}
     (sizes,) = (h for h in described["labels"] if h["title"].startswith("Size of the box"))
     # Sides of 8, 16, 8 and 8 px; edges are 0, 8, 16, 32.
-    assert sizes["counts"]["car"][:3] == [0, 3, 1] and sizes["counts"][HOSTILE][:2] == [1, 1]
+    assert sizes["counts"]["car"][:3] == [0, 3, 1] and sizes["counts"][HOSTILE_NAME][:2] == [1, 1]
     (points,) = (h for h in described["labels"] if h["title"].startswith("Laser points"))
     assert points["counts"]["car"][points["edges"].index(10.0)] == 4  # 7 + 4 points each
     (bright,) = (h for h in described["images"] if h["title"].startswith("Brightness"))
@@ -151,6 +151,7 @@ def test_hostile_names_stay_text(described: Json) -> None:
     assert not [name for _, attributes in page.tags for name in attributes if name[:2] == "on"]
     assert json.loads(page.raw["script"][0]) == [json.loads(json.dumps(described))]
     assert HOSTILE not in text
+    assert HOSTILE_NAME not in text
 
 
 def test_the_policy_permits_nothing_but_the_own_script_and_style(described: Json) -> None:
