@@ -21,6 +21,7 @@ from gen_data.generator.assemble.pipeline_factory import open_pipeline
 from gen_data.generator.core.capture import Channel, LidarHits, LidarRays, SensorReading
 from gen_data.generator.core.interfaces import Renderer
 from gen_data.generator.core.scene import Camera, Lidar, Scene
+from gen_data.generator.pipeline.checked_renderer import CheckedRenderer
 from gen_data.generator.renderers.warp.renderer import WarpRenderer
 
 _RENDERER = "gen_data.generator.renderers.warp."
@@ -219,7 +220,9 @@ def count_frames(config: str, samples: int, *overrides: str) -> list[Frame]:
     """Frames of the first samples of a shipped configuration."""
     spec = load_config(config, seed=1, overrides=(*AS_ON_GPU, *overrides))
     with open_pipeline(spec) as pipeline:
-        renderer = pipeline.renderer
+        checked = pipeline.renderer
+        assert isinstance(checked, CheckedRenderer)
+        renderer = checked.renderer
         assert isinstance(renderer, WarpRenderer)
         # A GPU has memory of its own.
         renderer._cache.shares_memory = False

@@ -75,10 +75,10 @@ def _echo_remarks(folder: Path) -> None:
     """Print what the meshes hold and is not used."""
     from gen_data.generator.assets.file_remarks import collect_remarks
     from gen_data.generator.assets.folder_index import user_folder
-    from gen_data.generator.assets.library import open_library
+    from gen_data.generator.packs.provision import open_assets
 
     ids = [one.asset_id for one in user_folder(folder)]
-    for remarks in collect_remarks(open_library([folder]), ids):
+    for remarks in collect_remarks(open_assets([folder]), ids):
         click.echo(f"{remarks.file}: not used as it is: {'; '.join(remarks.unused)}")
 
 

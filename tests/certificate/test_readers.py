@@ -24,7 +24,7 @@ from tests.certificate.sealing import SMALL
 # pycocotools' decoder predates numpy 2's __array__(copy=...).
 pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
 
-LARGE = {"datasets", "mlcroissant", "supervision"}
+LARGE = {"datasets", "mlcroissant", "open3d", "supervision"}
 """Packages that only slow tests have."""
 
 NAMES = [

@@ -234,7 +234,7 @@ def test_exports_and_rerenderings_that_will_not_fit_are_refused(
     dataset: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Copies of images on another disk and new images need space; hard links do not."""
-    monkeypatch.setattr(store, "free_bytes", lambda path: 200_000)
+    monkeypatch.setattr(store, "free_bytes", lambda path: 1_000_000)
 
     assert package.export(dataset, ["coco"], tmp_path / "linked", workers=0).made == 15
 

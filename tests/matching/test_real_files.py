@@ -108,9 +108,9 @@ def test_scans_of_every_format_have_the_same_points(tmp_path: Path, name: str) -
     if name.endswith(".npy"):
         np.save(tmp_path / name, made)
     elif name.endswith("ply"):
-        (tmp_path / name).write_bytes(ply_bytes(file_points(made)))
+        (tmp_path / name).write_bytes(ply_bytes(file_points(made), {}))
     elif name.endswith(".pcd"):
-        (tmp_path / name).write_bytes(pcd_bytes(file_points(made)))
+        (tmp_path / name).write_bytes(pcd_bytes(file_points(made), {}))
     else:
         ring = np.zeros((len(flat), 1), "<f4")
         five = np.hstack([flat, ring]) if name == "scan.pcd.bin" else flat

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
 from gen_data.generator.core.errors import Interrupted, StorageError, WorkerLost
@@ -22,8 +24,8 @@ def test_every_run_ends_with_all_its_shards_or_an_error() -> None:
 class WaitsForStarts(Supervisor):
     """Never kills a process that does not start."""
 
-    def _patience_s(self, state: State) -> float:
-        return float("inf") if state is State.STARTING else super()._patience_s(state)
+    def _patience_s(self, worker: Any) -> float:
+        return float("inf") if worker.state is State.STARTING else super()._patience_s(worker)
 
 
 class ForgetsShards(Supervisor):

@@ -643,7 +643,7 @@ def test_a_plan_is_the_first_file_in_the_folder(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Wherever a run stops, a folder with shards has a plan."""
-    monkeypatch.setattr(LocalStore, "scan", lambda *_: (_ for _ in ()).throw(Killed()))
+    monkeypatch.setattr(LocalStore, "scan", lambda *_, **__: (_ for _ in ()).throw(Killed()))
 
     with pytest.raises(Killed):
         make(tmp_path / "out")
