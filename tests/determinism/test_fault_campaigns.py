@@ -31,6 +31,7 @@ CHOSEN = [
 
 
 @pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:0 labels in")  # of images of a few pixels
 @pytest.mark.parametrize("name", CHOSEN)
 def test_every_promise_holds(name: str) -> None:
     """A sample of the attempts of docs/trust.md."""

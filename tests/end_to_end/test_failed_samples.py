@@ -134,7 +134,7 @@ def test_a_time_limit_that_is_none_is_refused(limit_s: float, tmp_path: Path) ->
 @pytest.mark.slow
 def test_a_surface_that_is_too_small_is_named_with_the_best_attempt() -> None:
     """500 objects on a table of 1.3 m x 0.9 m."""
-    crowded = gen_data.Dataset("tabletop.yaml", 1, overrides=["randomizers.clutter.count=500"])
+    crowded = gen_data.Dataset("tabletop.yaml", n=1, overrides=["randomizers.clutter.count=500"])
     best = r"Best: attempt \d+: \d+ of 500 objects of 'clutter' found a place on 'table'"
     with pytest.raises(gen_data.GenDataError, match=best):
         crowded[0]
