@@ -18,7 +18,10 @@ INSTALLATION = {ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "docs/insta
 PAGES = sorted({*ROOT.glob("*.md"), *ROOT.glob("docs/*.md")} - INSTALLATION)
 SMALL = "--set sensors[0].size_px=[96,72]"
 
-NOT_RUN = {
+NOT_UNPREPARED = {"arms", "performance", "report", "scaling"}
+"""Pages whose commands need data sets, sizes or packages that ``BEFORE`` and ``SMALLER`` lack yet:
+bent lenses refuse the small size, benchmarks and runs of parts follow from other pages."""
+RUN = {
     "pip install": "`.ci/bare_root` installs every extra",
     "LABEL_STUDIO_": "starts a server",
     "rerun ": "opens a window",
@@ -93,7 +96,7 @@ def test_reasons_are_those_of_commands_that_exist() -> None:
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("default")
-@pytest.mark.parametrize("name", [name for name, lines in RUN.items() if lines])
+@pytest.mark.parametrize("name", [n for n, lines in RUN.items() if lines and n not in UNPREPARED])
 def test_commands_run(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """From the first to the last one of the page, in an empty folder."""
     monkeypatch.chdir(tmp_path)
