@@ -18,10 +18,7 @@ INSTALLATION = {ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "docs/insta
 PAGES = sorted({*ROOT.glob("*.md"), *ROOT.glob("docs/*.md")} - INSTALLATION)
 SMALL = "--set sensors[0].size_px=[96,72]"
 
-NOT_UNPREPARED = {"arms", "performance", "report", "scaling"}
-"""Pages whose commands need data sets, sizes or packages that ``BEFORE`` and ``SMALLER`` lack yet:
-bent lenses refuse the small size, benchmarks and runs of parts follow from other pages."""
-RUN = {
+NOT_RUN = {
     "pip install": "`.ci/bare_root` installs every extra",
     "LABEL_STUDIO_": "starts a server",
     "rerun ": "opens a window",
@@ -79,6 +76,9 @@ def reason_against(command: str) -> str:
     return next((why for start, why in NOT_RUN.items() if command.startswith(start)), "")
 
 
+UNPREPARED = {"arms", "performance", "report", "scaling"}
+"""Pages whose commands need data sets, sizes or packages that ``BEFORE`` and ``SMALLER`` lack yet:
+bent lenses refuse the small size, benchmarks and runs of parts follow from other pages."""
 RUN = {
     page.stem: [line for line in commands(page) if not reason_against(line)]
     for page in PAGES
