@@ -8,14 +8,12 @@ generation with these exporters gives.
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gen_data.exporters.image_files import link_or_copy
-from gen_data.generator.core.errors import StorageError
 from gen_data.generator.core.interfaces import (
     DatasetInfo,
     Exporter,
@@ -23,7 +21,7 @@ from gen_data.generator.core.interfaces import (
     table_path,
 )
 from gen_data.generator.core.sample import Sample
-from gen_data.generator.runner.durable_files import Inode, get_inode, hash_file
+from gen_data.generator.runner.durable_files import Inode, get_inode
 from gen_data.generator.runner.labels import LABELS_NAME
 from gen_data.generator.runner.plan import FORMAT_VERSION
 from gen_data.generator.runner.progress import RunProgress, Summary
@@ -32,7 +30,7 @@ from gen_data.generator.runner.run import Settings, run
 from gen_data.generator.runner.seal import read_sums
 from gen_data.generator.runner.shard_record import FileRecord
 from gen_data.generator.runner.store import LICENCES_NAME, SUMS_NAME, LocalStore
-from gen_data.generator.runner.stored import CheckedSamples, StoredSamples
+from gen_data.generator.runner.stored import RECORDED, CheckedSamples, StoredSamples, check_digest
 from gen_data.generator.runner.verify import check_source
 
 NEW_BYTES = 8_000.0
@@ -131,11 +129,7 @@ class LinkedFiles:
         folder = self.stored.shard_dir(shard)
         for file in _linked_files(self.stored, shard):
             path = folder / file.path
-            if hash_file(path) != file.sha256:
-                raise StorageError(
-                    f"{path}: its sha256 is not that of the shard's record.\n  Repair: "
-                    f"gen-data repair {shlex.quote(str(self.stored.folder))}"
-                )
+            check_digest(path, file.sha256, self.stored.folder, RECORDED)
             found[get_inode(path)] = file.sha256
         return found
 
@@ -166,11 +160,8 @@ def _read_licences(path: Path) -> str:
     Raises:
         StorageError: the file is damaged.
     """
-    if hash_file(path) != read_sums(path.parent).digests.get(path.name):
-        raise StorageError(
-            f"{path}: its sha256 is not the one in {SUMS_NAME}.\n  Repair: "
-            f"gen-data repair {shlex.quote(str(path.parent))}"
-        )
+    expected = read_sums(path.parent).digests.get(path.name)
+    check_digest(path, expected, path.parent, f"the one in {SUMS_NAME}")
     return path.read_text("utf-8")
 
 

@@ -277,12 +277,24 @@ class CheckedSamples(StoredSamples):
     def _open_lines(self, path: Path) -> JsonLines:
         record = LocalStore(self.folder).record(int(path.parent.name))
         expected = {file.path: file.sha256 for file in record.files} if record else {}
-        if expected.get(path.name) != hash_file(path):
-            raise StorageError(
-                f"{path}: its sha256 is not that of the shard's record.\n  Repair: "
-                f"gen-data repair {shlex.quote(str(self.folder))}"
-            )
+        check_digest(path, expected.get(path.name), self.folder, RECORDED)
         return super()._open_lines(path)
+
+
+RECORDED = "that of the shard's record"
+
+
+def check_digest(path: Path, sha256: str | None, folder: Path, source: str) -> None:
+    """Refuse a damaged file of the data set in ``folder``; ``source`` names its digest.
+
+    Raises:
+        StorageError: the file does not have that digest, or none is known (None).
+    """
+    if hash_file(path) != sha256:
+        raise StorageError(
+            f"{path}: its sha256 is not {source}.\n  Repair: "
+            f"gen-data repair {shlex.quote(str(folder))}"
+        )
 
 
 def parse_dataset_id(manifest: Mapping[str, Any], place: object) -> str:
