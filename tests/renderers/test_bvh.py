@@ -39,9 +39,9 @@ def trace_mesh(
     faces: wp.array(dtype=wp.vec2i),
 ) -> None:
     i = wp.tid()
-    found = first_in_mesh(tree, wp.uint64(0), origins[i], ways[i], reach)
+    found = first_in_mesh(tree, origins[i], ways[i], reach)
     points[i] = wp.vec3(float(found[0]), float(found[1]), float(found[2]))
-    blocked = any_in_mesh(tree, wp.uint64(0), origins[i], ways[i], reach)
+    blocked = any_in_mesh(tree, origins[i], ways[i], reach)
     faces[i] = wp.vec2i(int(found[3]), wp.where(blocked, 1, 0))
 
 

@@ -18,6 +18,7 @@ from collections.abc import Sequence
 from functools import cache
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 import warp as wp
 
@@ -194,13 +195,32 @@ def bundle_folder() -> Path:
     return BUNDLES / f"{_digest()}-{sys.platform}-{platform.machine().lower()}"
 
 
+BLOCK_DIM = 32
+"""Threads of a block on a GPU. Kernels have thousands of long threads rather than millions of short
+ones: in blocks of 256, Warp's default, they would leave most multiprocessors without work. It is
+the same for all kernels, since Warp compiles a module once for each size."""
+
+
+def launch(
+    kernel: wp.Kernel,
+    dim: Any,
+    inputs: Sequence[Any],
+    outputs: Sequence[Any] = (),
+    *,
+    device: wp.Device,
+) -> None:
+    """Launch a kernel on a device; on the CPU, its threads run one after another."""
+    block_dim = None if device.is_cpu else BLOCK_DIM
+    wp.launch(kernel, dim, [*inputs], [*outputs], device=device, block_dim=block_dim)
+
+
 def load_kernels(device_name: str, names: Sequence[str]) -> None:
     """Load kernel modules in this process, which compiles those missing from the cache."""
     device = open_device(device_name)
     for name in names:
         module = f"{__package__}.{name}"
         import_module(module)
-        wp.load_module(module, device=device)
+        wp.load_module(module, device=device, block_dim=None if device.is_cpu else BLOCK_DIM)
 
 
 def compile_in_parallel(device: str, names: Sequence[str], folder: Path) -> bool:
@@ -239,6 +259,7 @@ def _compile_queued(device: str, folder: str) -> None:
         name = record.decode().strip()
         if device.startswith("sm_"):
             module = import_module(f"{__package__}.{name}")
+            wp.set_module_options({"block_dim": BLOCK_DIM}, module)
             wp.compile_aot_module(module, arch=int(device.removeprefix("sm_")), use_ptx=False)
         else:
             load_kernels(device, [name])

@@ -112,12 +112,10 @@ class DeviceCache:
 
         def make() -> DeviceMesh:
             data = self.assets.mesh(asset_id)
-            with_tree = self.device.is_cpu
             # The sizes, too: a tree of another mesh would lead rays out of its arrays, if somebody
             # changed a family and not its version.
             sizes = f"{len(data.vertices_m)} {len(data.faces)}"
-            name = f"device mesh {'with' if with_tree else 'without'} tree {sizes}"
-            prepared = self._derived(asset_id, name, lambda: prepare_mesh(data, with_tree))
+            prepared = self._derived(asset_id, f"device mesh {sizes}", lambda: prepare_mesh(data))
             return upload_mesh(data, prepared, self.device)
 
         return self._meshes.get(asset_id, make)

@@ -11,6 +11,7 @@ import warp as wp
 from gen_data.generator.core.interfaces import FindTones
 from gen_data.generator.core.scene import Camera, Scene
 from gen_data.generator.core.scene_time import scene_at
+from gen_data.generator.renderers.warp.device import launch
 from gen_data.generator.renderers.warp.device_cache import DeviceCache
 from gen_data.generator.renderers.warp.scene.kernels import records
 from gen_data.generator.renderers.warp.scene.scene_packing import (
@@ -106,7 +107,7 @@ class CameraView:
         self, kernel: wp.Kernel, dim: Any, inputs: Sequence[Any], outputs: Sequence[Any] = ()
     ) -> None:
         """Run a kernel on the renderer's device."""
-        wp.launch(kernel, dim, [*inputs], [*outputs], device=self.cache.device)
+        launch(kernel, dim, inputs, outputs, device=self.cache.device)
 
 
 def is_moving(state: CameraState, open_s: float) -> bool:

@@ -23,6 +23,7 @@ from gen_data.generator.core.motion import interpolate_poses
 from gen_data.generator.core.scene import Body, Camera, Lidar, Scene
 from gen_data.generator.core.se3 import Array
 from gen_data.generator.renderers.warp.atmosphere.weather import ground_record
+from gen_data.generator.renderers.warp.device import launch
 from gen_data.generator.renderers.warp.device_cache import DeviceCache
 from gen_data.generator.renderers.warp.lidar.infrared_materials import infrared_surfaces
 from gen_data.generator.renderers.warp.lidar.kernels import lidar_rays as kernels
@@ -212,9 +213,7 @@ def trace_secondary(
     if len(panes):
         given = [wp.array(panes, dtype=int, device=cache.device), first.ranges_m]
         outputs = [part[: len(panes)] for part in found.parts]
-        wp.launch(
-            kernels.trace_behind_panes, threads, [*inputs, *given], outputs, device=cache.device
-        )
+        launch(kernels.trace_behind_panes, threads, [*inputs, *given], outputs, device=cache.device)
     if len(mirrors):
         water = np.zeros(len(mirrors), np.float32)
         if first.puddles is not None:
@@ -227,7 +226,7 @@ def trace_secondary(
             wp.array(water, dtype=float, device=cache.device),
         ]
         outputs = [part[len(panes) :] for part in found.parts]
-        wp.launch(kernels.trace_mirrors, threads, [*inputs, *given], outputs, device=cache.device)
+        launch(kernels.trace_mirrors, threads, [*inputs, *given], outputs, device=cache.device)
     ranges_m, reflectances, hits = found.numpy()
     there = hits[:, 0] >= 0
     instances, categories, surfaces = labels.at(hits[there])
@@ -287,7 +286,7 @@ def trace_scan(scene: Scene, lidar: Lidar, beams: LidarRays, cache: DeviceCache)
     mirrors = covered or bool((infrared["mirror"] > 0.0).any())
     normals = cache.scratch("scan normals", count if mirrors else 1, wp.vec3)
     puddles = found.parts[4] if covered else cache.scratch("no puddles", 1, float)
-    wp.launch(
+    launch(
         kernels.scan_beams,
         dim=record.threads,
         inputs=[*inputs, cache.latest(f"order {lidar.name}", order, int)],

@@ -21,6 +21,7 @@ from gen_data.generator.core.scene import Camera, Scene
 from gen_data.generator.core.se3 import Array
 from gen_data.generator.core.streams import Streams
 from gen_data.generator.renderers.warp.atmosphere.weather import fill_fog, ground_record
+from gen_data.generator.renderers.warp.device import launch
 from gen_data.generator.renderers.warp.device_cache import DeviceCache
 from gen_data.generator.renderers.warp.frame_context import CameraView
 from gen_data.generator.renderers.warp.pathtraced.kernels import integrator
@@ -155,9 +156,9 @@ class PathTracer:
             budget.first = first
             budget.samples = min(_SAMPLES_AT_ONCE, self._settings.samples - first)
             inputs = [view, record, sky.table, budget]
-            wp.launch(integrator.trace_paths, n, inputs, [radiance], device=self._cache.device)
+            launch(integrator.trace_paths, n, inputs, [radiance], device=self._cache.device)
         share = 1.0 / self._settings.samples
-        wp.launch(integrator.scale_light, n, [share], [radiance], device=self._cache.device)
+        launch(integrator.scale_light, n, [share], [radiance], device=self._cache.device)
         return radiance
 
     def _denoise(self, frame: CameraView, radiance: wp.array) -> None:

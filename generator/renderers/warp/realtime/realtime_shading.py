@@ -17,6 +17,7 @@ from gen_data.generator.core.interfaces import Tones
 from gen_data.generator.core.se3 import Array
 from gen_data.generator.renderers.warp.atmosphere.precipitation import draw_precipitation
 from gen_data.generator.renderers.warp.atmosphere.weather import expose_ground, fill_air
+from gen_data.generator.renderers.warp.device import launch
 from gen_data.generator.renderers.warp.frame_context import (
     CameraState,
     CameraView,
@@ -52,6 +53,7 @@ from gen_data.generator.renderers.warp.visibility.kernels import (
 )
 from gen_data.generator.renderers.warp.visibility.kernels import msaa as mixing
 from gen_data.generator.renderers.warp.visibility.kernels.edge_detection import (
+    GROUP_PX,
     find_edges,
     write_mixed,
 )
@@ -206,8 +208,10 @@ def _find_edges(frame: CameraView) -> wp.array:
     cache = frame.cache
     count = wp.zeros(1, dtype=wp.int32, device=cache.device)
     pixels = cache.scratch("listed pixels", frame.pixels, wp.int32)
-    inputs = [frame.view, frame.gbuffer.record]
-    frame.launch(find_edges, frame.view.height, inputs, [count, pixels])
+    view = frame.view
+    run = view.width if cache.device.is_cpu else int(GROUP_PX)
+    shape = (view.height, -(-view.width // run))
+    frame.launch(find_edges, shape, [view, frame.gbuffer.record, run], [count, pixels])
     return pixels[: int(count.numpy()[0])]
 
 
@@ -266,7 +270,7 @@ def darken_outside(view: records.View, radiance: wp.array) -> None:
     """Set radiance to zero where the lens shows nothing, in place."""
     if view.lens != records.PINHOLE:
         n = view.width * view.height
-        wp.launch(distortion.darken_outside, n, [view], [radiance], device=radiance.device)
+        launch(distortion.darken_outside, n, [view], [radiance], device=radiance.device)
 
 
 def _shade(frame: CameraView, lattice: Lattice, around: LightVisibility) -> wp.array:

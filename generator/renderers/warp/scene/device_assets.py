@@ -56,7 +56,7 @@ class DeviceMesh:
 
     Attributes:
         record: A Geometry record [1].
-        keep: The device arrays and the hierarchy that the record points to.
+        keep: The device arrays that the record points to.
         low_m, high_m: Bounds in the mesh frame.
     """
 
@@ -69,20 +69,21 @@ class DeviceMesh:
     nbytes: int
 
 
-def prepare_mesh(data: MeshData, with_tree: bool) -> Arrays:
+def prepare_mesh(data: MeshData) -> Arrays:
     """Compute what rendering a mesh takes beside its own arrays.
 
     Returns:
-        ``boxes`` of ``boxes_around`` as by ``group_boxes``; ``convex`` [1], 0 or 1; with
-        a tree, ``tree``: that of ``mesh_tree``.
+        ``boxes`` of ``boxes_around`` as by ``group_boxes``; ``convex`` [1], 0 or 1; the ``tree`` of
+        ``mesh_tree``.
     """
     face_lows, face_highs = face_boxes(data.vertices_m, data.faces)
     lows, highs = boxes_around(face_lows, face_highs)
     is_convex = is_convex_solid(data.vertices_m, data.faces)
-    arrays: Arrays = {"boxes": group_boxes(lows, highs), "convex": np.array([is_convex])}
-    if with_tree:
-        arrays["tree"] = mesh_tree(data.vertices_m, data.faces, face_lows, face_highs)
-    return arrays
+    return {
+        "boxes": group_boxes(lows, highs),
+        "convex": np.array([is_convex]),
+        "tree": mesh_tree(data.vertices_m, data.faces, face_lows, face_highs),
+    }
 
 
 def upload_mesh(data: MeshData, prepared: Arrays, device: wp.Device) -> DeviceMesh:
@@ -90,7 +91,7 @@ def upload_mesh(data: MeshData, prepared: Arrays, device: wp.Device) -> DeviceMe
 
     Args:
         data: The mesh.
-        prepared: Arrays of ``prepare_mesh``; on the CPU, with a tree.
+        prepared: Arrays of ``prepare_mesh``.
         device: On the CPU, arrays are not copied: they must not change.
     """
     low, high = data.bounds_m()
@@ -101,28 +102,18 @@ def upload_mesh(data: MeshData, prepared: Arrays, device: wp.Device) -> DeviceMe
         "faces": _upload(data.faces.reshape(-1), wp.int32, device),
         "face_slots": _upload(data.face_slots, wp.int32, device),
         "boxes": _upload(prepared["boxes"], wp.float32, device),
+        "tree": _upload(prepared["tree"], wp.float32, device),
     }
-    if device.is_cuda:
-        arrays["tree"] = _upload(np.zeros(0, np.float32), wp.float32, device)
-        points, indices = arrays["vertices_m"].held, arrays["faces"].held
-        hierarchy = wp.Mesh(points=points, indices=indices)
-        number = hierarchy.id
-        # Warp's hierarchy has two 16-byte nodes per triangle, built from 24-byte boxes.
-        nbytes = 32 * len(data.vertices_m) + (16 + 64 + 24) * len(data.faces)
-    else:
-        arrays["tree"] = _upload(prepared["tree"], wp.float32, device)
-        hierarchy, number = None, 0
-        nbytes = owned_bytes(*(array.held for array in arrays.values()))
     fields: dict[str, object] = {name: array.field for name, array in arrays.items()}
-    fields |= {"mesh": number, "low_m": low, "high_m": high, "convex": prepared["convex"][0]}
+    fields |= {"low_m": low, "high_m": high, "convex": prepared["convex"][0]}
     return DeviceMesh(
         _make_record(Geometry, fields),
-        (hierarchy, *(array.held for array in arrays.values())),
+        tuple(array.held for array in arrays.values()),
         np.array(low),
         np.array(high),
         len(data.vertices_m),
         data.materials,
-        nbytes,
+        sum(array.nbytes for array in arrays.values()),
     )
 
 
@@ -132,10 +123,12 @@ class _Uploaded(NamedTuple):
     Attributes:
         held: The array, which has to stay alive.
         field: Value of the field of a record that points to it.
+        nbytes: Memory that it takes; 0 for a view of a mapped file.
     """
 
     held: Any
     field: tuple[object, ...]
+    nbytes: int
 
 
 def _upload(values: NDArray[Any], dtype: Any, device: wp.Device) -> _Uploaded:
@@ -147,12 +140,13 @@ def _upload(values: NDArray[Any], dtype: Any, device: wp.Device) -> _Uploaded:
     values = np.ascontiguousarray(values, _HOST_DTYPES[dtype])
     if device.is_cpu:
         held, address = values, values.__array_interface__["data"][0]
+        nbytes = owned_bytes(values)
     else:
         held = wp.array(values, dtype=dtype, device=device)
-        address = held.ptr or 0
+        address, nbytes = held.ptr or 0, values.nbytes
     # Address, address of a gradient, shape, strides [bytes], dimensions, flags.
     field = (address, 0, (len(values), 0, 0, 0), (values.strides[0], 0, 0, 0), 1, 0)
-    return _Uploaded(held, field)
+    return _Uploaded(held, field, nbytes)
 
 
 def _make_record(struct: Any, fields: Mapping[str, object]) -> NDArray[np.void]:
@@ -276,7 +270,6 @@ def upload_texture(prepared: Arrays, device: wp.Device) -> DeviceTexture:
     texels = arrays["texels"].held
     nbytes = sum(values.nbytes for values in images.values()) + cover.nbytes
     if device.is_cpu:
-        nbytes = owned_bytes(*(array.held for array in arrays.values()))
         texels = wp.array(texels, dtype=wp.uint32, device=device, copy=False)
     return DeviceTexture(
         _make_record(TextureRecord, fields),

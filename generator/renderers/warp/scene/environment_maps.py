@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from gen_data.generator.core.asset_types import Float32
 from gen_data.generator.core.colorimetry import luminance
 from gen_data.generator.core.se3 import Array, Vec3
+from gen_data.generator.renderers.warp.device import launch
 from gen_data.generator.renderers.warp.scene.kernels.environment_lighting import (
     prefilter,
     weigh_texels,
@@ -305,7 +306,7 @@ def _prefilter_level(source: Float32, level: int, device: wp.Device) -> wp.array
     radiance = wp.array(source.reshape(-1, 3), dtype=wp.vec3, device=device)
     lanes = _LANES if device.is_cpu else 1
     inputs = [shares, radiance, lanes]
-    wp.launch(prefilter, _GLOSSY_SIZE**2 // lanes, inputs, [smoothed], device=device)
+    launch(prefilter, _GLOSSY_SIZE**2 // lanes, inputs, [smoothed], device=device)
     return smoothed.reshape((_GLOSSY_SIZE, _GLOSSY_SIZE))
 
 
@@ -323,7 +324,7 @@ def _texel_weights(height: int, level: int, device: str) -> wp.array:
         roughness * roughness,
         _GLOSSY_SIZE,
     ]
-    wp.launch(weigh_texels, _GLOSSY_SIZE**2, inputs, [shares], device=device)
+    launch(weigh_texels, _GLOSSY_SIZE**2, inputs, [shares], device=device)
     return shares
 
 

@@ -81,7 +81,7 @@ class _Placement:
         body_records: Body records without the fields that depend on the camera.
         R_world_mesh, t_world_mesh, scale: Poses of the bodies, float64 [n, 3, 3], [n, 3] and [n].
         vertex_count, lows_m, highs_m: As of PackedWorld.
-        hierarchies: Kept alive for the World record, which has only their ids.
+        hierarchy: Kept alive for the World record, which has only its id; None without cut-outs.
     """
 
     body_records: NDArray[np.void]
@@ -91,7 +91,7 @@ class _Placement:
     vertex_count: int
     lows_m: wp.array
     highs_m: wp.array
-    hierarchies: tuple[wp.Bvh | None, ...]
+    hierarchy: wp.Bvh | None
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -158,7 +158,7 @@ def _pack_for_camera(
     record.bodies = to_device(body_records, records.BodyRecord, cache.device)
     return PackedWorld(
         record,
-        (placement.hierarchies, *packed.assets),
+        (placement.hierarchy, *packed.assets),
         body_records,
         placement.vertex_count,
         weather,
@@ -225,26 +225,22 @@ def _place_bodies(
         wp.array(np.ascontiguousarray(corner), dtype=wp.vec3, device=cache.device)
         for corner in (low, high)
     )
-    hierarchies = _build_hierarchies(record, body_records, lows_m, highs_m)
-    return _Placement(body_records, R, t, scale, vertex_count, lows_m, highs_m, hierarchies)
+    hierarchy = _build_hierarchies(record, body_records, cache.device)
+    return _Placement(body_records, R, t, scale, vertex_count, lows_m, highs_m, hierarchy)
 
 
 def _build_hierarchies(
-    record: records.World, body_records: NDArray[np.void], lows_m: wp.array, highs_m: wp.array
-) -> tuple[wp.Bvh | None, ...]:
-    device = lows_m.device
+    record: records.World, body_records: NDArray[np.void], device: wp.Device
+) -> wp.Bvh | None:
     low, high = (np.ascontiguousarray(body_records[name]) for name in ("low_m", "high_m"))
-    tree = np.zeros(0, np.float32) if device.is_cuda else body_tree(low, high)
     cutouts = np.flatnonzero(body_records["cutouts"]).astype(np.int32)
     corners = (wp.array(of[cutouts], dtype=wp.vec3, device=device) for of in (low, high))
-    hierarchy = wp.Bvh(lows_m, highs_m) if device.is_cuda else None
     cutout_hierarchy = wp.Bvh(*corners) if len(cutouts) else None
     record.boxes = wp.array(group_boxes(low, high), dtype=wp.float32, device=device)
-    record.tree = wp.array(tree, dtype=wp.float32, device=device)
+    record.tree = wp.array(body_tree(low, high), dtype=wp.float32, device=device)
     record.cutouts = wp.array(cutouts, dtype=wp.int32, device=device)
-    record.hierarchy = hierarchy.id if hierarchy else 0
     record.cutout_hierarchy = cutout_hierarchy.id if cutout_hierarchy else 0
-    return hierarchy, cutout_hierarchy
+    return cutout_hierarchy
 
 
 def pack_view(camera: Camera, cache: DeviceCache) -> records.View:

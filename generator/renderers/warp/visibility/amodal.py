@@ -21,6 +21,7 @@ from gen_data.generator.core.boxes import BoxPx, tight_box
 from gen_data.generator.core.capture import Silhouette
 from gen_data.generator.core.scene import Scene
 from gen_data.generator.core.se3 import Array
+from gen_data.generator.renderers.warp.device import launch
 from gen_data.generator.renderers.warp.frame_context import (
     CameraView,
     RowBand,
@@ -48,6 +49,8 @@ from gen_data.generator.renderers.warp.visibility.reprojection import make_bands
 _NOTHING = np.zeros((0, 0), np.bool_)
 _UNSNAPPED = -(2**31)
 _BANDS = 12
+_ROWS, _PARTS = 16, 32
+"""On a GPU: rows of an outline, and threads that share its faces."""
 EMPTY = BoxPx(0, 0, 0, 0)
 _EDGES = np.array([(k, k | bit) for bit in (1, 2, 4) for k in range(8) if not k & bit]).T
 """Corners at the ends of a box's twelve edges, [2, 12], as of CORNERS."""
@@ -82,11 +85,14 @@ def _rasterize_masks(frame: CameraView) -> tuple[dict[int, BoxPx], NDArray[np.bo
         number: boxes.get(scene.bodies[number].instance_id, EMPTY)
         for number in projected.reached.tolist()
     }
-    outlines, size = _outline_records(scene, boxes, whole)
+    shared = not cache.device.is_cpu
+    outlines, size = _outline_records(scene, boxes, whole, _ROWS if shared else None)
     mask = _Mask.allocate(size + LANES, cache.device)
     listed = wp.array(outlines, dtype=Outline, device=cache.device)
-    inputs = [view, world.record, projected.p_camera, projected.xy, listed]
-    frame.launch(draw_silhouettes, len(outlines), inputs, [mask.pixels])
+    # On the CPU, threads run one after another anyway; on a GPU, a few bodies need thousands.
+    parts = _PARTS if shared else 1
+    inputs = [view, world.record, projected.p_camera, projected.xy, listed, parts]
+    frame.launch(draw_silhouettes, (len(outlines), parts), inputs, [mask.pixels])
     return boxes, mask.read()
 
 
@@ -112,7 +118,7 @@ class _Mask:
     def read(self) -> NDArray[np.bool_]:
         """All pixels on the host."""
         bits = wp.empty(self.words.size, dtype=wp.uint8, device=self.words.device)
-        wp.launch(pack_bits, bits.size, [self.words], [bits], device=bits.device)
+        launch(pack_bits, bits.size, [self.words], [bits], device=bits.device)
         return np.unpackbits(bits.numpy(), bitorder="little").view(np.bool_)
 
 
@@ -123,8 +129,8 @@ def _boxes_px(frame: CameraView, projected: Projected) -> dict[int, BoxPx]:
     annotated = sorted(i.instance_id for i in scene.instances if i.annotated)
     boxes = dict.fromkeys(annotated, EMPTY)
     extents = projected.extents.numpy()
-    lows, highs = extents["low"], extents["high"]
-    for k in np.flatnonzero(extents["farthest_m"] >= Z_NEAR_M).tolist():
+    lows, highs = extents["low"].min(axis=1), extents["high"].max(axis=1)
+    for k in np.flatnonzero(extents["farthest_m"].max(axis=1) >= Z_NEAR_M).tolist():
         number = projected.reached[k]
         instance_id = scene.bodies[number].instance_id
         if instance_id in boxes:
@@ -163,11 +169,12 @@ def clipped_box_px(corners_m: Array, view: records.View) -> BoxPx:
 
 
 def _outline_records(
-    scene: Scene, boxes: dict[int, BoxPx], of_bodies: dict[int, BoxPx]
+    scene: Scene, boxes: dict[int, BoxPx], of_bodies: dict[int, BoxPx], band: int | None
 ) -> tuple[NDArray[np.void], int]:
-    """One record per body whose box is not empty, and the size of all instances' masks.
+    """Records of the bodies whose boxes are not empty, and the size of all instances' masks.
 
     Masks fill the boxes of the instances, one after another; each body's box is in its instance's.
+    A record has ``band`` rows at most; all of them if it is None.
     """
     first_pixels, size = {}, 0
     for instance_id, box in boxes.items():
@@ -181,7 +188,10 @@ def _outline_records(
         whole = boxes[instance_id]
         offset = (box.y_min - whole.y_min) * whole.width_px + box.x_min - whole.x_min
         window = (box.x_min, box.y_min, box.width_px, box.height_px)
-        rows.append((number, window, first_pixels[instance_id] + offset, whole.width_px))
+        place = (first_pixels[instance_id] + offset, whole.width_px)
+        for first in range(0, box.height_px, band or box.height_px):
+            last = min(first + (band or box.height_px), box.height_px) - 1
+            rows.append((number, window, first, last, *place))
     return np.array(rows, dtype=Outline.numpy_dtype()), size
 
 
@@ -221,7 +231,7 @@ def _trace_masks(frame: CameraView) -> tuple[dict[int, BoxPx], NDArray[np.bool_]
             near = cosines >= math.cos(min(half_rad + 1.5 * step_rad, math.pi))
             of_bodies[number] = _box_around(near, view).intersection(canvas_box(view))
             boxes[body.instance_id] = boxes[body.instance_id].union(of_bodies[number])
-    windows, size = _outline_records(scene, boxes, of_bodies)
+    windows, size = _outline_records(scene, boxes, of_bodies, None)
     mask = _Mask.allocate(size, cache.device)
     if len(windows):
         shape = (len(windows), int(windows["window"]["height"].max()))

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from gen_data.generator.core.boxes import BoxPx
 from gen_data.generator.core.se3 import Array
+from gen_data.generator.renderers.warp.device import launch
 from gen_data.generator.renderers.warp.device_cache import DeviceCache
 from gen_data.generator.renderers.warp.scene.kernels import ray_queries, records
 from gen_data.generator.renderers.warp.scene.kernels.simd import LANES
@@ -26,6 +27,10 @@ CORNERS = np.array([[(k >> axis) & 1 for axis in range(3)] for k in range(8)])
 def has_cutouts(body_records: NDArray[np.void]) -> NDArray[np.bool_]:
     """Whether rays may pass holes in each body, bool [n]."""
     return np.asarray((body_records["cutouts"] & int(records.HOLES)) != 0)
+
+
+_PARTS = 32
+"""Threads that share the vertices of a body on a GPU."""
 
 
 def list_drawn(
@@ -100,7 +105,7 @@ class Projected:
         p_camera: Vertices in the camera frame [m].
         xy: Vertices snapped to the image plane; see
             gen_data.generator.renderers.warp.visibility.kernels.rasterizer.
-        extents: Extent record of each reached body.
+        extents: Extent records of each reached body, [bodies, parts].
     """
 
     reached: NDArray[np.int32]
@@ -157,17 +162,18 @@ def find_visible(
         _rasterise(world, view, cache, projected, gbuffer.hits)
     else:
         inputs = [view, world.record, rasterizer.Z_NEAR_M]
-        wp.launch(ray_queries.trace_pixels, n, inputs, [gbuffer.hits], device=cache.device)
+        launch(ray_queries.trace_pixels, n, inputs, [gbuffer.hits], device=cache.device)
     # One thread per row on the CPU, where threads run one after the other anyway.
     run = view.width if cache.device.is_cpu else 1
     inputs, shape = [view, world.record, run, gbuffer.record], (view.height, view.width // run)
-    wp.launch(label_resolve.resolve, shape, inputs, device=cache.device)
+    launch(label_resolve.resolve, shape, inputs, device=cache.device)
     return gbuffer
 
 
 def project_vertices(world: PackedWorld, view: records.View, cache: DeviceCache) -> Projected:
     """Project vertices into the camera; valid until the next call."""
     count = max(world.vertex_count, 1)
+    parts = 1 if cache.device.is_cpu else _PARTS
     reached = bodies_within(world.body_records, view, 1.0)
     # Rounding may let the wider test reject a body that the narrower one accepts: it is outside
     # both.
@@ -177,12 +183,13 @@ def project_vertices(world: PackedWorld, view: records.View, cache: DeviceCache)
         list_drawn(world, view, in_view, cache.device),
         cache.scratch("p camera", count, wp.vec3),
         cache.scratch("xy", count, wp.vec2i),
-        wp.zeros(len(reached), dtype=rasterizer.Extent, device=cache.device),
+        wp.zeros((len(reached), parts), dtype=rasterizer.Extent, device=cache.device),
     )
     bodies = wp.array(projected.reached, dtype=wp.int32, device=cache.device)
     inputs = [view, world.record, bodies]
     outputs = [projected.p_camera, projected.xy, projected.extents]
-    wp.launch(rasterizer.project_vertices, len(bodies), inputs, outputs, device=cache.device)
+    shape = (len(bodies), parts)
+    launch(rasterizer.project_vertices, shape, inputs, outputs, device=cache.device)
     return projected
 
 
@@ -217,4 +224,4 @@ def _rasterise(
     window.width, window.height = view.width, view.height
     bodies = projected.in_view
     inputs = [view, window, world.record, bodies, projected.p_camera, projected.xy]
-    wp.launch(rasterizer.draw_bodies, len(bodies), inputs, [nearness, hits], device=cache.device)
+    launch(rasterizer.draw_bodies, len(bodies), inputs, [nearness, hits], device=cache.device)

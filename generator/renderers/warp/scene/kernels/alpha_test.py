@@ -178,11 +178,7 @@ def first_opaque_hit(world: World, b: int, o: wp.vec3, d: wp.vec3, reach: float,
     going = bool(True)
     while going:
         going = False
-        met = to_strike(
-            first_in_mesh(
-                world.geometries[g].tree, world.geometries[g].mesh, o + d * begin, d, reach - begin
-            )
-        )
+        met = to_strike(first_in_mesh(world.geometries[g].tree, o + d * begin, d, reach - begin))
         if met.face >= 0:
             weights = wp.vec3(met.u, met.v, 1.0 - met.u - met.v)
             if is_passable(world, b, met.face, weights, through):
@@ -212,9 +208,7 @@ def closest_solid_hit(world: World, b: int, o: wp.vec3, d: wp.vec3, reach: float
         # Only bodies whose flags match need a test at every face.
         strike = first_opaque_hit(world, b, o, d, reach, through)
     else:
-        strike = to_strike(
-            first_in_mesh(world.geometries[g].tree, world.geometries[g].mesh, o, d, reach)
-        )
+        strike = to_strike(first_in_mesh(world.geometries[g].tree, o, d, reach))
     return strike
 
 
@@ -223,7 +217,7 @@ def is_mesh_intersected(world: World, b: int, o: wp.vec3, d: wp.vec3, reach: flo
     """Whether a body blocks a ray; arguments as for closest_solid_hit."""
     g = world.bodies[b].geometry
     # The cheaper any-hit query comes first: only hits on cut-outs need the test at every face.
-    hit = any_in_mesh(world.geometries[g].tree, world.geometries[g].mesh, o, d, reach)
+    hit = any_in_mesh(world.geometries[g].tree, o, d, reach)
     if hit and (world.bodies[b].cutouts & through) != 0:
         hit = first_opaque_hit(world, b, o, d, reach, through).face >= 0
     return hit

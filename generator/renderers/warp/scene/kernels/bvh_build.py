@@ -17,8 +17,12 @@ wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll":
 NOWHERE = 1.0e30
 
 _GROW = (
-    # Trees are built on the CPU; CUDA has Warp's own.
-    "#if !defined(__CUDA_ARCH__) && !defined(AS_ON_GPU)"
+    # Trees are built on the CPU, for all devices.
+    """
+#if !defined(__CUDA_ARCH__)
+#pragma push_macro("AS_ON_GPU")
+#undef AS_ON_GPU
+"""
     + SIMD
     + f"""
     constexpr float NOWHERE = {NOWHERE}f;
@@ -202,6 +206,7 @@ _GROW = (
     }
     counts.data[0] = node_count;
     counts.data[1] = leaf_count;
+#pragma pop_macro("AS_ON_GPU")
 #endif
 """
 )

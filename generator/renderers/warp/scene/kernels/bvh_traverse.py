@@ -1,8 +1,9 @@
 """Ray traversal of bounding volume hierarchies, eight boxes or eight triangles at a time.
 
-On the CPU, trees are those of gen_data.generator.renderers.warp.scene.bvh, and the traversal takes
-a third of the time of ``wp.mesh_query_ray``, which tests boxes and triangles one by one. On CUDA
-the same functions query Warp's own hierarchies.
+Trees are those of gen_data.generator.renderers.warp.scene.bvh. On the CPU the traversal takes a
+third of the time of ``wp.mesh_query_ray``, which tests boxes and triangles one by one. On CUDA a
+thread tests the eight one after another, in the same order and with the same arithmetic: hits are
+equal to the last bit.
 
 Sources: Wald, Benthin and Boulos, "Getting rid of packets: efficient SIMD single-ray traversal
 using multi-branching BVHs", 2008; Woop, Benthin and Wald, "Watertight ray/triangle intersection",
@@ -10,8 +11,6 @@ JCGT 2(1), 2013; Ize, "Robust BVH ray traversal", JCGT 2(2), 2013 (FARTHER).
 """
 
 from __future__ import annotations
-
-from pathlib import Path
 
 import warp as wp
 
@@ -39,6 +38,10 @@ _RAY = (
         float sx, sy, sz;   // shear that aligns the ray with that axis
     };
     struct Strike { float t, u, v; int face; };
+    // The same 32 bits.
+    union Word { float number; unsigned bits; };
+    auto to_bits = [](float x) { Word word; word.number = x; return word.bits; };
+    auto to_float = [](Entry bits) { Word word; word.bits = (unsigned)bits; return word.number; };
     struct Walk { Entry stack[256]; int top; };
 
     auto start = [](Ray& ray, const wp::vec3& o, const wp::vec3& d) {
@@ -62,75 +65,80 @@ _RAY = (
 
     // Slab test of a node's eight boxes: push those that the ray enters, the nearest on top.
     auto enter = [&](Walk& walk, const Ray& ray, const float* node, float reach, bool sorted) {
-        auto slab = [&](int k, int lanes) {
-            return (load(node + lanes, Floats()) - Floats(ray.o[k])) * ray.inverse[k];
-        };
-        const Floats enters_x = slab(0, ray.near[0]), leaves_x = slab(0, ray.near[0] ^ 8);
-        const Floats enters_y = slab(1, ray.near[1]), leaves_y = slab(1, ray.near[1] ^ 8);
-        const Floats enters_z = slab(2, ray.near[2]), leaves_z = slab(2, ray.near[2] ^ 8);
-        const Floats enters = larger(enters_x, larger(enters_y, larger(enters_z, 0.0f)));
-        const Floats leaves = smaller(smaller(leaves_x, leaves_y), leaves_z);
-        unsigned hits = bits(enters <= smaller(leaves * FARTHER, reach));
-        const int* codes = (const int*)(node + 48);
         const int first = walk.top;
-        while (hits) {
-            const int lane = first_bit(hits);
-            hits &= hits - 1;
-            const unsigned bits = __builtin_bit_cast(unsigned, (float)enters[lane]);
-            const Entry entry = (Entry)bits << 32 | (unsigned)codes[lane];
-            // Insertion sort: a ray enters few of the eight boxes.
-            int at = walk.top++;
-            for (; sorted && at > first && walk.stack[at - 1] < entry; --at)
-                walk.stack[at] = walk.stack[at - 1];
-            walk.stack[at] = entry;
+        for (int part = 0; part < 8; part += LANES) {
+            auto slab = [&](int k, int lanes) {
+                return (load(node + lanes + part, Floats()) - Floats(ray.o[k])) * ray.inverse[k];
+            };
+            const Floats enters_x = slab(0, ray.near[0]), leaves_x = slab(0, ray.near[0] ^ 8);
+            const Floats enters_y = slab(1, ray.near[1]), leaves_y = slab(1, ray.near[1] ^ 8);
+            const Floats enters_z = slab(2, ray.near[2]), leaves_z = slab(2, ray.near[2] ^ 8);
+            const Floats enters = larger(enters_x, larger(enters_y, larger(enters_z, 0.0f)));
+            const Floats leaves = smaller(smaller(leaves_x, leaves_y), leaves_z);
+            unsigned hits = bits(enters <= smaller(leaves * FARTHER, reach));
+            const int* codes = (const int*)(node + 48) + part;
+            while (hits) {
+                const int lane = first_bit(hits);
+                hits &= hits - 1;
+                const Entry entry = (Entry)to_bits(at(enters, lane)) << 32 | (unsigned)codes[lane];
+                // Insertion sort: a ray enters few of the eight boxes.
+                int place = walk.top++;
+                for (; sorted && place > first && walk.stack[place - 1] < entry; --place)
+                    walk.stack[place] = walk.stack[place - 1];
+                walk.stack[place] = entry;
+            }
         }
     };
 
     // Pop the next code that begins within reach, down to a floor; false if there is none.
-    auto next = [](Walk& walk, int floor, float reach, int& code) {
+    auto next = [&](Walk& walk, int floor, float reach, int& code) {
         while (walk.top > floor) {
             const Entry entry = walk.stack[--walk.top];
             code = (int)(unsigned)entry;
-            if (__builtin_bit_cast(float, (unsigned)(entry >> 32)) < reach)
+            if (to_float(entry >> 32) < reach)
                 return true;
         }
         return false;
     };
 
     // Watertight test of eight triangles (Woop et al. 2013): whether any hit is nearer than before.
-    auto meet = [&](const float* faces, const Ray& ray, Strike& strike) {
-        const Floats ox = ray.o[ray.kx], oy = ray.o[ray.ky], oz = ray.o[ray.kz];
-        auto corner = [&](int axis, int k) {
-            return load(faces + 24 * axis + 8 * k, Floats());
-        };
-        const Floats az = corner(ray.kz, 0) - oz;
-        const Floats bz = corner(ray.kz, 1) - oz;
-        const Floats cz = corner(ray.kz, 2) - oz;
-        const Floats ax = corner(ray.kx, 0) - ox - az * ray.sx;
-        const Floats bx = corner(ray.kx, 1) - ox - bz * ray.sx;
-        const Floats cx = corner(ray.kx, 2) - ox - cz * ray.sx;
-        const Floats ay = corner(ray.ky, 0) - oy - az * ray.sy;
-        const Floats by = corner(ray.ky, 1) - oy - bz * ray.sy;
-        const Floats cy = corner(ray.ky, 2) - oy - cz * ray.sy;
-        // Scaled barycentric weights: edge functions in the sheared plane.
-        const Floats u = cx * by - cy * bx, v = ax * cy - ay * cx, w = bx * ay - by * ax;
-        const Floats low = smaller(smaller(u, v), w), high = larger(larger(u, v), w);
-        const Floats sum = u + v + w;
-        const Floats t = (u * az + v * bz + w * cz) * ray.sz / sum;
-        const Floats zero = 0.0f, reach = strike.t;
-        // All weights of one sign: faces have two sides, and shared edges leave no gap.
-        const auto inside = (low >= zero) | (high <= zero);
-        unsigned hits = bits(inside & (t >= zero) & (t < reach));
-        const bool any = hits != 0;
-        while (hits) {
-            const int lane = first_bit(hits);
-            hits &= hits - 1;
-            // In lane order: equal distances keep the first face, whatever the processor.
-            if (t[lane] < strike.t) {
-                strike.t = t[lane];
-                strike.u = u[lane] / sum[lane];
-                strike.v = v[lane] / sum[lane];
-                strike.face = ((const int*)(faces + 72))[lane];
+    auto meet = [&](const float* leaf, const Ray& ray, Strike& strike) {
+        const Floats ox = ray.o[ray.kx], oy = ray.o[ray.ky], oz = ray.o[ray.kz], zero = 0.0f;
+        bool any = false;
+        for (int part = 0; part < 8; part += LANES) {
+            const float* faces = leaf + part;
+            auto corner = [&](int axis, int k) {
+                return load(faces + 24 * axis + 8 * k, Floats());
+            };
+            const Floats az = corner(ray.kz, 0) - oz;
+            const Floats bz = corner(ray.kz, 1) - oz;
+            const Floats cz = corner(ray.kz, 2) - oz;
+            const Floats ax = corner(ray.kx, 0) - ox - az * ray.sx;
+            const Floats bx = corner(ray.kx, 1) - ox - bz * ray.sx;
+            const Floats cx = corner(ray.kx, 2) - ox - cz * ray.sx;
+            const Floats ay = corner(ray.ky, 0) - oy - az * ray.sy;
+            const Floats by = corner(ray.ky, 1) - oy - bz * ray.sy;
+            const Floats cy = corner(ray.ky, 2) - oy - cz * ray.sy;
+            // Scaled barycentric weights: edge functions in the sheared plane.
+            const Floats u = cx * by - cy * bx, v = ax * cy - ay * cx, w = bx * ay - by * ax;
+            const Floats low = smaller(smaller(u, v), w), high = larger(larger(u, v), w);
+            const Floats sum = u + v + w;
+            const Floats t = (u * az + v * bz + w * cz) * ray.sz / sum;
+            const Floats reach = strike.t;
+            // All weights of one sign: faces have two sides, and shared edges leave no gap.
+            const auto inside = (low >= zero) | (high <= zero);
+            unsigned hits = bits(inside & (t >= zero) & (t < reach));
+            any |= hits != 0;
+            while (hits) {
+                const int lane = first_bit(hits);
+                hits &= hits - 1;
+                // In lane order: equal distances keep the first face, whatever the processor.
+                if (at(t, lane) < strike.t) {
+                    strike.t = at(t, lane);
+                    strike.u = at(u, lane) / at(sum, lane);
+                    strike.v = at(v, lane) / at(sum, lane);
+                    strike.face = ((const int*)(faces + 72))[lane];
+                }
             }
         }
         return any;
@@ -184,45 +192,6 @@ _IN_SCENE = """
     } while (!(ANY && body >= 0) && next(walk, 0, strike.t, code));
 """
 
-_STRIKE_ON_CUDA = """
-    struct { float t, u, v; int face; } strike = {reach, 0.0f, 0.0f, -1};
-    float sign;
-    wp::vec3 normal;
-    auto search = [&](uint64_t mesh, const wp::vec3& o, const wp::vec3& d) {
-        return ANY ? wp::mesh_query_ray_anyhit(mesh, o, d, strike.t)
-                   : wp::mesh_query_ray(mesh, o, d, strike.t, strike.t, strike.u, strike.v, sign,
-                                        normal, strike.face);
-    };
-"""
-
-_IN_MESH_ON_CUDA = """
-    const int body = search(mesh, o, d) ? 0 : -1;
-"""
-
-# Warp 1.19 has an iterator for each kind of query; before, there was one for all.
-_HAS_KINDS = (
-    "bvh_query_ray_next" in Path(wp.__file__).with_name("native").joinpath("bvh.h").read_text()
-)
-
-_IN_SCENE_ON_CUDA = (
-    f"constexpr auto next_body = wp::bvh_query{'_ray' * _HAS_KINDS}_next;"
-    + """
-    // A tiny number instead of zero, as on the CPU: the slab test knows no 0 * inf.
-    auto not_zero = [](float x) { return x < 1.0e-20f && x > -1.0e-20f ? 1.0e-20f : x; };
-    const wp::vec3 way(not_zero(d[0]), not_zero(d[1]), not_zero(d[2]));
-    wp::bvh_query_t candidates = wp::bvh_query_ray(hierarchy, o, way, -1);
-    int body = -1, b = 0;
-    while (!(ANY && body >= 0) && next_body(candidates, b, strike.t)) {
-        const auto& placed = bodies.data[b];
-        if (placed.cutouts & through)
-            continue;
-        const wp::vec3 begin = mul(placed.B_mesh_world, o) + placed.t_mesh_world;
-        if (search(geometries.data[placed.geometry].mesh, begin, mul(placed.B_mesh_world, d)))
-            body = b;
-    }
-"""
-)
-
 _FOUND = """
     wp::vec_t<6, double> found;
     found[0] = strike.t;
@@ -243,48 +212,41 @@ _MET = """
 """
 
 
-def _snippet(cpu: str, cuda: str, told: str) -> str:
-    """Source of one native function for both devices.
+def _snippet(find: str, told: str) -> str:
+    """Source of one native function.
 
-    On the CPU it is compiled out of line: most modules traverse trees in several places.
+    It is compiled out of line: most modules traverse trees in several places.
 
     Args:
-        cpu, cuda: Code that finds a ``body`` and its ``strike``: any one (if ``ANY``) or the first.
+        find: Code that finds a ``body`` and its ``strike``: any one (if ``ANY``) or the first.
         told: What to return: the first intersection, the body of any, or whether there is any.
     """
     any_only = f"constexpr bool ANY = {str(told != _FOUND).lower()};"
     return f"""
-#if defined(__CUDA_ARCH__) || defined(AS_ON_GPU)
-    {any_only}{_STRIKE_ON_CUDA}{cuda}{told}
-#else
     auto walked = [&]() __attribute__((noinline)) {{
-    {any_only}{_RAY}{cpu}{told}
+    {any_only}{_RAY}{find}{told}
     }};
     return walked();
-#endif
 """
 
 
-@wp.func_native(_snippet(_IN_MESH, _IN_MESH_ON_CUDA, _FOUND))
+@wp.func_native(_snippet(_IN_MESH, _FOUND))
 def first_in_mesh(
-    tree: wp.array[wp.float32], mesh: wp.uint64, o: wp.vec3, d: wp.vec3, reach: float
+    tree: wp.array[wp.float32], o: wp.vec3, d: wp.vec3, reach: float
 ) -> wp.spatial_vectord:
     """The first face along a ray in the mesh frame, before a parameter."""
     ...
 
 
-@wp.func_native(_snippet(_IN_MESH, _IN_MESH_ON_CUDA, _MET))
-def any_in_mesh(
-    tree: wp.array[wp.float32], mesh: wp.uint64, o: wp.vec3, d: wp.vec3, reach: float
-) -> bool:
+@wp.func_native(_snippet(_IN_MESH, _MET))
+def any_in_mesh(tree: wp.array[wp.float32], o: wp.vec3, d: wp.vec3, reach: float) -> bool:
     """Whether a ray in the mesh frame meets a face before a parameter."""
     ...
 
 
-@wp.func_native(_snippet(_IN_SCENE, _IN_SCENE_ON_CUDA, _FOUND))
+@wp.func_native(_snippet(_IN_SCENE, _FOUND))
 def first_in_scene(
     tree: wp.array[wp.float32],
-    hierarchy: wp.uint64,
     bodies: wp.array[BodyRecord],
     geometries: wp.array[Geometry],
     o: wp.vec3,
@@ -296,10 +258,9 @@ def first_in_scene(
     ...
 
 
-@wp.func_native(_snippet(_IN_SCENE, _IN_SCENE_ON_CUDA, _BODY))
+@wp.func_native(_snippet(_IN_SCENE, _BODY))
 def any_in_scene(
     tree: wp.array[wp.float32],
-    hierarchy: wp.uint64,
     bodies: wp.array[BodyRecord],
     geometries: wp.array[Geometry],
     o: wp.vec3,

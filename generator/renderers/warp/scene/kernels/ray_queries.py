@@ -102,9 +102,7 @@ def closest_hit(world: World, o: wp.vec3, d: wp.vec3, reach: float, through: int
         reach: Largest parameter along the ray.
         through: What the ray may pass: HOLES, CLEAR or both.
     """
-    found = first_in_scene(
-        world.tree, world.hierarchy, world.bodies, world.geometries, o, d, reach, through
-    )
+    found = first_in_scene(world.tree, world.bodies, world.geometries, o, d, reach, through)
     met = RayHit()
     met.at = wp.vec2i(int(found[4]), int(found[3]))
     met.t = float(found[0])
@@ -229,7 +227,6 @@ def blocker_of(world: World, path: Path, through: int):
     """A body that intersects a path that passes ``through``; NOBODY if there is none."""
     b = any_in_scene(
         world.tree,
-        world.hierarchy,
         world.bodies,
         world.geometries,
         path.origin,

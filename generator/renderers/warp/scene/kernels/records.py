@@ -54,14 +54,12 @@ class Geometry:
     """One mesh in its own frame.
 
     Attributes:
-        mesh: Warp's hierarchy, on CUDA; 0 on the CPU.
-        tree: Hierarchy of gen_data.generator.renderers.warp.scene.bvh, on the CPU; empty on CUDA.
+        tree: Hierarchy of its faces, see gen_data.generator.renderers.warp.scene.bvh.
         faces: Three vertex indices per face, flat.
         boxes: Boxes that together bound all faces, see box_groups.
         convex: 1 for a convex solid, which never shadows itself when seen from outside.
     """
 
-    mesh: wp.uint64
     tree: wp.array[wp.float32]
     vertices_m: wp.array[wp.vec3]
     normals: wp.array[wp.vec3]
@@ -439,9 +437,7 @@ class World:
 
     Attributes:
         boxes: The bodies' boxes in the world, see box_groups.
-        tree: Hierarchy over the bodies' boxes, see gen_data.generator.renderers.warp.scene.bvh;
-            empty on CUDA.
-        hierarchy: Warp's hierarchy over the same boxes, on CUDA; 0 on the CPU.
+        tree: Hierarchy over the bodies' boxes, see gen_data.generator.renderers.warp.scene.bvh.
         cutouts: Numbers of the bodies with faces that rays may pass.
         cutout_hierarchy: Warp's hierarchy over their boxes; 0 without any.
         lobes: Directional albedo of specular lobes, see brdf.directional_albedo.
@@ -451,7 +447,6 @@ class World:
 
     boxes: wp.array[wp.float32]
     tree: wp.array[wp.float32]
-    hierarchy: wp.uint64
     cutouts: wp.array[wp.int32]
     cutout_hierarchy: wp.uint64
     geometries: wp.array[Geometry]

@@ -14,7 +14,8 @@ from gen_data.generator.renderers.warp.visibility.kernels.rasterizer import (
     clip,
     depth_plane,
     draw_coverage,
-    fan_edges,
+    fan_edges_in,
+    in_rows,
     is_beyond_guard,
     is_empty,
     is_filled,
@@ -32,21 +33,28 @@ def draw_silhouettes(
     p_camera: wp.array[wp.vec3],
     xy: wp.array[wp.vec2i],
     outlines: wp.array[Outline],
+    parts: int,
     mask: wp.array[wp.uint8],
 ):
-    """Write 1 at every pixel centre that a body covers; one body per thread.
+    """Write 1 at every pixel centre that bodies cover.
 
-    All threads write the same value, so bodies of one instance may be drawn concurrently.
+    All threads write the same value, so bodies of one instance may be drawn concurrently, and so
+    may faces of a body.
+
+    Args:
+        parts: Threads that share the faces of an outline.
     """
-    outline = outlines[wp.tid()]
+    number, part = wp.tid()
+    outline = outlines[number]
     geometry = world.geometries[world.bodies[outline.body].geometry]
     first = world.bodies[outline.body].first_vertex
-    for f in range(geometry.face_slots.shape[0]):
+    for f in range(part, geometry.face_slots.shape[0], parts):
         i = first + geometry.faces[3 * f]
         j = first + geometry.faces[3 * f + 1]
         k = first + geometry.faces[3 * f + 2]
         if xy[i][0] != UNSNAPPED and xy[j][0] != UNSNAPPED and xy[k][0] != UNSNAPPED:
             box = pixel_box(xy[i], xy[j], xy[k], outline.window, 0)
+            box = in_rows(box, outline.first_row, outline.last_row)
             if is_empty(box) or is_filled(box, outline, mask):
                 continue
             e = make_edges(xy[i], xy[j], xy[k], outline.window, box)
@@ -63,7 +71,9 @@ def draw_silhouettes(
             plane = depth_plane(view, p_camera[i], p_camera[j], p_camera[k], outline.window)
             plane.high = 1.0 / Z_NEAR_M
             for t in range(1, corners - 1):
-                e = fan_edges(view, polygon, t, outline.window, 0)
+                e = fan_edges_in(
+                    view, polygon, t, outline.window, 0, outline.first_row, outline.last_row
+                )
                 if e.covers != 0:
                     draw_coverage(world, e, plane, cutout, outline, mask)
 

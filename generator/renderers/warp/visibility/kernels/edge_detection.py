@@ -73,20 +73,26 @@ def edges_along(images: GBufferRecord, i: int, step: int, n: int, crease_cosine:
 
 
 @wp.kernel
-def find_edges(view: View, images: GBufferRecord, count: wp.array[int], pixels: wp.array[int]):
+def find_edges(
+    view: View, images: GBufferRecord, run: int, count: wp.array[int], pixels: wp.array[int]
+):
     """List the pixels that an edge may cross.
 
     Args:
+        run: Pixels of a row for one thread.
         count: Length of the list; 0 at first.
         pixels: The list, in any order.
     """
-    y = wp.tid()
+    y, part = wp.tid()
     width = view.width
+    x = int(part * run)
+    end = wp.min(x + run, width)
     left = int(0)
-    x = int(0)
-    while x < width:
+    if x > 0:
+        left = edges_along(images, y * width + x - 1, 1, 1, CREASE_COSINE)
+    while x < end:
         i = y * width + x
-        n = wp.min(GROUP_PX, width - x)
+        n = wp.min(GROUP_PX, end - x)
         right = edges_along(images, i, 1, wp.min(n, width - 1 - x), CREASE_COSINE)
         crossed = right | (right << 1) | left
         if y > 0:

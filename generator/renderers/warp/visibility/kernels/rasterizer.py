@@ -66,12 +66,15 @@ class Outline:
 
     Attributes:
         window: The pixels that the body may cover; may lie outside the image.
+        first_row, last_row: Rows of the window to draw.
         first_pixel: Index in the buffer of the window's first pixel.
         stride: Pixels between rows of the buffer.
     """
 
     body: int
     window: Window
+    first_row: int
+    last_row: int
     first_pixel: int
     stride: int
 
@@ -148,14 +151,17 @@ def project_vertices(
     bodies: wp.array[int],
     p_camera: wp.array[wp.vec3],
     xy: wp.array[wp.vec2i],
-    extents: wp.array[Extent],
+    extents: wp.array2d[Extent],
 ):
-    """Vertices in the camera frame and on the snapped image plane, one listed body per thread.
+    """Vertices in the camera frame and on the snapped image plane, of listed bodies.
 
     Args:
-        extents: Of each listed body; the depth of a body without vertices is negative.
+        extents: Of each listed body, in as many parts as threads share the work on it; the depth of
+            a part without vertices is negative.
     """
-    b = bodies[wp.tid()]
+    row, part = wp.tid()
+    parts = extents.shape[1]
+    b = bodies[row]
     A = world.bodies[b].A_camera_mesh
     t = world.bodies[b].t_camera_mesh
     geometry = world.geometries[world.bodies[b].geometry]
@@ -163,7 +169,7 @@ def project_vertices(
     low = wp.vec2i(2147483647, 2147483647)
     high = wp.vec2i(UNSNAPPED, UNSNAPPED)
     farthest_m = float(-1.0)
-    for i in range(geometry.vertices_m.shape[0]):
+    for i in range(part, geometry.vertices_m.shape[0], parts):
         p = A @ geometry.vertices_m[i] + t
         q = wp.vec2i(UNSNAPPED, UNSNAPPED)
         if (
@@ -181,7 +187,7 @@ def project_vertices(
     extent.low = low
     extent.high = high
     extent.farthest_m = farthest_m
-    extents[wp.tid()] = extent
+    extents[row, part] = extent
 
 
 @wp.func
@@ -488,13 +494,36 @@ def clip(view: View, p0: wp.vec3, p1: wp.vec3, p2: wp.vec3):
 
 
 @wp.func
+def in_rows(box: Box, first_row: int, last_row: int):
+    """The part of a box in some rows of its window."""
+    part = box
+    part.y_first = wp.max(box.y_first, first_row)
+    part.y_last = wp.min(box.y_last, last_row)
+    return part
+
+
+@wp.func
 def fan_edges(view: View, polygon: Polygon, t: int, window: Window, reach: int):
     """Edge functions of the t-th triangle of a polygon's fan."""
+    return fan_edges_in(view, polygon, t, window, reach, 0, window.height - 1)
+
+
+@wp.func
+def fan_edges_in(
+    view: View,
+    polygon: Polygon,
+    t: int,
+    window: Window,
+    reach: int,
+    first_row: int,
+    last_row: int,
+):
+    """As ``fan_edges``, over some rows of the window."""
     p = snap_to_grid(view, polygon[0])
     q = snap_to_grid(view, polygon[t])
     r = snap_to_grid(view, polygon[t + 1])
     edges = Edges()
-    box = pixel_box(p, q, r, window, reach)
+    box = in_rows(pixel_box(p, q, r, window, reach), first_row, last_row)
     if not is_empty(box):
         edges = make_edges(p, q, r, window, box)
     return edges
