@@ -40,6 +40,9 @@ def read_shape(
         own = materials and not shape.look.whole
         source = _with_named_images(read_mesh(folder, shape.file, materials=own), shape.file)
         matrix[:, :3] = matrix[:, :3] * np.array(shape.size)
+        if shape.file.lower().endswith((".glb", ".gltf")):
+            # Y points up in glTF: RViz (ros2/rviz pull request 1482) and Drake turn it, too.
+            matrix = matrix[:, [0, 2, 1, 3]] * (1.0, 1.0, -1.0, 1.0)
     else:
         source = MeshSource(TriangleSoup.of(_primitive(shape)))
         if shape.look.texture and materials:
