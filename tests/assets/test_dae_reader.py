@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -136,6 +137,31 @@ def test_geometry_with_a_broken_material_is_kept(tmp_path: Path) -> None:
     soup = read_mesh(folder, "a.dae").soup
     assert len(soup) == 2
     assert soup.slots[0].material.base_color == (0.6, 0.6, 0.6)
+
+
+def test_geometry_is_kept_where_an_image_has_no_path(tmp_path: Path) -> None:
+    """As in Gazebo's ``arm_part``; the remark names what is wrong."""
+    folder = folder_of(tmp_path)
+    text = (tmp_path / "a.dae").read_text()
+    text = re.sub("<image (.*?)>.*?</image>", r"<image \1></image>", text, flags=re.DOTALL)
+    (tmp_path / "a.dae").write_text(text)
+    source = read_mesh(folder, "a.dae")
+    assert len(source.soup) == 2
+    assert any("Image has no file path" in remark for remark in source.remarks)
+
+
+@pytest.mark.parametrize(
+    "path", ["model://shed/images/wood.png", "file://C:/me/wood.png", "C:\\me\\WOOD.png"]
+)
+def test_images_of_other_models_and_computers_are_found(tmp_path: Path, path: str) -> None:
+    """Beside the file, or in the folder of the model that has that name."""
+    here = "shed/images/wood.png" if path.startswith("model") else "wood.png"
+    (tmp_path / here).parent.mkdir(parents=True, exist_ok=True)
+    (tmp_path / here).write_bytes(b"")
+    folder = folder_of(tmp_path, material="wood")
+    text = (tmp_path / "a.dae").read_text().replace("my%20wood.png", path)
+    (tmp_path / "a.dae").write_text(text)
+    assert read_mesh(folder, "a.dae").soup.slots[0].material.texture == here
 
 
 @pytest.mark.parametrize(
