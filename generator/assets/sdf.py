@@ -112,7 +112,7 @@ class _Placement:
 
     model: str = _MODEL
     frame: str = ""
-    pose: SE3 = SE3()
+    pose: SE3 = field(default_factory=SE3)
     placed: str = ""
 
 

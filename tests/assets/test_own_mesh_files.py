@@ -108,8 +108,8 @@ def test_an_mtl_may_name_the_image_of_another_model(tmp_path: Path) -> None:
     (tmp_path / "van/a.mtl").write_text("newmtl m\nmap_Kd model://suv/images/wheel.png\n")
     text = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl m\nf 1/1 2/1 3/1\n"
     (tmp_path / "van/a.obj").write_text(text)
-    (slot,) = read_mesh(Folder(tmp_path), "van/a.obj").soup.slots
-    assert slot.material.texture == "suv/images/wheel.png"
+    soup = read_mesh(Folder(tmp_path), "van/a.obj").soup
+    assert soup.slots[soup.face_slots[0]].material.texture == "suv/images/wheel.png"
 
 
 def test_the_image_of_an_mtl_is_scaled_and_moved(tmp_path: Path) -> None:

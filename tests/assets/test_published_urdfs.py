@@ -252,7 +252,7 @@ def test_links_named_with_slashes_have_meshes(tmp_path: Path) -> None:
 
 
 def test_y_of_a_gltf_mesh_points_up_in_a_description(tmp_path: Path) -> None:
-    """As in RViz since Jazzy (ros2/rviz pull request 1482) and Drake: Y of the file is Z of the link.
+    """Y of the file is Z of the link, as in RViz (ros2/rviz pull request 1482) and Drake.
 
     A box whose lowest corner is (0, 0, 0) and whose highest is (1, 2, 3): Z of the file becomes -Y.
     The scale counts along the link's axes.
