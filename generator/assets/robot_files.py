@@ -52,9 +52,9 @@ def resolve_uri(folder: Folder, relative: str, uri: str) -> str:
 
 
 def _has_folder(folder: Folder, relative: str) -> bool:
-    """Whether the folder of a file exists."""
+    """Whether a file's folder exists and is not the asset folder itself."""
     try:
-        return folder.path(relative).parent.is_dir()
+        return "/" in relative and folder.path(relative).parent.is_dir()
     except AssetError:
         return False
 
