@@ -349,10 +349,11 @@ class _Reader:
             return None
         if kind == "mesh":
             uri = (given.findtext("uri") or "").strip()
-            if given.find("submesh") is not None:
-                self.remarks["submesh (the whole mesh is used)"] += 1
             file = resolve_uri(self.folder, scope.file, uri.removeprefix("file://"))
-            return Shape("mesh", file, _numbers(given.findtext("scale") or "1 1 1", 3), at)
+            scale = _numbers(given.findtext("scale") or "1 1 1", 3)
+            part = (given.findtext("submesh/name") or "").strip()
+            centered = (given.findtext("submesh/center") or "").strip() in ("true", "1")
+            return Shape("mesh", file, scale, at, part=part, centered=centered)
         if kind == "box":
             size = _numbers(given.findtext("size") or "", 3)
         elif kind == "ellipsoid":
@@ -397,12 +398,19 @@ class _Reader:
         self.frames[_MODEL] = ("", SE3())
         try:
             poses = {name: self._at(name) for name in self.links}
-            placed = [self._place(*anchor) for anchor in self.anchors.values()]
-            children = {p.joint.child for p in placed}
+            placed: list[PlacedJoint] = []
+            children: set[str] = set()
+            for anchor in self.anchors.values():
+                joint = self._place(*anchor)
+                if joint.joint.child in children:
+                    self.remarks[f"joint '{joint.joint.name[:60]}' (it closes a loop)"] += 1
+                    continue
+                children.add(joint.joint.child)
+                placed.append(joint)
             for name in self.links:
                 if name not in children:
-                    joint = Joint(f"{name}_fixed", "fixed", _MODEL, name, SE3(), _X, 0.0, 0.0)
-                    placed.append(PlacedJoint(joint, (0.0, 0.0, 0.0), _X))
+                    fixed = Joint(f"{name}_fixed", "fixed", _MODEL, name, SE3(), _X, 0.0, 0.0)
+                    placed.append(PlacedJoint(fixed, (0.0, 0.0, 0.0), _X))
             poses[_MODEL] = SE3()
             links = {_MODEL: Link(_MODEL, (), ()), **self.links}
             described = jointed(links, poses, placed)

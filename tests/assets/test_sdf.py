@@ -12,6 +12,7 @@ from PIL import Image
 from gen_data.generator.assets.asset_folder import Folder
 from gen_data.generator.assets.library import open_library
 from gen_data.generator.assets.robot_description import RobotDescription
+from gen_data.generator.assets.robot_shapes import read_shape
 from gen_data.generator.assets.sdf import read_sdf
 from gen_data.generator.core.errors import AssetError
 from gen_data.generator.core.kinematics import joint_transform
@@ -234,6 +235,34 @@ def test_a_mimic_follows_its_leader_from_a_reference(tmp_path: Path) -> None:
     described = read(tmp_path, *HINGED, link("leaf"), second)
     (other,) = (j for j in described.joints if j.name == "other")
     assert (other.mimic, other.mimic_multiplier, other.mimic_offset) == ("hinge", 2.0, 0.1)
+
+
+def test_one_object_of_a_mesh_file_is_used_and_centered(tmp_path: Path) -> None:
+    """Of a file with a tetrahedron at the origin and one 9 m along X, scaled by 2."""
+    moved = "\n".join(f"v {x} {y} {z}" for x, y, z in ((9, 0, 0), (10, 0, 0), (9, 1, 0), (9, 0, 1)))
+    second = f"o wheel\n{moved}\nf 5 7 6\nf 5 6 8\nf 6 7 8\nf 7 5 8\n"
+    (tmp_path / "car.obj").write_text(f"o body\n{TETRAHEDRON}{second}")
+    bounds = {}
+    for center in ("false", "true"):
+        part = f"<submesh><name>wheel</name><center>{center}</center></submesh>"
+        mesh = f"<geometry><mesh><uri>car.obj</uri><scale>2 2 2</scale>{part}</mesh></geometry>"
+        described = read(tmp_path, f'<link name="a"><visual name="v">{mesh}</visual></link>')
+        (shape,) = described.links["a"].visuals
+        x = read_shape(Folder(tmp_path), shape, SE3()).soup.corners[..., 0]
+        bounds[center] = (x.min(), x.max())
+    assert bounds == {"false": (18.0, 20.0), "true": (-1.0, 1.0)}
+    wrong = f'<link name="a"><visual name="v">{mesh.replace("wheel", "weel")}</visual></link>'
+    (shape,) = read(tmp_path, wrong).links["a"].visuals
+    with pytest.raises(AssetError, match=r"car\.obj: has no part 'weel' \(did you mean 'wheel'\?"):
+        read_shape(Folder(tmp_path), shape, SE3())
+
+
+def test_of_a_loop_the_first_joint_is_kept(tmp_path: Path) -> None:
+    """As of a closed loop of MJCF; the other one is named."""
+    brace = '<joint name="brace" type="fixed"><parent>frame</parent><child>door</child></joint>'
+    described = read(tmp_path, *HINGED, brace)
+    assert [j.name for j in described.joints if j.movable] == ["hinge"]
+    assert described.remarks == ("not used: 1 joint 'brace' (it closes a loop)",)
 
 
 def test_a_static_model_does_not_move(tmp_path: Path) -> None:
