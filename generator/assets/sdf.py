@@ -194,7 +194,7 @@ class _Reader:
         if element.tag not in ("link", "joint", "frame", "model"):
             return
         name = scope.prefix + element.get("name", "")
-        alike = {"link": self.links, "joint": self.anchors}.get(element.tag, {})
+        alike = {"link": [*self.links], "joint": [*self.anchors]}.get(element.tag, [])
         if scope.lenient and name in self.frames and name not in alike:
             name += f"_{element.tag}"
         if name in self.frames or not element.get("name"):

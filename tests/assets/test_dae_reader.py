@@ -72,6 +72,12 @@ def test_nodes_place_geometry_and_the_unit_makes_metres(tmp_path: Path) -> None:
     assert soup.face_groups.tolist() == [0, 0, 1, 1]
 
 
+def test_objects_have_the_names_of_their_nodes(tmp_path: Path) -> None:
+    """As tools show them; both nodes hold the one geometry ``plate``."""
+    soup = read_mesh(folder_of(tmp_path, second=SECOND), "a.dae").soup
+    assert soup.group_names == ("a", "b")
+
+
 def test_a_mirrored_node_keeps_its_front_outside(tmp_path: Path) -> None:
     """Scaled by -1 along X, the quad still faces +Z."""
     soup = read_mesh(folder_of(tmp_path, scale="-1 1 1"), "a.dae").soup

@@ -88,15 +88,33 @@ def _without_broken_materials(data: bytes, known: set[str]) -> bytes:
     return tostring(root)
 
 
-def _placed_geometries(document: Any) -> Iterator[tuple[Any, Float64, dict[str, Any]]]:
-    """Yield geometry, its affine map [3, 4] to the scene and its materials by symbol."""
+def _placed_geometries(document: Any) -> Iterator[tuple[str, Any, Float64, dict[str, Any]]]:
+    """Yield name, geometry, its affine map [3, 4] to the scene and its materials by symbol.
+
+    The name is that of the node, which tools show and descriptions refer to.
+    """
     if document.scene is None:
         for geometry in document.geometries:
-            yield geometry, np.eye(4)[:3], {}
+            yield "", geometry, np.eye(4)[:3], {}
         return
-    for bound in document.scene.objects("geometry"):
+    for name, bound in _bound_geometries(document.scene.nodes, None, ""):
         nodes = {symbol: node.target for symbol, node in bound.materialnodebysymbol.items()}
-        yield bound.original, np.asarray(bound.matrix, np.float64)[:3], nodes
+        yield name, bound.original, np.asarray(bound.matrix, np.float64)[:3], nodes
+
+
+def _bound_geometries(nodes: Any, matrix: Any, name: str) -> Iterator[tuple[str, Any]]:
+    """Geometries below nodes, each with the name of the nearest node around it that has one."""
+    from collada.scene import Node, NodeNode
+
+    for node in nodes:
+        if isinstance(node, NodeNode):
+            yield from _bound_geometries([node.node], matrix, name)
+        elif isinstance(node, Node):
+            here = node.matrix if matrix is None else np.dot(matrix, node.matrix)
+            yield from _bound_geometries(node.children, here, str(node.name or node.id or name))
+        else:
+            for bound in node.objects("geometry", matrix):
+                yield name, bound
 
 
 def _make_soup(
@@ -104,7 +122,7 @@ def _make_soup(
     relative: str,
     document: Any,
     number: int,
-    placed: tuple[Any, Float64, dict[str, Any]],
+    placed: tuple[str, Any, Float64, dict[str, Any]],
     remarks: list[str] | None,
 ) -> list[TriangleSoup]:
     """Soups of one geometry's sets of polygons; they are one group.
@@ -114,7 +132,7 @@ def _make_soup(
     from collada.polylist import Polylist
     from collada.triangleset import TriangleSet
 
-    geometry, matrix, bound = placed
+    node, geometry, matrix, bound = placed
     matrix = matrix * float(document.assetInfo.unitmeter or 1.0)
     soups = []
     for primitive in geometry.primitives:
@@ -135,7 +153,7 @@ def _make_soup(
             uvs = _rows(triangles.texcoordset[0], triangles.texcoord_indexset[0])[..., :2]
         if triangles.normal is not None:
             normals = _rows(triangles.normal, triangles.normal_index)
-        name = str(geometry.name or geometry.id or f"geometry_{number}")
+        name = node or str(geometry.name or geometry.id or f"geometry_{number}")
         soup = replace(soup, uvs=uvs, normals=normals, group_names=(name,))
         soups.append(soup.transformed(matrix))
     if len(soups) < 2:
