@@ -50,6 +50,8 @@ class Shape:
             (radius, 0, 0); radii of an ellipsoid.
         T_link_shape: Its pose.
         look: Its material.
+        part: Name of the object of the mesh file that alone is used; empty = all of them.
+        centered: Whether the middle of that part is moved to the origin of the file.
     """
 
     kind: str
@@ -57,6 +59,8 @@ class Shape:
     size: Vec3
     T_link_shape: SE3
     look: Look = Look()
+    part: str = ""
+    centered: bool = False
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ import re
 from pathlib import PurePosixPath
 
 from gen_data.generator.assets.asset_folder import Folder
+from gen_data.generator.core.errors import AssetError
 
 _PACKAGE_FILE = "package.xml"
 _URI = re.compile(r"(?:package|model)://")
@@ -20,7 +21,8 @@ def resolve_uri(folder: Folder, relative: str, uri: str) -> str:
     also tried unchanged, and names of folders above the file may precede it.
 
     Returns:
-        The first such file that exists, else the path where it is expected first.
+        The first such file that exists, else the first in a folder that exists, else the path
+        where it is expected first.
 
     Raises:
         AssetError: if it is another URL, absolute, or leaves the folder.
@@ -45,7 +47,16 @@ def resolve_uri(folder: Folder, relative: str, uri: str) -> str:
             ),
         ]
         candidates += [folder.refer(str(ancestor / name), str(tail)) for tail in tails]
-    return next((c for c in candidates if folder.exists(c)), candidates[0])
+    beside = (c for c in candidates if _has_folder(folder, c))
+    return next((c for c in candidates if folder.exists(c)), next(beside, candidates[0]))
+
+
+def _has_folder(folder: Folder, relative: str) -> bool:
+    """Whether a file's folder exists and is not the asset folder itself."""
+    try:
+        return "/" in relative and folder.path(relative).parent.is_dir()
+    except AssetError:
+        return False
 
 
 def _package_name(folder: Folder, ancestor: PurePosixPath) -> str:

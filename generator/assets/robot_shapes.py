@@ -22,6 +22,7 @@ from gen_data.generator.assets.triangle_soup import (
     face_crosses,
     sphere,
 )
+from gen_data.generator.core.errors import AssetError, did_you_mean
 from gen_data.generator.core.se3 import SE3
 
 
@@ -38,8 +39,14 @@ def read_shape(
     matrix = (T_root_link @ shape.T_link_shape).matrix()[:3]
     if shape.kind == "mesh":
         own = materials and not shape.look.whole
-        source = _with_named_images(read_mesh(folder, shape.file, materials=own), shape.file)
+        whole = read_mesh(folder, shape.file, materials=own)
+        if shape.part:
+            whole = replace(whole, soup=_part_of(whole.soup, shape, folder))
+        source = _with_named_images(whole, shape.file)
         matrix[:, :3] = matrix[:, :3] * np.array(shape.size)
+        if shape.file.lower().endswith((".glb", ".gltf")):
+            # Y points up in glTF: RViz (ros2/rviz pull request 1482) and Drake turn it, too.
+            matrix = matrix[:, [0, 2, 1, 3]] * (1.0, 1.0, -1.0, 1.0)
     else:
         source = MeshSource(TriangleSoup.of(_primitive(shape)))
         if shape.look.texture and materials:
@@ -49,6 +56,24 @@ def read_shape(
     extent = float(np.ptp(soup.corners.reshape(-1, 3), axis=0).max()) if soup.uvs is None else 0.0
     slots = tuple(_apply_look(slot, shape.look, extent) for slot in soup.slots)
     return replace(source, soup=replace(soup, slots=slots).transformed(matrix))
+
+
+def _part_of(soup: TriangleSoup, shape: Shape, folder: Folder) -> TriangleSoup:
+    """The triangles of the named object of a mesh file.
+
+    Raises:
+        AssetError: if it has none of that name.
+    """
+    numbers = [k for k, name in enumerate(soup.group_names) if name == shape.part]
+    part = soup.select(np.isin(soup.face_groups, numbers))
+    if not len(part):
+        known = f"{did_you_mean(shape.part, soup.group_names)}; correct the name"
+        raise AssetError(f"{folder.root / shape.file}: has no part '{shape.part[:60]}'{known}")
+    if shape.centered:
+        points = part.corners.reshape(-1, 3)
+        middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+        part = replace(part, corners=part.corners - middle)
+    return part
 
 
 def _with_named_images(source: MeshSource, file: str) -> MeshSource:

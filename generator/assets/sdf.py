@@ -7,6 +7,7 @@ world is not used: elements place it.
 from __future__ import annotations
 
 import math
+import re
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
@@ -67,7 +68,7 @@ def read_sdf(folder: Folder, relative: str) -> RobotDescription:
         AssetError: if it is malformed, holds no model or several, or refers outside the folder.
     """
     reader = _Reader(folder, relative)
-    reader.add_file(relative, "", (), SE3(), {})
+    reader.add_file(relative, "", (), _Placement())
     return reader.describe()
 
 
@@ -81,11 +82,38 @@ class _Fault(ValueError):
 
 @dataclass(frozen=True)
 class _Scope:
-    """A model that is being read: its file, and the prefix of its names."""
+    """A model that is being read.
+
+    Attributes:
+        file: Its file.
+        prefix: Of the names of its parts.
+        frame: Name of its own frame, ``__model__`` inside it.
+        depth: Files and models around it, and itself.
+        lenient: Whether its version, below 1.7, lets parts of two kinds have one name.
+    """
 
     file: str
     prefix: str
+    frame: str
     depth: tuple[str, ...]
+    lenient: bool
+
+    def named(self, name: str) -> str:
+        """Name among all parts of what this model calls ``name``."""
+        return self.frame if name == _MODEL else self.prefix + name
+
+
+@dataclass(frozen=True)
+class _Placement:
+    """Where an included model is: pose of its frame ``placed`` (empty = its own) in ``frame``.
+
+    ``model`` is the name that its own frame gets.
+    """
+
+    model: str = _MODEL
+    frame: str = ""
+    pose: SE3 = field(default_factory=SE3)
+    placed: str = ""
 
 
 @dataclass
@@ -108,67 +136,78 @@ class _Reader:
     remarks: Counter[str] = field(default_factory=Counter)
 
     def add_file(
-        self, file: str, prefix: str, depth: tuple[str, ...], pose: SE3, outer: dict[str, str]
+        self, file: str, prefix: str, depth: tuple[str, ...], placement: _Placement
     ) -> None:
-        """Add the model of a file. ``outer`` may name the frame of ``pose`` and another name."""
+        """Add the model of a file."""
         place = str(self.folder.root / file)
         data = self.folder.read(file)
         root = parse_xml(data, place, "sdf", "an SDF file", _MAX_ELEMENTS)
         models = root.findall("model") or root.findall("world/model")
-        if len(models) != 1:
+        included = [] if models else root.findall("include") or root.findall("world/include")
+        if len(models) + len(included) != 1:
             raise AssetError(f"{place}: holds {len(models)} models; give a file with one")
-        scope = _Scope(file, prefix, (*depth, file))
+        version = [int(n) for n in re.findall(r"\d+", root.get("version", ""))]
+        scope = _Scope(file, prefix, placement.model, (*depth, file), version < [1, 7])
         try:
-            self._add_model(models[0], scope, outer.get("frame", ""), pose)
+            if included:
+                inner = self._model_file(file, included[0])
+                self.add_file(inner, prefix, scope.depth, placement)
+            else:
+                self._add_model(models[0], scope, placement)
         except (ValueError, KeyError) as error:
-            at = error.element if isinstance(error, _Fault) else models[0]
+            at = error.element if isinstance(error, _Fault) else (models + included)[0]
             reason = f"missing {error}" if isinstance(error, KeyError) else error
             raise AssetError(
                 f"{place}{format_position(at)}: malformed SDF ({reason}); correct it"
             ) from None
 
-    def _add_model(self, model: Element, scope: _Scope, frame: str, pose: SE3) -> None:
+    def _add_model(self, model: Element, scope: _Scope, placement: _Placement) -> None:
         if len(scope.depth) > _MAX_DEPTH:
             raise ValueError(f"models inside models, more than {_MAX_DEPTH} deep")
-        own = scope.prefix + _MODEL
-        self.frames[own] = (frame, pose)
+        self.frames[scope.frame] = (placement.frame, placement.pose)
+        before = len(self.links)
         held = (model.findtext("static") or "").strip() in ("true", "1")
         for element in model:
             self.remarks[element.tag] += element.tag in _UNUSED
-            name = scope.prefix + element.get("name", "")
             try:
-                self._add_part(element, name, scope, held=held)
+                self._add_part(element, scope, held=held)
             except (ValueError, KeyError) as error:
                 if isinstance(error, _Fault):
                     raise
                 reason = f"missing {error}" if isinstance(error, KeyError) else error
+                name = scope.prefix + element.get("name", "")
                 raise _Fault(element, f"{element.tag} '{name[:60]}': {reason}") from None
-        first = next((k.get("name", "") for k in model.findall("link")), "")
-        self.attached[own] = scope.prefix + model.get("canonical_link", first)
+        first = next(iter([*self.links][before:]), "")
+        canonical = model.get("canonical_link", "")
+        self.attached[scope.frame] = scope.named(canonical) if canonical else first
+        placed = placement.placed or model.get("placement_frame", "")
+        if placed:
+            T_model_placed = self._at(scope.named(placed), scope.frame)
+            pose = placement.pose @ T_model_placed.inverse()
+            self.frames[scope.frame] = (placement.frame, pose)
 
-    def _add_part(self, element: Element, name: str, scope: _Scope, *, held: bool) -> None:
+    def _add_part(self, element: Element, scope: _Scope, *, held: bool) -> None:
         """Add one child of a model."""
-        own = scope.prefix + _MODEL
         if element.tag == "include":
-            uri = (element.findtext("uri") or "").strip()
-            file = self._model_file(scope.file, uri)
-            if file in scope.depth:
-                raise ValueError(f"{file} includes itself")
-            self.included.append(file)
-            inner = (element.findtext("name") or PurePosixPath(uri).name).strip()
-            frame, pose = self._pose(element, scope, own)
-            self.add_file(file, f"{scope.prefix}{inner}::", scope.depth, pose, {"frame": frame})
+            self._include(element, scope)
             return
         if element.tag not in ("link", "joint", "frame", "model"):
             return
+        name = scope.prefix + element.get("name", "")
+        alike = {"link": [*self.links], "joint": [*self.anchors]}.get(element.tag, [])
+        if scope.lenient and name in self.frames and name not in alike:
+            name += f"_{element.tag}"
         if name in self.frames or not element.get("name"):
             raise ValueError("its name is missing or used twice")
         if element.tag == "model":
-            frame, pose = self._pose(element, scope, own)
-            inside = _Scope(scope.file, f"{name}::", (*scope.depth, name))
-            self._add_model(element, inside, frame, pose)
+            frame, pose = self._pose(element, scope, scope.frame)
+            prefix = f"{name}::"
+            inside = replace(
+                scope, prefix=prefix, frame=prefix + _MODEL, depth=(*scope.depth, name)
+            )
+            self._add_model(element, inside, _Placement(inside.frame, frame, pose))
         elif element.tag == "link":
-            self.frames[name] = self._pose(element, scope, own)
+            self.frames[name] = self._pose(element, scope, scope.frame)
             visuals, collisions = (
                 tuple(self._shapes(element, tag, scope)) for tag in ("visual", "collision")
             )
@@ -178,17 +217,36 @@ class _Reader:
             if len(self.links) > MAX_LINKS:
                 raise ValueError(f"more than {MAX_LINKS} links")
         elif element.tag == "frame":
-            base = scope.prefix + (element.get("attached_to") or _MODEL)
+            base = scope.named(element.get("attached_to") or _MODEL)
             self.frames[name] = self._pose(element, scope, base)
             self.attached[name] = base
         else:
             self._add_joint(element, name, scope, held=held)
 
-    def _model_file(self, file: str, uri: str) -> str:
+    def _include(self, element: Element, scope: _Scope) -> None:
+        """Add an included model, with ``merge`` as if its parts were this model's own."""
+        file = self._model_file(scope.file, element)
+        if file in scope.depth:
+            raise ValueError(f"{file} includes itself")
+        self.included.append(file)
+        uri = (element.findtext("uri") or "").strip()
+        name = (element.findtext("name") or PurePosixPath(uri).name).strip()
+        merged = element.get("merge") in ("true", "1")
+        prefix = scope.prefix if merged else f"{scope.prefix}{name}::"
+        model = f"{prefix}_merged__{name}__model__" if merged else prefix + _MODEL
+        frame, pose = self._pose(element, scope, scope.frame)
+        placed = (element.findtext("placement_frame") or "").strip()
+        self.add_file(file, prefix, scope.depth, _Placement(model, frame, pose, placed))
+
+    def _model_file(self, file: str, include: Element) -> str:
         """SDF file of an included model: the folder's ``model.config`` names it."""
+        uri = (include.findtext("uri") or "").strip().removeprefix("file://")
         if PurePosixPath(uri).suffix == ".sdf":
-            return resolve_uri(self.folder, file, uri.removeprefix("file://"))
-        config = resolve_uri(self.folder, file, f"{uri.removeprefix('file://')}/model.config")
+            return resolve_uri(self.folder, file, uri)
+        config = resolve_uri(self.folder, file, f"{uri}/model.config")
+        if "://" not in uri and not self.folder.exists(config):
+            # Gazebo looks a bare name up among the models.
+            config = resolve_uri(self.folder, file, f"model://{uri}/model.config")
         base = PurePosixPath(config).parent
         if not self.folder.exists(config):
             return str(base / "model.sdf")
@@ -205,15 +263,15 @@ class _Reader:
         if pose is None:
             return default, SE3()
         relative = pose.get("relative_to") or pose.get("frame")
-        return scope.prefix + relative if relative else default, _parse_pose(pose)
+        return scope.named(relative) if relative else default, _parse_pose(pose)
 
     def _add_joint(self, element: Element, name: str, scope: _Scope, *, held: bool) -> None:
         kind = element.attrib["type"]
         parent, child = ((element.findtext(tag) or "").strip() for tag in ("parent", "child"))
         if not parent or not child:
             raise ValueError("it has no parent or no child")
-        child = scope.prefix + child
-        parent = _MODEL if parent == "world" else scope.prefix + parent
+        child = scope.named(child)
+        parent = _MODEL if parent == "world" else scope.named(parent)
         self.frames[name] = self._pose(element, scope, child)
         if kind in _HELD:
             self.remarks[f"{kind} joint (it stays at its origin)"] += 1
@@ -228,9 +286,9 @@ class _Reader:
             if xyz is not None:
                 direction = _unit(_numbers(xyz.text or "", 3))
                 stated = xyz.get("expressed_in")
-                frame = scope.prefix + stated if stated else name
+                frame = scope.named(stated) if stated else name
             if (axis.findtext("use_parent_model_frame") or "").strip() in ("true", "1"):
-                frame = scope.prefix + _MODEL
+                frame = scope.frame
             joint = self._moving(joint, kind, axis, scope)
         self.anchors[name] = (joint, frame, direction)
 
@@ -291,10 +349,11 @@ class _Reader:
             return None
         if kind == "mesh":
             uri = (given.findtext("uri") or "").strip()
-            if given.find("submesh") is not None:
-                self.remarks["submesh (the whole mesh is used)"] += 1
             file = resolve_uri(self.folder, scope.file, uri.removeprefix("file://"))
-            return Shape("mesh", file, _numbers(given.findtext("scale") or "1 1 1", 3), at)
+            scale = _numbers(given.findtext("scale") or "1 1 1", 3)
+            part = (given.findtext("submesh/name") or "").strip()
+            centered = (given.findtext("submesh/center") or "").strip() in ("true", "1")
+            return Shape("mesh", file, scale, at, part=part, centered=centered)
         if kind == "box":
             size = _numbers(given.findtext("size") or "", 3)
         elif kind == "ellipsoid":
@@ -339,12 +398,19 @@ class _Reader:
         self.frames[_MODEL] = ("", SE3())
         try:
             poses = {name: self._at(name) for name in self.links}
-            placed = [self._place(*anchor) for anchor in self.anchors.values()]
-            children = {p.joint.child for p in placed}
+            placed: list[PlacedJoint] = []
+            children: set[str] = set()
+            for anchor in self.anchors.values():
+                joint = self._place(*anchor)
+                if joint.joint.child in children:
+                    self.remarks[f"joint '{joint.joint.name[:60]}' (it closes a loop)"] += 1
+                    continue
+                children.add(joint.joint.child)
+                placed.append(joint)
             for name in self.links:
                 if name not in children:
-                    joint = Joint(f"{name}_fixed", "fixed", _MODEL, name, SE3(), _X, 0.0, 0.0)
-                    placed.append(PlacedJoint(joint, (0.0, 0.0, 0.0), _X))
+                    fixed = Joint(f"{name}_fixed", "fixed", _MODEL, name, SE3(), _X, 0.0, 0.0)
+                    placed.append(PlacedJoint(fixed, (0.0, 0.0, 0.0), _X))
             poses[_MODEL] = SE3()
             links = {_MODEL: Link(_MODEL, (), ()), **self.links}
             described = jointed(links, poses, placed)
@@ -375,11 +441,11 @@ class _Reader:
             name = self.attached[name]
         raise ValueError(f"there is no link or frame '{name[:60]}'")
 
-    def _at(self, name: str) -> SE3:
-        """Pose of a frame in that of the root."""
+    def _at(self, name: str, base: str = _MODEL) -> SE3:
+        """Pose of a frame in that of the root, or in ``base`` around it."""
         pose = SE3()
         for _ in range(len(self.frames) + 1):
-            if name in ("", _MODEL):
+            if name in ("", base):
                 return pose
             if name not in self.frames:
                 raise ValueError(f"there is no frame '{name[:60]}'")

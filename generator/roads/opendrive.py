@@ -76,10 +76,12 @@ class Piecewise:
 
     pieces: tuple[tuple[float, float, float, float, float], ...] = ()
 
-    def __call__(self, s_m: Array) -> Array:
-        """Values [n] at arc lengths [n]."""
+    def __call__(self, s_m: Array, end_m: float = math.inf) -> Array:
+        """Values [n] at arc lengths [n]; pieces from ``end_m`` on are not used."""
         values = np.zeros_like(s_m)
         for start, *coefficients in self.pieces:
+            if start > end_m - 1e-6:
+                break
             here = s_m >= start - 1e-9
             values[here] = cubic(coefficients, s_m[here] - start)
         return values
@@ -223,7 +225,8 @@ class Road:
 
     def boundaries_m(self, section: Section, s_m: Array) -> dict[int, Array]:
         """``t`` [n] of each lane's outer edge by number; 0 is the centre, at the lane offset."""
-        edges = {0: self.lane_offset_m(s_m)}
+        # The offset may jump where sections meet: the one before the end is this section's.
+        edges = {0: self.lane_offset_m(s_m, section.end_m)}
         for side in (1, -1):
             t = edges[0]
             for number in sorted((n for n in section.lanes if n * side > 0), key=abs):
@@ -611,7 +614,7 @@ def _read_marks(lane: Element) -> Iterator[tuple[float, Mark]]:
 
 def _read_piecewise(elements: Iterable[Element], start: str = "s") -> Piecewise:
     pieces = [(_read_number(e, start), *_read_cubic(e, "")) for e in elements]
-    return Piecewise(tuple(sorted(pieces)))
+    return Piecewise(tuple(sorted(pieces, key=lambda piece: round(piece[0], 6))))
 
 
 def _read_road_link(element: Element | None) -> RoadLink | None:

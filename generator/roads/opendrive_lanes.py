@@ -82,6 +82,9 @@ def network_lanes(network: Network) -> tuple[Lane, ...]:
             for k in _next_keys(network, key)
             if k in made and made[k].kind == lane.kind and not _tapers(network, key, k)
         ]
+        if lane.kind == "sidewalk":
+            # Their links join them whichever way they run here: head on they lead nowhere.
+            after = [k for k in after if _gap_m(lane, made[k]) <= MAX_LINK_GAP_M]
         for other in after:
             _check_gap(network, key, lane, made[other])
         linked.append(_link_lane(network, lane, key, after, made))
@@ -251,9 +254,13 @@ def _tapers(network: Network, key: Key, after: Key) -> bool:
 
 
 def _check_gap(network: Network, key: Key, lane: Lane, after: Lane) -> None:
-    gap = math.dist(lane.center_m[-1], after.center_m[0])
+    gap = _gap_m(lane, after)
     if gap > MAX_LINK_GAP_M:
         raise AssetError(
             f"{network.place}: road '{key[0]}': lane {key[2]} ends {gap:.2f} m from lane "
             f"'{after.name}' that it leads to; correct the link or the geometry"
         )
+
+
+def _gap_m(lane: Lane, after: Lane) -> float:
+    return math.dist(lane.center_m[-1], after.center_m[0])

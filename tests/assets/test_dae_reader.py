@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -71,6 +72,12 @@ def test_nodes_place_geometry_and_the_unit_makes_metres(tmp_path: Path) -> None:
     assert soup.face_groups.tolist() == [0, 0, 1, 1]
 
 
+def test_objects_have_the_names_of_their_nodes(tmp_path: Path) -> None:
+    """As tools show them; both nodes hold the one geometry ``plate``."""
+    soup = read_mesh(folder_of(tmp_path, second=SECOND), "a.dae").soup
+    assert soup.group_names == ("a", "b")
+
+
 def test_a_mirrored_node_keeps_its_front_outside(tmp_path: Path) -> None:
     """Scaled by -1 along X, the quad still faces +Z."""
     soup = read_mesh(folder_of(tmp_path, scale="-1 1 1"), "a.dae").soup
@@ -136,6 +143,31 @@ def test_geometry_with_a_broken_material_is_kept(tmp_path: Path) -> None:
     soup = read_mesh(folder, "a.dae").soup
     assert len(soup) == 2
     assert soup.slots[0].material.base_color == (0.6, 0.6, 0.6)
+
+
+def test_geometry_is_kept_where_an_image_has_no_path(tmp_path: Path) -> None:
+    """As in Gazebo's ``arm_part``; the remark names what is wrong."""
+    folder = folder_of(tmp_path)
+    text = (tmp_path / "a.dae").read_text()
+    text = re.sub("<image (.*?)>.*?</image>", r"<image \1></image>", text, flags=re.DOTALL)
+    (tmp_path / "a.dae").write_text(text)
+    source = read_mesh(folder, "a.dae")
+    assert len(source.soup) == 2
+    assert any("Image has no file path" in remark for remark in source.remarks)
+
+
+@pytest.mark.parametrize(
+    "path", ["model://shed/images/wood.png", "file://C:/me/wood.png", "C:\\me\\WOOD.png"]
+)
+def test_images_of_other_models_and_computers_are_found(tmp_path: Path, path: str) -> None:
+    """Beside the file, or in the folder of the model that has that name."""
+    here = "shed/images/wood.png" if path.startswith("model") else "wood.png"
+    (tmp_path / here).parent.mkdir(parents=True, exist_ok=True)
+    (tmp_path / here).write_bytes(b"")
+    folder = folder_of(tmp_path, material="wood")
+    text = (tmp_path / "a.dae").read_text().replace("my%20wood.png", path)
+    (tmp_path / "a.dae").write_text(text)
+    assert read_mesh(folder, "a.dae").soup.slots[0].material.texture == here
 
 
 @pytest.mark.parametrize(

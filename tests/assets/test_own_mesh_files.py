@@ -100,6 +100,18 @@ def test_names_for_no_material_are_grey_without_a_remark(tmp_path: Path, name: s
     assert read.remarks == ()
 
 
+def test_an_mtl_may_name_the_image_of_another_model(tmp_path: Path) -> None:
+    """As Gazebo's ``ambulance`` takes the wheels of ``suv``."""
+    (tmp_path / "suv/images").mkdir(parents=True)
+    (tmp_path / "suv/images/wheel.png").write_bytes(b"")
+    (tmp_path / "van").mkdir()
+    (tmp_path / "van/a.mtl").write_text("newmtl m\nmap_Kd model://suv/images/wheel.png\n")
+    text = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl m\nf 1/1 2/1 3/1\n"
+    (tmp_path / "van/a.obj").write_text(text)
+    soup = read_mesh(Folder(tmp_path), "van/a.obj").soup
+    assert soup.slots[soup.face_slots[0]].material.texture == "suv/images/wheel.png"
+
+
 def test_the_image_of_an_mtl_is_scaled_and_moved(tmp_path: Path) -> None:
     """``-s 2 3 1 -o 0.5 0``: u * 2 + 0.5 and v * 3, as in Blender and three.js."""
     (tmp_path / "a.obj").write_text(

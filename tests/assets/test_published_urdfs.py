@@ -7,13 +7,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 from PIL import Image
 
 from gen_data.generator.assets.asset_folder import Folder
 from gen_data.generator.assets.library import Library, open_library
 from gen_data.generator.assets.robot_description import RobotDescription
 from gen_data.generator.assets.robot_formats import read_description
+from gen_data.generator.assets.robot_shapes import read_shape
 from gen_data.generator.core.errors import AssetError
+from gen_data.generator.core.se3 import SE3
 
 BOX = '<geometry><box size="0.1 0.2 0.3"/></geometry>'
 TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
@@ -246,3 +249,19 @@ def test_links_named_with_slashes_have_meshes(tmp_path: Path) -> None:
     library = open_library([tmp_path], tmp_path / "cache", tmp_path)
     assert library.robot("user/r").links == ("left_hand",)
     assert len(library.mesh("user/r/left_hand").faces) == 12
+
+
+def test_y_of_a_gltf_mesh_points_up_in_a_description(tmp_path: Path) -> None:
+    """Y of the file is Z of the link, as in RViz (ros2/rviz pull request 1482) and Drake.
+
+    A box whose lowest corner is (0, 0, 0) and whose highest is (1, 2, 3): Z of the file becomes -Y.
+    The scale counts along the link's axes.
+    """
+    box = trimesh.creation.box(bounds=[(0.0, 0.0, 0.0), (1.0, 2.0, 3.0)])
+    (tmp_path / "a.glb").write_bytes(box.export(file_type="glb"))
+    mesh = '<geometry><mesh filename="a.glb" scale="1 1 10"/></geometry>'
+    (link_a,) = describe(tmp_path, link("a", visual(geometry=mesh))).links.values()
+    source = read_shape(Folder(tmp_path), link_a.visuals[0], SE3())
+    corners = source.soup.corners.reshape(-1, 3)
+    assert corners.min(axis=0) == pytest.approx([0.0, -3.0, 0.0])
+    assert corners.max(axis=0) == pytest.approx([1.0, 0.0, 20.0])

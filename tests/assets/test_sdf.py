@@ -12,6 +12,7 @@ from PIL import Image
 from gen_data.generator.assets.asset_folder import Folder
 from gen_data.generator.assets.library import open_library
 from gen_data.generator.assets.robot_description import RobotDescription
+from gen_data.generator.assets.robot_shapes import read_shape
 from gen_data.generator.assets.sdf import read_sdf
 from gen_data.generator.core.errors import AssetError
 from gen_data.generator.core.kinematics import joint_transform
@@ -132,6 +133,65 @@ def test_models_inside_models_have_prefixed_names_and_their_own_frames(tmp_path:
     assert described.included == ("hand/model.config", "hand/new.sdf")
 
 
+INCLUDED = (
+    '<sdf version="1.9"><model name="hand">'
+    f"{link('palm', '<pose>0 0 1 0 0 0</pose>')}"
+    '<frame name="tip" attached_to="palm"><pose>0.5 0 0 0 0 0</pose></frame></model></sdf>'
+)
+
+
+def test_a_merged_model_is_part_of_the_outer_one(tmp_path: Path) -> None:
+    """Names have no prefix; poses stay in its own frame, which is 2 m along X and half turned."""
+    (tmp_path / "hand.sdf").write_text(INCLUDED)
+    described = read(
+        tmp_path,
+        link("arm"),
+        '<include merge="true"><uri>hand.sdf</uri><pose>2 0 0 0 0 3.141592653589793</pose>'
+        "</include>",
+        '<joint name="wrist" type="fixed"><parent>arm</parent><child>palm</child></joint>',
+        link("ring", '<pose relative_to="tip">0 0 0 0 0 0</pose>'),
+    )
+    assert list(described.links) == ["__model__", "arm", "palm", "ring"]
+    assert middle(described, "palm") == [2.0, 0.0, 1.0]
+    assert middle(described, "ring") == [1.5, 0.0, 1.0]
+
+
+def test_an_included_model_is_placed_by_a_frame_of_it(tmp_path: Path) -> None:
+    """``tip`` at (0, 0, 3) puts the palm half a metre before it."""
+    (tmp_path / "hand.sdf").write_text(INCLUDED)
+    include = (
+        "<include><uri>hand.sdf</uri><name>h</name><pose>0 0 3 0 0 0</pose>"
+        "<placement_frame>tip</placement_frame></include>"
+    )
+    described = read(tmp_path, link("arm"), include)
+    assert middle(described, "h::palm") == [-0.5, 0.0, 3.0]
+    placed = INCLUDED.replace('name="hand">', 'name="hand" placement_frame="tip">')
+    (tmp_path / "hand.sdf").write_text(placed)
+    unnamed = include.replace("<placement_frame>tip</placement_frame>", "")
+    assert middle(read(tmp_path, link("arm"), unnamed), "h::palm") == [-0.5, 0.0, 3.0]
+
+
+def test_models_are_found_by_their_bare_names(tmp_path: Path) -> None:
+    """As Gazebo does with the folders of its resource path; the file may hold an include only."""
+    (tmp_path / "hand").mkdir()
+    (tmp_path / "hand/model.sdf").write_text(INCLUDED)
+    (tmp_path / "robot").mkdir()
+    text = '<sdf version="1.9"><include><uri>hand</uri></include></sdf>'
+    (tmp_path / "robot/model.sdf").write_text(text)
+    assert middle(read_sdf(Folder(tmp_path), "robot/model.sdf"), "palm") == [0.0, 0.0, 1.0]
+
+
+def test_before_version_1_7_a_joint_may_have_the_name_of_its_link(tmp_path: Path) -> None:
+    """Libsdformat renames it, too."""
+    joint = HINGED[2].replace('name="hinge"', 'name="door"')
+    with pytest.raises(AssetError, match="joint 'door': its name is missing or used twice"):
+        read(tmp_path, *HINGED[:2], joint)
+    text = (tmp_path / "a.sdf").read_text().replace('version="1.9"', 'version="1.6"')
+    (tmp_path / "a.sdf").write_text(text)
+    (hinge,) = (j for j in read_sdf(Folder(tmp_path), "a.sdf").joints if j.movable)
+    assert (hinge.name, hinge.child) == ("door_joint", "door")
+
+
 def test_meshes_materials_and_textures_of_gazebo(tmp_path: Path) -> None:
     """Diffuse colours replace those of a mesh; sRGB 0.5 is 0.214041 linear (IEC 61966-2-1)."""
     (tmp_path / "meshes").mkdir()
@@ -175,6 +235,34 @@ def test_a_mimic_follows_its_leader_from_a_reference(tmp_path: Path) -> None:
     described = read(tmp_path, *HINGED, link("leaf"), second)
     (other,) = (j for j in described.joints if j.name == "other")
     assert (other.mimic, other.mimic_multiplier, other.mimic_offset) == ("hinge", 2.0, 0.1)
+
+
+def test_one_object_of_a_mesh_file_is_used_and_centered(tmp_path: Path) -> None:
+    """Of a file with a tetrahedron at the origin and one 9 m along X, scaled by 2."""
+    moved = "\n".join(f"v {x} {y} {z}" for x, y, z in ((9, 0, 0), (10, 0, 0), (9, 1, 0), (9, 0, 1)))
+    second = f"o wheel\n{moved}\nf 5 7 6\nf 5 6 8\nf 6 7 8\nf 7 5 8\n"
+    (tmp_path / "car.obj").write_text(f"o body\n{TETRAHEDRON}{second}")
+    bounds = {}
+    for center in ("false", "true"):
+        part = f"<submesh><name>wheel</name><center>{center}</center></submesh>"
+        mesh = f"<geometry><mesh><uri>car.obj</uri><scale>2 2 2</scale>{part}</mesh></geometry>"
+        described = read(tmp_path, f'<link name="a"><visual name="v">{mesh}</visual></link>')
+        (shape,) = described.links["a"].visuals
+        x = read_shape(Folder(tmp_path), shape, SE3()).soup.corners[..., 0]
+        bounds[center] = (x.min(), x.max())
+    assert bounds == {"false": (18.0, 20.0), "true": (-1.0, 1.0)}
+    wrong = f'<link name="a"><visual name="v">{mesh.replace("wheel", "weel")}</visual></link>'
+    (shape,) = read(tmp_path, wrong).links["a"].visuals
+    with pytest.raises(AssetError, match=r"car\.obj: has no part 'weel' \(did you mean 'wheel'\?"):
+        read_shape(Folder(tmp_path), shape, SE3())
+
+
+def test_of_a_loop_the_first_joint_is_kept(tmp_path: Path) -> None:
+    """As of a closed loop of MJCF; the other one is named."""
+    brace = '<joint name="brace" type="fixed"><parent>frame</parent><child>door</child></joint>'
+    described = read(tmp_path, *HINGED, brace)
+    assert [j.name for j in described.joints if j.movable] == ["hinge"]
+    assert described.remarks == ("not used: 1 joint 'brace' (it closes a loop)",)
 
 
 def test_a_static_model_does_not_move(tmp_path: Path) -> None:

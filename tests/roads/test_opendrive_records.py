@@ -335,3 +335,49 @@ def test_what_has_no_effect_is_named_and_counted(tmp_path: Path) -> None:
 
     assert f"{tmp_path / 'town.xodr'}: {told}" in finding.warnings
     assert not finding.error
+
+
+# --- published maps ---
+
+OFFSET = '<laneOffset s="{}" a="{}" b="0" c="0" d="0"/>'
+
+
+def with_second_section(text_of_road: str, offsets: str, section: str) -> str:
+    """The road with lane offsets, and a second lane section from s = 50 m."""
+    whole = text_of_road.replace("<lanes>", f"<lanes>{offsets}")
+    center = '<center><lane id="0" type="none"/></center>'
+    return whole.replace(
+        "</lanes>", f'<laneSection s="50"><left>{section}</left>{center}</laneSection></lanes>'
+    )
+
+
+def test_a_lane_offset_may_jump_where_sections_meet() -> None:
+    """As RoadRunner writes it: a lane that is added inside moves the centre, no other lane."""
+    more = with_second_section(
+        road(left=lane(1, f'<link><successor id="2"/></link>{WIDTH}')),
+        OFFSET.format(0, 0) + OFFSET.format(50, -3.5),
+        lane(1, kind="none") + lane(2, f'<link><predecessor id="1"/></link>{WIDTH}'),
+    )
+    found = lanes(more)
+    assert found["1.1.2"].successors == ("1.0.1",)
+    for name in ("1.0.1", "1.1.2"):
+        assert {round(y, 6) for _, y, _ in found[name].center_m} == {1.75}
+
+
+def test_of_two_records_at_one_place_the_last_one_counts() -> None:
+    """Whatever their coefficients, and if they differ by a rounding error."""
+    for again in (0, 1e-9):
+        offsets = OFFSET.format(again, 5) + OFFSET.format(0, 1)
+        moved = road(left=lane(1)).replace("<lanes>", f"<lanes>{offsets}")
+        assert {round(y, 6) for _, y, _ in lanes(moved)["1.0.1"].center_m} == {2.75}
+
+
+def test_sidewalks_that_meet_head_on_lead_nowhere() -> None:
+    """Links join sidewalks of either direction, as at the corners of CARLA's towns."""
+    link = '<successor elementType="road" elementId="2" contactPoint="start"/>'
+    walk = lane(-1, f'<link><successor id="1"/></link>{WIDTH}', kind="sidewalk")
+    corner = road(left=lane(1, kind="sidewalk"), number=2, x=100)
+    corner = corner.replace("<lanes>", f"<lanes>{OFFSET.format(0, -3.5)}")
+    found = lanes(road(right=walk, link=link), corner)
+    assert found["1.0.-1"].center_m[-1] == found["2.0.1"].center_m[-1]
+    assert found["1.0.-1"].successors == ()

@@ -527,11 +527,27 @@ Tr_velo_to_cam: 0 -1 0 -0.004 0 0 -1 -0.076 1 0 0 -0.27
 """
 
 
-def test_a_calibration_of_kitti_places_cameras_from_the_scanner(tmp_path: Path) -> None:
-    """Points of the scanner through Tr, R0_rect and P2 are where the placed camera sees them."""
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("000000.txt", OBJECT),
+        ("0000.txt", OBJECT.replace("R0_rect:", "R_rect").replace("velo_to_cam:", "velo_cam")),
+        (
+            "calib.txt",
+            OBJECT.replace("Tr_velo_to_cam", "Tr").replace("R0_rect: 1 0 0 0 1 0 0 0 1\n", ""),
+        ),
+    ],
+)
+def test_a_calibration_of_kitti_places_cameras_from_the_scanner(
+    tmp_path: Path, name: str, content: str
+) -> None:
+    """Points of the scanner through Tr, R0_rect and P2 are where the placed camera sees them.
+
+    Files of the object, tracking and odometry benchmarks; the last one has no R0_rect.
+    """
     text = ("size_px: [1242, 375], lens: {model: calibrated, file: FILE, camera: camera_2}, rig: r,"
             " mounting: {file: FILE, frame: camera_2, relative_to: velodyne}")  # fmt: skip
-    found = sensor(tmp_path, text, "000000.txt", content=OBJECT)
+    found = sensor(tmp_path, text, name, content=content)
 
     points = np.array([[12.0, 1.5, -0.5, 1.0], [30.0, -4.0, 0.2, 1.0]])
     P = np.array([721.5, 0, 609.5, 44.85728, 0, 721.5, 172.8, 0.2163791, 0, 0, 1, 0.002745884])

@@ -11,13 +11,17 @@ import warnings
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
-from urllib.parse import unquote, urlsplit
+from urllib.parse import unquote
 from xml.etree.ElementTree import fromstring, tostring
 
 import numpy as np
 
 from gen_data.generator.assets.asset_folder import Folder
-from gen_data.generator.assets.readers.mesh_source import MeshSource, srgb_to_linear
+from gen_data.generator.assets.readers.mesh_source import (
+    MeshSource,
+    locate_file,
+    srgb_to_linear,
+)
 from gen_data.generator.assets.triangle_soup import Float64, MaterialSlot, TriangleSoup, join_soups
 from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.errors import AssetError
@@ -40,20 +44,27 @@ def read_dae(folder: Folder, relative: str, materials: bool) -> MeshSource:
     # Checked first, because pycollada's parser would expand entities.
     parse_xml(data, place, "COLLADA", "a COLLADA file", _MAX_ELEMENTS)
     from collada import Collada
-    from collada.common import DaeBrokenRefError, DaeError, DaeUnsupportedError
+    from collada.common import (
+        DaeBrokenRefError,
+        DaeError,
+        DaeIncompleteError,
+        DaeUnsupportedError,
+    )
 
+    remarks: list[str] = []
     try:
         with warnings.catch_warnings():
             # It multiplies by numpy.matrix, and sets the shapes of arrays.
             for category in (PendingDeprecationWarning, DeprecationWarning):
                 warnings.simplefilter("ignore", category)
-            tolerated = [DaeUnsupportedError, DaeBrokenRefError]
+            tolerated = [DaeUnsupportedError, DaeBrokenRefError, DaeIncompleteError]
             document = Collada(io.BytesIO(data), ignore=tolerated)
             if document.errors:
+                remarks += [f"ignored: {error.msg[:120]}" for error in document.errors]
                 mended = _without_broken_materials(data, {m.id for m in document.materials})
                 document = Collada(io.BytesIO(mended), ignore=tolerated)
             soups = [
-                _make_soup(folder, relative, document, *part, materials=materials)
+                _make_soup(folder, relative, document, *part, remarks if materials else None)
                 for part in enumerate(_placed_geometries(document))
             ]
     except (DaeError, ValueError, LookupError, TypeError, AttributeError) as error:
@@ -62,7 +73,8 @@ def read_dae(folder: Folder, relative: str, materials: bool) -> MeshSource:
     parts = [soup for group in soups for soup in group]
     if not parts:
         raise AssetError(f"{place}: holds no triangles; export it again with its faces")
-    return MeshSource(join_soups(parts), up=_UP.get(str(document.assetInfo.upaxis), "y"))
+    up = _UP.get(str(document.assetInfo.upaxis), "y")
+    return MeshSource(join_soups(parts), remarks=tuple(dict.fromkeys(remarks)), up=up)
 
 
 def _without_broken_materials(data: bytes, known: set[str]) -> bytes:
@@ -76,15 +88,33 @@ def _without_broken_materials(data: bytes, known: set[str]) -> bytes:
     return tostring(root)
 
 
-def _placed_geometries(document: Any) -> Iterator[tuple[Any, Float64, dict[str, Any]]]:
-    """Yield geometry, its affine map [3, 4] to the scene and its materials by symbol."""
+def _placed_geometries(document: Any) -> Iterator[tuple[str, Any, Float64, dict[str, Any]]]:
+    """Yield name, geometry, its affine map [3, 4] to the scene and its materials by symbol.
+
+    The name is that of the node, which tools show and descriptions refer to.
+    """
     if document.scene is None:
         for geometry in document.geometries:
-            yield geometry, np.eye(4)[:3], {}
+            yield "", geometry, np.eye(4)[:3], {}
         return
-    for bound in document.scene.objects("geometry"):
+    for name, bound in _bound_geometries(document.scene.nodes, None, ""):
         nodes = {symbol: node.target for symbol, node in bound.materialnodebysymbol.items()}
-        yield bound.original, np.asarray(bound.matrix, np.float64)[:3], nodes
+        yield name, bound.original, np.asarray(bound.matrix, np.float64)[:3], nodes
+
+
+def _bound_geometries(nodes: Any, matrix: Any, name: str) -> Iterator[tuple[str, Any]]:
+    """Geometries below nodes, each with the name of the nearest node around it that has one."""
+    from collada.scene import Node, NodeNode
+
+    for node in nodes:
+        if isinstance(node, NodeNode):
+            yield from _bound_geometries([node.node], matrix, name)
+        elif isinstance(node, Node):
+            here = node.matrix if matrix is None else np.dot(matrix, node.matrix)
+            yield from _bound_geometries(node.children, here, str(node.name or node.id or name))
+        else:
+            for bound in node.objects("geometry", matrix):
+                yield name, bound
 
 
 def _make_soup(
@@ -92,15 +122,17 @@ def _make_soup(
     relative: str,
     document: Any,
     number: int,
-    placed: tuple[Any, Float64, dict[str, Any]],
-    *,
-    materials: bool,
+    placed: tuple[str, Any, Float64, dict[str, Any]],
+    remarks: list[str] | None,
 ) -> list[TriangleSoup]:
-    """Soups of one geometry's sets of polygons; they are one group."""
+    """Soups of one geometry's sets of polygons; they are one group.
+
+    Without ``remarks`` it has no materials.
+    """
     from collada.polylist import Polylist
     from collada.triangleset import TriangleSet
 
-    geometry, matrix, bound = placed
+    node, geometry, matrix, bound = placed
     matrix = matrix * float(document.assetInfo.unitmeter or 1.0)
     soups = []
     for primitive in geometry.primitives:
@@ -110,18 +142,18 @@ def _make_soup(
             continue
         slot = MaterialSlot()
         target = bound.get(triangles.material)
-        if materials and target is not None:
+        if remarks is not None and target is not None:
             linear = any(
                 _LINEAR_WRITER in (c.authoring_tool or "") for c in document.assetInfo.contributors
             )
-            slot = _read_material(folder, relative, target, linear=linear)
+            slot = _read_material(folder, relative, target, remarks, linear=linear)
         soup = TriangleSoup.of(_rows(triangles.vertex, triangles.vertex_index), slot)
         uvs = normals = None
         if triangles.texcoordset:
             uvs = _rows(triangles.texcoordset[0], triangles.texcoord_indexset[0])[..., :2]
         if triangles.normal is not None:
             normals = _rows(triangles.normal, triangles.normal_index)
-        name = str(geometry.name or geometry.id or f"geometry_{number}")
+        name = node or str(geometry.name or geometry.id or f"geometry_{number}")
         soup = replace(soup, uvs=uvs, normals=normals, group_names=(name,))
         soups.append(soup.transformed(matrix))
     if len(soups) < 2:
@@ -140,17 +172,18 @@ def _rows(table: Any, indices: Any) -> Float64:
     return rows
 
 
-def _read_material(folder: Folder, relative: str, target: Any, *, linear: bool) -> MaterialSlot:
+def _read_material(
+    folder: Folder, relative: str, target: Any, remarks: list[str], *, linear: bool
+) -> MaterialSlot:
     """Diffuse colour or image, and opacity, of a material."""
     effect = target.effect
     name = str(target.name or target.id or "")
     material = Material(opacity=_read_opacity(effect))
     image = getattr(effect.diffuse, "sampler", None)
     if image is not None:
-        path = unquote(urlsplit(image.surface.image.path.replace("\\", "/")).path)
-        material = replace(
-            material, base_color=(1.0, 1.0, 1.0), texture=folder.refer(relative, path)
-        )
+        path = unquote(image.surface.image.path.removeprefix("file://"))
+        texture = locate_file(folder, relative, path, remarks)
+        material = replace(material, base_color=(1.0, 1.0, 1.0), texture=texture)
     elif isinstance(effect.diffuse, tuple):
         red, green, blue = (round(min(max(float(c), 0.0), 1.0), 6) for c in effect.diffuse[:3])
         color: Vec3 = (red, green, blue)

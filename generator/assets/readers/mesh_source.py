@@ -10,6 +10,7 @@ from pathlib import PurePosixPath
 import numpy as np
 
 from gen_data.generator.assets.asset_folder import Folder
+from gen_data.generator.assets.robot_files import resolve_uri
 from gen_data.generator.assets.triangle_soup import Int64, TriangleSoup
 from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.colorimetry import srgb_decode
@@ -59,6 +60,7 @@ def split_fans(sizes: Int64) -> Int64:
 def locate_file(folder: Folder, base: str, reference: str, remarks: list[str] | None = None) -> str:
     """Path of a file that ``base`` refers to, as it is written where it exists.
 
+    ``model://`` and ``package://`` are looked up as in descriptions of robots (``robot_files``).
     Else a file of that name beside ``base``, or of that name in other case, is taken: files are
     moved from computers with other paths, and some systems do not tell cases apart.
 
@@ -68,7 +70,7 @@ def locate_file(folder: Folder, base: str, reference: str, remarks: list[str] | 
     name = PurePosixPath(reference.replace("\\", "/")).name
     path, refusal = "", None
     try:
-        path = folder.refer(base, reference)
+        path = resolve_uri(folder, base, reference)
     except AssetError as error:
         refusal = error
     if not path or not folder.exists(path):

@@ -500,7 +500,8 @@ def _image_name(rest: str) -> tuple[str, UvTransform]:
             values += [float(word)] if _is_number(word) else []
     scale = ([*options.get("-s", ()), 1.0, 1.0])[:2]
     offset = ([*options.get("-o", ()), 0.0, 0.0])[:2]
-    name = str(PurePosixPath(" ".join(tokens).replace("\\", "/")))
+    name = " ".join(tokens).replace("\\", "/")
+    name = name if "://" in name else str(PurePosixPath(name))
     return name, ((scale[0], scale[1]), (offset[0], offset[1]))
 
 

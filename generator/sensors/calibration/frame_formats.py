@@ -36,8 +36,13 @@ from gen_data.generator.sensors.calibration.calibration import (
 )
 from gen_data.generator.sensors.calibration.camera_formats import lens_of, shifted
 
-_TRACKING = {"R_rect": "R0_rect", "Tr_velo_cam": "Tr_velo_to_cam", "Tr_imu_velo": "Tr_imu_to_velo"}
-"""Names of the tracking benchmark, by which it differs from the others."""
+_NAMES = {
+    "R_rect": "R0_rect",
+    "Tr_velo_cam": "Tr_velo_to_cam",
+    "Tr_imu_velo": "Tr_imu_to_velo",
+    "Tr": "Tr_velo_to_cam",
+}
+"""Names of the tracking and the odometry benchmark, by which they differ from the object one."""
 _OPTICAL = ("_optical", "_optical_frame")
 
 
@@ -174,7 +179,7 @@ def kitti_calibration(text: str, file: str, *, rectified: bool = False) -> Calib
         key, _, rest = line.strip().partition(" ")  # Files of tracking lack some of the colons.
         place = Position(file, k, 1, line)
         cells = tuple(Node(place, _number(word), text=word) for word in rest.split())
-        key = _TRACKING.get(key, key.rstrip(":"))
+        key = _NAMES.get(key.rstrip(":"), key.rstrip(":"))
         if key:
             lines[key] = Node(place, cells, text=rest.strip())
     frames, cameras = {"camera_0": Frame(optical=True)}, {}
