@@ -333,7 +333,7 @@ def _make_config(document: Node, name: str, changes: Changes) -> Config:
     for key, node in sections.items():
         if key not in ("shared", *VARYING) and refers(node):
             fact = f"cannot depend on shared values; expected them in {', '.join(VARYING)} only"
-            problems.add(node.position, key, fact)
+            problems.add(node.position, (key,), fact)
     render = _plugin(sections["render"], "render", RENDERERS, problems, DEFAULT_RENDERER)
     exporters = _plugins(sections["exporters"], "exporters", EXPORTERS, problems, _Known())
     annotations = _annotations(sections["annotations"], problems)

@@ -14,7 +14,7 @@ from types import ModuleType
 from gen_data import configs, scene_templates
 from gen_data.generator.config.merging import merge_named, merge_nodes, node_name, with_entry
 from gen_data.generator.config.paths import find_path
-from gen_data.generator.config.problems import Position, Problems, refuse
+from gen_data.generator.config.problems import Position, Problems, format_path, refuse
 from gen_data.generator.config.renamed_keys import refuse_moved_keys, replace_old_words
 from gen_data.generator.config.yaml_scalars import quote_value
 from gen_data.generator.config.yaml_tree import Node, load_yaml, parse_yaml, with_override
@@ -187,7 +187,7 @@ def _without(base: Node, dropped: Node | None) -> Node:
         return base
     content, problems = dict(_mapping_of(base)), Problems()
     for key, names in _mapping_of(dropped).items():
-        field = f"without.{key}"
+        field = format_path(("without", key))
         if key not in NAMED:
             fact = f"unknown key; expected one of {', '.join(NAMED)}"
             problems.add(dropped.key_position(key), field, fact)
@@ -234,7 +234,7 @@ def _override_elements(elements: Node, overrides: Node) -> Node:
         else:
             fact = f"the template has no element {quote_value(name)}; expected one of "
             fact += ", ".join(by_name) + did_you_mean(name, by_name)
-            problems.add(overrides.key_position(name), f"elements.{name}", fact)
+            problems.add(overrides.key_position(name), ("elements", name), fact)
     problems.raise_if_any()
     return Node(elements.position, tuple(by_name.values()))
 
@@ -269,7 +269,8 @@ def _load_template(document: Node) -> Node | None:
     for key in _mapping_of(loaded):
         if key not in TEMPLATE_KEYS:
             fact = f"unknown key; a template has {', '.join(TEMPLATE_KEYS)}"
-            problems.add(loaded.key_position(key), key, fact + did_you_mean(key, TEMPLATE_KEYS))
+            fact += did_you_mean(key, TEMPLATE_KEYS)
+            problems.add(loaded.key_position(key), (key,), fact)
     problems.raise_if_any()
     return loaded
 
@@ -312,7 +313,7 @@ def _with_defaults(elements: Node, defaults: Node | None) -> Node:
         if kind not in types:
             fact = f"no element is of this type; expected one of {', '.join(sorted(types))}"
             fact += did_you_mean(kind, types)
-            problems.add(defaults.key_position(kind), f"defaults.{kind}", fact)
+            problems.add(defaults.key_position(kind), ("defaults", kind), fact)
     problems.raise_if_any()
     merged = (
         merge_nodes(by_type[_kind_of(item)], item) if _kind_of(item) in by_type else item

@@ -405,7 +405,7 @@ def _check_label_map(config: Config, categories: Sequence[str]) -> None:
     problems, label_map = Problems(), config.general.labels.map
     classes = config.document.get("labels", "map", "classes") or config.document
     for name, fact in label_map.faults(categories).items():
-        problems.add(classes.key_position(name), f"labels.map.classes.{name}", fact)
+        problems.add(classes.key_position(name), ("labels", "map", "classes", name), fact)
     problems.raise_if_any()
     label_map.check(categories)
 

@@ -67,9 +67,10 @@ class Problems:
     def __init__(self) -> None:
         self._problems: dict[Problem, None] = {}
 
-    def add(self, position: Position, field: str, fact: str) -> None:
-        """Add a problem, unless it is a duplicate."""
-        self._problems[Problem(position, field, fact)] = None
+    def add(self, position: Position, field: str | FieldPath, fact: str) -> None:
+        """Add a problem, unless it is a duplicate; a ``field`` with keys of the user is a path."""
+        path = field if isinstance(field, str) else format_path(field)
+        self._problems[Problem(position, path, fact)] = None
 
     def extend(self, others: Problems) -> None:
         """Add all problems of another collection."""

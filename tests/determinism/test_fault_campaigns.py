@@ -22,6 +22,7 @@ CHOSEN = [
     "foreign",
     "derived",
     "caches",
+    "environments",
     "samples_alone",
     "structured_configurations",
     "mutated_configurations",

@@ -39,6 +39,7 @@ NOT_RUN = {
     "gen-data --config street.yaml --n 1000000 --out": "needs a cluster; tests/runner/test_ray.py",
     "gen-data verify s3:": "needs object storage; tests/runner/test_object_store.py",
     "docker ": "needs Docker; `.ci/run` runs it where it is",
+    "python -m benchmarks.readers": "installs 4.6 GB; tests/benchmarks/test_readers.py runs it",
     "python -m benchmarks.faults": "hours; tests/determinism/test_fault_campaigns.py is short",
 }
 """Beginnings of commands, and why they are not run here."""

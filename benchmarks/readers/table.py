@@ -1,0 +1,152 @@
+"""The readers: one line each, with the tolerance that its format or its reader allows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+from benchmarks.readers import detection, records, rigs
+from benchmarks.readers.truth import Boxes, Cubes, Poses, mot_category, scans, scans_and_lenses
+from benchmarks.readers.views import View
+from gen_data.exporters.cityscapes_classes import city_classes
+from gen_data.exporters.kitti import official_type
+from gen_data.exporters.nuscenes_classes import category_of
+
+Read = Callable[[Path], Iterable[View]]
+"""Views of a folder: of an export by a reader, or of a data set by ``gen_data.open``."""
+
+
+@dataclass(frozen=True)
+class Reader:
+    """A reader of one format.
+
+    Attributes:
+        package: The distribution that reads.
+        format: Name of the exporter, and of its folder.
+        read: Yields what the export holds.
+        expected: Yields what the data set states.
+        data: Name of the data set (``__main__.DATA``).
+        unit: Of the numbers: ``px`` or ``m``; empty for a reader of lenses only.
+        tolerance: Largest difference of a number.
+        iou: Smallest overlap of masks; None if it reads none.
+        lens: Largest difference of lenses [px, coefficients]; None if it reads none.
+        is_partial: Whether the format leaves things out by its definition.
+        because: Reason of tolerances other than 0 and 1, and of conventions.
+    """
+
+    package: str
+    format: str
+    read: Read
+    expected: Read
+    data: str = "tabletop"
+    unit: str = "px"
+    tolerance: float = 0.0
+    iou: float | None = None
+    lens: float | None = None
+    is_partial: bool = False
+    because: str = ""
+
+
+ALL, COLOR = Boxes(), Boxes(("color",))
+LEFT = ("image_02",)
+FLOATS = 1e-4
+"""Rounding of 32-bit floats [px]."""
+INSET = 0.0201
+"""Vertices of polygons lie 0.02 px inside the edges of pixels."""
+
+
+def frame(number: str) -> str:
+    """Name of a view from the number of the frame."""
+    return f"{int(number):09d}_image_02"
+
+
+def city_class(instance: object) -> str:
+    """Class of Cityscapes."""
+    return city_classes().of_instance(instance).name  # type: ignore[arg-type]
+
+
+D = detection
+READERS: tuple[Reader, ...] = (
+    Reader("pycocotools", "coco", D.by_pycocotools, ALL, iou=1, lens=0),
+    Reader("pycocotools", "coco", D.by_pycocotools, ALL, "runs", iou=1, lens=0),
+    Reader("pycocotools", "bop", D.by_pycocotools_in_bop, COLOR, iou=1, is_partial=True,
+           because="rigid objects only"),
+    Reader("torchvision", "coco", D.by_torchvision, ALL, tolerance=FLOATS, iou=1,
+           because="32-bit floats, enlarged by half and reduced"),
+    Reader("transformers", "coco", D.by_detr, ALL, tolerance=FLOATS, iou=1,
+           because="32-bit fractions of the image"),
+    Reader("sahi", "coco", D.by_sahi, ALL, tolerance=INSET, iou=1,
+           because="boxes of the polygons, 0.02 px inside"),
+    Reader("supervision", "coco", D.by_supervision, ALL, "runs", iou=1,
+           because="run lengths: it rounds polygons (findings/)"),
+    Reader("supervision", "yolo", D.by_certificate("yolo"), ALL, tolerance=FLOATS,
+           because="32-bit floats"),
+    Reader("supervision", "voc", D.by_certificate("voc"), ALL),
+    Reader("ultralytics-opencv-headless", "yolo", D.by_ultralytics("detect"), ALL,
+           tolerance=FLOATS, because="32-bit floats"),
+    Reader("ultralytics-opencv-headless", "yolo", D.by_ultralytics("segment"), ALL,
+           tolerance=INSET, iou=0.85,
+           because="boxes of the polygons; it draws the lines that join parts of an object"),
+    Reader("label-studio-sdk", "label_studio", D.by_label_studio, ALL, tolerance=INSET, iou=1,
+           because="boxes of the polygons, 0.02 px inside"),
+    Reader("torchvision", "voc", D.by_torchvision_voc, Boxes(shift=(1, 1, 0, 0)), iou=1,
+           because="VOC's numbers: pixels from 1"),
+    Reader("datumaro", "coco", D.by_datumaro("mmdet_coco"), ALL, iou=1),
+    Reader("datumaro", "voc", D.by_datumaro("voc_detection", "VOCdevkit/*"),
+           Boxes(shift=(1, 1, 0, 0)), because="it keeps VOC's pixels from 1"),
+    Reader("datumaro", "voc", D.by_datumaro("voc_segmentation", "VOCdevkit/*"), ALL, iou=1),
+    Reader("datumaro", "yolo", D.by_datumaro("yolo", "detect"), ALL, tolerance=FLOATS,
+           because="32-bit floats"),
+    Reader("datumaro", "cvat", D.by_datumaro("cvat", "*"), ALL, iou=1),
+    Reader("datumaro", "cvat", D.by_datumaro("cvat", "*"), ALL, "runs", tolerance=INSET, iou=1,
+           because="boxes of the polygons, 0.02 px inside"),
+    Reader("panopticapi-lite", "coco_panoptic", records.by_panopticapi, ALL, iou=1),
+    Reader("h5py", "hdf5", records.by_h5py, ALL, iou=1, lens=0),
+    Reader("datasets", "huggingface", records.by_datasets, ALL, iou=1, lens=0),
+    Reader("datasets", "webdataset", records.by_datasets_webdataset, ALL, iou=1, lens=0),
+    Reader("webdataset", "webdataset", D.by_certificate("webdataset"), ALL, iou=1),
+    Reader("datasets", "language", records.by_datasets_language, ALL, iou=1),
+    Reader("tfrecord", "tfrecord", records.by_tfrecord, ALL, tolerance=FLOATS, iou=1, lens=FLOATS,
+           because="32-bit fractions of the image"),
+    Reader("mlcroissant", "croissant", records.by_mlcroissant, ALL, lens=0),
+    Reader("pysolotools", "solo", records.by_pysolotools, COLOR, lens=1e-6,
+           because="nine decimals of a fraction"),
+    Reader("rerun-sdk", "rerun", records.by_rerun, ALL, lens=FLOATS,
+           because="32-bit floats; pinholes only"),
+    Reader("evo", "tum_rgbd", rigs.by_evo, Poses(("color",)), unit="m", tolerance=1e-8,
+           because="nine decimals"),
+    Reader("opencv-python-headless", "calibration", rigs.by_opencv, Poses(posed=False), unit="",
+           lens=1e-9, because="decimals"),
+    Reader("pycolmap", "calibration", rigs.by_pycolmap, Poses(), unit="m", tolerance=1e-9,
+           lens=1e-9, because="decimals of quaternions"),
+    Reader("usd-core", "usd", rigs.by_usd_core, Poses(), unit="m", tolerance=1e-6, lens=FLOATS,
+           because="apertures of 32 bits"),
+    Reader("mcap", "mcap", rigs.by_mcap, ALL, lens=0),
+    Reader("mcap", "mcap", rigs.by_mcap_cubes, Cubes(), unit="m", tolerance=1e-8, is_partial=True,
+           because="nine decimals; objects that a camera sees"),
+    Reader("mcap", "mcap", rigs.by_mcap, ALL, "rig", lens=0),
+    Reader("mcap", "mcap", rigs.by_mcap_cubes, Cubes(), "rig", "m", 1e-8, is_partial=True,
+           because="nine decimals; objects that a camera sees"),
+    Reader("mcap", "mcap", rigs.by_mcap_points, scans, "rig", "m"),
+    Reader("open3d", "pointclouds", rigs.by_open3d, scans, "rig", "m"),
+    Reader("nuscenes-devkit", "nuscenes", rigs.by_nuscenes_points, scans, "rig", "m",
+           because="turned: nuScenes' scanner has X to the right"),
+    Reader("nuscenes-devkit", "nuscenes", rigs.by_nuscenes_devkit,
+           Cubes(("image_02", "image_03"), category_of), "rig", "m", 1e-5, lens=1e-9,
+           is_partial=True, because="micrometres; objects that a sensor senses"),
+    Reader("torchvision", "kitti", rigs.by_torchvision_kitti, Cubes(LEFT, official_type), "rig",
+           "m", 1e-5, is_partial=True, because="micrometres; DontCare is left out"),
+    Reader("datumaro", "kitti", D.by_datumaro("kitti3d", "training", frame, "DontCare"),
+           Boxes(LEFT, (0, 0, -1, -1), official_type), "rig", is_partial=True,
+           because="KITTI's numbers: first and last pixel; DontCare is left out"),
+    Reader("pykitti", "kitti_raw", rigs.by_pykitti, scans_and_lenses, "rig", "m", lens=1e-9,
+           because="decimals"),
+    Reader("datumaro", "motchallenge",
+           D.by_datumaro("mot_seq", "rig-train/*", lambda k: frame(str(int(k) - 1))),
+           Boxes(LEFT, (1, 1, 1, 1), mot_category), "rig", because="MOT's pixels count from 1"),
+    Reader("datumaro", "dota", D.by_datumaro("dota"), Boxes(LEFT, along_heading=True), "rig",
+           tolerance=0.15, because="tenths of pixels; boxes around the corners"),
+    Reader("torchvision", "cityscapes", records.by_torchvision_cityscapes,
+           Boxes(LEFT, name_of=city_class), "rig", iou=1),
+)  # fmt: skip

@@ -1,0 +1,102 @@
+"""The comparison of exports with readers of other makers finds what is planted in a view."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.readers.table import READERS
+from benchmarks.readers.views import Comparison, Thing, View, from_corner
+from gen_data.exporters import TABLE
+
+ROOT = Path(__file__).parents[2]
+MASK = np.zeros((8, 10), bool)
+MASK[2:6, 1:5] = True
+CUP, BOWL = from_corner("cup", (1, 2, 4, 4), MASK), from_corner("bowl", (6, 0, 2, 3), ~MASK)
+STATED = View("000000003_color", (CUP, BOWL), (100.0, 100.0, 5.0, 4.0, -0.3))
+
+
+def compare(found: View, is_partial: bool = False) -> Comparison:
+    comparison = Comparison()
+    comparison.add_views([STATED], [found], is_partial)
+    return comparison
+
+
+def test_equal_views_have_no_difference() -> None:
+    """In any order of things; coefficients that are left out at the end are 0."""
+    found = replace(STATED, things=(BOWL, CUP), lens=(*STATED.lens, 0.0, 0.0))
+
+    assert compare(found) == Comparison(objects=2, worst=0.0, iou=1.0, lens=0.0)
+
+
+@pytest.mark.parametrize(
+    ("found", "name", "value"),
+    [
+        (replace(STATED, things=(replace(CUP, numbers=CUP.numbers + 0.25), BOWL)), "worst", 0.25),
+        (
+            replace(STATED, things=(replace(CUP, mask=MASK & (MASK.cumsum(1) < 4)), BOWL)),
+            "iou",
+            0.75,
+        ),
+        (replace(STATED, lens=(100.0, 100.0, 5.5, 4.0, -0.3)), "lens", 0.5),
+        (replace(STATED, lens=(100.0, 100.0, 5.0, 4.0)), "lens", 0.3),
+        (
+            replace(STATED, things=(CUP,)),
+            "faults",
+            ["000000003_color: bowl [6. 0. 8. 3.] is missing"],
+        ),
+        (
+            replace(STATED, things=(CUP, replace(BOWL, category="cup"))),
+            "faults",
+            [
+                "000000003_color: cup [6. 0. 8. 3.] is not in the data set",
+                "000000003_color: bowl [6. 0. 8. 3.] is missing",
+            ],
+        ),
+        (
+            replace(STATED, name="000000004_color"),
+            "faults",
+            ["000000003_color is missing", "000000004_color is not in the data set"],
+        ),
+    ],
+)
+def test_differences_are_measured_and_named(found: View, name: str, value: object) -> None:
+    """Half of a mask's row is a quarter of it; absent lens terms count."""
+    assert getattr(compare(found), name) == value
+
+
+def test_a_format_that_leaves_things_out_may_not_add_any() -> None:
+    """Neither of another class nor beside those that are there."""
+    assert compare(replace(STATED, things=(CUP,)), is_partial=True).faults == []
+    twice = compare(replace(STATED, things=(CUP, CUP)), is_partial=True)
+    assert twice.faults == ["000000003_color: cup [1. 2. 5. 6.] is not in the data set"]
+
+
+def test_numbers_of_another_kind_do_not_match() -> None:
+    """A box in space is no box in the image."""
+    cube = Thing("cup", np.zeros(12))
+    assert len(compare(replace(STATED, things=(cube, BOWL))).faults) == 2
+
+
+def test_the_documentation_names_the_formats_without_a_row() -> None:
+    """Every other exporter is read by a package of another maker."""
+    text = (ROOT / "docs/formats.md").read_text()
+    (sentence,) = re.findall(r"No row: (.*?)\.", text, re.DOTALL)
+
+    assert {*re.findall(r"`(\w+)`", sentence)} == {*TABLE} - {reader.format for reader in READERS}
+
+
+@pytest.mark.slow
+def test_readers_find_what_data_sets_state() -> None:
+    """All readers that are installed."""
+    command = [sys.executable, "-m", "benchmarks.readers"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert done.stdout.count(" yes ") > 10
