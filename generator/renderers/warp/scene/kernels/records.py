@@ -14,6 +14,8 @@ EQUIRECTANGULAR = wp.constant(3)
 # Flags of cut-outs: bits that rays match against what they may pass.
 HOLES = wp.constant(1)
 CLEAR = wp.constant(2)
+# Flag of bodies that move, which rays may pass as a whole.
+MOVES = wp.constant(4)
 
 Coefficients = wp.types.vector(length=8, dtype=wp.float32)
 
@@ -88,7 +90,8 @@ class BodyRecord:
         R_world_mesh, t_world_mesh: Rotation without scale, and position.
         B_mesh_world, t_mesh_world: World to mesh, scale included.
         low_m, high_m: Box in the world.
-        cutouts: HOLES, CLEAR or both if rays may pass some of its faces; 0 needs no test per face.
+        cutouts: HOLES, CLEAR or both if rays may pass some of its faces; neither needs no test per
+            face. MOVES if it does not stay where it is.
     """
 
     geometry: int
@@ -442,7 +445,7 @@ class World:
         tree: Hierarchy over the bodies' boxes, see gen_data.generator.renderers.warp.scene.bvh;
             empty on CUDA.
         hierarchy: Warp's hierarchy over the same boxes, on CUDA; 0 on the CPU.
-        cutouts: Numbers of the bodies with faces that rays may pass.
+        cutouts: Numbers of the bodies with HOLES or CLEAR faces.
         cutout_hierarchy: Warp's hierarchy over their boxes; 0 without any.
         lobes: Directional albedo of specular lobes, see brdf.directional_albedo.
         volumes: Boxes in which ``probes`` replace the sky's ambient light.
