@@ -127,6 +127,7 @@ class MaterialRecord:
         thin: 1 for a pane that does not refract, 0 for a solid that does.
         opacity: Share of the background that it hides.
         soaks: 1 for soil and turf, where rain seeps away; 0 for all else.
+        one_sided: 1 if the texture is on the front only; the back has its mean colour.
     """
 
     base_color: wp.vec3
@@ -145,6 +146,7 @@ class MaterialRecord:
     thin: int
     opacity: float
     soaks: float
+    one_sided: int
 
 
 @wp.struct
