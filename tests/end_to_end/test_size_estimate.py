@@ -28,12 +28,12 @@ def test_every_selected_pixel_counts_as_a_point() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("config", ["tabletop.yaml", "robot_vacuum.yaml", "carla_table.yaml"])
-def test_scans_take_at_most_what_is_estimated_and_not_much_less(
+def test_scans_take_at_most_what_is_estimated_and_at_least_half_of_it(
     config: str, tmp_path: Path
 ) -> None:
-    """The sky returns nothing: at most half as much again is estimated."""
+    """Rays into the sky return nothing: of `carla`, a third."""
     gen_data.generate(config, 1, out=tmp_path / "data", overrides=["exporters=[]"], workers=1)
 
     written = sum(p.stat().st_size for p in (tmp_path / "data/shards").rglob("*/points/*.npy"))
     estimate = estimate_point_bytes(load_config(config))
-    assert 1.0 <= estimate / written <= 1.5
+    assert 1.0 <= estimate / written <= 2.0
