@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from gen_data.generator.assemble.config import Config
 from gen_data.generator.core.capture import POINT
 from gen_data.generator.core.interfaces import DatasetInfo
@@ -44,11 +46,12 @@ def estimate_image_bytes(config: Config, info: DatasetInfo) -> float:
 def estimate_point_bytes(config: Config) -> float:
     """Bytes of the laser scans of a sample, as if every ray had one return."""
     sizes_px = {s.name: s.size_px for s in config.sensors if hasattr(s, "size_px")}
-    return sum(
-        POINT.itemsize * sensor.count_rays(sizes_px.get(sensor.camera, (0, 0))) + FILE_BYTES
-        for sensor in config.sensors
-        if hasattr(sensor, "count_rays")
+    scanners: list[Any] = [s for s in config.sensors if hasattr(s, "count_rays")]
+    total: float = sum(
+        POINT.itemsize * scanner.count_rays(sizes_px.get(scanner.camera, (0, 0))) + FILE_BYTES
+        for scanner in scanners
     )
+    return total
 
 
 def estimate_sample_bytes(config: Config, info: DatasetInfo) -> float:
