@@ -25,7 +25,7 @@ from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.sample import Sample
 from gen_data.generator.runner.exports import LinkedFiles, StoredPipeline
 from gen_data.generator.runner.shard import drop_pixels
-from gen_data.generator.runner.stored import StoredSamples
+from gen_data.generator.runner.stored import CheckedSamples, StoredSamples
 
 
 def measure(folder: Path, entry: dict[str, Any], n: int) -> tuple[float, float]:
@@ -34,7 +34,7 @@ def measure(folder: Path, entry: dict[str, Any], n: int) -> tuple[float, float]:
     Raises:
         ConfigError: the data set cannot be exported in this format.
     """
-    stored = StoredSamples(folder)
+    stored = CheckedSamples(folder)
     config = load_config(str(folder), overrides=[f"exporters={json.dumps([entry])}"])
     exporters = ready_exporters(config, stored.info, open_library(config.asset_folders))
     ((name, exporter),) = exporters.items()

@@ -86,7 +86,7 @@ from typing import Any, ClassVar, Literal
 from gen_data.exporters.base import ANY_FORMAT, ExporterBase
 from gen_data.exporters.conventions import EDGES, READING, Conventions
 from gen_data.exporters.fragments import fragment_lines, fragment_rows, image_splits, write_fragment
-from gen_data.exporters.ignored_regions import each_class
+from gen_data.exporters.ignored_regions import numbered
 from gen_data.exporters.image_files import link_or_copy
 from gen_data.exporters.lens_fields import lens_fields
 from gen_data.exporters.mask_polygons import drawable_polygons
@@ -95,7 +95,6 @@ from gen_data.exporters.sensor_selection import check_channels, instant_s, rgb_c
 from gen_data.exporters.sequences import sequence_number
 from gen_data.generator.core.boxes import BoxPx, OrientedBox
 from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.interfaces import DatasetInfo
 from gen_data.generator.core.intrinsics import Intrinsics
 from gen_data.generator.core.motion import Twist
@@ -108,7 +107,7 @@ from gen_data.generator.core.sample import (
     Sample,
     both_ways,
 )
-from gen_data.generator.core.scene import LABEL_IDS_MAX, Instance, Scene, Weather
+from gen_data.generator.core.scene import Instance, Scene, Weather
 from gen_data.generator.core.se3 import Array
 from gen_data.generator.core.serialization import canonical_json
 from gen_data.generator.core.shutter import Shutter
@@ -166,7 +165,7 @@ class Coco(ExporterBase):
                 annotations = rows.setdefault(f"{sample.split}.annotations", [])
                 images.append(_image(info, sample, sensor))
                 visible = [thing for thing in truth.objects if thing.box is not None]
-                for thing, number in _numbered(info, visible):
+                for thing, number in numbered(info, visible):
                     row = self._annotation(info, sample, sensor, thing)
                     row["id"] = sample.annotation_id(sensor, number)
                     annotations.append(row)
@@ -241,30 +240,6 @@ class Coco(ExporterBase):
         return thing.amodal_box.clipped(camera.width_px, camera.height_px)
 
 
-def _numbered(
-    info: DatasetInfo, objects: Sequence[ObjectTruth]
-) -> Iterator[tuple[ObjectTruth, int]]:
-    """Objects, each under every class that it counts for, with numbers unique in the image.
-
-    Raises:
-        ConfigError: there are more regions without a class than numbers.
-    """
-    last = max((thing.instance.instance_id for thing in objects), default=0)
-    free = iter(range(LABEL_IDS_MAX, last, -1))
-    for thing in objects:
-        if thing.instance.category_id:
-            yield thing, thing.instance.instance_id
-            continue
-        for region in each_class(info, [thing]):
-            number = next(free, None)
-            if number is None:
-                raise ConfigError(
-                    f"exporter 'coco': more than {LABEL_IDS_MAX - last} ignored regions in an "
-                    "image; expected `others: drop` in labels.map, or fewer classes"
-                )
-            yield region, number
-
-
 def image_labels(info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
     """Labels of one image, without paths: the row of ``images`` and its ``annotations``.
 
@@ -272,11 +247,12 @@ def image_labels(info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, An
     their ``category``.
     """
     row = _image(info, sample, sensor)
-    visible = (thing for thing in sample.truth[sensor].objects if thing.box is not None)
+    visible = [thing for thing in sample.truth[sensor].objects if thing.box is not None]
     style = Coco(segmentation="rle")
     annotations = [
-        style._annotation(info, sample, sensor, thing) | {"category": thing.instance.category}
-        for thing in visible
+        style._annotation(info, sample, sensor, thing)
+        | {"id": sample.annotation_id(sensor, number), "category": thing.instance.category}
+        for thing, number in numbered(info, visible)
     ]
     without_paths = {k: v for k, v in row.items() if k not in ("file_name", "files")}
     return without_paths | {"annotations": annotations}

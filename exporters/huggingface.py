@@ -44,6 +44,7 @@ from pydantic import Field
 from gen_data.exporters.base import ANY_FORMAT, ExporterBase, check_installed
 from gen_data.exporters.conventions import EDGES, READING, Conventions
 from gen_data.exporters.fragments import fragment_rows, numbered_stem, write_fragment
+from gen_data.exporters.ignored_regions import numbered
 from gen_data.exporters.lens_fields import has_bent_camera, lens_fields
 from gen_data.exporters.parquet_tables import (
     GROUP_ROWS,
@@ -289,10 +290,10 @@ def object_features(info: DatasetInfo) -> dict[str, Any]:
 def _row(info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
     """Row of an image without its pixels."""
     camera = sample.truth[sensor].camera
+    visible = [thing for thing in sample.truth[sensor].objects if thing.box is not None]
     objects = [
-        _object(sample, sensor, thing)
-        for thing in sample.truth[sensor].objects
-        if thing.box is not None
+        _object(sample, sensor, thing) | {"id": sample.annotation_id(sensor, number)}
+        for thing, number in numbered(info, visible)
     ]
     return {
         "image_id": sample.image_id(sensor),
@@ -318,12 +319,11 @@ def _lens(lens: Lens) -> dict[str, Any] | None:
 
 
 def _object(sample: Sample, sensor: str, thing: ObjectTruth) -> dict[str, Any]:
-    """Values of a visible object by column."""
+    """Values of a visible object by column, but its id."""
     assert thing.box is not None, "invisible objects are not listed"
     assert thing.mask is not None, "the annotation instance_masks is in `needs`"
     camera, box = sample.truth[sensor].camera.intrinsics, thing.box
     return {
-        "id": sample.annotation_id(sensor, thing.instance.instance_id),
         "instance_id": thing.instance.instance_id,
         "category": thing.instance.category_id - 1,
         "bbox": [box.x_min, box.y_min, box.width_px, box.height_px],

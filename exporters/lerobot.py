@@ -44,7 +44,13 @@ from gen_data.exporters.fragments import fragment_rows
 from gen_data.exporters.lerobot_files import LABELS, LAYOUTS, RobotFiles
 from gen_data.exporters.lerobot_statistics import image_sums
 from gen_data.exporters.sensor_selection import rgb_camera, rgb_cameras
-from gen_data.exporters.sequences import FRAMES, Frame, frame_facts, write_frames
+from gen_data.exporters.sequences import (
+    FRAMES,
+    Frame,
+    frame_facts,
+    unbroken_episodes,
+    write_frames,
+)
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.demonstrations import (
     DemonstrationStep,
@@ -136,8 +142,7 @@ class LeRobot(ExporterBase):
         lines = fragment_rows(shard_dirs, self.type, FRAMES)
         frames = (Frame(shard_dir, row) for shard_dir, row in lines)
         folders: dict[tuple[str, str], RobotFiles] = {}
-        for _, group in groupby(frames, key=lambda frame: frame.row["sequence"]):
-            episode = list(group)
+        for episode in unbroken_episodes(frames):
             first = episode[0].row
             key = (first["split"], first["robot"])
             if key not in folders:

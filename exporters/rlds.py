@@ -24,8 +24,7 @@ files of TensorFlow Datasets that describe a builder are not written.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from itertools import groupby
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
@@ -35,7 +34,7 @@ from gen_data.exporters.base import check_installed
 from gen_data.exporters.conventions import ANY_LENS, Conventions
 from gen_data.exporters.fragments import fragment_rows, numbered_stem
 from gen_data.exporters.lerobot import LeRobot
-from gen_data.exporters.sequences import FRAMES, Frame, write_text
+from gen_data.exporters.sequences import FRAMES, Frame, unbroken_episodes, write_text
 from gen_data.exporters.tfrecord import Feature, encode_example, encode_features, frame_record
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.interfaces import DatasetInfo
@@ -88,17 +87,10 @@ class Rlds(LeRobot):
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Write the episodes of all shards, and what their keys are."""
-        totals: Counter[tuple[str, str]] = Counter()
-        seen = -1
-        for _, row in fragment_rows(shard_dirs, self.type, FRAMES):
-            if row["sequence"] != seen:
-                totals[row["split"], row["robot"]] += 1
-                seen = row["sequence"]
-        frames = (Frame(d, row) for d, row in fragment_rows(shard_dirs, self.type, FRAMES))
+        totals = Counter(_data_set(episode) for episode in self._episodes(shard_dirs))
         written: Counter[tuple[str, str]] = Counter()
-        for _, group in groupby(frames, key=lambda frame: frame.row["sequence"]):
-            episode = list(group)
-            key = (episode[0].row["split"], episode[0].row["robot"])
+        for episode in self._episodes(shard_dirs):
+            key = _data_set(episode)
             folder = dataset_dir / key[0] / key[1].replace("/", "_")
             folder.mkdir(parents=True, exist_ok=True)
             features = _features(info, episode)
@@ -113,17 +105,29 @@ class Rlds(LeRobot):
                 file.write(record)
             written[key] += 1
 
+    def _episodes(self, shard_dirs: Sequence[Path]) -> Iterator[list[Frame]]:
+        rows = fragment_rows(shard_dirs, self.type, FRAMES)
+        return unbroken_episodes(Frame(shard_dir, row) for shard_dir, row in rows)
+
+
+def _data_set(episode: Sequence[Frame]) -> tuple[str, str]:
+    """Split and robot of an episode."""
+    row = episode[0].row
+    return row["split"], row["robot"]
+
 
 def _features(info: DatasetInfo, frames: Sequence[Frame]) -> dict[str, Feature]:
     """Lists of an episode by key."""
     rows = [{**frame.row, **frame.row["labels"]} for frame in frames]
     first, last = rows[0], len(rows) - 1
     succeeded = bool(first.get("annotation.succeeded"))
+    # An episode that a missing sample ends has not come to its success.
+    rewarded = succeeded and rows[last]["step"] == info.steps_per_scene - 1
     features: dict[str, Feature] = {
         "steps/is_first": [int(k == 0) for k in range(len(rows))],
         "steps/is_last": [int(k == last) for k in range(len(rows))],
-        "steps/is_terminal": [int(k == last and succeeded) for k in range(len(rows))],
-        "steps/reward": [float(k == last and succeeded) for k in range(len(rows))],
+        "steps/is_terminal": [int(k == last and rewarded) for k in range(len(rows))],
+        "steps/reward": [float(k == last and rewarded) for k in range(len(rows))],
         "steps/discount": [1.0] * len(rows),
         "steps/language_instruction": [row["task"].encode() for row in rows],
         "episode_metadata/sequence": [first["sequence"]],

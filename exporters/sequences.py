@@ -8,9 +8,10 @@ merging the shards numbers the frames.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -101,6 +102,20 @@ def read_sequences(shard_dirs: Sequence[Path], exporter: str) -> dict[int, list[
     for shard_dir, row in fragment_rows(shard_dirs, exporter, FRAMES):
         sequences.setdefault(row["sequence"], []).append(Frame(shard_dir, row))
     return sequences
+
+
+def unbroken_episodes(frames: Iterable[Frame]) -> Iterator[list[Frame]]:
+    """Yield the frames of each sequence, in order; a sample that does not exist ends an episode.
+
+    For formats whose frames are one step apart by definition.
+    """
+
+    def run_of(item: tuple[int, Frame]) -> tuple[int, int]:
+        place, frame = item
+        return frame.row["sequence"], frame.index - place
+
+    for _, run in groupby(enumerate(frames), key=run_of):
+        yield [frame for _, frame in run]
 
 
 def frame_rate_hz(info: DatasetInfo, frames: Sequence[Frame]) -> float:

@@ -29,6 +29,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
+from functools import cache
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 from xml.sax.saxutils import escape
@@ -269,5 +270,13 @@ def _list_lines(info: DatasetInfo, row: dict[str, Any]) -> Iterable[tuple[str, s
         yield f"Main/{name}", f"{stem}\n"
         yield f"Segmentation/{name}", f"{stem}\n"
         for k, category in enumerate(info.categories, 1):
-            word = "".join(c if c.isalnum() else "-" for c in category)
-            yield f"Main/{word}_{name}", f"{stem} {row['shown'].get(str(k), -1):2d}\n"
+            yield (
+                f"Main/{_file_word(category)}_{name}",
+                f"{stem} {row['shown'].get(str(k), -1):2d}\n",
+            )
+
+
+@cache
+def _file_word(category: str) -> str:
+    """A category in names of files."""
+    return "".join(c if c.isalnum() else "-" for c in category)

@@ -72,10 +72,18 @@ class Robot(PlacedElement):
     def _find_installed(self, assets: AssetIndex) -> str:
         """Find its first installed asset; if there is none, the first that needs no pack.
 
-        The error text then is about that one; ids of packs have a slash.
+        The error text then is about that one; ids of packs have a slash. A name that its installed
+        pack does not have is a mistake, whatever comes after it.
+
+        Raises:
+            AssetError: there is such a name.
         """
         wanted = (self.asset,) if isinstance(self.asset, str) else self.asset
         known = {asset.asset_id for asset in assets.find((), kind="robot")}
+        installed = {name.rpartition("/")[0] for name in known}
+        for name in wanted:
+            if name not in known and name.rpartition("/")[0] in installed:
+                assets.robot(name)
         without_pack = [name for name in wanted if "/" not in name]
         return next((name for name in wanted if name in known), [*without_pack, wanted[0]][0])
 

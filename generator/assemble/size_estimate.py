@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from gen_data.generator.assemble.config import Config
+from gen_data.generator.core.capture import POINT
 from gen_data.generator.core.interfaces import DatasetInfo
 
 BYTES_PER_PIXEL = {
@@ -40,6 +43,17 @@ def estimate_image_bytes(config: Config, info: DatasetInfo) -> float:
     return total
 
 
+def estimate_point_bytes(config: Config) -> float:
+    """Bytes of the laser scans of a sample, as if every ray had one return."""
+    sizes_px = {s.name: s.size_px for s in config.sensors if hasattr(s, "size_px")}
+    scanners: list[Any] = [s for s in config.sensors if hasattr(s, "count_rays")]
+    total: float = sum(
+        POINT.itemsize * scanner.count_rays(sizes_px.get(scanner.camera, (0, 0))) + FILE_BYTES
+        for scanner in scanners
+    )
+    return total
+
+
 def estimate_sample_bytes(config: Config, info: DatasetInfo) -> float:
-    """Bytes of a sample with images, scene and labels; without points, whose number varies."""
-    return estimate_image_bytes(config, info) + RECORDS_BYTES
+    """Bytes of a sample with images, points, scene and labels."""
+    return estimate_image_bytes(config, info) + estimate_point_bytes(config) + RECORDS_BYTES

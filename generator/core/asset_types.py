@@ -40,7 +40,8 @@ class Material:
             other side, linear RGB in [0, 1]; multiplies the texture. Renderers reduce it where it
             and the base colour exceed 1 together. Metals have none.
         printed: The texture is part of what the object *is* (a label, a book cover);
-            randomizers leave colour and texture alone.
+            randomizers leave colour and texture alone. On paint, plates and signs it is on the
+            front only: their backs have its mean colour.
         role: Function of the slot on its object, for randomizers that target it:
             ``paint``, ``glass``, ``headlight``, ``lens_red``, ``skin``, ...; empty = nothing
             special.

@@ -6,7 +6,7 @@ a drive would lead out of the folder that it is joined to. Names are checked whe
 
 from __future__ import annotations
 
-from pathlib import PureWindowsPath
+import ntpath
 
 NAME_MAX = 255
 """Longest name of a file on common file systems."""
@@ -25,7 +25,7 @@ def check_name(name: str, longest: int = NAME_MAX) -> str:
         isinstance(name, str) and 0 < len(name) <= longest and name.isprintable() and name.strip()
     )
     leads_away = name in (".", "..") or any(separator in name for separator in "/\\")
-    if not fits or leads_away or PureWindowsPath(name).drive:
+    if not fits or leads_away or ntpath.splitdrive(name)[0]:
         raise ValueError(
             f"{str(name)[:longest]!r} cannot name a file; expected a name of 1 to {longest} "
             "printable characters, without / and \\"

@@ -22,6 +22,9 @@ from gen_data.generator.core.se3 import SE3, Vec3, rotate_by_quaternion
 RIG_AXES = SE3((0.0, 0.0, 0.0), (0.5, 0.5, -0.5, 0.5))
 """``T_camera_rig``: X forward, Y left, Z up in the camera's X right, Y down, Z forward."""
 
+_DRIVEN = frozenset({"driving", "bicycle"})
+_SITTING = "sitting"
+
 EGO = "ego"
 """Name of the rig that truth about a sample as a whole refers to."""
 
@@ -80,6 +83,26 @@ def place_sensors(scene: Scene) -> Scene:
         scene,
         lidars=tuple(_placed_lidar(scene, lidar) for lidar in scene.lidars),
         devices=tuple(_placed_device(scene, device) for device in scene.devices),
+    )
+
+
+def moving_bodies(scene: Scene) -> frozenset[str]:
+    """Names of bodies that do not stay where they are, also in a still image.
+
+    They have a trajectory, drive (objects on driving or bicycle lanes), or belong to a person who
+    is not sitting.
+    """
+    tracked = {track.body for track in scene.tracks}
+    driven = {group.name for group in scene.groups if _DRIVEN & set(group.lanes)}
+    afoot = {
+        instance.instance_id
+        for instance in scene.instances
+        if dict(instance.attributes).get("behaviour", _SITTING) != _SITTING
+    }
+    return frozenset(
+        body.name
+        for body in scene.bodies
+        if body.name in tracked or body.group in driven or body.instance_id in afoot
     )
 
 

@@ -142,7 +142,14 @@ def _dataclass_builder(kind: type) -> Callable[[Any], Any]:
     def build(plain: Any) -> Any:
         if isinstance(plain, kind):
             return plain
-        return kind(**fields_from_plain(kind, plain))
+        # As fields_from_plain: records of streets hold a thousand such values.
+        builders = _field_builders(kind)
+        return kind(
+            **{
+                name: item if (build := builders[name]) is _itself else build(item)
+                for name, item in plain.items()
+            }
+        )
 
     return build
 

@@ -29,7 +29,7 @@ from gen_data.generator.runner.provenance import SCENES_NAME
 from gen_data.generator.runner.run import Settings, run
 from gen_data.generator.runner.seal import read_sums
 from gen_data.generator.runner.shard_record import FileRecord
-from gen_data.generator.runner.store import LICENCES_NAME, SUMS_NAME, LocalStore
+from gen_data.generator.runner.store import LICENCES_NAME, SUMS_NAME
 from gen_data.generator.runner.stored import RECORDED, CheckedSamples, StoredSamples, check_digest
 from gen_data.generator.runner.verify import check_source
 
@@ -92,7 +92,7 @@ class StoredPipeline:
 class LinkedFiles:
     """Links the files of a data set into the shards of its export."""
 
-    stored: StoredSamples
+    stored: CheckedSamples
 
     def link_media(self, info: DatasetInfo, sample: Sample, shard_dir: Path) -> None:
         """Link images, laser scans and measurements of a sample."""
@@ -129,7 +129,11 @@ class LinkedFiles:
         folder = self.stored.shard_dir(shard)
         for file in _linked_files(self.stored, shard):
             path = folder / file.path
-            check_digest(path, file.sha256, self.stored.folder, RECORDED)
+            if path.parent == folder:
+                # Checked before it was read.
+                self.stored.check(path)
+            else:
+                check_digest(path, file.sha256, self.stored.folder, RECORDED)
             found[get_inode(path)] = file.sha256
         return found
 
@@ -137,15 +141,15 @@ class LinkedFiles:
         return self.stored.shard_dir(index // self.stored.plan.shard_size)
 
 
-def _linked_sample_bytes(stored: StoredSamples) -> float:
+def _linked_sample_bytes(stored: CheckedSamples) -> float:
     """Mean size of the files of a sample that exports link, in the first shard."""
     sizes = [file.bytes for file in _linked_files(stored, 0)]
-    record = LocalStore(stored.folder).record(0)
+    record = stored.record(0)
     return sum(sizes) / max(record.samples if record else 0, 1)
 
 
-def _linked_files(stored: StoredSamples, shard: int) -> list[FileRecord]:
-    record = LocalStore(stored.folder).record(shard)
+def _linked_files(stored: CheckedSamples, shard: int) -> list[FileRecord]:
+    record = stored.record(shard)
     sensors = {sensor.name for sensor in stored.info.sensors}
     return [
         file
@@ -200,15 +204,15 @@ def export(  # noqa: PLR0913  (keywords of one front door)
         GenDataError: see ``run``.
     """
     check_source(stored.folder)
-    stored = CheckedSamples(stored.folder)
+    source = CheckedSamples(stored.folder)
     licences = stored.folder / LICENCES_NAME
     text = _read_licences(licences) if licences.exists() else None
-    files = LinkedFiles(stored)
-    linked_bytes = _linked_sample_bytes(stored)
+    files = LinkedFiles(source)
+    linked_bytes = _linked_sample_bytes(source)
     linked = _is_same_disk(stored.folder, out.absolute())
     return run(
         replace(stored.plan, config=config.resolved, format_version=FORMAT_VERSION),
-        StoredPipeline(stored, exporters, config.asset_folders),
+        StoredPipeline(source, exporters, config.asset_folders),
         out,
         workers=workers,
         resume_command=resume_command,

@@ -274,10 +274,27 @@ class CheckedSamples(StoredSamples):
     What is made of them gets checksums of its own, which damage in the source would pass.
     """
 
-    def _open_lines(self, path: Path) -> JsonLines:
-        record = LocalStore(self.folder).record(int(path.parent.name))
+    def __init__(self, folder: str | PathLike[str]) -> None:
+        super().__init__(folder)
+        self.record = lru_cache(SHARDS_KEPT)(LocalStore(self.folder).record)
+        """Record of a shard; None if it is missing or damaged."""
+        self._checked: set[Path] = set()
+
+    def check(self, path: Path) -> None:
+        """Hold a file of a shard's own folder against the shard's record, once.
+
+        Raises:
+            StorageError: it is damaged.
+        """
+        if path in self._checked:
+            return
+        record = self.record(int(path.parent.name))
         expected = {file.path: file.sha256 for file in record.files} if record else {}
         check_digest(path, expected.get(path.name), self.folder, RECORDED)
+        self._checked.add(path)
+
+    def _open_lines(self, path: Path) -> JsonLines:
+        self.check(path)
         return super()._open_lines(path)
 
 

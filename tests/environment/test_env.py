@@ -18,7 +18,7 @@ import gen_data
 from gen_data.generator.api.config import read_model
 from gen_data.generator.config.yaml_tree import parse_yaml
 from gen_data.generator.core.distribution import install_command
-from gen_data.generator.core.errors import ConfigError, SceneRejected
+from gen_data.generator.core.errors import AssetError, ConfigError, SceneRejected
 from gen_data.generator.environment.env import ENV_ID, Env, make_vec
 from gen_data.generator.environment.settings import EnvSettings
 from tests.environment.small import CONFIG, arm_of, nominal, same, simulation_of, small
@@ -232,6 +232,13 @@ def test_configurations_without_one_robot_with_a_gripper_are_refused() -> None:
         Env("tabletop.yaml")
     with pytest.raises(ConfigError, match=r"elements: robot 'kuka_iiwa' has no gripper"):
         Env("tabletop.yaml", overrides=["shared.robot=kuka_iiwa"])
+
+
+@pytest.mark.parametrize("name", ["nope", "frank_panda"])
+def test_a_robot_that_does_not_exist_is_refused_whatever_may_replace_it(name: str) -> None:
+    """Only robots of packs that are not installed have a replacement."""
+    with pytest.raises(AssetError, match=rf"shared\.robot: asset '{name}': unknown"):
+        Env("arm_tasks.yaml", overrides=[f"shared.robot={name}"])
 
 
 def test_a_task_without_solution_is_refused_with_reasons() -> None:

@@ -167,6 +167,13 @@ def test_rlds_rewards_the_last_step_of_a_success(world: Any, samples: Any, tmp_p
     assert values(example, "steps/reward") == [0.0, 0.0, 0.0, 1.0]
     assert values(example, "steps/is_terminal") == [0, 0, 0, 1]
 
+    # Steps are even: a sample that does not exist ends the episode, before its success.
+    cut = world.export(Rlds(), drive_info(world), done[:2] + done[3:], tmp_path / "cut")
+    records = tfrecord_iterator(str(next((cut / "train/toys_arm").glob("*.tfrecord"))))
+    # The iterator reads every record into the same buffer.
+    parts = [example_pb2.Example.FromString(bytes(record)) for record in records]
+    assert [values(part, "steps/reward") for part in parts] == [[0.0, 0.0], [1.0]]
+
 
 def test_the_hand_of_a_step_is_that_of_its_joints(samples: Any) -> None:
     """Shoulder and elbow at 0: the hand stands upright over the base, 0.3 + 0.3 + 0.35 m up."""

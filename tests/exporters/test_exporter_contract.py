@@ -8,11 +8,16 @@ from typing import Any
 import pytest
 
 from gen_data.exporters import TABLE
+from gen_data.exporters.label_map import LabelMap, MappedExporter
 from gen_data.generator import annotations
 from tests.exporters.drives import drive_info
 
 PACKED = {"huggingface", "rlds", "tfrecord", "webdataset", "rerun"}
 """Formats with several samples in a file."""
+EVERY_CLASS = {"coco", "huggingface", "tfrecord", "voc", "webdataset"}
+"""Formats with regions that a score leaves out class by class; each has its own test of them."""
+NO_CLASS = {"cityscapes", "hdf5", "kitti", "kitti_tracking", "language", "motchallenge"}
+"""Formats with a mark for ignored objects that needs no class, or that only mention them."""
 
 
 def files(folder: Path) -> dict[str, bytes]:
@@ -93,3 +98,25 @@ def test_text_files_are_utf8_with_unix_line_ends(written: Path) -> None:
     for name, data in files(written / "dataset").items():
         if name.endswith((".json", ".txt")):
             assert b"\r" not in data.decode("utf-8").encode()
+
+
+def test_only_formats_with_a_mark_for_it_have_ignored_objects_without_a_class(
+    exporter: Any, world: Any, tmp_path: Path
+) -> None:
+    """All others leave them out: their readers would take class 0 for the first or last class."""
+    info, samples = given(exporter, world)
+    classes = {name: (name,) for name in info.categories[1:]}
+
+    dropped, ignored = (
+        files(
+            world.export(
+                MappedExporter(exporter, LabelMap(classes=classes, others=others)),
+                info,
+                samples[:1],
+                tmp_path / others,
+            )
+        )
+        for others in ("drop", "ignore")
+    )
+
+    assert (dropped != ignored) == (exporter.type in EVERY_CLASS | NO_CLASS)

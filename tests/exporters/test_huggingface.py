@@ -22,6 +22,7 @@ from pycocotools import mask as coco_mask
 
 from gen_data.exporters import huggingface
 from gen_data.exporters.huggingface import HuggingFace
+from gen_data.exporters.label_map import LabelMap, MappedExporter
 from gen_data.generator.core.errors import ConfigError
 
 # pycocotools' decoder predates numpy 2's __array__(copy=...).
@@ -149,6 +150,28 @@ def test_ignored_objects_are_crowds(world: Any, tmp_path: Path) -> None:
     (row,) = read(folder / "data/train-00000-of-00001.parquet").to_pylist()
 
     assert row["objects"]["iscrowd"] == [True] + [False] * (len(row["objects"]["id"]) - 1)
+
+
+def test_an_ignored_object_without_a_class_is_a_crowd_of_every_class(
+    world: Any, tmp_path: Path
+) -> None:
+    """A reader compares it with detections of its class only; ids stay unique."""
+    classes = {"box": ("crate",), "walker": ("pedestrian",)}
+    exporter = MappedExporter(HuggingFace(), LabelMap(classes=classes, others="ignore"))
+    things = (
+        world.instance(1, "car", 9.0, 2.5, 0.0),
+        world.instance(2, "crate", 8.0, -1.0, 0.0),
+    )
+    sample = world.sample(0, things, [world.camera()])
+
+    folder = world.export(exporter, world.info(1), [sample], tmp_path)
+
+    (row,) = read(folder / "data/train-00000-of-00001.parquet").to_pylist()
+    rows = row["objects"]
+    assert sorted(zip(rows["category"], rows["iscrowd"], strict=True)) == [
+        (0, False), (0, True), (1, True),
+    ]  # fmt: skip
+    assert len(set(rows["id"])) == 3
 
 
 def test_a_data_set_without_photographs_is_refused(world: Any) -> None:

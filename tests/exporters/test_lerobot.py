@@ -383,3 +383,23 @@ def test_cameras_that_skip_steps_are_refused(world: Any) -> None:
     with pytest.raises(ConfigError, match="camera 'right' reads 5 times per second"):
         LeRobot().check(info)
     LeRobot(cameras=("left",)).check(info)
+
+
+@pytest.mark.parametrize("version", ["v3.0", "v2.1"])
+def test_a_sample_that_does_not_exist_ends_the_episode(
+    world: Any, tmp_path: Path, version: Any
+) -> None:
+    """Frames are 1 / fps apart by definition: what follows a gap is another episode."""
+    samples = [replace(sample, split="train") for sample in world.reach()]
+    kept = [sample for sample in samples if sample.index != 1]
+
+    folder = world.export(LeRobot(version=version), drive_info(world), kept, tmp_path)
+
+    rows = rows_of(folder / "train/toys_arm")
+    fps = json.loads((folder / "train/toys_arm/meta/info.json").read_text())["fps"]
+    assert [(row["episode_index"], row["frame_index"]) for row in rows] == [
+        (0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2), (2, 3),
+    ]  # fmt: skip
+    assert [row["index"] for row in rows] == list(range(7))
+    for row in rows:
+        assert row["timestamp"] == pytest.approx(row["frame_index"] / fps, rel=1e-6)

@@ -134,6 +134,11 @@ class LidarSensor(Mounted):
             model = model.model_copy(update={"rotation_hz": self.rotation_hz})
         return model.with_beams(self.beams) if self.beams else model
 
+    def count_rays(self, size_px: tuple[int, int]) -> int:
+        """Number of pulses of a sweep, whatever the size of its camera's image."""
+        del size_px
+        return len(make_sweep(self.device, 0.0).ring)
+
     def describe(self) -> SensorInfo:
         """Describe a laser scanner."""
         return self._info(self.name, Modality.LIDAR)

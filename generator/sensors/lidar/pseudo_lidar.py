@@ -53,6 +53,11 @@ class PseudoLidar(Mounted):
     stride_px: int = Field(8, ge=1, le=256)
     range_max_m: float = Field(120.0, gt=0, le=10_000)
 
+    def count_rays(self, size_px: tuple[int, int]) -> int:
+        """Number of pixels of its camera's image, of width and height, that it selects."""
+        columns, rows = (len(range(self.stride_px // 2, size, self.stride_px)) for size in size_px)
+        return columns * rows
+
     def describe(self) -> SensorInfo:
         """Describe a laser scanner, as which exporters treat it."""
         return SensorInfo(

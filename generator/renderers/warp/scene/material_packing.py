@@ -22,6 +22,8 @@ _COLUMNS = (
 )  # fmt: skip
 _REFLECTANCE_MIN = 1e-3
 """Smallest reflectance of a sheet that transmits: kernels know the ratio of both only."""
+_PRINTS = frozenset({"paint", "plate", "sign"})
+"""Roles of sheets with print on the outside: from within, a livery would be in mirror writing."""
 _SURFACE = {role: number for number, role in enumerate(SURFACES)}
 
 
@@ -59,6 +61,7 @@ def _pack_materials(materials: tuple[Material, ...]) -> BodyMaterials:
         for name in _COLUMNS:
             values[name] = [getattr(m, name) for m in materials]
         values["soaks"] = [m.role == "grass" for m in materials]
+        values["one_sided"] = [m.printed and m.role in _PRINTS for m in materials]
         for k, material in enumerate(materials):
             if any(material.diffuse_transmission):
                 _pack_transmission(material, values[k])

@@ -22,6 +22,7 @@ from gen_data.generator.core.scene import (
     Scene,
     Weather,
 )
+from gen_data.generator.core.scene_time import moving_bodies
 from gen_data.generator.core.se3 import Array, unit_quaternions_to_rotations
 from gen_data.generator.renderers.warp.device_cache import DeviceCache
 from gen_data.generator.renderers.warp.scene.bvh import body_tree, group_boxes
@@ -176,7 +177,12 @@ def _pack_scene(scene: Scene, cache: DeviceCache) -> _PackedScene:
     world.lamps = to_device(lamp_records(scene.lights), records.LightRecord, cache.device)
     world.sky = sky_record(scene.environment, environment)
     _fill_volumes(world, scene.environment.volumes, cache.device)
-    return replace(bodies, record=world, assets=(*bodies.assets, environment))
+    placement = replace(bodies.placement, body_records=bodies.placement.body_records.copy())
+    moving = moving_bodies(scene)
+    moves = np.array([body.name in moving for body in scene.bodies], dtype=bool)
+    placement.body_records["cutouts"][moves] |= int(records.MOVES)
+    assets = (*bodies.assets, environment)
+    return replace(bodies, record=world, assets=assets, placement=placement)
 
 
 def _pack_bodies(bodies: tuple[Body, ...], cache: DeviceCache) -> _PackedScene:
@@ -233,7 +239,8 @@ def _build_hierarchies(
     record: records.World, body_records: NDArray[np.void], device: wp.Device
 ) -> wp.Bvh | None:
     low, high = (np.ascontiguousarray(body_records[name]) for name in ("low_m", "high_m"))
-    cutouts = np.flatnonzero(body_records["cutouts"]).astype(np.int32)
+    cut = int(records.HOLES | records.CLEAR)
+    cutouts = np.flatnonzero(body_records["cutouts"] & cut).astype(np.int32)
     corners = (wp.array(of[cutouts], dtype=wp.vec3, device=device) for of in (low, high))
     cutout_hierarchy = wp.Bvh(*corners) if len(cutouts) else None
     record.boxes = wp.array(group_boxes(low, high), dtype=wp.float32, device=device)

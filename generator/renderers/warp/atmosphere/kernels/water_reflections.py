@@ -67,7 +67,7 @@ def probe_exposure(world: World, lattice: Lattice, exposed: wp.array[float]):
     k = wp.tid()
     exposed[k] = 1.0
     if lattice.body[k] >= 0 and lattice.normal[k][2] > 0.1:
-        exposed[k] = precipitation_exposure(world, lattice.origin_m[k])
+        exposed[k] = precipitation_exposure(world, lattice.body[k], lattice.origin_m[k])
 
 
 @wp.kernel

@@ -337,18 +337,20 @@ def first_hit(
 
 
 @wp.func
-def coat_at_hit(scan: Scan, world: World, ray: Ray, range_m: float, surface: int, n_lidar: wp.vec3):
-    """Water and snow at the end of a ray."""
+def coat_at_hit(
+    scan: Scan, world: World, ray: Ray, range_m: float, hit: wp.vec2i, n_lidar: wp.vec3
+):
+    """Water and snow at the end of a ray, at a (body, material)."""
     n = scan.R_world_lidar @ n_lidar
     if wp.dot(n_lidar, ray.direction) > 0.0:
         n = -n
     p = scan.eye_m + scan.R_world_lidar @ (ray.origin_m + ray.direction * range_m)
     exposed = float(1.0)
     if n[2] > 0.1:
-        exposed = precipitation_exposure(world, p + n * SHELTER_OFFSET_M)
+        exposed = precipitation_exposure(world, hit[0], p + n * SHELTER_OFFSET_M)
     # A footprint grows by 1 / cosine; beyond fifty beam widths its length no longer matters.
     slant = wp.max(wp.abs(wp.dot(n_lidar, ray.direction)), 0.02)
-    return coat_at(world, surface, p, n, exposed, scan.divergence_rad * range_m / slant)
+    return coat_at(world, hit[1], p, n, exposed, scan.divergence_rad * range_m / slant)
 
 
 @wp.func
@@ -454,7 +456,7 @@ def scan_beams(
                 if world.ground.covered == 0:
                     reflectances[i] = share * backscatter(lights[material], cosine)
                 else:
-                    coat = coat_at_hit(scan, world, ray, hit.range_m, material, n_lidar)
+                    coat = coat_at_hit(scan, world, ray, hit.range_m, hits[i], n_lidar)
                     light = apply_weather(world, lights[material], coat, material, cosine)
                     reflectances[i] = share * backscatter(light, cosine)
                     puddles[i] = coat.puddle * (1.0 - wp.min(coat.snow, 1.0))

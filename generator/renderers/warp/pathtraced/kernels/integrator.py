@@ -217,7 +217,7 @@ def make_vertex(world: World, hit: RayHit, d: wp.vec3, width_m: float):
     if world.surfaces[v.surface].layered != 0:
         v = add_layers(world, v, hit.at, weight, width_m)
     if world.ground.covered != 0:
-        v = add_weather(world, v, smooth, width_m)
+        v = add_weather(world, v, b, smooth, width_m)
     v.material.normal = face_viewer(v.material.normal, d)
     return v
 
@@ -242,11 +242,11 @@ def add_layers(world: World, v: Vertex, at: wp.vec2i, weight: wp.vec2, width_m: 
 
 
 @wp.func(**OUT_OF_LINE)
-def add_weather(world: World, v: Vertex, n: wp.vec3, width_m: float):
-    """Add water and snow to a vertex; ``n`` is its normal without bumps."""
+def add_weather(world: World, v: Vertex, b: int, n: wp.vec3, width_m: float):
+    """Add water and snow to a vertex on body b; ``n`` is its normal without bumps."""
     exposed = float(1.0)
     if n[2] > 0.1:
-        exposed = precipitation_exposure(world, offset_origin(v.p, v.flat))
+        exposed = precipitation_exposure(world, b, offset_origin(v.p, v.flat))
     coat = coat_at(world, v.surface, v.p, n, exposed, width_m)
     v.material = apply_coat(world, v.surface, v.material, coat, n)
     bare = 1.0 - wp.min(coat.snow, 1.0)

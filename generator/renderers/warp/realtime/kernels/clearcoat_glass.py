@@ -419,7 +419,7 @@ def radiance_along(view: View, world: World, probe: Probe, ray: Ray, sample: int
             material, maps = evaluate_with_maps(world, surface, m.hit, m.weight, n, ray.width_m, v)
             if world.ground.covered != 0:
                 lifted = ray_origin(world, m.hit, m.weight, p, ray.d)
-                exposed = sky_exposure_at(world, lifted, n)
+                exposed = sky_exposure_at(world, m.hit[0], lifted, n)
                 coat = coat_at(world, surface, p, n, exposed, ray.width_m)
                 material = apply_coat(world, surface, material, coat, n)
             clear = world.surfaces[surface].transmission * (1.0 - material.metallic)

@@ -26,6 +26,7 @@ from gen_data.generator.renderers.warp.realtime.kernels.lattice_lighting import 
 )
 from gen_data.generator.renderers.warp.realtime.kernels.soft_shadows import surface_tolerance
 from gen_data.generator.renderers.warp.scene.kernels.environment_lighting import sky_image
+from gen_data.generator.renderers.warp.scene.kernels.material_eval import print_footprint
 from gen_data.generator.renderers.warp.scene.kernels.records import (
     GBufferRecord,
     TextureRecord,
@@ -193,6 +194,7 @@ def stretch_at(
         # Footprints are ellipses: use the level of the geometric mean of both axes.
         slant = wp.max(wp.dot(n, v), 0.05)
         width_m = pixel_width(view, i, images.z_m[i])
+        width_m = print_footprint(world, surface, images.weights[i], width_m)
         texels = width_m * patch.texels_per_m / wp.sqrt(slant)
         sampler = make_sampler(world, stretch.texture, wp.log2(texels))
         if world.textures[stretch.texture].has_bumps != 0 and wp.dot(towards, towards) > 0.0:

@@ -509,16 +509,16 @@ def find_pixel_visibility(
             sky = visible_sky_fraction(world, body, p, origin, n, side, probe.disc, probe.radius_m)
             corners = 1.0
         listed.open_sky[0, k] = sky / corners
-        listed.exposed[k] = sky_exposure_at(world, origin, n)
+        listed.exposed[k] = sky_exposure_at(world, body, origin, n)
 
 
 @wp.func
-def sky_exposure_at(world: World, origin: wp.vec3, n: wp.vec3):
-    """Exposure of a point to precipitation, by a ray."""
+def sky_exposure_at(world: World, body: int, origin: wp.vec3, n: wp.vec3):
+    """Exposure of a point on a body to precipitation, by a ray."""
     exposed = float(1.0)
     # Steep surfaces hold no water or snow: their exposure is never used.
     if world.ground.covered != 0 and n[2] > 0.1:
-        exposed = precipitation_exposure(world, origin)
+        exposed = precipitation_exposure(world, body, origin)
     return exposed
 
 

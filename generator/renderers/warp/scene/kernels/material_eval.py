@@ -19,6 +19,9 @@ from gen_data.generator.renderers.warp.visibility.kernels.label_resolve import m
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 
+# A footprint as large as any texture: its mean.
+EVERYTHING_M = wp.constant(1.0e6)
+
 
 @wp.struct
 class SurfaceMaterial:
@@ -54,6 +57,15 @@ def sheet_normal(world: World, surface: int, hit: wp.vec2i, weight: wp.vec2):
         if is_back_face(weight):
             n = -n
     return n
+
+
+@wp.func
+def print_footprint(world: World, surface: int, weight: wp.vec2, width_m: float):
+    """Width over which a texture is averaged: the back of a print shows its mean."""
+    prints = world.surfaces[surface].one_sided != 0
+    if prints and is_back_face(weight) and world.surfaces[surface].texture_scale_m == 0.0:
+        return EVERYTHING_M
+    return width_m
 
 
 @wp.func
@@ -192,5 +204,6 @@ def evaluate_material(
                 material, world, texture, hit[0], p_mesh, scale_m, footprint_m
             )
         else:
+            footprint_m = print_footprint(world, surface, weight, footprint_m)
             material = apply_uv_texture(material, world, texture, hit, weight, footprint_m)
     return material

@@ -25,6 +25,7 @@ from gen_data.generator.renderers.warp.scene.kernels.bvh_traverse import (
 from gen_data.generator.renderers.warp.scene.kernels.records import (
     CLEAR,
     HOLES,
+    MOVES,
     View,
     World,
     is_in_view,
@@ -243,11 +244,13 @@ def blocker_of(world: World, path: Path, through: int):
 def blocker_with_cutouts(world: World, path: Path, through: int):
     """As ``blocker_of``, among bodies with cut-outs."""
     blocker = int(NOBODY)
+    passed = through & MOVES
     candidates = wp.bvh_query_ray(world.cutout_hierarchy, path.origin, path.way)
     k = int(0)
     while wp.bvh_query_next(candidates, k, 1.0):
         b = world.cutouts[k]
-        if (world.bodies[b].cutouts & through) != 0:
+        flags = world.bodies[b].cutouts
+        if (flags & through) != 0 and (flags & passed) == 0:
             if is_cut_by(world, b, path, through):
                 blocker = b
                 break
@@ -316,15 +319,22 @@ def free_path_before(world: World, b: int, path: Path, free: float):
 
 
 @wp.func
-def precipitation_exposure(world: World, origin: wp.vec3):
-    """Exposure of a point to precipitation: 1 or 0, by one upward ray."""
+def precipitation_exposure(world: World, body: int, origin: wp.vec3):
+    """Exposure of a point on a body to precipitation: 1 or 0, by one upward ray.
+
+    Bodies that move shelter what moves, such as seats below a roof, but never the ground: it was
+    in the rain before they came.
+    """
     # The ray is tilted by a smooth function of position: edges of shelter become irregular, without
     # a random number.
     x = origin[0] * 5.0
     y = origin[1] * 5.0
     east = 0.15 * wp.sin(1.7 * x + 2.3 * wp.sin(1.3 * y))
     north = 0.15 * wp.sin(1.9 * y + 2.1 * wp.sin(1.1 * x))
+    through = HOLES
+    if (world.bodies[body].cutouts & MOVES) == 0:
+        through = HOLES | MOVES
     free = float(1.0)
-    if is_intersected(world, path_along(origin, wp.vec3(east, north, 1.0) * SHELTER_M), HOLES):
+    if is_intersected(world, path_along(origin, wp.vec3(east, north, 1.0) * SHELTER_M), through):
         free = 0.0
     return free

@@ -14,6 +14,8 @@ EQUIRECTANGULAR = wp.constant(3)
 # Flags of cut-outs: bits that rays match against what they may pass.
 HOLES = wp.constant(1)
 CLEAR = wp.constant(2)
+# Flag of bodies that move, which rays may pass as a whole.
+MOVES = wp.constant(4)
 
 Coefficients = wp.types.vector(length=8, dtype=wp.float32)
 
@@ -86,7 +88,8 @@ class BodyRecord:
         R_world_mesh, t_world_mesh: Rotation without scale, and position.
         B_mesh_world, t_mesh_world: World to mesh, scale included.
         low_m, high_m: Box in the world.
-        cutouts: HOLES, CLEAR or both if rays may pass some of its faces; 0 needs no test per face.
+        cutouts: HOLES, CLEAR or both if rays may pass some of its faces; neither needs no test per
+            face. MOVES if it does not stay where it is.
     """
 
     geometry: int
@@ -122,6 +125,7 @@ class MaterialRecord:
         thin: 1 for a pane that does not refract, 0 for a solid that does.
         opacity: Share of the background that it hides.
         soaks: 1 for soil and turf, where rain seeps away; 0 for all else.
+        one_sided: 1 if the texture is on the front only; the back has its mean colour.
     """
 
     base_color: wp.vec3
@@ -140,6 +144,7 @@ class MaterialRecord:
     thin: int
     opacity: float
     soaks: float
+    one_sided: int
 
 
 @wp.struct
@@ -438,7 +443,7 @@ class World:
     Attributes:
         boxes: The bodies' boxes in the world, see box_groups.
         tree: Hierarchy over the bodies' boxes, see gen_data.generator.renderers.warp.scene.bvh.
-        cutouts: Numbers of the bodies with faces that rays may pass.
+        cutouts: Numbers of the bodies with HOLES or CLEAR faces.
         cutout_hierarchy: Warp's hierarchy over their boxes; 0 without any.
         lobes: Directional albedo of specular lobes, see brdf.directional_albedo.
         volumes: Boxes in which ``probes`` replace the sky's ambient light.
