@@ -15,8 +15,8 @@ configuration for the next round, and a line in the curriculum of the folder.
 
 \b
 gen-data --config tabletop.yaml --seed 7 --n 400 --out out/judged
-gen-data adapt tabletop.yaml out/judged --results results.json --out out/curriculum
-gen-data --config out/curriculum/round_1.yaml --n 4000
+gen-data adapt tabletop.yaml out/judged --results results.json --out out/next
+gen-data --config out/next/round_1.yaml --n 4000
 """
 
 

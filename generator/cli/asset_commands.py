@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import textwrap
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -74,6 +75,7 @@ def list_(tags: tuple[str, ...], folders: tuple[Path, ...]) -> None:
         return
     from gen_data.generator.assets.installed_packs import installed_packs
     from gen_data.generator.assets.paths import packs_dir
+    from gen_data.generator.config.describe import TEXT_WIDTH
     from gen_data.generator.packs.install import is_installed
     from gen_data.generator.packs.pack_table import PACKS
 
@@ -84,7 +86,8 @@ def list_(tags: tuple[str, ...], folders: tuple[Path, ...]) -> None:
         state = "-"
         if record is not None:
             state = _format_mb(record.size) if is_installed(pack, folder) else "out of date"
-        click.echo(f"{pack.name:<10} {state:>12}  {pack.summary} ({pack.source}, {pack.licence})")
+        line = f"{pack.name:<10} {state:>12}  {pack.summary} ({pack.source}, {pack.licence})"
+        click.echo(textwrap.fill(line, TEXT_WIDTH, subsequent_indent=" " * 25))
     click.echo(f"folder: {folder}")
 
 

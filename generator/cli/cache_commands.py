@@ -71,7 +71,7 @@ def info() -> None:
         sizes = [size for folder in folders for size in _file_sizes(folder)]
         places = ", ".join(sorted({str(_place(folder)) for folder in folders})) or "empty"
         total = format_bytes(sum(sizes))
-        click.echo(f"{one.name:8} {total:>10} {len(sizes):6} files  {one.content}: {places}")
+        click.echo(f"{one.name:8} {total:>10} {len(sizes):6} files  {one.content}\n  {places}")
 
 
 @cache.command()

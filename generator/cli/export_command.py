@@ -20,7 +20,7 @@ The result is a data set with the same bytes as if it had been generated with th
 images are hard links.
 
 \b
-gen-data export out/tabletop --format yolo --format voc --out out/tabletop-yolo
+gen-data export out/tabletop --format yolo --format voc --out out/further
 """
 
 

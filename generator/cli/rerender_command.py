@@ -13,9 +13,9 @@ HELP = """Render the scenes of a finished data set again with other sensors, wea
 Objects keep their ids, shapes and poses; only randomizers with changed settings are drawn again.
 
 \b
-gen-data rerender out/street --out out/street-night --set shared.weather=WetNight
-gen-data rerender out/tabletop --out out/tabletop-fisheye --sensors fisheye.yaml
-gen-data rerender out/tabletop --out out/tabletop-pt --tier pathtraced
+gen-data rerender out/street --out out/night --set shared.weather=WetNight
+gen-data rerender out/tabletop --out out/fisheye --sensors fisheye.yaml
+gen-data rerender out/tabletop --out out/traced --tier pathtraced
 """
 
 

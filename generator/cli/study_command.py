@@ -19,10 +19,10 @@ CONFIG, the baseline, and of every variant, with several seeds; all are judged o
 pictures. The same command goes on after an interruption.
 
 \b
-gen-data study photographs tabletop.yaml --without each
-gen-data study photographs tabletop.yaml --set randomizers.clutter.count=20 --mix 50
-gen-data study photographs tabletop.yaml --against shelf.yaml
-gen-data study photographs --results old=a.json --results new=b.json
+gen-data study photos tabletop.yaml --without each
+gen-data study photos tabletop.yaml --set randomizers.clutter.count=9 --mix 50
+gen-data study photos tabletop.yaml --against shelf.yaml
+gen-data study photos --results old=a.json --results new=b.json
 """
 
 

@@ -25,11 +25,11 @@ if TYPE_CHECKING:
 VERIFY_HELP = """Check a data set against its manifest. Exit code 7 if it deviates.
 
 \b
-gen-data verify out/street                  sizes, records, manifest, foreign files
-gen-data verify out/street --full           every sha256
-gen-data verify out/street --deep           every sample decoded, its labels checked; the claims
-                                            of its certificate repeated, if it has one
-gen-data verify out/street --regenerate 20  20 random samples generated again
+gen-data verify DIR                  sizes, records, manifest, foreign files
+gen-data verify DIR --full           every sha256
+gen-data verify DIR --deep           every sample decoded, its labels checked;
+                                     the claims of its certificate repeated
+gen-data verify DIR --regenerate 20  20 random samples generated again
 """
 
 

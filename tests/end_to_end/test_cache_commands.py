@@ -32,10 +32,10 @@ def caches(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def test_info_tells_places_sizes_and_numbers_of_files(caches: Path) -> None:
     """An absent cache has no files."""
+    printed = CliRunner().invoke(cache, ["info"]).output.splitlines()
     lines = {
-        line.split()[0]: line
-        for line in CliRunner().invoke(cache, ["info"]).output.split("\n")
-        if line
+        line.split()[0]: line + place
+        for line, place in zip(printed[::2], printed[1::2], strict=True)
     }
 
     assert "1.0 MB" in lines["kernels"]

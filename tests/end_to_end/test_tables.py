@@ -5,9 +5,12 @@ from __future__ import annotations
 import io
 from typing import Any
 
+import click
 import pytest
+from click.testing import CliRunner
 from rich.console import Console
 
+from gen_data.generator.cli.main import cli
 from gen_data.generator.cli.tables import print_tables
 
 
@@ -55,3 +58,32 @@ def test_a_word_longer_than_the_terminal_is_folded() -> None:
     text = printed({"header": ["file", "n"], "rows": [[path, "1"]]})
     assert path in "".join(line.strip().split(" ")[0] for line in text.splitlines())
     assert "…" not in text
+
+
+def helps(group: click.Group, names: tuple[str, ...] = ()) -> list[tuple[str, ...]]:
+    """Arguments that print the help of every command below a group."""
+    context = click.Context(group)
+    found = []
+    for name in group.list_commands(context):
+        command = group.get_command(context, name)
+        found.append((*names, name, "--help"))
+        if isinstance(command, click.Group):
+            found += helps(command, (*names, name))
+    return found
+
+
+@pytest.mark.parametrize(
+    "arguments", [*helps(cli), ("--help",), ("assets", "list"), ("formats",)], ids=" ".join
+)
+def test_help_and_lists_fit_a_terminal(
+    arguments: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Examples of commands, which nobody wraps, too."""
+    monkeypatch.setenv("COLUMNS", "80")
+    done = CliRunner().invoke(cli, arguments)
+    assert done.exit_code == 0
+    assert [
+        line
+        for line in done.output.splitlines()
+        if len(line) > 80 and not line.startswith("folder: ")
+    ] == []
