@@ -24,8 +24,8 @@ from gen_data.generator.core.errors import (
     is_refused,
 )
 from gen_data.generator.core.serialization import from_plain
+from gen_data.generator.runner.layout import CERTIFICATE_NAME, MANIFEST_NAME
 from gen_data.generator.runner.plan import DAMAGE
-from gen_data.generator.runner.store import CERTIFICATE_NAME, MANIFEST_NAME
 from gen_data.generator.runner.stored import StoredSamples
 from gen_data.generator.runner.verify import scan_finished
 

@@ -190,7 +190,7 @@ def _try_physics() -> str:
     from gen_data.generator.core.se3 import SE3
     from gen_data.generator.physics import PhysicsConfig
     from gen_data.generator.physics.collision_shapes import collision_shape
-    from gen_data.generator.physics.world import open_world
+    from gen_data.generator.physics.open_world import open_world
 
     config = PhysicsConfig()
     corners = np.array([(x, y, z) for x in (-0.1, 0.1) for y in (-0.1, 0.1) for z in (-0.1, 0.1)])

@@ -146,7 +146,7 @@ def _find_invalid(folder: Path) -> list[Finding]:
 
 def _check_certificate(folder: Path, deep: bool, notes: list[str]) -> list[Finding]:
     """Compare a certificate with the manifest, and with ``deep`` with one that is made now."""
-    from gen_data.generator.runner.store import CERTIFICATE_NAME
+    from gen_data.generator.runner.layout import CERTIFICATE_NAME
     from gen_data.generator.runner.verify import Finding
 
     if not (folder / CERTIFICATE_NAME).is_file():
@@ -199,7 +199,8 @@ def repair(folder: Path, source: Path | None, workers: int | None) -> None:
     """
     from gen_data.generator.api.repair import repair as restore
     from gen_data.generator.cli.generate_command import print_summary, progress_bar
-    from gen_data.generator.runner.plan import PLAN_NAME, load_plan
+    from gen_data.generator.runner.layout import PLAN_NAME
+    from gen_data.generator.runner.plan import load_plan
 
     # A damaged plan is restored below; until then the number of samples is not known.
     try:
