@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
+from gen_data.generator.assets.family import Solid
 from gen_data.generator.assets.procedural import FAMILIES
-from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.furniture import (
     SLOTS,
     bin_interior_m,
