@@ -49,6 +49,12 @@ CORE = tuple(
 """Modules among them that belong to the core."""
 
 
+LABORATORY = tuple(
+    f"{GENERATOR}.{name}" for name in ("certificate", "environment", "matching", "study")
+)
+"""Tools on top of the core, which finds their commands in tables of names."""
+
+
 def is_below(name: str, packages: tuple[str, ...]) -> bool:
     """Whether a module is one of some packages or in one."""
     return any(name == package or name.startswith(f"{package}.") for package in packages)
@@ -67,5 +73,17 @@ def test_the_core_imports_no_content() -> None:
         if not is_content(name)
         for other in sorted(others)
         if is_content(other)
+    ]
+    assert not found
+
+
+def test_the_core_imports_no_laboratory() -> None:
+    """Only ``gen_data/__init__.py``, which offers the names of both, knows both."""
+    found = [
+        f"{name} -> {other}"
+        for name, others in sorted(imports().items())
+        if name != "gen_data" and not is_below(name, LABORATORY)
+        for other in sorted(others)
+        if is_below(other, LABORATORY)
     ]
     assert not found

@@ -50,7 +50,7 @@ def certify(folder: Path, samples: int, rays: int, scenes: int, alpha: float) ->
     """
     from rich.console import Console
 
-    from gen_data.generator.api.certify import certify as make_certificate
+    from gen_data.generator.certificate.api import certify as make_certificate
     from gen_data.generator.certificate.certificate import describe_failures
     from gen_data.generator.certificate.finding import Status
     from gen_data.generator.runner.layout import CERTIFICATE_NAMES
