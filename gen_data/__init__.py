@@ -20,7 +20,7 @@ if not os.path.isdir(f"{_folder}/generator"):  # noqa: PTH112  pathlib takes lon
     # A checkout without symbolic links: the packages are the folders beside this one.
     __path__.append(os.path.dirname(_folder))  # noqa: PTH120
 
-from gen_data.generator import __version__  # noqa: E402
+from gen_data.generator.core.version import __version__  # noqa: E402
 
 # ``typing`` would delay the moment from which the command line handles Ctrl-C.
 TYPE_CHECKING = False

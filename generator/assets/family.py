@@ -291,20 +291,25 @@ def _arguments(package: str, row: Mapping[str, Any]) -> dict[str, Any]:
         "version": 1,
         "variants": 0,
         **row,
-        "build": Lazy(f"{package}.{row['build']}"),
+        "build": _lazy(package, row["build"]),
         "tags": tuple(sorted(row["tags"])),
-        **({"wear": Lazy(f"{package}.{row['wear']}")} if "wear" in row else {}),
+        **({"wear": _lazy(package, row["wear"])} if "wear" in row else {}),
         "parameters": parameters,
         "declares": {key: _fact(package, value) for key, value in row.get("declares", {}).items()},
         **_symmetries(package, row.get("symmetries")),
     }
 
 
+def _lazy(package: str, path: str) -> Lazy:
+    """A value named by a full path, or by a path in the package of the table."""
+    return Lazy(path if path.startswith("gen_data.") else f"{package}.{path}")
+
+
 def _fact(package: str, value: Any) -> Any:
     """A declared fact: lists become tuples, ``module:name`` is imported when it is used."""
     if isinstance(value, list):
         return tuple(value)
-    return Lazy(f"{package}.{value}") if isinstance(value, str) and ":" in value else value
+    return _lazy(package, value) if isinstance(value, str) and ":" in value else value
 
 
 def _symmetries(package: str, given: str | Mapping[str, int] | None) -> dict[str, Any]:
@@ -312,5 +317,5 @@ def _symmetries(package: str, given: str | Mapping[str, int] | None) -> dict[str
     if given is None:
         return {}
     if isinstance(given, str):
-        return {"symmetries": Lazy(f"{package}.{given}")}
+        return {"symmetries": _lazy(package, given)}
     return {"symmetries": ConstantSymmetries(given)}

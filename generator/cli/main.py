@@ -16,7 +16,6 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
-from gen_data.generator import __version__
 from gen_data.generator.cli.options import (
     ConfigurationOptions,
     choose_cluster,
@@ -42,6 +41,7 @@ from gen_data.generator.core.errors import (
 )
 from gen_data.generator.core.processes import SINGLE_THREADED
 from gen_data.generator.core.urls import is_url, needs_folder
+from gen_data.generator.core.version import __version__
 
 FOLDERS_ONLY = frozenset(
     "adapt certify contact-sheet diff export match merge preview repair report repro".split()  # noqa: SIM905
