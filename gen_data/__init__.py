@@ -20,23 +20,22 @@ if not os.path.isdir(f"{_folder}/generator"):  # noqa: PTH112  pathlib takes lon
     # A checkout without symbolic links: the packages are the folders beside this one.
     __path__.append(os.path.dirname(_folder))  # noqa: PTH120
 
-from gen_data.generator import __version__  # noqa: E402
+from gen_data.generator.core.version import __version__  # noqa: E402
 
 # ``typing`` would delay the moment from which the command line handles Ctrl-C.
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
 
-    from gen_data.generator.api.certify import certify
     from gen_data.generator.api.dataset import Dataset, SampleSequence, StoredDataset
     from gen_data.generator.api.dataset import open_dataset as open  # noqa: A004
     from gen_data.generator.api.export import export
     from gen_data.generator.api.generate import generate
     from gen_data.generator.api.loader import Loader
-    from gen_data.generator.api.match import match
     from gen_data.generator.api.rerender import rerender
     from gen_data.generator.api.sample import Box2d, Box3d, CameraReading, Sample
     from gen_data.generator.api.write_sample import write_sample
+    from gen_data.generator.certificate.api import certify
     from gen_data.generator.core.errors import (
         AssetError,
         CertificationError,
@@ -55,6 +54,7 @@ if TYPE_CHECKING:
     )
     from gen_data.generator.core.scene import Scene
     from gen_data.generator.environment.env import Env, make_vec
+    from gen_data.generator.matching.api import match
 
 _HOMES = {
     "Box2d": "gen_data.generator.api.sample",
@@ -67,12 +67,12 @@ _HOMES = {
     "SampleSequence": "gen_data.generator.api.dataset",
     "Scene": "gen_data.generator.core.scene",
     "StoredDataset": "gen_data.generator.api.dataset",
-    "certify": "gen_data.generator.api.certify",
+    "certify": "gen_data.generator.certificate.api",
     "export": "gen_data.generator.api.export",
     "generate": "gen_data.generator.api.generate",
     "write_sample": "gen_data.generator.api.write_sample",
     "make_vec": "gen_data.generator.environment.env",
-    "match": "gen_data.generator.api.match",
+    "match": "gen_data.generator.matching.api",
     "rerender": "gen_data.generator.api.rerender",
     "AssetError": "gen_data.generator.core.errors",
     "CertificationError": "gen_data.generator.core.errors",

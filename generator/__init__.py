@@ -2,5 +2,3 @@
 
 The map of the packages is ARCHITECTURE.md; units, frames and pixel conventions are CONVENTIONS.md.
 """
-
-__version__ = "0.1.0"

@@ -7,7 +7,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from gen_data.generator.assets.procedural.furniture import SLOTS
+from gen_data.generator.assets.families import declared
 from gen_data.generator.config import distributions as dist
 from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.interfaces import AssetIndex
@@ -83,7 +83,7 @@ class Backdrop(RandomizerBase):
         paint = Material(base_color=color, roughness=PAINT_ROUGHNESS)
         wall = paint if self.painted.draw(rng) else textured
         looks = {"floor": ground, "ground": ground, "paper": paint, "walls": wall}
-        slots = SLOTS.get(body.asset.partition("?")[0], ())
+        slots = declared(body.asset, "slots", ())
         materials = list(body_materials(body, assets))
         for number, slot in enumerate(slots[: len(materials)]):
             materials[number] = looks.get(slot, materials[number])

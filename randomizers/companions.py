@@ -7,7 +7,6 @@ from collections.abc import Collection, Sequence
 from typing import Annotated, Literal
 
 from gen_data.generator.assets.asset_ids import AssetId, parse_asset_id
-from gen_data.generator.assets.people.posing import BEHAVIOURS, MOVING_POSES
 from gen_data.generator.config import distributions as dist
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.members import Member, add_members, change_assets
@@ -16,12 +15,10 @@ from gen_data.generator.core.se3 import SE3
 from gen_data.generator.core.streams import Rng
 from gen_data.randomizers.asset_groups import CategoryWeights, GroupRandomizer, draw_asset
 from gen_data.randomizers.free_space import Footprint, Ground, make_ground, standing_bodies
+from gen_data.randomizers.pedestrian_poses import moving_poses, talking_poses, walking_poses
 
 SIZE_MAX = 12
 """Largest size of a company."""
-_TALKING = tuple(pose for pose, behaviour in BEHAVIOURS.items() if behaviour == "talking")
-_STANDS = tuple(pose for pose in _TALKING if pose not in MOVING_POSES)
-_WALKS = tuple(pose for pose in MOVING_POSES if BEHAVIOURS[pose] != "running")
 _SWAY_M = 0.2
 """Standard deviation of how far a companion walks ahead or behind."""
 
@@ -67,7 +64,7 @@ class Companions(GroupRandomizer):
             pose = dict(assets.get(leader.asset).attributes).get("pose", "")
             if others == 0:
                 continue
-            if not pose or pose in MOVING_POSES:
+            if not pose or pose in moving_poses():
                 added += self._walk_beside(leader, others, weights, ground, assets, rng)
             else:
                 changed[leader.name] = _talking(leader.asset, assets)
@@ -92,7 +89,7 @@ class Companions(GroupRandomizer):
             drawn = draw_asset(weights, rng)
             aside_m = side * gap_m * (k // 2 + 1) * (-1.0 if k % 2 else 1.0)
             ahead_m = _SWAY_M * float(rng.normal())
-            if not _fits(drawn, _WALKS, assets) and not _has_poses(drawn):
+            if not _fits(drawn, walking_poses(), assets) and not _has_poses(drawn):
                 continue  # a mesh that stands cannot walk
             place = leader.T_world_body @ SE3((ahead_m, aside_m, 0.0))
             made += self._place(_walking(drawn, assets), place, ground, assets)
@@ -129,14 +126,15 @@ class Companions(GroupRandomizer):
 
 def _walking(asset: str, assets: AssetIndex) -> str:
     """The asset as it walks: in its own pose if that is a walk, at its own phase."""
-    return _posed(asset, _WALKS, "walk", assets)
+    return _posed(asset, walking_poses(), "walk", assets)
 
 
 def _talking(asset: str, assets: AssetIndex) -> str:
     """The asset as it stands and talks: each seed in one of the poses."""
     seed = parse_asset_id(asset).parameters.get("seed", 0)
-    pose = _STANDS[seed % len(_STANDS)] if isinstance(seed, int) else _STANDS[0]
-    return _posed(asset, _STANDS, pose, assets)
+    poses = talking_poses()
+    pose = poses[seed % len(poses)] if isinstance(seed, int) else poses[0]
+    return _posed(asset, poses, pose, assets)
 
 
 def _posed(asset: str, fitting: Collection[str], pose: str, assets: AssetIndex) -> str:

@@ -10,11 +10,11 @@ from typing import Literal
 import numpy as np
 
 from gen_data.generator.assets.asset_ids import AssetId
-from gen_data.generator.assets.interiors.fixtures import DRAIN, TAP
 from gen_data.generator.config import distributions as dist
 from gen_data.generator.core.asset_types import RobotModel
 from gen_data.generator.core.boxes import overlap_of
 from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.keypoint_names import DRAIN, TAP
 from gen_data.generator.core.kinematics import link_poses, position_limits, positions_of
 from gen_data.generator.core.scene import Body, Instance, Scene
 from gen_data.generator.core.se3 import SE3, Vec3

@@ -30,7 +30,7 @@ class PhotoPlate(RandomizerBase):
 
     def possible_assets(self, assets: AssetIndex) -> tuple[str, ...]:
         """Ids of the photographs to draw from."""
-        return find_plates(assets, self.photos, f"randomizers.{self.name}.photos")
+        return find_plates(assets.find((), "plate"), self.photos, f"randomizers.{self.name}.photos")
 
     def check(self, scene: Scene, assets: AssetIndex) -> None:
         """Check that the element exists and that every photograph can be used.

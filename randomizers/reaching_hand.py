@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 
 from gen_data.generator.assets.asset_ids import AssetId, parse_asset_id
-from gen_data.generator.assets.procedural.hands import GRASP, RADII_M, held_axis_m, is_left
+from gen_data.generator.assets.families import declared
 from gen_data.generator.config import distributions as dist
 from gen_data.generator.core.asset_types import Float32
 from gen_data.generator.core.interfaces import AssetIndex
@@ -151,18 +151,27 @@ class ReachingHand(GroupRandomizer):
         if radii is None or high[2] - low[2] < 0.07:
             return []
         radii_mm = tuple(float(math.ceil(1e3 * r)) for r in radii)
-        if not all(RADII_M[0] <= 1e-3 * r <= RADII_M[1] for r in radii_mm):
+        least_m, most_m = declared("hand", "radii_m")
+        if not all(least_m <= 1e-3 * r <= most_m for r in radii_mm):
             return []
-        asset = str(AssetId(parsed.name, {"pose": GRASP, "radii_mm": radii_mm, "seed": seed}))
+        asset = str(
+            AssetId(
+                parsed.name,
+                {"pose": declared("hand", "grasp_pose"), "radii_mm": radii_mm, "seed": seed},
+            )
+        )
         points = {point.name: point.position_m for point in assets.keypoints(asset)}
         knuckle = points["index_1"]
-        axis = held_axis_m(seed, [1e-3 * r for r in radii_mm])
+        axis = declared("hand", "held_axis_m")(seed, [1e-3 * r for r in radii_mm])
         # The wrist's height is that of the hand's middle, where radii were measured.
         middle_z = points["wrist"][2]
         hand_low = assets.bounds_m(asset)[0][2]
         at_m = -low[2] + 0.02 * (high[2] - low[2])
         base_m = max(raised_m, _GAP_M - hand_low + middle_z - at_m, 0.0005)
-        yaw, turn = reach.yaw_rad, 0.5 * math.pi * (-1.0 if is_left(seed) else 1.0)
+        yaw, turn = (
+            reach.yaw_rad,
+            0.5 * math.pi * (-1.0 if declared("hand", "is_left")(seed) else 1.0),
+        )
         x, y = knuckle[0] + axis[0], knuckle[1] + axis[1]
         c, s = math.cos(yaw), math.sin(yaw)
         origin = (

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gen_data.generator.assets.people.posing import MOVING_POSES
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Body, Scene
 from gen_data.generator.core.se3 import SE3, Array
@@ -17,6 +16,7 @@ from gen_data.generator.traffic.conflict_zones import crosswalk_zones, heading
 from gen_data.generator.traffic.lane_routes import LaneGraph, LanePosition
 from gen_data.generator.traffic.signal_cycles import Approach, Cycle
 from gen_data.randomizers.free_space import Footprint, standing_bodies
+from gen_data.randomizers.pedestrian_poses import moving_poses
 from gen_data.randomizers.traffic_lights import Signal, runs_along
 
 PERSON = "person"
@@ -135,7 +135,7 @@ def find_pedestrians(
         if near:
             place = min(near, key=lambda pair: pair[0])[1]
             pose = dict(asset.attributes).get("pose", "walk")
-            walks = pose in MOVING_POSES
+            walks = pose in moving_poses()
             # Somebody who stands on a crosswalk is an obstacle.
             if walks or place.lane in sidewalks.lines:
                 found.append(OnFoot(body, place, walks))

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gen_data.generator.assets.asset_ids import AssetId, parse_asset_id
-from gen_data.generator.assets.people.posing import PHASES
 from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.motion import StateChange
@@ -21,6 +20,7 @@ from gen_data.generator.traffic.signal_cycles import Approach
 from gen_data.generator.traffic.simulation import STEP_S
 from gen_data.generator.traffic.vehicles import Entry
 from gen_data.randomizers.base import add_attributes, body_materials, scale_emission, set_emission
+from gen_data.randomizers.pedestrian_poses import stride_phases
 from gen_data.randomizers.traffic_lights import Signal, show_state
 from gen_data.randomizers.vehicle_lights import AMBER, RED
 
@@ -128,7 +128,8 @@ def gait_changes(
         return []
     asset = parse_asset_id(body.asset)
     stride = body.scale * stride_m(float(known.get("height_m", DEFAULT_HEIGHT_M)))
-    phases = np.floor((start + walked_m / stride) * PHASES).astype(np.int64) % PHASES
+    count = stride_phases()
+    phases = np.floor((start + walked_m / stride) * count).astype(np.int64) % count
     standing = np.zeros(len(phases), bool)
     still = False
     for k, pace in enumerate(pace_m_s.tolist()):
@@ -138,7 +139,7 @@ def gait_changes(
     rest = "stand_umbrella" if known["pose"] == "walk_umbrella" else "stand"
     at_rest = str(AssetId(asset.name, {**asset.parameters, "pose": rest}))
     walking = [
-        str(AssetId(asset.name, {**asset.parameters, "phase": k / PHASES})) for k in range(PHASES)
+        str(AssetId(asset.name, {**asset.parameters, "phase": k / count})) for k in range(count)
     ]
     facts = {
         of: tuple(p for p in assets.get(of).attributes if p[0] in ("behaviour", "pose"))

@@ -7,19 +7,15 @@ from typing import Literal
 from pydantic import Field
 
 from gen_data.generator.assets.asset_ids import AssetId, parse_asset_id
-from gen_data.generator.assets.people.posing import BEHAVIOURS, HELD, MOVING_POSES
 from gen_data.generator.config import distributions as dist
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.members import change_assets
 from gen_data.generator.core.scene import ObjectGroup, Scene
 from gen_data.generator.core.streams import Rng
 from gen_data.randomizers.base import RandomizerBase, check_known
+from gen_data.randomizers.pedestrian_poses import free_handed_poses, moving_poses
 
 _WALKS, _STANDS = "walk_umbrella", "stand_umbrella"
-_FREE = frozenset(
-    name for name, held in HELD.items() if not held and BEHAVIOURS[name] in ("walking", "standing")
-)
-"""Poses of people whose hands can open an umbrella."""
 
 
 class Umbrellas(RandomizerBase):
@@ -58,7 +54,7 @@ class Umbrellas(RandomizerBase):
                 continue
             wanted = self.opened.draw(rng) and float(rng.uniform()) < share
             pose = dict(assets.get(body.asset).attributes).get("pose", "")
-            if wanted and pose in _FREE:
+            if wanted and pose in free_handed_poses():
                 opened[body.name] = _under_umbrella(body.asset, pose)
         return change_assets(scene, opened)
 
@@ -66,5 +62,5 @@ class Umbrellas(RandomizerBase):
 def _under_umbrella(asset: str, pose: str) -> str:
     """The same person with an open umbrella; who walks keeps the phase of the stride."""
     parsed = parse_asset_id(asset)
-    held = _WALKS if pose in MOVING_POSES else _STANDS
+    held = _WALKS if pose in moving_poses() else _STANDS
     return str(AssetId(parsed.name, {**parsed.parameters, "pose": held}))

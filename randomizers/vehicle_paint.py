@@ -8,10 +8,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from gen_data.generator.assets.procedural.data_tables import load_table
-from gen_data.generator.assets.vehicles.plates import FORMATS, IN_EUROPE, SEEDS, reseed_plate
-from gen_data.generator.assets.vehicles.road_dirt import DUST, cleaned, is_soiled, soiled
+from gen_data.generator.assets.families import declared
 from gen_data.generator.config import distributions as dist
+from gen_data.generator.config.data_files import load_table
 from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Body, Scene
@@ -51,6 +50,9 @@ class Paint:
 
 PAINTS = load_table("gen_data.randomizers", "vehicle_paint", Paint)
 ON_ROADS = {name: paint.weight for name, paint in PAINTS.items()}
+_PLATE, _DIRT = "texture/licence_plate", "texture/road_dirt"
+IN_EUROPE: dict[str, float] = declared(_PLATE, "weights")
+"""Relative frequency of plates by country."""
 
 
 class VehiclePaint(SurfaceRandomizer):
@@ -92,7 +94,7 @@ class VehiclePaint(SurfaceRandomizer):
         del context
         for kind, given, known in (
             ("colour", self.weights, PAINTS),
-            ("country", self.countries, FORMATS),
+            ("country", self.countries, declared(_PLATE, "countries")),
         ):
             unknown = sorted(set(given) - set(known))
             if unknown:
@@ -114,9 +116,10 @@ class VehiclePaint(SurfaceRandomizer):
 
     def _change_plates(self, body: Body, home: str, rng: Rng) -> Body:
         """Return the body with another licence plate, if it has one."""
-        seed, other = int(rng.integers(SEEDS)), _pick(self.countries, rng)
+        seed, other = int(rng.integers(declared(_PLATE, "seeds"))), _pick(self.countries, rng)
         country = other if self.foreign.draw(rng) else home
-        textures = (reseed_plate(m.texture, seed, country) for m in body.materials)
+        reseed = declared(_PLATE, "reseed")
+        textures = (reseed(m.texture, seed, country) for m in body.materials)
         slots = (
             m if m.texture == texture else replace(m, texture=texture)
             for m, texture in zip(body.materials, textures, strict=True)
@@ -153,14 +156,17 @@ def _finish(body: Body, assets: AssetIndex, paint: dict[str, Any] | None, dirt: 
     """Return the body with dust on it, and painted unless the paint is None."""
 
     def finish(material: Material) -> Material:
-        gathers, seed = is_soiled(material), 0
+        gathers, seed = declared(_DIRT, "is_soiled")(material), 0
         if gathers:
-            material, seed = cleaned(material)
+            material, seed = declared(_DIRT, "cleaned")(material)
         if paint is not None and material.role == PAINT and not material.printed:
             material = replace(material, **paint)
         if material.role in _SOILED:
             material = _soil(material, dirt)
-        return soiled(material, _GATHERED * dirt, seed) if gathers and dirt > 0.0 else material
+        if not gathers or dirt <= 0.0:
+            return material
+        soiled: Material = declared(_DIRT, "soiled")(material, _GATHERED * dirt, seed)
+        return soiled
 
     slots = body_materials(body, assets)
     return replace(body, materials=tuple(finish(material) for material in slots))
@@ -179,7 +185,7 @@ def _soil(material: Material, dirt: float) -> Material:
     share = min(_SOILED[material.role] * dirt, 1.0)
     red, green, blue = (
         round(clean * (1.0 - share) + dust * share, 6)
-        for clean, dust in zip(material.base_color, DUST, strict=True)
+        for clean, dust in zip(material.base_color, declared(_DIRT, "dust"), strict=True)
     )
     rough = round(material.roughness + (0.8 - material.roughness) * share, 4)
     dusty = replace(material, base_color=(red, green, blue), roughness=rough)

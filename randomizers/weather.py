@@ -10,9 +10,9 @@ from typing import Any, Literal
 
 from pydantic import Field, field_validator
 
-from gen_data.generator.assets.procedural.data_tables import load_table
 from gen_data.generator.assets.skies.sky import SkyModel
 from gen_data.generator.config import distributions as dist
+from gen_data.generator.config.data_files import load_table
 from gen_data.generator.config.yaml_scalars import quote_value
 from gen_data.generator.core.errors import did_you_mean
 from gen_data.generator.core.interfaces import AssetIndex

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from gen_data.generator.assets.procedural.furniture import bin_interior_m
+from gen_data.generator.assets.families import declared
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Scene
 from gen_data.scene_templates.element import PlacedElement, add_static, parametric_id
@@ -26,5 +26,5 @@ class Bin(PlacedElement):
         """Add a static body, its instance, and the surface of its floor."""
         asset, pose = parametric_id("bin", size_m=self.size_m), self.pose(scene)
         scene = add_static(scene, assets, self.name, asset, pose, annotated=self.annotate)
-        length_m, width_m, floor_m = bin_interior_m(self.size_m)
+        length_m, width_m, floor_m = declared("bin", "interior_m")(self.size_m)
         return self.add_surface(scene, floor_m, (length_m, width_m), clearance_m=1.5, walled=True)

@@ -9,30 +9,18 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
-from gen_data.generator.assets.scenery.horizons import (
-    FOREST_M,
-    HILL_M,
-    TREE_LINE_M,
-)
-from gen_data.generator.assets.scenery.townscapes import SKYLINE_M, TOWN_M
+from gen_data.generator.assets.families import declared
 from gen_data.generator.config.base_model import NAME_PATTERN
 from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Lane, Scene
 from gen_data.generator.core.se3 import SE3, Array
+from gen_data.generator.core.variant_rng import VariantRng, variant_rng
 from gen_data.scene_templates.element import Element, add_background, parametric_id
 
 HorizonKind = Literal["trees", "forest", "town", "skyline", "hills"]
 Season = Literal["spring", "summer", "autumn", "winter"]
 
-_PIECE_M: dict[HorizonKind, float] = {
-    "trees": TREE_LINE_M,
-    "forest": FOREST_M,
-    "town": TOWN_M,
-    "skyline": SKYLINE_M,
-    "hills": HILL_M,
-}
 _FAR: dict[HorizonKind, float] = {
     "trees": 1.0, "forest": 1.5, "town": 1.4, "skyline": 3.0, "hills": 4.0,
 }  # fmt: skip
@@ -106,7 +94,8 @@ class Horizon(Element):
         outline = offset_outline(hull_m, far_m)
         steps = np.sqrt(((np.roll(outline, -1, axis=0) - outline) ** 2).sum(axis=1))
         perimeter = float(steps.sum())
-        count = max(3, math.ceil(perimeter / (0.94 * _PIECE_M[kind])))
+        piece_m: float = declared(f"horizon/{kind}", "length_m")
+        count = max(3, math.ceil(perimeter / (0.94 * piece_m)))
         start = np.concatenate([[0.0], np.cumsum(steps)])
         closed = np.concatenate([outline, outline[:1]])
         centre = 0.5 * (hull_m.min(axis=0) + hull_m.max(axis=0))

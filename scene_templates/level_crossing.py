@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from gen_data.generator.assets.scenery.railway import TOP_M
+from gen_data.generator.assets.families import declared
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Scene
 from gen_data.generator.core.se3 import SE3
@@ -76,7 +76,7 @@ class LevelCrossing(Element):
             # The ballast lies over the land beside the road, and over the ground around.
             head_m = max(edge_z_m, _GROUND_M) + _HEAD_M
             at_m = side * (edge_m + 0.5 * self.track_m)
-            pose = place.pose(at_m, head_m - TOP_M, 0.5 * math.pi)
+            pose = place.pose(at_m, head_m - declared("railway_track", "rail_top_m"), 0.5 * math.pi)
             scene = add_static(scene, assets, f"{self.name}/track_{word}", track, pose)
             # Those who come on this side see the barrier in front of them.
             way = -1.0 if place.shape.forward(side) else 1.0

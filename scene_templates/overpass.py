@@ -8,7 +8,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from gen_data.generator.assets.scenery.overpass import DEPTHS_M, SLOPE
+from gen_data.generator.assets.families import declared
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Scene
 from gen_data.scene_templates.element import (
@@ -57,9 +57,11 @@ class Overpass(Element):
         """Add the deck as background, and the ends, which take room."""
         half_m = 0.5 * self.width_m + 1.0
         place = find_place(scene, self.road, self.station_m, half_m, f"elements.{self.name}")
-        height_m = self.clearance_m + DEPTHS_M[self.kind]
+        height_m = self.clearance_m + declared("overpass", "depths_m")[self.kind]
         scene = cut_lanes(scene, place, half_m + 4.0, ("verge", "furniture"))
-        scene = cut_lanes(scene, place, half_m + SLOPE * height_m, ("garden", "frontage"))
+        scene = cut_lanes(
+            scene, place, half_m + declared("overpass", "slope") * height_m, ("garden", "frontage")
+        )
         left, right = (place.edge_m(side, land=False)[0] + _MARGIN_M for side in (1, -1))
         pier = place.shape.median_m >= _PIER_MEDIAN_M and left == right
         deck = parametric_id(

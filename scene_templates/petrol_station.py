@@ -9,11 +9,11 @@ from typing import Literal
 
 from pydantic import Field
 
-from gen_data.generator.assets.procedural.variant_rng import variant_rng
-from gen_data.generator.assets.scenery.shelters import pump_islands_m
+from gen_data.generator.assets.families import declared
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import LaneKind, Scene
 from gen_data.generator.core.se3 import SE3
+from gen_data.generator.core.variant_rng import variant_rng
 from gen_data.generator.roads.cross_section import strips
 from gen_data.scene_templates.element import (
     Element,
@@ -113,7 +113,7 @@ class PetrolStation(Element):
     def _add_cars(self, scene: Scene, assets: AssetIndex, T_world_canopy: SE3, brand: int) -> Scene:
         """Add cars beside the islands, their fronts to or from the shop."""
         rng = variant_rng("petrol_station/cars", self.seed)
-        for number, y in enumerate(pump_islands_m(brand)):
+        for number, y in enumerate(declared("petrol_canopy", "islands_m")(brand)):
             here = rng.chance(self.cars)
             at = SE3.about_z(math.pi * (rng.random() < 0.5), (rng.between(-1.4, 1.4), y + _BESIDE_M,
                              0.0))  # fmt: skip

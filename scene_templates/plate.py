@@ -43,7 +43,8 @@ class PlateElement(Element):
             ConfigError: there is no such photograph, or nothing can stand on its ground.
             AssetError: no horizon was found in it.
         """
-        photo = find_plates(assets, self.photos, f"elements.{self.name}.photos")[0]
+        field = f"elements.{self.name}.photos"
+        photo = find_plates(assets.find((), "plate"), self.photos, field)[0]
         plate = assets.plate(photo)
         catcher = (Material(role=CATCHER),)
         ground = parametric_id("plane", size_m=_GROUND_M)

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from gen_data.generator.assets.scenery.farmland_things import SPAN_MAX_M
+from gen_data.generator.assets.families import declared
 from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Scene
@@ -36,7 +36,7 @@ class PowerLine(Element):
     type: Literal["power_line"] = "power_line"
     at_m: tuple[float, float] = (0.0, 120.0)
     yaw_deg: float = 0.0
-    span_m: float = Field(280.0, ge=60, le=SPAN_MAX_M)
+    span_m: float = Field(280.0, ge=60, le=declared("power_pylon", "span_max_m"))
     count: int = Field(4, ge=1, le=20)
     seed: int = Field(0, ge=0, le=1_000_000)
 

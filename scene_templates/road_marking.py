@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from gen_data.generator.assets.roads.painted_signs import LETTERS
+from gen_data.generator.assets.families import declared
 from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Scene
@@ -65,10 +65,11 @@ class RoadMarking(Element):
                 f"{where}.station_m: the sign would span {start:g} to {end:g} m of '{self.road}', "
                 f"which is {shape.length_m:g} m long"
             )
-        if unknown := sorted(set(self.text) - LETTERS):
+        letters: frozenset[str] = declared("road_marking", "letters")
+        if unknown := sorted(set(self.text) - letters):
             raise ConfigError(
                 f"{where}.text: '{unknown[0]}' cannot be painted; expected letters of "
-                f"{''.join(sorted(LETTERS))}"
+                f"{''.join(sorted(letters))}"
             )
         lane_m = 2.0 if self.sign in ("blocked_area", "zigzag") else lane_m - 0.3
         given: dict[str, Any] = {"sign": self.sign} if self.sign != "straight" else {}

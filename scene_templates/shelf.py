@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from gen_data.generator.assets.procedural.furniture import shelf_clearance_m, shelf_levels_m
+from gen_data.generator.assets.families import declared
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Scene
 from gen_data.scene_templates.element import PlacedElement, add_static, parametric_id
@@ -37,8 +37,9 @@ class Shelf(PlacedElement):
         pose = self.pose(scene)
         scene = add_static(scene, assets, self.name, asset, pose, annotated=self.annotate)
         board_m = (self.size_m[0] - 2 * SIDE_M, self.size_m[1] - SIDE_M)
-        clearance_m = shelf_clearance_m(self.size_m, self.levels)
-        for level, height_m in enumerate(shelf_levels_m(self.size_m, self.levels)):
+        clearance_m = declared("shelf", "clearance_m")(self.size_m, self.levels)
+        levels_m = declared("shelf", "levels_m")(self.size_m, self.levels)
+        for level, height_m in enumerate(levels_m):
             name = f"{self.name}/{level}"
             scene = self.add_surface(scene, height_m, board_m, name=name, clearance_m=clearance_m)
         return scene

@@ -11,14 +11,14 @@ from contextlib import AbstractContextManager, ExitStack, contextmanager
 from dataclasses import dataclass
 from os import PathLike
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar, overload
+from typing import TYPE_CHECKING, Any, TypeVar, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gen_data.generator.api.config import ConfigLike, check_whole, load_config, path_text
 from gen_data.generator.api.relabelling import LabelMapLike, RelabelledSamples, load_label_map
-from gen_data.generator.api.sample import Sample, SampleRecord
+from gen_data.generator.api.sample import Sample, SampleRecord, SampleSource
 from gen_data.generator.core.errors import (
     ConfigError,
     ConfigWarning,
@@ -44,28 +44,6 @@ UNBOUNDED = range(sys.maxsize)
 
 ALL = "all"
 """All splits, chosen on purpose."""
-
-
-class SampleSource(Protocol):
-    """Source of the samples of a sequence."""
-
-    def sample(self, index: int) -> SampleRecord:
-        """Return the sample of that number."""
-        ...
-
-    @property
-    def categories(self) -> tuple[str, ...]:
-        """Sorted names; category id ``k`` is ``categories[k - 1]``."""
-        ...
-
-    @property
-    def config(self) -> Mapping[str, Any]:
-        """The resolved configuration as plain values."""
-        ...
-
-    def close(self) -> None:
-        """Release the engines; a later call of ``sample`` restarts them."""
-        ...
 
 
 class SampleSequence(Sequence[Sample], AbstractContextManager["SampleSequence", None]):

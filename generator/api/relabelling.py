@@ -9,7 +9,7 @@ from os import PathLike
 from typing import TYPE_CHECKING, Any
 
 from gen_data.generator.api.config import read_document, read_model
-from gen_data.generator.api.sample import SampleRecord
+from gen_data.generator.api.sample import SampleRecord, SampleSource
 from gen_data.generator.core.capture import Capture
 from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.interfaces import DatasetInfo
@@ -18,7 +18,6 @@ from gen_data.generator.core.scene import Scene
 
 if TYPE_CHECKING:
     from gen_data.exporters.label_map import AppliedLabelMap, LabelMap
-    from gen_data.generator.api.dataset import SampleSource
 
 LabelMapLike = str | PathLike[str] | Mapping[str, Any]
 """A file with a label map, or its content."""

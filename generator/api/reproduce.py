@@ -59,7 +59,8 @@ def reproduce(
     from gen_data.generator.assemble.config import load_config
     from gen_data.generator.assemble.pipeline_factory import PipelineFactory
     from gen_data.generator.runner.durable_files import storage_errors
-    from gen_data.generator.runner.plan import PLAN_NAME, load_plan
+    from gen_data.generator.runner.layout import PLAN_NAME
+    from gen_data.generator.runner.plan import load_plan
     from gen_data.generator.runner.regeneration import plan_regeneration, write_alone
     from gen_data.generator.runner.sample_stages import SampleFiles, compare_samples
     from gen_data.generator.runner.store import LocalStore

@@ -255,6 +255,28 @@ class SampleRecord(Protocol):
         ...
 
 
+class SampleSource(Protocol):
+    """Source of the samples of a sequence."""
+
+    def sample(self, index: int) -> SampleRecord:
+        """Return the sample of that number."""
+        ...
+
+    @property
+    def categories(self) -> tuple[str, ...]:
+        """Sorted names; category id ``k`` is ``categories[k - 1]``."""
+        ...
+
+    @property
+    def config(self) -> Mapping[str, Any]:
+        """The resolved configuration as plain values."""
+        ...
+
+    def close(self) -> None:
+        """Release the engines; a later call of ``sample`` restarts them."""
+        ...
+
+
 class Sample:
     """One element of a data set, generated or read from disk.
 

@@ -9,14 +9,16 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 
 import numpy as np
 
 from gen_data.generator.assets.asset_folder import Folder
+from gen_data.generator.assets.content import content
 from gen_data.generator.assets.convex_decomposition import convex_parts, single_hull
+from gen_data.generator.assets.family import Lazy, Solid
 from gen_data.generator.assets.folder_index import Finish, MeshEntry, Region, RobotEntry
 from gen_data.generator.assets.image_decoding import decode_image
 from gen_data.generator.assets.mesh_decimation import decimate
@@ -24,7 +26,6 @@ from gen_data.generator.assets.normal_form import check_coordinates, normal_form
 from gen_data.generator.assets.readers import read_mesh
 from gen_data.generator.assets.readers.mesh_source import MeshSource, srgb_to_linear
 from gen_data.generator.assets.readers.usd import open_stage
-from gen_data.generator.assets.roads.network_surface import network_solid
 from gen_data.generator.assets.robot_description import RobotDescription, Shape
 from gen_data.generator.assets.robot_formats import is_description, read_description
 from gen_data.generator.assets.robot_shapes import read_shape
@@ -476,7 +477,8 @@ def _scale_to_size(extents: Float64, size_m: float | Vec3, place: str) -> float:
 
 def import_road_network(folder: Folder, relative: str) -> ImportedMesh:
     """Import the road surface of an OpenDRIVE file. Raises AssetError if it is unusable."""
-    solid = network_solid(_read_network(folder, relative))
+    build: Callable[[Network], Solid] = Lazy(content().ROAD_NETWORK)
+    solid = build(_read_network(folder, relative))
     return ImportedMesh(solid.mesh, solid.collision, {}, solid.keypoints)
 
 

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import importlib
-from collections.abc import Callable, Iterator, Mapping
-from functools import cache, partial
+from collections.abc import Callable, Iterator
+from functools import partial
 from typing import Any, TypeVar
 
 from gen_data.generator.assets.asset_arrays import (
@@ -15,38 +14,28 @@ from gen_data.generator.assets.asset_arrays import (
 )
 from gen_data.generator.assets.asset_cache import Arrays, Store, content_key
 from gen_data.generator.assets.asset_ids import AssetId, ParameterValue, format_parameter
-from gen_data.generator.assets.importer import ImportedMesh
-from gen_data.generator.assets.procedural.family import (
+from gen_data.generator.assets.families import (
+    AnyFamily,
+    kind_of,
+    own_families,
+    third_party_families,
+)
+from gen_data.generator.assets.family import (
     EnvironmentFamily,
     Facts,
     Family,
     TextureFamily,
 )
+from gen_data.generator.assets.importer import ImportedMesh
 from gen_data.generator.core.asset_types import Asset, Float32, Symmetry, TextureData
 from gen_data.generator.core.bounded_cache import CountCache, Sized
-from gen_data.generator.core.errors import AssetError, ConfigError, did_you_mean
-from gen_data.generator.core.plugins import loaded, package_of, third_party
+from gen_data.generator.core.errors import AssetError, did_you_mean
 
 VERSION = 4
 """Increased whenever code shared by all families generates different geometry."""
 _KEYS = 8192
 """Content keys kept in memory, some hundred bytes each."""
 _MAX_SEED = 2**31 - 1
-_PREFIXES = {"object": "", "texture": "texture/", "environment": "environment/"}
-
-AnyFamily = Family | TextureFamily | EnvironmentFamily
-TABLES = (
-    "gen_data.generator.assets.procedural",
-    "gen_data.generator.assets.roads",
-    "gen_data.generator.assets.scenery",
-    "gen_data.generator.assets.vehicles",
-    "gen_data.generator.assets.people",
-    "gen_data.generator.assets.interiors",
-    "gen_data.generator.assets.skies",
-)
-"""Packages with tables ``FAMILIES``, ``TEXTURES`` or ``ENVIRONMENTS``."""
-KIND = "asset_family"
-"""Third-party packages add families through the entry-point group ``gen_data.asset_family``."""
 _offered: CountCache[tuple[AnyFamily, Asset]] = CountCache(16384)
 """Descriptions of assets offered for selection, about 1 kB each: every library of a process has the
 same, each search by tags finds many of them, and their facts take a millisecond."""
@@ -59,18 +48,11 @@ class ProceduralLibrary:
 
     def __init__(self, store: Store) -> None:
         self._store = store
-        self._families: dict[str, AnyFamily] = {
-            _PREFIXES[_kind(family)] + name: family
-            for table in _import_tables()
-            for name, family in table.items()
-        }
-        self._packages: dict[str, str] = {}
+        others = third_party_families()
+        own = own_families()
+        self._packages = {name: package for name, (_, package) in others.items() if name not in own}
+        self._families = {**own, **{name: others[name][0] for name in self._packages}}
         self._keys: CountCache[str] = CountCache(_KEYS)
-        for name, family, package in _load_third_party():
-            full_name = _PREFIXES[_kind(family)] + name
-            if full_name not in self._families:
-                self._families[full_name] = family
-                self._packages[full_name] = package
 
     def __contains__(self, name: str) -> bool:
         """Whether a family has that name."""
@@ -84,7 +66,7 @@ class ProceduralLibrary:
     def find(self, tags: frozenset[str], kind: str) -> Iterator[Asset]:
         """Yield the assets offered for selection of a kind that have every tag."""
         for name, family in self._families.items():
-            if _kind(family) == kind and tags.issubset(_list_tags(name, family)):
+            if kind_of(family) == kind and tags.issubset(_list_tags(name, family)):
                 for k in range(family.variants):
                     yield self.get(AssetId(name, {"seed": k}))
 
@@ -102,7 +84,7 @@ class ProceduralLibrary:
         origin = family.origin
         return Asset(
             asset_id=str(asset_id),
-            kind=_kind(family),
+            kind=kind_of(family),
             category=family.category if isinstance(family, Family) else family.name,
             tags=_list_tags(asset_id.name, family),
             licence=origin.licence,
@@ -153,7 +135,7 @@ class ProceduralLibrary:
         """The id's family. Raises AssetError if it is of another kind."""
         family = self._families[asset_id.name]
         if not isinstance(family, kind):
-            raise AssetError(f"asset '{asset_id}': is of kind {_kind(family)}, not {expected}")
+            raise AssetError(f"asset '{asset_id}': is of kind {kind_of(family)}, not {expected}")
         return family
 
     def _result(
@@ -186,32 +168,6 @@ class ProceduralLibrary:
         return content_key(content)
 
 
-def _import_tables() -> Iterator[Mapping[str, AnyFamily]]:
-    for name in TABLES:
-        module = importlib.import_module(name)
-        for table in ("FAMILIES", "TEXTURES", "ENVIRONMENTS"):
-            yield getattr(module, table, {})
-
-
-@cache
-def _load_third_party() -> tuple[tuple[str, AnyFamily, str], ...]:
-    """Name, family and package of every entry point of the group ``gen_data.asset_family``.
-
-    Raises:
-        ConfigError: one of them cannot be imported, or is not a family.
-    """
-    found = []
-    for name, entry in sorted(third_party(KIND).items()):
-        family = loaded(entry.value, f"{KIND} '{name}'")
-        if not isinstance(family, (Family, TextureFamily, EnvironmentFamily)):
-            raise ConfigError(
-                f"{KIND} '{name}': {entry.value} is not a Family, TextureFamily or "
-                "EnvironmentFamily; see gen_data.generator.assets.procedural.family"
-            )
-        found.append((name, family, package_of(entry)))
-    return tuple(found)
-
-
 def _is_offered(asset_id: AssetId, family: AnyFamily) -> bool:
     """Whether an asset is one of the family's seeds that are offered for selection."""
     seed = asset_id.parameters.get("seed")
@@ -228,12 +184,6 @@ def _list_symmetries(asset_id: AssetId, family: AnyFamily) -> tuple[Symmetry, ..
     if not isinstance(family, Family) or family.symmetries is None:
         return ()
     return family.symmetries(**_merge_arguments(asset_id, family))
-
-
-def _kind(family: AnyFamily) -> Any:
-    if isinstance(family, Family):
-        return "object"
-    return "texture" if isinstance(family, TextureFamily) else "environment"
 
 
 def _list_tags(name: str, family: AnyFamily) -> tuple[str, ...]:

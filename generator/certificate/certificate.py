@@ -10,7 +10,6 @@ from dataclasses import asdict, dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from gen_data.generator import __version__
 from gen_data.generator.certificate.claims import CLAIMS, FILES, Claim
 from gen_data.generator.certificate.examined import Examined, Scope
 from gen_data.generator.certificate.finding import Finding, Status, not_checked
@@ -24,8 +23,9 @@ from gen_data.generator.core.errors import (
     is_refused,
 )
 from gen_data.generator.core.serialization import from_plain
+from gen_data.generator.core.version import __version__
+from gen_data.generator.runner.layout import CERTIFICATE_NAME, MANIFEST_NAME
 from gen_data.generator.runner.plan import DAMAGE
-from gen_data.generator.runner.store import CERTIFICATE_NAME, MANIFEST_NAME
 from gen_data.generator.runner.stored import StoredSamples
 from gen_data.generator.runner.verify import scan_finished
 

@@ -14,8 +14,9 @@ from typing import Any
 
 from gen_data.generator.certificate.examined import Examined
 from gen_data.generator.certificate.finding import Contradictions, Finding, not_checked
+from gen_data.generator.runner.layout import LOG_NAME, RUN_NAME
 from gen_data.generator.runner.seal import parse_object
-from gen_data.generator.runner.store import LOG_NAME, RUN_NAME, LocalStore
+from gen_data.generator.runner.store import LocalStore
 
 
 def check_run_log(examined: Examined) -> Iterator[Finding]:

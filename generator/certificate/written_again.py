@@ -13,8 +13,9 @@ from gen_data.generator.certificate.examined import Examined
 from gen_data.generator.certificate.finding import Contradictions, Finding, not_checked
 from gen_data.generator.runner.durable_files import make_folder
 from gen_data.generator.runner.exports import export
+from gen_data.generator.runner.layout import MANIFEST_NAME
 from gen_data.generator.runner.seal import read_sums
-from gen_data.generator.runner.store import MANIFEST_NAME, LocalStore
+from gen_data.generator.runner.store import LocalStore
 
 
 def check_written_again(examined: Examined) -> Iterator[Finding]:

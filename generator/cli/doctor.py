@@ -27,13 +27,13 @@ from typing import Any
 
 import click
 
-from gen_data.generator import __version__
 from gen_data.generator.core.distribution import DISTRIBUTION, install_command
 from gen_data.generator.core.errors import GenDataError, SampleError
 from gen_data.generator.core.optional_packages import missing_packages
 from gen_data.generator.core.processes import silence_stdio
 from gen_data.generator.core.system_calls import usable_cores
 from gen_data.generator.core.temporary_folders import temporary_folder
+from gen_data.generator.core.version import __version__
 
 FILES_MIN = 64
 MEMORY_MIN_BYTES = 2_000_000_000
@@ -190,7 +190,7 @@ def _try_physics() -> str:
     from gen_data.generator.core.se3 import SE3
     from gen_data.generator.physics import PhysicsConfig
     from gen_data.generator.physics.collision_shapes import collision_shape
-    from gen_data.generator.physics.world import open_world
+    from gen_data.generator.physics.open_world import open_world
 
     config = PhysicsConfig()
     corners = np.array([(x, y, z) for x in (-0.1, 0.1) for y in (-0.1, 0.1) for z in (-0.1, 0.1)])

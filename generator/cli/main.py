@@ -16,7 +16,6 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
-from gen_data.generator import __version__
 from gen_data.generator.cli.options import (
     ConfigurationOptions,
     choose_cluster,
@@ -42,6 +41,7 @@ from gen_data.generator.core.errors import (
 )
 from gen_data.generator.core.processes import SINGLE_THREADED
 from gen_data.generator.core.urls import is_url, needs_folder
+from gen_data.generator.core.version import __version__
 
 FOLDERS_ONLY = frozenset(
     "adapt certify contact-sheet diff export match merge preview repair report repro".split()  # noqa: SIM905
@@ -63,11 +63,11 @@ class LazyCommands(click.Group):
         "assets": "gen_data.generator.cli.asset_commands:assets",
         "cache": "gen_data.generator.cli.cache_commands:cache",
         "report": "gen_data.generator.cli.report_command:report",
-        "study": "gen_data.generator.cli.study_command:study",
-        "adapt": "gen_data.generator.cli.adapt_command:adapt",
-        "match": "gen_data.generator.cli.match_command:match",
+        "study": "gen_data.generator.study.study_command:study",
+        "adapt": "gen_data.generator.study.adapt_command:adapt",
+        "match": "gen_data.generator.matching.match_command:match",
         "verify": "gen_data.generator.cli.verification_commands:verify",
-        "certify": "gen_data.generator.cli.certify_command:certify",
+        "certify": "gen_data.generator.certificate.certify_command:certify",
         "merge": "gen_data.generator.cli.merge_command:merge",
         "repair": "gen_data.generator.cli.verification_commands:repair",
         "diff": "gen_data.generator.cli.verification_commands:diff",

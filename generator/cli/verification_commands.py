@@ -22,6 +22,9 @@ from gen_data.generator.core.urls import is_url
 if TYPE_CHECKING:
     from gen_data.generator.runner.verify import Finding
 
+_CHECK_CERTIFICATE = "gen_data.generator.certificate.verification:check_certificate"
+"""Function of the laboratory, which stands above the command line."""
+
 VERIFY_HELP = """Check a data set against its manifest. Exit code 7 if it deviates.
 
 \b
@@ -146,25 +149,12 @@ def _find_invalid(folder: Path) -> list[Finding]:
 
 def _check_certificate(folder: Path, deep: bool, notes: list[str]) -> list[Finding]:
     """Compare a certificate with the manifest, and with ``deep`` with one that is made now."""
-    from gen_data.generator.runner.store import CERTIFICATE_NAME
+    from gen_data.generator.core.plugins import loaded
+    from gen_data.generator.runner.layout import CERTIFICATE_NAME
     from gen_data.generator.runner.verify import Finding
 
-    if not (folder / CERTIFICATE_NAME).is_file():
-        return []
-    from threadpoolctl import threadpool_limits
-
-    from gen_data.generator.certificate.certificate import compare, examine, load_certificate
-
-    try:
-        certificate = load_certificate(folder)
-    except VerificationError as error:
-        _, _, fact = str(error).partition(f"{CERTIFICATE_NAME}: ")
-        return [Finding("certificate", CERTIFICATE_NAME, fact)]
-    if certificate is None or not deep:
-        return []
-    with threadpool_limits(limits=1):
-        contradictions, unsure = compare(certificate, examine(folder, certificate.scope))
-    notes += ["the certificate's claims hold again" * (not contradictions), *unsure]
+    contradictions, compared = loaded(_CHECK_CERTIFICATE, "certificate")(folder, deep)
+    notes += compared
     return [Finding("certificate", CERTIFICATE_NAME, text) for text in contradictions]
 
 
@@ -199,7 +189,8 @@ def repair(folder: Path, source: Path | None, workers: int | None) -> None:
     """
     from gen_data.generator.api.repair import repair as restore
     from gen_data.generator.cli.generate_command import print_summary, progress_bar
-    from gen_data.generator.runner.plan import PLAN_NAME, load_plan
+    from gen_data.generator.runner.layout import PLAN_NAME
+    from gen_data.generator.runner.plan import load_plan
 
     # A damaged plan is restored below; until then the number of samples is not known.
     try:

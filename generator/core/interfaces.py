@@ -16,7 +16,7 @@ Every member of a Protocol below is required. Base classes provide those that fe
 ``gen_data.exporters.base.ExporterBase``. A class that lacks a member is refused when it is loaded.
 
 The kind ``asset_family`` differs: its entry points name instances of
-``gen_data.generator.assets.procedural.family.Family``, ``TextureFamily`` or ``EnvironmentFamily``.
+``gen_data.generator.assets.family.Family``, ``TextureFamily`` or ``EnvironmentFamily``.
 
 Forbidden operations are impossible by design: randomizers get no engine, annotators no rng, and
 exporters process one shard at a time and compute ids instead of counting.

@@ -8,13 +8,13 @@ point. Linear values of a photograph are relative to its white: 1 is ``WHITE_CD_
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.core.asset_types import Material
+from gen_data.generator.core.asset_types import Asset, Material
 from gen_data.generator.core.colorimetry import luminance
 from gen_data.generator.core.errors import ConfigError, did_you_mean
 from gen_data.generator.core.intrinsics import Intrinsics
@@ -28,9 +28,6 @@ from gen_data.generator.core.scene import (
     SupportSurface,
 )
 from gen_data.generator.core.se3 import SE3, Array, Vec3, rotation_to_quaternion
-
-if TYPE_CHECKING:
-    from gen_data.generator.core.interfaces import AssetIndex
 
 PointPx = tuple[float, float]
 
@@ -247,13 +244,13 @@ def fitted_intrinsics(whole: Intrinsics, width_px: int, height_px: int) -> Intri
     )
 
 
-def find_plates(assets: AssetIndex, names: tuple[str, ...], field: str) -> tuple[str, ...]:
-    """Ids of the photographs with any of these ids or tags, sorted.
+def find_plates(plates: Iterable[Asset], names: tuple[str, ...], field: str) -> tuple[str, ...]:
+    """Ids of the given photographs with any of these ids or tags, sorted.
 
     Raises:
         ConfigError: a name matches none.
     """
-    every = assets.find((), "plate")
+    every = tuple(plates)
     found: set[str] = set()
     for name in names:
         fitting = {a.asset_id for a in every if name == a.asset_id or name in a.tags}

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
+from gen_data.generator.assets.content import content
 from gen_data.generator.config.data_files import load_data
 from gen_data.generator.core.errors import ConfigError, did_you_mean
 
@@ -56,7 +57,7 @@ class Pack:
 
 PACKS = tuple(
     Pack(**{**entry, "wanted": tuple(entry["wanted"]), "options": tuple(entry.get("options", ()))})
-    for entry in load_data(__package__, "packs")
+    for entry in load_data(content().PACKS, "packs")
 )
 
 

@@ -26,9 +26,9 @@ from gen_data.generator.physics.manipulation.arm_simulation import (
 from gen_data.generator.physics.manipulation.demonstration import demonstrate
 from gen_data.generator.physics.manipulation.joint_trajectories import TrajectoryRecording
 from gen_data.generator.physics.manipulation.manipulation_planner import TaskPlanner
+from gen_data.generator.physics.open_world import open_world
 from gen_data.generator.physics.physics_config import PhysicsConfig
 from gen_data.generator.physics.settling import Settling, candidate_surfaces
-from gen_data.generator.physics.world import open_world
 
 _SHAPES = 512
 """Capacity of the cache of collision shapes, about 20 kB each."""

@@ -6,11 +6,9 @@ import math
 from collections.abc import Iterable
 from typing import NamedTuple, Protocol
 
-from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.scene import BodyJoint
 from gen_data.generator.core.se3 import SE3, Array, Vec3
 from gen_data.generator.physics.collision_shapes import CollisionShape
-from gen_data.generator.physics.physics_config import PhysicsConfig, missing_engine
 
 GRAVITY_M_S2 = 9.81
 ANGULAR_DAMPING_PER_S = 0.5
@@ -182,21 +180,3 @@ def joint_position(joint: BodyJoint, T_world_home: SE3, T_world_body: SE3) -> fl
     along = sum(a * b for a, b in zip(joint.axis, vector, strict=True))
     angle = 2.0 * math.atan2(along, w)
     return angle - 2.0 * math.pi * round(angle / (2.0 * math.pi))
-
-
-def open_world(config: PhysicsConfig) -> World:
-    """Open an empty world of the configured simulator.
-
-    Raises:
-        ConfigError: it is not installed.
-    """
-    missing = missing_engine(config.engine)
-    if missing:
-        raise ConfigError(f"physics.engine: {missing}")
-    if config.engine == "mujoco":
-        from gen_data.generator.physics.mujoco_world import MujocoWorld
-
-        return MujocoWorld(config.time_step_s, config.solver_iterations)
-    from gen_data.generator.physics.bullet_world import BulletWorld
-
-    return BulletWorld(config.time_step_s, config.solver_iterations)

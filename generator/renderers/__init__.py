@@ -7,7 +7,7 @@ from gen_data.generator.core.plugins import PluginTable
 
 TABLE = PluginTable[RendererSettings](
     "renderer",
-    {"warp": "gen_data.generator.renderers.warp.settings:WarpPlugin"},
+    {"warp": "gen_data.generator.renderers.warp.plugin:WarpPlugin"},
     (RendererSettings,),
     tag="renderer",
 )

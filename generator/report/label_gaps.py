@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from gen_data.exporters.label_map import AppliedLabelMap, LabelMap
 from gen_data.generator.core.sample import ImageTruth
-from gen_data.generator.runner.store import MANIFEST_NAME
+from gen_data.generator.runner.layout import MANIFEST_NAME
 from gen_data.generator.runner.stored import LabelledImages, StoredSamples
 
 FEW_IMAGES = 5

@@ -39,7 +39,7 @@ from gen_data.generator.report.report_tables import (
 )
 from gen_data.generator.report.sample_browser import browser_images, thumbnail
 from gen_data.generator.report.stored_labels import ObjectStatistics, read_images
-from gen_data.generator.runner.store import LICENCES_NAME, MANIFEST_NAME, RUN_NAME
+from gen_data.generator.runner.layout import LICENCES_NAME, MANIFEST_NAME, RUN_NAME
 from gen_data.generator.runner.stored import StoredSamples
 
 BROWSER_BYTES_MAX = 9_000_000

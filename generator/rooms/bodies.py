@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from gen_data.generator.assets.asset_ids import AssetId, ParameterValue
-from gen_data.generator.assets.interiors.shell import NO_OPENINGS, NO_SPLASHBACK
+from gen_data.generator.assets.families import declared
 from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.members import free_instance_ids
@@ -21,8 +21,6 @@ from gen_data.generator.rooms.outlook import Outlook
 OUTSIDE = "outside"
 LEADS_OUT = "leads_out"
 """Attribute of doors without a room behind them."""
-_VESSELS = frozenset({"bowl", "cup", "mug", "tumbler", "wine_glass"})
-_WITH_WORKTOPS = frozenset({"cooker", "kitchen_sink", "kitchen_unit"})
 _SPLASHBACK_M = (0.86, 1.45)
 """Edges of splashbacks: from behind worktops to the usual height of wall units."""
 _BELOW_SILL_M = 0.03
@@ -96,18 +94,24 @@ def keypoint_m(assets: AssetIndex, asset: str, name: str) -> Vec3 | None:
 
 
 def find_splashback(room: Room, wall: int, pieces: Sequence[Piece]) -> tuple[float, ...]:
-    """The place of a wall's ``splashback``: behind its worktops, up to the lowest window there."""
+    """The place of a wall's ``splashback``: behind its worktops, up to the lowest window there.
+
+    Empty if there is no worktop.
+    """
     c, s = direction(wall)
     x, y = room.center_m
     spans = []
     for piece in pieces:
-        if piece.family in _WITH_WORKTOPS and round(piece.yaw_rad / (0.5 * math.pi)) % 4 == wall:
+        if (
+            declared(piece.family, "worktop", False)
+            and round(piece.yaw_rad / (0.5 * math.pi)) % 4 == wall
+        ):
             px, py, *_, half = piece.footprint
             # The wall's own X axis runs to the right of what faces into the room.
             right = (px - x) * s - (py - y) * c
             spans.append((right - half, right + half))
     if not spans:
-        return NO_SPLASHBACK
+        return ()
     low, high = min(a for a, _ in spans), max(b for _, b in spans)
     top = min(
         (
@@ -183,7 +187,7 @@ class Builder:
         body = Body(full, asset, pose, instance_id=number, group=group, materials=materials)
         found = self._assets.get(asset)
         attributes: list[tuple[str, str]] = [("room", room)]
-        if asset.partition("?")[0] in _VESSELS:
+        if declared(asset, "vessel", False):
             attributes.append(("full", "1" if "contents" in dict(found.attributes) else "0"))
         if part is None:
             self._bodies.append(body)
@@ -276,8 +280,9 @@ class Builder:
         length = round(room.wall_length_m(wall) + 2 * WALL_M * (wall % 2), 4)
         parameters: dict[str, ParameterValue] = {"size_m": (length, room.size_m[2], WALL_M)}
         if holes:
-            parameters["openings"] = (*holes, *NO_OPENINGS[len(holes) :])
-        if looks.splashback is not None and splashback != NO_SPLASHBACK:
+            none = [0.0] * (4 * declared("wall", "openings_max") - len(holes))
+            parameters["openings"] = (*holes, *none)
+        if looks.splashback is not None and splashback:
             parameters["splashback"] = splashback
         pose = SE3.about_z(0.5 * math.pi * (wall - 1), (*room.at_wall(wall, 0.0, 0.0), 0.0))
         asset = _id("wall", **parameters)

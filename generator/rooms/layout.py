@@ -14,20 +14,15 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.assets.interiors.parts import BACKREST, INSIDE, SUPPORT
-from gen_data.generator.assets.interiors.shell import SILL_BESIDE_M, SILL_REACH_M
-from gen_data.generator.assets.interiors.storage import (
-    PALLET_PITCH_M,
-    VARIANTS_PER_LOOK,
-    board_levels_m,
-)
+from gen_data.generator.assets.families import declared
 from gen_data.generator.core.bounded_cache import ObjectCache
 from gen_data.generator.core.boxes import Rectangle, overlap_of
 from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.keypoint_names import BACKREST, INSIDE, SUPPORT
 from gen_data.generator.core.se3 import SE3, Array, Quaternion, Vec3
 from gen_data.generator.core.streams import Rng
 from gen_data.generator.rooms.floor_plan import Opening, Room, between, direction, draw_count
-from gen_data.generator.rooms.resting import LOOSE, UPRIGHT, turn_to_rest
+from gen_data.generator.rooms.resting import UPRIGHT, turn_to_rest
 from gen_data.generator.rooms.rules import RoomType, Rule
 
 Options = Mapping[str, Sequence[str]]
@@ -45,36 +40,12 @@ _CROWDED = 0.25
 """Distance within which a piece before a window hides it."""
 _SILL_M = 0.026
 """Height of sills below the openings of windows."""
-_NEAR_SILL_M = (SILL_REACH_M + 0.005, SILL_BESIDE_M + 0.005)
-"""Reach and overhang of sills, and what things keep away from them."""
-_FREE_ABOVE_M = {"wall_shelf": 0.32}
-"""Height above pieces that others leave free."""
+_OFF_SILLS_M = 0.005
+"""Distance that things keep from sills."""
 _HANGS_M = 0.3
 """What begins higher than this above the floor hangs on a wall."""
-_FLAT = frozenset({"rug"})
-_BOARDS = frozenset({"bookcase", "steel_rack"})
-_EDGES_M = {
-    "bookcase": (0.02, 0.03),
-    "steel_rack": (0.03, 0.03),
-    "pallet_rack": (0.0, 0.09),
-    "wall_shelf": (0.01, 0.02),
-}
-"""Width of the border of surfaces that stays free, in depth and width: that of sides and posts.
-Pallets reach over the beams of their racks."""
-_SEATS = frozenset({"armchair", "chair", "sofa"})
-_SQUARE = frozenset(
-    {
-        "book_row",
-        "binder_row",
-        "crockery",
-        "dish_rack",
-        "hanging_clothes",
-        "microwave",
-        "pallet",
-        "spice_rack",
-    }
-)
-"""Things that stand square to what carries them."""
+_BORDER_M = (0.05, 0.05)
+"""Width of the border of surfaces that stays free, in depth and width."""
 _SQUARE_SHARE = 0.4
 """Share of things on tables that lie square to them."""
 _TRIES_ON = 6
@@ -149,10 +120,20 @@ class _Shape:
     rest: Quaternion | None
 
 
+def _is_flat(family: str) -> bool:
+    """Whether pieces of a family lie on the floor and others stand on them."""
+    return bool(declared(family, "flat", False))
+
+
+def _free_above_m(family: str) -> float:
+    """Height above pieces of a family that others leave free."""
+    return float(declared(family, "free_above_m", 0.0))
+
+
 def _find_shape(assets: AssetIndex, asset: str) -> _Shape:
     low, high = assets.bounds_m(asset)
     rest: Quaternion | None = UPRIGHT
-    if asset.partition("?")[0] in LOOSE:
+    if declared(asset, "loose", False):
         points_m = np.asarray(assets.vertices_m(asset), np.float64)
         rest = turn_to_rest(points_m)
         if rest is not None:
@@ -241,8 +222,8 @@ class Layout:
         zone = _before(footprint, rule.clearance_m) if rule.clearance_m > 0.0 else None
         carrier = ignore if rule.place == "over" else -2
         # With what it will carry.
-        top_m = high_m + _FREE_ABOVE_M.get(family, 0.0)
-        reason = self.refuse(footprint, low_m, high_m, zone, ignore, carrier, flat=family in _FLAT)
+        top_m = high_m + _free_above_m(family)
+        reason = self.refuse(footprint, low_m, high_m, zone, ignore, carrier, flat=_is_flat(family))
         if not reason and self.meets_sill(footprint, low_m, top_m):
             reason = "meets a sill"
         if reason:
@@ -287,10 +268,10 @@ class Layout:
         if high_m > self.room.size_m[2] + 1e-6:
             return "higher than the room"
         for k, other in enumerate(self.pieces):
-            if k == carrier or flat != (other.family in _FLAT):
+            if k == carrier or flat != (_is_flat(other.family)):
                 continue
             if (
-                low_m < other.high_m + _FREE_ABOVE_M.get(other.family, 0.0) - 1e-6
+                low_m < other.high_m + _free_above_m(other.family) - 1e-6
                 and other.low_m < high_m - 1e-6
                 and overlap_of(footprint, other.footprint)
             ):
@@ -312,7 +293,7 @@ class Layout:
         if not self.holds(zone):
             return "no free floor before it"
         for other in self.pieces:
-            stands = other.low_m < _HEAD_M and other.family not in _FLAT
+            stands = other.low_m < _HEAD_M and not _is_flat(other.family)
             if stands and overlap_of(zone, other.footprint):
                 return f"no free floor before it: {other.role}"
         return ""
@@ -337,11 +318,13 @@ class Layout:
 
     def meets_sill(self, footprint: Rectangle, low_m: float, high_m: float) -> bool:
         """Whether something touches the sill of a window, which is wider than the opening."""
+        reach_m = declared("window", "sill_reach_m") + _OFF_SILLS_M
+        beside_m = declared("window", "sill_beside_m") + _OFF_SILLS_M
         return any(
             opening.kind == "window"
             and low_m < opening.low_m
             and high_m > opening.low_m - _SILL_M
-            and overlap_of(footprint, self.before_opening(opening, *_NEAR_SILL_M))
+            and overlap_of(footprint, self.before_opening(opening, reach_m, beside_m))
             for opening in self.room.openings
         )
 
@@ -418,8 +401,9 @@ def _draw_asset(layout: Layout, rule: Rule, options: Options) -> tuple[str, str]
     family = layout.pick(_unused(layout, rule))
     found = options[family]
     if rule.matching:
-        look = int(layout.look * (len(found) // VARIANTS_PER_LOOK))
-        seeds = range(VARIANTS_PER_LOOK * look, VARIANTS_PER_LOOK * (look + 1))
+        alike = declared(family, "variants_per_look")
+        look = int(layout.look * (len(found) // alike))
+        seeds = range(alike * look, alike * (look + 1))
         found = [f"{family}?seed={seed}" for seed in seeds]
     return family, layout.pick(found)
 
@@ -546,9 +530,7 @@ def _put_relative(layout: Layout, rule: Rule, family: str, asset: str, k: int) -
         case "above":
             dx, low = s.half_x - a - WALL_GAP_M + 0.0005, min(ref.high_m, 0.91) + gap
         case "under":
-            dx = layout.signed(0.1) + (
-                0.35 * a if ref.family == "bed" else 0.6 * a if ref.family == "wash_basin" else 0.0
-            )
+            dx = layout.signed(0.1) + (declared(ref.family, "under_share", 0.0) * a)
             yaw += 0.0
         case _:
             return _put_across(layout, rule, family, asset, k)
@@ -723,19 +705,19 @@ def supports(piece: Piece, assets: AssetIndex) -> list[Support]:
         )
         free = (0.5 * (x1 - x0), 0.5 * (y1 - y0))
         return [Support(piece.position_m[2] + z, 0.35, (middle[0], middle[1]), free)]
-    if piece.family in _SEATS:
+    if declared(piece.family, "seat", False):
         # Seats of packs do not say where they are level.
         return []
-    edge_x, edge_y = _EDGES_M.get(piece.family, (0.05, 0.05))
+    edge_x, edge_y = declared(piece.family, "border_m", _BORDER_M)
     inner = (half[0] - edge_x, half[1] - edge_y)
-    if piece.family in _BOARDS:
-        levels = board_levels_m(round(height, 6))
+    levels_m = declared(piece.family, "levels_m", None)
+    if levels_m is not None:
+        levels = levels_m(round(height, 6))
         free_m = height / len(levels) - 0.05
         return [Support(piece.low_m + z, free_m, (0.0, 0.0), inner) for z in levels]
-    if piece.family == "pallet_rack":
-        return [
-            Support(k * PALLET_PITCH_M, PALLET_PITCH_M - 0.16, (0.0, 0.0), inner) for k in range(3)
-        ]
+    pitch_m = declared(piece.family, "pallet_pitch_m", None)
+    if pitch_m is not None:
+        return [Support(k * pitch_m, pitch_m - 0.16, (0.0, 0.0), inner) for k in range(3)]
     return [Support(piece.high_m, 0.6, (0.0, 0.0), inner, is_top=True)]
 
 
@@ -792,7 +774,9 @@ def _put_thing(
         return None
     for _ in range(_TRIES_ON):
         turn = layout.signed(math.pi if support.is_top else 0.25)
-        if family in _SQUARE or (support.is_top and layout.rng.random() < _SQUARE_SHARE):
+        if declared(family, "square", False) or (
+            support.is_top and layout.rng.random() < _SQUARE_SHARE
+        ):
             turn = 0.0
         reach = _reach(s, turn)
         free = support.half_m[0] - reach[0], support.half_m[1] - reach[1]
@@ -825,7 +809,7 @@ def _fill_board(
         family = layout.pick(rule.things)
         asset = layout.pick(options[family])
         s = layout.shape(asset)
-        turn = 0.0 if family in _SQUARE else layout.signed(0.12)
+        turn = 0.0 if declared(family, "square", False) else layout.signed(0.12)
         reach = _reach(s, turn)
         free = support.half_m[0] - reach[0]
         if free < 0.0 or at + 2.0 * reach[1] > support.half_m[1] or not _fits(layout, s, support):
@@ -904,7 +888,7 @@ def free_floor(
     inside = (np.abs(x - mx) < 0.5 * sx - margin_m) & (np.abs(y - my) < 0.5 * sy - margin_m)
     free: NDArray[np.bool_] = np.broadcast_to(inside, (rows, columns)).copy()
     for piece in pieces:
-        if piece.low_m >= _HEAD_M or piece.family in _FLAT:
+        if piece.low_m >= _HEAD_M or _is_flat(piece.family):
             continue
         px, py, c, s, a, b = piece.footprint
         along, across = c * (x - px) + s * (y - py), c * (y - py) - s * (x - px)

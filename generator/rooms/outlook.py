@@ -6,8 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from gen_data.generator.assets.scenery.horizons import FOREST_M, TREE_LINE_M
-from gen_data.generator.assets.scenery.townscapes import TOWN_M
+from gen_data.generator.assets.families import declared
 from gen_data.generator.core.se3 import SE3
 from gen_data.generator.core.streams import Rng
 from gen_data.generator.rooms.floor_plan import Room, between, draw_count, outer_radius_m
@@ -25,11 +24,11 @@ _HOUSES = (
     ("building/old_town", 96),
 )
 _FAR = (
-    ("horizon/trees", 8, TREE_LINE_M, 75.0),
-    ("horizon/town", 8, TOWN_M, 105.0),
-    ("horizon/forest", 6, FOREST_M, 110.0),
+    ("horizon/trees", 8, 75.0),
+    ("horizon/town", 8, 105.0),
+    ("horizon/forest", 6, 110.0),
 )
-"""Families that close the view, numbers of their variants, lengths and distances of pieces [m]."""
+"""Families that close the view, numbers of their variants, distances of pieces [m]."""
 _GROUNDS = ("texture/grass", "texture/grass", "texture/paving", "texture/asphalt")
 _VARIANTS = 24
 """Of the variants of each family, so many are used: the first rooms of a data set know them all."""
@@ -88,7 +87,8 @@ def draw_outlook(rooms: Sequence[Room], rng: Rng) -> Outlook:
 
 def _end_of_view(ground_m: float, rng: Rng) -> list[tuple[str, SE3]]:
     """Pieces of a wood all around, which hide where the ground ends."""
-    family, variants, length_m, far_m = _FAR[draw_count(rng, (0, len(_FAR) - 1))]
+    family, variants, far_m = _FAR[draw_count(rng, (0, len(_FAR) - 1))]
+    length_m: float = declared(family, "length_m")
     count = math.ceil(2.0 * math.pi * far_m / length_m)
     first, pieces = between(rng, (0.0, 2.0 * math.pi)), []
     for k in range(count):

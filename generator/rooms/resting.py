@@ -13,34 +13,6 @@ import numpy as np
 
 from gen_data.generator.core.se3 import Array, Quaternion
 
-LOOSE = frozenset(
-    {
-        "ball",
-        "banana",
-        "barrier",
-        "carrot",
-        "grapes",
-        "keyboard",
-        "kick_scooter",
-        "kiwi",
-        "knife",
-        "lemon",
-        "lime",
-        "litter_bin",
-        "mushroom",
-        "parked_bicycle",
-        "peach",
-        "pipe_elbow",
-        "plum",
-        "scissors",
-        "screwdriver",
-        "stepped_shaft",
-        "strawberry",
-        "suitcase",
-        "tomato",
-    }
-)
-"""Families whose own frame is not at rest for all variants; all others stand in theirs."""
 STEEPEST = math.cos(math.radians(50.0))
 """Facets that are turned further from below than this are another way to lie, not this one."""
 UPRIGHT: Quaternion = (1.0, 0.0, 0.0, 0.0)

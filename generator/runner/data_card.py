@@ -29,8 +29,9 @@ from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.interfaces import DatasetInfo, Modality, SensorInfo
 from gen_data.generator.core.markdown import plain
 from gen_data.generator.runner.labels import LABELS_NAME
+from gen_data.generator.runner.layout import PLAN_NAME
 from gen_data.generator.runner.licence_table import licences_in
-from gen_data.generator.runner.plan import PLAN_NAME, Plan, plan_bytes
+from gen_data.generator.runner.plan import Plan, plan_bytes
 from gen_data.generator.runner.provenance import SCENES_NAME
 from gen_data.generator.runner.shard_record import SplitCount
 

@@ -11,12 +11,13 @@ from pathlib import Path
 from gen_data.generator.core.errors import StorageError
 from gen_data.generator.runner.durable_files import tree_sizes
 from gen_data.generator.runner.labels import LABELS_NAME
-from gen_data.generator.runner.plan import PLAN_NAME, Plan, compare_plans, load_plan
+from gen_data.generator.runner.layout import MANIFEST_NAME, PLAN_NAME, SHARDS_NAME
+from gen_data.generator.runner.plan import Plan, compare_plans, load_plan
 from gen_data.generator.runner.provenance import SCENES_NAME
 from gen_data.generator.runner.sample_stages import Difference, SampleFiles, compare_samples
 from gen_data.generator.runner.seal import read_sums
 from gen_data.generator.runner.shard_record import ShardRecord
-from gen_data.generator.runner.store import MANIFEST_NAME, SHARDS_NAME, LocalStore
+from gen_data.generator.runner.store import LocalStore
 
 
 @dataclass(frozen=True)

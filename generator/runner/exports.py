@@ -23,13 +23,13 @@ from gen_data.generator.core.interfaces import (
 from gen_data.generator.core.sample import Sample
 from gen_data.generator.runner.durable_files import Inode, get_inode
 from gen_data.generator.runner.labels import LABELS_NAME
+from gen_data.generator.runner.layout import LICENCES_NAME, SUMS_NAME
 from gen_data.generator.runner.plan import FORMAT_VERSION
 from gen_data.generator.runner.progress import RunProgress, Summary
 from gen_data.generator.runner.provenance import SCENES_NAME
 from gen_data.generator.runner.run import Settings, run
 from gen_data.generator.runner.seal import read_sums
 from gen_data.generator.runner.shard_record import FileRecord
-from gen_data.generator.runner.store import LICENCES_NAME, SUMS_NAME
 from gen_data.generator.runner.stored import RECORDED, CheckedSamples, StoredSamples, check_digest
 from gen_data.generator.runner.verify import check_source
 

@@ -28,17 +28,18 @@ from gen_data.generator.runner.durable_files import (
     tree_sizes,
 )
 from gen_data.generator.runner.error_context import explain_errors
-from gen_data.generator.runner.plan import PLAN_NAME, Plan, plan_bytes
+from gen_data.generator.runner.layout import (
+    LICENCES_NAME,
+    MANIFEST_NAME,
+    PLAN_NAME,
+    SHARDS_NAME,
+    SUMS_NAME,
+)
+from gen_data.generator.runner.plan import Plan, plan_bytes
 from gen_data.generator.runner.seal import Entry, SealedBefore, dataset_id, sums_text
 from gen_data.generator.runner.shard import PipelineLike
 from gen_data.generator.runner.shard_record import ShardRecord, sum_counts
-from gen_data.generator.runner.store import (
-    LICENCES_NAME,
-    MANIFEST_NAME,
-    SHARDS_NAME,
-    SUMS_NAME,
-    LocalStore,
-)
+from gen_data.generator.runner.store import LocalStore
 
 LicencesOf = Callable[[Sequence[str]], str]
 """Formats the licences of the assets with these ids."""

@@ -35,20 +35,19 @@ from gen_data.generator.runner.durable_files import (
     tree_sizes,
 )
 from gen_data.generator.runner.failed_sample import FailedSample
-from gen_data.generator.runner.plan import PLAN_NAME, Plan, parse_plan, plan_bytes
-from gen_data.generator.runner.seal import parse_object, parse_sums
-from gen_data.generator.runner.shard_record import FileRecord, ShardRecord, parse_record
-from gen_data.generator.runner.store import (
+from gen_data.generator.runner.layout import (
     CERTIFICATE_NAME,
     CERTIFICATE_NAMES,
     MANIFEST_NAME,
+    PLAN_NAME,
     RUN_NAME,
     SHARDS_NAME,
     SUMS_NAME,
-    FolderState,
-    LocalStore,
-    Scan,
 )
+from gen_data.generator.runner.plan import Plan, parse_plan, plan_bytes
+from gen_data.generator.runner.seal import parse_object, parse_sums
+from gen_data.generator.runner.shard_record import FileRecord, ShardRecord, parse_record
+from gen_data.generator.runner.store import FolderState, LocalStore, Scan
 
 BATCH = 1000
 """Number of objects that one request to ``fsspec`` reads or writes."""

@@ -12,6 +12,7 @@ from typing import Any
 from gen_data.generator.core.errors import StorageError, no_folder
 from gen_data.generator.core.serialization import canonical_json, from_plain, to_plain
 from gen_data.generator.runner.durable_files import write_durably
+from gen_data.generator.runner.layout import PLAN_NAME
 
 FORMAT_VERSION = 2
 """Version of the folder layout, the shard records and the manifest.
@@ -20,7 +21,6 @@ Since version 2, records have checksums, and records and manifest list empty fol
 """
 READABLE_VERSIONS = (1, FORMAT_VERSION)
 
-PLAN_NAME = "plan.json"
 DAMAGE = (OSError, ValueError, TypeError, LookupError, AttributeError, RecursionError)
 """What reading a damaged JSON file into typed values may raise."""
 

@@ -12,7 +12,7 @@ from gen_data.generator.core.errors import CacheWarning, GenDataError
 from gen_data.generator.core.serialization import canonical_json
 from gen_data.generator.runner.durable_files import format_bytes
 from gen_data.generator.runner.free_space import SpaceCheck
-from gen_data.generator.runner.store import LOG_NAME
+from gen_data.generator.runner.layout import LOG_NAME
 from gen_data.generator.runner.worker_events import (
     Action,
     Event,

@@ -94,7 +94,7 @@ class RayCluster:
         """Open a pool of workers of the connected cluster."""
         from gen_data.generator.runner.ray_pool import RayPool
 
-        return RayPool(job, self)
+        return RayPool(job, cpus=self.cpus, gpus=self.gpus)
 
 
 @contextmanager

@@ -31,7 +31,6 @@ from gen_data.generator.runner.worker_events import (
 )
 
 if TYPE_CHECKING:
-    from gen_data.generator.runner.ray_cluster import RayCluster
     from gen_data.generator.runner.shard import Job
 
 FAILED = 1
@@ -55,17 +54,18 @@ class RayPool:
 
     Args:
         job: What the workers do; its folder exists on all machines, or is a URL.
-        cluster: Resources of a worker.
+        cpus: CPU cores per worker.
+        gpus: GPUs per worker.
     """
 
-    def __init__(self, job: Job, cluster: RayCluster) -> None:
+    def __init__(self, job: Job, *, cpus: float, gpus: float) -> None:
         import ray
 
         self._ray = ray
         self._job = ray.put(pickle.dumps(job))
         self._make_actor = ray.remote(ShardWorker).options(
-            num_cpus=cluster.cpus,
-            num_gpus=cluster.gpus,
+            num_cpus=cpus,
+            num_gpus=gpus,
             max_restarts=0,
             max_task_retries=0,
             runtime_env={"env_vars": dict.fromkeys(SINGLE_THREADED, "1")},

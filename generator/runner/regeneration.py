@@ -16,7 +16,8 @@ from gen_data.generator.assemble.pipeline_factory import PipelineFactory
 from gen_data.generator.core.errors import ConfigError, StorageError
 from gen_data.generator.runner.finalize import LicencesOf
 from gen_data.generator.runner.identity import format_licences, make_plan
-from gen_data.generator.runner.plan import PLAN_NAME, Plan, compare_plans
+from gen_data.generator.runner.layout import PLAN_NAME
+from gen_data.generator.runner.plan import Plan, compare_plans
 from gen_data.generator.runner.rerender import rerender_plan
 from gen_data.generator.runner.sample_stages import Difference, SampleFiles, compare_samples
 from gen_data.generator.runner.shard import (

@@ -10,7 +10,8 @@ import os
 
 from gen_data.generator.core.errors import StorageError
 from gen_data.generator.runner.durable_files import make_folder, write_durably
-from gen_data.generator.runner.plan import PLAN_NAME, Plan, plan_bytes
+from gen_data.generator.runner.layout import PLAN_NAME
+from gen_data.generator.runner.plan import Plan, plan_bytes
 from gen_data.generator.runner.seal import read_or_empty, read_sums
 from gen_data.generator.runner.store import LocalStore
 from gen_data.generator.runner.verify import find_deviations

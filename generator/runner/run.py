@@ -14,9 +14,10 @@ from gen_data.generator.core.sample import Sample
 from gen_data.generator.runner.failed_sample import FailedSample, parse_failed
 from gen_data.generator.runner.finalize import LicencesOf, finalize
 from gen_data.generator.runner.free_space import DOCUMENTS_BYTES, SpaceCheck
+from gen_data.generator.runner.layout import MANIFEST_NAME, PLAN_NAME, SUMS_NAME
 from gen_data.generator.runner.numerics_guard import admit_numerics
 from gen_data.generator.runner.object_store import open_store
-from gen_data.generator.runner.plan import PLAN_NAME, Plan, plan_bytes
+from gen_data.generator.runner.plan import Plan, plan_bytes
 from gen_data.generator.runner.processes import Pool, open_worker_pool, run_supervisor
 from gen_data.generator.runner.progress import RunMonitor, RunProgress, Summary
 from gen_data.generator.runner.repair import quarantine_extra, restore_plan
@@ -32,13 +33,7 @@ from gen_data.generator.runner.shard import (
     write_images,
     write_records,
 )
-from gen_data.generator.runner.store import (
-    MANIFEST_NAME,
-    SUMS_NAME,
-    FolderState,
-    LocalStore,
-    Scan,
-)
+from gen_data.generator.runner.store import FolderState, LocalStore, Scan
 from gen_data.generator.runner.supervisor import Limits, Supervisor
 from gen_data.generator.runner.termination_signals import Interruption
 from gen_data.generator.runner.worker import done_event

@@ -1,16 +1,5 @@
 """Storage of a data set in a folder.
 
-    plan.json               identity of the data set; written first
-    shards/000042/          files of one shard, renamed into place when all are on disk
-    shards/000042.json      its record; from here on the shard is committed
-    coco/ kitti/ ...        merged results of exporters
-    README.md               data card; croissant.json: its facts for programs
-    SHA256SUMS              every file but run/, certificates and itself, for ``sha256sum -c``
-    manifest.json           written last: it marks the data set as finished
-    CERTIFICATE.json        results of ``gen-data certify``, with a page; no part of the data set
-    run/                    lock, log, a copy of the plan, unfinished and quarantined files; no part
-                            of the data set
-
 Nothing is inferred from the files in a folder: a shard either matches its record or is generated
 again.
 """
@@ -44,26 +33,20 @@ from gen_data.generator.runner.durable_files import (
     write_durably,
 )
 from gen_data.generator.runner.failed_sample import FailedSample
-from gen_data.generator.runner.plan import (
+from gen_data.generator.runner.layout import (
+    CERTIFICATE_NAMES,
+    LICENCES_NAME,
+    MANIFEST_NAME,
     PLAN_NAME,
-    Plan,
-    compare_plans,
-    load_plan,
-    plan_bytes,
-    write_plan,
+    RUN_NAME,
+    SHARDS_NAME,
+    SUMS_NAME,
+    record_path,
+    shard_path,
 )
+from gen_data.generator.runner.plan import Plan, compare_plans, load_plan, plan_bytes, write_plan
 from gen_data.generator.runner.shard_record import ShardRecord, parse_record
 
-MANIFEST_NAME = "manifest.json"
-SUMS_NAME = "SHA256SUMS"
-LICENCES_NAME = "LICENSES-ASSETS.md"
-RUN_NAME = "run"
-LOG_NAME = "log.jsonl"
-"""Log of all runs, in ``run``: committed shards with digests of their records, and summaries."""
-CERTIFICATE_NAME = "CERTIFICATE.json"
-CERTIFICATE_NAMES = (CERTIFICATE_NAME, "CERTIFICATE.html")
-"""Statements about a finished data set, beside its manifest; no part of its identity."""
-SHARDS_NAME = "shards"
 REMEDY = "choose another folder with --out"
 SCRATCH_FOLDERS_MAX = 1_000_000
 RUN_NAMES = frozenset({"lock", "tmp", "tmp-doomed", PLAN_NAME})
@@ -140,11 +123,11 @@ class LocalStore:
 
     def shard_dir(self, shard: int) -> Path:
         """Path of the folder of a committed shard."""
-        return self._shards_dir / f"{shard:06d}"
+        return shard_path(self.root, shard)
 
     def record_path(self, shard: int) -> Path:
         """Path of the record of a committed shard."""
-        return self._shards_dir / f"{shard:06d}.json"
+        return record_path(self.root, shard)
 
     @property
     def place(self) -> str:

@@ -37,9 +37,10 @@ from gen_data.generator.core.urls import is_url, needs_folder
 from gen_data.generator.runner.durable_files import hash_file
 from gen_data.generator.runner.failed_sample import FailedSample, parse_failed
 from gen_data.generator.runner.labels import LABELS_NAME, Labels, parse_labels
+from gen_data.generator.runner.layout import MANIFEST_NAME, SHARDS_NAME
 from gen_data.generator.runner.plan import DAMAGE, load_plan
 from gen_data.generator.runner.provenance import SCENES_NAME, KeptScene, parse_scene
-from gen_data.generator.runner.store import MANIFEST_NAME, SHARDS_NAME, LocalStore
+from gen_data.generator.runner.store import LocalStore
 
 T = TypeVar("T")
 

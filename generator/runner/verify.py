@@ -21,17 +21,19 @@ from gen_data.generator.runner.durable_files import (
     hash_file,
     scan_tree,
 )
-from gen_data.generator.runner.plan import PLAN_NAME, Plan, load_plan
-from gen_data.generator.runner.seal import parse_object, read_or_empty, read_sums
-from gen_data.generator.runner.shard_record import ShardRecord, parse_unchecked_record
-from gen_data.generator.runner.store import (
+from gen_data.generator.runner.layout import (
     CERTIFICATE_NAMES,
     MANIFEST_NAME,
+    PLAN_NAME,
     RUN_NAME,
     SHARDS_NAME,
     SUMS_NAME,
-    LocalStore,
+    record_path,
+    shard_path,
 )
+from gen_data.generator.runner.plan import Plan, load_plan
+from gen_data.generator.runner.seal import parse_object, read_or_empty, read_sums
+from gen_data.generator.runner.shard_record import ShardRecord, parse_unchecked_record
 
 SAMPLE_NAME = re.compile(r"(?:^|[/_])(\d{6,9})[._]")
 SHARD_PATH = re.compile(rf"{SHARDS_NAME}/(\d+)[/.]")
@@ -201,7 +203,6 @@ class _Check:
         self._digests = digests
         self._folder = folder
         self._plan = plan
-        self._store = LocalStore(folder)
         self._sums: Mapping[str, str] = {}
         self._sizes: dict[str, int] = {}
         self._empty_folders: set[str] = set()
@@ -251,7 +252,7 @@ class _Check:
         if len(digests) != self._plan.shard_count:
             yield Finding("inconsistent", MANIFEST_NAME, "number of shards is not the plan's")
         for shard, digest in enumerate(digests[: self._plan.shard_count]):
-            place = self._store.record_path(shard)
+            place = record_path(self._folder, shard)
             path = f"{SHARDS_NAME}/{place.name}"
             data = read_or_empty(place)
             record = parse_unchecked_record(data)
@@ -270,7 +271,7 @@ class _Check:
                 self._sizes.setdefault(path, size)
 
     def _compare_record(self, shard: int, record: ShardRecord) -> Iterator[Finding]:
-        folder = f"{SHARDS_NAME}/{self._store.shard_dir(shard).name}"
+        folder = f"{SHARDS_NAME}/{shard_path(self._folder, shard).name}"
         self._empty_folders.update(f"{folder}/{inner}" for inner in record.empty_folders)
         for file in record.files:
             path = f"{folder}/{file.path}"

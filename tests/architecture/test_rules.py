@@ -107,7 +107,9 @@ def test_only_the_command_line_prints_and_reads_the_environment() -> None:
     offenders = [
         f"{path.relative_to(ROOT)}: {node.attr}"
         for path in python_files(*OURS)
-        if "cli" not in path.parts and path != ROOT / "generator" / "assets" / "paths.py"
+        if "cli" not in path.parts
+        and not path.stem.endswith("_command")
+        and path != ROOT / "generator" / "assets" / "paths.py"
         # Parsing takes longest: most files do not have the words.
         if "environ" in (source := path.read_text()) or "getenv" in source
         for node in ast.walk(ast.parse(source))

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
+from gen_data.generator.assets.families import declared
+from gen_data.generator.assets.family import Solid
 from gen_data.generator.assets.procedural import FAMILIES
-from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.furniture import (
-    SLOTS,
     bin_interior_m,
     shelf_clearance_m,
     shelf_levels_m,
@@ -27,8 +27,8 @@ def test_defaults_build_finite_meshes_with_the_documented_slots(name: str) -> No
 
     assert np.isfinite(mesh.vertices_m).all()
     assert np.isfinite(mesh.normals).all()
-    assert len(mesh.materials) == len(SLOTS[name])
-    assert set(np.unique(mesh.face_slots)) == set(range(len(SLOTS[name])))
+    assert len(mesh.materials) == len(declared(name, "slots"))
+    assert set(np.unique(mesh.face_slots)) == set(range(len(declared(name, "slots"))))
 
 
 @pytest.mark.parametrize("name", SIZED)

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
+from gen_data.generator.assets.family import Solid
 from gen_data.generator.assets.procedural import FAMILIES, TEXTURES
-from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.vessel_contents import CONTENTS, FOODS
 from gen_data.generator.assets.procedural.vessels import choose
 from gen_data.generator.core.asset_types import MeshData

@@ -9,8 +9,8 @@ import yaml
 
 from gen_data.generator import assets
 from gen_data.generator.assets.procedural.bottles import BOTTLES, BottleStyle
-from gen_data.generator.assets.procedural.data_tables import load_table
 from gen_data.generator.assets.vehicles.car_design import DESIGNS, Design
+from gen_data.generator.config.data_files import load_table
 
 VEHICLES = "gen_data.generator.assets.vehicles"
 TABLES = sorted(Path(assets.__path__[0]).rglob("*.yaml"))

@@ -7,8 +7,8 @@ from functools import cache
 import numpy as np
 import pytest
 
+from gen_data.generator.assets.family import Worn
 from gen_data.generator.assets.procedural import FAMILIES, TEXTURES
-from gen_data.generator.assets.procedural.family import Worn
 from gen_data.generator.assets.procedural.textures import printed_matter
 from gen_data.generator.assets.procedural.wear import Film, draw_wear, dust_share, lay_films
 from gen_data.generator.core.asset_types import MeshData, TextureData

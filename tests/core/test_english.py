@@ -9,7 +9,7 @@ from importlib.resources import files
 import pytest
 import yaml
 
-from gen_data.generator.assets.procedural_library import TABLES
+from gen_data.generator.content import FAMILIES
 from gen_data.generator.core.english import count, plural
 
 BY_HAND = {
@@ -56,7 +56,7 @@ BY_HAND = {
 @cache
 def categories() -> frozenset[str]:
     """Of all families and of the objects of all packs, in words."""
-    modules = [importlib.import_module(name) for name in TABLES]
+    modules = [importlib.import_module(name) for name in FAMILIES]
     found = {f.category for m in modules for f in getattr(m, "FAMILIES", {}).values()}
     for path in files("gen_data.generator.packs").iterdir():
         if path.name.endswith(".yaml"):

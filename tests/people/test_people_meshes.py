@@ -7,10 +7,10 @@ from collections import Counter
 import numpy as np
 import pytest
 
+from gen_data.generator.assets.family import Solid
 from gen_data.generator.assets.people.person import Person, draw_person
 from gen_data.generator.assets.people.person_mesh import build_person, dress_person, simple_person
 from gen_data.generator.assets.people.posing import HELD
-from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.core.asset_types import MeshData
 from tests.people.bodies import KINDS, body_of
 

@@ -18,8 +18,9 @@ from gen_data.generator.physics.manipulation.joint_trajectories import (
     limit_speed,
     sample_positions,
 )
+from gen_data.generator.physics.open_world import open_world
 from gen_data.generator.physics.physics_config import EngineName
-from gen_data.generator.physics.world import World, open_world
+from gen_data.generator.physics.world import World
 from tests.physics.doubles import box, cylinder
 
 STROKE_M = 0.08

@@ -16,8 +16,8 @@ from gen_data.generator.core.serialization import canonical_json
 from gen_data.generator.physics import PhysicsConfig, open_engine
 from gen_data.generator.physics.collision_shapes import collision_shape
 from gen_data.generator.physics.engine import Engine
+from gen_data.generator.physics.open_world import open_world
 from gen_data.generator.physics.physics_config import EngineName
-from gen_data.generator.physics.world import open_world
 from tests.physics.doubles import TABLE_TOP_Z_M, Solids, box, dropped_clutter, table_scene, thing
 from tests.physics.panda import HOME
 

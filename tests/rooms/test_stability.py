@@ -19,11 +19,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from gen_data.generator.assets.families import declared
 from gen_data.generator.assets.library import open_library
 from gen_data.generator.core.interfaces import AssetLibrary
 from gen_data.generator.core.scene import Body, Scene
 from gen_data.generator.core.se3 import SE3, Array
-from gen_data.generator.rooms.resting import LOOSE, turn_to_rest
+from gen_data.generator.rooms.resting import turn_to_rest
 from gen_data.generator.rooms.rules import room_types
 from tests.rooms.test_layouts import KINDS, family, furnished, library
 
@@ -197,7 +198,8 @@ def standing_families() -> list[str]:
     rules = [rule for kind in room_types().values() for rule in kind.pieces]
     placed = {f for rule in rules if rule.place in places for f in rule.assets}
     things = {f for rule in rules for f in rule.things}
-    return sorted((placed | things) - LOOSE - HUNG - FIXED - SOFT)
+    loose = {name for name in placed | things if declared(name, "loose", False)}
+    return sorted((placed | things) - loose - HUNG - FIXED - SOFT)
 
 
 @pytest.mark.slow

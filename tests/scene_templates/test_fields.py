@@ -10,10 +10,10 @@ import pytest
 
 from gen_data.generator.assets.library import Library, open_library
 from gen_data.generator.assets.roads import FAMILIES
-from gen_data.generator.assets.roads.fields import FieldsShape
 from gen_data.generator.assets.scenery.farmland_things import power_pylon
 from gen_data.generator.core.errors import AssetError, ConfigError
 from gen_data.generator.core.scene import Scene
+from gen_data.generator.roads.fields_shape import FieldsShape
 from gen_data.scene_templates.builder import build_scene
 from gen_data.scene_templates.element import Element
 from gen_data.scene_templates.fields import Fields

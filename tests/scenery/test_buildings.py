@@ -8,8 +8,8 @@ from functools import cache
 import numpy as np
 import pytest
 
+from gen_data.generator.assets.family import Solid
 from gen_data.generator.assets.library import open_library
-from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.scenery.building_designs import (
     REGIONS,
     STYLES,

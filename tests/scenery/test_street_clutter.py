@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gen_data.generator.assets.procedural.family import Solid
+from gen_data.generator.assets.family import Solid
 from gen_data.generator.assets.scenery import FAMILIES
 from gen_data.generator.assets.scenery.utility_lines import utility_pole
 from gen_data.generator.core.asset_types import Asset

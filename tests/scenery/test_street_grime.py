@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gen_data.generator.assets.procedural.family import Worn
+from gen_data.generator.assets.family import Worn
 from gen_data.generator.assets.scenery import FAMILIES, TEXTURES
 from tests.every_value import for_every
 

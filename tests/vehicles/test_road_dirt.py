@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gen_data.generator.assets.procedural.family import Solid, Worn
+from gen_data.generator.assets.family import Solid, Worn
 from gen_data.generator.assets.procedural.wear import draw_wear
 from gen_data.generator.assets.vehicles import FAMILIES, TEXTURES
 from gen_data.generator.assets.vehicles.road_dirt import (

@@ -11,7 +11,6 @@ import numpy as np
 from gen_data.generator.assets.interiors.parts import (
     HOUSEHOLD,
     LACQUERS,
-    SUPPORT,
     Box,
     board,
     cushion,
@@ -40,6 +39,7 @@ from gen_data.generator.assets.procedural.material_presets import (
 from gen_data.generator.assets.procedural.patches import Patch
 from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
 from gen_data.generator.core.asset_types import Keypoint, Material
+from gen_data.generator.core.keypoint_names import SUPPORT
 
 _PAPER = painted_material("#f5f3ec", 0.85)
 _DARK = painted_material("#1d1e20", 0.5)

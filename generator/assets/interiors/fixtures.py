@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 
 from gen_data.generator.assets.interiors.parts import (
-    SUPPORT,
     Box,
     board,
     brushed_steel,
@@ -29,10 +28,9 @@ from gen_data.generator.assets.procedural.material_presets import (
 from gen_data.generator.assets.procedural.patches import Patch
 from gen_data.generator.assets.procedural.variant_rng import variant_rng
 from gen_data.generator.core.asset_types import Keypoint, Material
+from gen_data.generator.core.keypoint_names import DRAIN, SUPPORT, TAP
 from gen_data.generator.core.se3 import Vec3
 
-TAP, DRAIN = "tap", "drain"
-"""Keypoints where water comes out of a tap, and where it falls to."""
 _X = 0.29
 _CHROME = metal_material(STAINLESS, 0.15)
 

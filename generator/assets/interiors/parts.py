@@ -22,12 +22,6 @@ from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.se3 import Vec3
 
 Box = tuple[Vec3, Vec3]
-SUPPORT = "support"
-"""Keypoints at two opposite corners of a level surface that carries things and is not a top."""
-INSIDE = "inside"
-"""Keypoints at the lowest and the highest corner of the room above a board behind doors."""
-BACKREST = "backrest"
-"""Keypoint in the middle of the upper edge of a back."""
 LACQUERS = (
     *("#f1f0ec", "#f1f0ec", "#eceae5", "#e6e4de", "#d9d7d1", "#b7b6b2", "#8b8c8c", "#3b3d3f"),
     *("#b9c2bd", "#66737a", "#939d8d"),

@@ -9,9 +9,6 @@ from dataclasses import replace
 import numpy as np
 
 from gen_data.generator.assets.interiors.parts import (
-    BACKREST,
-    INSIDE,
-    SUPPORT,
     Box,
     board,
     cushion,
@@ -36,6 +33,7 @@ from gen_data.generator.assets.procedural.material_presets import (
 from gen_data.generator.assets.procedural.patches import Patch
 from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
 from gen_data.generator.core.asset_types import Keypoint
+from gen_data.generator.core.keypoint_names import BACKREST, INSIDE, SUPPORT
 from gen_data.generator.core.se3 import Vec3
 
 PIPING_HEIGHT = 0.9

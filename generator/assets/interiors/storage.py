@@ -10,7 +10,6 @@ from dataclasses import replace
 
 from gen_data.generator.assets.interiors.cartons import carton_looks, tape_carton
 from gen_data.generator.assets.interiors.parts import (
-    INSIDE,
     LACQUERS,
     Box,
     board,
@@ -37,6 +36,7 @@ from gen_data.generator.assets.procedural.material_presets import (
 from gen_data.generator.assets.procedural.patches import Patch
 from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
 from gen_data.generator.core.asset_types import Keypoint, Material
+from gen_data.generator.core.keypoint_names import INSIDE
 
 _T = 0.018
 """Thickness of boards."""

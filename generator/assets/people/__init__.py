@@ -44,6 +44,10 @@ def _people(name: str, version: int, *tags: str) -> Family:
         stored=False,
         stored_parameters=("pose",),
         origin=_PACK if "pack" in tags else OURS,
+        declares={
+            fact: Lazy(f"{_PACKAGE}.posing:{fact.upper()}")
+            for fact in ("behaviours", "held", "moving_poses", "phases")
+        },
     )
 
 

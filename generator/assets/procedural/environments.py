@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from gen_data.generator.assets.procedural.material_presets import hex_to_linear
 from gen_data.generator.assets.procedural.noise import fbm, smoothstep, uniform
 from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
+from gen_data.generator.assets.skies.equirectangular import normalize_luminance, pixel_directions
 from gen_data.generator.core.asset_types import Float32
 from gen_data.generator.core.colorimetry import luminance
 
@@ -145,30 +146,6 @@ def night_city(seed: int) -> Float32:
         tint = rng.choose(((1.0, 0.66, 0.3), (1.0, 0.85, 0.62), (0.85, 0.95, 1.0)))
         image += glow * np.array(tint)
     return normalize_luminance(image)
-
-
-def pixel_directions(height_px: int, rows: int | None = None) -> Array:
-    """Unit vector of each pixel's centre, shape [height, 2 * height, 3], or of the first rows."""
-    polar = (math.pi * (np.arange(height_px) + 0.5) / height_px)[:rows]
-    turn = 2.0 * math.pi * (0.5 - (np.arange(2 * height_px) + 0.5) / (2 * height_px))
-    flat = np.sin(polar)[:, None]
-    directions = np.zeros((len(polar), 2 * height_px, 3))
-    np.multiply(flat, np.cos(turn), out=directions[..., 0])
-    np.multiply(flat, np.sin(turn), out=directions[..., 1])
-    directions[..., 2] = np.cos(polar)[:, None]
-    return directions
-
-
-def normalize_luminance(image: Array | Float32) -> Float32:
-    """The image scaled to mean luminance 1 by solid angle."""
-    image = np.maximum(image, 0.0)
-    rows = image.shape[0]
-    edges = np.cos(math.pi * np.arange(rows + 1) / rows)
-    weight = (edges[:-1] - edges[1:]) / 2.0
-    per_row = luminance(image).mean(axis=1, dtype=np.float64)
-    image /= float((per_row * weight).sum())
-    scaled: Float32 = image.astype(np.float32, copy=False)
-    return scaled
 
 
 def _direction(azimuth_rad: float, elevation_rad: float) -> Array:

@@ -1,301 +1,43 @@
-"""Families: named generators of objects, textures and environments, and their tables."""
+"""Families; see ``generator/assets/family.py``."""
 
 from __future__ import annotations
 
-import importlib
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import partial
-from typing import Any, NamedTuple
-
-from gen_data.generator.assets.procedural.variant_rng import in_turn
-from gen_data.generator.config.data_files import load_data
-from gen_data.generator.core.asset_types import (
-    ConvexParts,
-    Keypoint,
-    MeshData,
-    Symmetry,
+from gen_data.generator.assets.family import (
+    OURS,
+    ConstantFacts,
+    ConstantSymmetries,
+    EnvironmentFamily,
+    Facts,
+    Family,
+    FamilyTables,
+    ImageFamily,
+    Lazy,
+    Provenance,
+    Solid,
+    TextureFamily,
+    Worn,
+    axis_symmetries,
+    check_option,
+    choose_option,
+    load_families,
 )
-from gen_data.generator.core.errors import AssetError, did_you_mean
-from gen_data.generator.core.se3 import Vec3
 
-
-@dataclass(frozen=True, eq=False, slots=True)
-class Solid:
-    """One object: visual mesh, collision geometry and keypoints.
-
-    Attributes:
-        mesh: Visual geometry in the object's frame.
-        collision: Convex parts in the same frame.
-        keypoints: Named points in the same frame.
-        body_bounds_m: Bounds of the mesh without a vehicle's exterior mirrors or a pole's cables,
-            smallest and largest coordinates [m]; None if it has none.
-    """
-
-    mesh: MeshData
-    collision: ConvexParts
-    keypoints: tuple[Keypoint, ...] = ()
-    body_bounds_m: tuple[Vec3, Vec3] | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Provenance:
-    """Source and licence of an asset."""
-
-    licence: str
-    author: str
-    source: str
-
-
-OURS = Provenance("Apache-2.0", "gen-data contributors", "gen-data (procedural)")
-
-
-@dataclass(frozen=True, slots=True)
-class Facts:
-    """Facts about an object that need no mesh.
-
-    Attributes:
-        subcategory: A finer name than the category.
-        attributes: Further facts that labels carry.
-    """
-
-    subcategory: str = ""
-    attributes: Mapping[str, str] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class Family:
-    """A generator of similar objects.
-
-    Attributes:
-        name: First part of its ids: ``mug`` in ``mug?seed=3``.
-        category: Category of its objects in labels.
-        tags: Sorted words that configurations select it by.
-        variants: ``build(seed=k)`` is an object for ``k`` in ``range(variants)``; 0 = the family
-            is parametric: ``build(**parameters)``.
-        mass_kg: Nominal mass; 0 = does not move.
-        stackable: Flat above and below.
-        version: Raised whenever the same arguments make other bytes.
-        parameters: ``{name: default}`` of a parametric family.
-        build: Pure function of its arguments.
-        facts: Pure, quick function of the same arguments; None = no further facts.
-        symmetries: Likewise: turns that leave the object as it looks; None = there are none.
-        stored: Whether the disk cache also keeps results that are not offered for selection;
-            false where hardly any is used twice.
-        stored_parameters: Parameters that stored results may have beside a seed, even so.
-        origin: Source and licence, if not all is ours.
-    """
-
-    name: str
-    category: str
-    tags: tuple[str, ...]
-    variants: int
-    mass_kg: float
-    stackable: bool
-    version: int
-    parameters: Mapping[str, object]
-    build: Callable[..., Solid]
-    facts: Callable[..., Facts] | None = None
-    stored: bool = True
-    stored_parameters: tuple[str, ...] = ()
-    origin: Provenance = OURS
-    symmetries: Callable[..., tuple[Symmetry, ...]] | None = None
-
-
-@dataclass(frozen=True)
-class ImageFamily:
-    """A generator of images; ``build(seed, **parameters)`` is a pure function.
-
-    Attributes:
-        variants: Seeds ``range(variants)`` are offered for selection; any other seed works too.
-        stored: Whether the disk cache also keeps images that are not offered for selection;
-            false where hardly any is used twice.
-        stored_parameters: As of objects.
-        origin: Source and licence, if it is not ours.
-    """
-
-    name: str
-    tags: tuple[str, ...]
-    variants: int
-    version: int
-    build: Callable[..., Any]
-    parameters: Mapping[str, object] = field(default_factory=dict)
-    stored: bool = True
-    stored_parameters: tuple[str, ...] = ()
-    origin: Provenance = OURS
-
-
-class TextureFamily(ImageFamily):
-    """A generator of textures: ``TextureData``."""
-
-
-class EnvironmentFamily(ImageFamily):
-    """A generator of equirectangular images of relative luminance; see ``AssetLibrary``."""
-
-
-@dataclass(frozen=True)
-class Lazy:
-    """A function named by ``module:function`` and imported when first called.
-
-    Attributes:
-        path: Full name of the module, and the function in it.
-    """
-
-    path: str
-
-    def __call__(self, *args: Any, **kwargs: Any) -> Any:
-        """Call the function."""
-        module, _, function = self.path.partition(":")
-        return getattr(importlib.import_module(module), function)(*args, **kwargs)
-
-
-@dataclass(frozen=True)
-class Worn:
-    """A generator whose objects are worn, more or less by seed.
-
-    Attributes:
-        build: The generator of objects as new.
-        name: Name of the family.
-        wear: Function of the object, the name and the seed: the object in use.
-    """
-
-    build: Callable[..., Solid]
-    name: str
-    wear: Callable[[Solid, str, int], Solid]
-
-    def __call__(self, seed: int, **parameters: Any) -> Solid:
-        """The object in use."""
-        return self.wear(self.build(seed=seed, **parameters), self.name, seed)
-
-
-_USE = Lazy(f"{__package__}.textures.use_marks:use")
-
-
-@dataclass(frozen=True)
-class ConstantFacts:
-    """Facts that are the same for every variant."""
-
-    subcategory: str
-
-    def __call__(self, **_: Any) -> Facts:
-        """The facts, whatever the arguments."""
-        return Facts(self.subcategory)
-
-
-@dataclass(frozen=True)
-class ConstantSymmetries:
-    """Symmetries that are the same for every variant.
-
-    Attributes:
-        folds: Fold by axis ``x``, ``y`` or ``z``; see ``Symmetry``.
-    """
-
-    folds: Mapping[str, int]
-
-    def __call__(self, **_: Any) -> tuple[Symmetry, ...]:
-        """The symmetries, whatever the arguments."""
-        return axis_symmetries(**self.folds)
-
-
-def axis_symmetries(**folds: int) -> tuple[Symmetry, ...]:
-    """Symmetries about axes of the object's frame, by name: ``z=0`` is any turn about Z."""
-    return tuple(Symmetry(_AXES[name], fold) for name, fold in folds.items())
-
-
-_AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
-
-
-def choose_option(
-    family: str, parameter: str, value: str, options: Sequence[str], seed: int
-) -> str:
-    """The value of a parameter; ``any`` takes the options in turn by seed.
-
-    Raises:
-        AssetError: if it is neither ``any`` nor one of the options.
-    """
-    if value == "any":
-        return in_turn(options, seed)
-    check_option(family, parameter, value, ("any", *options))
-    return value
-
-
-def check_option(family: str, parameter: str, value: str, options: Iterable[str]) -> None:
-    """Raise AssetError if a parameter of a family has none of the values that it may have."""
-    if value not in options:
-        raise AssetError(
-            f"{family}: {parameter}={value} is unknown; expected one of {', '.join(options)}"
-            f"{did_you_mean(value, options)}"
-        )
-
-
-class FamilyTables(NamedTuple):
-    """The families of one package, by name."""
-
-    objects: Mapping[str, Family]
-    textures: Mapping[str, TextureFamily]
-    environments: Mapping[str, EnvironmentFamily]
-
-
-def load_families(package: str) -> FamilyTables:
-    """The tables in ``families.yaml`` of a package; the file's own header explains its keys."""
-    plain = load_data(package, "families")
-
-    def table(section: str, make: Callable[..., Any]) -> Mapping[str, Any]:
-        rows = plain.get(section, {})
-        return {name: make(name, **_arguments(package, row)) for name, row in rows.items()}
-
-    return FamilyTables(
-        table("objects", _object_family),
-        table("textures", TextureFamily),
-        table("environments", EnvironmentFamily),
-    )
-
-
-def _object_family(
-    name: str,
-    *,
-    category: str = "",
-    subcategory: str = "",
-    facts: bool = False,
-    marks: Mapping[int | str, str] | None = None,
-    wear: Callable[[Solid, str, int], Solid] | None = None,
-    **row: Any,
-) -> Family:
-    known: Callable[..., Facts] | None = None
-    if facts:
-        known = Lazy(f"{row['build'].path}_facts")
-    elif subcategory:
-        known = ConstantFacts(subcategory)
-    row = {"mass_kg": 0.0, "stackable": False, **row}
-    if marks:
-        row["build"] = Worn(row["build"], name, partial(_USE, marks=marks))
-    elif wear:
-        row["build"] = Worn(row["build"], name, wear)
-    return Family(name=name, category=category or name, facts=known, **row)
-
-
-def _arguments(package: str, row: Mapping[str, Any]) -> dict[str, Any]:
-    """A row of the table as keywords: lists become tuples, ``build`` a function."""
-    parameters = {
-        key: tuple(value) if isinstance(value, list) else value
-        for key, value in row.get("parameters", {}).items()
-    }
-    return {
-        "version": 1,
-        "variants": 0,
-        **row,
-        "build": Lazy(f"{package}.{row['build']}"),
-        "tags": tuple(sorted(row["tags"])),
-        **({"wear": Lazy(f"{package}.{row['wear']}")} if "wear" in row else {}),
-        "parameters": parameters,
-        **_symmetries(package, row.get("symmetries")),
-    }
-
-
-def _symmetries(package: str, given: str | Mapping[str, int] | None) -> dict[str, Any]:
-    """A function for ``module:function``, or for folds by axis; nothing for None."""
-    if given is None:
-        return {}
-    if isinstance(given, str):
-        return {"symmetries": Lazy(f"{package}.{given}")}
-    return {"symmetries": ConstantSymmetries(given)}
+__all__ = [
+    "OURS",
+    "ConstantFacts",
+    "ConstantSymmetries",
+    "EnvironmentFamily",
+    "Facts",
+    "Family",
+    "FamilyTables",
+    "ImageFamily",
+    "Lazy",
+    "Provenance",
+    "Solid",
+    "TextureFamily",
+    "Worn",
+    "axis_symmetries",
+    "check_option",
+    "choose_option",
+    "load_families",
+]

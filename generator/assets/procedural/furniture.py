@@ -35,7 +35,6 @@ from gen_data.generator.core.se3 import Vec3
 
 Box = tuple[Vec3, Vec3]
 
-SLOTS = load_table(__package__, "furniture_slots", tuple[str, ...])
 PANEL_SHAPES = ("rectangle", "disk")
 TABLE_STYLES = ("legs", "trestle", "bench")
 SHELF_STYLES = ("bookcase", "rack")

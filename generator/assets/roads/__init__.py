@@ -14,7 +14,8 @@ from gen_data.generator.roads.roundabout_shape import RoundaboutShape
 
 def _surface(path: str, **parameters: object) -> Family:
     build, name = Lazy(f"gen_data.generator.assets.roads.{path}"), path.partition(":")[2]
-    return Family(name, name, ("street",), 0, 0.0, False, 2, parameters, build)
+    facts = {"letters": Lazy(f"{__name__}.painted_signs:LETTERS")} if name == "road_marking" else {}
+    return Family(name, name, ("street",), 0, 0.0, False, 2, parameters, build, declares=facts)
 
 
 _SHAPE, _JUNCTION, _ROUNDABOUT, _PARKING = (
@@ -25,7 +26,7 @@ _FIELDS: dict[str, object] = {
     "length_m": 150.0, "curvature_per_m": 0.0, "side": 1.0, "inner_m": 8.0, "depth_m": 80.0,
     "crops": "maize_wheat_meadow", "seed": 0,
 }  # fmt: skip
-"""Fields of ``fields.FieldsShape``, which needs no import of numpy here."""
+"""Fields of ``roads.fields_shape.FieldsShape``, which needs no import of numpy here."""
 _LOOKS: dict[str, object] = {
     "seed": 0, "wear": 0.3, "paving": "paving", "ground": "grass", "carriageway": "asphalt",
     "age_years": -1.0, "coating": "none", "center_color": "white",

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -21,77 +20,15 @@ from gen_data.generator.assets.roads.crop_textures import CROP_TILE_M, CROPS, ST
 from gen_data.generator.assets.roads.deck import mapped_surface
 from gen_data.generator.assets.roads.lane_textures import TILE_M
 from gen_data.generator.core.asset_types import Material
-from gen_data.generator.roads.reference_line import ReferenceLine, bend_line
+from gen_data.generator.roads.fields_shape import TRACK_M, FieldsShape, Parcel
 
 HEIGHTS_M = {"maize": 2.3, "wheat": 0.82, "rape": 1.4}
 """Standing crops; others lie flat (in flower or ripe: maize 2 to 3 m, winter wheat 0.7 to 1 m, rape
 1.2 to 1.7 m; assumed, 10 %)."""
-_TRACK_M, _HEADLAND_M, _STEP_M = 3.0, 9.0, 0.8
+_HEADLAND_M, _STEP_M = 9.0, 0.8
 _TRAMLINES = {"wheat": 18.0, "rape": 18.0, "seedlings": 18.0, "maize": 0.0}
 """Distance of the sprayer's tracks [m], a multiple of the drill's 3 m (assumed); 0 = none."""
 _LIFT_M = 0.03
-
-
-@dataclass(frozen=True, slots=True)
-class Parcel:
-    """A field between two arc lengths of its road.
-
-    Attributes:
-        start_m, end_m: Arc lengths.
-        crop: A word of ``CROPS``.
-        across: Whether rows run away from the road, with a headland in front.
-    """
-
-    start_m: float
-    end_m: float
-    crop: str
-    across: bool
-
-
-@dataclass(frozen=True, slots=True)
-class FieldsShape:
-    """Fields on one side of a road.
-
-    Attributes:
-        length_m, curvature_per_m: The road's reference line.
-        side: 1 = left, -1 = right.
-        inner_m: Distance from the reference line to their edge.
-        depth_m: Width across the road.
-        crops: Words of ``CROPS`` to draw from, joined by underscores.
-        seed: Of parcels and textures.
-    """
-
-    length_m: float = 150.0
-    curvature_per_m: float = 0.0
-    side: float = 1.0
-    inner_m: float = 8.0
-    depth_m: float = 80.0
-    crops: str = "maize_wheat_meadow"
-    seed: int = 0
-
-    def line(self) -> ReferenceLine:
-        """Reference line of the road."""
-        return bend_line(self.length_m, self.curvature_per_m)
-
-    def parcels(self) -> tuple[Parcel, ...]:
-        """Parcels from the road's start to its end; tracks of 3 m or nothing lie between them."""
-        rng = variant_rng(f"fields/{self.side:g}", self.seed)
-        words = self.crops.split("_")
-        made: list[Parcel] = []
-        start = 0.0
-        while start < self.length_m - 12.0:
-            end = start + rng.between(40.0, 130.0)
-            end = self.length_m if end > self.length_m - 25.0 else end
-            others = [word for word in words if not made or word != made[-1].crop] or words
-            made.append(Parcel(start, end, rng.choose(others), rng.chance(0.45)))
-            start = end + (_TRACK_M if rng.chance(0.5) else 0.0)
-        return tuple(made)
-
-    def points(self, s_m: Array, away_m: Array) -> Array:
-        """Points [..., 2] at arc lengths and distances from the inner edge, outwards."""
-        t = self.side * (self.inner_m + away_m)
-        flat: Array = self.line().points(s_m.ravel(), np.broadcast_to(t, s_m.shape).ravel())
-        return flat.reshape(*s_m.shape, 2)
 
 
 def fields(**shape: float | str) -> Solid:
@@ -234,9 +171,9 @@ def _edges(
 def _track(plan: FieldsShape, start_m: float, slot: int) -> Patch:
     """A farm track that leads away from the road."""
     s, away = np.meshgrid(
-        [start_m, start_m + _TRACK_M], [-1.0, 0.5 * plan.depth_m, plan.depth_m], indexing="ij"
+        [start_m, start_m + TRACK_M], [-1.0, 0.5 * plan.depth_m, plan.depth_m], indexing="ij"
     )
-    uv = np.stack([(s - start_m) / _TRACK_M, away / TILE_M], axis=2)
+    uv = np.stack([(s - start_m) / TRACK_M, away / TILE_M], axis=2)
     return _laid(plan, s, away, np.full(s.shape, 0.5 * _LIFT_M), uv, slot)
 
 

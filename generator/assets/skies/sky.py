@@ -19,10 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gen_data.generator.assets.procedural.data_tables import load_table
-from gen_data.generator.assets.procedural.environments import normalize_luminance, pixel_directions
 from gen_data.generator.assets.procedural.noise import smoothstep
 from gen_data.generator.assets.skies import daylight
 from gen_data.generator.assets.skies.clouds import cloud_layer
+from gen_data.generator.assets.skies.equirectangular import normalize_luminance, pixel_directions
 from gen_data.generator.core.asset_types import Float32
 from gen_data.generator.core.colorimetry import REC709_FROM_XYZ, REC709_LUMINANCE, luminance
 

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
+import numpy as np
 import warp as wp
+from numpy.typing import NDArray
 
+from gen_data.generator.core.asset_types import Float32
 from gen_data.generator.core.interfaces import FindTones
 from gen_data.generator.core.scene import Camera, Scene
 from gen_data.generator.core.scene_time import scene_at
@@ -24,9 +27,38 @@ from gen_data.generator.renderers.warp.scene.struct_dtypes import copy_struct
 from gen_data.generator.renderers.warp.settings import RenderSettings
 from gen_data.generator.renderers.warp.visibility.gbuffer import GBuffer, find_visible
 
-if TYPE_CHECKING:
-    from gen_data.generator.renderers.warp.pathtraced.path_tracer import PathTracer
-    from gen_data.generator.renderers.warp.plates import Backdrop
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Backdrop:
+    """A photograph as a camera's image shows it.
+
+    Attributes:
+        photo: Radiance [cd/m^2], linear RGB, float32 [h, w, 3].
+        mask: Share of each pixel that the foreground covers, float32 [h, w]; None = no foreground.
+        ground: Pixels that show ground on which things may stand, bool [h, w].
+        unshaded: Radiance of the ground without anything on it, flat, on the device; None until it
+            is rendered.
+    """
+
+    photo: Float32
+    mask: Float32 | None
+    ground: NDArray[np.bool_]
+    unshaded: wp.array | None = None
+
+    @property
+    def hidden(self) -> NDArray[np.bool_]:
+        """Pixels that show the foreground, bool [h, w]."""
+        if self.mask is None:
+            return np.zeros(self.ground.shape, np.bool_)
+        return np.asarray(self.mask >= 0.5)
+
+
+class LightTracer(Protocol):
+    """Finds light along paths, in place of the realtime tier."""
+
+    def light(self, frame: CameraView) -> wp.array:
+        """Radiance of all pixels through the air [cd/m^2], linear RGB, flat; scratch memory."""
+        ...
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -41,7 +73,7 @@ class RenderContext:
 
     cache: DeviceCache
     settings: RenderSettings
-    paths: PathTracer | None = None
+    paths: LightTracer | None = None
     backdrop: Backdrop | None = None
     find_tones: FindTones | None = None
 

@@ -10,7 +10,7 @@ place of his difference, so that the texture of the ground is kept in shadows.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import cv2
@@ -34,7 +34,7 @@ from gen_data.generator.core.plates import (
 )
 from gen_data.generator.core.scene import Camera, Scene, Weather
 from gen_data.generator.core.se3 import Array
-from gen_data.generator.renderers.warp.frame_context import CameraView
+from gen_data.generator.renderers.warp.frame_context import Backdrop, CameraView
 from gen_data.generator.renderers.warp.visibility.kernels import photographs as kernels
 
 _RATIO_MAX = 16.0
@@ -46,31 +46,6 @@ _FIREFLY = np.float32(1.3)
 _SAME_PLACE = 1e-5
 _FLOW = frozenset({Channel.FLOW_FORWARD, Channel.FLOW_BACKWARD})
 _OCCLUDED = frozenset({Channel.FLOW_OCCLUDED_FORWARD, Channel.FLOW_OCCLUDED_BACKWARD})
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class Backdrop:
-    """A photograph as a camera's image shows it.
-
-    Attributes:
-        photo: Radiance [cd/m^2], linear RGB, float32 [h, w, 3].
-        mask: Share of each pixel that the foreground covers, float32 [h, w]; None = no foreground.
-        ground: Pixels that show ground on which things may stand, bool [h, w].
-        unshaded: Radiance of the ground without anything on it, flat, on the device; None until it
-            is rendered.
-    """
-
-    photo: Float32
-    mask: Float32 | None
-    ground: NDArray[np.bool_]
-    unshaded: wp.array | None = None
-
-    @property
-    def hidden(self) -> NDArray[np.bool_]:
-        """Pixels that show the foreground, bool [h, w]."""
-        if self.mask is None:
-            return np.zeros(self.ground.shape, np.bool_)
-        return np.asarray(self.mask >= 0.5)
 
 
 def open_backdrop(scene: Scene, camera: Camera, assets: AssetLibrary) -> Backdrop | None:

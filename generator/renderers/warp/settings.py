@@ -7,7 +7,6 @@ from typing import Literal
 from pydantic import Field
 
 from gen_data.generator.config.base_model import Strict
-from gen_data.generator.core.interfaces import AssetLibrary, Renderer
 
 
 class RenderSettings(Strict):
@@ -43,30 +42,3 @@ class RenderSettings(Strict):
     environment_shadow: Literal["auto", "off"] = "auto"
     max_lamps: int = Field(16, ge=1)
     visibility: Literal["auto", "raster", "rays"] = "auto"
-
-
-class WarpPlugin(RenderSettings):
-    """Settings and device of the Warp renderer.
-
-    Attributes:
-        renderer: Name of the renderer.
-        device: auto, cpu or cuda:N; auto uses a CUDA GPU if there is one.
-    """
-
-    renderer: Literal["warp"] = "warp"
-    device: str = Field("auto", pattern=r"^(auto|cpu|cuda(:[0-9]+)?)$")
-
-    @property
-    def settings(self) -> RenderSettings:
-        """The settings without the device."""
-        return RenderSettings(**self.model_dump(exclude={"device", "renderer"}))
-
-    def open(self, assets: AssetLibrary) -> Renderer:
-        """Open the renderer on its device.
-
-        Raises:
-            ConfigError: the device does not exist, or the denoiser is requested but not installed.
-        """
-        from gen_data.generator.renderers.warp.renderer import WarpRenderer
-
-        return WarpRenderer(assets, self.device, self.settings)

@@ -8,8 +8,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from gen_data.generator.assets.procedural.data_tables import load_table
 from gen_data.generator.config.base_model import Strict
+from gen_data.generator.config.data_files import load_table
 from gen_data.generator.core.errors import did_you_mean
 from gen_data.generator.core.intrinsics import Intrinsics
 from gen_data.generator.core.lens import COEFFICIENTS, Lens, LensModel

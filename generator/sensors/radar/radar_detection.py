@@ -21,8 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from gen_data.generator.assets.procedural.data_tables import load_table
 from gen_data.generator.config.base_model import Strict
+from gen_data.generator.config.data_files import load_table
 from gen_data.generator.core.asset_types import SURFACES
 from gen_data.generator.core.scene import Instance
 from gen_data.generator.core.se3 import Array

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.assets.procedural.data_tables import load_table
+from gen_data.generator.config.data_files import load_table
 from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.se3 import Array
 from gen_data.generator.renderers.warp.device_cache import DeviceCache

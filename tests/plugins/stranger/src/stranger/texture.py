@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gen_data.generator.assets.procedural.family import Provenance, TextureFamily
+from gen_data.generator.assets.family import Provenance, TextureFamily
 from gen_data.generator.core.asset_types import TextureData
 
 

@@ -55,8 +55,8 @@ def match(
 
     from rich.console import Console
 
-    from gen_data.generator.api.match import match as fit
     from gen_data.generator.cli.tables import print_tables
+    from gen_data.generator.matching.api import match as fit
     from gen_data.generator.matching.match_report import make_tables
 
     with Console(stderr=True).status("") as status:

@@ -50,10 +50,10 @@ def certify(folder: Path, samples: int, rays: int, scenes: int, alpha: float) ->
     """
     from rich.console import Console
 
-    from gen_data.generator.api.certify import certify as make_certificate
+    from gen_data.generator.certificate.api import certify as make_certificate
     from gen_data.generator.certificate.certificate import describe_failures
     from gen_data.generator.certificate.finding import Status
-    from gen_data.generator.runner.store import CERTIFICATE_NAMES
+    from gen_data.generator.runner.layout import CERTIFICATE_NAMES
 
     with Console(stderr=True).status("") as status:
         certificate = make_certificate(

@@ -52,7 +52,8 @@ def certify(
     from gen_data.generator.certificate.examined import Scope
     from gen_data.generator.certificate.page import format_page
     from gen_data.generator.runner.durable_files import make_folder
-    from gen_data.generator.runner.store import CERTIFICATE_NAMES, LocalStore
+    from gen_data.generator.runner.layout import CERTIFICATE_NAMES
+    from gen_data.generator.runner.store import LocalStore
 
     for name, value in (("samples", samples), ("rays", rays), ("scenes", scenes)):
         if value < 0:

@@ -1,0 +1,11 @@
+"""The seam between the core and its content: the tables of ``generator/content``."""
+
+from __future__ import annotations
+
+import importlib
+from types import ModuleType
+
+
+def content() -> ModuleType:
+    """The package of content."""
+    return importlib.import_module("gen_data.generator.content")

@@ -1,0 +1,89 @@
+"""Families of assets by name, and the facts that they declare.
+
+``generator/content`` lists the packages of families; third-party packages add families through the
+entry-point group ``gen_data.asset_family``.
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Iterator, Mapping
+from functools import cache
+from typing import Any
+
+from gen_data.generator.assets.content import content
+from gen_data.generator.assets.family import (
+    EnvironmentFamily,
+    Family,
+    Lazy,
+    TextureFamily,
+)
+from gen_data.generator.core.errors import AssetError, ConfigError
+from gen_data.generator.core.plugins import loaded, package_of, third_party
+
+AnyFamily = Family | TextureFamily | EnvironmentFamily
+KIND = "asset_family"
+_PREFIXES = {"object": "", "texture": "texture/", "environment": "environment/"}
+_REQUIRED: Any = object()
+
+
+def kind_of(family: AnyFamily) -> Any:
+    """Kind of a family's assets: ``object``, ``texture`` or ``environment``."""
+    if isinstance(family, Family):
+        return "object"
+    return "texture" if isinstance(family, TextureFamily) else "environment"
+
+
+@cache
+def own_families() -> Mapping[str, AnyFamily]:
+    """Families of this program by the first part of their assets' ids, in the tables' order."""
+    return {
+        _PREFIXES[kind_of(family)] + name: family
+        for table in _tables()
+        for name, family in table.items()
+    }
+
+
+def _tables() -> Iterator[Mapping[str, AnyFamily]]:
+    for name in content().FAMILIES:
+        module = importlib.import_module(name)
+        for table in ("FAMILIES", "TEXTURES", "ENVIRONMENTS"):
+            yield getattr(module, table, {})
+
+
+@cache
+def third_party_families() -> Mapping[str, tuple[AnyFamily, str]]:
+    """Family and package of every entry point, by the first part of its assets' ids.
+
+    Raises:
+        ConfigError: one of them cannot be imported, or is not a family.
+    """
+    found = {}
+    for name, entry in sorted(third_party(KIND).items()):
+        family = loaded(entry.value, f"{KIND} '{name}'")
+        if not isinstance(family, (Family, TextureFamily, EnvironmentFamily)):
+            raise ConfigError(
+                f"{KIND} '{name}': {entry.value} is not a Family, TextureFamily or "
+                "EnvironmentFamily; see gen_data.generator.assets.family"
+            )
+        found[_PREFIXES[kind_of(family)] + name] = (family, package_of(entry))
+    return found
+
+
+def declared(asset_id: str, fact: str, default: Any = _REQUIRED) -> Any:
+    """A fact that the family of an asset declares for those who place or change its assets.
+
+    Args:
+        asset_id: Id of an asset, or name of a family.
+        fact: Key of ``declares`` in the family's row.
+        default: Value for assets of files, and for families that do not declare the fact.
+
+    Raises:
+        AssetError: there is neither the fact nor a default.
+    """
+    name = asset_id.partition("?")[0]
+    family = own_families().get(name) or third_party_families().get(name, (None, ""))[0]
+    value = default if family is None else family.declares.get(fact, default)
+    if value is _REQUIRED:
+        raise AssetError(f"family '{name}': declares no fact '{fact}'")
+    return value.value if isinstance(value, Lazy) else value

@@ -1,0 +1,25 @@
+"""The simulator of a configuration."""
+
+from __future__ import annotations
+
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.physics.physics_config import PhysicsConfig, missing_engine
+from gen_data.generator.physics.world import World
+
+
+def open_world(config: PhysicsConfig) -> World:
+    """Open an empty world of the configured simulator.
+
+    Raises:
+        ConfigError: it is not installed.
+    """
+    missing = missing_engine(config.engine)
+    if missing:
+        raise ConfigError(f"physics.engine: {missing}")
+    if config.engine == "mujoco":
+        from gen_data.generator.physics.mujoco_world import MujocoWorld
+
+        return MujocoWorld(config.time_step_s, config.solver_iterations)
+    from gen_data.generator.physics.bullet_world import BulletWorld
+
+    return BulletWorld(config.time_step_s, config.solver_iterations)
