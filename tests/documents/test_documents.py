@@ -17,7 +17,8 @@ from gen_data.generator.cli.main import cli
 from tests.tiers import slow
 
 ROOT = Path(__file__).parents[2]
-PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *ROOT.glob("examples/**/*.md")])
+FOLDERS = ("*.md", "docs/*.md", "docs/decisions/*.md", "examples/**/*.md")
+PAGES = sorted(path for pattern in FOLDERS for path in ROOT.glob(pattern))
 OLD_NAMES = {ROOT / "docs/migration.md", ROOT / "CHANGELOG.md"}
 """Pages that list names which no longer exist."""
 
