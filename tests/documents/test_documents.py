@@ -105,6 +105,16 @@ def test_modules_exist(page: Path) -> None:
         assert (ROOT / name).exists(), name
 
 
+def test_the_readme_is_short() -> None:
+    """At most 80 lines, and no paragraph in a cell of a table."""
+    lines = (ROOT / "README.md").read_text("utf-8").splitlines()
+    links = re.compile(r"\]\([^)]*\)")
+
+    assert len(lines) <= 80
+    for line in lines:
+        assert not line.startswith("|") or len(links.sub("", line)) <= 160, line
+
+
 def commands_of(page: Path) -> list[str]:
     """Command lines in a page's blocks of shell code and in its tables."""
     text = page.read_text("utf-8")
