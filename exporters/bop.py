@@ -117,8 +117,8 @@ class Bop(ExporterBase):
         """Reject a data set that this format cannot represent.
 
         Raises:
-            ConfigError: no such camera, it is no pinhole or does not write the rgb channel, or too
-                many samples for six digits.
+            ConfigError: no such camera, it is not a pinhole or does not write the rgb channel, or
+                too many samples for six digits.
         """
         pinhole_camera(info, self.camera, self.type)
         check_frame_names(info, self.type)

@@ -128,7 +128,7 @@ class Cityscapes(ExporterBase):
         """Write label images, polygons and calibration of each sample, and a line for it.
 
         Raises:
-            ConfigError: see ``check``, or the cameras are no rectified pair.
+            ConfigError: see ``check``, or the cameras are not a rectified pair.
             StorageError: an image is missing.
         """
         assert self._assets is not None, "call with_assets first"
@@ -259,7 +259,7 @@ def camera_facts(scene: Scene, camera: str, right: str) -> dict[str, Any]:
     """Content of a camera file.
 
     Raises:
-        ConfigError: the cameras are no rectified pair.
+        ConfigError: the cameras are not a rectified pair.
     """
     view = scene.camera(camera)
     pose = camera_mount(scene, camera).T_rig_sensor @ RIG_AXES

@@ -139,7 +139,7 @@ class Kitti(ExporterBase):
         """Reject a data set that this format cannot represent.
 
         Raises:
-            ConfigError: no such camera or lidar, the camera is no pinhole or does not write the
+            ConfigError: no such camera or lidar, the camera is not a pinhole or does not write the
                 rgb channel, or too many samples for six digits.
         """
         self._camera(info)

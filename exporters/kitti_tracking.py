@@ -104,7 +104,7 @@ class KittiTracking(ExporterBase):
         """Reject a data set that this format cannot represent.
 
         Raises:
-            ConfigError: a sensor is not there, a camera is no pinhole, or there are too many
+            ConfigError: a sensor is not there, a camera is not a pinhole, or there are too many
                 sequences.
         """
         self._cameras(info)

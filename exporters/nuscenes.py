@@ -103,7 +103,7 @@ class NuScenes(ExporterBase):
         """Reject a data set that this format cannot represent.
 
         Raises:
-            ConfigError: there is no laser scanner, a camera is no pinhole, two sensors have the
+            ConfigError: there is no laser scanner, a camera is not a pinhole, two sensors have the
                 same channel, or no category has a class in this format.
         """
         self._channels(info)

@@ -133,10 +133,10 @@ class SemanticKitti(ExporterBase):
         return True
 
     def check(self, info: DatasetInfo) -> None:
-        """Reject a data set without the sensors, or whose camera is no pinhole.
+        """Reject a data set without the sensors, or whose camera is not a pinhole.
 
         Raises:
-            ConfigError: a sensor is missing, or the camera is no pinhole.
+            ConfigError: a sensor is missing, or the camera is not a pinhole.
         """
         for field, name, known in (
             ("lidar", self.lidar, info.lidars),

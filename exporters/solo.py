@@ -102,7 +102,7 @@ class Solo(ExporterBase):
         """Reject a data set that this format cannot represent.
 
         Raises:
-            ConfigError: no camera writes the rgb channel, one of them is no pinhole, or the last
+            ConfigError: no camera writes the rgb channel, one of them is not a pinhole, or the last
                 sequence is incomplete.
         """
         rgb_camera(info, "", self.type)

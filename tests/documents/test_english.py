@@ -18,7 +18,10 @@ import yaml
 ROOT = Path(__file__).parents[2]
 TABLE = ROOT / "tests/documents/english.yaml"
 DOCUMENTS = ("*.md", "docs/*.md", "docs/decisions/*.md", "docs/tutorials/*.md", "examples/**/*.md")
-SOURCES = ("generator/api/*.py", "generator/cli/*.py", "generator/config/**/*.py")
+SOURCES = (
+    *(f"generator/{folder}/**/*.py" for folder in ("api", "cli", "config")),
+    *(f"{folder}/**/*.py" for folder in ("randomizers", "scene_templates", "exporters")),
+)
 HISTORY = {"CHANGELOG.md", "docs/migration.md"}
 
 TICS = {
