@@ -87,7 +87,7 @@ class Rlds(LeRobot):
         super().check(info)
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
-        """Write the episodes of all shards, and what their keys are."""
+        """Write the episodes of all shards, and their keys."""
         totals: Counter[tuple[str, str]] = Counter()
         seen = -1
         for _, row in fragment_rows(shard_dirs, self.type, FRAMES):
