@@ -3,6 +3,7 @@
     python docs/pictures.py                          # all; PICTURES_PROCESSES=2
     python docs/pictures.py randomizer/lighting      # those of one plug-in
     python docs/pictures.py configuration            # the gallery
+    python docs/pictures.py tutorial                 # results of the tutorials
     python docs/pictures.py --missing                # those without a file
 
 A strip shows one scene three times, with a low, a middle and a high value of one field. Strips of
@@ -14,6 +15,8 @@ from __future__ import annotations
 import json
 import math
 import os
+import re
+import subprocess
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
@@ -41,7 +44,9 @@ FOLDER = DOCS / "pictures"
 TABLE = DOCS / "pictures.yaml"
 WITHOUT_PICTURE = "no picture because "
 MISSING = "--missing"
-DISTRIBUTION, CONFIGURATION = "distribution", "configuration"
+DISTRIBUTION, CONFIGURATION, TUTORIAL = "distribution", "configuration", "tutorial"
+BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+FILE = re.compile(r"# ([\w./-]+\.(?:py|toml|yaml))\n")
 WIDTH_PX, HEIGHT_PX = 320, 240
 GAP_PX = 6
 CAPTION_PX = 22
@@ -90,9 +95,11 @@ class Strip(Strict):
 
 
 class Sheet(Strict):
-    """Samples of a shipped configuration.
+    """Samples of a shipped configuration, or of the configuration of a tutorial.
 
     Attributes:
+        config: Name of the configuration; empty = that of the sheet.
+        until: Text of the first block of a tutorial that is not carried out before drawing.
         samples: Numbers of the samples.
         columns: Pictures in a row.
         seed: In place of the configuration's own.
@@ -102,6 +109,8 @@ class Sheet(Strict):
         set_too: Values by path.
     """
 
+    config: str = ""
+    until: str = ""
     samples: tuple[int, ...] = (0, 5, 10)
     columns: int = Field(3, ge=1)
     seed: int | None = None
@@ -133,7 +142,7 @@ class Job:
         """The file."""
         if isinstance(self.entry, Strip):
             return strip_path(self.kind, self.name, self.entry)
-        return sheet_path(self.name)
+        return sheet_path(self.name, self.kind)
 
 
 def strip_path(kind: str, name: str, strip: Strip) -> Path:
@@ -141,9 +150,9 @@ def strip_path(kind: str, name: str, strip: Strip) -> Path:
     return FOLDER / kind / f"{name}-{strip.name}.webp"
 
 
-def sheet_path(name: str) -> Path:
-    """File of the contact sheet of a configuration."""
-    return FOLDER / CONFIGURATION / f"{name}.webp"
+def sheet_path(name: str, kind: str = CONFIGURATION) -> Path:
+    """File of the contact sheet of a configuration or tutorial."""
+    return FOLDER / kind / f"{name}.webp"
 
 
 @cache
@@ -155,7 +164,7 @@ def read_rows() -> tuple[Row, ...]:
     """
     rows = []
     for kind, entries in _table().items():
-        if kind == CONFIGURATION:
+        if kind in (CONFIGURATION, TUTORIAL):
             continue
         for name, entry in entries.items():
             if isinstance(entry, str) and not entry.startswith(WITHOUT_PICTURE):
@@ -168,16 +177,17 @@ def read_rows() -> tuple[Row, ...]:
 
 
 @cache
-def read_sheets() -> Mapping[str, Sheet]:
-    """Contact sheets by name of the configuration; those without one are left out."""
-    listed = {k: v for k, v in _table()[CONFIGURATION].items() if not isinstance(v, str)}
+def read_sheets(kind: str = CONFIGURATION) -> Mapping[str, Sheet]:
+    """Contact sheets by name of the configuration or tutorial; reasons are left out."""
+    listed = {k: v for k, v in _table()[kind].items() if not isinstance(v, str)}
     return {name: Sheet.model_validate_json(json.dumps(entry)) for name, entry in listed.items()}
 
 
 def find_jobs(words: Sequence[str] = ()) -> Iterator[Job]:
     """Files to draw: all, or those of some kinds or plug-ins (``kind/name``)."""
     jobs = [Job(row.kind, row.name, strip) for row in read_rows() for strip in row.strips]
-    jobs += [Job(CONFIGURATION, name, sheet) for name, sheet in read_sheets().items()]
+    for kind in (CONFIGURATION, TUTORIAL):
+        jobs += [Job(kind, name, sheet) for name, sheet in read_sheets(kind).items()]
     for job in jobs:
         names = {job.kind, f"{job.kind}/{job.name}", f"{job.kind}/{job.path.stem}"}
         if not words or names & set(words):
@@ -187,7 +197,9 @@ def find_jobs(words: Sequence[str] = ()) -> Iterator[Job]:
 def draw(job: Job) -> Path:
     """Draw one file."""
     entry = job.entry
-    if isinstance(entry, Sheet):
+    if isinstance(entry, Sheet) and job.kind == TUTORIAL:
+        picture = _draw_tutorial(job.name, entry)
+    elif isinstance(entry, Sheet):
         picture = _draw_sheet(job.name, entry)
     elif job.kind == DISTRIBUTION:
         tiles = [_plot_draws(job.name, value, entry.values) for value in entry.values]
@@ -299,6 +311,42 @@ def _join(tiles: Sequence[Pixels], captions: Sequence[str]) -> Image.Image:
     return sheet
 
 
+def _draw_tutorial(name: str, sheet: Sheet) -> Image.Image:
+    """Contact sheet of the configuration that a reader of the page has at ``sheet.until``."""
+    former = Path.cwd()
+    with TemporaryDirectory() as folder:
+        os.chdir(folder)
+        Path("examples").symlink_to(DOCS.parent / "examples")
+        try:
+            _follow_tutorial((DOCS / f"tutorials/{name}.md").read_text("utf-8"), sheet.until)
+            return _draw_sheet(name, sheet)
+        finally:
+            os.chdir(former)
+
+
+def _follow_tutorial(text: str, until: str) -> None:
+    """Write the files and run the code of a page in the current folder, up to a block.
+
+    Packages are installed into the folder ``packages``.
+    """
+    sys.path.insert(0, str(Path.cwd() / "packages"))
+    path = os.pathsep.join(["packages", str(DOCS.parent), os.environ.get("PYTHONPATH", "")])
+    for kind, block in BLOCK.findall(text):
+        if until and until in block:
+            break
+        file = FILE.match(block)
+        if file:
+            target = Path(file[1])
+            target.parent.mkdir(parents=True, exist_ok=True)
+            target.write_text(block.removeprefix(file[0]) if kind == "python" else block, "utf-8")
+        elif kind in ("bash", "python"):
+            install = "pip install -q --no-deps --no-build-isolation --target packages "
+            code = block.replace("pip install ", install) if kind == "bash" else block
+            code = code.replace("gen-data ", f"{sys.executable} -m gen_data ")
+            words = ["bash", "-ec"] if kind == "bash" else [sys.executable, "-c"]
+            subprocess.run([*words, code], check=True, env={**os.environ, "PYTHONPATH": path})
+
+
 def _draw_sheet(name: str, sheet: Sheet) -> Image.Image:
     from gen_data.generator.assemble.config import load_config
     from gen_data.generator.assemble.pipeline_factory import open_pipeline
@@ -306,7 +354,7 @@ def _draw_sheet(name: str, sheet: Sheet) -> Image.Image:
     from gen_data.generator.preview.contact_sheet import arrange_tiles, make_tiles, render_tiles
 
     overrides = [f"{path}={to_flow_yaml(value)}" for path, value in sheet.set_too.items()]
-    config = load_config(f"{name}.yaml", seed=sheet.seed, overrides=overrides)
+    config = load_config(sheet.config or f"{name}.yaml", seed=sheet.seed, overrides=overrides)
     own = sheet.channels == "written"
     wanted = () if own else tuple(Channel(word) for word in sheet.channels.split(","))
     with open_pipeline(config, extra_channels=frozenset(wanted)) as pipeline:
@@ -414,8 +462,9 @@ def main(words: Sequence[str]) -> None:
         sys.exit(f"no picture for {' '.join(names)}; see {TABLE}")
     jobs = [job for job in found if MISSING not in words or not job.path.exists()]
     failed = 0
-    # Forked processes would share the state of the renderer's threads.
-    with ProcessPoolExecutor(PROCESSES, get_context("spawn")) as pool:
+    # Forked processes would share the state of the renderer's threads; a process that has listed
+    # the plug-ins does not find the one that a tutorial installs.
+    with ProcessPoolExecutor(PROCESSES, get_context("spawn"), max_tasks_per_child=1) as pool:
         running = {pool.submit(draw, job): job for job in jobs}
         for number, future in enumerate(as_completed(running), 1):
             name = running[future].path.relative_to(DOCS)

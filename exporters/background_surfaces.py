@@ -3,7 +3,7 @@
 The instance images of a renderer name objects and scenery; ground and sky have instance 0 there.
 The ground is looked up by the position of each pixel's point, from its depth, on a map of the
 background bodies, drawn from above by the roles of their materials. Its resolution is 1 cm within
-12 m around the camera, 5 cm within 64 m and 25 cm beyond; depths are those of the 16-bit image.
+12 m around the camera, 5 cm within 64 m and 25 cm beyond; depths come from the 16-bit image.
 Overpasses are not told from the road below. Ground beyond the range of the depth image is unknown.
 """
 
@@ -36,7 +36,7 @@ SKY_FROM_M = 100.0
 """Depth images that end nearer than this do not tell the sky from a distant wall."""
 MAPS = ((0.01, 12.0, 4.0), (0.05, 64.0, 32.0), (0.25, 320.0, 128.0))
 """Side of a cell, reach and step [m] of each map, the finest first. Maps are centred on multiples
-of the step, so that the cameras of a rig and many views of a scene share them."""
+of the step: the cameras of a rig and many views of a scene share them."""
 _SUBPIXEL_BITS = 4
 _BLOCK_BITS = 5
 _BLOCK = 1 << _BLOCK_BITS
@@ -231,7 +231,7 @@ def _triangles_of(ground: tuple[_Piece, ...]) -> _Triangles:
 class _GroundMap:
     """Surface of each cell of a square map; rows along Y, columns along X.
 
-    Cameras see a small part of it, so that blocks of cells are drawn when they are looked up.
+    Cameras see a small part of it: blocks of cells are drawn when they are looked up.
     """
 
     def __init__(

@@ -53,7 +53,7 @@ class ExporterBase(Strict):
         cameras: Names of the cameras to export, or patterns such as ``front_*``; empty = all.
         sensors: Names or patterns of the other sensors to export: laser scanners, radars, IMUs;
             empty = all.
-        rectify: Replace images and labels of bent lenses by those of pinholes: ``true``, or
+        rectify: Replace images and labels of bent lenses by pinholes' ones: ``true``, or
             ``{hfov_deg: 90}`` for a horizontal field of view [degrees], or ``{keep_focal: true}``
             for the focal lengths of the lens. Texts about images cannot be rectified.
     """
@@ -63,7 +63,7 @@ class ExporterBase(Strict):
     rectify: bool | Rectify = False
 
     conventions: ClassVar[Conventions]
-    """What its numbers mean; every exporter of the project states it."""
+    """Meaning of its numbers; every exporter of the project states it."""
 
     image_formats: ClassVar[frozenset[str]] = PNG_ONLY
     """Formats of photographs that it can hold; see ``check_image_formats``."""

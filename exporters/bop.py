@@ -22,13 +22,13 @@ Where BOP's conventions differ from ours:
 
 * **Boxes** of ``scene_gt_info.json`` are ``[x, y, x_max - x_min, y_max - y_min]`` with the last
   pixel as maximum: a pixel less than COCO's, which ``scene_gt_coco.json`` has.
-* ``px_count_all`` and ``bbox_obj`` count the silhouette outside the image too, so that
+* ``px_count_all`` and ``bbox_obj`` count the silhouette outside the image too:
   ``visib_fract`` of a truncated object is below 1. All boxes of an invisible object are -1.
 * ``px_count_valid`` counts pixels of the silhouette inside the image with a depth.
 
 Objects are numbered from 1 in the sorted order of their assets and scales. A person's phases of a
-walk are several geometries. Symmetries are those that the assets state, or else those that surface
-and colours show (``symmetry_search``). Articulated robots and ignored objects are left out.
+walk are several geometries. Symmetries are stated by the assets, or else found on surface
+and colours (``symmetry_search``). Articulated robots and ignored objects are left out.
 
 References: Hodan et al., "BOP: Benchmark for 6D Object Pose Estimation", ECCV 2018, and the
 documentation of bop_toolkit.
@@ -117,8 +117,8 @@ class Bop(ExporterBase):
         """Reject a data set that this format cannot represent.
 
         Raises:
-            ConfigError: no such camera, it is no pinhole or does not write the rgb channel, or too
-                many samples for six digits.
+            ConfigError: no such camera, it is not a pinhole or does not write the rgb channel, or
+                too many samples for six digits.
         """
         pinhole_camera(info, self.camera, self.type)
         check_frame_names(info, self.type)
@@ -135,7 +135,7 @@ class Bop(ExporterBase):
 
         Raises:
             ConfigError: see ``check``.
-            AssetError: an asset's symmetries are no finite group.
+            AssetError: an asset's symmetries are not a finite group.
         """
         assert self._assets is not None, "call with_assets first"
         self.check(info)

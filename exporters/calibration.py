@@ -12,10 +12,10 @@
 * Every distinct calibration has a number: there are several if randomizers vary lenses or mounts.
 * In COLMAP's files pixel centres are at halves, as in this project; in all others at integers:
   their principal points are smaller by 0.5.
-* Coefficients are those of the lens: Brown and Conrady's are ``plumb_bob`` or
+* Coefficients are the lens's: Brown and Conrady's are ``plumb_bob`` or
   ``rational_polynomial`` of ROS and ``radtan`` of Kalibr, which lacks k3 to k6; Kannala and
-  Brandt's are OpenCV's ``fisheye`` and ``equidistant``. What a format lacks is left out, with a
-  comment in its place. Panoramas are left out.
+  Brandt's are OpenCV's ``fisheye`` and ``equidistant``. Values that a format lacks are left out,
+  with a comment in their place. Panoramas are left out.
 
 ``gen_data.generator.sensors.calibration`` reads these files.
 """

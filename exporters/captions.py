@@ -1,6 +1,6 @@
 """Captions of images: a sentence about place, objects, weather, light and camera.
 
-Every word is a function of the scene and its labels, so that equal scenes have equal captions. An
+Every word is a function of the scene and its labels: equal scenes have equal captions. An
 object counts if it is visible in the image.
 """
 

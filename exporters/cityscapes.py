@@ -10,8 +10,8 @@
     camera/<split>/<city>/<city>_000012_000000_camera.json
     rightImg8bit/...  disparity/...                                     with a second camera
 
-The city is the name of the data set, its letters and digits; numbers are those of the sequence and
-of the instant in it.
+The city is the name of the data set, its letters and digits; numbers count the sequence and the
+instant in it.
 
 * **Classes** are the 34 of the benchmark with ids from 0: by category for objects and scenery, by
   surface for ground and sky, which need images of depth (``background_surfaces``). The vehicle that
@@ -92,15 +92,15 @@ class Cityscapes(ExporterBase):
 
     @property
     def has_own_classes(self) -> bool:
-        """Classes are those of the benchmark."""
+        """Classes are the benchmark's."""
         return True
 
     def check(self, info: DatasetInfo) -> None:
         """Reject a data set that this format cannot represent.
 
         Raises:
-            ConfigError: the camera is missing, is no pinhole or lacks a channel, or there are too
-                many samples.
+            ConfigError: the camera is missing, is not a pinhole or lacks a channel, or there are
+                too many samples.
         """
         camera = pinhole_camera(info, self.camera, self.type)
         needed = [Channel.INSTANCE, *([Channel.DISPARITY] if self.right else [])]
@@ -128,7 +128,7 @@ class Cityscapes(ExporterBase):
         """Write label images, polygons and calibration of each sample, and a line for it.
 
         Raises:
-            ConfigError: see ``check``, or the cameras are no rectified pair.
+            ConfigError: see ``check``, or the cameras are not a rectified pair.
             StorageError: an image is missing.
         """
         assert self._assets is not None, "call with_assets first"
@@ -226,7 +226,7 @@ def find_instances(
 def polygons_of(instances: UInt16) -> Iterator[dict[str, Any]]:
     """Yield the objects of a polygons file: outlines through centres of pixels, larger ones first.
 
-    Regions in holes of others are smaller than these, so that they are drawn later.
+    Regions in holes of others are smaller than these and are drawn later.
     """
     classes = list(city_classes().by_name.values())
     outlines: list[tuple[float, str, list[list[int]]]] = []
@@ -259,7 +259,7 @@ def camera_facts(scene: Scene, camera: str, right: str) -> dict[str, Any]:
     """Content of a camera file.
 
     Raises:
-        ConfigError: the cameras are no rectified pair.
+        ConfigError: the cameras are not a rectified pair.
     """
     view = scene.camera(camera)
     pose = camera_mount(scene, camera).T_rig_sensor @ RIG_AXES

@@ -1,7 +1,7 @@
 """Classes of Cityscapes by category and surface; ``cityscapes_classes.yaml`` has the tables.
 
 Reference: Cordts et al., "The Cityscapes Dataset for Semantic Urban Scene Understanding", CVPR
-2016; names, ids and colours are those of cityscapesscripts.
+2016; names, ids and colours come from cityscapesscripts.
 """
 
 from __future__ import annotations

@@ -29,7 +29,7 @@ the values of ``weather`` other than zero. Annotators that are enabled add these
 ``amodal_bbox``, ``amodal_segmentation``
     The whole silhouette. The box may leave the image, the mask is clipped to it. With
     ``bbox: amodal``, the key ``bbox`` is that box too, clipped to the image; ``segmentation`` and
-    ``area`` remain those of the visible pixels, as in data sets of amodal detection.
+    ``area`` refer to the visible pixels, as in data sets of amodal detection.
 ``visible_fraction``, ``occlusion``, ``truncation``
     Fractions in [0, 1]: visible pixels of the silhouette; hidden pixels of its part inside the
     image; silhouette pixels outside the image.
@@ -51,20 +51,20 @@ If views are sequences of several instants, images also have ``sequence_id``, ``
 of the instant in its sequence, from 0) and ``time_s``, and annotations have ``track_id``: the same
 for one object in all images of its sequence, of all cameras, and unique in the data set.
 
-Images have ``K`` and, unless their camera is a pinhole, ``lens``: its ``model`` (one of those in
+Images have ``K`` and, unless their camera is a pinhole, ``lens``: its ``model`` (one in
 ``gen_data.generator.core.lens``), OpenCV's ``distortion`` vector with the names of its
 ``coefficients``, to be applied before ``K``, and ``half_field_rad``, the angle to the axis at which
 the image ends.
 
 Images of a camera with a shutter have ``exposure_s``, the exposure time of a row, and
-``readout_s``, the time from the exposure of the upper edge to that of the lower edge (negative =
+``readout_s``, the time from the exposure of the upper edge to the lower edge's (negative =
 upwards, 0 = global shutter): row ``v`` is exposed around ``readout_s * ((v + 0.5) / height - 0.5)``
 after the image's instant. Masks, boxes and keypoints refer to the instants of their rows, all 3D
 values to the instant of the image.
 
 If enabled, images have ``lane_borders``, lists of image points in the direction of travel with
 their visibility (0 = hidden), ``free_space``, run-length encoded, and ``relationships``: triples
-of subject, predicate and object, both by ``instance_id``. An object may be a thing without
+of subject, predicate and object, both by ``instance_id``. An object may be without
 annotation, such as a table; ``others`` has the categories of those, by ``instance_id``.
 
 Camera frames are X right, Y down, Z forward. ``K`` is for image coordinates in which pixel ``i``
@@ -243,7 +243,7 @@ class Coco(ExporterBase):
 def image_labels(info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
     """Labels of one image, without paths: the row of ``images`` and its ``annotations``.
 
-    For formats that keep the labels of each image beside it. Annotations also have the name of
+    For formats that keep the labels of each image next to it. Annotations also have the name of
     their ``category``.
     """
     row = _image(info, sample, sensor)

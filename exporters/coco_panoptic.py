@@ -11,10 +11,10 @@
 * **Stuff** is one segment per category and image: scenery that has an instance and no annotation
   (``building``, ``tree``, ``table``, ...), by its category; where images of depth are written, also
   ``road``, ``pavement``, ``grass`` and ``sky`` (see ``background_surfaces``). Categories of stuff
-  that occur in the data set have the ids after those of things, in alphabetical order.
+  that occur in the data set have the ids after the things', in alphabetical order.
 * **Void** are pixels of neither: ignored objects, annotated objects below the thresholds, and
-  unannotated objects of a category of things (the hood of the ego vehicle), so that evaluation
-  ignores what is predicted there.
+  unannotated objects of a category of things (the hood of the ego vehicle): evaluation
+  ignores predictions there.
 
 Ids of segments are numbers within an image, scattered over all colours: things count from 1 by
 instance, stuff follows 65536. Box and area are those of the segment's pixels.
@@ -62,9 +62,9 @@ STUFF_OF_SURFACE = {
 }
 """Names of stuff by surface of the background."""
 FIRST_STUFF = 65_536
-"""Number of an image's first segment of stuff; those of things are instance ids, of 16 bits."""
+"""Number of an image's first segment of stuff; things have instance ids, of 16 bits."""
 _SCATTER = 0x9E3779B1
-"""Odd, so that multiplication modulo 2^24 gives every number one id, and only 0 the id 0."""
+"""Odd: multiplication modulo 2^24 gives every number one id, and only 0 the id 0."""
 
 
 class CocoPanoptic(ExporterBase):

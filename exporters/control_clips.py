@@ -16,7 +16,7 @@ Depth is ``(1 / z - 1 / far) / (1 / near - 1 / far)``, clipped to [0, 1]. The ra
 ``near_m`` and ``far_m``; without them, each image has its own, which ``clip.json`` states, as
 estimators of relative depth have. Sequences need the fixed range, since depth would flicker.
 
-``metadata.jsonl`` is that of Hugging Face's ``imagefolder``: its columns are ``image``, ``depth``,
+``metadata.jsonl`` follows Hugging Face's ``imagefolder``: its columns are ``image``, ``depth``,
 ``segmentation``, ``edges`` and ``text``. diffusers' ``train_controlnet.py`` takes them by name.
 
 Videos are MPEG-4, written by OpenCV: their bytes are the same in every run on a machine, but its

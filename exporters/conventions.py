@@ -19,7 +19,7 @@ SAMPLE = "s from the sequence's first instant"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Conventions:
-    """What the numbers of a format mean; empty where the format has no such number.
+    """Meaning of the numbers of a format; empty where the format has no such number.
 
     Attributes:
         pixel_centre: Coordinate of the centre of pixel ``i`` in calibrations (keypoints and

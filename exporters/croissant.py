@@ -8,14 +8,14 @@
     images/<split>/000000012_color.png
 
 Record sets: ``images`` (a line of ``images.csv`` with the pixels as ``content``), ``objects``
-(a line of ``objects.csv``) and ``categories``. Ids and boxes equal those of the exporter ``coco``;
+(a line of ``objects.csv``) and ``categories``. Ids and boxes equal the exporter ``coco``'s;
 ``fx fy cx cy`` are for image coordinates in which pixel ``i`` covers ``[i, i + 1)``. Data sets with
-a camera that is no pinhole have the columns ``lens``, its model, and ``distortion``: coefficients
+a bent camera have the columns ``lens``, its model, and ``distortion``: coefficients
 in the order of OpenCV's functions, separated by spaces, to be applied before ``fx fy cx cy``.
 
-Title, licence and creators are those of the section ``dataset`` of the configuration; without a
-licence, those of the assets in the scenes are stated. Every data set has a ``croissant.json`` of
-its files and a data card at its root, with or without this exporter.
+Title, licence and creators come from the section ``dataset`` of the configuration; without a
+licence, the licences of the assets in the scenes are stated. Every data set has a
+``croissant.json`` of its files and a data card at its root, with or without this exporter.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ IMAGE_COLUMNS = {
 }
 """Columns of ``images.csv`` with their data types."""
 LENS_COLUMNS = {"lens": "sc:Text", "distortion": "sc:Text"}
-"""Further columns of ``images.csv``, of data sets with a camera that is no pinhole."""
+"""Further columns of ``images.csv``, of data sets with a bent camera."""
 OBJECT_COLUMNS = {
     "object_id": "sc:Integer",
     "image_id": "sc:Integer",
@@ -104,7 +104,7 @@ class Croissant(ExporterBase):
     _assets: AssetLibrary | None = PrivateAttr(None)
 
     def with_assets(self, assets: AssetLibrary) -> Croissant:
-        """Return the exporter with a library that knows the licences of assets."""
+        """Return the exporter with a library that has the licences of assets."""
         bound = self.model_copy()
         bound._assets = assets
         return bound

@@ -27,7 +27,7 @@ def croissant_document(
 
     Args:
         info: The data set, with its title, licence and creators.
-        licences: Licences of its assets, which are stated if it has none of its own.
+        licences: Licences of its assets, which are stated if it has none.
         distribution: See ``file_object`` and ``file_set``.
         record_sets: See ``record_set``.
     """

@@ -1,7 +1,7 @@
 """Fragments: the JSON lines that an exporter writes into a shard and merges at the end.
 
 A fragment is a file ``<shard>/<exporter>/<name>.jsonl``. Shards are merged in the order of their
-samples, so that the merged data set does not depend on the size of shards.
+samples: the merged data set does not depend on the size of shards.
 """
 
 from __future__ import annotations

@@ -10,10 +10,10 @@ Rows of grasps are score, width, height, depth, rotation (3 x 3, row by row; X =
 opening), translation, object id; ``GraspGroup().from_npy`` of graspnetAPI reads them. Rows of
 suctions are score, direction (out of the surface), translation, object id, as ``SuctionGroup`` of
 suctionnetAPI has them. All are in the camera frame [m], of the objects that are annotated in the
-image; object ids are instance ids. Height and depth are those of the fingers: ``finger_m`` and
+image; object ids are instance ids. Height and depth refer to the fingers: ``finger_m`` and
 ``reach_m`` of the annotation ``grasps``. Width is the opening of the hand before it closes: the
 distance of the contacts, with ``clearance_m`` on both sides. Fingers so far apart are free of
-everything, as those of graspnetAPI's collision test must be.
+everything, as the fingers of graspnetAPI's collision test must be.
 """
 
 from __future__ import annotations

@@ -30,9 +30,9 @@ lens                       JSON                   of other lenses than a pinhole
 T_world_camera             float64 [4, 4]         pose; X right, Y down, Z forward
 =========================  =====================  ================================================
 
-A channel that the camera does not write has no key; those that BlenderProc does not have keep their
-names (``part``, ``disparity``, ...). ``K`` and ``cam_K`` refer to pixel centres at whole numbers,
-as BlenderProc's do: the principal point is ours minus 0.5. Instances without an entry in
+A channel that the camera does not write has no key; channels that BlenderProc does not have keep
+their names (``part``, ``disparity``, ...). ``K`` and ``cam_K`` refer to pixel centres at whole
+numbers, as BlenderProc's do: the principal point is ours minus 0.5. Instances without an entry in
 ``instance_attribute_maps`` are not annotated. JSON texts are byte strings.
 
 Reference: the writer and the documentation of BlenderProc 2, https://dlr-rm.github.io/BlenderProc.
@@ -79,7 +79,7 @@ KEYS = {
 """BlenderProc's keys; other channels keep their names."""
 
 BLENDER_AXES = np.array([1.0, -1.0, -1.0])
-"""Signs of our camera axes along those of Blender: Y up, Z backwards."""
+"""Signs of our camera axes along Blender's: Y up, Z backwards."""
 
 LEVEL = 1
 """Level of gzip."""
@@ -92,8 +92,8 @@ class Hdf5(ExporterBase):
 
     Attributes:
         container: ``hdf5``, or ``npz`` for NumPy alone.
-        compression: Of images: ``gzip`` as BlenderProc has it, or ``none`` for larger files that
-            are written faster.
+        compression: Compression of images: ``gzip`` as BlenderProc has it, or ``none`` for larger
+            files that are written faster.
     """
 
     type: Literal["hdf5"] = "hdf5"
@@ -168,8 +168,8 @@ def write_hdf5(
 
     Args:
         path: File to write.
-        arrays: By key.
-        attributes: Of the file itself, by name.
+        arrays: Arrays by key.
+        attributes: Attributes of the file, by name.
         compressed: Whether images are compressed.
     """
     import h5py
@@ -211,7 +211,7 @@ def _read(
 
 
 def _camera_arrays(truth: ImageTruth) -> dict[str, NDArray[Any]]:
-    """Arrays of an image that are no channel."""
+    """Arrays of an image that are not a channel."""
     seen = [thing for thing in truth.objects if thing.box is not None]
     background: dict[str, Any] = {"idx": 0, "category_id": 0, "name": "background"}
     T_world_camera = np.round(truth.camera.T_world_camera.matrix(), 9) + 0.0

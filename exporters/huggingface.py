@@ -22,7 +22,7 @@ Images keep the bytes of the shards' files: photographs may be JPEG or WebP. Cha
 16-bit components (flow, object coordinates) are binary columns of PNG files, since Pillow would
 reduce them to 8 bits. An image that a camera does not write is null.
 
-Ids, pixels and box values equal those of the exporter ``coco``. Bytes of Parquet files depend on
+Ids, pixels and box values equal the ones of the exporter ``coco``. Bytes of Parquet files depend on
 the release of pyarrow, which writes its name into them; plans name that release.
 
 References: https://huggingface.co/docs/hub/datasets-cards;

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 COLOR_STEP = 0x9E3779
-"""Odd, so that multiples by different ids are different modulo 2^24; about 0.618 of it."""
+"""Odd: multiples by different ids are different modulo 2^24; about 0.618 of it."""
 
 _IDS = 65_536
 

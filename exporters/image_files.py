@@ -3,7 +3,7 @@
 ====================  =====================  =====================================================
 channel               PNG                    value; value for "nothing"
 ====================  =====================  =====================================================
-rgb                   8-bit RGB              sRGB; JPEG or WebP if the camera's encoding says so
+rgb                   8-bit RGB              sRGB; JPEG or WebP if the camera's encoding is so
 depth, range          16-bit grey            ``round(metres / depth_scale_m)``, half to even;
                                              0 = nothing, or farther than 65535 units
 instance, part,       16-bit grey            the id; 0
@@ -90,7 +90,7 @@ def write_media(info: DatasetInfo, sample: Sample, shard_dir: Path) -> None:
     without a reading at this sample has no file.
 
     Raises:
-        ConfigError: a channel is no image.
+        ConfigError: a channel is not an image.
         SampleError: a depth is negative or NaN.
     """
     for sensor in info.cameras:
@@ -122,10 +122,10 @@ def encode_channel(
         channel: Channel of the image.
         image: As listed at ``Channel``.
         depth_scale_m: Metres per unit of depth and range images.
-        encoding: Of the file; only photographs have others than PNG.
+        encoding: Encoding of the file; only photographs have others than PNG.
 
     Raises:
-        ConfigError: the channel is no image.
+        ConfigError: the channel is not an image.
         SampleError: a depth is negative or NaN.
     """
     if channel not in ENCODING:

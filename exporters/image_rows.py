@@ -49,4 +49,4 @@ class ImageRowsExporter(ExporterBase):
 
     @abstractmethod
     def image_row(self, info: DatasetInfo, sample: Sample, sensor: str) -> Mapping[str, Any]:
-        """What the line of a photograph has besides ``sensor`` and ``sample``."""
+        """Contents of a photograph's line besides ``sensor`` and ``sample``."""

@@ -25,9 +25,9 @@ Where KITTI's conventions differ from ours (https://www.cvlibs.net/datasets/kitt
   plane" (readme of its object devkit).
 * **Occlusion** is a judgement of KITTI's annotators (the same readme), who had no numbers: 0 fully
   visible, 1 partly, 2 largely occluded, 3 unknown. Here it follows from the hidden share of the
-  silhouette inside the image, with limits of our own; nothing is unknown, so that 3 is not used.
+  silhouette inside the image, with limits defined here; nothing is unknown, and 3 is not used.
   COCO's key ``occlusion`` has the share itself.
-* **Points** are those of the data set's laser scanner, or of its ``pseudo_lidar``; without either
+* **Points** come from the data set's laser scanner, or of its ``pseudo_lidar``; without either
   there is no velodyne folder, which some readers require.
 * **Point labels** are an extension. They follow KITTI's rule that an object is the content of its
   box: a point of an object has no row if noise, or the object's motion between the pulse and the
@@ -139,7 +139,7 @@ class Kitti(ExporterBase):
         """Reject a data set that this format cannot represent.
 
         Raises:
-            ConfigError: no such camera or lidar, the camera is no pinhole or does not write the
+            ConfigError: no such camera or lidar, the camera is not a pinhole or does not write the
                 rgb channel, or too many samples for six digits.
         """
         self._camera(info)
@@ -277,7 +277,7 @@ def label_rows(truth: ImageTruth, style: LabelStyle) -> list[LabelRow]:
 def without_returns(
     rows: Sequence[LabelRow], unseen: frozenset[int], truth: ImageTruth
 ) -> list[LabelRow]:
-    """The rows, with those of the ``unseen`` instances, which no laser pulse hit, as DontCare."""
+    """The rows, with rows of the ``unseen`` instances, which no laser pulse hit, as DontCare."""
     boxes = {thing.instance.instance_id: thing.box for thing in truth.objects}
     changed = []
     for row, number in rows:

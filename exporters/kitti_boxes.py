@@ -56,7 +56,7 @@ class UprightBox:
 def upright_box(box: OrientedBox) -> UprightBox:
     """Compute the smallest upright box, with the heading of the object's x axis, around a box.
 
-    If that axis is vertical, the heading is that of the y axis minus a quarter turn.
+    If that axis is vertical, the heading is the y axis's minus a quarter turn.
     """
     corners = box.corners()
     rotation = box.T_frame_box.rotation()

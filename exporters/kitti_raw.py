@@ -135,7 +135,7 @@ class KittiRaw(ExporterBase):
         """Reject a data set that this format cannot represent.
 
         Raises:
-            ConfigError: a sensor is missing, a camera is no pinhole, or there are too many
+            ConfigError: a sensor is missing, a camera is not a pinhole, or there are too many
                 sequences.
         """
         self._cameras(info)

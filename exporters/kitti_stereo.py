@@ -72,7 +72,7 @@ class KittiStereo(ExporterBase):
         """Reject a data set that this format cannot represent.
 
         Raises:
-            ConfigError: there is no pair of cameras, one is no pinhole, or there are too many
+            ConfigError: there is no pair of cameras, one is not a pinhole, or there are too many
                 samples.
         """
         self._pair(info)

@@ -10,8 +10,8 @@
 
 A frame is an instant at which camera 02 reads, numbered without gaps. Labels have 17 columns,
 separated by blanks: ``frame track_id type truncated occluded alpha left top right bottom h w l x y
-z rotation_y``. They equal those of the exporter ``kitti``, but ``track_id`` is the instance id (-1
-for DontCare), ``truncated`` is 0, 1 or 2, and sitting people are ``Person``, as in KITTI's
+z rotation_y``. They equal the rows of the exporter ``kitti``, but ``track_id`` is the instance id
+(-1 for DontCare), ``truncated`` is 0, 1 or 2, and sitting people are ``Person``, as in KITTI's
 evaluation code.
 
 Reference: Geiger et al., "Are we ready for Autonomous Driving?", CVPR 2012, and the readme of the
@@ -104,7 +104,7 @@ class KittiTracking(ExporterBase):
         """Reject a data set that this format cannot represent.
 
         Raises:
-            ConfigError: a sensor is not there, a camera is no pinhole, or there are too many
+            ConfigError: a sensor is not there, a camera is not a pinhole, or there are too many
                 sequences.
         """
         self._cameras(info)

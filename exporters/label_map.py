@@ -39,12 +39,12 @@ Sources = tuple[str, ...]
 class LabelMap(Strict):
     """Which objects exports have, and under which class names.
 
-    Formats with classes of their own, such as KITTI's eight types, leave out and ignore the same
+    Formats with prescribed classes, such as KITTI's eight types, leave out and ignore the same
     objects, but keep their own names.
 
     Attributes:
         classes: ``{class: categories}``, in the order of class ids; a class without categories
-            takes the category of its own name. Or the name of a public list: ``coco80``,
+            takes the category of its name. Or the name of a public list: ``coco80``,
             ``kitti``, ``nuscenes``, ``cityscapes``, ``nyu40``, ``ade20k``. Without it, all
             categories keep their names.
         others: Objects of all other categories: left out, or kept as ignored regions (in formats
@@ -127,7 +127,7 @@ class LabelMap(Strict):
 
         Warns:
             ConfigWarning: the user named a category that the data set does not have, besides others
-                that it has. A map may serve several data sets, so this is no error.
+                that it has. A map may serve several data sets, so this is not an error.
         """
         faults = self.faults(categories)
         if faults:
@@ -196,7 +196,7 @@ class MappedExporter:
         return self.exporter.has_own_classes
 
     def check(self, info: DatasetInfo) -> None:
-        """Refuse what the exporter refuses."""
+        """Refuse as the exporter does."""
         self.exporter.check(self._mapping(info).info)
 
     def with_assets(self, assets: AssetLibrary) -> MappedExporter:
@@ -232,8 +232,7 @@ class AppliedLabelMap:
     def info(self) -> DatasetInfo:
         """The data set as the exporter sees it.
 
-        It has no images of category ids if the classes differ, as their pixels hold those of the
-        data set.
+        It has no images of category ids if the classes differ, as their pixels hold the data set's.
         """
         if not self._has_classes:
             return self.dataset
@@ -307,7 +306,7 @@ class AppliedLabelMap:
         return replace(instance, category=name, category_id=number)
 
     def map_scene(self, scene: Scene) -> Scene:
-        """The scene whose instances are mapped; those of other categories are not annotated."""
+        """The scene whose instances are mapped; instances of other categories are not annotated."""
         known = self._class_of if self.label_map.classes is not None else None
         instances = tuple(
             self._map_instance(one)

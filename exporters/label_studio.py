@@ -78,7 +78,7 @@ class LabelStudio(ImageRowsExporter):
     kind: Literal["annotations", "predictions"] = "annotations"
     """Whether regions are finished annotations, or predictions that an annotator starts from."""
     url_prefix: str = LOCAL_FILES
-    """What comes before the path of an image."""
+    """Prefix of the path of an image."""
 
     @property
     def needs(self) -> frozenset[str]:

@@ -7,7 +7,7 @@
     <split>/000000012_color.png
 
 A line of ``<split>.jsonl`` has ``id`` (unique), ``image_id``, ``file_name``, ``kind``, ``text``,
-``answer`` (empty without a question) and ``object_ids``, what the line is about: the mask of an
+``answer`` (empty without a question) and ``object_ids``, its objects: the mask of an
 answer is the union of theirs, and an expression has one. Besides the lines of the annotation
 ``language`` there is one of the kind ``scene_caption`` about place, weather, light and view, as
 ``control_clips`` writes it.
@@ -44,7 +44,7 @@ UTTERANCE_STRIDE = 1_000
 
 
 class LanguageJsonl(ImageRowsExporter):
-    """Text about every photograph as JSON lines, with masks of what it is about."""
+    """Text about every photograph as JSON lines, with masks of its objects."""
 
     type: Literal["language"] = "language"
     conventions: ClassVar[Conventions] = Conventions(box=EDGES, lens=ANY_LENS)

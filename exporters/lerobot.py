@@ -23,7 +23,7 @@ frame's number divided by the frame rate.
 Joints are named in ``info.json``, in the order of the robot's description.
 
 An episode is a sequence: all instants of one view. Robots of different models have different
-joints and hence data sets of their own; so have splits, since training takes all episodes of a data
+joints and hence separate data sets; so have splits, since training takes all episodes of a data
 set. The task is a sentence made of the arm's goals and the objects that move.
 
 Bytes of Parquet files depend on the release of pyarrow.
@@ -92,7 +92,7 @@ class LeRobot(ExporterBase):
     _assets: AssetLibrary | None = PrivateAttr(None)
 
     def with_assets(self, assets: AssetLibrary) -> LeRobot:
-        """Return the exporter with a library that knows the joints of robots."""
+        """Return the exporter with a library that has the joints of robots."""
         bound = self.model_copy()
         bound._assets = assets
         return bound

@@ -96,7 +96,7 @@ class RobotFiles(ABC):
     _tasks: dict[str, int] = field(default_factory=dict)
 
     def add_episode(self, frames: Sequence[Frame]) -> None:
-        """Write the frames of one episode, and what is known of it as a whole."""
+        """Write the frames of one episode, and its summary."""
         task = frames[0].row["task"]
         task_index = self._tasks.setdefault(task, len(self._tasks))
         rows = [self._values(frame.row, k, task_index) for k, frame in enumerate(frames)]
@@ -114,7 +114,7 @@ class RobotFiles(ABC):
     def _write_episode(self, episode: _Episode) -> None: ...
 
     def _write_frames(self, writer: ParquetWriter, episode: _Episode) -> None:
-        """Write the rows of an episode with images; those of one row group are in memory."""
+        """Write the rows of an episode with images; one row group is in memory."""
         import pyarrow
 
         frames = episode.frames
@@ -184,7 +184,7 @@ class RobotFiles(ABC):
         }
 
     def _facts(self) -> dict[str, Any]:
-        """What both formats have in ``info.json``."""
+        """Common contents of ``info.json`` in both formats."""
         return {
             "codebase_version": self.version,
             "robot_type": self.first["robot"],

@@ -1,4 +1,4 @@
-"""Statistics of episodes as LeRobot stores them: what policies normalise their inputs with.
+"""Statistics of episodes as LeRobot stores them, for the normalisation of policies' inputs.
 
 A feature has least and largest value, mean, deviation and count, and numbers also the quantiles
 that LeRobot names. Images count in fractions of 255, with the shape [3, 1, 1]. Statistics of images
@@ -93,7 +93,7 @@ def image_statistics(frames: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
 def merge_statistics(first: Mapping[str, Any], second: Mapping[str, Any]) -> dict[str, Any]:
     """Statistics by feature of two disjoint sets of frames together.
 
-    Quantiles are means weighted by the number of frames, as LeRobot merges those of episodes.
+    Quantiles are means weighted by the number of frames, as LeRobot merges episodes' quantiles.
     """
     return {name: _merged(first[name], second[name]) for name in first}
 

@@ -1,7 +1,7 @@
 """PNG files of binary masks: 8-bit grey, 255 inside and 0 outside.
 
 A mask is a few long runs of equal bytes, which general compressors still read byte by byte. Here
-each run becomes a literal and copies of it, so that the cost is that of the runs. Sources: Deutsch,
+each run becomes a literal and copies of it: the cost grows with the runs. Sources: Deutsch,
 RFC 1951, 1996, sections 3.2.5 (lengths) and 3.2.6 (fixed Huffman codes), and RFC 1950.
 """
 

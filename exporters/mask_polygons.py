@@ -37,7 +37,7 @@ INSET_PX = 0.02
 """Rasterisers that cut vertices to whole pixels draw exactly the mask; larger images lose less than
 with a larger inset."""
 TRACED_MASKS = 1024
-"""Masks whose outlines are kept: about those of a shard, which each format reads in turn."""
+"""Masks whose outlines are kept: about the masks of a shard, which each format reads in turn."""
 
 
 def mask_polygons(mask: MaskPx) -> list[Polygon]:

@@ -19,7 +19,7 @@ topic                           message (Protobuf schema ``foxglove.*``)
 
 Every sequence starts at 0:00 UTC of 1 January 2020. Log times and times in messages are equal: each
 sensor has the instant of its reading, a scanner the middle of its sweep. ``time_s`` of points
-counts from there, so that stamp plus time is the instant of the pulse, or from the start of the
+counts from there: stamp plus time is the instant of the pulse, or from the start of the
 sweep (``point_time``). Messages are in order of time. Frames are called
 ``camera/<name>`` (X right, Y down, Z forward), ``lidar/<name>`` and ``rig/<name>`` (X forward,
 Y left, Z up).
@@ -27,7 +27,7 @@ Y left, Z up).
 Calibrations follow ROS and OpenCV, where the centre of the first pixel is (0, 0): the principal
 point is ours minus 0.5. Annotations are in Foxglove's image coordinates, which are ours.
 
-Chunks are not compressed unless ``compression: zstd`` says so, because images already are; sums
+Chunks are not compressed unless ``compression: zstd`` is set, because images already are; sums
 guard every chunk. Bytes depend on the release of the Foxglove schemas, which are part of each file,
 and of zstandard.
 
@@ -85,9 +85,9 @@ class Mcap(ExporterBase):
     """MCAP files of sequences: images, calibrations, scans, transforms and boxes.
 
     Attributes:
-        compression: Of the files' chunks: ``zstd`` for smaller files, mostly because of points.
+        compression: Compression of the files' chunks: ``zstd`` for smaller files, mostly of points.
         point_time: Instant from which ``time_s`` of points counts: the ``sweep_middle``, which is
-            that of the message's stamp, or the ``sweep_start``.
+            the message's stamp, or the ``sweep_start``.
     """
 
     type: Literal["mcap"] = "mcap"
@@ -432,7 +432,7 @@ def point_fields() -> Iterator[dict[str, Any]]:
 
 
 def _objects_message(objects: Iterable[Mapping[str, Any]], time_ns: int) -> Message:
-    """Cubes that replace those of the instant before."""
+    """Cubes that replace the cubes of the instant before."""
     from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 
     message = SceneUpdate()

@@ -85,7 +85,7 @@ class MotChallenge(ExporterBase):
 
     @property
     def has_own_classes(self) -> bool:
-        """Classes are those of the benchmark."""
+        """Classes are the benchmark's."""
         return True
 
     def check(self, info: DatasetInfo) -> None:

@@ -10,21 +10,21 @@
     lidarseg/v1.0-mini/*_lidarseg.bin    panoptic/v1.0-mini/*_panoptic.npz    of key frames
     maps/000003.png                      driveable surface of world 3
 
-* **Scenes** are sequences; a log is a world, with a map and a location of its own. ``splits.json``
+* **Scenes** are sequences; a log is a world, with a separate map and location. ``splits.json``
   lists the scenes of ``all`` and of each split of the data set: ``gen_train``, ``gen_val`` and
   ``gen_test``. Official splits have none of their names.
 * **Key frames** are scans of LIDAR_TOP at least ``key_frame_s`` apart.
-* **The global frame** is the world, moved so that the map begins at (0, 0), as the devkit expects:
+* **The global frame** is the world, with the map's corner at (0, 0), as the devkit expects:
   ``world_origin`` in ``log.json`` is the origin of the world in it.
 * **The ego** is the rig that carries LIDAR_TOP; every reading has the ego's pose at its instant.
-* **Images** are PNG: links to those of the shards. Pixel centres of ``camera_intrinsic`` are whole
-  numbers.
+* **Images** are PNG: links to the images of the shards. Pixel centres of ``camera_intrinsic`` are
+  whole numbers.
 * **Boxes** have the category of ``nuscenes_classes.yaml``, whatever the data set calls it. A box is
   where the pulses of the scan hit the object, as annotators fit boxes to points; ``boxes_at: step``
   puts it where the object is at the instant of the key frame. An object is annotated from the first
   to the last key frame in which a camera, lidar or radar senses it.
-* **num_lidar_pts** counts the points in the box: within 2 cm of its faces only those that hit the
-  object. Point labels agree: points in a box belong to its object, also those of the road.
+* **num_lidar_pts** counts the points in the box: within 2 cm of its faces only hits of the
+  object. Point labels agree: points in a box belong to its object, also road points.
 * **num_radar_pts** counts the detections that the object caused.
 
 Reference: Caesar et al., "nuScenes: A multimodal dataset for autonomous driving", CVPR 2020, and
@@ -85,9 +85,9 @@ class NuScenes(ExporterBase):
     key_frame_s: float = Field(0.5, gt=0)
     """Smallest time between key frames; readings in between are sweeps."""
     boxes_at: Literal["pulse", "step"] = "pulse"
-    """Instant of a moving object's box: when pulses hit it, or that of the step."""
+    """Instant of a moving object's box: when pulses hit it, or the step's."""
     box_margin_m: float = Field(0.002, ge=0, le=0.1)
-    """How much larger boxes are on every side, so that points on the surface are inside."""
+    """How much larger boxes are on every side: points on the surface are inside."""
 
     @property
     def needs(self) -> frozenset[str]:
@@ -96,14 +96,14 @@ class NuScenes(ExporterBase):
 
     @property
     def has_own_classes(self) -> bool:
-        """Categories are those of nuScenes."""
+        """Categories are nuScenes'."""
         return True
 
     def check(self, info: DatasetInfo) -> None:
         """Reject a data set that this format cannot represent.
 
         Raises:
-            ConfigError: there is no laser scanner, a camera is no pinhole, two sensors have the
+            ConfigError: there is no laser scanner, a camera is not a pinhole, two sensors have the
                 same channel, or no category has a class in this format.
         """
         self._channels(info)

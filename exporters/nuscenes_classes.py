@@ -1,7 +1,7 @@
 """Categories and attributes of nuScenes; ``nuscenes_classes.yaml`` has the tables.
 
 Reference: Caesar et al., "nuScenes", CVPR 2020, and Fong et al., "Panoptic nuScenes", RA-L 2022;
-names and indices are those of the devkit's ``category.json`` with lidarseg.
+names and indices come from the devkit's ``category.json`` with lidarseg.
 """
 
 from __future__ import annotations

@@ -71,7 +71,7 @@ DRIVEABLE = frozenset({"driving", "parking", "bicycle", "crosswalk"})
 
 
 def quarter_turns(T_ego_lidar: SE3) -> int:
-    """Quarter turns about Z from a scanner's frame to that of its files.
+    """Quarter turns about Z from a scanner's frame to its files' frame.
 
     The latter's y axis is the axis of the former that is nearest to the ego's forward axis.
     """
@@ -104,7 +104,7 @@ def lidar_bytes(points: NDArray[np.void], turns: int) -> bytes:
 
 
 def radar_bytes(rows: NDArray[np.void]) -> bytes:
-    """Encode the detections of a radar; ``rows`` are those of ``measurement_dtypes.RADAR``.
+    """Encode the detections of a radar; ``rows`` are of ``measurement_dtypes.RADAR``.
 
     Velocities are the radial one, along x and y; no radar measures the other component. Without
     detections there is one point of NaN, as readers expect.
@@ -175,7 +175,7 @@ def points_in_boxes(
 ) -> BoxPoints:
     """Assign points to boxes.
 
-    Within ``BORDER_M`` of a face, on either side, a box contains the points of its own instance
+    Within ``BORDER_M`` of a face, on either side, a box contains the points of its instance
     only: noise-free points lie on the faces, and the road lies under all of them. Points of
     instances without a box, and of none, belong to a box that contains them.
 

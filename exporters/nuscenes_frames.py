@@ -135,7 +135,7 @@ class Thing:
 
 
 def annotated_things(sample: Sample) -> dict[int, Thing]:
-    """Annotated objects of a sample by instance id, except those that labels ignore.
+    """Annotated objects of a sample by instance id, except the ones that labels ignore.
 
     Raises:
         ConfigError: a category has more objects than panoptic labels can tell apart.
@@ -251,7 +251,7 @@ def views_by_instance(sample: Sample) -> dict[int, list[ObjectTruth]]:
 def visibility_level(views: Sequence[ObjectTruth]) -> str:
     """Token of the visibility of an object in all images together.
 
-    The visible fraction is that of the parts inside the images that nothing hides, times the
+    The visible fraction counts the parts inside the images that nothing hides, times the
     fraction of the silhouette inside the images.
     """
     if not views:

@@ -47,7 +47,7 @@ _LABEL_SUFFIXES = {"lidarseg": ".bin", "panoptic": ".npz"}
 
 
 def reading_path(info: DatasetInfo, shard_dir: Path, channel: Channel, index: int) -> Path:
-    """File of a reading in a shard; images are those that all formats share."""
+    """File of a reading in a shard; images are the ones that all formats share."""
     if channel.modality == "camera":
         return info.media_path(shard_dir, channel.sensor, ImageChannel.RGB, index)
     suffix = reading_suffix(info, channel)

@@ -1,6 +1,6 @@
 """Tables of nuScenes: files, tokens, and the rows that no sequence has.
 
-Tokens are hashes of the content's identity (data set, sequence, instant, sensor or object), so that
+Tokens are hashes of the content's identity (data set, sequence, instant, sensor or object):
 the same data set has the same tokens, whatever the shards.
 """
 

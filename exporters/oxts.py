@@ -78,7 +78,7 @@ def navigation_mount(scene: Scene, name: str, carrier: str, exporter: str) -> Mo
 
 
 def rig_motion(scene: Scene, mount: Mount) -> RigMotion:
-    """Motion of a mount: that of its rig's body along its trajectory, plus the lever arm's part."""
+    """Motion of a mount: its rig's body along its trajectory, plus the lever arm's part."""
     pose = mounted_pose(scene, mount)
     rig = next((rig for rig in scene.rigs if rig.name == mount.rig), None)
     track = scene.track(rig.body) if rig else None

@@ -7,7 +7,7 @@
                               "boxes": [3D boxes in the lidar frame]}
 
 Pose and boxes are at ``time_s``, the middle of the sweep, which lasts ``sweep_s``. ``time`` of a
-point counts from there, so that ``time_s + time`` is the instant of its pulse; with
+point counts from there: ``time_s + time`` is the instant of its pulse; with
 ``point_time: sweep_start`` it counts from the start of the sweep. Comments in the files repeat it.
 
 Properties: ``x y z intensity time ring instance category surface return_number return_count``, as
@@ -68,7 +68,7 @@ class PointClouds(ExporterBase):
     Attributes:
         format: Binary PLY, or binary PCD of the Point Cloud Library.
         point_time: Instant from which ``time`` of points counts: the ``sweep_middle``, which is
-            that of poses and boxes, or the ``sweep_start``.
+            the instant of poses and boxes, or the ``sweep_start``.
     """
 
     type: Literal["pointclouds"] = "pointclouds"
@@ -117,7 +117,7 @@ class PointClouds(ExporterBase):
             (folder / "poses.jsonl").write_text(lines, encoding="utf-8", newline="\n")
 
     def _statements(self) -> dict[str, str]:
-        """What the numbers in a file mean."""
+        """Meaning of the numbers in a file."""
         return {**self.conventions.facts(), "point_time": self.point_time}
 
     def _pose(self, sample: Sample, lidar: str) -> dict[str, Any]:

@@ -19,7 +19,7 @@ after the other. Entities:
 
 Class ids are category ids, 0 is the background. Quaternions are x y z w, boxes have half sizes, and
 principal points have pixel centres at i + 0.5. Ignored objects have no boxes and keypoints. Other
-channels and devices are not in it; meshes are in what ``gen-data preview`` shows.
+channels and devices are not in it; ``gen-data preview`` shows meshes.
 
 Reference: https://rerun.io/docs/reference/types.
 """
@@ -288,7 +288,7 @@ def _camera_chunks(
 def _channel_columns(
     info: DatasetInfo, name: str, channel: Channel, rows: Sequence[Row]
 ) -> Any | None:
-    """Columns of the images of a channel; None for those that are left out."""
+    """Columns of the images of a channel; None for channels that are left out."""
     import rerun as rr
     from rerun.components import ImageFormat
     from rerun.encodings import ChannelDatatype

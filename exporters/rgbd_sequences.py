@@ -35,7 +35,7 @@ class RgbdExporter(ExporterBase):
         """Reject a data set without such a camera.
 
         Raises:
-            ConfigError: the camera is missing, is no pinhole or lacks a channel.
+            ConfigError: the camera is missing, is not a pinhole or lacks a channel.
         """
         camera = self._camera(info)
         for channel in self.channels:
@@ -68,7 +68,7 @@ class RgbdExporter(ExporterBase):
     def write_frame(
         self, info: DatasetInfo, sample: Sample, camera: str, shard_dir: Path
     ) -> dict[str, Any]:
-        """Write the files of a frame and return what its line has besides ``frame_facts``."""
+        """Write the files of a frame and return its line without ``frame_facts``."""
 
 
 def depth_png(

@@ -104,7 +104,7 @@ def build_model(pieces: Sequence[Piece], assets: AssetLibrary) -> Model:
     """Join the pieces, move the origin to the centre of the box, and measure the result.
 
     Raises:
-        AssetError: the asset's symmetries are no finite group.
+        AssetError: the asset's symmetries are not a finite group.
     """
     parts, faces, count = [], [], 0
     for piece in pieces:

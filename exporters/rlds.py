@@ -86,7 +86,7 @@ class Rlds(LeRobot):
         super().check(info)
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
-        """Write the episodes of all shards, and what their keys are."""
+        """Write the episodes of all shards, and their keys."""
         totals = Counter(_data_set(episode) for episode in self._episodes(shard_dirs))
         written: Counter[tuple[str, str]] = Counter()
         for episode in self._episodes(shard_dirs):

@@ -29,7 +29,7 @@ _TAIL = struct.Struct("<QQI8sI")
 """Place, length and checksum of the footer, its magic, and the number of footers."""
 _CHECKSUM_SEED = 7850921
 _FIRST_ID = 28
-"""Place of the first message's id: after the header of 12 bytes and that of the message."""
+"""Place of the first message's id: after the header of 12 bytes and the message's."""
 _ID_TAGS = {0: b"\x0a\x12\x09", 11: b"\x11"}
 """Tags of its field, of 18 bytes, and of its halves."""
 

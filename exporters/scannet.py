@@ -13,7 +13,7 @@
     scannetv2-labels.combined.tsv             names of classes
 
 A space is a scene of the data set and a scan one of its views. Frames are numbered from 0. Depth is
-registered to the colour image, so that both have the same intrinsics, with pixel centres at whole
+registered to the colour image: both have the same intrinsics, with pixel centres at whole
 numbers. Classes are numbers of a public list from 1 (``label_maps.yaml``): NYU-40's, as ScanNet's
 tools have after their mapping, or ADE20K's, as in its annotation images. Instances have the ids of
 the data set, the same in all frames; ScanNet's images hold them in 8 bits, too few for large rooms.
@@ -74,7 +74,7 @@ class ScanNet(RgbdExporter):
 
     @property
     def has_own_classes(self) -> bool:
-        """Classes are those of the list."""
+        """Classes are the list's."""
         return True
 
     def check(self, info: DatasetInfo) -> None:

@@ -11,16 +11,16 @@
 
 Scans are numbered without gaps in the order of samples; ``scans.txt`` names their samples.
 
-* **Views of several instants** are one sequence each, numbered by view. Instance ids are those of
-  the scene. Objects that move at the instant of a scan have a moving class.
+* **Views of several instants** are one sequence each, numbered by view. Instance ids are
+  the scene's. Objects that move at the instant of a scan have a moving class.
 * **Views of one instant** form one sequence per split, one sweep apart: train is 00, val 08, test
   11, each from the official split. Views of one scene share a world, and objects keep their
   instance ids from scan to scan; the next scene is elsewhere and has its own instance ids.
-  Such a sequence is no drive: views of a street are a hundred metres apart.
+  Such a sequence is not a drive: views of a street are a hundred metres apart.
   Train on single scans; a method that joins scans needs views of several instants.
 
 Reference: Behley et al., "SemanticKITTI", ICCV 2019, and semantic-kitti-api, which define classes
-and numbers. Vans are cars there; masts are poles, also those of signs and lights.
+and numbers. Vans are cars there; masts are poles, also of signs and lights.
 """
 
 from __future__ import annotations
@@ -129,14 +129,14 @@ class SemanticKitti(ExporterBase):
 
     @property
     def has_own_classes(self) -> bool:
-        """Classes are those of the benchmark."""
+        """Classes are the benchmark's."""
         return True
 
     def check(self, info: DatasetInfo) -> None:
-        """Reject a data set without the sensors, or whose camera is no pinhole.
+        """Reject a data set without the sensors, or whose camera is not a pinhole.
 
         Raises:
-            ConfigError: a sensor is missing, or the camera is no pinhole.
+            ConfigError: a sensor is missing, or the camera is not a pinhole.
         """
         for field, name, known in (
             ("lidar", self.lidar, info.lidars),

@@ -58,7 +58,7 @@ def check_pinholes(info: DatasetInfo, cameras: Iterable[str], exporter: str) -> 
     """Reject lenses that a format of rectified images cannot describe.
 
     Raises:
-        ConfigError: a camera is no pinhole.
+        ConfigError: a camera is not a pinhole.
     """
     lenses = {camera: info.sensor(camera).lens for camera in cameras}
     bent = [
@@ -78,7 +78,7 @@ def pinhole_camera(info: DatasetInfo, wanted: str, exporter: str) -> str:
     """Find a camera as ``rgb_camera`` does, for formats that describe pinholes only.
 
     Raises:
-        ConfigError: there is none, or it is no pinhole.
+        ConfigError: there is none, or it is not a pinhole.
     """
     camera = rgb_camera(info, wanted, exporter)
     check_pinholes(info, [camera], exporter)

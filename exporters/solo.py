@@ -18,7 +18,7 @@ A sequence is a view with its steps. Where SOLO's conventions differ from ours:
   infinity: ``m00 = 2 fx / W``, ``m11 = 2 fy / H``.
 * **Segmentation** images have a colour per instance, which is a function of its id, or per label;
   black is everything else.
-* **Readers** derive the place of a frame from the numbers of frames and sequences, so that all
+* **Readers** derive the place of a frame from the numbers of frames and sequences: all
   sequences must have the same length.
 
 References: SOLO's schema in the documentation of Unity's Perception package 1.0; pysolotools.
@@ -102,7 +102,7 @@ class Solo(ExporterBase):
         """Reject a data set that this format cannot represent.
 
         Raises:
-            ConfigError: no camera writes the rgb channel, one of them is no pinhole, or the last
+            ConfigError: no camera writes the rgb channel, one of them is not a pinhole, or the last
                 sequence is incomplete.
         """
         rgb_camera(info, "", self.type)
@@ -161,7 +161,7 @@ class _Counter:
     """Numbers of the latest frame of a split, from 0.
 
     Attributes:
-        frames: Of the frame, from 1: SOLO numbers frames of a simulation.
+        frames: Number of the frame, from 1: SOLO numbers frames of a simulation.
         original: Number of its sequence in the whole data set.
     """
 

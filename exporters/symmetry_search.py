@@ -5,7 +5,7 @@ diagonals between them, about the principal axes of the surface, and half turns 
 was found, all through the centroid of the surface, which every symmetry keeps. A turn counts if
 turned points of the surface lie on the surface, where it has their colour.
 
-Two sets of points sample the surface: what one is from the other without a turn is the error of
+Two sets of points sample the surface: their distance without a turn is the error of
 sampling and the noise of textures, which a turn may add little to.
 """
 
@@ -30,7 +30,7 @@ FOLDS = tuple(range(24, 1, -1))
 _DIAGONALS = np.array(
     [(1, 1, 0), (1, -1, 0), (1, 0, 1), (1, 0, -1), (0, 1, 1), (0, 1, -1)], np.float64
 ) / math.sqrt(2.0)
-"""Axes of half turns of what was modelled along the axes of its frame, such as an elbow."""
+"""Axes of half turns of objects modelled along the axes of their frame, such as an elbow."""
 ANGLES_RAD = (1.0, 2.2, 0.3)
 """Turns that stand for every angle; no simple parts of a circle."""
 FAR_SHARE = 0.006
@@ -195,7 +195,7 @@ class _Search:
 
 
 def _distinct(axes: Sequence[Array]) -> list[Array]:
-    """Axes without those that are nearly parallel to an earlier one: an inexact copy of it."""
+    """Axes without any that is nearly parallel to an earlier one: an inexact copy of it."""
     found: list[Array] = []
     for axis in axes:
         if all(abs(float(axis @ other)) < 1.0 - NEAR for other in found):

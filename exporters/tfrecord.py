@@ -22,7 +22,7 @@ OpenCV's functions, to be applied before the intrinsics) and ``image/lens/half_f
 angle to the axis at which the image ends. ``image/conventions`` is JSON.
 
 A record is its length (uint64), the masked CRC32C of the length, the data, and the masked CRC32C of
-the data. Feature maps are written sorted by key, so that the same values give the same bytes.
+the data. Feature maps are written sorted by key: the same values give the same bytes.
 
 References: https://www.tensorflow.org/tutorials/load_data/tfrecord#tfrecords_format_details;
 tensorflow/core/example/{example,feature}.proto; https://protobuf.dev/programming-guides/encoding;
@@ -275,7 +275,7 @@ def encode_features(
     Args:
         features: Values by key.
         floats: Keys whose values are floats.
-        integers: Keys whose values are integers; those of all others are bytes.
+        integers: Keys whose values are integers; all others are bytes.
     """
     entries = (
         _message(1, key.encode())

@@ -10,12 +10,12 @@
     <split>/000003/calibration.txt       fx fy cx cy
 
 Folders are sequences. Timestamps are seconds from the start of the sequence's scene. The pose is
-that of the colour camera's optical centre in the world (X right, Y down, Z forward). Depth is
+the colour camera's optical centre in the world (X right, Y down, Z forward). Depth is
 z-depth, registered to the colour image; surfaces beyond 13.1 m have none. The principal point has
 pixel centres at whole numbers. Accelerations [m/s^2] are specific forces along the IMU's axes.
 
 Reference: Sturm et al., "A Benchmark for the Evaluation of RGB-D SLAM Systems", IROS 2012, and the
-benchmark's page on file formats; ``calibration.txt`` is what DROID-SLAM and DPVO read.
+benchmark's page on file formats; DROID-SLAM and DPVO read ``calibration.txt``.
 """
 
 from __future__ import annotations
@@ -60,8 +60,8 @@ class TumRgbd(RgbdExporter):
         """Reject a data set that this format cannot represent.
 
         Raises:
-            ConfigError: the camera is missing, is no pinhole or has no depth, or there is no such
-                IMU.
+            ConfigError: the camera is missing, is not a pinhole or has no depth, or there is no
+                such IMU.
         """
         super().check(info)
         self._imu(info)

@@ -1,4 +1,4 @@
-"""Tasks of robot arms: their things, program and conditions of success, from a table."""
+"""Tasks of robot arms: their objects, program and conditions of success, from a table."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ SEEDS = 16
 """Variants to draw from where the table names a family."""
 _TRIES = 200
 _APART_M = 0.03
-"""Least gap between things that are drawn."""
+"""Least gap between drawn objects."""
 _YAWS = 8
 """Rotations of a held object to try at its destination."""
 _LIFT_M = 0.0005
@@ -73,15 +73,15 @@ class Failures(Strict):
 
 
 class ArmTask(RandomizerBase):
-    """Draws the things of a task and gives an arm its program; physics demonstrates and judges it.
+    """Draws the objects of a task and gives an arm its program; physics demonstrates and judges it.
 
-    Its things become the members of an object group.
+    They become the members of an object group.
 
     Attributes:
         group: Name of the template's object group; empty = the randomizer's own name.
         task: Name of a task.
-        tasks: Name of a YAML file of tasks beside the configuration, besides those of
-            ``arm_tasks.yaml``; of the same name, they replace them.
+        tasks: Name of a YAML file of tasks next to the configuration, in addition to
+            ``arm_tasks.yaml``; tasks of the same name replace those.
         arm: Name of the arm; empty = the first one.
         failures: Shares of demonstrations that fail on purpose, of tasks that grasp.
         speed: Fraction of the joints' speed and acceleration limits to use.
@@ -144,7 +144,7 @@ class ArmTask(RandomizerBase):
                 )
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
-        """Return the scene with the things of a task, and an arm that has it to do."""
+        """Return the scene with the objects of a task, and an arm that has to perform it."""
         name = self.task.draw(rng)
         table, arm = self._table(), self._find_arm(scene)
         check_known(name, tuple(table), f"randomizers.{self.name}.task: unknown task")
@@ -216,7 +216,7 @@ class ArmTask(RandomizerBase):
     def _place_things(
         self, task: Task, arm: Articulation, assets: AssetIndex, rng: Rng
     ) -> dict[str, _Placed]:
-        """Draw asset and pose of every thing, apart from those before it."""
+        """Draw asset and pose of every object, apart from the ones before it."""
         placed: dict[str, _Placed] = {}
         for name, thing in task.things.items():
             words = sorted(thing.assets)
@@ -235,7 +235,7 @@ class ArmTask(RandomizerBase):
 
 @dataclass(frozen=True, slots=True)
 class _Placed:
-    """A thing in the scene; ``half_m`` are half extents along its own axes."""
+    """An object in the scene; ``half_m`` are half extents along its own axes."""
 
     words: str
     member: Member
@@ -354,7 +354,7 @@ def _goals(
 
 
 def _frame(step: Step, placed: Mapping[str, _Placed], arm: Articulation) -> SE3:
-    """Frame of a step at the top of its thing."""
+    """Frame of a step at the top of its object."""
     if not step.at:
         return IDENTITY
     thing = placed[step.at]

@@ -1,7 +1,7 @@
-"""Tasks of robot arms as data: things, program and conditions of success of each.
+"""Tasks of robot arms as data: objects, program and conditions of success of each.
 
-The shipped ones are in ``arm_tasks.yaml``. Users' own are in a file beside their configuration,
-whose content replaces its name there, so that plans are self-contained and errors name the file,
+The shipped ones are in ``arm_tasks.yaml``. Users' own are in a file next to their configuration,
+whose content replaces its name there: plans are self-contained, and errors name the file,
 line and column that they come from.
 """
 
@@ -26,7 +26,7 @@ Span = tuple[float, float]
 
 
 class Thing(Strict):
-    """A thing of a task.
+    """An object of a task.
 
     Attributes:
         assets: Its name in instructions, and the id of its asset; an id without parameters is a
@@ -34,7 +34,7 @@ class Thing(Strict):
         x_m, y_m: Bounds of its middle: ahead of the arm's base and to its left, for an arm whose
             workspace begins 0.3 m ahead of it; from ``near``, if given, along its axes.
         yaw_deg: Bounds of its rotation about Z.
-        near: Name of another thing that it is placed by, at ``z_m`` from that one's bottom.
+        near: Name of another object that it is placed by, at ``z_m`` from that one's bottom.
         z_m: Height of its bottom above the table, or above the bottom of ``near``.
         mass_kg: 0 = fixed; None = the asset's own.
         joint: Joint of a part that moves, in the frame of the part.
@@ -51,15 +51,15 @@ class Thing(Strict):
 
 
 class Joint(Strict):
-    """A joint of a thing; see ``BodyJoint``.
+    """A joint of an object; see ``BodyJoint``.
 
     Attributes:
         kind: ``prismatic`` slides, ``revolute`` turns.
-        axis: Direction of the motion, in the frame of the thing.
-        anchor_m: A point on the axis, in the frame of the thing.
+        axis: Direction of the motion, in the frame of the object.
+        anchor_m: A point on the axis, in the frame of the object.
         limits: Smallest and largest position [m or degrees].
         friction: Force or torque that moves it at least [N or N m].
-        stiffness: Of a spring that returns it to 0 [N/m or N m/rad].
+        stiffness: Stiffness of a spring that returns it to 0 [N/m or N m/rad].
     """
 
     kind: Literal["prismatic", "revolute"]
@@ -71,31 +71,31 @@ class Joint(Strict):
 
 
 class Step(Strict):
-    """One step of a program: a verb and what it refers to.
+    """One step of a program: a verb and its objects.
 
     Attributes:
-        verb: ``grasp`` lifts ``at``. ``place`` puts the held thing down on top of ``at``.
-            ``reach`` takes the hand, or with ``carries`` the held thing, to a point above the top
+        verb: ``grasp`` lifts ``at``. ``place`` puts the held object down on top of ``at``.
+            ``reach`` takes the hand, or with ``carries`` the held object, to a point above the top
             of ``at``, around all obstacles. ``move`` moves the hand along straight lines or an
             arc, and may touch and push. ``grip`` opens or closes the fingers, with ``at`` until
-            they meet that thing, which they do not hold.
-        at: Name of a thing.
-        along: Thing that the X axis of the step's frame points to, horizontally; ``own`` = the X
+            they meet that object, which they do not hold.
+        at: Name of an object.
+        along: Object that the X axis of the step's frame points to, horizontally; ``own`` = the X
             axis of ``at``; empty = away from the arm. Z is up.
-        carries: Whether ``reach`` takes the held thing there. It keeps its rotation or turns by
-            eighths; with ``yaws``, its X axis is that of the step's frame, or turned evenly.
-        offset_m: Of the goal of ``reach``, in the step's frame.
-        yaw_deg: Of the hand against that frame; at 0 the fingers open along its Y.
+        carries: Whether ``reach`` takes the held object there. It keeps its rotation or turns by
+            eighths; with ``yaws``, its X axis is the step's, or turned evenly.
+        offset_m: Offset of the goal of ``reach``, in the step's frame.
+        yaw_deg: Angle of the hand against that frame; at 0 the fingers open along its Y.
         yaws: Number of evenly spaced rotations to try; 0 = two of the hand.
         by_m: Displacements of ``move``, each from its beginning, in the step's frame.
         turn_deg: Turn during ``move``, about ``axis`` through ``pivot_m``, after displacements.
-        axis: Of the turn, in the step's frame.
+        axis: Axis of the turn, in the step's frame.
         pivot_m: Point of the axis, from the top of ``at``; None = the hand's goal of the latest
             ``reach``.
-        opening: Of the gripper: 0 closed, 1 open.
-        touches: Names of the things that ``move`` may touch.
+        opening: Opening of the gripper: 0 closed, 1 open.
+        touches: Names of the objects that ``move`` may touch.
         pivots: Whether ``move`` leads the hand along the arc without turning it, with fingers so
-            loose that the held thing turns between them where it meets ``touches``.
+            loose that the held object turns between them where it meets ``touches``.
         phase: Name of the step in labels.
         pace: Factor on the arm's speed.
     """
@@ -125,8 +125,8 @@ class Success(Strict):
         measure: ``distance`` between the middles of two boxes, its horizontal part ``offset``,
             ``height`` of the body above the other, ``gap`` between surfaces [m]; ``tilt`` of the
             body from its first rotation [rad]; ``travel`` of its joint [m or rad].
-        body: Name of the thing that is measured; ``hand`` = the grasp frame's origin.
-        other: Name of the thing that it is measured from.
+        body: Name of the object that is measured; ``hand`` = the grasp frame's origin.
+        other: Name of the object that it is measured from.
         ever: Whether one instant is enough; else it must hold at the end.
         at_least, at_most: Bounds, inclusive; null = unbounded.
     """
@@ -143,11 +143,11 @@ class Task(Strict):
     """An entry of the table.
 
     Attributes:
-        instruction: Sentence with names of things in braces.
-        things: By name, in the order in which they are placed.
+        instruction: Sentence with names of objects in braces.
+        things: Objects by name, in the order in which they are placed.
         program: Steps in order.
         success: Conditions, all of which must hold.
-        hand: What the arm must hold things with; None = either will do.
+        hand: Required kind of hand; None = either will do.
     """
 
     instruction: str
@@ -173,7 +173,7 @@ class Task(Strict):
         used += [name or "" for _, name, _, _ in Formatter().parse(self.instruction)]
         unknown = sorted({*used} - {*self.things, "", "own", HAND})
         if unknown:
-            raise ValueError(f"there is no thing '{unknown[0]}'")
+            raise ValueError(f"there is no object '{unknown[0]}'")
         return self
 
 
@@ -189,7 +189,7 @@ def load_tasks(randomizer: Node) -> Node:
     """Replace the name of a file of tasks, in the document of a randomizer, by its content.
 
     Raises:
-        ConfigError: there is no such file, or it is no YAML.
+        ConfigError: there is no such file, or it is not YAML.
     """
     kind, own = randomizer.get("type"), randomizer.get("tasks")
     if kind is None or kind.content != "arm_task" or own is None:

@@ -66,7 +66,7 @@ class RandomizerBase(Strict):
         """Return a new scene; the one passed in is unchanged.
 
         Raises:
-            ConfigError: a field names something unknown, or the scene lacks what it needs.
+            ConfigError: a field names something unknown, or the scene lacks a required part.
             LayoutRejected: no free or possible place was found; another draw may succeed.
         """
 
@@ -184,7 +184,7 @@ def set_emission(body: Body, assets: AssetIndex, emission_cd_m2: Mapping[str, Ve
 
 
 def add_attributes(scene: Scene, attributes: Mapping[int, Iterable[tuple[str, str]]]) -> Scene:
-    """Return the scene with attributes added to those of some instances, by instance id."""
+    """Return the scene with further attributes of some instances, by instance id."""
     instances = []
     for instance in scene.instances:
         if instance.instance_id in attributes:

@@ -1,4 +1,4 @@
-"""Camera poses on an orbit around the scene's focus or around a thing in it."""
+"""Camera poses on an orbit around the scene's focus or around an object in it."""
 
 from __future__ import annotations
 
@@ -37,9 +37,9 @@ _LENS_CHANGE = 2.0
 
 
 class CameraPose(RandomizerBase):
-    """Places cameras on an orbit around the scene's focus or a thing in it, aimed at it.
+    """Places cameras on an orbit around the scene's focus or an object in it, aimed at it.
 
-    The distance is given by ``distance_m``, or follows from the share of the image that the thing
+    The distance is given by ``distance_m``, or follows from the share of the image that the object
     fills, for the lens that the camera has then: list ``camera_intrinsics`` before it.
 
     Attributes:
@@ -47,17 +47,18 @@ class CameraPose(RandomizerBase):
             with ``rig``, its first camera.
         rig: Name of a ``stand``: it is moved with all its sensors, whose places on it remain, so
             that ``camera`` is where this randomizer places it.
-        aim: What to look at: a group, of which an object is drawn, a surface, or an element by
+        aim: Target of the view: a group, of which an object is drawn, a surface, or an element by
             name; empty = the scene's focus.
         fills: Share of the image's longer side that the longer side of the projected box of the
-            aimed thing spans, hidden parts and parts outside the image included; above 1 it is
+            aimed object spans, hidden parts and parts outside the image included; above 1 it is
             truncated. Takes the place of ``distance_m`` and ``jitter_m``.
-        off_center: With ``fills``: displacement of the thing's centre from the middle of the image,
-            along both axes, drawn for each; 1 = a square of the thing's size touches the border.
+        off_center: With ``fills``: displacement of the object's centre from the middle of the
+            image, along both axes, drawn for each; 1 = a square of the object's size touches
+            the border.
         distance_m: Distance to the look-at point.
         azimuth_deg: Angle around the vertical: 0 is on the +X side, 90 on the +Y side.
         elevation_deg: Angle above the horizon.
-        jitter_m: Largest offset of the look-at point from the focus or the thing's centre, along
+        jitter_m: Largest offset of the look-at point from the focus or the object's centre, along
             each axis.
         roll_deg: Rotation about the viewing direction.
         clearance_m: Smallest distance to any body.
@@ -94,7 +95,7 @@ class CameraPose(RandomizerBase):
         """Check names, and whether some distance in the scene's interior gives the share.
 
         Raises:
-            ConfigError: a name is unknown, or no camera can see a thing as large or as small.
+            ConfigError: a name is unknown, or no camera can see an object as large or as small.
         """
         known = names_to_aim_at(scene)
         for name in self.aim.outcomes():
@@ -116,7 +117,7 @@ class CameraPose(RandomizerBase):
         return replace(scene, cameras=cameras)
 
     def _moved(self, scene: Scene) -> tuple[Camera, ...]:
-        """The cameras to place: without a rig, all that are meant; with one, one of its own."""
+        """The cameras to place: without a rig, all that are meant; with one, one on it."""
         if self.rig:
             stands = [rig.name for rig in scene.rigs if not rig.body]
             fault = f"randomizers.{self.name}.rig: there is no stand"
@@ -164,9 +165,9 @@ class CameraPose(RandomizerBase):
         raise self.reject("no free place for a camera", remedy)
 
     def _frame_thing(self, camera: Camera, scene: Scene, assets: AssetIndex, rng: Rng) -> Camera:
-        """Draw the share once: places that are taken change thing and direction, never the share.
+        """Draw the share once: places that are taken change object and direction, never the share.
 
-        Otherwise large shares of small things, near others, would be rarer than declared.
+        Otherwise large shares of small objects, near others, would be rarer than declared.
         """
         assert self.fills is not None, "only framed cameras come here"
         share = self.fills.draw(rng)
@@ -180,9 +181,9 @@ class CameraPose(RandomizerBase):
                 return replace(camera, T_world_camera=pose.rounded())
         if not seen:
             remedy = "a smaller range of fills or off_center, or another lens"
-            raise self.reject("the lens cannot show a thing at the drawn share", remedy)
+            raise self.reject("the lens cannot show an object at the drawn share", remedy)
         remedy = "another range of fills, azimuth_deg or elevation_deg, or a smaller clearance_m"
-        raise self.reject("no free place for a camera that frames a thing", remedy)
+        raise self.reject("no free place for a camera that frames an object", remedy)
 
     def _draw_thing(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Thing:
         name = self.aim.draw(rng)
@@ -232,18 +233,18 @@ class CameraPose(RandomizerBase):
         if high * _LENS_CHANGE < smallest:
             raise ConfigError(
                 f"{fault}at most {high:g} of the image of camera '{camera.name}', but the smallest "
-                f"thing fills about {smallest:.2g} from the farthest place, {farthest_m:.3g} m "
+                f"object fills about {smallest:.2g} from the farthest place, {farthest_m:.3g} m "
                 "away; expected a larger share, a wider lens or a larger room"
             )
         if low > _LENS_CHANGE * largest:
             raise ConfigError(
                 f"{fault}at least {low:g} of the image of camera '{camera.name}', but the largest "
-                f"thing fills about {largest:.2g} at the clearance_m of {self.clearance_m:g}; "
+                f"object fills about {largest:.2g} at the clearance_m of {self.clearance_m:g}; "
                 "expected a smaller share, a smaller clearance_m or a longer lens"
             )
 
     def _sizes_m(self, scene: Scene, assets: AssetIndex) -> Iterator[Vec3]:
-        """Sizes of things that may be aimed at, along their axes [m]."""
+        """Sizes of objects that may be aimed at, along their axes [m]."""
         groups = {group.name: group.assets for group in scene.groups}
         for name in self.aim.outcomes():
             listed = groups.get(name, ())

@@ -26,15 +26,15 @@ _SWAY_M = 0.2
 class Companions(GroupRandomizer):
     """Gives members of a ``lane_objects`` group company.
 
-    List it after the randomizer that draws the group. Companions of somebody who walks walk beside
+    List it after the randomizer that draws the group. Companions of somebody who walks walk next to
     them in the same direction; companions of somebody who stands form a circle with them and talk.
     Those who would overlap something else are left out, and so are people of packs and files whose
-    one pose is to stand, beside walkers. Everybody has one way to walk in company and one way to
-    talk, so that meshes are used again.
+    one pose is to stand, next to walkers. Everybody has one way to walk in company and one way to
+    talk, which lets scenes share meshes.
 
     Attributes:
         size: Number of people in a company, including the one who has a place already. By default a
-            Poisson distribution without 0 with a mean parameter of 1, so that 63 % of all people
+            Poisson distribution without 0 with a mean parameter of 1: 63 % of all people
             have company; Moussaid et al., "The walking behaviour of pedestrian social groups and
             its impact on crowd dynamics", PLoS ONE 5(4), 2010, report this family of distributions
             and up to 70 %.
@@ -146,7 +146,7 @@ def _posed(asset: str, fitting: Collection[str], pose: str, assets: AssetIndex) 
 
 
 def _fits(asset: str, fitting: Collection[str], assets: AssetIndex) -> bool:
-    """Whether its pose is one of these; what names no pose fits everywhere."""
+    """Whether its pose is one of these; an asset without a pose fits everywhere."""
     own = dict(assets.get(asset).attributes).get("pose")
     return own is None or own in fitting
 

@@ -87,5 +87,5 @@ def _sun(model: SkyModel, yaw_rad: float) -> tuple[Light, ...]:
 
 
 def _significant(value: float) -> float:
-    """Round to five digits, so that the recorded value is the rendered one."""
+    """Round to five digits: the recorded value is the rendered one."""
     return float(f"{value:.5g}")

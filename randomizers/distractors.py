@@ -14,7 +14,7 @@ from gen_data.randomizers.objects import COUNT_MAX, Objects
 class Distractors(Objects):
     """Draws the objects of a group that the template does not annotate.
 
-    Distractors have an instance id in the masks, so that occlusion by them is counted.
+    Distractors have an instance id in the masks: occlusion by them is counted.
 
     Attributes:
         count: Number of distractors.

@@ -20,7 +20,7 @@ from gen_data.randomizers.free_space import Footprint, make_ground, standing_bod
 DOOR = "door"
 """Keypoint of a building where its door meets the ground."""
 _STEP_M = 0.25
-"""Lengths are multiples of this, so that paths are used again."""
+"""Lengths are multiples of this, which lets scenes share paths."""
 _SUNK_M = 0.03
 
 
@@ -28,7 +28,7 @@ class DoorPaths(GroupRandomizer):
     """Lays a path from the street to the door of every house behind a garden.
 
     The members of the group are assets with a parameter ``length_m``. List this randomizer after
-    that of the houses and before those of fences and plants, which then leave the paths free.
+    the houses' and before the fences' and plants', which then leave the paths free.
     Houses without a keypoint ``door`` or without a garden lane before them get none.
 
     Attributes:

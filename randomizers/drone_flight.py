@@ -35,7 +35,7 @@ class DroneFlight(RandomizerBase):
     """Flies the template's drone over a lane; list it after buildings and trees, and after traffic.
 
     The drone flies at constant height and speed through coordinated turns: its bank angle swings
-    about a mean, and turns the heading at ``g tan(bank) / speed`` [rad/s], so that the specific
+    about a mean, and turns the heading at ``g tan(bank) / speed`` [rad/s]: the specific
     force stays in the airframe's plane of symmetry (Stevens, Lewis and Johnson, "Aircraft Control
     and Simulation", 3rd edition, section 3.6). It leans forward with its speed. The gimbal keeps
     its angle to the horizon and to the heading, except for a residual of bank and lean. At time 0

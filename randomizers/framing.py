@@ -1,7 +1,7 @@
-"""Framing: which thing a camera is aimed at, and from where it fills a share of the image.
+"""Framing: which object a camera is aimed at, and from where it fills a share of the image.
 
-The size of a thing in an image is that of the box around the projection of all its vertices, also
-of those outside the image. For a pinhole that is the box of its silhouette; a lens that bends
+The size of an object in an image is the size of the box around the projection of all its vertices,
+also outside the image. For a pinhole that is the box of its silhouette; a lens that bends
 straight edges adds less than the length of an edge bends.
 """
 
@@ -27,7 +27,7 @@ _DOUBLINGS_MAX = 40
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Thing:
-    """A thing to aim a camera at.
+    """An object to aim a camera at.
 
     Attributes:
         center_m: Centre of its bounding box, world.
@@ -53,10 +53,10 @@ def names_to_aim_at(scene: Scene) -> list[str]:
 
 
 def candidates(scene: Scene, name: str) -> list[Region | SupportSurface | tuple[Body, ...]]:
-    """Things of a name, in the scene's order; empty if a group has no object.
+    """Objects of a name, in the scene's order; empty if a group has no object.
 
     A group gives each of its objects, an empty name the scene's focus. A surface's name goes
-    before that of its body.
+    before its body's.
     """
     if not name:
         return [scene.focus]
@@ -95,12 +95,12 @@ def _vertices_m(body: Body, assets: AssetIndex) -> Array:
 
 @dataclass(frozen=True, slots=True)
 class Framing:
-    """How a thing is to be seen.
+    """Wanted view of an object.
 
     Attributes:
         share: Longer side of its box over the longer side of the image.
-        toward: Unit vector from the thing's centre to the camera, world.
-        at_px: Where the thing's centre appears.
+        toward: Unit vector from the object's centre to the camera, world.
+        at_px: Where the object's centre appears.
         roll_rad: Rotation of the camera about its viewing direction.
     """
 
@@ -111,7 +111,7 @@ class Framing:
 
 
 def frame(thing: Thing, framing: Framing, intrinsics: Intrinsics) -> SE3 | None:
-    """``T_world_camera`` that shows a thing as wanted; None if no distance does."""
+    """``T_world_camera`` that shows an object as wanted; None if no distance does."""
     ray = intrinsics.rays(np.array(framing.at_px))
     if np.isnan(ray).any():
         return None
@@ -144,7 +144,7 @@ def long_side_share(points_camera_m: Array, intrinsics: Intrinsics) -> float:
 def distance_for_share(
     share_at: Callable[[float], float], wanted: float, start_m: float
 ) -> float | None:
-    """Distance at which a thing fills the wanted share of an image; None if there is none.
+    """Distance at which an object fills the wanted share of an image; None if there is none.
 
     Args:
         share_at: Share by distance [m]; infinite for distances that are too short.
@@ -202,10 +202,10 @@ def _root(error: Callable[[float], float], low: float, high: float) -> float | N
 
 
 def _turn(framing: Framing, ray: Array) -> SE3:
-    """Rotation of a camera whose ray points at the thing.
+    """Rotation of a camera whose ray points at the object.
 
     Its X axis is level but for the roll, except near the vertical, where a camera that keeps it
-    level cannot show the thing beside its axis.
+    level cannot show the object off its axis.
     """
     c, s = math.cos(framing.roll_rad), math.sin(framing.roll_rad)
     # The ray in a camera without roll: right, down, forward.
@@ -244,8 +244,8 @@ def smallest_and_largest_share(
 ) -> tuple[float, float]:
     """Estimate the range of shares that boxes of these sizes fill, from a range of distances.
 
-    The smallest is that of a box that shows its two shorter sides at the farthest distance, the
-    largest that of the sphere around a box, seen from ``nearest_m`` outside the box's nearest
+    The smallest share belongs to a box that shows its two shorter sides at the farthest distance,
+    the largest to the sphere around a box, seen from ``nearest_m`` outside the box's nearest
     side; infinite where the camera is within that sphere.
     """
     smallest, largest = math.inf, 0.0

@@ -107,7 +107,7 @@ def make_ground(bodies: Iterable[Body], assets: AssetIndex) -> Ground:
 
 
 class _Grounds:
-    """The latest ground: each of a street's randomizers asks for that of the bodies so far."""
+    """The latest ground: each of a street's randomizers needs it for the bodies so far."""
 
     def __init__(self) -> None:
         self._assets: AssetIndex | None = None
@@ -149,7 +149,7 @@ def is_in_the_open(point_m: Vec3, scene: Scene, assets: AssetIndex, margin_m: fl
 
 @dataclass(frozen=True, eq=False)
 class Sight:
-    """What rays through the middles of a grid of an image's cells meet first.
+    """First hits of rays through the middles of a grid of an image's cells.
 
     Attributes:
         bodies: Bodies that were tested, by their bounding boxes.
@@ -165,7 +165,7 @@ class Sight:
 
 
 def look_around(camera: Camera, scene: Scene, assets: AssetIndex, reach_m: float) -> Sight:
-    """What a camera sees within a reach; parts of the image without a ray show nothing."""
+    """Surfaces that a camera sees within a reach; parts of the image without a ray show nothing."""
     k = camera.intrinsics
     u, v = ((np.arange(count) + 0.5) / count for count in _GRID)
     shares = np.stack(np.meshgrid(u, v), axis=-1).reshape(-1, 2)
@@ -228,14 +228,14 @@ class _Boxes:
 def hidden_share(camera: Camera, scene: Scene, assets: AssetIndex, near_m: float) -> float:
     """Share of a camera's image, in [0, 1], that bodies nearer than ``near_m`` may hide.
 
-    Bodies are those that ``is_clear`` tests.
+    ``is_clear`` tests the same bodies.
     """
     distances_m = look_around(camera, scene, assets, near_m).distances_m
     return float((distances_m <= near_m).mean()) if len(distances_m) else 0.0
 
 
 def is_clear(point_m: Vec3, scene: Scene, assets: AssetIndex, margin_m: float) -> bool:
-    """Whether a point is no nearer than ``margin_m`` to a body.
+    """Whether a point is at least as far as ``margin_m`` to a body.
 
     Bodies are tested by their bounding boxes. The background (the room itself) is ignored, except
     for the fixtures of lights.
@@ -245,7 +245,7 @@ def is_clear(point_m: Vec3, scene: Scene, assets: AssetIndex, margin_m: float) -
 
 
 def _solid_bodies(scene: Scene) -> Iterator[Body]:
-    """Yield all bodies but the background; fixtures of lights are no background."""
+    """Yield all bodies but the background; fixtures of lights do not belong to it."""
     fixtures = {light.body for light in scene.lights}
     for body in scene.bodies:
         if body.instance_id or body.name in fixtures:

@@ -68,8 +68,8 @@ class Furnish(RandomizerBase):
 
     Attributes:
         room: Name of the template's ``room_layout`` element.
-        length_m, width_m, height_m: Inner size along X, Y and Z; by default that of the type.
-        clutter: Factor on the numbers of small things.
+        length_m, width_m, height_m: Inner size along X, Y and Z; by default the type's.
+        clutter: Factor on the numbers of small objects.
     """
 
     type: Literal["furnish"] = "furnish"
@@ -81,7 +81,7 @@ class Furnish(RandomizerBase):
     clutter: dist.NonNegative = dist.Uniform(0.6, 1.6)
 
     def possible_assets(self, assets: AssetIndex) -> tuple[str, ...]:
-        """Ids of what is outside, and texture files; the element's group lists the furniture."""
+        """Ids of assets outside, and texture files; the element's group lists the furniture."""
         floors = find_textures(assets, ("floor",), f"randomizers.{self.name}")
         return (*find_texture_files(assets, floors), *outlook_assets())
 

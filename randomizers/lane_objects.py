@@ -68,7 +68,7 @@ class LaneObjects(GroupRandomizer):
     existing ones are left out.
 
     Attributes:
-        lanes: Kinds of lanes to use; empty = those of the group.
+        lanes: Kinds of lanes to use; empty = the group's.
         roads: Names of the elements whose lanes to use; empty = all.
         gap_m: Gap between neighbours along a lane, or between runs.
         run_m: Length of a run: the same asset again and again without gaps, such as the fence of
@@ -78,7 +78,7 @@ class LaneObjects(GroupRandomizer):
         count: Largest number of objects, chosen at random from all places; null = no limit.
         min_count: Smallest number of free places; a layout with fewer is rejected.
         lateral: Position across the free width of the lane: -1 right edge, 0 middle, 1 left edge.
-        behind_m: Distance to the right of the lane, which is away from the street on lanes beside
+        behind_m: Distance to the right of the lane, which is away from the street on lanes next to
             it: second rows of houses, trees behind them.
         yaw_deg: Rotation from the lane's direction.
         reversed: Whether an object faces against the lane's direction.
@@ -251,7 +251,7 @@ def _scale_bounds(bounds_m: Bounds, scale: float) -> Bounds:
 
 
 def _land_fall_m(behind_m: float) -> float:
-    """Depth of the land below a lane beside a road, at a distance away from the street."""
+    """Depth of the land below a lane next to a road, at a distance away from the street."""
     return min(1.0, behind_m / LAND_SLOPE_M) * LAND_FALL_M
 
 

@@ -22,7 +22,7 @@ class Materials(SurfaceRandomizer):
         coated: Whether to set a clear coat; otherwise the material keeps its own.
         coat: Weight of the clear coat.
         coat_roughness: Roughness of the clear coat.
-        clear: Whether the object transmits light; its colour then is a tint, and it is no metal.
+        clear: Whether the object transmits light; its colour then is a tint, and it is not a metal.
         transmission: Fraction of the light that is transmitted.
         ior: Index of refraction.
         solid: Whether the object refracts as a solid; otherwise its walls are thin panes.

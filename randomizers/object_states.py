@@ -1,4 +1,4 @@
-"""States of things: doors, drawers and lids that are open, screens and taps that are on."""
+"""States of objects: doors, drawers and lids that are open, screens and taps that are on."""
 
 from __future__ import annotations
 
@@ -31,20 +31,20 @@ _STEPS = (1.0, 0.6, 0.3)
 
 
 class ObjectStates(RandomizerBase):
-    """Opens doors, drawers and lids as far as nothing is in their way, and switches things on.
+    """Opens doors, drawers and lids as far as nothing is in their way, and switches devices on.
 
     Labels carry ``open``, from 0 to 1, ``joint``: the turn [rad] or way [m] of the part, and
     ``state``: on or off, of screens and taps. Doors that lead out of all rooms stay closed.
 
-    Things with joints of a user (element ``prop``) move, too. Labels carry, for a joint ``j``,
+    Jointed objects of a user (element ``prop``) move, too. Labels carry, for a joint ``j``,
     ``open_j`` from 0 to 1, its position ``joint_j`` [rad or m], ``joint_j_type``, its limits
-    ``joint_j_limits``, and its axis in the frame of the thing, ``joint_j_axis``.
+    ``joint_j_limits``, and its axis in the frame of the object, ``joint_j_axis``.
 
     Attributes:
         is_open: Whether a part is open at all.
         opening: Share of the joint's range, if it is.
         is_on: Whether a screen is on.
-        luminance_cd_m2: Of screens that are on.
+        luminance_cd_m2: Luminance of screens that are on.
         runs: Whether water runs from a tap.
     """
 
@@ -105,7 +105,7 @@ class ObjectStates(RandomizerBase):
     def _move(
         self, scene: Scene, assets: AssetIndex, thing: Instance, rng: Rng
     ) -> tuple[tuple[Body, ...], list[tuple[str, str]]]:
-        """The bodies of a thing with its joints drawn, and what labels state of each joint.
+        """The bodies of an object with its joints drawn, and the labels of each joint.
 
         A joint opens from its home position towards its farther limit.
         """
@@ -158,7 +158,7 @@ def _jointed_things(scene: Scene, assets: AssetIndex) -> Iterator[Instance]:
 
 
 def _base_pose(thing: Instance, model: RobotModel, own: Mapping[str, Body]) -> SE3:
-    """``T_world_base`` of a thing in its home position."""
+    """``T_world_base`` of an object in its home position."""
     poses = link_poses(model, SE3(), model.home)
     name, body = next(iter(own.items()))
     link = name.removeprefix(f"{thing.name}/")
@@ -172,7 +172,7 @@ def _placed(
     positions: Mapping[str, float],
     own: Mapping[str, Body],
 ) -> tuple[Body, ...]:
-    """The bodies of a thing at joint positions [rad or m]."""
+    """The bodies of an object at joint positions [rad or m]."""
     poses = link_poses(model, T_world_base, positions_of(model.joints, positions))
     return tuple(
         replace(body, T_world_body=poses[name.removeprefix(f"{thing.name}/")].rounded())

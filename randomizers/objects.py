@@ -19,7 +19,7 @@ COUNT_MAX = 500
 class Objects(GroupRandomizer):
     """Replaces the objects of a group by drawn ones: their number, assets, sizes and start poses.
 
-    The category is drawn first and then one of its assets, so that a category with many variants
+    The category is drawn first and then one of its assets: a category with many variants
     is not more frequent.
 
     Attributes:

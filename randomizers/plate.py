@@ -17,8 +17,8 @@ from gen_data.randomizers.base import RandomizerBase, check_known, choose
 class PhotoPlate(RandomizerBase):
     """Draws the photograph of the element ``plate`` of the same name.
 
-    Its ground, light, lanes and camera come with it: list this randomizer before those that place
-    things on the ground.
+    Its ground, light, lanes and camera come with it: list this randomizer before the ones that
+    place objects on the ground.
 
     Attributes:
         photos: Ids or tags of photographs (``plates`` in ``assets.yaml``).

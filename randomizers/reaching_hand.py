@@ -41,7 +41,7 @@ class _Reach:
     """A drawn place of a hand in the frame of its surface.
 
     Attributes:
-        tip: Point on the surface of what the hand holds, or of its fingertips.
+        tip: Point on the surface of the held object, or of its fingertips.
         yaw_rad: Direction of the forearm towards the fingers.
     """
 
@@ -60,12 +60,12 @@ class ReachingHand(GroupRandomizer):
         probability: Whether there is a hand.
         holding: Whether it holds something; otherwise it rests, points or is closed.
         things: Name of the object group whose assets it may hold.
-        held_categories: Categories that it may hold; those with an upright, round middle as thick
-            as a hand can grasp.
-        reach_m: Distance from the edge to what it holds, or to its fingertips.
+        held_categories: Categories that it may hold; the ones with an upright, round middle as
+            thick as a hand can grasp.
+        reach_m: Distance from the edge to the held object, or to its fingertips.
         turn_deg: Angle between forearm and the normal of the edge.
-        raised_m: Height of a held object above the surface; low ones are raised so that the hand
-            has room.
+        raised_m: Height of a held object above the surface; low ones are raised to give the hand
+            room.
     """
 
     type: Literal["reaching_hand"] = "reaching_hand"
@@ -188,8 +188,8 @@ class ReachingHand(GroupRandomizer):
 def measure_radii(vertices_m: Array | Float32, heights_m: Array) -> tuple[float, ...] | None:
     """Radii of an upright, round object about its Z axis at some heights [m].
 
-    A handle is left out. The outside between vertices is that of their convex hull within 6 cm, so
-    that contents and inner walls do not count. None if the object is not round there.
+    A handle is left out. The outside between vertices follows their convex hull within 6 cm:
+    contents and inner walls do not count. None if the object is not round there.
 
     Args:
         vertices_m: Vertices in the object's frame, shape [n, 3].
@@ -264,7 +264,7 @@ def _ends(member: Member, assets: AssetIndex) -> tuple[Array, Array]:
 
 
 def _is_behind_edge(member: Member, surface: SupportSurface, assets: AssetIndex) -> bool:
-    """Whether the arm comes from beyond the edge; things without joints may lie anywhere."""
+    """Whether the arm comes from beyond the edge; hands without joints may lie anywhere."""
     if not assets.keypoints(member.asset):
         return True
     rear, _ = _ends(member, assets)
@@ -280,7 +280,7 @@ def _is_free(member: Member, scene: Scene, assets: AssetIndex) -> bool:
 
 
 def _cover(members: Sequence[Member], assets: AssetIndex) -> tuple[Vec3, ...]:
-    """Discs ``(x, y, radius)`` [m], world, over an arm and what it holds."""
+    """Discs ``(x, y, radius)`` [m], world, over an arm and a held object."""
     rear, tip = _ends(members[0], assets)
     count = max(2, math.ceil(math.dist(rear[:2], tip[:2]) / _DISC_M))
     discs = [

@@ -1,4 +1,4 @@
-"""Cameras in rooms: where a person or a robot can stand, looking at what is there."""
+"""Cameras in rooms: where a person or a robot can stand, looking at furniture."""
 
 from __future__ import annotations
 
@@ -148,7 +148,7 @@ class RoomCamera(RandomizerBase):
 
 
 def _is_hidden(sight: Sight, near_m: float) -> bool:
-    """Whether what is near, but floors and ceilings, hides too much of an image."""
+    """Whether near surfaces, but floors and ceilings, hide too much of an image."""
     flat = [body.name.endswith(("/floor", "/ceiling")) for body in sight.bodies]
     near = (sight.distances_m <= near_m) & ~np.array([*flat, True])[sight.hits]
     middle = (np.abs(sight.places) < _MIDDLE).all(axis=1)
@@ -156,7 +156,7 @@ def _is_hidden(sight: Sight, near_m: float) -> bool:
 
 
 def _is_large(body: Body, assets: AssetIndex) -> bool:
-    """Whether a piece is furniture rather than a small thing."""
+    """Whether a piece is furniture rather than a small object."""
     low, high = assets.bounds_m(body.asset)
     return max(b - a for a, b in zip(low, high, strict=True)) > _LARGE_M
 

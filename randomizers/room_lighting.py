@@ -33,9 +33,9 @@ _SHADE_M2 = 0.35
 """Assumed luminous area of a lamp: a shade of 0.2 m radius and 0.25 m height."""
 _BULB_M = 0.06
 _VIEW_MEAN = 0.7
-"""What windows send in, relative to the mean outside: houses hide some sky, and panes reflect."""
+"""Light from windows, relative to the mean outside: houses hide some sky, and panes reflect."""
 _DAYLIGHT: Vec3 = (0.95, 1.0, 1.07)
-"""Colour of what windows send in: between overcast and clear skies."""
+"""Colour of light from windows: between overcast and clear skies."""
 _SKIES = 8
 _NIGHT_CD_M2 = 0.2
 """Assumed mean outdoors by night in towns: a lit street has 1 cd/m^2 (EN 13201-2), a sky 0.01."""
@@ -44,7 +44,7 @@ _NIGHT_CD_M2 = 0.2
 class RoomLighting(RandomizerBase):
     """Replaces the lights of a furnished room: lamps, daylight from windows, and the sun.
 
-    Each window is a panel with the luminance of the view outside; what surfaces send to each other
+    Each window is a panel with the luminance of the view outside; light between surfaces
     is found by radiosity. Labels of lamps carry ``state``: on or off.
 
     Attributes:

@@ -28,7 +28,7 @@ CELL_M = 0.1
 KNOT_S = 0.1
 _GOALS = 40
 _FLAT_M = 0.03
-"""Higher things are in the way."""
+"""Higher objects are in the way."""
 _HEAD_M = 2.0
 _TURN_S = 0.8
 """Time over which the heading follows the path."""
@@ -116,7 +116,7 @@ class RoomPath(RandomizerBase):
 
 
 def _obstacles(scene: Scene, assets: AssetIndex, room: str) -> list[Rectangle]:
-    """Footprints of what a walker runs into: furniture and open doors."""
+    """Footprints of a walker's obstacles: furniture and open doors."""
     found = []
     for body in scene.bodies:
         if not (body.group == room or body.name.endswith("/leaf")):
@@ -166,7 +166,7 @@ class _Grid:
         self._free = free
 
     def is_free(self, points_m: Array) -> bool:
-        """Whether all points [n, 2] are in free cells, or beside one."""
+        """Whether all points [n, 2] are in free cells, or next to one."""
         i = np.floor((points_m[:, 1] - self._corner[1]) / CELL_M).astype(np.intp)
         j = np.floor((points_m[:, 0] - self._corner[0]) / CELL_M).astype(np.intp)
         return bool(self._free[i, j].all())

@@ -41,7 +41,7 @@ class StreetLights(RandomizerBase):
         cone_deg: Half angle at which a lamp's light has faded; it does so from half of it on.
         broken: Whether a lamp is dark.
         lamp_luminance_cd_m2: Luminance of a lamp's emitting surface.
-        windows: Whether windows of a body are lit; its texture says which.
+        windows: Whether windows of a body are lit; its texture defines which.
         window_luminance_cd_m2: Luminance of lit windows.
         window_temperature_k: Colour temperature of lit windows.
     """

@@ -94,7 +94,7 @@ class TrafficFlow(RandomizerBase):
         routes: Route by name of a vehicle (``ego``): lanes, or points (x, y) in metres, to drive
             through; a random route follows. Vehicles without an entry drive at random.
         signals: Whether traffic lights operate. If not, they keep their state, and vehicles give
-            way to those that arrive first or from the right.
+            way to vehicles that arrive first or from the right.
         green_s: Duration of green for one axis of a junction.
         all_red_s: Time between amber for one axis and green for the other.
         lens_cd_m2: Luminance of a lit signal lens.

@@ -36,7 +36,7 @@ class Umbrellas(RandomizerBase):
     rain_mm_h: float = Field(2.5, gt=0, le=500)
 
     def check(self, scene: Scene, assets: AssetIndex) -> None:
-        """Raise ConfigError if a target is no group of the template."""
+        """Raise ConfigError if a target is not a group of the template."""
         del assets
         groups: dict[str, ObjectGroup] = {group.name: group for group in scene.groups}
         for name in self.targets:

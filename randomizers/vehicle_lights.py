@@ -31,7 +31,7 @@ _CONE_RAD = 0.9
 _EVEN = 0.5
 """The beam is uniform up to this fraction of its cone."""
 _OUTSIDE_M = 0.06
-"""A beam starts this far in front of its lens, so that the lens does not shade it."""
+"""A beam starts this far in front of its lens, which therefore does not shade it."""
 
 
 class VehicleLights(SurfaceRandomizer):
@@ -41,7 +41,7 @@ class VehicleLights(SurfaceRandomizer):
         headlights: Whether head and tail lights are on by day; they always are in the dark.
         braking: Whether the brake lights are on.
         indicator: Indicators that are on: none, left, right or both.
-        headlight_cd_m2: Mean luminance of a headlight's lens outside its beam: UN R112 asks for 62
+        headlight_cd_m2: Mean luminance of a headlight's lens outside its beam: UN R112 requires 62
             to 437 cd there (zone III), and lenses have 40 to 490 cm^2.
         taillight_cd_m2, brakelight_cd_m2, indicator_cd_m2: Luminance of the other lamps. UN R7 and
             R6 require 4 to 17 cd, 60 to 260 cd and 175 to 1000 cd; lenses have about 340, 100 and
@@ -84,7 +84,7 @@ class VehicleLights(SurfaceRandomizer):
         return add_attributes(lit, states)
 
     def _draw_emission(self, on: bool, braking: bool, side: str, rng: Rng) -> dict[str, Vec3]:
-        """Draw emission by role; every luminance is drawn, so that switches shift no other draw."""
+        """Draw emission by role; every luminance is drawn: switches shift no other draw."""
         head, tail = self.headlight_cd_m2.draw(rng), self.taillight_cd_m2.draw(rng)
         brake, blink = self.brakelight_cd_m2.draw(rng), self.indicator_cd_m2.draw(rng)
         glow: dict[str, Vec3] = {}

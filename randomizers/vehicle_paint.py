@@ -24,7 +24,7 @@ _GATHERED = 3.2
 _PIGMENT = 0.45
 """Roughness of the pigment below a clear coat."""
 _WORN = 0.4
-"""Ratio of a clear coat's roughness to that of an uncoated paint of similar appearance."""
+"""Ratio of a clear coat's roughness to the roughness of an uncoated paint of similar appearance."""
 _WEATHERED = (0.42, 0.65)
 """Roughness of paint whose clear coat has gone; assumed."""
 _PALER = 0.02
@@ -66,12 +66,12 @@ class VehiclePaint(SurfaceRandomizer):
         metallic: Whether the paint contains metal flakes; white never does.
         dirt: Fraction of dust on the vehicle's surfaces; more gathers along sills, around and
             behind wheels and on the rear.
-        weathered: Probability that the clear coat of a vehicle has gone, so that its paint is matt
+        weathered: Probability that the clear coat of a vehicle has gone: its paint is matt
             and paler, without flakes.
         plates: Whether every vehicle gets its own licence plate instead of its model's.
         countries: Relative frequency by country of licence plates, drawn once per scene: de, fr,
-            gb, ..., us_ca, us_tx, jp, cn. Those that are not 520 mm by 110 mm are drawn smaller, in
-            a dark holder.
+            gb, ..., us_ca, us_tx, jp, cn. Plates that are not 520 mm by 110 mm are drawn smaller,
+            in a dark holder.
         foreign: Probability that a vehicle's plate is of another of the countries.
         coat: Weight of a separate clear coat, traced with one ray per pixel; ``roughness`` then
             sets the wear of the coat. 0 = no separate coat.

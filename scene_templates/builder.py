@@ -61,7 +61,7 @@ def focus_region(scene: Scene) -> Region:
 
 
 def _bounds_of_lanes(lanes: Sequence[Lane]) -> tuple[Vec3, Vec3]:
-    """Space for the cameras and lamps of a street: above its lanes and beside them."""
+    """Space for the cameras and lamps of a street: above its lanes and next to them."""
     points = np.concatenate([np.array(lane.center_m) for lane in lanes])
     low, high = points.min(axis=0), points.max(axis=0)
     x0, y0 = (float(v) - STREET_MARGIN_M for v in low[:2])

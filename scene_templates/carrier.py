@@ -13,7 +13,7 @@ from gen_data.generator.core.se3 import SE3
 from gen_data.scene_templates.element import Element, next_instance_id
 
 CATEGORY = "ego"
-"""Category of its pixels; no data set lists it, so that they have no category id."""
+"""Category of its pixels; no data set lists it: they have no category id."""
 
 
 class Carrier(Element):

@@ -16,7 +16,7 @@ from gen_data.generator.traffic.axles import find_axles
 from gen_data.scene_templates.element import Element, name_relations, next_instance_id
 
 CATEGORY = "ego"
-"""Category of its pixels; no data set lists it, so that they have no category id."""
+"""Category of its pixels; no data set lists it: they have no category id."""
 
 
 class Ego(Element):

@@ -1,4 +1,4 @@
-"""Fields beside a road."""
+"""Fields next to a road."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Crop = Literal[
 ]  # fmt: skip
 
 _LIFT_M, _LOWEST_M = 0.02, -0.05
-"""Fields lie this far over the land beside the road, and never below the ground around."""
+"""Fields lie this far over the land next to the road, and never below the ground around."""
 _BALE_PITCH_M, _BALE_KINDS, _REACH_M = 17.0, 6, 60.0
 """Distance between bales: one per 290 m^2 gives the 35 per hectare of straw that balers report
 (assumed, 30 %); variants; farther bales would be a few pixels high."""

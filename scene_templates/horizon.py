@@ -29,18 +29,18 @@ _VARIANTS: dict[HorizonKind, int] = {"trees": 8, "forest": 6, "town": 8, "skylin
 _OUTWARD = 16
 """Directions in which outermost points are sought."""
 _INSIDE_M = 0.01
-"""Depth below which a point is no corner of the outline, whatever rounding does."""
+"""Depth below which a point is not a corner of the outline, whatever rounding does."""
 _SUNK_M: dict[HorizonKind, float] = {
     "trees": 0.12, "forest": 0.12, "town": 0.12, "skyline": 0.12, "hills": 1.0,
 }  # fmt: skip
-"""Pieces stand this far below z = 0, so that no gap shows under them."""
+"""Pieces stand this far below z = 0: no gap shows under them."""
 
 
 class Horizon(Element):
     """A ring of scenery around all roads that ends the view; background, without labels.
 
     Each kind is a layer of pieces that face the roads. The ring follows the convex outline of all
-    lanes, so that no piece stands on a road.
+    lanes: no piece stands on a road.
 
     Attributes:
         kinds: Layers: rows of trees, forests, roofs of a town, skylines, hills with fields.

@@ -32,7 +32,7 @@ class Intersection(RoadSurface, Element):
         arms_deg: Directions of its three or four arms, ascending from 0; arm 0 is the first.
         sidewalk_m: Width of the sidewalks; 0 = none.
         beside_m: Width between kerb and sidewalk, to match roads with verges or parking strips.
-        setback_m: Width of the land between sidewalk and house fronts, to match that of the roads.
+        setback_m: Width of the land between sidewalk and house fronts, to match the roads'.
         kerb_m: Height of the kerbs.
         radius_m: Radius of the kerb at the corners.
         crown: Cross slope of the arms, from their middle to their gutters.

@@ -21,7 +21,7 @@ class Junction(Intersection):
     Attributes:
         lanes: Number of lanes per arm and direction.
         lane_width_m: Width of each lane.
-        median_m: Width of the strip between the directions, to match that of the roads.
+        median_m: Width of the strip between the directions, to match the roads'.
         turn_lane: Whether that strip, at least 2.5 m wide, is a lane for those who turn across.
             Roads continue it by ``turn_m``.
         speed_m_s: Usual speed of crossing vehicles.

@@ -36,7 +36,7 @@ class LaneObjects(Element):
     annotate: bool = True
 
     def leave_out(self, scene: Scene) -> Scene:
-        """Return the scene with a group of no objects, so that randomizers know its name."""
+        """Return the scene with a group of no objects, whose name randomizers accept."""
         return replace(scene, groups=(*scene.groups, empty_group(self.name, "along")))
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:

@@ -56,7 +56,7 @@ class LevelCrossing(Element):
         return name_relations(road=self.road)
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
-        """Add the surface as background; the track beside the road and the barriers take room."""
+        """Add the surface as background; the track next to the road and the barriers take room."""
         where = f"elements.{self.name}"
         place = find_place(scene, self.road, self.station_m, 6.0, where)
         _, parameters, T_world_road = find_road(scene, self.road, f"{where}.road")

@@ -130,7 +130,7 @@ class Objects(Element):
         return name_relations(on=self.on)
 
     def leave_out(self, scene: Scene) -> Scene:
-        """Return the scene with a group of no objects, so that randomizers know its name."""
+        """Return the scene with a group of no objects, whose name randomizers accept."""
         return replace(scene, groups=(*scene.groups, empty_group(self.name, self.placement)))
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:

@@ -1,4 +1,4 @@
-"""Petrol stations beside roads."""
+"""Petrol stations next to roads."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _BESIDE_M, _CARS = 1.75, 124
 
 
 class PetrolStation(Element):
-    """A forecourt beside a road with a canopy over pumps, a shop and a price sign.
+    """A forecourt next to a road with a canopy over pumps, a shop and a price sign.
 
     It takes the place of houses, gardens and trees there; the road stays as it is. Two driveways
     cross the kerb and the sidewalk. Only cars at the pumps have labels.
@@ -111,7 +111,7 @@ class PetrolStation(Element):
         return scene
 
     def _add_cars(self, scene: Scene, assets: AssetIndex, T_world_canopy: SE3, brand: int) -> Scene:
-        """Add cars beside the islands, their fronts to or from the shop."""
+        """Add cars next to the islands, their fronts to or from the shop."""
         rng = variant_rng("petrol_station/cars", self.seed)
         for number, y in enumerate(declared("petrol_canopy", "islands_m")(brand)):
             here = rng.chance(self.cars)

@@ -22,7 +22,7 @@ _GROUND_M, _GROUND_SCALE = (100.0, 100.0), 6.0
 class PlateElement(Element):
     """A photograph as backdrop; the randomizer ``plate`` of the same name draws another one.
 
-    Its ground shows the photograph, with shadows and reflections of what stands on it. The ground
+    Its ground shows the photograph, with shadows and reflections of objects on it. The ground
     is a surface of the element's name for ``objects``; the photograph's lanes are for
     ``lane_objects``. List it before both.
 

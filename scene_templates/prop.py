@@ -1,4 +1,4 @@
-"""Single static objects, and things with joints."""
+"""Single static objects, and jointed objects."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from gen_data.scene_templates.element import (
 class Prop(PlacedElement):
     """A static asset, such as a gantry, a plinth or a tray.
 
-    A thing with joints, listed under ``robots`` of an asset folder with a category such as
+    A jointed object, listed under ``robots`` of an asset folder with a category such as
     ``cabinet``, is one instance whose parts are its links; ``object_states`` moves its joints.
 
     Attributes:

@@ -1,4 +1,4 @@
-"""Roads, and the lanes on and beside them."""
+"""Roads, and the lanes on and next to them."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class RoadSurface(Strict):
     Attributes:
         wear: Wear from 0, new, to 1, worn out: ruts, patches, sealed cracks, flaking paint.
         paving: Material of the sidewalks.
-        ground: Material of the land beside.
+        ground: Material of the land on its sides.
         carriageway: Material of the driven surface; gravel and earth have no markings.
         age_years: Age of the driven surface: asphalt turns from dark to grey; -1 = 40 times the
             wear.
@@ -93,7 +93,7 @@ class Road(RoadSurface, Element):
         bicycle_m, shoulder_m: Width of bicycle lanes and of hard shoulders; 0 = none.
         parking: Parking strips along the kerb: true or ``parallel`` = 2.2 m wide, ``angled`` =
             bays at 60 degrees, 5.58 m, ``perpendicular`` = 5 m; angled and perpendicular bays are
-            lanes of their own. A single word is for both sides.
+            separate lanes. A single word is for both sides.
         verge_m: Width of planted strips between kerb and sidewalk; 0 = none.
         sidewalk_m: Width of the sidewalks; 0 = none.
         setback_m: Width of the land between sidewalk and house fronts, covered with ``ground``; a
@@ -109,7 +109,7 @@ class Road(RoadSurface, Element):
         rails: Whether there are guard rails.
         arrows: Whether lanes that lead to the start and to the end of the road have arrows there.
         tram: Whether the lanes next to the middle have the rails of a tramway.
-        apron_m: Width of the land beside the road that slopes down to the ground.
+        apron_m: Width of the land next to the road that slopes down to the ground.
         speed_m_s: Usual speed.
     """
 
@@ -149,7 +149,7 @@ class Road(RoadSurface, Element):
         return name_relations(after=self.after)
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
-        """Add the road as background, and link its lanes to those of the roads that it meets."""
+        """Add the road as background, and link its lanes to the roads that it meets."""
         shape = self.shape()
         pose = self._find_pose(scene)
         options: dict[str, Any] = {
@@ -229,7 +229,7 @@ def add_street(
     T_world_body: SE3,
     lanes: tuple[Lane, ...],
 ) -> Scene:
-    """Add a surface as background, and link its lanes to those that it meets."""
+    """Add a surface as background, and link its lanes to the ones that it meets."""
     scene = add_background(scene, assets, name, asset, T_world_body)
     return replace(scene, lanes=link_lanes((*scene.lanes, *lanes)))
 

@@ -1,4 +1,4 @@
-"""Places along a road: frames beside it, and lanes that leave room for what stands there."""
+"""Places along a road: frames next to it, and lanes that leave room for them."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class RoadPlace:
         return (row[-1].outer_m, row[-1].outer_z_m) if row else (0.0, 0.0)
 
     def sagitta_m(self, side: int, half_m: float) -> float:
-        """How far the road bends into a straight rectangle of half a length beside it."""
+        """How far the road bends into a straight rectangle of half a length at its side."""
         return 0.5 * max(0.0, side * self.shape.curvature_per_m) * half_m * half_m
 
 
@@ -70,7 +70,7 @@ def find_place(scene: Scene, road: str, station_m: float, half_m: float, where: 
 def cut_lanes(
     scene: Scene, place: RoadPlace, half_m: float, kinds: Collection[LaneKind], sides: str = "both"
 ) -> Scene:
-    """Return the scene whose lanes beside a road have a gap around a place.
+    """Return the scene whose lanes next to a road have a gap around a place.
 
     Lanes across the road, such as bays, are left out within the gap.
 
@@ -94,7 +94,7 @@ def cut_lanes(
 
 
 def _station_m(lane: Lane, place: RoadPlace) -> float:
-    """Arc length of the road beside the start of a lane that lies across it, such as a bay."""
+    """Arc length of the road at the start of a lane that lies across it, such as a bay."""
     start = place.T_world_road.inverse().apply(np.array([lane.center_m[0]]))[0, :2]
     s = np.linspace(0.0, place.shape.length_m, max(2, round(place.shape.length_m) + 1))
     away = place.shape.line().points(s, np.zeros(len(s))) - start
@@ -102,7 +102,7 @@ def _station_m(lane: Lane, place: RoadPlace) -> float:
 
 
 def _pieces(lane: Lane, place: RoadPlace, half_m: float) -> Iterator[Lane]:
-    """What is left of a lane on both sides of a gap; the first piece keeps the name."""
+    """The rest of a lane on both sides of a gap; the first piece keeps the name."""
     line = LaneLine(lane)
     middle, reach = place.station_m / place.shape.length_m, half_m / line.length_m
     # Lanes on the left run against the road.

@@ -19,7 +19,7 @@ _SPARE_RAD = math.radians(4.0)
 class Roundabout(Intersection):
     """A roundabout of one lane; roads of one lane per direction start at ``<name>/<arm>``.
 
-    Vehicles wait for each other as at a junction without signs, not only for those on the ring.
+    Vehicles wait for each other as at a junction without signs, not only for vehicles on the ring.
 
     Attributes:
         diameter_m: Outer diameter of the ring.
@@ -52,8 +52,8 @@ class Roundabout(Intersection):
         if self.ring_m < self.truck_apron_m + self.lane_width_m or shape.island_m < 2.0:
             raise ConfigError(
                 f"{where}.ring_m: {self.ring_m:g} m; expected {self.truck_apron_m:g} m of truck "
-                f"apron and at least {self.lane_width_m:g} m beside it, and an island of at least "
-                f"4 m within a diameter of {self.diameter_m:g} m"
+                f"apron and at least {self.lane_width_m:g} m at its side, and an island of at "
+                f"least 4 m within a diameter of {self.diameter_m:g} m"
             )
         self.check_corners(shape)
         needed = 2.0 * shape.mouth_rad() + _SPARE_RAD

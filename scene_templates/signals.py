@@ -26,7 +26,7 @@ SIGNAL_M = 0.6
 
 
 class Signals(Element):
-    """A traffic light beside every road into a junction, facing the incoming traffic.
+    """A traffic light at every road into a junction, facing the incoming traffic.
 
     Attributes:
         junction: Name of the junction; list its roads before this element.

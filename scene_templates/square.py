@@ -1,4 +1,4 @@
-"""Squares beside roads."""
+"""Squares next to roads."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _WALK_M = 3.0
 
 
 class Square(Element):
-    """A paved square beside a road: houses on three sides, trees, benches and a fountain.
+    """A paved square next to a road: houses on three sides, trees, benches and a fountain.
 
     Sidewalks run along its houses, on which people walk; the rest is background without labels.
 
@@ -63,7 +63,7 @@ class Square(Element):
         return name_relations(road=self.road)
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
-        """Add the pavement, what stands on it and around it, and its sidewalks."""
+        """Add the pavement, its objects and surroundings, and its sidewalks."""
         side = 1 if self.side == "left" else -1
         where = f"elements.{self.name}"
         place = find_place(scene, self.road, self.station_m, 0.5 * self.length_m, where)

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 import click
 
+from docs.hooks.plugin_reference import as_fields
 from gen_data.generator.cli.main import cli
 
 
@@ -20,7 +21,7 @@ def command_page() -> str:
         options = [p for p in command.get_params(context) if isinstance(p, click.Option)]
         rows = [_row(option, context) for option in options if not option.hidden]
         if rows:
-            lines.append("\n".join(("| option | default | |", "|---|---|---|", *rows)))
+            lines.append(as_fields("\n".join(("| option | default | |", "|---|---|---|", *rows))))
     return "\n\n".join(part for part in lines if part) + "\n"
 
 
@@ -52,7 +53,8 @@ def _row(option: click.Option, context: click.Context) -> str:
     default = option.get_default(context, call=False)
     shown = f"`{default}`" if option.show_default and default not in (None, ()) else ""
     text = (option.help or "").replace("<", "&lt;")
-    return "| " + " | ".join(cell.replace("|", "\\|") for cell in (names, shown, text)) + " |"
+    # Bars in code need no escape, and would show it.
+    return "| " + " | ".join((names, *(cell.replace("|", "\\|") for cell in (shown, text)))) + " |"
 
 
 def _takes_context(option: click.Option) -> bool:

@@ -27,7 +27,6 @@ PAGES = {
     "README.md": "index.md",
     "ARCHITECTURE.md": "project/architecture.md",
     "CONVENTIONS.md": "project/conventions.md",
-    "DECISIONS.md": "project/decisions.md",
     "CONTRIBUTING.md": "project/contributing.md",
     "CHANGELOG.md": "project/changelog.md",
     "examples/README.md": "project/examples.md",

@@ -75,7 +75,7 @@ def read_model(document: Node, model: type[Model]) -> Model:
 
 
 def check_whole(name: str, value: object, least: int | None = None) -> None:
-    """Refuse an argument that is no whole number of at least ``least``; None = any.
+    """Refuse an argument that is not a whole number of at least ``least``; None = any.
 
     Raises:
         ConfigError: it is none; True and False are none either.
@@ -131,7 +131,7 @@ def _yaml_text(config: Mapping[str, Any]) -> str:
     try:
         return yaml.safe_dump(_plain(config), sort_keys=False, allow_unicode=True)
     except yaml.YAMLError as error:
-        raise ConfigError(f"<config>: holds a value that is no YAML: {error}") from None
+        raise ConfigError(f"<config>: holds a value that is not YAML: {error}") from None
 
 
 def _plain(value: Any) -> Any:

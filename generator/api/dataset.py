@@ -72,7 +72,7 @@ class SampleSequence(Sequence[Sample], AbstractContextManager["SampleSequence", 
         Raises:
             SampleIndexError: the index is out of range; it is also an IndexError.
             SampleError: the sample cannot be generated.
-            IndexKindError: the index is no whole number; it is also a TypeError.
+            IndexKindError: the index is not a whole number; it is also a TypeError.
         """
         if isinstance(index, slice):
             part = copy.copy(self)
@@ -180,7 +180,7 @@ class SampleSequence(Sequence[Sample], AbstractContextManager["SampleSequence", 
 
         Args:
             label_map: File or dictionary with the content of ``labels.map`` of a configuration;
-                None = that of this data set's configuration.
+                None = the map of this data set's configuration.
 
         Raises:
             ConfigError: it is invalid, or the configuration has none.
@@ -256,7 +256,7 @@ class IsPresent:
 
 
 class SplitIndices(Sequence[int]):
-    """Some of the indices, such as those of one split; picklable, and possibly endless.
+    """Some of the indices, such as the samples of one split; picklable, and possibly endless.
 
     Args:
         indices: Numbers of samples.
@@ -274,7 +274,7 @@ class SplitIndices(Sequence[int]):
 
     @property
     def stop(self) -> int:
-        """As of a range: that of ``UNBOUNDED`` if there is no end."""
+        """As of a range: the stop of ``UNBOUNDED`` if there is no end."""
         return self._positions.stop
 
     def __len__(self) -> int:
@@ -288,7 +288,7 @@ class SplitIndices(Sequence[int]):
     def __getitem__(self, index: slice) -> SplitIndices: ...
 
     def __getitem__(self, index: int | slice) -> int | SplitIndices:
-        """One index, or those of a slice."""
+        """One index, or the indices of a slice."""
         if isinstance(index, slice):
             part = copy.copy(self)
             part._positions = self._positions[index]
@@ -306,7 +306,7 @@ class SplitIndices(Sequence[int]):
 
 
 def _check_index(index: Any) -> None:
-    """Refuse an index that is no whole number; for a name, the text has the remedy."""
+    """Refuse an index that is not a whole number; for a name, the text has the remedy."""
     if not hasattr(index, "__index__") or isinstance(index, bool):
         remedy = f"; .split({index!r}) has the samples of a split" if isinstance(index, str) else ""
         raise IndexKindError(f"index: {index!r}; expected a whole number or a slice{remedy}")
@@ -454,7 +454,7 @@ class ReadSamples:
         return self.stored.config
 
     def close(self) -> None:
-        """Forget what was read."""
+        """Forget the samples that were read."""
         self.stored.close()
 
 
@@ -483,7 +483,7 @@ def open_dataset(folder: str | PathLike[str], split: str = "") -> StoredDataset:
     Shards at a URL are copied to a cache in the user's cache folder when their samples are read.
 
     Args:
-        folder: Of the data set, or its URL.
+        folder: Folder of the data set, or its URL.
         split: Only the samples of this split; see ``SampleSequence.split``. Empty = all.
 
     Raises:

@@ -39,14 +39,14 @@ def export(  # noqa: PLR0913  (keywords of one front door)
 ) -> Summary:
     """Write a finished data set in other formats, without rendering it again.
 
-    The result is a data set of its own, with the same bytes as if it had been generated with these
+    The result is another data set, with the same bytes as if it had been generated with these
     exporters. Its images are hard links, or copies on another file system.
 
     Args:
         folder: A finished data set.
         formats: Exporters, at least one.
         out: Folder of the result.
-        label_map: YAML file with a label map, which replaces that of the data set.
+        label_map: YAML file with a label map, which replaces the data set's.
         workers: Processes; None = one per core, 0 = this process.
         force: Start although the disk is probably too small.
         on_progress: Called after each sample and shard.
@@ -104,7 +104,7 @@ def _named_formats() -> Iterator[None]:
         text = re.sub(r"^(\s*)--set:1:\d+: exporters\[", r"\1formats[", str(error), flags=re.M)
         if text == str(error):
             raise
-        # What was typed is short, and quoted by the shell: no excerpt.
+        # The typed text is short, and quoted by the shell: no excerpt.
         kept = [line for line in text.splitlines() if not _EXCERPT.match(line)]
         raise ConfigError("\n".join(kept)) from None
 
@@ -113,8 +113,8 @@ def label_map_override(path: Path, categories: Sequence[str]) -> str:
     """Override of a configuration with the label map of a file.
 
     Raises:
-        ConfigError: the file is no label map, or has a class that no object of these categories can
-            have; the message lists all errors.
+        ConfigError: the file is not a label map, or has a class that no object of these
+            categories can have; the message lists all errors.
     """
     from gen_data.generator.api.relabelling import load_label_map
 

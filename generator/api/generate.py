@@ -56,13 +56,13 @@ def generate(  # noqa: PLR0913  (keywords of one front door)
         seed: Replaces the configuration's seed.
         overrides: ``KEY=VALUE`` texts, as for ``gen-data --set``.
         without: Names of randomizers to leave out.
-        repair: Hash all existing files first, and restore what is damaged.
+        repair: Hash all existing files first, and restore damaged ones.
         allow_mixed_numerics: Go on on a machine that computes differently from the first one.
         force: Start although the disk is probably too small.
         skip_failed: Go on without samples that fail; ``failed`` of the summary and of the manifest
             names them, and only ``repair`` tries them again.
-        sample_timeout_s: Time after which a sample hangs [s]: no second try. None = that of the
-            configuration, or else 300 s and 3 tries. Not with ``workers=0``.
+        sample_timeout_s: Time after which a sample hangs [s]: no second try. None = the
+            configuration's, or else 300 s and 3 tries. Not with ``workers=0``.
         shards: First shard and the one after the last, for a part of the data set in a folder of
             its own; ``merge`` gathers the parts. None = all.
         cluster: Ray cluster that generates the shards; None = processes of this machine.
@@ -86,7 +86,7 @@ def generate(  # noqa: PLR0913  (keywords of one front door)
     with _standby_worker(cluster, workers) as standby:
         _check_arguments(config, n, out, workers, repair)
         _check_time_limit(sample_timeout_s)
-        # Before the imports below, so that errors of a configuration come at once.
+        # Before the imports below: errors of a configuration come at once.
         loaded = load_config(config, seed=seed, overrides=overrides, without=without)
         factory = _make_factory(loaded, n)
         settings = replace(
@@ -110,7 +110,7 @@ def _run(
     settings: Settings,
     on_progress: Callable[[RunProgress], None] | None,
 ) -> Summary:
-    """Run the plan of a factory, and name what files of the user hold and nothing uses."""
+    """Run the plan of a factory, and name unused contents of the user's files."""
     from gen_data.generator.assets.file_remarks import warn_of_remarks
     from gen_data.generator.runner.identity import format_licences, make_plan
     from gen_data.generator.runner.run import run
@@ -221,7 +221,7 @@ def _check_arguments(
 def _check_time_limit(limit_s: float | None) -> None:
     if limit_s is not None and not 0.0 < limit_s < math.inf:
         raise ConfigError(
-            f"sample_timeout_s: {limit_s:g} is no time limit; expected seconds above 0"
+            f"sample_timeout_s: {limit_s:g} is not a time limit; expected seconds above 0"
         )
 
 

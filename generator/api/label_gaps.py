@@ -1,4 +1,4 @@
-"""The end of every run that finishes a data set: what it was to label and did not."""
+"""The end of every run that finishes a data set: labels that it was to have and lacks."""
 
 from __future__ import annotations
 

@@ -37,17 +37,17 @@ class Loader(Generic[T]):
 
     Args:
         samples: A ``Dataset``, which is rendered while training, or a finished one.
-        target: Function from a Sample to what is trained on, such as those of
+        target: Function from a Sample to inputs of training, such as the functions of
             ``gen_data.targets``. With workers it must be importable.
         batch_size: Targets per batch; the last batch of an epoch may be smaller.
-        shuffle: Whether each epoch has an order of its own.
-        seed: Of the orders.
+        shuffle: Whether each epoch has another order.
+        seed: Seed of the orders.
         workers: Processes; 0 = this process. A script with workers needs the guard
             ``if __name__ == "__main__":``.
         prefetch: Scenes that each worker may be ahead; bounds the memory.
         mixed_scenes: Number of scenes whose samples are shuffled together.
-        rank: Of this process among ``world_size`` processes that train together; each has its own
-            scenes.
+        rank: Rank of this process among ``world_size`` processes that train together; each has
+            its own scenes.
         world_size: Number of these processes.
         epoch_size: Samples per epoch of a ``Dataset`` without a size, of which every epoch has new
             ones: epoch ``e`` has the samples from ``e * epoch_size``.
@@ -133,11 +133,11 @@ class Loader(Generic[T]):
         """Continue where another loader with the same arguments was.
 
         Raises:
-            ConfigError: the other loader had another seed, or this is no state of a loader.
+            ConfigError: the other loader had another seed, or this is not a state of a loader.
         """
         if set(state) != set(self.state_dict()):
             raise ConfigError(
-                f"state: has the keys {', '.join(map(str, state)) or 'none'}; expected those of "
+                f"state: has the keys {', '.join(map(str, state)) or 'none'}; expected the keys of "
                 f"state_dict: {', '.join(self.state_dict())}"
             )
         for name in ("epoch", "position"):

@@ -25,7 +25,7 @@ LabelMapLike = str | PathLike[str] | Mapping[str, Any]
 
 @dataclass(frozen=True, eq=False)
 class RelabelledSample:
-    """A sample with mapped labels; its images are those of the other one."""
+    """A sample with mapped labels; its images are the other sample's."""
 
     record: SampleRecord
     applied: AppliedLabelMap
@@ -96,7 +96,7 @@ class RelabelledSamples:
 
 
 def load_label_map(source: LabelMapLike | None, config: Mapping[str, Any]) -> LabelMap:
-    """Read a label map; None = that of the configuration.
+    """Read a label map; None = the configuration's.
 
     Raises:
         ConfigError: it is invalid, or the configuration has none.

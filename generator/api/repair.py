@@ -24,7 +24,7 @@ def repair(
     on_progress: Callable[[RunProgress], None] | None = None,
     resume_command: str = "the same call of repair",
 ) -> Summary:
-    """Restore what is damaged or missing in a data set, byte for byte, from its own plan.
+    """Restore damaged or missing files of a data set, byte for byte, from its own plan.
 
     Damaged shards are generated again, merged files are written again, and files that do not belong
     to the data set are moved to ``run/quarantine``, where the damaged ones are, too. Samples that

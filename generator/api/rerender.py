@@ -37,14 +37,14 @@ def rerender(  # noqa: PLR0913  (keywords of one front door)
     """Render the scenes of a finished data set again with other sensors, weather, light or quality.
 
     Objects keep their ids, shapes and poses. Randomizers with changed settings are drawn again, all
-    others are not, so that the two data sets are counterfactual pairs. A changed camera without a
+    others are not: the two data sets are counterfactual pairs. A changed camera without a
     rig keeps its pose; a new one has the pose of the first camera without a rig. Exporters of the
     data set that new sensors do not fit are left out, unless the overrides name exporters.
 
     Args:
         folder: A finished data set.
         out: Folder of the result.
-        sensors: Configuration file whose ``sensors`` replace those of the data set.
+        sensors: Configuration file whose ``sensors`` replace the data set's.
         overrides: ``KEY=VALUE`` texts, as for ``gen-data --set``. A key may begin with the name of
             a randomizer: ``weather.preset=WetNight``.
         redraw: Names of further randomizers to draw again, because they depend on a changed one.
@@ -119,7 +119,7 @@ def _with_fitting_exporters(
         except ConfigError as error:
             warnings.warn(
                 f"{exporter.type} of the data set is left out, as the new sensors do not fit it; "
-                f"--set exporters=[...] names those that you want\n{error}",
+                f"--set exporters=[...] names the ones that you want\n{error}",
                 ConfigWarning,
                 stacklevel=3,
             )

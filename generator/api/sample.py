@@ -151,7 +151,7 @@ class CameraReading:
 
     @property
     def truth(self) -> ImageTruth:
-        """All annotations of the image, including those of the image as a whole."""
+        """All annotations of the image, including annotations of the whole image."""
         return self._truth
 
     @cached_property
@@ -222,7 +222,7 @@ class _ChannelNames(Mapping[str, NDArray[Any]]):
 
 
 class SampleRecord(Protocol):
-    """The parts of a sample that the Python API shows; those of a stored one are read on access."""
+    """The parts of a sample that the Python API shows; a stored sample reads them on access."""
 
     @property
     def index(self) -> int:

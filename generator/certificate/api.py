@@ -24,10 +24,10 @@ def certify(
     date: str = "",
     on_progress: Callable[[str], None] = lambda _: None,
 ) -> Certificate:
-    """Check all claims about a finished data set, and write its certificate beside the manifest.
+    """Check all claims about a finished data set, and write its certificate next to the manifest.
 
-    ``CERTIFICATE.json`` and ``CERTIFICATE.html`` are no part of the data set: its identity does not
-    change. They are also written if claims fail.
+    ``CERTIFICATE.json`` and ``CERTIFICATE.html`` are not part of the data set: its identity does
+    not change. They are also written if claims fail.
 
     Args:
         folder: A finished data set.
@@ -35,11 +35,11 @@ def certify(
         rays: Pixels per image, and points per scan, of these samples.
         scenes: Scenes whose parameters are drawn again.
         alpha: Probability that a correct data set fails the claim on distributions, in (0, 0.1].
-        date: Of the certificate, such as ``2026-11-23``; empty = none, as no clock is asked.
+        date: Date of the certificate, such as ``2026-11-23``; empty = none, as no clock is asked.
         on_progress: Called with the name of each claim when its check begins.
 
     Returns:
-        The certificate: ``holds`` tells whether no claim failed, ``claims`` has the findings.
+        The certificate: ``holds`` is whether no claim failed, ``claims`` has the findings.
 
     Raises:
         ConfigError: a number is out of range.
@@ -59,7 +59,9 @@ def certify(
         if value < 0:
             raise ConfigError(f"{name}: {value} is negative; expected 0 or more")
     if not 0.0 < alpha <= 0.1:
-        raise ConfigError(f"alpha: {alpha} is no false-alarm rate; expected more than 0, up to 0.1")
+        raise ConfigError(
+            f"alpha: {alpha} is not a false-alarm rate; expected more than 0, up to 0.1"
+        )
     path = Path(folder)
     # Poses of scenes that are drawn again must have the last bits of the stored ones.
     with threadpool_limits(limits=1):

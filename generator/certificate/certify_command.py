@@ -42,11 +42,11 @@ from gen_data.generator.core.errors import CertificationError, ConfigError
     help="Probability that the distributions of a correct data set fail.",
 )
 def certify(folder: Path, samples: int, rays: int, scenes: int, alpha: float) -> None:
-    """Check a data set by independent means, and write CERTIFICATE.json and a page beside it.
+    """Check a data set by independent means, and write CERTIFICATE.json and a page next to it.
 
-    What could not be checked on this machine is listed with what to install. verify --deep repeats
-    the checks. Exit code 8 if a claim fails. A certificate has the date of SOURCE_DATE_EPOCH, if
-    that is set.
+    Claims that could not be checked on this machine are listed with the package to install.
+    verify --deep repeats the checks. Exit code 8 if a claim fails. A certificate has the date of
+    SOURCE_DATE_EPOCH, if that is set.
     """
     from rich.console import Console
 
@@ -86,5 +86,5 @@ def _date(epoch_s: str) -> str:
         return datetime.fromtimestamp(int(epoch_s), timezone.utc).date().isoformat()
     except (ValueError, OverflowError, OSError):
         raise ConfigError(
-            f"SOURCE_DATE_EPOCH: {epoch_s!r} is no number of seconds since 1970"
+            f"SOURCE_DATE_EPOCH: {epoch_s!r} is not a number of seconds since 1970"
         ) from None

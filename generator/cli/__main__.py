@@ -28,7 +28,7 @@ def main() -> None:
     try:
         run()
     finally:
-        # The process ends: what is frozen is not searched again by the interpreter's last steps.
+        # The process ends: frozen objects are not searched again by the interpreter's last steps.
         gc.freeze()
 
 

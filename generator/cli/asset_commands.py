@@ -198,7 +198,7 @@ def remove(names: tuple[str, ...]) -> None:
 
 
 def _warm_cache(pack: str) -> None:
-    """Import a pack's objects into the cache, so that the first run starts faster."""
+    """Import a pack's objects into the cache: the first run then starts faster."""
     from gen_data.generator.assets.library import open_library
 
     library = open_library()

@@ -1,7 +1,7 @@
-"""``gen-data cache``: size of what is kept between runs, and its removal.
+"""``gen-data cache``: size of the caches between runs, and their removal.
 
 Nothing in a cache is needed: it is computed or fetched again. Staged shards of runs into object
-storage lie beside the caches, but are results, and are never removed here.
+storage lie next to the caches, but are results, and are never removed here.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class Cache:
 def _asset_folders() -> list[Path]:
     from gen_data.generator.assets.library import default_cache_dir
 
-    # Every version of the format; the files beside them are digests of users' files.
+    # Every version of the format; the files next to them are digests of users' files.
     return [*default_cache_dir().glob("format-*"), *default_cache_dir().glob("*.json")]
 
 
@@ -58,7 +58,7 @@ CACHES = (
 
 @click.group()
 def cache() -> None:
-    """Show or clear what is kept between runs: assets, files from URLs, compiled kernels."""
+    """Show or clear the caches between runs: assets, files from URLs, compiled kernels."""
 
 
 @cache.command()

@@ -13,9 +13,9 @@ class Prices:
     """Prices in one currency; None = unknown.
 
     Attributes:
-        cpu_hour: Of one core for one hour.
-        gpu_hour: Of one GPU for one hour.
-        gb_month: Of storing 1e9 bytes for one month.
+        cpu_hour: Price of one core for one hour.
+        gpu_hour: Price of one GPU for one hour.
+        gb_month: Price of storing 1e9 bytes for one month.
     """
 
     cpu_hour: float | None = None

@@ -1,6 +1,6 @@
 """``gen-data doctor``: checks of all engines on this machine.
 
-Each check loads a library and uses it once, in a separate process, so that a crash, as on an
+Each check loads a library and uses it once, in a separate process: a crash, as on an
 unsupported processor, is one failed check.
 """
 
@@ -169,7 +169,7 @@ def _try_renderer() -> str:
 
 
 def _try_gpu() -> str:
-    """The first GPU: what it is, and one computation on it."""
+    """The first GPU: its name, and one computation on it."""
     import warp as wp
 
     from gen_data.generator.renderers.warp.device import open_device, why_no_gpu
@@ -225,10 +225,10 @@ def _try_images() -> str:
 
     grey = np.full((16, 16), 128, np.uint8)
     packed = deflate.zlib_compress(grey.tobytes(), 6)
-    _expect(zlib.decompress(packed) == grey.tobytes(), "libdeflate writes what zlib cannot read")
+    _expect(zlib.decompress(packed) == grey.tobytes(), "zlib cannot read the output of libdeflate")
     coded = cv2.imencode(".jpg", grey)[1]
     read = cv2.imdecode(coded, cv2.IMREAD_GRAYSCALE)
-    _expect(read is not None and np.array_equal(read, grey), "OpenCV does not read what it wrote")
+    _expect(read is not None and np.array_equal(read, grey), "OpenCV does not read its own output")
     _expect(Image.fromarray(grey).resize((4, 4)).size == (4, 4), "Pillow does not resize")
     return f"OpenCV {version('opencv-python-headless')}, libdeflate {version('deflate')}"
 
@@ -242,7 +242,7 @@ def _try_openexr() -> str:
         header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
         OpenEXR.File(header, {"RGB": np.ones((2, 2, 3), np.float32)}).write(path)
         read = OpenEXR.File(path).channels()["RGB"].pixels
-    _expect(float(read.sum()) == 12.0, "OpenEXR does not read what it wrote")
+    _expect(float(read.sum()) == 12.0, "OpenEXR does not read its own output")
     return f"OpenEXR {version('OpenEXR')}"
 
 

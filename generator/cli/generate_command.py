@@ -72,7 +72,7 @@ def progress_bar(n: int) -> Iterator[Callable[[RunProgress], None]]:
         return bar, bar.add_task("samples", total=n, rate="", rejections=0)
 
     def show(progress: RunProgress) -> None:
-        # Started by the first sample, so that errors and warnings of the configuration come alone.
+        # Started by the first sample, because errors and warnings of the configuration come alone.
         bar, task = started()
         bar.update(
             task,
@@ -89,7 +89,7 @@ def progress_bar(n: int) -> Iterator[Callable[[RunProgress], None]]:
 
 
 def _make_bar() -> Progress:
-    # Not imported before: a worker already prepares itself when a run asks for its first bar.
+    # Not imported before: a worker already prepares itself when a run shows its first bar.
     from rich.console import Console
     from rich.progress import (
         BarColumn,

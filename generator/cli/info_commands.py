@@ -15,7 +15,7 @@ import click
 def describe(name: str | None) -> None:
     """Explain a plug-in, section, distribution, template or configuration.
 
-    NAME may be that of a nested mapping: labels.map, rgb_camera.lens, brown_conrady. Without NAME,
+    NAME may be a nested mapping: labels.map, rgb_camera.lens, brown_conrady. Without NAME,
     all are listed.
     """
     from gen_data.generator.assemble.descriptions import (
@@ -30,7 +30,7 @@ def describe(name: str | None) -> None:
         click.echo(list_names_of({**TABLES, "section": section_names(), **shipped}))
         return
     name = name.removesuffix(".yaml")
-    # A name may be that of a template and of the configuration that uses it.
+    # A template may have the name of the configuration that uses it.
     found = [(kind, texts[name]) for kind, texts in shipped.items() if name in texts]
     for kind, text in found:
         click.echo(f"{kind} {name}\n{text}")

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from gen_data.generator.cli.own_meshes import OwnMesh
 
 ASSETS = "assets"
-"""Folder of the user's meshes, beside the configuration."""
+"""Folder of the user's meshes, next to the configuration."""
 
 
 @click.command("init")
@@ -72,7 +72,7 @@ def init(template: str, paths: tuple[Path, ...], categories: tuple[str, ...], ou
 
 
 def _echo_remarks(folder: Path) -> None:
-    """Print what the meshes hold and is not used."""
+    """Print unused contents of the meshes."""
     from gen_data.generator.assets.file_remarks import collect_remarks
     from gen_data.generator.assets.folder_index import user_folder
     from gen_data.generator.packs.provision import open_assets
@@ -119,7 +119,7 @@ def starter_files(template: str, meshes: Sequence[OwnMesh]) -> Iterator[tuple[st
     config = load_config(name)
     scene = Path(scene_templates.__path__[0]) / f"{config.general.template}.yaml"
     text, scene_name = (folder / f"{name}.yaml").read_text("utf-8"), f"{name}_scene.yaml"
-    # The first comment of a shipped file names its schema, which is not beside the copy.
+    # The first comment of a shipped file names its schema, which is not next to the copy.
     text = re.sub(r"\A# yaml-language-server.*\n", "", text)
     text, changed = re.subn(r"(?m)^template: \S+", f"template: {scene_name}", text)
     if not changed:

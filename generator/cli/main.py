@@ -89,8 +89,8 @@ class LazyCommands(click.Group):
         "assets": "Install, list, show, verify and remove packs of assets.",
         "cache": "Show or clear caches of assets, data sets at URLs, and kernels.",
         "report": "Statistics of a data set, and an HTML page with its samples.",
-        "study": "Measure what a change of a configuration is worth on real pictures.",
-        "adapt": "Draw more of what a detector missed: the next round of a curriculum.",
+        "study": "Measure the value of changes of a configuration on real pictures.",
+        "adapt": "Draw more of the objects that a detector missed: the next round of a curriculum.",
         "match": "Fit exposure, colour, noise, blur and laser to real recordings.",
         "verify": "Check a data set: sizes, checksums, labels, reproducibility.",
         "certify": "Check a data set by independent means; write its certificate.",
@@ -145,11 +145,11 @@ class LazyCommands(click.Group):
 
 
 GENERATING = frozenset({"generate", "run", "gen", "create", "make", "build"})
-"""Words that stand for generating elsewhere; here it is what a configuration does."""
+"""Words that stand for generating elsewhere; here a configuration does it."""
 
 
 def _no_command(args: list[str], known: list[str]) -> str:
-    """Message for a command line whose first word is no command."""
+    """Message for a command line whose first word is not a command."""
     from importlib.resources import files
 
     word = args[0]
@@ -280,7 +280,7 @@ def main() -> None:
         os.environ[name] = "1"
     # A cluster that a run starts reports nothing to anybody.
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
-    # A reader of exports that certificates use asks no hub.
+    # A reader of exports that certificates use queries no hub.
     os.environ.setdefault("HF_HUB_OFFLINE", "1")
     warnings.showwarning = partial(_show_warning, warnings.showwarning)
     code = _exit_code()
@@ -296,7 +296,7 @@ def _show_warning(
     *place: Any,
     **options: Any,
 ) -> None:
-    """Print our own warnings as plain messages; those of libraries as usual."""
+    """Print our own warnings as plain messages, and warnings of libraries as usual."""
     if category in (FutureWarning, AssetWarning, ConfigWarning, CacheWarning):
         click.echo(f"gen-data: warning: {message}", err=True)
     else:

@@ -61,7 +61,7 @@ class _Taken:
     ids: set[str] = field(default_factory=set)
 
     def has_room(self, mesh: OwnMesh) -> bool:
-        """Whether a mesh has an id of its own, and no file of another content at its places."""
+        """Whether a mesh has a unique id, and no file of another content at its places."""
         return mesh.asset_id not in self.ids and all(
             place not in self.sources or self.sources[place].read_bytes() == source.read_bytes()
             for source, place in mesh.files()
@@ -113,7 +113,7 @@ def _meshes_at(path: Path) -> Iterator[OwnMesh]:
         if not path.is_file():
             raise AssetError(f"{path}: no such file; expected a mesh ({kinds}), or a folder")
         if path.suffix.lower() not in MESH_SUFFIXES:
-            raise AssetError(f"{path}: is no mesh that can be read; expected one of {kinds}")
+            raise AssetError(f"{path}: is not a readable mesh; expected one of {kinds}")
         yield OwnMesh(path.parent, path.name, path.stem)
         return
     files = [name for name in list_files(path) if Path(name).suffix.lower() in MESH_SUFFIXES]
@@ -208,7 +208,7 @@ labels:
 
 
 def _how_to_leave_out(resolved: Mapping[str, object]) -> str:
-    """Comments on the parts of the shipped scene that are no objects of the user."""
+    """Comments on the parts of the shipped scene that do not come from the user."""
     elements, randomizers = ([*_entries(resolved[key])] for key in ("elements", "randomizers"))
     text = ""
     for robot in (e["name"] for e in elements if e["type"] == "robot"):

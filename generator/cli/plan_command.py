@@ -1,4 +1,4 @@
-"""``gen-data plan``: what a run would make, without making it."""
+"""``gen-data plan``: size, cost and contents of a run, before it starts."""
 
 from __future__ import annotations
 

@@ -104,7 +104,7 @@ def preview(
     "--channels",
     default="rgb",
     show_default=True,
-    help="Comma-separated channels of all cameras; 'written' = those that each sensor writes.",
+    help="Comma-separated channels of all cameras; 'written' = the channels written by each.",
 )
 @click.option("--labels/--no-labels", default=True, show_default=True, help="Draw the labels.")
 @click.option("--captions", is_flag=True, help="Write a caption under every tile.")

@@ -25,12 +25,12 @@ PAGE = Path("run/report/index.html")
     "--compare",
     type=click.Path(path_type=Path),
     metavar="FOLDER2",
-    help="Show a second data set beside it in the page.",
+    help="Show a second data set next to it in the page.",
 )
 @click.option(
     "--html",
     type=click.Path(path_type=Path),
-    help=f"The page to write [default: FOLDER/{PAGE}]; a .json file with its figures is beside it.",
+    help=f"The page to write [default: FOLDER/{PAGE}]; its figures are in a .json file next to it.",
 )
 @click.option(
     "--scenes",
@@ -43,7 +43,7 @@ def report(folder: Path, compare: Path | None, html: Path | None, scenes: int) -
     """Print statistics of a data set, and write an HTML page with its samples.
 
     FOLDER is a finished data set, or any folder with labels in the layout of the formats coco or
-    kitti. The page shows labelled samples, drawn parameters beside their distributions, checks of
+    kitti. The page shows labelled samples, drawn parameters next to their distributions, checks of
     labels, near-duplicates, costs and licences. It is one file that requests nothing.
     """
     from rich.console import Console

@@ -27,7 +27,7 @@ gen-data rerender out/tabletop --out out/traced --tier pathtraced
 @click.option(
     "--sensors",
     type=click.Path(path_type=Path),
-    help="Configuration whose sensors replace those of the data set.",
+    help="Configuration whose sensors replace the data set's.",
 )
 @click.option("--tier", type=click.Choice(["realtime", "pathtraced"]), help="Rendering tier.")
 @click.option(

@@ -31,7 +31,7 @@ _installed: list[signal.Signals] = []
 _kept: list[socket.socket] = []
 """Sockets that live as long as the process."""
 _raised: list[int] = []
-"""Number of the signal that has raised KeyboardInterrupt; one at most, so that cleaning up is not
+"""Number of the signal that has raised KeyboardInterrupt; one at most: cleaning up is not
 interrupted."""
 
 
@@ -45,7 +45,7 @@ def handle_stop_signals() -> None:
     reader, writer = wake_channel()
     _kept.append(writer)
     signal.set_wakeup_fd(writer.fileno(), warn_on_full_buffer=False)
-    # A forked process would report its signals as those of this one.
+    # A forked process would report its signals as signals of this one.
     if hasattr(os, "register_at_fork"):
         os.register_at_fork(after_in_child=_forget_wakeup)
     for number in SIGNALS:

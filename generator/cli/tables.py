@@ -42,7 +42,7 @@ def print_tables(console: Console, tables: Iterable[Mapping[str, Any]]) -> None:
                     overflow="fold",
                 )
             for row in table["rows"]:
-                # Names are text: brackets in them are no markup.
+                # Names are text: brackets in them are not markup.
                 shown.add_row(*(Text(row[number]) for number in group))
             console.print(shown)
 
@@ -54,7 +54,7 @@ def _width(column: Sequence[str]) -> int:
 
 
 def _groups(widths: Sequence[int], width: int) -> Iterator[list[int]]:
-    """Numbers of the columns of each table: the first one, and what fits beside it."""
+    """Numbers of the columns of each table: the first one, and columns that fit next to it."""
     group, used = [0], widths[0]
     for number, own in enumerate(widths[1:], 1):
         if used + own > width and len(group) > 1:

@@ -183,7 +183,7 @@ def _print_json(facts: dict[str, object], found: list[Finding]) -> None:
 )
 @click.option("--workers", "-w", type=int, help="Worker processes [default: one per core].")
 def repair(folder: Path, source: Path | None, workers: int | None) -> None:
-    """Restore what is damaged or missing in a data set, byte for byte, from its own plan.
+    """Restore damaged or missing files of a data set, byte for byte, from its own plan.
 
     Damaged and foreign files are moved to FOLDER/run/quarantine.
     """

@@ -1,4 +1,4 @@
-"""Tables in YAML files beside the modules that use them."""
+"""Tables in YAML files next to the modules that use them."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def load_data(package: str | None, name: str) -> Any:
 
     Args:
         package: Full name of the package; a module passes its ``__package__``.
-        name: Of the file, without its ending.
+        name: Name of the file, without its ending.
     """
     assert package is not None
     text = (files(package) / f"{name}.yaml").read_text(encoding="utf-8")

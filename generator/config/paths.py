@@ -2,7 +2,7 @@
 
 A relative path starts from the folder of the file that contains it; on the command line, from the
 current folder. ``~`` is the home folder. If nothing exists there, a shipped file of that name is
-used. A finished data set remembers where its folders were (``LOCATIONS``), so that it can be read
+used. A finished data set remembers where its folders were (``LOCATIONS``) and can be read
 from anywhere.
 """
 
@@ -18,10 +18,10 @@ from gen_data.generator.core.errors import ConfigError, did_you_mean
 from gen_data.generator.core.urls import is_url
 
 PLAN = "plan.json"
-"""Record of a data set; its paths are those of its configuration, which lies elsewhere."""
+"""Record of a data set; its paths are relative to its configuration, which lies elsewhere."""
 
 LOCATIONS = "locations.json"
-"""Beside the log of a data set: ``{folder as written: where it was}``; no part of its identity."""
+"""Next to the log of a data set: ``{folder as written: where it was}``; no part of its identity."""
 
 
 def find_path(
@@ -37,7 +37,7 @@ def find_path(
 
     Args:
         name: As written; ``.yaml`` may be omitted for shipped files.
-        position: Of the name in its document; None for an argument of the command line.
+        position: Position of the name in its document; None for an argument of the command line.
         field: Dotted path of the field with the name.
         kind: Noun for the message, such as ``template``.
         shipped: Files of the package.
@@ -53,7 +53,7 @@ def find_path(
     except (OSError, RuntimeError) as error:
         # A name that is too long, a folder that may not be read, or the home of an unknown user.
         reason = error.strerror if isinstance(error, OSError) else str(error)
-        raise _error(position, field, f"'{abbreviate(name)}' is no {kind} ({reason})") from None
+        raise _error(position, field, f"'{abbreviate(name)}' is not a {kind} ({reason})") from None
     by_name = {file.name: file for file in shipped}
     for known in (name, f"{name}.yaml"):
         if known in by_name and not _is_document(by_name[known], position):

@@ -62,7 +62,7 @@ def refuse(position: Position, field: str | FieldPath, fact: str) -> NoReturn:
 
 
 class Problems:
-    """Collected problems, so that a user can correct all of them at once."""
+    """Collected problems: a user can correct all of them at once."""
 
     def __init__(self) -> None:
         self._problems: dict[Problem, None] = {}

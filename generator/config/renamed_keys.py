@@ -121,7 +121,7 @@ def _rename_plugin(item: Node, section: str, path: FieldPath) -> Node:
 
 
 def _at(node: Node, place: str, path: FieldPath, change: Callable[[Node, FieldPath], Node]) -> Node:
-    """Change the node at a dotted place, if there is one; in a selection, that of every entry."""
+    """Change the node at a dotted place, if there is one; in a selection, in every entry."""
     if not place:
         return change(node, path)
     key, _, rest = place.partition(".")
@@ -155,7 +155,7 @@ def _rename_keys(node: Node, path: FieldPath, words: Words) -> Node:
 
 
 def _rename_value(node: Node, path: FieldPath, words: Words) -> Node:
-    """Rename a word; in a selection, that of every entry."""
+    """Rename a word; in a selection, in every entry."""
     if SWITCH in node.entries:
         return node.with_children(
             lambda key, entry: entry if key == SWITCH else _rename_value(entry, (*path, key), words)

@@ -92,7 +92,7 @@ def docstring_summary(model: type) -> str:
 def documented_attributes(model: type[BaseModel]) -> dict[str, str]:
     """``{field: text}`` of a class and its bases.
 
-    Texts are those of the section ``Attributes:`` and of docstrings below fields.
+    Texts come from the section ``Attributes:`` and of docstrings below fields.
     """
     found: dict[str, str] = {}
     for base in reversed(model.__mro__):
@@ -149,7 +149,7 @@ def with_shared_values(schema: dict[str, Any], constant: Collection[str] = ()) -
     """Allow references to shared values in the schema of a plug-in.
 
     Args:
-        schema: Of a model, definitions included.
+        schema: Schema of a model, definitions included.
         constant: Names of fields that must not depend on shared values.
     """
     wrapped: dict[str, Any] = _allow_shared(schema)

@@ -1,7 +1,7 @@
 """Values that are drawn once per scene, and references to them.
 
 A configuration may have a section ``shared`` of named values. Each is drawn once per scene from its
-own stream, so that their order has no effect. Elsewhere, ``$shared.NAME`` stands for such a value,
+own stream, and their order has no effect. Elsewhere, ``$shared.NAME`` stands for such a value,
 and a mapping with the key ``switch`` for the entry that the value selects::
 
     shared:
@@ -180,7 +180,7 @@ def _evaluate(section: Node, streams: Streams, fixed: Shared) -> dict[str, Share
 
 
 def _order(section: Node) -> tuple[str, ...]:
-    """Names of all values, each after those that it depends on.
+    """Names of all values, each after the values that it depends on.
 
     Raises:
         ConfigError: values depend on one another.

@@ -74,7 +74,7 @@ class Fault:
     Attributes:
         kind: Pydantic's type of error.
         detail: Pydantic's record of the error.
-        path: Of the field, without the names of union branches.
+        path: Path of the field, without the names of union branches.
         below: From the field to the wrong part of its distribution.
         owner: Schema of the field; of the mapping or list, for an unknown or missing part.
         at_key: The key is wrong, not its value.

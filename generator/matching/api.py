@@ -38,7 +38,7 @@ def match(  # noqa: PLR0913  (keywords of one front door)
         folder: Holds photographs, scans (``.bin``, ``.pcd``, ``.ply``) and labels at any depth.
         config: A YAML file or a shipped name.
         out: The configuration to write, which extends ``config``; a ``.json`` and an ``.html`` file
-            beside it have the report.
+            next to it have the report.
         images: Largest number of photographs to read, chosen evenly.
         scans: Largest number of scans to read, chosen evenly.
         scenes: Number of scenes of the configuration to simulate.
@@ -47,7 +47,7 @@ def match(  # noqa: PLR0913  (keywords of one front door)
         on_progress: Called with the name of each step when it begins.
 
     Returns:
-        What was fitted, with intervals, statistics before and after, and the files that were read.
+        The fitted values with intervals, statistics before and after, and the files that were read.
 
     Raises:
         ConfigError: the configuration is wrong, or an argument.
@@ -88,6 +88,6 @@ def match(  # noqa: PLR0913  (keywords of one front door)
         write_whole({target: text.encode() for target, text in files.items()})
     except OSError as error:
         raise StorageError(f"{error.filename}: {error.strerror}; choose another --out") from error
-    # What is written must be a configuration.
+    # The written file must be a configuration.
     load_config(str(path))
     return found

@@ -10,7 +10,7 @@ HELP = """Fit the sensors of CONFIG to a folder of unlabelled recordings.
 
 Exposure, tone, colour, noise, blur and JPEG quality follow from photographs; reflectance, dropout
 and range from laser scans; distance and pitch of the camera from boxes of COCO or KITTI, if there
-are any. The result extends CONFIG; a .json and an .html file beside it have the report.
+are any. The result extends CONFIG; a .json and an .html file next to it have the report.
 
 \b
 gen-data match recordings/ street.yaml --out matched.yaml

@@ -1,4 +1,4 @@
-"""``gen-data adapt``: the next round of a curriculum, with more of what a detector missed."""
+"""``gen-data adapt``: the next round of a curriculum, with more of the missed objects."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-HELP = """Draw more of what a detector missed.
+HELP = """Draw more of the objects that a detector missed.
 
 CONFIG is a configuration and DATA a finished data set of it that the detector did not train on.
 Missed objects are joined with the values that were drawn for their scenes; where misses depend on a

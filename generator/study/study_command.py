@@ -1,4 +1,4 @@
-"""``gen-data study``: what a change of a configuration is worth on real pictures."""
+"""``gen-data study``: the value of changes of a configuration on real pictures."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from gen_data.generator.core.errors import ConfigError
 if TYPE_CHECKING:
     from gen_data.generator.study.experiment import Variant
 
-HELP = """Measure what changes of a configuration are worth on real labelled pictures.
+HELP = """Measure the value of changes of a configuration on real labelled pictures.
 
 REAL_FOLDER has labels in the layout of COCO or KITTI. A small detector is trained on data of
 CONFIG, the baseline, and of every variant, with several seeds; all are judged on the real

@@ -267,7 +267,7 @@ def test_outcomes_lists_what_can_be_drawn_where_that_is_little() -> None:
 
 def test_names_have_no_range() -> None:
     """Asking for one is a mistake of the program, not of the user."""
-    with pytest.raises(TypeError, match="'a' is no number"):
+    with pytest.raises(TypeError, match="'a' is not a number"):
         Choice(("a", "b")).support()
 
 

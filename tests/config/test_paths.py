@@ -146,9 +146,9 @@ def test_a_name_that_no_file_can_have_is_refused_on_one_line(
     assert str(caught.value).startswith(f"{tmp_path}/mine.yaml:2:5: template: ")
 
 
-def test_a_configuration_with_such_a_name_is_refused_likewise() -> None:
+def test_a_configuration_with_such_a_name_is_refused_too() -> None:
     """As an argument of the command line."""
     with pytest.raises(
-        ConfigError, match=r"^'n{57}\.\.\.' is no configuration \(File name too long\)$"
+        ConfigError, match=r"^'n{57}\.\.\.' is not a configuration \(File name too long\)$"
     ):
         load_config("n" * 300)

@@ -16,8 +16,8 @@ from gen_data.generator.core.distribution import DISTRIBUTION, install_command
 from gen_data.generator.core.errors import SampleError
 
 ROOT = Path(__file__).parents[2]
-HISTORY = {"CHANGELOG.md", "DECISIONS.md", "tests/core/test_distribution.py"}
-"""Pages that tell what was, and this list of what must not be."""
+HISTORY = {"CHANGELOG.md", "tests/core/test_distribution.py"}
+"""The page of past changes, and this list of what must not be."""
 AS_REQUIREMENT = re.compile(
     r"""gen-data\\*\[                            # with extras
     | ^name\ =\ "gen-data"

@@ -17,7 +17,8 @@ from gen_data.generator.cli.main import cli
 from tests.tiers import slow
 
 ROOT = Path(__file__).parents[2]
-PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *ROOT.glob("examples/**/*.md")])
+FOLDERS = ("*.md", "docs/*.md", "docs/decisions/*.md", "examples/**/*.md")
+PAGES = sorted(path for pattern in FOLDERS for path in ROOT.glob(pattern))
 OLD_NAMES = {ROOT / "docs/migration.md", ROOT / "CHANGELOG.md"}
 """Pages that list names which no longer exist."""
 
@@ -102,6 +103,16 @@ def test_modules_exist(page: Path) -> None:
         )
     ):
         assert (ROOT / name).exists(), name
+
+
+def test_the_readme_is_short() -> None:
+    """At most 80 lines, and no paragraph in a cell of a table."""
+    lines = (ROOT / "README.md").read_text("utf-8").splitlines()
+    links = re.compile(r"\]\([^)]*\)")
+
+    assert len(lines) <= 80
+    for line in lines:
+        assert not line.startswith("|") or len(links.sub("", line)) <= 160, line
 
 
 def commands_of(page: Path) -> list[str]:

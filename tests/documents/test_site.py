@@ -64,6 +64,14 @@ def test_every_plugin_is_there_with_every_field_and_a_valid_example(kind: str) -
 
 
 @pytest.mark.parametrize("kind", list(TABLES))
+def test_tables_of_fields_become_blocks_on_narrow_screens(kind: str) -> None:
+    """Each is in an element of the class that docs/site.css rearranges."""
+    page = page_of(kind)
+
+    assert 1 <= page.count("| field |") == page.count('<div class="fields" markdown>\n\n| field |')
+
+
+@pytest.mark.parametrize("kind", list(TABLES))
 def test_headings_are_unique_and_links_lead_to_them(kind: str) -> None:
     """A second heading of the same name would get another anchor."""
     page = page_of(kind)

@@ -20,6 +20,7 @@ import click
 import pytest
 import yaml
 
+from docs import pictures
 from gen_data.generator.cli.main import cli
 from tests.documents import test_documents
 
@@ -89,6 +90,14 @@ def test_pages_are_short_and_tested(page: Path) -> None:
     assert page.stem in SMALLER
     assert len(prose.splitlines()) <= 120
     assert {kind for kind, _ in BLOCK.findall(text)} <= {"bash", "python", "yaml", "toml", "text"}
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_the_page_shows_its_result(name: str) -> None:
+    """A picture that docs/pictures.py draws from the page itself, of at most 150 kB."""
+    assert f"](../pictures/tutorial/{name}.webp)" in PAGES[name].read_text("utf-8")
+    assert (ROOT / f"docs/pictures/tutorial/{name}.webp").stat().st_size <= 150_000
+    assert pictures.read_sheets(pictures.TUTORIAL)[name].until in PAGES[name].read_text("utf-8")
 
 
 @pytest.mark.slow

@@ -127,7 +127,9 @@ def test_repair_makes_the_whole_data_set(folder: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize("limit_s", [0.0, -1.0, float("nan"), float("inf")])
 def test_a_time_limit_that_is_none_is_refused(limit_s: float, tmp_path: Path) -> None:
     """Before anything is made."""
-    with pytest.raises(gen_data.GenDataError, match="is no time limit; expected seconds above 0"):
+    with pytest.raises(
+        gen_data.GenDataError, match="is not a time limit; expected seconds above 0"
+    ):
         gen_data.generate("tabletop.yaml", 1, out=tmp_path, workers=0, sample_timeout_s=limit_s)
 
 

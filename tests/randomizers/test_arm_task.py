@@ -65,9 +65,9 @@ def test_instructions_name_things_of_the_task(name: str) -> None:
 def test_a_task_that_refers_to_an_unknown_thing_is_refused() -> None:
     """By the thing's name."""
     assert Task.model_validate_json(MINIMAL % "it")
-    with pytest.raises(ValidationError, match="there is no thing 'cup'"):
+    with pytest.raises(ValidationError, match="there is no object 'cup'"):
         Task.model_validate_json(MINIMAL % "cup")
-    with pytest.raises(ValidationError, match="there is no thing 'lid'"):
+    with pytest.raises(ValidationError, match="there is no object 'lid'"):
         Task.model_validate_json((MINIMAL % "it").replace("{it}.", "{lid}."))
 
 

@@ -279,14 +279,14 @@ def test_empty_group_and_unreachable_share_are_rejected_with_a_reason() -> None:
     wide = replace(SCENE.cameras[0], intrinsics=LENSES["panorama"])
     with pytest.raises(LayoutRejected) as refused:
         framed(replace(SCENE, cameras=(wide,)), fills=Constant(3.0))
-    assert "the lens cannot show a thing" in refused.value.rejection.reason
+    assert "the lens cannot show an object" in refused.value.rejection.reason
 
 
 @pytest.mark.parametrize(
     ("given", "fact"),
     [
-        ({"fills": Constant(0.001)}, "smallest thing fills about 0.003.*larger room"),
-        ({"fills": Uniform(0.9, 1.0), "clearance_m": 0.8}, "largest thing fills about.*smaller"),
+        ({"fills": Constant(0.001)}, "smallest object fills about 0.003.*larger room"),
+        ({"fills": Uniform(0.9, 1.0), "clearance_m": 0.8}, "largest object fills about.*smaller"),
         ({"fills": Constant(0.2), "aim": Constant("cluter")}, "named 'cluter'.*mean 'clutter'"),
         ({"fills": Constant(0.2), "camera": "colour"}, "no camera 'colour'.*mean 'color'"),
     ],

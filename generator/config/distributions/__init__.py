@@ -228,7 +228,7 @@ def distribution_schema(kind: Kind[Any]) -> dict[str, Any]:
 def _plain(
     expected: str, types: tuple[type, ...], hint: Callable[[Any], str]
 ) -> Callable[[Any], Any]:
-    """A reader of plain values of some types; ``hint`` tells what else may have been meant."""
+    """A reader of plain values of some types; ``hint`` names alternatives."""
 
     def read_plain(value: Any) -> Any:
         if type(value) not in types:

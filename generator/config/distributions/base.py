@@ -60,7 +60,7 @@ DISTRIBUTIONS: PluginTable[Distribution[Any]] = PluginTable(
 
 
 class Malformed(ValueError):
-    """A value that is no distribution, and the place of the fault in it.
+    """A value that is not a distribution, and the place of the fault in it.
 
     Attributes:
         fact: The fault and the expectation.
@@ -86,7 +86,7 @@ class Kind(Generic[T]):
         expected: A constant of it in messages: ``a number``.
         read: The value of a plain constant; raises Malformed.
         schema: JSON Schema of a constant.
-        of_number: Name of the distribution that a plain number stands for, if it is no constant.
+        of_number: Name of the distribution that a plain number stands for, if it is not a constant.
     """
 
     name: str
@@ -110,11 +110,11 @@ class Kind(Generic[T]):
 
 
 class Distribution(ABC, Generic[T_co]):
-    """A parameter that is drawn anew for each scene or view.
+    """A parameter that is drawn again for each scene or view.
 
     Frozen and comparable. In YAML it is a mapping with one key, its name; the value of that key,
     the argument, follows from its fields: nothing without fields, the value of a single field, a
-    list of all fields in order if ``needs`` says so, else a mapping of fields.
+    list of all fields in order if ``needs`` is set, else a mapping of fields.
 
     Attributes:
         name: Its key in YAML.
@@ -134,7 +134,7 @@ class Distribution(ABC, Generic[T_co]):
     ) -> None:
         """Attributes of the class are keywords of its definition; others are inherited.
 
-        ``key`` is its name: Python 3.10 takes the keyword ``name`` for that of the class.
+        ``key`` is its name: Python 3.10 takes the keyword ``name`` for the class's.
         """
         super().__init_subclass__()
         cls.name, cls.kinds = key or cls.name, kinds or cls.kinds

@@ -201,7 +201,7 @@ class Probability(Listed[bool], key="probability", kinds=("flag",)):
     p: float = Field(json_schema_extra={"minimum": 0, "maximum": 1})
 
     def __post_init__(self) -> None:
-        """Refuse numbers that are no probability."""
+        """Refuse numbers that are not a probability."""
         if not 0 <= self.p <= 1:
             raise Malformed(f"probability needs a number in [0, 1], got {format_number(self.p)}")
 
@@ -230,5 +230,5 @@ def _freeze(values: Any) -> tuple[Any, ...]:
 
 def _as_number(value: object) -> float:
     if not isinstance(value, (int, float)):
-        raise TypeError(f"{value!r} is no number: it has no mean and no range")
+        raise TypeError(f"{value!r} is not a number: it has no mean and no range")
     return value

@@ -102,7 +102,7 @@ class Mixture(Numeric[T_co], key="mixture", kinds=("number", "whole number")):
 
     @classmethod
     def schema(cls, constant: Mapping[str, Any]) -> dict[str, Any]:
-        """A list of pairs; what the distributions in them are is left to the reader."""
+        """A list of pairs; the reader interprets the distributions in them."""
         part = {"anyOf": [dict(constant), {"type": "object", "minProperties": 1}]}
         pair = [{"type": "number", "minimum": 0}, part]
         return {

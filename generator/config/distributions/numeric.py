@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 _STANDARD = NormalDist()
 _LEAST_PROBABILITY = 1e-280
-"""Of a clip range: what is smaller could be rounded to nothing while drawing."""
+"""Of a clip range: a smaller one could be rounded to nothing while drawing."""
 _PAIR = {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2}
 _Above0 = Annotated[float, WithJsonSchema({"type": "number", "exclusiveMinimum": 0})]
 
@@ -97,7 +97,7 @@ class LogUniform(
 class Normal(Numeric[float], key="normal", kinds=("number",)):
     """Gaussian; with ``clip`` it is truncated: values outside are not drawn, none pile up.
 
-    Drawn by inverting the cumulative distribution, so that each value costs exactly one random
+    Drawn by inverting the cumulative distribution: each value costs exactly one random
     number. Inverse: Wichura, "Algorithm AS 241", Applied Statistics 37(3), 1988.
 
     Attributes:

@@ -324,7 +324,7 @@ def _texel_weights(height: int, level: int, device: str) -> wp.array:
         roughness * roughness,
         _GLOSSY_SIZE,
     ]
-    launch(weigh_texels, _GLOSSY_SIZE**2, inputs, [shares], device=device)
+    launch(weigh_texels, _GLOSSY_SIZE**2, inputs, [shares], device=wp.get_device(device))
     return shares
 
 
