@@ -29,7 +29,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
-from functools import cache
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 from xml.sax.saxutils import escape
@@ -276,7 +276,7 @@ def _list_lines(info: DatasetInfo, row: dict[str, Any]) -> Iterable[tuple[str, s
             )
 
 
-@cache
+@lru_cache(maxsize=1024)
 def _file_word(category: str) -> str:
     """A category in names of files."""
     return "".join(c if c.isalnum() else "-" for c in category)

@@ -8,7 +8,7 @@ from functools import cache
 from gen_data.generator.assets.families import declared
 
 _PEOPLE = "simple_person"
-"""Family whose poses all people have that are no files."""
+"""Family whose poses all people have, except people from files."""
 
 
 def stride_phases() -> int:

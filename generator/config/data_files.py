@@ -33,7 +33,7 @@ def load_table(package: str, name: str, kind: type[T]) -> Mapping[str, T]:
 
     Args:
         package: Full name of the package.
-        name: Of the file, without its ending.
+        name: File name without its ending.
         kind: Type of a row: a dataclass, or an annotation made of tuples and plain types.
 
     Raises:
