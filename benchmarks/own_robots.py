@@ -1,20 +1,25 @@
-"""Robots of users, read here and by an independent reader: yourdfpy for URDF, MuJoCo for MJCF.
+"""Robots of users, read here and by an independent reader.
 
-    pip install yourdfpy
+That is yourdfpy for URDF, MuJoCo for MJCF and Drake for SDF. Drake does not know Gazebo's sensors,
+plug-ins, materials and parts of meshes: files with the former are compared without them.
+
+    pip install yourdfpy drake trimesh
     python -m benchmarks.own_robots ROOT FILE...      # descriptions below an asset folder ROOT
 
 prints, for each description, whether links, joint limits, colours and the bounding box at the
 zero position agree. ``--python`` runs the independent readers in another environment, which needs
-yourdfpy or mujoco, and numpy.
+yourdfpy, mujoco or drake and trimesh, and numpy.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import re
 import subprocess
 import sys
 import warnings
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -54,7 +59,7 @@ def ours(root: Path, file: str) -> dict[str, Any]:
     joints = [j for j in robot.joints if j.movable]
     sited = [j for j in robot.joints if j.name.endswith("_site")]
     return {
-        "links": len(robot.links) - (len(sited) + 1 if file.endswith(".xml") else 0),
+        "links": len(robot.links) - {"xml": len(sited) + 1, "sdf": 1}.get(file[-3:], 0),
         "joints": {j.name: None if j.kind == "continuous" else [j.lower, j.upper] for j in joints},
         "colors": sorted(c for c in colors if c),
         "size_m": _size(points),
@@ -64,8 +69,9 @@ def ours(root: Path, file: str) -> dict[str, Any]:
 
 def reference(root: Path, file: str) -> dict[str, Any]:
     """The same facts from an independent reader."""
+    readers = {"xml": _mujoco, "sdf": _drake}
     try:
-        return _mujoco(root / file) if file.endswith(".xml") else _yourdfpy(root / file)
+        return readers.get(file[-3:], _yourdfpy)(root / file)
     except Exception as error:
         return {"error": f"{type(error).__name__}: {str(error)[:200]}"}
 
@@ -147,7 +153,81 @@ def _mujoco(path: Path) -> dict[str, Any]:
     }
     return {
         "reader": f"mujoco {mujoco.__version__}",
-        "links": model.nbody - 1,
+        # A body with several joints is several links here.
+        "links": model.nbody - 1 + sum(max(int(n) - 1, 0) for n in model.body_jntnum),
+        "joints": joints,
+        "colors": sorted(colors),
+        "size_m": _size(points),
+    }
+
+
+def _drake_corners(shape: Any) -> Any:
+    """Corners [n, 3] of a shape of Drake."""
+    import trimesh
+    from pydrake.geometry import Box, Cylinder, Mesh, Sphere
+
+    if isinstance(shape, Mesh):
+        mesh = trimesh.load(str(shape.source().path()), process=False, force="mesh")
+        corners = mesh.vertices[np.unique(mesh.faces)] * shape.scale3()
+        upright = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
+        return corners @ upright if shape.extension() in (".gltf", ".glb") else corners
+    if isinstance(shape, Box):
+        return trimesh.creation.box(shape.size()).vertices
+    if isinstance(shape, Cylinder):
+        return trimesh.creation.cylinder(shape.radius(), shape.length(), 720).vertices
+    if isinstance(shape, Sphere):
+        return trimesh.creation.icosphere(5, shape.radius()).vertices
+    raise ValueError(f"no corners of {type(shape).__name__}")
+
+
+def _drake(path: Path) -> dict[str, Any]:
+    from pydrake.geometry import Role
+    from pydrake.multibody.parsing import Parser
+    from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
+    from pydrake.multibody.tree import BodyIndex
+    from pydrake.systems.framework import DiagramBuilder
+
+    builder = DiagramBuilder()
+    plant, graph = AddMultibodyPlantSceneGraph(builder, 0.0)
+    parser = Parser(plant, graph)
+    packages = parser.package_map()
+    packages.Remove("drake_models")
+    named = (p for p in path.parents if (p / "package.xml").exists())
+    packages.Add("drake_models", str(next(named, path.parent)))
+    for folder in (f for p in path.parents[:3] for f in p.iterdir() if f.is_dir()):
+        if not packages.Contains(folder.name):
+            packages.Add(folder.name, str(folder))
+    pattern = r"<(sensor|plugin|collision|light)\b[^>]*?(/>|>.*?</\1>)"
+    bare = path.with_name("stripped.sdf")
+    bare.write_text(re.sub(pattern, "", path.read_text(), flags=re.DOTALL))
+    try:
+        parser.AddModels(str(bare))
+    finally:
+        bare.unlink()
+    plant.Finalize()
+    context = plant.GetMyContextFromRoot(builder.Build().CreateDefaultContext())
+    joints: dict[str, Any] = {}
+    for joint in (plant.get_joint(k) for k in plant.GetJointIndices()):
+        if joint.type_name() in ("revolute", "prismatic"):
+            turn = joint.type_name() == "revolute"
+            (joint.set_angle if turn else joint.set_translation)(context, 0.0)
+            limits = [*joint.position_lower_limits(), *joint.position_upper_limits()]
+            joints[joint.name()] = limits if max(map(abs, limits)) < ENDLESS else None
+    scene, points, colors = graph.model_inspector(), [], []
+    for body in (plant.get_body(BodyIndex(k)) for k in range(1, plant.num_bodies())):
+        frame = plant.GetBodyFrameIdOrThrow(body.index())
+        T_world_body = plant.EvalBodyPoseInWorld(context, body)
+        for geometry in scene.GetGeometries(frame, Role.kIllustration):
+            shape, look = scene.GetShape(geometry), scene.GetIllustrationProperties(geometry)
+            if look.HasProperty("phong", "diffuse"):
+                rgba = look.GetProperty("phong", "diffuse").rgba
+                colors.append([float(v) for v in rgba])
+            corners = _drake_corners(shape)
+            T_world_shape = T_world_body @ scene.GetPoseInFrame(geometry)
+            points.append((T_world_shape @ corners.T).T)
+    return {
+        "reader": f"drake {version('drake')}",
+        "links": plant.num_bodies() - 1,
         "joints": joints,
         "colors": sorted(colors),
         "size_m": _size(points),

@@ -239,6 +239,20 @@ def test_colours_of_a_dense_scan_survive_its_decimation(tmp_path: Path) -> None:
         assert color_at(read, (at, 0.1)) == pytest.approx((255 - expected, 0, expected), abs=5)
 
 
+@pytest.mark.parametrize(("color", "told"), [("255 0 0", 1), ("192 192 192", 0)])
+def test_a_colour_beside_an_image_of_ply_is_named(tmp_path: Path, color: str, told: int) -> None:
+    """Unless it is one grey, a placeholder."""
+    properties = "".join(f"property float {n}\n" for n in ("x", "y", "z", "s", "t"))
+    properties += "".join(f"property uchar {n}\n" for n in ("red", "green", "blue"))
+    corners = "".join(f"{x} {y} 0 {x} {y} {color}\n" for x, y in ((0, 0), (1, 0), (0, 1)))
+    (tmp_path / "a.ply").write_text(
+        f"ply\nformat ascii 1.0\ncomment TextureFile t.png\nelement vertex 3\n{properties}"
+        f"element face 1\nproperty list uchar int vertex_indices\nend_header\n{corners}3 0 1 2\n"
+    )
+    remarks = read_mesh(Folder(tmp_path), "a.ply").remarks
+    assert remarks.count("vertex and face colours are not used beside an image") == told
+
+
 def test_ply_image_with_texture_coordinates_of_corners(tmp_path: Path) -> None:
     """MeshLab: ``TextureFile`` and a list ``texcoord`` per face; the file's words are longer."""
     (tmp_path / "a.ply").write_text(

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import shutil
 from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
+import trimesh
 
 from gen_data.generator.assemble.config import load_config
 from gen_data.generator.assemble.pipeline_factory import open_pipeline
@@ -201,6 +203,53 @@ def test_an_arm_of_a_user_stacks_with_fingers_made_for_it(tmp_path: Path) -> Non
     assert len(arm.joint_positions) == len(JOINTS) + 2
     assert arm.episode is not None
     assert arm.episode.succeeded
+
+
+HAND = """<robot name="hand"><link name="palm"><visual>{palm}</visual>
+<collision>{palm}</collision></link>{fingers}</robot>"""
+FINGER = """<link name="{name}"><visual>{mesh}</visual><collision>{mesh}</collision></link>
+<joint name="open_{name}" type="prismatic"><origin xyz="0 0 0.06"/><parent link="palm"/>
+<child link="{name}"/><axis xyz="0 {side} 0"/>
+<limit lower="0" upper="0.04" effort="40" velocity="0.1"/>{mimic}</joint>"""
+
+
+def own_hand() -> str:
+    """A palm and two fingers of one STL file in millimetres; the right one mirrors the left."""
+    mesh = '<geometry><mesh filename="finger.stl" scale="0.001 {}0.001 0.001"/></geometry>'
+    right = FINGER.format(
+        name="right", side=-1, mesh=mesh.format("-"), mimic='<mimic joint="open_left"/>'
+    )
+    left = FINGER.format(name="left", side=1, mesh=mesh.format(""), mimic="")
+    palm = '<origin xyz="0 0 0.03"/><geometry><box size="0.07 0.12 0.06"/></geometry>'
+    return HAND.format(palm=palm, fingers=left + right)
+
+
+@pytest.mark.slow
+def test_a_published_panda_lifts_with_a_hand_of_its_own_files(tmp_path: Path) -> None:
+    """Its description as pybullet ships it, without its hand; physics confirms the lift."""
+    pybullet_data = pytest.importorskip("pybullet_data")
+    arms = tmp_path / "arms"
+    shutil.copytree(Path(pybullet_data.getDataPath()) / "franka_panda", arms / "franka_panda")
+    (arms / "hand.urdf").write_text(own_hand())
+    trimesh.creation.box(bounds=[(-10, 0, 0), (10, 12, 80)]).export(arms / "finger.stl")
+    (arms / "assets.yaml").write_text(
+        "robots:\n  - id: my_arm\n    file: franka_panda/panda.urdf\n"
+        "    home: {panda_joint2: -0.5, panda_joint4: -2.2, panda_joint6: 1.7}\n"
+        "    tool: {kind: file, file: hand.urdf, flange: panda_link8, instead_of: panda_hand}\n"
+        "    gripper: {link: palm, grasp_offset_m: 0.131, finger_joints: [open_left], "
+        "stroke_m: 0.08}\n"
+    )
+    config = tmp_path / "config.yaml"
+    config.write_text(
+        "extends: arm_tasks\nassets: {folders: [arms]}\n"
+        "shared: {robot: {choice: {user/my_arm: 1}}, task: {choice: {lift: 1}}}\n"
+        "randomizers:\n  - {name: things, failures: {}}\n"
+    )
+    with open_pipeline(load_config(str(config), overrides=SMALL)) as pipeline:
+        (arm,) = pipeline.accepted_scene(0).scene.articulations
+    assert arm.episode is not None
+    assert arm.episode.succeeded
+    assert [span.label for span in arm.episode.held] == ["things/0"]
 
 
 def test_an_arm_of_a_user_without_limits_is_refused_by_its_joint(tmp_path: Path) -> None:

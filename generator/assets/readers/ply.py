@@ -314,7 +314,7 @@ def _build_soup(
     uvs = _read_uvs(vertex, face, faces, fans, corner) if images else None
     textured = uvs is not None
     colors = None if textured else _read_colors(vertex, face, corner, polygon, remarks)
-    if textured and (_varies(_srgb(vertex)) or _varies(_srgb(face))):
+    if textured and (_is_colored(_srgb(vertex)) or _is_colored(_srgb(face))):
         remarks.append("vertex and face colours are not used beside an image")
     if images and not textured:
         remarks.append(f"the image {images[0]} is not used: there are no texture coordinates")
@@ -387,6 +387,11 @@ def _read_colors(
 def _varies(colors: Float64 | None) -> bool:
     """Whether there is more than one colour."""
     return colors is not None and bool(np.ptp(colors, axis=0).any())
+
+
+def _is_colored(colors: Float64 | None) -> bool:
+    """Whether there is more than one even grey, which scanners write as a placeholder."""
+    return colors is not None and bool((colors != colors[:1, :1]).any())
 
 
 def _srgb(element: _Columns) -> Float64 | None:
