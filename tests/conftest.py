@@ -28,6 +28,15 @@ atexit.register(shutil.rmtree, os.environ["GEN_DATA_ASSETS"], ignore_errors=True
 
 provide_pybullet_data()
 
+
+def _check_descriptor(descriptor: int) -> None:
+    os.fstat(descriptor)
+
+
+# No power fails while tests run: a disk takes longer for fsync than they take for all else.
+# ``tests/runner/fragile_disk.py`` counts calls of this function as it would calls of the other.
+os.fsync = _check_descriptor
+
 collect_ignore = [] if HAS_RERUN else ["exporters/test_rerun.py", "preview"]
 
 SKIPS_ALLOWED_IN_CI = (

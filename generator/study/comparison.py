@@ -92,7 +92,7 @@ def interval(scores: Scores, confidence: float = CONFIDENCE) -> Interval:
         confidence: Share of such intervals that contain the true value.
     """
     from scipy.optimize import brentq
-    from scipy.stats import t
+    from scipy.special import stdtrit
 
     mean = float(np.nanmean(scores.measured))
     seeds, draws = scores.resampled.shape
@@ -103,7 +103,7 @@ def interval(scores: Scores, confidence: float = CONFIDENCE) -> Interval:
         parts.append((float(np.nanvar(scores.measured, ddof=1)) / seeds, seeds - 1.0))
 
     def reach(alpha: float) -> float:
-        quantiles = [(variance, t.ppf(1.0 - alpha / 2.0, freedom)) for variance, freedom in parts]
+        quantiles = [(variance, stdtrit(freedom, 1.0 - alpha / 2.0)) for variance, freedom in parts]
         return math.sqrt(sum(variance * quantile**2 for variance, quantile in quantiles))
 
     if not any(variance for variance, _ in parts):

@@ -284,6 +284,7 @@ def test_importing_loads_no_engine() -> None:
     assert done.stdout.strip() == "[]"
 
 
+@pytest.mark.slow
 def test_packages_of_the_same_names_do_no_harm(tmp_path: Path) -> None:
     """A user's own ``configs``, ``exporters`` and ``tests`` lie beside the script, and it works.
 

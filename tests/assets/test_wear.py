@@ -18,7 +18,7 @@ LABELS = ("label", "front_label", "can_label", "carton", "milk_label", "book_cov
 PRINTS = {"carton": "carton", "book": "book_cover"}
 """Families with edges, and their textures."""
 MARKED = sorted(name for name, family in FAMILIES.items() if isinstance(family.build, Worn))
-VARIANTS = [(name, seed) for name in MARKED for seed in range(0, FAMILIES[name].variants, 6)]
+VARIANTS = [(name, seed) for name in MARKED for seed in range(0, FAMILIES[name].variants, 12)]
 KINDS = ("vessel", "dish", "metal", "plastic")
 
 
@@ -153,7 +153,7 @@ def test_some_boxes_are_dusty() -> None:
 @pytest.mark.parametrize("name", LABELS)
 def test_most_labels_stay_legible(name: str) -> None:
     """On nine of ten variants at most a tenth of all pixels changes by more than a quarter."""
-    hidden = [(change(name, seed) > 64).mean() for seed in range(0, TEXTURES[name].variants, 2)]
+    hidden = [(change(name, seed) > 64).mean() for seed in range(0, TEXTURES[name].variants, 4)]
 
     assert np.quantile(hidden, 0.9) < 0.1
 
@@ -207,7 +207,7 @@ def test_every_family_of_things_to_handle_has_new_and_marked_variants() -> None:
     for name in ("fork", "remote", "mug", "plate", "hammer", "scissors"):
         textures = [
             {m.texture for m in FAMILIES[name].build(seed=seed).mesh.materials}
-            for seed in range(FAMILIES[name].variants)
+            for seed in range(0, FAMILIES[name].variants, 3)
         ]
         marked = np.mean([any("use_marks" in t for t in each) for each in textures])
         assert 0.5 < marked < 0.98, name

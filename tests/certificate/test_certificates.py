@@ -469,6 +469,7 @@ def test_a_data_set_that_grows_loses_its_certificate(certified: Path, tmp_path: 
     assert not list(copy.glob("CERTIFICATE*"))
 
 
+@pytest.mark.slow
 def test_an_export_of_a_certified_data_set_is_certified_by_itself(
     certified: Path, tmp_path: Path
 ) -> None:

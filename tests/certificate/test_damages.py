@@ -27,14 +27,14 @@ pytestmark = [
     pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning"),
 ]
 
-N = 24
+N = 18
 SHARD = "shards/000000"
 COCO = "coco/annotations/instances_train.json"
 
 
 @pytest.fixture(scope="module")
 def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Twelve scenes of two views, in two shards and three splits."""
+    """Nine scenes of two views, in two shards and three splits."""
     folder = tmp_path_factory.mktemp("damages") / "table"
     gen_data.generate("tabletop.yaml", N, out=folder, workers=0, seed=1, **SMALL)
     return folder
@@ -197,7 +197,7 @@ def add_to_shard(folder: Path) -> None:
 def edit_card(folder: Path) -> None:
     """The data card."""
     path = folder / "README.md"
-    path.write_text(path.read_text().replace("24", "25"))
+    path.write_text(path.read_text().replace(str(N), str(N + 1)))
 
 
 AGAIN = {"written again", "generated again"}

@@ -46,14 +46,14 @@ def numerics() -> dict[str, str]:
 
 
 def digests_of(library: ProceduralLibrary) -> Mapping[str, dict[str, str]]:
-    """``{content key: digest of bytes}`` by family: of eight objects, or of one image.
+    """``{content key: digest of bytes}`` by family: of four objects, or of one image.
 
     A content key changes with the family's version.
     """
     counts = Counter(name.split("?")[0] for name in library.names() if "?" in name)
     found: dict[str, dict[str, str]] = {}
     for name, count in sorted(counts.items()):
-        chosen = 1 if name.startswith(("texture/", "environment/")) else min(count, 8)
+        chosen = 1 if name.startswith(("texture/", "environment/")) else min(count, 4)
         for seed in (k * count // chosen for k in range(chosen)):
             asset = library.get(parse_asset_id(f"{name}?seed={seed}"))
             digest = _digest(_arrays(library, parse_asset_id(asset.asset_id), asset.kind))

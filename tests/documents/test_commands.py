@@ -40,6 +40,7 @@ NOT_RUN = {
     "gen-data verify s3:": "needs object storage; tests/runner/test_object_store.py",
     "docker ": "needs Docker; `.ci/run` runs it where it is",
     "python -m benchmarks.readers": "installs 4.6 GB; tests/benchmarks/test_readers.py runs it",
+    "python -m benchmarks.gpu": "needs a GPU; tests/benchmarks/test_gpu.py runs both on a CPU",
     "python -m benchmarks.faults": "hours; tests/determinism/test_fault_campaigns.py is short",
 }
 """Beginnings of commands, and why they are not run here."""
@@ -48,7 +49,7 @@ BEFORE = {
     "certificates": ("gen-data --config tabletop.yaml --n 2 --out out/table {small}",),
     "report": (
         "gen-data --config tabletop.yaml --n 2 {small}",
-        "gen-data --config fisheye_street.yaml --n 1 --out out/fisheye {small}",
+        "gen-data --config tabletop.yaml --n 2 --seed 8 --out out/fisheye {small}",
     ),
     "trust": ("gen-data --config street.yaml --n 1 {small}",),
 }
@@ -56,7 +57,7 @@ BEFORE = {
 
 SMALLER = {
     "--n 1380": f"--n 1 {SMALL}",
-    "--n 60": f"--n 1 {SMALL}",
+    "--n 60": f"--n 1 {SMALL} --out out/suction",
     "--n 60 --seed 1 --out out/table": "--n 1 --seed 1 --out out/small",
     "--probe 20": "--probe 1",
     "certify out/table": "certify out/table --samples 1 --rays 10 --scenes 0",
@@ -77,9 +78,6 @@ def reason_against(command: str) -> str:
     return next((why for start, why in NOT_RUN.items() if command.startswith(start)), "")
 
 
-UNPREPARED = {"arms", "performance", "report", "scaling"}
-"""Pages whose commands need data sets, sizes or packages that ``BEFORE`` and ``SMALLER`` lack yet:
-bent lenses refuse the small size, benchmarks and runs of parts follow from other pages."""
 RUN = {
     page.stem: [line for line in commands(page) if not reason_against(line)]
     for page in PAGES
@@ -97,7 +95,7 @@ def test_reasons_are_those_of_commands_that_exist() -> None:
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("default")
-@pytest.mark.parametrize("name", [n for n, lines in RUN.items() if lines and n not in UNPREPARED])
+@pytest.mark.parametrize("name", [name for name, lines in RUN.items() if lines])
 def test_commands_run(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """From the first to the last one of the page, in an empty folder."""
     monkeypatch.chdir(tmp_path)

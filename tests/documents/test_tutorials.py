@@ -221,9 +221,11 @@ def register_coco_instances(name: str, metadata: dict[str, Any], path: str, fold
     assert all((Path(folder) / image["file_name"]).is_file() for image in coco.imgs.values())
 
 
-def build_detector(num_classes: int) -> Any:
-    """A module that accepts inputs which torchvision's detectors accept."""
+def build_detector(*, weights: None, weights_backbone: None, num_classes: int) -> Any:
+    """A module that accepts inputs which torchvision's detectors accept; weights are downloads."""
     import torch
+
+    assert weights is None and weights_backbone is None
 
     class Checking(torch.nn.Module):
         def __init__(self) -> None:

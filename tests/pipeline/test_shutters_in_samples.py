@@ -40,13 +40,19 @@ def sample(pipeline: Pipeline) -> Sample:
     return pipeline.sample(6)
 
 
+@pytest.fixture(scope="module")
+def following(pipeline: Pipeline, sample: Sample) -> Sample:
+    """The one after it, made after it."""
+    return pipeline.sample(sample.index + 1)
+
+
 def reading(sample: Sample) -> SensorReading:
     return sample.capture.readings["dash"]
 
 
+@pytest.mark.usefixtures("following")
 def test_a_step_made_alone_is_the_step_of_the_sequence(pipeline: Pipeline, sample: Sample) -> None:
     """Whatever was rendered before: the same bytes in every channel."""
-    pipeline.sample(7)
     again = reading(pipeline.sample(6))
 
     for channel, image in reading(sample).channels.items():
@@ -93,9 +99,9 @@ def test_a_drive_bends_the_image_and_blurs_it(pipeline: Pipeline, sample: Sample
     assert detail(rolled.channels[Channel.RGB]) < 0.95 * detail(instant.channels[Channel.RGB])
 
 
-def test_flow_of_the_street_is_that_of_the_next_image(pipeline: Pipeline, sample: Sample) -> None:
+def test_flow_of_the_street_is_that_of_the_next_image(sample: Sample, following: Sample) -> None:
     """Where the point is not hidden, the next image shows the same thing at its end."""
-    now, then = reading(sample), reading(pipeline.sample(7))
+    now, then = reading(sample), reading(following)
     v, u = np.mgrid[: SIZE_PX[1], : SIZE_PX[0]] + 0.5
     flow = now.channels[Channel.FLOW_FORWARD]
     image = now.channels[Channel.INSTANCE]

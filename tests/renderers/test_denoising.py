@@ -18,6 +18,7 @@ from tests.renderers.fake_library import DARK, MATTE, FakeLibrary, box_mesh, cam
 DENOISED = RenderSettings(tier="pathtraced", samples=4, denoise=True)
 
 
+@pytest.mark.slow
 def test_a_denoised_image_is_closer_to_the_converged_one() -> None:
     """Four samples, with and without denoising, against 256."""
     pytest.importorskip("pyoidn")

@@ -64,11 +64,12 @@ def plates() -> list[Frame]:
     return frames_of("photo_plates.yaml", 2)
 
 
-CASES = pytest.mark.parametrize("frames", [tabletop, street, rig])
+SLOW = [pytest.param(frames, marks=pytest.mark.slow) for frames in (street, rig)]
+CASES = pytest.mark.parametrize("frames", [tabletop, *SLOW])
 Frames = Callable[[], list[Frame]]
 
 
-@pytest.mark.parametrize("frames", [tabletop, street, rig, plates])
+@pytest.mark.parametrize("frames", [tabletop, plates, *SLOW])
 def test_little_but_what_was_asked_for_leaves_the_device(frames: Frames) -> None:
     """In first and further views, of cameras and scanners."""
     for frame in frames():

@@ -185,9 +185,9 @@ def test_nothing_falls_in_five_rooms_with_furniture_of_packs(kind: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
-def test_nothing_falls_in_ten_rooms_of_each_type(kind: str) -> None:
+def test_nothing_falls_in_four_rooms_of_each_type(kind: str) -> None:
     """Tables, shelves and floors carry what is on them."""
-    results = [settle(furnished(kind, seed), library()) for seed in range(10)]
+    results = [settle(furnished(kind, seed), library()) for seed in range(4)]
     assert sum(number for number, _ in results) > 20
     assert [fallen for _, fallen in results if fallen] == []
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from itertools import combinations
 
 import cv2
@@ -10,8 +11,15 @@ import numpy as np
 from gen_data.generator.assets.interiors.wall_art import is_upright, wall_art
 from gen_data.generator.core.asset_types import UInt8
 from tests.rooms.test_layouts import library
+from tests.tiers import seeds
 
 VARIANTS = 84
+
+
+@cache
+def picture(seed: int) -> UInt8:
+    """A motif."""
+    return wall_art(seed).albedo
 
 
 def small(image: UInt8) -> np.ndarray:
@@ -19,17 +27,19 @@ def small(image: UInt8) -> np.ndarray:
     return cv2.resize(image, (12, 12), interpolation=cv2.INTER_AREA).astype(np.float64)
 
 
-def test_no_two_motifs_look_alike() -> None:
-    """Some part of 12 by 12 differs by a tenth of the range, for any two of all."""
-    pictures = [small(wall_art(seed).albedo) for seed in range(VARIANTS)]
+@seeds(12, VARIANTS)
+def test_no_two_motifs_look_alike(seeds: range) -> None:
+    """Some part of 12 by 12 differs by a tenth of the range, of any two motifs."""
+    pictures = [small(picture(seed)) for seed in range(seeds.stop)]
 
     assert min(np.abs(a - b).max() for a, b in combinations(pictures, 2)) > 25.0
 
 
-def test_motifs_have_the_side_ratio_of_their_frames() -> None:
+@seeds(12, VARIANTS)
+def test_motifs_have_the_side_ratio_of_their_frames(seeds: range) -> None:
     """Four to three, upright or lying."""
-    for seed in range(VARIANTS):
-        h, w = wall_art(seed).albedo.shape[:2]
+    for seed in seeds:
+        h, w = picture(seed).shape[:2]
         assert (w, h) == ((384, 512) if is_upright(seed) else (512, 384))
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -23,12 +22,6 @@ from gen_data.generator.runner.verify import find_deviations
 from tests.runner.doubles import make, tree_digest, write_raw_images
 
 N, SHARD_SIZE = 11, 2
-
-
-@pytest.fixture(autouse=True)
-def no_fsync(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Durability has tests of its own."""
-    monkeypatch.setattr(os, "fsync", lambda descriptor: None)
 
 
 def make_part(out: Path, shards: range) -> Path:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import random
 import shutil
 from collections.abc import Callable
@@ -18,12 +17,6 @@ from tests.runner.doubles import make, tree_digest, write_raw_images
 
 N, SHARD_SIZE = 6, 2
 REPAIR = Settings(repair=True, write_media=write_raw_images)
-
-
-@pytest.fixture(autouse=True)
-def no_fsync(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Durability has tests of its own."""
-    monkeypatch.setattr(os, "fsync", lambda descriptor: None)
 
 
 @pytest.fixture(scope="module")

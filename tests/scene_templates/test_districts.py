@@ -231,6 +231,7 @@ def test_towers_stand_where_one_sees_a_city() -> None:
     assert share["leafy_suburb"] < share["residential"] < 0.5 < share["arterial"] < 0.9
 
 
+@pytest.mark.slow
 def test_trees_are_bare_where_snow_lies() -> None:
     """Every weather with snow on the ground draws winter, whose deciduous trees are bare."""
     snowy = [name for name, preset in PRESETS.items() if preset.condition.weather.snow_cover > 0.0]

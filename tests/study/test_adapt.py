@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from gen_data.generator.assemble.config import load_config
 from gen_data.generator.core.errors import ConfigError, StorageError
 from gen_data.generator.report.drawn_parameters import replay_scenes
 from gen_data.generator.runner.stored import StoredSamples
-from gen_data.generator.study.adapt import adapt, tabulate
+from gen_data.generator.study.adapt import Round, adapt, tabulate
 
 CONFIG = """\
 extends: tabletop.yaml
@@ -67,12 +68,14 @@ def results(data: Path) -> Path:
     return path
 
 
-def test_the_next_round_draws_more_of_what_was_missed(
-    config: Path, data: Path, results: Path, tmp_path: Path
-) -> None:
-    """Only the distance changes; the file loads, and most of its weight is beyond 1.2 m."""
-    made = adapt(str(config), data, tmp_path, results=results)
+@pytest.fixture(scope="module")
+def made(config: Path, data: Path, results: Path) -> Round:
+    """The first round, in a folder of its own."""
+    return adapt(str(config), data, data.parent / "first", results=results)
 
+
+def test_the_next_round_draws_more_of_what_was_missed(made: Round) -> None:
+    """Only the distance changes; the file loads, and most of its weight is beyond 1.2 m."""
     assert made.changed == ("orbit.distance_m",)
     document = yaml.safe_load(made.config.read_text())
     assert (document["seed"], list(document)) == (8, ["extends", "seed", "randomizers"])
@@ -85,12 +88,11 @@ def test_the_next_round_draws_more_of_what_was_missed(
 
 
 def test_the_same_input_writes_the_same_bytes(
-    config: Path, data: Path, results: Path, tmp_path: Path
+    config: Path, data: Path, results: Path, made: Round
 ) -> None:
     """Of the configuration and of the curriculum, which names what was judged."""
-    first, second = tmp_path / "a", tmp_path / "b"
-    for out in (first, second):
-        adapt(str(config), data, out, results=results)
+    first, second = made.config.parent, made.config.parent.with_name("again")
+    adapt(str(config), data, second, results=results)
 
     for name in ("round_1.yaml", "curriculum.yaml"):
         assert (first / name).read_bytes() == (second / name).read_bytes()
@@ -100,21 +102,21 @@ def test_the_same_input_writes_the_same_bytes(
     assert list(entry["weights"]) == ["orbit.distance_m"]
 
 
-def test_a_second_round_extends_the_first(
-    config: Path, data: Path, results: Path, tmp_path: Path
-) -> None:
+def test_a_second_round_extends_the_first(made: Round, tmp_path: Path) -> None:
     """Its parts are those of the mixture of the first round."""
-    first = adapt(str(config), data, tmp_path, results=results)
+    rounds_folder = made.config.parent.with_name("rounds")
+    shutil.copytree(made.config.parent, rounds_folder)
+    first = rounds_folder / made.config.name
     judged = tmp_path / "judged"
-    gen_data.generate(str(first.config), 30, out=judged, workers=0)
+    gen_data.generate(str(first), 30, out=judged, workers=0)
     path = tmp_path / "second.json"
     path.write_text(json.dumps(weak_results(judged)))
 
-    second = adapt(str(first.config), judged, tmp_path, results=path)
+    second = adapt(str(first), judged, rounds_folder, results=path)
 
     assert second.config.name == "round_2.yaml"
     assert yaml.safe_load(second.config.read_text())["extends"] == "round_1.yaml"
-    rounds = yaml.safe_load((tmp_path / "curriculum.yaml").read_text())["rounds"]
+    rounds = yaml.safe_load((rounds_folder / "curriculum.yaml").read_text())["rounds"]
     assert [entry["seed"] for entry in rounds] == [8, 9]
 
 
@@ -148,11 +150,9 @@ def test_results_in_images_that_the_data_set_lacks_are_refused(
 
 
 def test_a_round_says_in_how_many_images_something_was_detected(
-    config: Path, data: Path, results: Path, tmp_path: Path
+    made: Round, results: Path
 ) -> None:
     """So that results of a part of the data set, or of another one, show."""
-    made = adapt(str(config), data, tmp_path, results=results)
-
     images = {row["image_id"] for row in json.loads(results.read_text())}
     assert made.images == (len(images), 40)
     assert tabulate(made, 1.0)["note"].endswith(f"{len(images)} of 40 images have detections")

@@ -216,6 +216,7 @@ def test_people_walk_in_step() -> None:
     assert checked
 
 
+@pytest.mark.slow
 def test_a_sample_alone_equals_the_one_in_its_sequence() -> None:
     """Image and scene of the fifth step, made first and made after others."""
     with factory()() as pipeline:
