@@ -149,9 +149,7 @@ def test_results_in_images_that_the_data_set_lacks_are_refused(
         adapt(str(config), data, tmp_path / "out", results=path)
 
 
-def test_a_round_says_in_how_many_images_something_was_detected(
-    made: Round, results: Path
-) -> None:
+def test_a_round_says_in_how_many_images_something_was_detected(made: Round, results: Path) -> None:
     """So that results of a part of the data set, or of another one, show."""
     images = {row["image_id"] for row in json.loads(results.read_text())}
     assert made.images == (len(images), 40)
