@@ -29,7 +29,7 @@ atexit.register(shutil.rmtree, os.environ["GEN_DATA_ASSETS"], ignore_errors=True
 provide_pybullet_data()
 
 
-def _check_descriptor(descriptor: int) -> None:
+def _check_descriptor(descriptor: Any) -> None:
     os.fstat(descriptor)
 
 
