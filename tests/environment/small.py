@@ -37,16 +37,24 @@ NOMINAL = {
 """Dynamics without variation: critically damped motors."""
 
 
+OPENED: list[Env] = []
+"""Environments of the running test, which are closed after it: each holds a renderer's memory."""
+
+
 def small(engine: str = INSTALLED[0], task: str = "reach", **options: Any) -> Env:
     """A new environment."""
     shared = {**CONFIG["shared"], "task": task}
-    return Env({**CONFIG, "shared": shared, "physics": {"engine": engine}}, **options)
+    env = Env({**CONFIG, "shared": shared, "physics": {"engine": engine}}, **options)
+    OPENED.append(env)
+    return env
 
 
 @cache
 def nominal(engine: str, control: str, task: str = "reach") -> Env:
     """An environment without variation of its dynamics, which tests share."""
-    return small(engine, task, settings={"control": control, "dynamics": NOMINAL})
+    env = small(engine, task, settings={"control": control, "dynamics": NOMINAL})
+    OPENED.remove(env)
+    return env
 
 
 def arm_of(env: Env) -> Articulation:
