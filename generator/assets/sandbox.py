@@ -66,7 +66,7 @@ class Sandbox:
 
         Args:
             function: Function of a module.
-            arguments: Values that can be pickled.
+            arguments: Values that can be pickled; paths are relative to this process's folder.
             place: Beginning of an error message: the file.
             input_bytes: Total size of the files that the function reads; its limits grow with it.
 
@@ -78,7 +78,7 @@ class Sandbox:
         """
         cpu_s = CPU_S + CPU_S_PER_BYTE * input_bytes
         memory_bytes = MEMORY_BYTES + MEMORY_PER_BYTE * input_bytes
-        request = pickle.dumps((function, arguments, place, cpu_s, memory_bytes))
+        request = pickle.dumps((function, arguments, place, cpu_s, memory_bytes, _working_folder()))
         with self._lock:
             return _decode_reply(self._call(request, cpu_s, place))
 
@@ -159,6 +159,14 @@ class Sandbox:
                 if pipe is not None:
                     pipe.close()
         return status
+
+
+def _working_folder() -> str:
+    """The folder that relative paths start from; empty if it no longer exists."""
+    try:
+        return str(Path.cwd())
+    except OSError:
+        return ""
 
 
 def _describe_end(status: int, cpu_s: float) -> str:

@@ -77,8 +77,11 @@ def _give_up_rights() -> None:
 
 def _serve(request: bytes) -> bytes:
     """Encoded result, or error, of a request."""
-    function, arguments, place, cpu_s, memory_bytes = pickle.loads(request)
+    function, arguments, place, cpu_s, memory_bytes, working_folder = pickle.loads(request)
     try:
+        if working_folder:
+            # The parent may have changed it since this process started, as notebooks do.
+            os.chdir(working_folder)
         _limit(cpu_s, memory_bytes)
         return encode_arrays("", function(*arguments))
     except AssetError as error:

@@ -17,6 +17,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from gen_data.generator.assets import sandbox
 from gen_data.generator.assets.parsing import parse_image
@@ -50,6 +51,21 @@ def test_errors_of_readers_arrive_as_they_are(shared: Sandbox, tmp_path: Path) -
     (tmp_path / "a.png").write_bytes(b"noise")
     with pytest.raises(AssetError, match=r"a\.png: unreadable.*; [^\n]*$"):
         shared.run(parse_image, tmp_path, {}, "a.png", "rgb", place="x", input_bytes=0)
+
+
+def test_relative_paths_follow_the_folder_of_the_caller(
+    shared: Sandbox, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A notebook changes its folder while the child lives; each call reads the file of its own."""
+    for shade in (10, 200):
+        here = tmp_path / str(shade)
+        (here / "photos").mkdir(parents=True)
+        Image.new("L", (2, 2), shade).save(here / "photos" / "a.png")
+        monkeypatch.chdir(here)
+        arrays = shared.run(
+            parse_image, Path("photos"), {}, "a.png", "rgb", place="", input_bytes=0
+        )
+        assert next(iter(arrays.values())).max() == shade
 
 
 def test_mistakes_of_ours_are_not_called_errors_of_the_file(shared: Sandbox) -> None:
