@@ -3,7 +3,7 @@ FROM python:3.11-slim-bookworm AS build
 COPY . /src
 # The wheel brings compiled kernels, so that the first sample does not wait for them.
 RUN pip install --no-cache-dir /src \
-    && cd /src && python -m gen_data.generator.renderers.warp.kernel_bundle
+    && cd /src && python -m gen_data.renderers.warp.kernel_bundle
 RUN pip wheel --no-cache-dir --no-deps --wheel-dir /wheels /src
 
 FROM python:3.11-slim-bookworm

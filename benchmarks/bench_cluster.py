@@ -14,8 +14,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from benchmarks.runs import machine
-from gen_data.generator.runner.ray_cluster import RayCluster
-from gen_data.generator.runner.run import Settings, Summary, run
+from gen_data.runner.ray_cluster import RayCluster
+from gen_data.runner.run import Settings, Summary, run
 from tests.runner.doubles import FakeFactory, Trouble, fake_plan, write_raw_images
 
 SLEEP_S = 0.05

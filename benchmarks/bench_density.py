@@ -13,15 +13,15 @@ import time
 from collections import Counter
 from collections.abc import Iterator
 
-from gen_data.generator.assemble.config import Config, load_config
-from gen_data.generator.assemble.pipeline_factory import scene_source
-from gen_data.generator.assets.library import Library, open_library
-from gen_data.generator.config.shared_values import probe_values
-from gen_data.generator.core.errors import LayoutRejected
-from gen_data.generator.core.interfaces import Stage
-from gen_data.generator.core.lane_geometry import LaneLine
-from gen_data.generator.core.scene import Scene
-from gen_data.generator.core.streams import Streams
+from gen_data.assemble.config import Config, load_config
+from gen_data.assemble.pipeline_factory import scene_source
+from gen_data.assets.library import Library, open_library
+from gen_data.config.shared_values import probe_values
+from gen_data.core.errors import LayoutRejected
+from gen_data.core.interfaces import Stage
+from gen_data.core.lane_geometry import LaneLine
+from gen_data.core.scene import Scene
+from gen_data.core.streams import Streams
 
 LEFT_OUT = frozenset({"traffic", "people"})
 

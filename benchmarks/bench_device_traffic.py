@@ -16,15 +16,15 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from gen_data.generator.assemble.config import load_config
-from gen_data.generator.assemble.pipeline_factory import open_pipeline
-from gen_data.generator.core.capture import Channel, LidarHits, LidarRays, SensorReading
-from gen_data.generator.core.interfaces import Renderer
-from gen_data.generator.core.scene import Camera, Lidar, Scene
-from gen_data.generator.pipeline.checked_renderer import CheckedRenderer
-from gen_data.generator.renderers.warp.renderer import WarpRenderer
+from gen_data.assemble.config import load_config
+from gen_data.assemble.pipeline_factory import open_pipeline
+from gen_data.core.capture import Channel, LidarHits, LidarRays, SensorReading
+from gen_data.core.interfaces import Renderer
+from gen_data.core.scene import Camera, Lidar, Scene
+from gen_data.pipeline.checked_renderer import CheckedRenderer
+from gen_data.renderers.warp.renderer import WarpRenderer
 
-_RENDERER = "gen_data.generator.renderers.warp."
+_RENDERER = "gen_data.renderers.warp."
 _UPLOADERS = frozenset({"to_device", "_upload", "constant"})
 """Functions that upload on behalf of their callers."""
 _ASSETS = ("scene.device_assets.", "scene.environment_maps.", "lidar.infrared_materials.")
@@ -83,7 +83,7 @@ def counted_traffic() -> Iterator[Traffic]:
     """Count all transfers within the context."""
     import warp as wp
 
-    from gen_data.generator.renderers.warp.scene import device_assets
+    from gen_data.renderers.warp.scene import device_assets
 
     assets: Any = device_assets
     traffic = Traffic()

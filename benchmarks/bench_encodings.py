@@ -15,9 +15,9 @@ from typing import get_args
 
 import numpy as np
 
+from gen_data.core.capture import Channel, ImageEncoding, ImageFormat
 from gen_data.exporters.image_files import encode_channel, read_image
-from gen_data.generator.core.capture import Channel, ImageEncoding, ImageFormat
-from gen_data.generator.runner.stored import StoredSamples
+from gen_data.runner.stored import StoredSamples
 
 QUALITIES = {"jpeg": (85, 92, 97), "webp": (85, 92)}
 

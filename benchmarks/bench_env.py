@@ -15,7 +15,7 @@ from collections.abc import Callable
 import numpy as np
 
 from benchmarks.runs import machine
-from gen_data.generator.environment.env import Env
+from gen_data.lab.environment.env import Env
 
 WARM_STEPS = 20
 EPISODES = 4

@@ -17,15 +17,15 @@ from typing import Any
 
 import yaml
 
+from gen_data.assemble.config import load_config
+from gen_data.assemble.pipeline_factory import ready_exporters
+from gen_data.assets.library import open_library
+from gen_data.core.errors import ConfigError
+from gen_data.core.sample import Sample
 from gen_data.exporters import TABLE
-from gen_data.generator.assemble.config import load_config
-from gen_data.generator.assemble.pipeline_factory import ready_exporters
-from gen_data.generator.assets.library import open_library
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.sample import Sample
-from gen_data.generator.runner.exports import LinkedFiles, StoredPipeline
-from gen_data.generator.runner.shard import drop_pixels
-from gen_data.generator.runner.stored import CheckedSamples, StoredSamples
+from gen_data.runner.exports import LinkedFiles, StoredPipeline
+from gen_data.runner.shard import drop_pixels
+from gen_data.runner.stored import CheckedSamples, StoredSamples
 
 
 def measure(folder: Path, entry: dict[str, Any], n: int) -> tuple[float, float]:

@@ -16,15 +16,15 @@ from dataclasses import replace
 
 from benchmarks.bench_render import timed_launches
 from benchmarks.runs import machine
-from gen_data.generator.assemble.config import load_config
-from gen_data.generator.assemble.pipeline_factory import open_pipeline
-from gen_data.generator.core.capture import LidarRays, PointCloud
-from gen_data.generator.core.motion import Trajectory
-from gen_data.generator.core.scene import Body, Rig, Scene
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.core.streams import Streams
-from gen_data.generator.sensors.lidar.lidar_sensor import LidarSensor
-from gen_data.generator.sensors.lidar.scan_pattern import lidar_model, make_sweep
+from gen_data.assemble.config import load_config
+from gen_data.assemble.pipeline_factory import open_pipeline
+from gen_data.core.capture import LidarRays, PointCloud
+from gen_data.core.motion import Trajectory
+from gen_data.core.scene import Body, Rig, Scene
+from gen_data.core.se3 import SE3
+from gen_data.core.streams import Streams
+from gen_data.sensors.lidar.lidar_sensor import LidarSensor
+from gen_data.sensors.lidar.scan_pattern import lidar_model, make_sweep
 
 
 def best_s(work: Callable[[], object], repeats: int) -> float:

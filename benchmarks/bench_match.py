@@ -15,13 +15,13 @@ from collections.abc import Iterable
 import numpy as np
 
 from benchmarks.runs import machine
-from gen_data.generator.config.distributions import Constant, Distribution, Normal
-from gen_data.generator.matching.camera_fit import fit_camera, measure_photo
-from gen_data.generator.matching.lidar_fit import fit_lidar
-from gen_data.generator.matching.recordings import Photo
-from gen_data.generator.matching.results import FittedQuantity
-from gen_data.generator.matching.simulation import photograph, rescan
-from gen_data.generator.sensors.camera.image_pipeline import ImagePipeline
+from gen_data.config.distributions import Constant, Distribution, Normal
+from gen_data.lab.matching.camera_fit import fit_camera, measure_photo
+from gen_data.lab.matching.lidar_fit import fit_lidar
+from gen_data.lab.matching.recordings import Photo
+from gen_data.lab.matching.results import FittedQuantity
+from gen_data.lab.matching.simulation import photograph, rescan
+from gen_data.sensors.camera.image_pipeline import ImagePipeline
 from tests.matching.scenes import RESPONSE, exposures, illuminations, scanner
 
 BASE = ImagePipeline.model_validate({"preset": "industrial", "focus": None})

@@ -22,14 +22,14 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.runs import format_summary, machine
-from gen_data.generator.assemble.config import load_config
-from gen_data.generator.assemble.pipeline_factory import PipelineFactory
-from gen_data.generator.assets.library import open_library
-from gen_data.generator.renderers.warp.device import open_device
-from gen_data.generator.renderers.warp.device_cache import DeviceCache
-from gen_data.generator.runner.identity import format_licences, make_plan
-from gen_data.generator.runner.resident_memory import release_memory
-from gen_data.generator.runner.run import RunProgress, run
+from gen_data.assemble.config import load_config
+from gen_data.assemble.pipeline_factory import PipelineFactory
+from gen_data.assets.library import open_library
+from gen_data.renderers.warp.device import open_device
+from gen_data.renderers.warp.device_cache import DeviceCache
+from gen_data.runner.identity import format_licences, make_plan
+from gen_data.runner.resident_memory import release_memory
+from gen_data.runner.run import RunProgress, run
 
 SMALL_PX = {"tabletop": (96, 72), "street": (124, 38)}
 FIELDS = ("Rss", "Pss", "Pss_Anon", "Private_Dirty", "Shared_Clean")

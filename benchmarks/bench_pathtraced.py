@@ -23,9 +23,9 @@ from functools import cache
 
 import numpy as np
 
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.renderers.warp.renderer import WarpRenderer
+from gen_data.core.capture import Channel
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.renderers.warp.renderer import WarpRenderer
 from tests.renderers.mitsuba_scene import mitsuba_scene
 from tests.renderers.paths import settings_of
 from tests.renderers.test_path_tracing_against_mitsuba import PICTURES, Picture, flip_of

@@ -17,13 +17,13 @@ from typing import Any
 import numpy as np
 
 from benchmarks.bench_tabletop import make_config
-from gen_data.generator.assemble.pipeline_factory import open_pipeline
-from gen_data.generator.core.capture import Channel, SensorReading
-from gen_data.generator.core.interfaces import AssetLibrary
-from gen_data.generator.core.scene import Scene
-from gen_data.generator.core.streams import Streams
-from gen_data.generator.renderers.warp.renderer import WarpRenderer
-from gen_data.generator.sensors.camera.image_pipeline import ImagePipeline, capture_photograph
+from gen_data.assemble.pipeline_factory import open_pipeline
+from gen_data.core.capture import Channel, SensorReading
+from gen_data.core.interfaces import AssetLibrary
+from gen_data.core.scene import Scene
+from gen_data.core.streams import Streams
+from gen_data.renderers.warp.renderer import WarpRenderer
+from gen_data.sensors.camera.image_pipeline import ImagePipeline, capture_photograph
 
 LABELLED = frozenset({Channel.RGB, Channel.Z_DEPTH, Channel.INSTANCE, Channel.CATEGORY})
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import argparse
 
 from benchmarks.runs import format_summary, machine, measure_run
-from gen_data.generator.assemble.config import load_config
+from gen_data.assemble.config import load_config
 
 
 def main() -> None:

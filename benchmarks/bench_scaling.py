@@ -26,18 +26,18 @@ from benchmarks.bench_render import frame_ms, photograph
 from benchmarks.bench_street_render import CHANNELS, Street, grid_mesh
 from benchmarks.bench_tabletop import make_config
 from benchmarks.runs import machine, measure_run
-from gen_data.generator.assemble.pipeline_factory import PipelineFactory
-from gen_data.generator.assets.library import open_library
-from gen_data.generator.core.asset_types import Material, MeshData
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.scene import Body, Camera, Environment, Instance, Light, Scene
-from gen_data.generator.core.se3 import SE3, look_at
-from gen_data.generator.core.streams import Streams
-from gen_data.generator.core.system_calls import usable_cores
-from gen_data.generator.renderers.warp.device import open_device
-from gen_data.generator.renderers.warp.device_cache import DeviceCache
-from gen_data.generator.renderers.warp.renderer import WarpRenderer
-from gen_data.generator.runner.resident_memory import release_memory
+from gen_data.assemble.pipeline_factory import PipelineFactory
+from gen_data.assets.library import open_library
+from gen_data.core.asset_types import Material, MeshData
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.scene import Body, Camera, Environment, Instance, Light, Scene
+from gen_data.core.se3 import SE3, look_at
+from gen_data.core.streams import Streams
+from gen_data.core.system_calls import usable_cores
+from gen_data.renderers.warp.device import open_device
+from gen_data.renderers.warp.device_cache import DeviceCache
+from gen_data.renderers.warp.renderer import WarpRenderer
+from gen_data.runner.resident_memory import release_memory
 
 Points = list[tuple[float, float]]
 FIELD_M = 4.0

@@ -34,9 +34,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.assemble.config import load_config
-from gen_data.generator.assemble.pipeline_factory import open_pipeline
-from gen_data.generator.core.sample import Sample
+from gen_data.assemble.config import load_config
+from gen_data.assemble.pipeline_factory import open_pipeline
+from gen_data.core.sample import Sample
 
 Float64 = NDArray[np.float64]
 GROUND_M, PATCH_M, PATCH_POINTS = (4.0, 20.0), 4.0, 30

@@ -13,13 +13,13 @@ import math
 
 import numpy as np
 
-from gen_data.generator.assets.library import Library, open_library
-from gen_data.generator.core.capture import LidarRays
-from gen_data.generator.core.interfaces import Renderer
-from gen_data.generator.core.scene import Body, Instance, Lidar, Scene
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.renderers.warp.renderer import WarpRenderer
-from gen_data.generator.sensors.lidar.scan_pattern import LidarModel, lidar_model, make_sweep
+from gen_data.assets.library import Library, open_library
+from gen_data.core.capture import LidarRays
+from gen_data.core.interfaces import Renderer
+from gen_data.core.scene import Body, Instance, Lidar, Scene
+from gen_data.core.se3 import SE3
+from gen_data.renderers.warp.renderer import WarpRenderer
+from gen_data.sensors.lidar.scan_pattern import LidarModel, lidar_model, make_sweep
 
 SCANNER_M, FLOOR_M = 1.73, 0.2
 """Heights above the ground: of KITTI's scanner, and below which points may be ground."""

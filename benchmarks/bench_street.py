@@ -9,7 +9,7 @@ from __future__ import annotations
 import argparse
 
 from benchmarks.runs import format_summary, machine, measure_run
-from gen_data.generator.assemble.config import Config, load_config
+from gen_data.assemble.config import Config, load_config
 
 OVERRIDES = (
     "views_per_scene=5",

@@ -17,7 +17,7 @@ from functools import cache
 import numpy as np
 
 from benchmarks.bench_render import frame_ms, photograph, timed_launches
-from gen_data.generator.core.asset_types import (
+from gen_data.core.asset_types import (
     Asset,
     ConvexParts,
     Float32,
@@ -27,13 +27,13 @@ from gen_data.generator.core.asset_types import (
     RobotModel,
     TextureData,
 )
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.errors import AssetError
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.scene import Body, Camera, Environment, Instance, Light, Scene
-from gen_data.generator.core.se3 import SE3, Array, Vec3, look_at
-from gen_data.generator.core.streams import Rng, Streams
-from gen_data.generator.renderers.warp.renderer import WarpRenderer
+from gen_data.core.capture import Channel
+from gen_data.core.errors import AssetError
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.scene import Body, Camera, Environment, Instance, Light, Scene
+from gen_data.core.se3 import SE3, Array, Vec3, look_at
+from gen_data.core.streams import Rng, Streams
+from gen_data.renderers.warp.renderer import WarpRenderer
 
 CHANNELS = frozenset(
     {Channel.RGB, Channel.Z_DEPTH, Channel.INSTANCE, Channel.CATEGORY, Channel.AMODAL}

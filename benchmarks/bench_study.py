@@ -19,9 +19,9 @@ from typing import Any
 import gen_data
 from benchmarks.bench_training import cpu_s
 from benchmarks.runs import machine
-from gen_data.generator.study.adapt import CURRICULUM, adapt, tabulate
-from gen_data.generator.study.experiment import Experiment, Variant, list_runs, perform, prepare
-from gen_data.generator.study.study import run_study
+from gen_data.lab.study.adapt import CURRICULUM, adapt, tabulate
+from gen_data.lab.study.experiment import Experiment, Variant, list_runs, perform, prepare
+from gen_data.lab.study.study import run_study
 
 CONFIGS = Path(__file__).with_name("studies")
 """Folder of the configurations."""

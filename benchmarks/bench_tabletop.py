@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 from benchmarks.runs import format_summary, machine, measure_run
-from gen_data.generator.assemble.config import Config, load_config
-from gen_data.generator.assemble.pipeline_factory import open_pipeline
+from gen_data.assemble.config import Config, load_config
+from gen_data.assemble.pipeline_factory import open_pipeline
 
 OVERRIDES = (
     "randomizers.clutter.count=10",

@@ -13,15 +13,15 @@ from collections.abc import Iterator
 from typing import Any
 
 from benchmarks.runs import machine
-from gen_data.generator.assemble.config import load_config
-from gen_data.generator.assemble.pipeline_factory import scene_source
-from gen_data.generator.assets.library import Library, open_library
-from gen_data.generator.core.errors import LayoutRejected
-from gen_data.generator.core.scene import Scene
-from gen_data.generator.core.streams import Streams
-from gen_data.generator.traffic.simulation import SimulatedMotion, simulate
+from gen_data.assemble.config import load_config
+from gen_data.assemble.pipeline_factory import scene_source
+from gen_data.assets.library import Library, open_library
+from gen_data.core.errors import LayoutRejected
+from gen_data.core.scene import Scene
+from gen_data.core.streams import Streams
 from gen_data.randomizers import traffic_flow
 from gen_data.randomizers.traffic_flow import TrafficFlow
+from gen_data.traffic.simulation import SimulatedMotion, simulate
 
 FULL = {"traffic": ("gap_m=3", "count=29"), "people": ("gap_m=2", "count=40")}
 

@@ -42,7 +42,7 @@ for name in ${SKIP:-}; do rm -f "$staging/wheels/${name//-/_}"-*.whl; done
 
 mkdir "$staging/tree"
 git archive HEAD | tar x -C "$staging/tree" --exclude='docs/*.png' --exclude=docs/pictures
-(cd "$staging/tree" && PYTHONPATH=$PWD python -m gen_data.generator.renderers.warp.kernel_bundle \
+(cd "$staging/tree" && PYTHONPATH=$PWD python -m gen_data.renderers.warp.kernel_bundle \
     ${kinds[@]+"${kinds[@]}"})
 GEN_DATA_ASSETS="$staging/assets" PYTHONPATH="$staging/tree" python -m gen_data assets install pybullet
 

@@ -23,9 +23,9 @@ from typing import Any
 
 import numpy as np
 
-from gen_data.generator.assets.asset_folder import Folder
-from gen_data.generator.assets.readers import read_mesh
-from gen_data.generator.core.errors import AssetError
+from gen_data.assets.asset_folder import Folder
+from gen_data.assets.readers import read_mesh
+from gen_data.core.errors import AssetError
 
 SUFFIXES = (".obj", ".ply", ".stl", ".glb", ".gltf", ".usd", ".usda", ".usdc", ".usdz")
 SAME = 0.01
@@ -33,9 +33,9 @@ SAME = 0.01
 _TIMES = """
 import sys, time
 from pathlib import Path
-from gen_data.generator.assets.asset_folder import Folder
-from gen_data.generator.assets.readers import read_mesh
-from gen_data.generator.core.errors import AssetError
+from gen_data.assets.asset_folder import Folder
+from gen_data.assets.readers import read_mesh
+from gen_data.core.errors import AssetError
 for line in sys.stdin:
     path = Path(line.strip())
     best = 1e9

@@ -32,10 +32,10 @@ TOLERANCE_M = 1e-4
 
 def ours(root: Path, file: str) -> dict[str, Any]:
     """Facts of a description as this project reads it."""
-    from gen_data.generator.assets.asset_folder import Folder
-    from gen_data.generator.assets.robot_formats import read_description
-    from gen_data.generator.assets.robot_shapes import read_shape
-    from gen_data.generator.core.errors import AssetError
+    from gen_data.assets.asset_folder import Folder
+    from gen_data.assets.robot_formats import read_description
+    from gen_data.assets.robot_shapes import read_shape
+    from gen_data.core.errors import AssetError
 
     folder = Folder(root)
     try:

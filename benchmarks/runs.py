@@ -7,10 +7,10 @@ import tempfile
 from functools import partial
 from pathlib import Path
 
-from gen_data.generator.assemble.config import Config
-from gen_data.generator.assemble.pipeline_factory import PipelineFactory
-from gen_data.generator.runner.identity import format_licences, make_plan
-from gen_data.generator.runner.run import Summary, run
+from gen_data.assemble.config import Config
+from gen_data.assemble.pipeline_factory import PipelineFactory
+from gen_data.runner.identity import format_licences, make_plan
+from gen_data.runner.run import Summary, run
 
 
 def measure_run(config: Config, n: int, workers: int) -> Summary:

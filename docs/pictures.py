@@ -34,10 +34,10 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 from pydantic import Field
 
-from gen_data.generator.config.base_model import Strict
-from gen_data.generator.config.distributions import DISTRIBUTIONS
-from gen_data.generator.config.yaml_scalars import to_flow_yaml
-from gen_data.generator.core.streams import Streams
+from gen_data.config.base_model import Strict
+from gen_data.config.distributions import DISTRIBUTIONS
+from gen_data.config.yaml_scalars import to_flow_yaml
+from gen_data.core.streams import Streams
 
 DOCS = Path(__file__).parent
 FOLDER = DOCS / "pictures"
@@ -234,7 +234,7 @@ def strip_configurations(strip: Strip) -> list[tuple[Any, str]]:
 
 def _load(strip: Strip, fields: Mapping[str, Any], sensors: Sequence[Any] = ()) -> Any:
     """Configuration (``assemble.config.Config``) of the base with changes."""
-    from gen_data.generator.assemble.config import load_config
+    from gen_data.assemble.config import load_config
 
     listed = [*strip.add.get("sensors", ()), *sensors]
     extended = {"extends": str(FOLDER / f"{strip.base}.yaml"), **strip.add, "sensors": listed}
@@ -267,9 +267,9 @@ def _render_strip(strip: Strip) -> list[Pixels]:
 
 def _tiles_of(config: Any, strip: Strip) -> list[Any]:
     """Tiles (``contact_sheet.Tile``) of a sample."""
-    from gen_data.generator.assemble.pipeline_factory import open_pipeline
-    from gen_data.generator.preview.contact_sheet import Tile, make_tiles
-    from gen_data.generator.preview.sensor_views import top_view
+    from gen_data.assemble.pipeline_factory import open_pipeline
+    from gen_data.preview.contact_sheet import Tile, make_tiles
+    from gen_data.preview.sensor_views import top_view
 
     with open_pipeline(config) as pipeline:
         sample = pipeline.sample(strip.index)
@@ -348,10 +348,10 @@ def _follow_tutorial(text: str, until: str) -> None:
 
 
 def _draw_sheet(name: str, sheet: Sheet) -> Image.Image:
-    from gen_data.generator.assemble.config import load_config
-    from gen_data.generator.assemble.pipeline_factory import open_pipeline
-    from gen_data.generator.core.capture import Channel
-    from gen_data.generator.preview.contact_sheet import arrange_tiles, make_tiles, render_tiles
+    from gen_data.assemble.config import load_config
+    from gen_data.assemble.pipeline_factory import open_pipeline
+    from gen_data.core.capture import Channel
+    from gen_data.preview.contact_sheet import arrange_tiles, make_tiles, render_tiles
 
     overrides = [f"{path}={to_flow_yaml(value)}" for path, value in sheet.set_too.items()]
     config = load_config(sheet.config or f"{name}.yaml", seed=sheet.seed, overrides=overrides)
@@ -384,7 +384,7 @@ def _plot_draws(name: str, argument: Any, all_arguments: Sequence[Any]) -> Pixel
 
 def _draw_values(name: str, argument: Any) -> list[Any]:
     """Values of ``DRAWS`` scenes."""
-    from gen_data.generator.config.distributions import (
+    from gen_data.config.distributions import (
         DIRECTION,
         FLAG,
         NAME,
@@ -393,7 +393,7 @@ def _draw_values(name: str, argument: Any) -> list[Any]:
         ROTATION,
         WHOLE_NUMBER,
     )
-    from gen_data.generator.config.distributions.base import read_distribution
+    from gen_data.config.distributions.base import read_distribution
 
     kinds = (NUMBER, WHOLE_NUMBER, FLAG, NAME, ROTATION, DIRECTION, POSITION)
     known = DISTRIBUTIONS.load(name).kinds
@@ -406,7 +406,7 @@ def _draw_values(name: str, argument: Any) -> list[Any]:
 
 def _as_point(value: tuple[float, ...]) -> tuple[float, ...]:
     """A position or direction itself; a rotation by the tip of its turned X axis."""
-    from gen_data.generator.core.se3 import SE3
+    from gen_data.core.se3 import SE3
 
     if len(value) == 3:
         return value

@@ -25,10 +25,10 @@ import torch
 from numpy.typing import NDArray
 
 import gen_data
-from gen_data.generator.study.detector import Detector
-from gen_data.generator.study.evaluation import evaluate
-from gen_data.generator.study.real_pictures import read_real
-from gen_data.generator.study.training import detect_all, fit
+from gen_data.lab.study.detector import Detector
+from gen_data.lab.study.evaluation import evaluate
+from gen_data.lab.study.real_pictures import read_real
+from gen_data.lab.study.training import detect_all, fit
 from gen_data.targets import detection_target
 
 KEPT_MAX = 4000

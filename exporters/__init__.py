@@ -6,8 +6,8 @@ images. At the end it merges all shards into the layout of its format; images ar
 
 from __future__ import annotations
 
-from gen_data.generator.core.interfaces import Exporter
-from gen_data.generator.core.plugins import PluginTable
+from gen_data.core.interfaces import Exporter
+from gen_data.core.plugins import PluginTable
 
 TABLE = PluginTable[Exporter](
     "exporter",

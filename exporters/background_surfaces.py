@@ -18,13 +18,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gen_data.core.capture import Channel
+from gen_data.core.interfaces import AssetLibrary, DatasetInfo, media_path
+from gen_data.core.rolling_shutter_projection import world_points
+from gen_data.core.sample import Sample
+from gen_data.core.scene import Body, Camera, Scene
+from gen_data.core.se3 import Array
 from gen_data.exporters.image_files import DEPTH_UNITS_MAX, read_image
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.interfaces import AssetLibrary, DatasetInfo, media_path
-from gen_data.generator.core.rolling_shutter_projection import world_points
-from gen_data.generator.core.sample import Sample
-from gen_data.generator.core.scene import Body, Camera, Scene
-from gen_data.generator.core.se3 import Array
 
 UInt8 = NDArray[np.uint8]
 UInt16 = NDArray[np.uint16]

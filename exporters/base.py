@@ -8,13 +8,13 @@ from typing import ClassVar, TypeVar, get_args
 
 from pydantic import Field, model_validator
 
+from gen_data.config.base_model import Strict
+from gen_data.core.capture import Channel, ImageFormat
+from gen_data.core.errors import ConfigError, did_you_mean, list_names
+from gen_data.core.interfaces import AssetLibrary, DatasetInfo, Exporter
+from gen_data.core.optional_packages import missing_packages
+from gen_data.core.scene import Scene
 from gen_data.exporters.conventions import Conventions
-from gen_data.generator.config.base_model import Strict
-from gen_data.generator.core.capture import Channel, ImageFormat
-from gen_data.generator.core.errors import ConfigError, did_you_mean, list_names
-from gen_data.generator.core.interfaces import AssetLibrary, DatasetInfo, Exporter
-from gen_data.generator.core.optional_packages import missing_packages
-from gen_data.generator.core.scene import Scene
 
 PNG_ONLY = frozenset({"png"})
 PNG_OR_JPEG = frozenset({"png", "jpeg"})

@@ -36,17 +36,17 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
+from gen_data.core.capture import Channel
+from gen_data.core.interfaces import DatasetInfo
+from gen_data.core.lane_geometry import LaneBorder
+from gen_data.core.motion import Twist
+from gen_data.core.sample import BirdseyeMap, BorderTruth, EgoTruth, Sample
+from gen_data.core.serialization import canonical_json
 from gen_data.exporters.base import ANY_FORMAT, ExporterBase
 from gen_data.exporters.conventions import ANY_LENS, SAMPLE, Conventions
 from gen_data.exporters.image_files import link_or_copy
 from gen_data.exporters.png import RowFilter, encode_png
 from gen_data.exporters.sequences import write_text
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.interfaces import DatasetInfo
-from gen_data.generator.core.lane_geometry import LaneBorder
-from gen_data.generator.core.motion import Twist
-from gen_data.generator.core.sample import BirdseyeMap, BorderTruth, EgoTruth, Sample
-from gen_data.generator.core.serialization import canonical_json
 
 FRAMES, LANES = "frames.jsonl", "lanes"
 ROWS_PX = 10

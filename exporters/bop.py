@@ -46,6 +46,14 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import PrivateAttr
 
+from gen_data.core.bounded_cache import ByteCache
+from gen_data.core.boxes import BoxPx
+from gen_data.core.capture import Channel
+from gen_data.core.interfaces import AssetLibrary, DatasetInfo, media_path
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.sample import MaskPx, ObjectTruth, Sample
+from gen_data.core.se3 import SE3
+from gen_data.core.serialization import canonical_json
 from gen_data.exporters.base import PNG_OR_JPEG, ExporterBase
 from gen_data.exporters.conventions import PINHOLE, Conventions
 from gen_data.exporters.fragments import fragment_lines, fragment_rows, write_fragment
@@ -63,14 +71,6 @@ from gen_data.exporters.rigid_models import (
 from gen_data.exporters.rle import run_lengths
 from gen_data.exporters.sensor_selection import pinhole_camera
 from gen_data.exporters.sequences import check_frame_names, write_bytes, write_text
-from gen_data.generator.core.bounded_cache import ByteCache
-from gen_data.generator.core.boxes import BoxPx
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.interfaces import AssetLibrary, DatasetInfo, media_path
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.sample import MaskPx, ObjectTruth, Sample
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.core.serialization import canonical_json
 
 TARGET_VISIBILITY = 0.1
 """Visible fraction from which an object is a target of the benchmark of 2019."""

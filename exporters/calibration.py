@@ -17,7 +17,7 @@
   Brandt's are OpenCV's ``fisheye`` and ``equidistant``. Values that a format lacks are left out,
   with a comment in their place. Panoramas are left out.
 
-``gen_data.generator.sensors.calibration`` reads these files.
+``gen_data.sensors.calibration`` reads these files.
 """
 
 from __future__ import annotations
@@ -27,6 +27,12 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
+from gen_data.core.capture import Channel
+from gen_data.core.errors import ConfigError
+from gen_data.core.interfaces import DatasetInfo
+from gen_data.core.sample import Sample
+from gen_data.core.scene import Scene
+from gen_data.core.serialization import canonical_json
 from gen_data.exporters.base import ANY_FORMAT, ExporterBase
 from gen_data.exporters.calibration_texts import (
     camera_info_text,
@@ -46,12 +52,6 @@ from gen_data.exporters.sequences import (
     write_frames,
     write_text,
 )
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import DatasetInfo
-from gen_data.generator.core.sample import Sample
-from gen_data.generator.core.scene import Scene
-from gen_data.generator.core.serialization import canonical_json
 
 PANORAMA = "equirectangular"
 

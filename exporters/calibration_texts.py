@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.se3 import SE3
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.se3 import SE3
 
 DECIMALS = 9
 _ROS = {"pinhole": "plumb_bob", "kannala_brandt": "equidistant"}

@@ -11,9 +11,9 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 
-from gen_data.generator.core.english import article, count, join
-from gen_data.generator.core.sample import ObjectTruth, Sample
-from gen_data.generator.core.scene import Camera, Scene, Weather
+from gen_data.core.english import article, count, join
+from gen_data.core.sample import ObjectTruth, Sample
+from gen_data.core.scene import Camera, Scene, Weather
 
 LIGHT_RAIN_MM_H, HEAVY_RAIN_MM_H = 2.5, 10.0
 """WMO's limits of light and heavy rain (Guide to Instruments and Methods of Observation, 2018)."""

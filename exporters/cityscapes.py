@@ -46,6 +46,15 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import PrivateAttr
 
+from gen_data.core.boxes import BoxPx
+from gen_data.core.capture import Channel
+from gen_data.core.errors import ConfigError, StorageError
+from gen_data.core.interfaces import AssetLibrary, DatasetInfo, media_path
+from gen_data.core.sample import Sample
+from gen_data.core.scene import Camera, Scene
+from gen_data.core.scene_time import RIG_AXES
+from gen_data.core.serialization import canonical_json
+from gen_data.core.stereo import baseline_m
 from gen_data.exporters.background_surfaces import SURFACES, UInt16, read_surfaces
 from gen_data.exporters.base import ExporterBase
 from gen_data.exporters.cityscapes_classes import city_classes
@@ -63,15 +72,6 @@ from gen_data.exporters.sequences import (
     write_bytes,
     write_text,
 )
-from gen_data.generator.core.boxes import BoxPx
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.errors import ConfigError, StorageError
-from gen_data.generator.core.interfaces import AssetLibrary, DatasetInfo, media_path
-from gen_data.generator.core.sample import Sample
-from gen_data.generator.core.scene import Camera, Scene
-from gen_data.generator.core.scene_time import RIG_AXES
-from gen_data.generator.core.serialization import canonical_json
-from gen_data.generator.core.stereo import baseline_m
 
 PER_CLASS = 1000
 """Numbers of instances per class and image; further ones become groups."""

@@ -16,7 +16,7 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from gen_data.generator.core.scene import Instance
+from gen_data.core.scene import Instance
 
 UInt8 = NDArray[np.uint8]
 

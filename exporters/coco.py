@@ -52,7 +52,7 @@ of the instant in its sequence, from 0) and ``time_s``, and annotations have ``t
 for one object in all images of its sequence, of all cameras, and unique in the data set.
 
 Images have ``K`` and, unless their camera is a pinhole, ``lens``: its ``model`` (one in
-``gen_data.generator.core.lens``), OpenCV's ``distortion`` vector with the names of its
+``gen_data.core.lens``), OpenCV's ``distortion`` vector with the names of its
 ``coefficients``, to be applied before ``K``, and ``half_field_rad``, the angle to the axis at which
 the image ends.
 
@@ -83,6 +83,25 @@ from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
+from gen_data.core.boxes import BoxPx, OrientedBox
+from gen_data.core.capture import Channel
+from gen_data.core.interfaces import DatasetInfo
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.motion import Twist
+from gen_data.core.sample import (
+    ANNOTATION_STRIDE,
+    ImageTruth,
+    KeypointTruth,
+    MotionTruth,
+    ObjectTruth,
+    Sample,
+    both_ways,
+)
+from gen_data.core.scene import Instance, Scene, Weather
+from gen_data.core.se3 import Array
+from gen_data.core.serialization import canonical_json
+from gen_data.core.shutter import Shutter
+from gen_data.core.skeletons import Skeleton, find_skeleton
 from gen_data.exporters.base import ANY_FORMAT, ExporterBase
 from gen_data.exporters.conventions import EDGES, READING, Conventions
 from gen_data.exporters.fragments import fragment_lines, fragment_rows, image_splits, write_fragment
@@ -93,25 +112,6 @@ from gen_data.exporters.mask_polygons import drawable_polygons
 from gen_data.exporters.rle import encode_rle
 from gen_data.exporters.sensor_selection import check_channels, instant_s, rgb_cameras
 from gen_data.exporters.sequences import sequence_number
-from gen_data.generator.core.boxes import BoxPx, OrientedBox
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.interfaces import DatasetInfo
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.motion import Twist
-from gen_data.generator.core.sample import (
-    ANNOTATION_STRIDE,
-    ImageTruth,
-    KeypointTruth,
-    MotionTruth,
-    ObjectTruth,
-    Sample,
-    both_ways,
-)
-from gen_data.generator.core.scene import Instance, Scene, Weather
-from gen_data.generator.core.se3 import Array
-from gen_data.generator.core.serialization import canonical_json
-from gen_data.generator.core.shutter import Shutter
-from gen_data.generator.core.skeletons import Skeleton, find_skeleton
 
 DECIMALS = 9
 """Decimals of metres, matrices and fractions: far below any measurement error."""

@@ -34,6 +34,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import PrivateAttr
 
+from gen_data.core.capture import Channel
+from gen_data.core.interfaces import AssetLibrary, DatasetInfo
+from gen_data.core.sample import Sample
+from gen_data.core.serialization import canonical_json
 from gen_data.exporters.background_surfaces import SURFACES, UInt16, read_surfaces
 from gen_data.exporters.base import ANY_FORMAT, ExporterBase
 from gen_data.exporters.coco import box_xywh, dataset_header, image_name, write_dataset
@@ -45,10 +49,6 @@ from gen_data.exporters.label_png import encode_label_png
 from gen_data.exporters.label_regions import find_regions
 from gen_data.exporters.sensor_selection import check_channels, rgb_cameras
 from gen_data.exporters.sequences import write_bytes
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.interfaces import AssetLibrary, DatasetInfo
-from gen_data.generator.core.sample import Sample
-from gen_data.generator.core.serialization import canonical_json
 
 UInt32 = NDArray[np.uint32]
 

@@ -40,6 +40,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from gen_data.core.capture import Channel
+from gen_data.core.errors import ConfigError, StorageError
+from gen_data.core.interfaces import DatasetInfo
+from gen_data.core.sample import Sample
+from gen_data.core.serialization import canonical_json
 from gen_data.exporters.base import ANY_FORMAT, ExporterBase
 from gen_data.exporters.captions import caption
 from gen_data.exporters.conventions import ANY_LENS, Conventions
@@ -64,11 +69,6 @@ from gen_data.exporters.sequences import (
     write_frames,
     write_text,
 )
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.errors import ConfigError, StorageError
-from gen_data.generator.core.interfaces import DatasetInfo
-from gen_data.generator.core.sample import Sample
-from gen_data.generator.core.serialization import canonical_json
 
 CONTROLS = ("depth", "segmentation", "edges")
 IMAGES = ("rgb", *CONTROLS)

@@ -30,6 +30,11 @@ from typing import Any, ClassVar, Literal
 
 from pydantic import PrivateAttr
 
+from gen_data.core.capture import Channel
+from gen_data.core.errors import ConfigError
+from gen_data.core.interfaces import AssetLibrary, DatasetInfo
+from gen_data.core.sample import Sample
+from gen_data.core.scene_assets import assets_in
 from gen_data.exporters.base import ANY_FORMAT, ExporterBase
 from gen_data.exporters.coco import image_name
 from gen_data.exporters.conventions import EDGES, Conventions
@@ -45,11 +50,6 @@ from gen_data.exporters.image_files import link_or_copy
 from gen_data.exporters.lens_fields import has_bent_camera
 from gen_data.exporters.sensor_selection import rgb_camera, rgb_cameras
 from gen_data.exporters.sequences import write_text
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import AssetLibrary, DatasetInfo
-from gen_data.generator.core.sample import Sample
-from gen_data.generator.core.scene_assets import assets_in
 
 IMAGES, ASSETS = "images", "assets"
 MIME_TYPES = {".png": "image/png", ".jpg": "image/jpeg", ".webp": "image/webp"}

@@ -12,7 +12,7 @@ from typing import Any
 
 import yaml
 
-from gen_data.generator.core.interfaces import DatasetInfo
+from gen_data.core.interfaces import DatasetInfo
 
 CONFORMS_TO = "http://mlcommons.org/croissant/1.0"
 

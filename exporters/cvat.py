@@ -25,6 +25,9 @@ from xml.sax.saxutils import escape, quoteattr
 
 import numpy as np
 
+from gen_data.core.capture import Channel
+from gen_data.core.interfaces import DatasetInfo
+from gen_data.core.sample import MaskPx, ObjectTruth, Sample
 from gen_data.exporters.coco import image_name
 from gen_data.exporters.conventions import ANY_LENS, Conventions
 from gen_data.exporters.fragments import fragment_rows, image_splits
@@ -32,9 +35,6 @@ from gen_data.exporters.image_files import link_or_copy
 from gen_data.exporters.image_rows import ImageRowsExporter
 from gen_data.exporters.label_colors import voc_palette
 from gen_data.exporters.mask_polygons import drawable_polygons
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.interfaces import DatasetInfo
-from gen_data.generator.core.sample import MaskPx, ObjectTruth, Sample
 
 OCCLUDED = 0.05
 """Hidden share of the silhouette in the image above which ``occluded`` is 1."""

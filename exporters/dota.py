@@ -23,15 +23,15 @@ from typing import Any, ClassVar, Literal
 
 from pydantic import Field
 
+from gen_data.core.capture import Channel
+from gen_data.core.interfaces import DatasetInfo
+from gen_data.core.sample import ObjectTruth, Sample
 from gen_data.exporters.coco import image_name
 from gen_data.exporters.conventions import ANY_LENS, Conventions
 from gen_data.exporters.fragments import fragment_rows, image_splits
 from gen_data.exporters.image_files import link_or_copy
 from gen_data.exporters.image_rows import ImageRowsExporter
 from gen_data.exporters.sequences import write_text
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.interfaces import DatasetInfo
-from gen_data.generator.core.sample import ObjectTruth, Sample
 
 HEADER = ("imagesource:gen-data", "gsd:null")
 

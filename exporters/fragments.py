@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from gen_data.generator.core.serialization import canonical_json
+from gen_data.core.serialization import canonical_json
 
 
 def write_fragment(folder: Path, name: str, rows: Iterable[Mapping[str, Any]]) -> None:

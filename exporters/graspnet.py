@@ -26,15 +26,15 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
+from gen_data.core.capture import Channel
+from gen_data.core.interfaces import DatasetInfo
+from gen_data.core.sample import Sample
 from gen_data.exporters.coco import image_name
 from gen_data.exporters.conventions import ANY_LENS, Conventions
 from gen_data.exporters.fragments import fragment_rows, image_splits
 from gen_data.exporters.image_files import link_or_copy
 from gen_data.exporters.image_rows import ImageRowsExporter
 from gen_data.exporters.sequences import write_bytes
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.interfaces import DatasetInfo
-from gen_data.generator.core.sample import Sample
 
 
 class GraspNet(ImageRowsExporter):

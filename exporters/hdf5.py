@@ -49,6 +49,14 @@ import deflate
 import numpy as np
 from numpy.typing import NDArray
 
+from gen_data.core.capture import Channel
+from gen_data.core.errors import ConfigError
+from gen_data.core.interfaces import DatasetInfo
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.optional_packages import missing_packages
+from gen_data.core.sample import ImageTruth, ObjectTruth, Sample
+from gen_data.core.se3 import Array
+from gen_data.core.serialization import canonical_json
 from gen_data.exporters.base import ANY_FORMAT, ExporterBase
 from gen_data.exporters.conventions import Conventions
 from gen_data.exporters.fragments import fragment_rows, write_fragment
@@ -56,14 +64,6 @@ from gen_data.exporters.image_files import link_or_copy, read_image
 from gen_data.exporters.lens_fields import lens_fields
 from gen_data.exporters.npz import npz_bytes
 from gen_data.exporters.sequences import write_text
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import DatasetInfo
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.optional_packages import missing_packages
-from gen_data.generator.core.sample import ImageTruth, ObjectTruth, Sample
-from gen_data.generator.core.se3 import Array
-from gen_data.generator.core.serialization import canonical_json
 
 KEYS = {
     Channel.RGB: "colors",

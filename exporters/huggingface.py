@@ -41,6 +41,11 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 import yaml
 from pydantic import Field
 
+from gen_data.core.boxes import OrientedBox
+from gen_data.core.capture import Channel
+from gen_data.core.interfaces import DatasetInfo
+from gen_data.core.lens import Lens
+from gen_data.core.sample import ObjectTruth, Sample
 from gen_data.exporters.base import ANY_FORMAT, ExporterBase, check_installed
 from gen_data.exporters.conventions import EDGES, READING, Conventions
 from gen_data.exporters.fragments import fragment_rows, numbered_stem, write_fragment
@@ -57,11 +62,6 @@ from gen_data.exporters.parquet_tables import (
 from gen_data.exporters.rle import encode_rle
 from gen_data.exporters.sensor_selection import instant_s, rgb_camera, rgb_cameras
 from gen_data.exporters.sequences import write_text
-from gen_data.generator.core.boxes import OrientedBox
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.interfaces import DatasetInfo
-from gen_data.generator.core.lens import Lens
-from gen_data.generator.core.sample import ObjectTruth, Sample
 
 if TYPE_CHECKING:
     import pyarrow

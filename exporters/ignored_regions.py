@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import DatasetInfo
-from gen_data.generator.core.sample import ObjectTruth
-from gen_data.generator.core.scene import LABEL_IDS_MAX
+from gen_data.core.errors import ConfigError
+from gen_data.core.interfaces import DatasetInfo
+from gen_data.core.sample import ObjectTruth
+from gen_data.core.scene import LABEL_IDS_MAX
 
 
 def each_class(info: DatasetInfo, objects: Iterable[ObjectTruth]) -> Iterator[ObjectTruth]:

@@ -39,13 +39,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gen_data.core.capture import PNG, Channel, ImageEncoding
+from gen_data.core.errors import ConfigError, SampleError, StorageError
+from gen_data.core.interfaces import DatasetInfo
+from gen_data.core.sample import Sample
 from gen_data.exporters.measurement_tables import write_table
 from gen_data.exporters.png import RowFilter, decode_png, encode_png
 from gen_data.exporters.point_cloud_io import write_cloud
-from gen_data.generator.core.capture import PNG, Channel, ImageEncoding
-from gen_data.generator.core.errors import ConfigError, SampleError, StorageError
-from gen_data.generator.core.interfaces import DatasetInfo
-from gen_data.generator.core.sample import Sample
 
 UInt16 = NDArray[np.uint16]
 

@@ -7,11 +7,11 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, ClassVar
 
+from gen_data.core.interfaces import DatasetInfo
+from gen_data.core.sample import Sample
 from gen_data.exporters.base import ANY_FORMAT, ExporterBase
 from gen_data.exporters.fragments import write_fragment
 from gen_data.exporters.sensor_selection import check_channels, rgb_cameras
-from gen_data.generator.core.interfaces import DatasetInfo
-from gen_data.generator.core.sample import Sample
 
 
 class ImageRowsExporter(ExporterBase):

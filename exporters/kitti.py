@@ -51,6 +51,13 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from gen_data.core.boxes import BoxPx
+from gen_data.core.capture import Channel
+from gen_data.core.interfaces import DatasetInfo, media_path
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.sample import ImageTruth, ObjectTruth, Sample
+from gen_data.core.scene import Instance
+from gen_data.core.se3 import Array
 from gen_data.exporters.base import ExporterBase
 from gen_data.exporters.conventions import PINHOLE, Conventions
 from gen_data.exporters.image_files import link_or_copy
@@ -58,13 +65,6 @@ from gen_data.exporters.kitti_boxes import UprightBox, members_in_box, upright_b
 from gen_data.exporters.point_cloud_io import T_camera_lidar, read_points, xyzi_bytes
 from gen_data.exporters.sensor_selection import has_scans, laser_scanner, pinhole_camera
 from gen_data.exporters.sequences import check_frame_names, write_bytes, write_text
-from gen_data.generator.core.boxes import BoxPx
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.interfaces import DatasetInfo, media_path
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.sample import ImageTruth, ObjectTruth, Sample
-from gen_data.generator.core.scene import Instance
-from gen_data.generator.core.se3 import Array
 
 OFFICIAL_TYPES = {
     "car": "Car",

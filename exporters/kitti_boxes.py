@@ -10,8 +10,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.core.boxes import OrientedBox
-from gen_data.generator.core.se3 import Array, Vec3
+from gen_data.core.boxes import OrientedBox
+from gen_data.core.se3 import Array, Vec3
 
 BORDER_M = 0.029
 """Tolerance of the tests for points in boxes: 3 cm, less rounding."""

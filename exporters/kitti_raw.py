@@ -34,6 +34,13 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
+from gen_data.core.capture import Channel
+from gen_data.core.errors import ConfigError
+from gen_data.core.interfaces import DatasetInfo, media_path
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.sample import Sample
+from gen_data.core.scene import Scene
+from gen_data.core.se3 import SE3, Array, Vec3
 from gen_data.exporters.base import ExporterBase
 from gen_data.exporters.conventions import PINHOLE, Conventions
 from gen_data.exporters.image_files import link_or_copy
@@ -63,13 +70,6 @@ from gen_data.exporters.sequences import (
     write_text,
 )
 from gen_data.exporters.tracklets import frame_boxes, tracklets_text
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import DatasetInfo, media_path
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.sample import Sample
-from gen_data.generator.core.scene import Scene
-from gen_data.generator.core.se3 import SE3, Array, Vec3
 
 DRIVES_MAX = 10_000
 """Drive numbers have four digits."""

@@ -30,6 +30,11 @@ from typing import ClassVar, Literal
 import cv2
 import numpy as np
 
+from gen_data.core.capture import Channel
+from gen_data.core.errors import ConfigError
+from gen_data.core.interfaces import DatasetInfo, media_path
+from gen_data.core.sample import Sample
+from gen_data.core.stereo import baseline_m
 from gen_data.exporters.base import ExporterBase
 from gen_data.exporters.conventions import PINHOLE, Conventions
 from gen_data.exporters.image_files import link_or_copy
@@ -46,11 +51,6 @@ from gen_data.exporters.sequences import (
     write_frames,
     write_text,
 )
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import DatasetInfo, media_path
-from gen_data.generator.core.sample import Sample
-from gen_data.generator.core.stereo import baseline_m
 
 SPLITS = ("train", "val", "test")
 LABELS = {Channel.DISPARITY: "disp_occ_0", Channel.DISPARITY_VISIBLE: "disp_noc_0"}

@@ -27,6 +27,10 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
+from gen_data.core.capture import Channel
+from gen_data.core.interfaces import DatasetInfo, media_path
+from gen_data.core.sample import ObjectTruth, Sample
+from gen_data.core.scene import Scene
 from gen_data.exporters.base import ExporterBase
 from gen_data.exporters.conventions import PINHOLE, Conventions
 from gen_data.exporters.image_files import link_or_copy
@@ -49,10 +53,6 @@ from gen_data.exporters.sequences import (
     write_frames,
     write_text,
 )
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.interfaces import DatasetInfo, media_path
-from gen_data.generator.core.sample import ObjectTruth, Sample
-from gen_data.generator.core.scene import Scene
 
 SEQUENCES_MAX = 10_000
 """Names of sequences have four digits."""

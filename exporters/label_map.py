@@ -18,18 +18,13 @@ from typing import Literal
 import yaml
 from pydantic import Field, field_validator, model_validator
 
-from gen_data.generator.config.base_model import Strict
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.errors import (
-    ConfigError,
-    ConfigWarning,
-    did_you_mean,
-    list_names,
-)
-from gen_data.generator.core.interfaces import AssetLibrary, DatasetInfo, Exporter
-from gen_data.generator.core.path_names import CATEGORY_MAX, check_name
-from gen_data.generator.core.sample import ImageTruth, ObjectTruth, Sample
-from gen_data.generator.core.scene import Instance, Scene
+from gen_data.config.base_model import Strict
+from gen_data.core.capture import Channel
+from gen_data.core.errors import ConfigError, ConfigWarning, did_you_mean, list_names
+from gen_data.core.interfaces import AssetLibrary, DatasetInfo, Exporter
+from gen_data.core.path_names import CATEGORY_MAX, check_name
+from gen_data.core.sample import ImageTruth, ObjectTruth, Sample
+from gen_data.core.scene import Instance, Scene
 
 PublicList = Literal["coco80", "kitti", "nuscenes", "cityscapes", "nyu40", "ade20k"]
 Sources = tuple[str, ...]

@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gen_data.core.sample import ObjectTruth
 from gen_data.exporters.png import GREY, RGB, RowFilter, assemble_palette_png, assemble_png
-from gen_data.generator.core.sample import ObjectTruth
 
 UInt8 = NDArray[np.uint8]
 UInt16 = NDArray[np.uint16]

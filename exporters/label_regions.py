@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.core.boxes import BoxPx
+from gen_data.core.boxes import BoxPx
 
 
 @dataclass(frozen=True, slots=True)

@@ -32,6 +32,10 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 from numpy.typing import NDArray
 
+from gen_data.core.capture import Channel
+from gen_data.core.interfaces import DatasetInfo
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.sample import MaskPx, ObjectTruth, Sample
 from gen_data.exporters.coco import image_name
 from gen_data.exporters.conventions import ANY_LENS, Conventions
 from gen_data.exporters.fragments import fragment_rows, image_splits
@@ -40,10 +44,6 @@ from gen_data.exporters.image_rows import ImageRowsExporter
 from gen_data.exporters.label_colors import voc_palette
 from gen_data.exporters.mask_polygons import drawable_polygons, join_polygons
 from gen_data.exporters.sequences import write_text
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.interfaces import DatasetInfo
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.sample import MaskPx, ObjectTruth, Sample
 
 LOCAL_FILES = "/data/local-files/?d="
 """Label Studio's address of a file in its folder of local files."""

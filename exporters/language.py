@@ -27,6 +27,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
+from gen_data.core.capture import Channel
+from gen_data.core.interfaces import DatasetInfo
+from gen_data.core.sample import Sample, Utterance
+from gen_data.core.serialization import canonical_json
 from gen_data.exporters.captions import caption
 from gen_data.exporters.coco import box_xywh, image_name, scene_graph
 from gen_data.exporters.conventions import ANY_LENS, EDGES, Conventions
@@ -34,10 +38,6 @@ from gen_data.exporters.fragments import fragment_rows, image_splits
 from gen_data.exporters.image_files import link_or_copy
 from gen_data.exporters.image_rows import ImageRowsExporter
 from gen_data.exporters.rle import encode_rle
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.interfaces import DatasetInfo
-from gen_data.generator.core.sample import Sample, Utterance
-from gen_data.generator.core.serialization import canonical_json
 
 UTTERANCE_STRIDE = 1_000
 """Ids of lines per image; more lines than this are left out."""

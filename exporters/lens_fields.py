@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
-from gen_data.generator.core.interfaces import DatasetInfo
-from gen_data.generator.core.lens import COEFFICIENTS, Lens
+from gen_data.core.interfaces import DatasetInfo
+from gen_data.core.lens import COEFFICIENTS, Lens
 
 
 def lens_fields(lens: Lens) -> dict[str, Any]:
     """A lens as ``{"lens": {...}}``; empty for a pinhole.
 
-    Its ``model`` is one of ``gen_data.generator.core.lens``; ``distortion`` are its coefficients in
+    Its ``model`` is one of ``gen_data.core.lens``; ``distortion`` are its coefficients in
     the order of OpenCV's functions, with the names ``coefficients``; beyond ``half_field_rad`` from
     the axis it has no image. A panorama has the model only. K has the pixel centres of the format.
     """

@@ -38,29 +38,19 @@ from typing import Any, ClassVar, Literal
 
 from pydantic import PrivateAttr
 
+from gen_data.core.capture import Channel
+from gen_data.core.demonstrations import DemonstrationStep, demonstration_step, joint_positions
+from gen_data.core.errors import ConfigError
+from gen_data.core.interfaces import AssetLibrary, DatasetInfo
+from gen_data.core.sample import Sample
+from gen_data.core.scene import Articulation, Scene
 from gen_data.exporters.base import ANY_FORMAT, ExporterBase, check_installed, select_names
 from gen_data.exporters.conventions import ANY_LENS, Conventions
 from gen_data.exporters.fragments import fragment_rows
 from gen_data.exporters.lerobot_files import LABELS, LAYOUTS, RobotFiles
 from gen_data.exporters.lerobot_statistics import image_sums
 from gen_data.exporters.sensor_selection import rgb_camera, rgb_cameras
-from gen_data.exporters.sequences import (
-    FRAMES,
-    Frame,
-    frame_facts,
-    unbroken_episodes,
-    write_frames,
-)
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.demonstrations import (
-    DemonstrationStep,
-    demonstration_step,
-    joint_positions,
-)
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import AssetLibrary, DatasetInfo
-from gen_data.generator.core.sample import Sample
-from gen_data.generator.core.scene import Articulation, Scene
+from gen_data.exporters.sequences import FRAMES, Frame, frame_facts, unbroken_episodes, write_frames
 
 PHRASES = {
     "joints": "move to a posture",

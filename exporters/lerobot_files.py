@@ -18,6 +18,9 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from gen_data.core.capture import Channel
+from gen_data.core.interfaces import DatasetInfo
+from gen_data.core.serialization import canonical_json
 from gen_data.exporters.lerobot_statistics import (
     image_statistics,
     merge_statistics,
@@ -32,9 +35,6 @@ from gen_data.exporters.parquet_tables import (
     value_feature,
 )
 from gen_data.exporters.sequences import Frame, write_text
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.interfaces import DatasetInfo
-from gen_data.generator.core.serialization import canonical_json
 
 if TYPE_CHECKING:
     from pyarrow.parquet import ParquetWriter

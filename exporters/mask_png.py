@@ -12,8 +12,8 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from gen_data.core.sample import MaskPx
 from gen_data.exporters.png import assemble_png
-from gen_data.generator.core.sample import MaskPx
 
 INSIDE = 255
 

@@ -26,7 +26,7 @@ from typing import overload
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.core.sample import MaskPx
+from gen_data.core.sample import MaskPx
 
 Polygon = NDArray[np.int64]
 """Vertices [n, 2] as (x, y) in image coordinates [px]; the last is joined to the first."""

@@ -42,20 +42,20 @@ from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
+from gen_data.core.boxes import OrientedBox
+from gen_data.core.capture import POINT, Channel
+from gen_data.core.errors import ConfigError
+from gen_data.core.interfaces import DatasetInfo
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.sample import ImageTruth, Sample
+from gen_data.core.scene import Camera, Instance, Lidar
+from gen_data.core.se3 import SE3
+from gen_data.core.serialization import canonical_json
 from gen_data.exporters.base import ANY_FORMAT, ExporterBase, check_installed
 from gen_data.exporters.conventions import POINT_TIME, Conventions
 from gen_data.exporters.fragments import fragment_rows
 from gen_data.exporters.point_cloud_io import PointTime, count_times_from, read_points
 from gen_data.exporters.sequences import FRAMES, Frame, frame_facts, write_frames
-from gen_data.generator.core.boxes import OrientedBox
-from gen_data.generator.core.capture import POINT, Channel
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import DatasetInfo
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.sample import ImageTruth, Sample
-from gen_data.generator.core.scene import Camera, Instance, Lidar
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.core.serialization import canonical_json
 
 if TYPE_CHECKING:
     from google.protobuf.message import Message

@@ -9,7 +9,7 @@
                                  device's model, its pose on the rig and in the world
 
 Every row starts with the index of its sample; ``columns.json`` and
-``gen_data.generator.core.measurement_dtypes`` describe the other columns. Units are the ends of the
+``gen_data.core.measurement_dtypes`` describe the other columns. Units are the ends of the
 names. ``nan`` is "nothing".
 """
 
@@ -23,15 +23,15 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from gen_data.core.capture import Measurements
+from gen_data.core.errors import ConfigError, StorageError
+from gen_data.core.interfaces import DatasetInfo, SensorInfo, table_path
+from gen_data.core.measurement_dtypes import TABLE_COLUMNS, columns_dtype
+from gen_data.core.sample import Sample
+from gen_data.core.serialization import canonical_json
 from gen_data.exporters.base import ANY_FORMAT, ExporterBase
 from gen_data.exporters.conventions import SAMPLE, Conventions
 from gen_data.exporters.sequences import write_text
-from gen_data.generator.core.capture import Measurements
-from gen_data.generator.core.errors import ConfigError, StorageError
-from gen_data.generator.core.interfaces import DatasetInfo, SensorInfo, table_path
-from gen_data.generator.core.measurement_dtypes import TABLE_COLUMNS, columns_dtype
-from gen_data.generator.core.sample import Sample
-from gen_data.generator.core.serialization import canonical_json
 
 INDEX = "sample"
 

@@ -22,6 +22,11 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
+from gen_data.core.capture import Channel
+from gen_data.core.errors import ConfigError
+from gen_data.core.interfaces import DatasetInfo
+from gen_data.core.sample import ImageTruth, ObjectTruth, Sample
+from gen_data.core.scene import Instance
 from gen_data.exporters.base import ANY_FORMAT, ExporterBase
 from gen_data.exporters.conventions import ANY_LENS, Conventions
 from gen_data.exporters.image_files import link_or_copy
@@ -35,11 +40,6 @@ from gen_data.exporters.sequences import (
     write_frames,
     write_text,
 )
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import DatasetInfo
-from gen_data.generator.core.sample import ImageTruth, ObjectTruth, Sample
-from gen_data.generator.core.scene import Instance
 
 PEDESTRIAN, PERSON_ON_VEHICLE, BICYCLE, MOTORBIKE, STATIC_PERSON = 1, 2, 4, 5, 7
 CLASSES = {

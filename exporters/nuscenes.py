@@ -40,6 +40,9 @@ from typing import ClassVar, Literal
 
 from pydantic import Field
 
+from gen_data.core.errors import ConfigError
+from gen_data.core.interfaces import DatasetInfo
+from gen_data.core.sample import Sample
 from gen_data.exporters.base import PNG_OR_JPEG, ExporterBase
 from gen_data.exporters.conventions import PINHOLE, Conventions
 from gen_data.exporters.fragments import fragment_rows
@@ -57,9 +60,6 @@ from gen_data.exporters.nuscenes_tables import (
 )
 from gen_data.exporters.sensor_selection import check_pinholes, laser_scanner, rgb_cameras
 from gen_data.exporters.sequences import FRAMES, Frame, write_frames
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import DatasetInfo
-from gen_data.generator.core.sample import Sample
 
 SPLITS = ("train", "val", "test")
 

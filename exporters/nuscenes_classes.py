@@ -16,8 +16,8 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from gen_data.generator.core.asset_types import SURFACES
-from gen_data.generator.core.scene import Body, Instance, Scene
+from gen_data.core.asset_types import SURFACES
+from gen_data.core.scene import Body, Instance, Scene
 
 MOVING_M_S = 0.1
 """Speed above which an object counts as moving."""

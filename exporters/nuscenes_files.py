@@ -24,11 +24,11 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gen_data.core.boxes import OrientedBox
+from gen_data.core.lane_geometry import border_line
+from gen_data.core.scene import Lane
+from gen_data.core.se3 import SE3, Array
 from gen_data.exporters.png import RowFilter, encode_png
-from gen_data.generator.core.boxes import OrientedBox
-from gen_data.generator.core.lane_geometry import border_line
-from gen_data.generator.core.scene import Lane
-from gen_data.generator.core.se3 import SE3, Array
 
 BORDER_M = 0.019
 """Tolerance of the tests for points in boxes: 2 cm, less rounding."""

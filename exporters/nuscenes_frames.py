@@ -9,6 +9,14 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from gen_data.core.boxes import OrientedBox
+from gen_data.core.errors import ConfigError
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.motion import Trajectory
+from gen_data.core.sample import ObjectTruth, Sample
+from gen_data.core.scene import Body, Instance, Scene
+from gen_data.core.scene_time import RIG_AXES
+from gen_data.core.se3 import SE3, Vec3
 from gen_data.exporters.nuscenes_classes import category_of
 from gen_data.exporters.nuscenes_files import quarter_turns, turned_pose
 from gen_data.exporters.sensor_selection import instant_s
@@ -19,14 +27,6 @@ from gen_data.exporters.sequences import (
     lidar_mount,
     relative_pose,
 )
-from gen_data.generator.core.boxes import OrientedBox
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.motion import Trajectory
-from gen_data.generator.core.sample import ObjectTruth, Sample
-from gen_data.generator.core.scene import Body, Instance, Scene
-from gen_data.generator.core.scene_time import RIG_AXES
-from gen_data.generator.core.se3 import SE3, Vec3
 
 Modality = Literal["camera", "lidar", "radar"]
 INSTANCES_MAX = 999

@@ -7,6 +7,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
+from gen_data.core.boxes import OrientedBox
+from gen_data.core.capture import Channel as ImageChannel
+from gen_data.core.interfaces import DatasetInfo, table_path
+from gen_data.core.sample import Sample
+from gen_data.core.se3 import SE3
 from gen_data.exporters.measurement_tables import read_rows
 from gen_data.exporters.nuscenes_classes import attribute_of, point_classes
 from gen_data.exporters.nuscenes_files import (
@@ -36,11 +41,6 @@ from gen_data.exporters.nuscenes_recording import LIDAR_TOP
 from gen_data.exporters.point_cloud_io import read_points, scanner_at_sweep
 from gen_data.exporters.sensor_selection import has_scans, instant_s
 from gen_data.exporters.sequences import Mount, frame_facts, relative_pose, write_bytes
-from gen_data.generator.core.boxes import OrientedBox
-from gen_data.generator.core.capture import Channel as ImageChannel
-from gen_data.generator.core.interfaces import DatasetInfo, table_path
-from gen_data.generator.core.sample import Sample
-from gen_data.generator.core.se3 import SE3
 
 FOLDER = "nuscenes"
 _LABEL_SUFFIXES = {"lidarseg": ".bin", "panoptic": ".npz"}

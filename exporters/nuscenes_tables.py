@@ -14,10 +14,10 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, TextIO
 
+from gen_data.core.interfaces import DatasetInfo
+from gen_data.core.serialization import canonical_json
 from gen_data.exporters.nuscenes_classes import classes
 from gen_data.exporters.sequences import Frame, write_text
-from gen_data.generator.core.interfaces import DatasetInfo
-from gen_data.generator.core.serialization import canonical_json
 
 TABLES = (
     "attribute",

@@ -18,11 +18,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gen_data.core.errors import ConfigError, did_you_mean
+from gen_data.core.motion import STILL, Twist
+from gen_data.core.scene import Scene
+from gen_data.core.se3 import SE3, Array
 from gen_data.exporters.sequences import Mount, mounted_pose
-from gen_data.generator.core.errors import ConfigError, did_you_mean
-from gen_data.generator.core.motion import STILL, Twist
-from gen_data.generator.core.scene import Scene
-from gen_data.generator.core.se3 import SE3, Array
 
 COLUMNS = """\
 lat lon:            position [deg], by the Mercator projection of KITTI's devkit

@@ -1,6 +1,6 @@
 """Laser scans on disk: one NumPy file of ``POINT`` records per sweep, written before labels.
 
-``numpy.load`` reads them; every field is described at ``gen_data.generator.core.capture.POINT``.
+``numpy.load`` reads them; every field is described at ``gen_data.core.capture.POINT``.
 Exporters make their own files from these.
 """
 
@@ -12,12 +12,12 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.core.capture import POINT, PointCloud
-from gen_data.generator.core.errors import StorageError
-from gen_data.generator.core.interfaces import cloud_path
-from gen_data.generator.core.sample import Sample
-from gen_data.generator.core.scene import Lidar
-from gen_data.generator.core.se3 import Array
+from gen_data.core.capture import POINT, PointCloud
+from gen_data.core.errors import StorageError
+from gen_data.core.interfaces import cloud_path
+from gen_data.core.sample import Sample
+from gen_data.core.scene import Lidar
+from gen_data.core.se3 import Array
 
 PointTime = Literal["sweep_middle", "sweep_start"]
 """Instant from which times of points count."""

@@ -11,7 +11,7 @@ point counts from there: ``time_s + time`` is the instant of its pulse; with
 ``point_time: sweep_start`` it counts from the start of the sweep. Comments in the files repeat it.
 
 Properties: ``x y z intensity time ring instance category surface return_number return_count``, as
-described at ``gen_data.generator.core.capture.POINT``. Open3D, PCL, CloudCompare and MeshLab read
+described at ``gen_data.core.capture.POINT``. Open3D, PCL, CloudCompare and MeshLab read
 both formats and skip unknown fields.
 
 References: Turk, "The PLY Polygon File Format", 1994; PCL, "The PCD file format".
@@ -26,6 +26,12 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from gen_data.core.boxes import OrientedBox
+from gen_data.core.errors import ConfigError
+from gen_data.core.interfaces import DatasetInfo
+from gen_data.core.sample import Sample
+from gen_data.core.scene import Instance
+from gen_data.core.serialization import canonical_json
 from gen_data.exporters.base import ANY_FORMAT, ExporterBase
 from gen_data.exporters.conventions import POINT_TIME, READING, Conventions
 from gen_data.exporters.image_files import link_or_copy
@@ -36,12 +42,6 @@ from gen_data.exporters.point_cloud_io import (
     scanner_at_sweep,
 )
 from gen_data.exporters.sensor_selection import has_scans, instant_s
-from gen_data.generator.core.boxes import OrientedBox
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import DatasetInfo
-from gen_data.generator.core.sample import Sample
-from gen_data.generator.core.scene import Instance
-from gen_data.generator.core.serialization import canonical_json
 
 FILE_POINT = np.dtype(
     [

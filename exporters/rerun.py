@@ -35,6 +35,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from gen_data.core.capture import Channel
+from gen_data.core.interfaces import DatasetInfo
+from gen_data.core.sample import ObjectTruth, Sample
+from gen_data.core.se3 import SE3
+from gen_data.core.skeletons import Skeleton, find_skeleton
 from gen_data.exporters.base import PNG_OR_JPEG, ExporterBase, check_installed
 from gen_data.exporters.conventions import READING, Conventions
 from gen_data.exporters.fragments import fragment_rows, write_fragment
@@ -42,11 +47,6 @@ from gen_data.exporters.image_files import read_pixels
 from gen_data.exporters.label_colors import voc_palette
 from gen_data.exporters.point_cloud_io import read_points
 from gen_data.exporters.rrd_container import write_recording
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.interfaces import DatasetInfo
-from gen_data.generator.core.sample import ObjectTruth, Sample
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.core.skeletons import Skeleton, find_skeleton
 
 DEPTHS = (Channel.Z_DEPTH, Channel.MEASURED_DEPTH)
 Row = Mapping[str, Any]

@@ -7,16 +7,16 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, ClassVar
 
+from gen_data.core.capture import Channel
+from gen_data.core.errors import ConfigError
+from gen_data.core.interfaces import DatasetInfo, media_path
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.sample import Sample
 from gen_data.exporters.base import ExporterBase
 from gen_data.exporters.image_files import depth_units, read_image
 from gen_data.exporters.png import RowFilter, encode_png
 from gen_data.exporters.sensor_selection import pinhole_camera
 from gen_data.exporters.sequences import frame_facts, write_frames
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import DatasetInfo, media_path
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.sample import Sample
 
 
 class RgbdExporter(ExporterBase):

@@ -19,6 +19,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gen_data.core.asset_types import Material, MeshData, Symmetry
+from gen_data.core.colorimetry import srgb_decode, srgb_encode
+from gen_data.core.errors import AssetError
+from gen_data.core.interfaces import AssetLibrary, FileFrames
+from gen_data.core.scene import Body, Instance, Scene
+from gen_data.core.se3 import IDENTITY, SE3, Array, Vec3
+from gen_data.core.serialization import canonical_json
 from gen_data.exporters.symmetry_search import (
     POINTS,
     PROBES,
@@ -26,13 +33,6 @@ from gen_data.exporters.symmetry_search import (
     find_symmetries,
     sample_triangles,
 )
-from gen_data.generator.core.asset_types import Material, MeshData, Symmetry
-from gen_data.generator.core.colorimetry import srgb_decode, srgb_encode
-from gen_data.generator.core.errors import AssetError
-from gen_data.generator.core.interfaces import AssetLibrary, FileFrames
-from gen_data.generator.core.scene import Body, Instance, Scene
-from gen_data.generator.core.se3 import IDENTITY, SE3, Array, Vec3
-from gen_data.generator.core.serialization import canonical_json
 
 MM_PER_M = 1000.0
 _SHARES = ((POINTS, 0.5), (PROBES, 0.25))

@@ -30,15 +30,15 @@ from typing import Any, ClassVar, Literal
 
 from pydantic import Field
 
+from gen_data.core.capture import Channel
+from gen_data.core.interfaces import DatasetInfo
+from gen_data.core.serialization import canonical_json
 from gen_data.exporters.base import check_installed
 from gen_data.exporters.conventions import ANY_LENS, Conventions
 from gen_data.exporters.fragments import fragment_rows, numbered_stem
 from gen_data.exporters.lerobot import LeRobot
 from gen_data.exporters.sequences import FRAMES, Frame, unbroken_episodes, write_text
 from gen_data.exporters.tfrecord import Feature, encode_example, encode_features, frame_record
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.interfaces import DatasetInfo
-from gen_data.generator.core.serialization import canonical_json
 
 FLOATS = {
     "steps/observation/state": "state",

@@ -11,7 +11,7 @@ from typing import TypedDict
 import numpy as np
 from pycocotools import mask as coco_mask
 
-from gen_data.generator.core.sample import MaskPx
+from gen_data.core.sample import MaskPx
 
 
 class Rle(TypedDict):

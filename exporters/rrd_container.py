@@ -16,7 +16,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from gen_data.generator.core.errors import StorageError
+from gen_data.core.errors import StorageError
 
 APPLICATION = "gen-data"
 TUID_HIGH = 1

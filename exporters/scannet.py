@@ -32,6 +32,10 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from gen_data.core.capture import Channel, ImageEncoding
+from gen_data.core.interfaces import DatasetInfo, media_path
+from gen_data.core.sample import Sample
+from gen_data.core.se3 import Array
 from gen_data.exporters.base import PNG_OR_JPEG
 from gen_data.exporters.conventions import PINHOLE, Conventions
 from gen_data.exporters.image_files import encode_channel, link_or_copy, read_image, read_pixels
@@ -44,10 +48,6 @@ from gen_data.exporters.sequences import (
     write_bytes,
     write_text,
 )
-from gen_data.generator.core.capture import Channel, ImageEncoding
-from gen_data.generator.core.interfaces import DatasetInfo, media_path
-from gen_data.generator.core.sample import Sample
-from gen_data.generator.core.se3 import Array
 
 UNITS_PER_M = 1000
 SPACES_MAX = 10_000

@@ -33,6 +33,13 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from gen_data.core.asset_types import SURFACES
+from gen_data.core.errors import ConfigError, did_you_mean
+from gen_data.core.interfaces import DatasetInfo
+from gen_data.core.sample import Sample
+from gen_data.core.scene import Scene
+from gen_data.core.se3 import SE3
+from gen_data.core.serialization import from_plain
 from gen_data.exporters.base import ANY_FORMAT, ExporterBase
 from gen_data.exporters.conventions import PINHOLE, Conventions
 from gen_data.exporters.image_files import link_or_copy
@@ -52,13 +59,6 @@ from gen_data.exporters.sequences import (
     write_frames,
     write_text,
 )
-from gen_data.generator.core.asset_types import SURFACES
-from gen_data.generator.core.errors import ConfigError, did_you_mean
-from gen_data.generator.core.interfaces import DatasetInfo
-from gen_data.generator.core.sample import Sample
-from gen_data.generator.core.scene import Scene
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.core.serialization import from_plain
 
 THINGS = {
     "car": 10,

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.errors import ConfigError, did_you_mean
-from gen_data.generator.core.interfaces import DatasetInfo, cloud_path
-from gen_data.generator.core.sample import Sample
+from gen_data.core.capture import Channel
+from gen_data.core.errors import ConfigError, did_you_mean
+from gen_data.core.interfaces import DatasetInfo, cloud_path
+from gen_data.core.sample import Sample
 
 
 def rgb_cameras(info: DatasetInfo) -> tuple[str, ...]:

@@ -15,13 +15,13 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
+from gen_data.core.errors import ConfigError
+from gen_data.core.interfaces import DatasetInfo
+from gen_data.core.sample import Sample
+from gen_data.core.scene import Scene
+from gen_data.core.scene_time import RIG_AXES
+from gen_data.core.se3 import SE3, Array
 from gen_data.exporters.fragments import fragment_rows, write_fragment
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import DatasetInfo
-from gen_data.generator.core.sample import Sample
-from gen_data.generator.core.scene import Scene
-from gen_data.generator.core.scene_time import RIG_AXES
-from gen_data.generator.core.se3 import SE3, Array
 
 FRAMES = "frames"
 _FRAMES_MAX = 1_000_000

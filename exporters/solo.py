@@ -33,6 +33,16 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
+from gen_data.core.capture import Channel
+from gen_data.core.errors import ConfigError
+from gen_data.core.interfaces import DatasetInfo
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.motion import STILL, Twist
+from gen_data.core.sample import ObjectTruth, Sample
+from gen_data.core.scene import Camera, Scene
+from gen_data.core.scene_time import rig_twist
+from gen_data.core.se3 import SE3, Array, Vec3, rotation_to_quaternion
+from gen_data.core.serialization import canonical_json
 from gen_data.exporters.base import PNG_OR_JPEG, ExporterBase
 from gen_data.exporters.conventions import EDGES, PINHOLE, READING, Conventions
 from gen_data.exporters.fragments import fragment_rows, write_fragment
@@ -41,16 +51,6 @@ from gen_data.exporters.image_files import link_or_copy
 from gen_data.exporters.label_png import encode_label_png, number_masks
 from gen_data.exporters.sensor_selection import check_pinholes, instant_s, rgb_camera, rgb_cameras
 from gen_data.exporters.sequences import frame_facts, write_bytes, write_text
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import DatasetInfo
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.motion import STILL, Twist
-from gen_data.generator.core.sample import ObjectTruth, Sample
-from gen_data.generator.core.scene import Camera, Scene
-from gen_data.generator.core.scene_time import rig_twist
-from gen_data.generator.core.se3 import SE3, Array, Vec3, rotation_to_quaternion
-from gen_data.generator.core.serialization import canonical_json
 
 FORMAT_VERSION = "1.0.0-preview.1"
 """Version of Unity's Perception package whose schema the files follow."""

@@ -19,8 +19,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.core.asset_types import Symmetry
-from gen_data.generator.core.se3 import SE3, Array
+from gen_data.core.asset_types import Symmetry
+from gen_data.core.se3 import SE3, Array
 
 POINTS = 20_000
 """Sampled points that turned points are compared with."""

@@ -43,6 +43,11 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
+from gen_data.core.capture import Channel
+from gen_data.core.interfaces import DatasetInfo
+from gen_data.core.lens import Lens
+from gen_data.core.sample import ImageTruth, ObjectTruth, Sample
+from gen_data.core.serialization import canonical_json
 from gen_data.exporters.base import PNG_OR_JPEG, ExporterBase, check_installed
 from gen_data.exporters.conventions import Conventions
 from gen_data.exporters.fragments import fragment_rows, numbered_stem, write_fragment
@@ -51,11 +56,6 @@ from gen_data.exporters.lens_fields import lens_fields
 from gen_data.exporters.png import RowFilter, encode_png
 from gen_data.exporters.sensor_selection import rgb_camera, rgb_cameras
 from gen_data.exporters.sequences import write_bytes, write_text
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.interfaces import DatasetInfo
-from gen_data.generator.core.lens import Lens
-from gen_data.generator.core.sample import ImageTruth, ObjectTruth, Sample
-from gen_data.generator.core.serialization import canonical_json
 
 IMAGES = "images"
 DIFFICULT = 0.25

@@ -17,10 +17,10 @@ from typing import Any
 
 import numpy as np
 
+from gen_data.core.boxes import OrientedBox
+from gen_data.core.sample import ImageTruth, ObjectTruth, Sample
 from gen_data.exporters.kitti import occlusion_level, official_type
 from gen_data.exporters.pointclouds import lidar_boxes
-from gen_data.generator.core.boxes import OrientedBox
-from gen_data.generator.core.sample import ImageTruth, ObjectTruth, Sample
 
 INTERPOLATED, LABELLED = 1, 2
 """States of a box: not visible in this frame; visible."""

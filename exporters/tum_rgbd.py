@@ -24,21 +24,16 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
+from gen_data.core.capture import Channel
+from gen_data.core.errors import ConfigError, did_you_mean
+from gen_data.core.interfaces import DatasetInfo, media_path
+from gen_data.core.sample import Sample
 from gen_data.exporters.conventions import PINHOLE, READING, Conventions
 from gen_data.exporters.image_files import link_or_copy
 from gen_data.exporters.measurement_tables import sequence_rows
 from gen_data.exporters.rgbd_sequences import RgbdExporter, depth_png, opencv_pinhole
 from gen_data.exporters.sensor_selection import instant_s
-from gen_data.exporters.sequences import (
-    Frame,
-    read_sequences,
-    write_bytes,
-    write_text,
-)
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.errors import ConfigError, did_you_mean
-from gen_data.generator.core.interfaces import DatasetInfo, media_path
-from gen_data.generator.core.sample import Sample
+from gen_data.exporters.sequences import Frame, read_sequences, write_bytes, write_text
 
 UNITS_PER_M = 5000
 FORCES = ("force_x_m_s2", "force_y_m_s2", "force_z_m_s2")

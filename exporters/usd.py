@@ -7,7 +7,7 @@
     textures/<texture>.png, environments/<sky>.hdr
     stages.jsonl        one line per stage: file, first sample, scene, view, split, steps
 
-See ``gen_data.generator.usd.stage_writer`` for the layout of a stage. Metres, Z up; ``time code =
+See ``gen_data.usd.stage_writer`` for the layout of a stage. Metres, Z up; ``time code =
 step``. A camera with ``time_offset_s`` has its delay in ``genData:timeOffset``; the stage also has
 the poses of these instants, which are other time codes. Labels are ``UsdSemantics.LabelsAPI`` with
 the taxonomies ``category``, ``subcategory`` (annotated instances) and ``instance_id`` (all, as in
@@ -31,18 +31,18 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import PrivateAttr
 
+from gen_data.core.asset_types import TextureData
+from gen_data.core.interfaces import AssetLibrary, DatasetInfo
+from gen_data.core.sample import Sample
+from gen_data.core.scene_time import scene_at
+from gen_data.core.serialization import canonical_json
 from gen_data.exporters.base import ANY_FORMAT, ExporterBase, check_installed
 from gen_data.exporters.conventions import Conventions
 from gen_data.exporters.image_files import link_or_copy
 from gen_data.exporters.png import RowFilter, encode_png
 from gen_data.exporters.sequences import write_bytes, write_text
-from gen_data.generator.core.asset_types import TextureData
-from gen_data.generator.core.interfaces import AssetLibrary, DatasetInfo
-from gen_data.generator.core.sample import Sample
-from gen_data.generator.core.scene_time import scene_at
-from gen_data.generator.core.serialization import canonical_json
-from gen_data.generator.usd.asset_layer import TextureFiles, write_asset_layer
-from gen_data.generator.usd.stage_writer import StageFiles, write_stage
+from gen_data.usd.asset_layer import TextureFiles, write_asset_layer
+from gen_data.usd.stage_writer import StageFiles, write_stage
 
 STAGES = "stages.jsonl"
 

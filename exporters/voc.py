@@ -37,6 +37,10 @@ from xml.sax.saxutils import escape
 import cv2
 import numpy as np
 
+from gen_data.core.capture import Channel
+from gen_data.core.errors import ConfigError
+from gen_data.core.interfaces import DatasetInfo
+from gen_data.core.sample import ImageTruth, ObjectTruth, Sample
 from gen_data.exporters.base import ANY_FORMAT, ExporterBase
 from gen_data.exporters.coco import image_name
 from gen_data.exporters.conventions import ANY_LENS, Conventions
@@ -47,10 +51,6 @@ from gen_data.exporters.label_colors import voc_palette
 from gen_data.exporters.label_png import UInt16, encode_label_png, number_masks
 from gen_data.exporters.sensor_selection import check_channels, rgb_cameras
 from gen_data.exporters.sequences import write_bytes, write_text
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import DatasetInfo
-from gen_data.generator.core.sample import ImageTruth, ObjectTruth, Sample
 
 YEAR = "VOCdevkit/VOC2012"
 """Folder of the data set; readers know the years 2007 to 2012."""

@@ -38,6 +38,10 @@ import numpy as np
 from numpy.lib.recfunctions import structured_to_unstructured
 from pydantic import Field
 
+from gen_data.core.errors import ConfigError
+from gen_data.core.interfaces import DatasetInfo, cloud_path, table_path
+from gen_data.core.sample import Sample
+from gen_data.core.serialization import canonical_json
 from gen_data.exporters.base import ANY_FORMAT, ExporterBase
 from gen_data.exporters.coco import image_labels
 from gen_data.exporters.conventions import EDGES, READING, Conventions
@@ -45,10 +49,6 @@ from gen_data.exporters.fragments import fragment_rows, write_fragment
 from gen_data.exporters.point_cloud_io import scanner_at_sweep
 from gen_data.exporters.sensor_selection import has_scans
 from gen_data.exporters.sequences import sequence_number
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import DatasetInfo, cloud_path, table_path
-from gen_data.generator.core.sample import Sample
-from gen_data.generator.core.serialization import canonical_json
 
 SAMPLES = "samples"
 

@@ -37,6 +37,13 @@ import cv2
 import numpy as np
 from pydantic import Field
 
+from gen_data.core.boxes import BoxPx
+from gen_data.core.capture import Channel
+from gen_data.core.errors import ConfigError, did_you_mean
+from gen_data.core.interfaces import DatasetInfo
+from gen_data.core.sample import KeypointTruth, ObjectTruth, Sample
+from gen_data.core.se3 import Array
+from gen_data.core.skeletons import find_skeleton
 from gen_data.exporters.base import ANY_FORMAT, ExporterBase
 from gen_data.exporters.coco import image_name
 from gen_data.exporters.conventions import ANY_LENS, Conventions
@@ -50,13 +57,6 @@ from gen_data.exporters.mask_polygons import (
 )
 from gen_data.exporters.sensor_selection import check_channels, rgb_cameras
 from gen_data.exporters.sequences import write_text
-from gen_data.generator.core.boxes import BoxPx
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.errors import ConfigError, did_you_mean
-from gen_data.generator.core.interfaces import DatasetInfo
-from gen_data.generator.core.sample import KeypointTruth, ObjectTruth, Sample
-from gen_data.generator.core.se3 import Array
-from gen_data.generator.core.skeletons import find_skeleton
 
 Task = Literal["detect", "segment", "pose", "obb"]
 SPLITS = ("train", "val", "test")

@@ -10,33 +10,31 @@
 Only the names in ``__all__`` are public; everything else may change between releases.
 """
 
-from __future__ import annotations
-
 import os
 from importlib import import_module
 
 _folder = __path__[0]
-if not os.path.isdir(f"{_folder}/generator"):  # noqa: PTH112  pathlib takes longer than this module
-    # A checkout without symbolic links: the packages are the folders beside this one.
-    __path__.append(os.path.dirname(_folder))  # noqa: PTH120
+if not os.path.isdir(f"{_folder}/core"):  # noqa: PTH112  pathlib takes longer than this module
+    # A checkout without symbolic links: the packages are in the folders next to this one.
+    _root = os.path.dirname(_folder)  # noqa: PTH120
+    __path__ += [f"{_root}/generator", _root]
 
-from gen_data.generator.core.version import __version__  # noqa: E402
+from gen_data.core.version import __version__  # noqa: E402
 
 # ``typing`` would delay the moment from which the command line handles Ctrl-C.
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
 
-    from gen_data.generator.api.dataset import Dataset, SampleSequence, StoredDataset
-    from gen_data.generator.api.dataset import open_dataset as open  # noqa: A004
-    from gen_data.generator.api.export import export
-    from gen_data.generator.api.generate import generate
-    from gen_data.generator.api.loader import Loader
-    from gen_data.generator.api.rerender import rerender
-    from gen_data.generator.api.sample import Box2d, Box3d, CameraReading, Sample
-    from gen_data.generator.api.write_sample import write_sample
-    from gen_data.generator.certificate.api import certify
-    from gen_data.generator.core.errors import (
+    from gen_data.api.dataset import Dataset, SampleSequence, StoredDataset
+    from gen_data.api.dataset import open_dataset as open  # noqa: A004
+    from gen_data.api.export import export
+    from gen_data.api.generate import generate
+    from gen_data.api.loader import Loader
+    from gen_data.api.rerender import rerender
+    from gen_data.api.sample import Box2d, Box3d, CameraReading, Sample
+    from gen_data.api.write_sample import write_sample
+    from gen_data.core.errors import (
         AssetError,
         CertificationError,
         ConfigError,
@@ -52,42 +50,43 @@ if TYPE_CHECKING:
         UnknownNameError,
         VerificationError,
     )
-    from gen_data.generator.core.scene import Scene
-    from gen_data.generator.environment.env import Env, make_vec
-    from gen_data.generator.matching.api import match
+    from gen_data.core.scene import Scene
+    from gen_data.lab.certificate.api import certify
+    from gen_data.lab.environment.env import Env, make_vec
+    from gen_data.lab.matching.api import match
 
 _HOMES = {
-    "Box2d": "gen_data.generator.api.sample",
-    "Box3d": "gen_data.generator.api.sample",
-    "CameraReading": "gen_data.generator.api.sample",
-    "Dataset": "gen_data.generator.api.dataset",
-    "Env": "gen_data.generator.environment.env",
-    "Loader": "gen_data.generator.api.loader",
-    "Sample": "gen_data.generator.api.sample",
-    "SampleSequence": "gen_data.generator.api.dataset",
-    "Scene": "gen_data.generator.core.scene",
-    "StoredDataset": "gen_data.generator.api.dataset",
-    "certify": "gen_data.generator.certificate.api",
-    "export": "gen_data.generator.api.export",
-    "generate": "gen_data.generator.api.generate",
-    "write_sample": "gen_data.generator.api.write_sample",
-    "make_vec": "gen_data.generator.environment.env",
-    "match": "gen_data.generator.matching.api",
-    "rerender": "gen_data.generator.api.rerender",
-    "AssetError": "gen_data.generator.core.errors",
-    "CertificationError": "gen_data.generator.core.errors",
-    "ConfigError": "gen_data.generator.core.errors",
-    "ConfigWarning": "gen_data.generator.core.errors",
-    "DeterminismError": "gen_data.generator.core.errors",
-    "GenDataError": "gen_data.generator.core.errors",
-    "NoLabels": "gen_data.generator.core.errors",
-    "Interrupted": "gen_data.generator.core.errors",
-    "SampleError": "gen_data.generator.core.errors",
-    "SampleIndexError": "gen_data.generator.core.errors",
-    "SceneRejected": "gen_data.generator.core.errors",
-    "StorageError": "gen_data.generator.core.errors",
-    "UnknownNameError": "gen_data.generator.core.errors",
-    "VerificationError": "gen_data.generator.core.errors",
+    "Box2d": "gen_data.api.sample",
+    "Box3d": "gen_data.api.sample",
+    "CameraReading": "gen_data.api.sample",
+    "Dataset": "gen_data.api.dataset",
+    "Env": "gen_data.lab.environment.env",
+    "Loader": "gen_data.api.loader",
+    "Sample": "gen_data.api.sample",
+    "SampleSequence": "gen_data.api.dataset",
+    "Scene": "gen_data.core.scene",
+    "StoredDataset": "gen_data.api.dataset",
+    "certify": "gen_data.lab.certificate.api",
+    "export": "gen_data.api.export",
+    "generate": "gen_data.api.generate",
+    "write_sample": "gen_data.api.write_sample",
+    "make_vec": "gen_data.lab.environment.env",
+    "match": "gen_data.lab.matching.api",
+    "rerender": "gen_data.api.rerender",
+    "AssetError": "gen_data.core.errors",
+    "CertificationError": "gen_data.core.errors",
+    "ConfigError": "gen_data.core.errors",
+    "ConfigWarning": "gen_data.core.errors",
+    "DeterminismError": "gen_data.core.errors",
+    "GenDataError": "gen_data.core.errors",
+    "NoLabels": "gen_data.core.errors",
+    "Interrupted": "gen_data.core.errors",
+    "SampleError": "gen_data.core.errors",
+    "SampleIndexError": "gen_data.core.errors",
+    "SceneRejected": "gen_data.core.errors",
+    "StorageError": "gen_data.core.errors",
+    "UnknownNameError": "gen_data.core.errors",
+    "VerificationError": "gen_data.core.errors",
 }
 """Module of each public name; modules are imported on first use."""
 
@@ -128,12 +127,12 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> "Any":
     """Import a public name."""
     if name in ("targets", "torch"):
         return import_module(f"gen_data.{name}")
     if name == "open":
-        return import_module("gen_data.generator.api.dataset").open_dataset
+        return import_module("gen_data.api.dataset").open_dataset
     if name not in _HOMES:
         raise AttributeError(f"module 'gen_data' has no attribute '{name}'")
     return getattr(import_module(_HOMES[name]), name)

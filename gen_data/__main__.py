@@ -1,5 +1,5 @@
 """``python -m gen_data`` is ``gen-data``."""
 
-from gen_data.generator.cli.__main__ import main
+from gen_data.cli.__main__ import main
 
 main()

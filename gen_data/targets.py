@@ -17,10 +17,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.api.sample import CameraReading, Sample
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.sample import ObjectTruth
-from gen_data.generator.core.skeletons import find_skeleton
+from gen_data.api.sample import CameraReading, Sample
+from gen_data.core.errors import ConfigError
+from gen_data.core.sample import ObjectTruth
+from gen_data.core.skeletons import find_skeleton
 
 Arrays = dict[str, NDArray[Any]]
 

@@ -15,9 +15,9 @@ import numpy as np
 import torch
 from torch.utils.data import Dataset, IterableDataset
 
-from gen_data.generator.api.dataset import SampleSequence
-from gen_data.generator.api.loader import Loader
-from gen_data.generator.api.sample import Sample
+from gen_data.api.dataset import SampleSequence
+from gen_data.api.loader import Loader
+from gen_data.api.sample import Sample
 from gen_data.targets import detection_target
 
 __all__ = ["SampleDataset", "SampleStream", "collate", "loader", "to_tensors", "to_tv_tensors"]

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from gen_data.generator.core.interfaces import Randomizer
-from gen_data.generator.core.plugins import PluginTable
+from gen_data.core.interfaces import Randomizer
+from gen_data.core.plugins import PluginTable
 
 TABLE = PluginTable[Randomizer](
     "randomizer",

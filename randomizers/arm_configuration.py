@@ -8,12 +8,12 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from gen_data.generator.config import distributions as dist
-from gen_data.generator.core.asset_types import Joint, RobotModel
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.scene import ArmGoal, Articulation, Body, Scene
-from gen_data.generator.core.se3 import SE3, Vec3
-from gen_data.generator.core.streams import Rng
+from gen_data.config import distributions as dist
+from gen_data.core.asset_types import Joint, RobotModel
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.scene import ArmGoal, Articulation, Body, Scene
+from gen_data.core.se3 import SE3, Vec3
+from gen_data.core.streams import Rng
 from gen_data.randomizers.base import RandomizerBase
 from gen_data.randomizers.placement import half_extents_m
 

@@ -8,13 +8,13 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from gen_data.generator.config import distributions as dist
-from gen_data.generator.config.base_model import Strict
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.scene import ArmGoal, Articulation, Body, Scene, SupportSurface
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.core.streams import Rng
+from gen_data.config import distributions as dist
+from gen_data.config.base_model import Strict
+from gen_data.core.errors import ConfigError
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.scene import ArmGoal, Articulation, Body, Scene, SupportSurface
+from gen_data.core.se3 import SE3
+from gen_data.core.streams import Rng
 from gen_data.randomizers.arm_configuration import (
     GRASP_MARGIN,
     arm_joints,

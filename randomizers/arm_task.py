@@ -10,14 +10,14 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 from pydantic.config import JsonDict
 
-from gen_data.generator.config import distributions as dist
-from gen_data.generator.config.base_model import Strict
-from gen_data.generator.core.asset_types import WORKSPACE_FROM_M
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.kinematics import arm_joints
-from gen_data.generator.core.members import Member, add_members, remove_members
-from gen_data.generator.core.scene import (
+from gen_data.config import distributions as dist
+from gen_data.config.base_model import Strict
+from gen_data.core.asset_types import WORKSPACE_FROM_M
+from gen_data.core.errors import ConfigError
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.kinematics import arm_joints
+from gen_data.core.members import Member, add_members, remove_members
+from gen_data.core.scene import (
     HAND,
     ArmGoal,
     Articulation,
@@ -28,8 +28,8 @@ from gen_data.generator.core.scene import (
     ObjectGroup,
     Scene,
 )
-from gen_data.generator.core.se3 import IDENTITY, SE3, Vec3
-from gen_data.generator.core.streams import Rng
+from gen_data.core.se3 import IDENTITY, SE3, Vec3
+from gen_data.core.streams import Rng
 from gen_data.randomizers.arm_configuration import hand_pose
 from gen_data.randomizers.arm_task_table import Step, Success, Task, Thing, tasks
 from gen_data.randomizers.base import RandomizerBase, check_known

@@ -15,12 +15,12 @@ from typing import Literal
 
 from pydantic import Field, model_validator
 
-from gen_data.generator.config.base_model import Strict
-from gen_data.generator.config.data_files import load_data
-from gen_data.generator.config.paths import find_path
-from gen_data.generator.config.yaml_tree import Node, load_yaml
-from gen_data.generator.core.scene import HAND, Measure
-from gen_data.generator.core.se3 import Vec3
+from gen_data.config.base_model import Strict
+from gen_data.config.data_files import load_data
+from gen_data.config.paths import find_path
+from gen_data.config.yaml_tree import Node, load_yaml
+from gen_data.core.scene import HAND, Measure
+from gen_data.core.se3 import Vec3
 
 Span = tuple[float, float]
 

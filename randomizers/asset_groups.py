@@ -6,10 +6,10 @@ from typing import Annotated
 
 from pydantic import Field
 
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.scene import ObjectGroup, Scene
-from gen_data.generator.core.streams import Rng
+from gen_data.core.errors import ConfigError
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.scene import ObjectGroup, Scene
+from gen_data.core.streams import Rng
 from gen_data.randomizers.base import RandomizerBase, check_known, choose, pick_by_weight
 
 CategoryWeights = tuple[tuple[float, tuple[str, ...]], ...]

@@ -7,13 +7,13 @@ from typing import Literal
 
 from pydantic import Field
 
-from gen_data.generator.assets.families import declared
-from gen_data.generator.config import distributions as dist
-from gen_data.generator.core.asset_types import Material
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.plates import is_catcher
-from gen_data.generator.core.scene import Body, Scene
-from gen_data.generator.core.streams import Rng
+from gen_data.assets.families import declared
+from gen_data.config import distributions as dist
+from gen_data.core.asset_types import Material
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.plates import is_catcher
+from gen_data.core.scene import Body, Scene
+from gen_data.core.streams import Rng
 from gen_data.randomizers.base import (
     RandomizerBase,
     body_materials,

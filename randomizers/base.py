@@ -9,14 +9,14 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from gen_data.generator.config.base_model import NAME_PATTERN, Strict
-from gen_data.generator.core.asset_types import Asset, Material
-from gen_data.generator.core.bounded_cache import ObjectCache
-from gen_data.generator.core.errors import ConfigError, LayoutRejected, Rejection, one_of
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.scene import Body, Scene
-from gen_data.generator.core.se3 import Vec3
-from gen_data.generator.core.streams import Rng
+from gen_data.config.base_model import NAME_PATTERN, Strict
+from gen_data.core.asset_types import Asset, Material
+from gen_data.core.bounded_cache import ObjectCache
+from gen_data.core.errors import ConfigError, LayoutRejected, Rejection, one_of
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.scene import Body, Scene
+from gen_data.core.se3 import Vec3
+from gen_data.core.streams import Rng
 
 _BY_WORD: ObjectCache[Mapping[str, tuple[str, ...]]] = ObjectCache(2)
 

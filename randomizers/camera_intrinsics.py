@@ -6,14 +6,14 @@ import math
 from dataclasses import replace
 from typing import Annotated, Literal
 
-from gen_data.generator.config import distributions as dist
-from gen_data.generator.config.base_model import Strict
-from gen_data.generator.core.errors import ConfigError, LayoutRejected, Rejection
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.lens import COEFFICIENTS, Lens
-from gen_data.generator.core.scene import Camera, Scene
-from gen_data.generator.core.streams import Rng
+from gen_data.config import distributions as dist
+from gen_data.config.base_model import Strict
+from gen_data.core.errors import ConfigError, LayoutRejected, Rejection
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.lens import COEFFICIENTS, Lens
+from gen_data.core.scene import Camera, Scene
+from gen_data.core.streams import Rng
 from gen_data.randomizers.base import RandomizerBase, check_known
 
 PINHOLE_MAX_DEG = 170.0

@@ -8,22 +8,16 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from gen_data.generator.config import distributions as dist
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.lane_geometry import LaneLine
-from gen_data.generator.core.scene import Camera, LaneKind, Scene
-from gen_data.generator.core.se3 import SE3, look_at
-from gen_data.generator.core.streams import Rng
+from gen_data.config import distributions as dist
+from gen_data.core.errors import ConfigError
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.lane_geometry import LaneLine
+from gen_data.core.scene import Camera, LaneKind, Scene
+from gen_data.core.se3 import SE3, look_at
+from gen_data.core.streams import Rng
 from gen_data.randomizers.base import RandomizerBase, pick_by_weight
 from gen_data.randomizers.daylight import is_dark
-from gen_data.randomizers.free_space import (
-    Footprint,
-    Ground,
-    hidden_share,
-    is_clear,
-    make_ground,
-)
+from gen_data.randomizers.free_space import Footprint, Ground, hidden_share, is_clear, make_ground
 from gen_data.randomizers.vehicle_lights import dipped_beam
 
 TRIES = 64

@@ -10,13 +10,13 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from gen_data.generator.config import distributions as dist
-from gen_data.generator.core.errors import ConfigError, did_you_mean
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.scene import Camera, Scene
-from gen_data.generator.core.scene_time import place_sensors
-from gen_data.generator.core.se3 import SE3, Array, Vec3, look_at
-from gen_data.generator.core.streams import Rng
+from gen_data.config import distributions as dist
+from gen_data.core.errors import ConfigError, did_you_mean
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.scene import Camera, Scene
+from gen_data.core.scene_time import place_sensors
+from gen_data.core.se3 import SE3, Array, Vec3, look_at
+from gen_data.core.streams import Rng
 from gen_data.randomizers.base import RandomizerBase, check_known
 from gen_data.randomizers.framing import (
     Framing,

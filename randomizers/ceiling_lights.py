@@ -7,17 +7,12 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from gen_data.generator.config import distributions as dist
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.photometry import (
-    add_fixture,
-    fixture_asset,
-    remove_lights,
-    scale_to_flux,
-)
-from gen_data.generator.core.scene import PANEL_KINDS, Light, LightKind, Scene
-from gen_data.generator.core.se3 import Vec3
-from gen_data.generator.core.streams import Rng
+from gen_data.config import distributions as dist
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.photometry import add_fixture, fixture_asset, remove_lights, scale_to_flux
+from gen_data.core.scene import PANEL_KINDS, Light, LightKind, Scene
+from gen_data.core.se3 import Vec3
+from gen_data.core.streams import Rng
 from gen_data.randomizers.base import RandomizerBase
 from gen_data.randomizers.color_space import Temperature, temperature_to_linear
 

@@ -7,14 +7,14 @@ from typing import Annotated
 
 import numpy as np
 
-from gen_data.generator.config import distributions as dist
-from gen_data.generator.core.colorimetry import (
+from gen_data.config import distributions as dist
+from gen_data.core.colorimetry import (
     REC709_FROM_XYZ,
     luminance,
     srgb_decode,
     temperature_to_chromaticity,
 )
-from gen_data.generator.core.se3 import Vec3
+from gen_data.core.se3 import Vec3
 
 Temperature = Annotated[dist.Scalar, dist.Bounds(1667, 25_000)]
 """Colour temperature [K] within the range of ``temperature_to_chromaticity``."""

@@ -6,13 +6,13 @@ import math
 from collections.abc import Collection, Sequence
 from typing import Annotated, Literal
 
-from gen_data.generator.assets.asset_ids import AssetId, parse_asset_id
-from gen_data.generator.config import distributions as dist
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.members import Member, add_members, change_assets
-from gen_data.generator.core.scene import Body, Scene
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.core.streams import Rng
+from gen_data.assets.asset_ids import AssetId, parse_asset_id
+from gen_data.config import distributions as dist
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.members import Member, add_members, change_assets
+from gen_data.core.scene import Body, Scene
+from gen_data.core.se3 import SE3
+from gen_data.core.streams import Rng
 from gen_data.randomizers.asset_groups import CategoryWeights, GroupRandomizer, draw_asset
 from gen_data.randomizers.free_space import Footprint, Ground, make_ground, standing_bodies
 from gen_data.randomizers.pedestrian_poses import moving_poses, talking_poses, walking_poses

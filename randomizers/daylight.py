@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from gen_data.generator.assets.skies.daylight import sun_color, sun_radius_rad
-from gen_data.generator.assets.skies.sky import SkyModel, mean_luminance_cd_m2, sun_lux
-from gen_data.generator.core.scene import Environment, Light, Scene
-from gen_data.generator.core.streams import Rng
+from gen_data.core.scene import Environment, Light, Scene
+from gen_data.core.streams import Rng
+from gen_data.sky.daylight import sun_color, sun_radius_rad
+from gen_data.sky.sky import SkyModel, mean_luminance_cd_m2, sun_lux
 
 SUN = "sun"
 """Name of the sun among the lights."""

@@ -6,8 +6,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from gen_data.generator.config import distributions as dist
-from gen_data.generator.config.base_model import NAME_PATTERN
+from gen_data.config import distributions as dist
+from gen_data.config.base_model import NAME_PATTERN
 from gen_data.randomizers.objects import COUNT_MAX, Objects
 
 

@@ -8,12 +8,12 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from gen_data.generator.assets.asset_ids import AssetId, parse_asset_id
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.members import Member, add_members, remove_members
-from gen_data.generator.core.scene import Body, Lane, Scene
-from gen_data.generator.core.se3 import SE3, Array, Vec3
-from gen_data.generator.core.streams import Rng
+from gen_data.assets.asset_ids import AssetId, parse_asset_id
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.members import Member, add_members, remove_members
+from gen_data.core.scene import Body, Lane, Scene
+from gen_data.core.se3 import SE3, Array, Vec3
+from gen_data.core.streams import Rng
 from gen_data.randomizers.asset_groups import GroupRandomizer, draw_asset
 from gen_data.randomizers.free_space import Footprint, make_ground, standing_bodies
 

@@ -9,15 +9,15 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from gen_data.generator.config import distributions as dist
-from gen_data.generator.core.errors import ConfigError, did_you_mean
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.lane_geometry import LaneLine
-from gen_data.generator.core.motion import Trajectory
-from gen_data.generator.core.scene import Scene
-from gen_data.generator.core.scene_time import place_sensors
-from gen_data.generator.core.se3 import SE3, Vec3
-from gen_data.generator.core.streams import Rng
+from gen_data.config import distributions as dist
+from gen_data.core.errors import ConfigError, did_you_mean
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.lane_geometry import LaneLine
+from gen_data.core.motion import Trajectory
+from gen_data.core.scene import Scene
+from gen_data.core.scene_time import place_sensors
+from gen_data.core.se3 import SE3, Vec3
+from gen_data.core.streams import Rng
 from gen_data.randomizers.base import RandomizerBase, pick_by_weight
 from gen_data.randomizers.free_space import is_clear
 

@@ -7,16 +7,16 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from gen_data.generator.config import distributions as dist
-from gen_data.generator.core.errors import ConfigError, did_you_mean
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.lane_geometry import LaneLine
-from gen_data.generator.core.scene import Body, Scene
-from gen_data.generator.core.streams import Rng
-from gen_data.generator.traffic.axles import find_axles
-from gen_data.generator.traffic.lane_routes import LaneGraph, lanes_through_point
+from gen_data.config import distributions as dist
+from gen_data.core.errors import ConfigError, did_you_mean
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.lane_geometry import LaneLine
+from gen_data.core.scene import Body, Scene
+from gen_data.core.streams import Rng
 from gen_data.randomizers.base import RandomizerBase
 from gen_data.randomizers.free_space import Footprint, make_ground, standing_bodies
+from gen_data.traffic.axles import find_axles
+from gen_data.traffic.lane_routes import LaneGraph, lanes_through_point
 
 TRIES = 32
 

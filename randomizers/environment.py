@@ -8,12 +8,12 @@ from typing import Literal
 
 from pydantic import Field
 
-from gen_data.generator.config import distributions as dist
-from gen_data.generator.config.yaml_scalars import quote_value
-from gen_data.generator.core.errors import ConfigError, did_you_mean
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.scene import Environment, Scene
-from gen_data.generator.core.streams import Rng
+from gen_data.config import distributions as dist
+from gen_data.config.yaml_scalars import quote_value
+from gen_data.core.errors import ConfigError, did_you_mean
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.scene import Environment, Scene
+from gen_data.core.streams import Rng
 from gen_data.randomizers.base import RandomizerBase, choose
 
 

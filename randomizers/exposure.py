@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Literal
 
-from gen_data.generator.config import distributions as dist
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.scene import Scene
-from gen_data.generator.core.streams import Rng
+from gen_data.config import distributions as dist
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.scene import Scene
+from gen_data.core.streams import Rng
 from gen_data.randomizers.base import RandomizerBase
 
 

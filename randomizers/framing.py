@@ -13,11 +13,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gen_data.generator.core.boxes import OrientedBox
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.scene import Body, Region, Scene, SupportSurface
-from gen_data.generator.core.se3 import SE3, VERTICAL, Array, Vec3, look_at, multiply_quaternions
+from gen_data.core.boxes import OrientedBox
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.scene import Body, Region, Scene, SupportSurface
+from gen_data.core.se3 import SE3, VERTICAL, Array, Vec3, look_at, multiply_quaternions
 
 PRECISION = 1e-6
 """Largest relative error of a share."""

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.core.boxes import Rectangle, overlap_of
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.scene import Body, Camera, Scene
-from gen_data.generator.core.se3 import SE3, Array, Vec3, rotate_by_quaternion
+from gen_data.core.boxes import Rectangle, overlap_of
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.scene import Body, Camera, Scene
+from gen_data.core.se3 import SE3, Array, Vec3, rotate_by_quaternion
 
 _GRID = (16, 9)
 """Columns and rows of the rays that test a view."""

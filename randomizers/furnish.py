@@ -8,26 +8,21 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Annotated, Literal
 
-from gen_data.generator.config import distributions as dist
-from gen_data.generator.core.asset_types import Material
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.scene import Region, Scene
-from gen_data.generator.core.se3 import Vec3
-from gen_data.generator.core.streams import Rng
-from gen_data.generator.rooms.bodies import JOINTS, Builder, Looks, remove_room
-from gen_data.generator.rooms.floor_plan import Room, between, draw_plan
-from gen_data.generator.rooms.layout import Conflict, Piece, furnish
-from gen_data.generator.rooms.options import families_of, find_options
-from gen_data.generator.rooms.outlook import draw_outlook, outlook_assets
-from gen_data.generator.rooms.rules import APARTMENT, Range, find_room_type
-from gen_data.randomizers.base import (
-    RandomizerBase,
-    choose,
-    find_texture_files,
-    find_textures,
-)
+from gen_data.config import distributions as dist
+from gen_data.core.asset_types import Material
+from gen_data.core.errors import ConfigError
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.scene import Region, Scene
+from gen_data.core.se3 import Vec3
+from gen_data.core.streams import Rng
+from gen_data.randomizers.base import RandomizerBase, choose, find_texture_files, find_textures
 from gen_data.randomizers.color_space import hsv_to_linear
+from gen_data.rooms.bodies import JOINTS, Builder, Looks, remove_room
+from gen_data.rooms.floor_plan import Room, between, draw_plan
+from gen_data.rooms.layout import Conflict, Piece, furnish
+from gen_data.rooms.options import families_of, find_options
+from gen_data.rooms.outlook import draw_outlook, outlook_assets
+from gen_data.rooms.rules import APARTMENT, Range, find_room_type
 
 TRIES, TRIES_PER_ROOM = 12, 3
 """Floor plans tried before the scene is rejected, and layouts of each of their rooms."""

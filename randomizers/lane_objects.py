@@ -10,14 +10,14 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from gen_data.generator.config import distributions as dist
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.lane_geometry import LaneLine, pose_on_lane
-from gen_data.generator.core.members import Member, add_members, remove_members
-from gen_data.generator.core.scene import LaneKind, ObjectGroup, Scene
-from gen_data.generator.core.se3 import SE3, Vec3
-from gen_data.generator.core.streams import Rng
+from gen_data.config import distributions as dist
+from gen_data.core.errors import ConfigError
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.lane_geometry import LaneLine, pose_on_lane
+from gen_data.core.members import Member, add_members, remove_members
+from gen_data.core.scene import LaneKind, ObjectGroup, Scene
+from gen_data.core.se3 import SE3, Vec3
+from gen_data.core.streams import Rng
 from gen_data.randomizers.asset_groups import CategoryWeights, GroupRandomizer, draw_asset
 from gen_data.randomizers.free_space import (
     Footprint,

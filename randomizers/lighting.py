@@ -8,10 +8,10 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from gen_data.generator.config import distributions as dist
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.photometry import (
+from gen_data.config import distributions as dist
+from gen_data.core.errors import ConfigError
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.photometry import (
     add_fixture,
     fixture_asset,
     flux_to_intensity_cd,
@@ -19,9 +19,9 @@ from gen_data.generator.core.photometry import (
     level_side,
     remove_lights,
 )
-from gen_data.generator.core.scene import LIGHT_KINDS, PANEL_KINDS, Light, LightKind, Scene
-from gen_data.generator.core.se3 import Vec3
-from gen_data.generator.core.streams import Rng
+from gen_data.core.scene import LIGHT_KINDS, PANEL_KINDS, Light, LightKind, Scene
+from gen_data.core.se3 import Vec3
+from gen_data.core.streams import Rng
 from gen_data.randomizers.base import RandomizerBase
 from gen_data.randomizers.color_space import Temperature, temperature_to_linear
 from gen_data.randomizers.free_space import is_in_the_open, is_inside

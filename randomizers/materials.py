@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from gen_data.generator.config import distributions as dist
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.scene import Scene
-from gen_data.generator.core.streams import Rng
+from gen_data.config import distributions as dist
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.scene import Scene
+from gen_data.core.streams import Rng
 from gen_data.randomizers.base import SurfaceRandomizer
 
 

@@ -9,19 +9,19 @@ from typing import Literal
 
 import numpy as np
 
-from gen_data.generator.assets.asset_ids import AssetId
-from gen_data.generator.config import distributions as dist
-from gen_data.generator.core.asset_types import RobotModel
-from gen_data.generator.core.boxes import overlap_of
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.keypoint_names import DRAIN, TAP
-from gen_data.generator.core.kinematics import link_poses, position_limits, positions_of
-from gen_data.generator.core.scene import Body, Instance, Scene
-from gen_data.generator.core.se3 import SE3, Vec3
-from gen_data.generator.core.streams import Rng
-from gen_data.generator.rooms.bodies import JOINTS, LEADS_OUT, Joint, keypoint_m, part_pose
+from gen_data.assets.asset_ids import AssetId
+from gen_data.config import distributions as dist
+from gen_data.core.asset_types import RobotModel
+from gen_data.core.boxes import overlap_of
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.keypoint_names import DRAIN, TAP
+from gen_data.core.kinematics import link_poses, position_limits, positions_of
+from gen_data.core.scene import Body, Instance, Scene
+from gen_data.core.se3 import SE3, Vec3
+from gen_data.core.streams import Rng
 from gen_data.randomizers.base import RandomizerBase, add_attributes, body_materials
 from gen_data.randomizers.free_space import Footprint
+from gen_data.rooms.bodies import JOINTS, LEADS_OUT, Joint, keypoint_m, part_pose
 
 SCREEN = "screen"
 """Role of slots that show images."""

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from gen_data.generator.config import distributions as dist
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.members import Member, add_members, remove_members
-from gen_data.generator.core.scene import Scene
-from gen_data.generator.core.streams import Rng
+from gen_data.config import distributions as dist
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.members import Member, add_members, remove_members
+from gen_data.core.scene import Scene
+from gen_data.core.streams import Rng
 from gen_data.randomizers.asset_groups import GroupRandomizer, draw_asset
 from gen_data.randomizers.placement import Item, find_floors, half_extents_m, lay_out
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import cache
 
-from gen_data.generator.assets.families import declared
+from gen_data.assets.families import declared
 
 _PEOPLE = "simple_person"
 """Family whose poses all people have, except people from files."""

@@ -7,12 +7,12 @@ from bisect import insort
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-from gen_data.generator.config import distributions as dist
-from gen_data.generator.core.errors import LayoutRejected, Rejection
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.scene import Body, ObjectGroup, Scene, SupportSurface
-from gen_data.generator.core.se3 import SE3, Vec3
-from gen_data.generator.core.streams import Rng
+from gen_data.config import distributions as dist
+from gen_data.core.errors import LayoutRejected, Rejection
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.scene import Body, ObjectGroup, Scene, SupportSurface
+from gen_data.core.se3 import SE3, Vec3
+from gen_data.core.streams import Rng
 
 GAP_M = 0.004
 """Gap between placed objects."""

@@ -6,11 +6,11 @@ from typing import Literal
 
 from pydantic import Field
 
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.plates import find_plates, is_catcher, show_plate
-from gen_data.generator.core.scene import Scene
-from gen_data.generator.core.streams import Rng
+from gen_data.core.errors import ConfigError
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.plates import find_plates, is_catcher, show_plate
+from gen_data.core.scene import Scene
+from gen_data.core.streams import Rng
 from gen_data.randomizers.base import RandomizerBase, check_known, choose
 
 

@@ -9,15 +9,15 @@ from typing import Literal
 
 import numpy as np
 
-from gen_data.generator.assets.asset_ids import AssetId, parse_asset_id
-from gen_data.generator.assets.families import declared
-from gen_data.generator.config import distributions as dist
-from gen_data.generator.core.asset_types import Float32
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.members import Member, add_members
-from gen_data.generator.core.scene import Scene, SupportSurface
-from gen_data.generator.core.se3 import SE3, Array, Vec3
-from gen_data.generator.core.streams import Rng
+from gen_data.assets.asset_ids import AssetId, parse_asset_id
+from gen_data.assets.families import declared
+from gen_data.config import distributions as dist
+from gen_data.core.asset_types import Float32
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.members import Member, add_members
+from gen_data.core.scene import Scene, SupportSurface
+from gen_data.core.se3 import SE3, Array, Vec3
+from gen_data.core.streams import Rng
 from gen_data.randomizers.asset_groups import GroupRandomizer, draw_asset
 from gen_data.randomizers.base import check_known, choose
 

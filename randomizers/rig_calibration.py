@@ -7,13 +7,13 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any, Literal, TypeVar
 
-from gen_data.generator.config import distributions as dist
-from gen_data.generator.core.errors import ConfigError, did_you_mean
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.scene import Camera, Device, Lidar, Scene
-from gen_data.generator.core.scene_time import place_sensors
-from gen_data.generator.core.se3 import SE3, multiply_quaternions
-from gen_data.generator.core.streams import Rng
+from gen_data.config import distributions as dist
+from gen_data.core.errors import ConfigError, did_you_mean
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.scene import Camera, Device, Lidar, Scene
+from gen_data.core.scene_time import place_sensors
+from gen_data.core.se3 import SE3, multiply_quaternions
+from gen_data.core.streams import Rng
 from gen_data.randomizers.base import RandomizerBase
 
 Sensor = TypeVar("Sensor", Camera, Lidar, Device)

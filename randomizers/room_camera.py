@@ -9,11 +9,11 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
-from gen_data.generator.config import distributions as dist
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.scene import Body, Camera, Scene
-from gen_data.generator.core.se3 import Array, Vec3, look_at
-from gen_data.generator.core.streams import Rng
+from gen_data.config import distributions as dist
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.scene import Body, Camera, Scene
+from gen_data.core.se3 import Array, Vec3, look_at
+from gen_data.core.streams import Rng
 from gen_data.randomizers.base import RandomizerBase
 from gen_data.randomizers.free_space import Sight, is_clear, look_around
 

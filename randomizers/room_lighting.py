@@ -9,24 +9,19 @@ from typing import Annotated, Literal
 
 import numpy as np
 
-from gen_data.generator.config import distributions as dist
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.photometry import remove_lights, scale_to_flux
-from gen_data.generator.core.scene import Body, Environment, Light, Scene
-from gen_data.generator.core.se3 import Vec3
-from gen_data.generator.core.streams import Rng
-from gen_data.generator.rooms.bodies import OUTSIDE, keypoint_m
-from gen_data.generator.rooms.interreflection import find_interreflection
-from gen_data.generator.rooms.lit_rooms import find_lit_rooms
-from gen_data.generator.rooms.window_niches import find_niches
-from gen_data.randomizers.base import (
-    RandomizerBase,
-    add_attributes,
-    scale_emission,
-    set_emission,
-)
+from gen_data.config import distributions as dist
+from gen_data.core.errors import ConfigError
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.photometry import remove_lights, scale_to_flux
+from gen_data.core.scene import Body, Environment, Light, Scene
+from gen_data.core.se3 import Vec3
+from gen_data.core.streams import Rng
+from gen_data.randomizers.base import RandomizerBase, add_attributes, scale_emission, set_emission
 from gen_data.randomizers.color_space import Temperature, temperature_to_linear
+from gen_data.rooms.bodies import OUTSIDE, keypoint_m
+from gen_data.rooms.interreflection import find_interreflection
+from gen_data.rooms.lit_rooms import find_lit_rooms
+from gen_data.rooms.window_niches import find_niches
 
 LAMP = "lamp"
 _SHADE_M2 = 0.35

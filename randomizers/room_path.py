@@ -12,14 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from gen_data.generator.config import distributions as dist
-from gen_data.generator.core.boxes import Rectangle
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.motion import Trajectory
-from gen_data.generator.core.scene import Body, Scene
-from gen_data.generator.core.se3 import SE3, Array
-from gen_data.generator.core.streams import Rng
+from gen_data.config import distributions as dist
+from gen_data.core.boxes import Rectangle
+from gen_data.core.errors import ConfigError
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.motion import Trajectory
+from gen_data.core.scene import Body, Scene
+from gen_data.core.se3 import SE3, Array
+from gen_data.core.streams import Rng
 from gen_data.randomizers.base import RandomizerBase
 from gen_data.randomizers.free_space import Footprint
 

@@ -8,14 +8,14 @@ from typing import Annotated, Literal
 
 import numpy as np
 
-from gen_data.generator.config import distributions as dist
-from gen_data.generator.core.asset_types import Keypoint
-from gen_data.generator.core.colorimetry import luminance
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.photometry import flux_to_intensity_cd
-from gen_data.generator.core.scene import Body, Light, Scene
-from gen_data.generator.core.se3 import Vec3
-from gen_data.generator.core.streams import Rng
+from gen_data.config import distributions as dist
+from gen_data.core.asset_types import Keypoint
+from gen_data.core.colorimetry import luminance
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.photometry import flux_to_intensity_cd
+from gen_data.core.scene import Body, Light, Scene
+from gen_data.core.se3 import Vec3
+from gen_data.core.streams import Rng
 from gen_data.randomizers.base import RandomizerBase, body_materials, scale_emission, set_emission
 from gen_data.randomizers.color_space import Temperature, temperature_to_linear
 from gen_data.randomizers.daylight import is_dark

@@ -6,16 +6,11 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from gen_data.generator.config import distributions as dist
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.scene import Scene
-from gen_data.generator.core.streams import Rng
-from gen_data.randomizers.base import (
-    SurfaceRandomizer,
-    choose,
-    find_texture_files,
-    find_textures,
-)
+from gen_data.config import distributions as dist
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.scene import Scene
+from gen_data.core.streams import Rng
+from gen_data.randomizers.base import SurfaceRandomizer, choose, find_texture_files, find_textures
 
 
 class Textures(SurfaceRandomizer):

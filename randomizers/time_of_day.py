@@ -6,13 +6,13 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from gen_data.generator.assets.skies.sky import SkyModel
-from gen_data.generator.config import distributions as dist
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.scene import Scene
-from gen_data.generator.core.streams import Rng
+from gen_data.config import distributions as dist
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.scene import Scene
+from gen_data.core.streams import Rng
 from gen_data.randomizers.base import RandomizerBase
 from gen_data.randomizers.daylight import draw_cloud_seed, set_daylight, shared_number
+from gen_data.sky.sky import SkyModel
 
 Altitude = Annotated[dist.Scalar, dist.Bounds(-90, 90)]
 Turbidity = Annotated[dist.Scalar, dist.Bounds(1.8, 8.0)]

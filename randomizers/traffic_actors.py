@@ -8,16 +8,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.scene import Body, Scene
-from gen_data.generator.core.se3 import SE3, Array
-from gen_data.generator.traffic.axles import Axles, find_axles
-from gen_data.generator.traffic.conflict_zones import crosswalk_zones, heading
-from gen_data.generator.traffic.lane_routes import LaneGraph, LanePosition
-from gen_data.generator.traffic.signal_cycles import Approach, Cycle
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.scene import Body, Scene
+from gen_data.core.se3 import SE3, Array
 from gen_data.randomizers.free_space import Footprint, standing_bodies
 from gen_data.randomizers.pedestrian_poses import moving_poses
 from gen_data.randomizers.traffic_lights import Signal, runs_along
+from gen_data.traffic.axles import Axles, find_axles
+from gen_data.traffic.conflict_zones import crosswalk_zones, heading
+from gen_data.traffic.lane_routes import LaneGraph, LanePosition
+from gen_data.traffic.signal_cycles import Approach, Cycle
 
 PERSON = "person"
 SCENERY = "scenery"

@@ -9,24 +9,13 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from gen_data.generator.config import distributions as dist
-from gen_data.generator.core.errors import ConfigError, LayoutRejected, Rejection, did_you_mean
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.motion import StateChange, Trajectory
-from gen_data.generator.core.scene import Body, Scene
-from gen_data.generator.core.se3 import Array
-from gen_data.generator.core.streams import Rng
-from gen_data.generator.traffic.lane_routes import LaneGraph, draw_route, lanes_through_point
-from gen_data.generator.traffic.pedestrian_paths import WalkNetwork, draw_path, make_walk_network
-from gen_data.generator.traffic.pedestrians import Pedestrian
-from gen_data.generator.traffic.signal_cycles import Approach, Cycle
-from gen_data.generator.traffic.simulation import (
-    SimulatedMotion,
-    first_overlap,
-    make_upright_trajectories,
-    simulate,
-)
-from gen_data.generator.traffic.vehicles import LOOKAHEAD_M, Vehicle, Vehicles, make_vehicles
+from gen_data.config import distributions as dist
+from gen_data.core.errors import ConfigError, LayoutRejected, Rejection, did_you_mean
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.motion import StateChange, Trajectory
+from gen_data.core.scene import Body, Scene
+from gen_data.core.se3 import Array
+from gen_data.core.streams import Rng
 from gen_data.randomizers.base import RandomizerBase
 from gen_data.randomizers.ego_on_lane import Stop
 from gen_data.randomizers.traffic_actors import (
@@ -57,6 +46,17 @@ from gen_data.randomizers.traffic_states import (
     lamp_states,
     signal_changes,
 )
+from gen_data.traffic.lane_routes import LaneGraph, draw_route, lanes_through_point
+from gen_data.traffic.pedestrian_paths import WalkNetwork, draw_path, make_walk_network
+from gen_data.traffic.pedestrians import Pedestrian
+from gen_data.traffic.signal_cycles import Approach, Cycle
+from gen_data.traffic.simulation import (
+    SimulatedMotion,
+    first_overlap,
+    make_upright_trajectories,
+    simulate,
+)
+from gen_data.traffic.vehicles import LOOKAHEAD_M, Vehicle, Vehicles, make_vehicles
 
 JUNCTION_M = 40.0
 """Largest distance between neighbouring signals of one junction."""

@@ -7,17 +7,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, ClassVar, Literal
 
-from gen_data.generator.config import distributions as dist
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.scene import Body, Scene
-from gen_data.generator.core.se3 import Vec3
-from gen_data.generator.core.streams import Rng
-from gen_data.randomizers.base import (
-    RandomizerBase,
-    add_attributes,
-    body_materials,
-    set_emission,
-)
+from gen_data.config import distributions as dist
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.scene import Body, Scene
+from gen_data.core.se3 import Vec3
+from gen_data.core.streams import Rng
+from gen_data.randomizers.base import RandomizerBase, add_attributes, body_materials, set_emission
 
 LIT: Mapping[str, tuple[str, ...]] = {
     "red": ("lens_red", "lens_stop"),

@@ -9,20 +9,20 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.assets.asset_ids import AssetId, parse_asset_id
-from gen_data.generator.core.asset_types import Material
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.motion import StateChange
-from gen_data.generator.core.scene import Body, Scene
-from gen_data.generator.core.se3 import Array, Vec3
-from gen_data.generator.traffic.pedestrians import stride_m
-from gen_data.generator.traffic.signal_cycles import Approach
-from gen_data.generator.traffic.simulation import STEP_S
-from gen_data.generator.traffic.vehicles import Entry
+from gen_data.assets.asset_ids import AssetId, parse_asset_id
+from gen_data.core.asset_types import Material
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.motion import StateChange
+from gen_data.core.scene import Body, Scene
+from gen_data.core.se3 import Array, Vec3
 from gen_data.randomizers.base import add_attributes, body_materials, scale_emission, set_emission
 from gen_data.randomizers.pedestrian_poses import stride_phases
 from gen_data.randomizers.traffic_lights import Signal, show_state
 from gen_data.randomizers.vehicle_lights import AMBER, RED
+from gen_data.traffic.pedestrians import stride_m
+from gen_data.traffic.signal_cycles import Approach
+from gen_data.traffic.simulation import STEP_S
+from gen_data.traffic.vehicles import Entry
 
 BRAKES_M_S2 = 0.7
 """Deceleration from which brake lights are on (UN R13-H, 5.2.22.4); also at a standstill."""

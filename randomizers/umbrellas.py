@@ -6,12 +6,12 @@ from typing import Literal
 
 from pydantic import Field
 
-from gen_data.generator.assets.asset_ids import AssetId, parse_asset_id
-from gen_data.generator.config import distributions as dist
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.members import change_assets
-from gen_data.generator.core.scene import ObjectGroup, Scene
-from gen_data.generator.core.streams import Rng
+from gen_data.assets.asset_ids import AssetId, parse_asset_id
+from gen_data.config import distributions as dist
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.members import change_assets
+from gen_data.core.scene import ObjectGroup, Scene
+from gen_data.core.streams import Rng
 from gen_data.randomizers.base import RandomizerBase, check_known
 from gen_data.randomizers.pedestrian_poses import free_handed_poses, moving_poses
 

@@ -7,11 +7,11 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from gen_data.generator.config import distributions as dist
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.scene import Body, Light, Scene
-from gen_data.generator.core.se3 import SE3, Vec3
-from gen_data.generator.core.streams import Rng
+from gen_data.config import distributions as dist
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.scene import Body, Light, Scene
+from gen_data.core.se3 import SE3, Vec3
+from gen_data.core.streams import Rng
 from gen_data.randomizers.base import (
     SurfaceRandomizer,
     add_attributes,

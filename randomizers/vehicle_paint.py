@@ -8,13 +8,13 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from gen_data.generator.assets.families import declared
-from gen_data.generator.config import distributions as dist
-from gen_data.generator.config.data_files import load_table
-from gen_data.generator.core.asset_types import Material
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.scene import Body, Scene
-from gen_data.generator.core.streams import Rng
+from gen_data.assets.families import declared
+from gen_data.config import distributions as dist
+from gen_data.config.data_files import load_table
+from gen_data.core.asset_types import Material
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.scene import Body, Scene
+from gen_data.core.streams import Rng
 from gen_data.randomizers.base import SurfaceRandomizer, body_materials
 from gen_data.randomizers.color_space import hsv_to_linear
 

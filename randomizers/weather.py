@@ -10,18 +10,18 @@ from typing import Any, Literal
 
 from pydantic import Field, field_validator
 
-from gen_data.generator.assets.skies.sky import SkyModel
-from gen_data.generator.config import distributions as dist
-from gen_data.generator.config.data_files import load_table
-from gen_data.generator.config.yaml_scalars import quote_value
-from gen_data.generator.core.errors import did_you_mean
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.scene import Scene
-from gen_data.generator.core.scene import Weather as SceneWeather
-from gen_data.generator.core.streams import Rng
+from gen_data.config import distributions as dist
+from gen_data.config.data_files import load_table
+from gen_data.config.yaml_scalars import quote_value
+from gen_data.core.errors import did_you_mean
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.scene import Scene
+from gen_data.core.scene import Weather as SceneWeather
+from gen_data.core.streams import Rng
 from gen_data.randomizers.base import RandomizerBase
 from gen_data.randomizers.daylight import draw_cloud_seed, set_daylight
 from gen_data.randomizers.time_of_day import Altitude, Turbidity
+from gen_data.sky.sky import SkyModel
 
 _FIELDS = ("fog_extinction_per_m", "fog_height_m", "rain_mm_h", "snow_mm_h", "wetness", "puddles",
            "snow_cover", "lens_drops")  # fmt: skip

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Literal
 
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.scene import Scene
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.scene import Scene
 from gen_data.scene_templates.element import PlacedElement, add_background, stand_upright
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Literal
 
-from gen_data.generator.assets.families import declared
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.scene import Scene
+from gen_data.assets.families import declared
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.scene import Scene
 from gen_data.scene_templates.element import PlacedElement, add_static, parametric_id
 
 

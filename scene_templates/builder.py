@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import AssetIndex, Element
-from gen_data.generator.core.plates import has_plate
-from gen_data.generator.core.scene import Lane, Light, Region, Scene, SupportSurface
-from gen_data.generator.core.se3 import Vec3
+from gen_data.core.errors import ConfigError
+from gen_data.core.interfaces import AssetIndex, Element
+from gen_data.core.plates import has_plate
+from gen_data.core.scene import Lane, Light, Region, Scene, SupportSurface
+from gen_data.core.se3 import Vec3
 from gen_data.scene_templates.element import Element as TemplateElement
 
 CONTENT_HEIGHT_M = 0.25

@@ -7,9 +7,9 @@ from typing import Literal
 
 from pydantic import Field
 
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.scene import Body, Instance, Rig, Scene
-from gen_data.generator.core.se3 import SE3
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.scene import Body, Instance, Rig, Scene
+from gen_data.core.se3 import SE3
 from gen_data.scene_templates.element import Element, next_instance_id
 
 CATEGORY = "ego"

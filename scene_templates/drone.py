@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Literal
 
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.scene import Rig, Scene
-from gen_data.generator.core.se3 import SE3, Vec3
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.scene import Rig, Scene
+from gen_data.core.se3 import SE3, Vec3
 from gen_data.scene_templates.element import Element, add_background
 
 GIMBAL_BELOW_M = 0.09

@@ -8,12 +8,12 @@ from typing import Literal
 
 from pydantic import Field
 
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.lane_geometry import LaneLine
-from gen_data.generator.core.scene import Body, Instance, Rig, Scene
-from gen_data.generator.traffic.axles import find_axles
+from gen_data.core.errors import ConfigError
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.lane_geometry import LaneLine
+from gen_data.core.scene import Body, Instance, Rig, Scene
 from gen_data.scene_templates.element import Element, name_relations, next_instance_id
+from gen_data.traffic.axles import find_axles
 
 CATEGORY = "ego"
 """Category of its pixels; no data set lists it: they have no category id."""

@@ -10,13 +10,13 @@ from typing import Any
 
 from pydantic import Field
 
-from gen_data.generator.assets.asset_ids import AssetId, ParameterValue
-from gen_data.generator.config.base_model import NAME_PATTERN, Strict
-from gen_data.generator.core.errors import ConfigError, did_you_mean
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.members import free_instance_ids
-from gen_data.generator.core.scene import Body, Instance, Scene, SupportSurface
-from gen_data.generator.core.se3 import SE3, Vec3
+from gen_data.assets.asset_ids import AssetId, ParameterValue
+from gen_data.config.base_model import NAME_PATTERN, Strict
+from gen_data.core.errors import ConfigError, did_you_mean
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.members import free_instance_ids
+from gen_data.core.scene import Body, Instance, Scene, SupportSurface
+from gen_data.core.se3 import SE3, Vec3
 
 
 class Element(Strict):

@@ -10,13 +10,13 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.scene import Body, Scene
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.core.variant_rng import variant_rng
-from gen_data.generator.roads.cross_section import RoadShape, non_default_fields, strips
-from gen_data.generator.roads.fields_shape import FieldsShape, Parcel
+from gen_data.core.errors import ConfigError
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.scene import Body, Scene
+from gen_data.core.se3 import SE3
+from gen_data.core.variant_rng import variant_rng
+from gen_data.roads.cross_section import RoadShape, non_default_fields, strips
+from gen_data.roads.fields_shape import FieldsShape, Parcel
 from gen_data.scene_templates.element import Element, add_background, name_relations, parametric_id
 from gen_data.scene_templates.road import find_road
 

@@ -6,15 +6,11 @@ from typing import Literal
 
 from pydantic import Field
 
-from gen_data.generator.config.base_model import NAME_PATTERN
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.scene import Scene
-from gen_data.generator.core.se3 import SE3
-from gen_data.scene_templates.element import (
-    PlacedElement,
-    add_background,
-    parametric_id,
-)
+from gen_data.config.base_model import NAME_PATTERN
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.scene import Scene
+from gen_data.core.se3 import SE3
+from gen_data.scene_templates.element import PlacedElement, add_background, parametric_id
 from gen_data.scene_templates.road import Ground
 
 

@@ -9,13 +9,13 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from gen_data.generator.assets.families import declared
-from gen_data.generator.config.base_model import NAME_PATTERN
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.scene import Lane, Scene
-from gen_data.generator.core.se3 import SE3, Array
-from gen_data.generator.core.variant_rng import VariantRng, variant_rng
+from gen_data.assets.families import declared
+from gen_data.config.base_model import NAME_PATTERN
+from gen_data.core.errors import ConfigError
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.scene import Lane, Scene
+from gen_data.core.se3 import SE3, Array
+from gen_data.core.variant_rng import VariantRng, variant_rng
 from gen_data.scene_templates.element import Element, add_background, parametric_id
 
 HorizonKind = Literal["trees", "forest", "town", "skyline", "hills"]

@@ -9,13 +9,13 @@ from typing import Any, ClassVar, Literal
 
 from pydantic import Field
 
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.scene import Lane, Scene
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.roads.cross_section import non_default_fields
-from gen_data.generator.roads.junction_shape import ABSENT, JunctionShape
-from gen_data.generator.roads.roundabout_shape import RoundaboutShape
+from gen_data.core.errors import ConfigError
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.scene import Lane, Scene
+from gen_data.core.se3 import SE3
+from gen_data.roads.cross_section import non_default_fields
+from gen_data.roads.junction_shape import ABSENT, JunctionShape
+from gen_data.roads.roundabout_shape import RoundaboutShape
 from gen_data.scene_templates.element import Element, level_pose, name_relations, parametric_id
 from gen_data.scene_templates.road import RoadSurface, add_street, find_port
 

@@ -7,10 +7,10 @@ from typing import ClassVar, Literal
 
 from pydantic import Field
 
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.scene import Lane
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.roads.junction_shape import JunctionShape, junction_lanes
+from gen_data.core.errors import ConfigError
+from gen_data.core.scene import Lane
+from gen_data.core.se3 import SE3
+from gen_data.roads.junction_shape import JunctionShape, junction_lanes
 from gen_data.scene_templates.intersection import Intersection
 from gen_data.scene_templates.road import TURN_LANE_M
 

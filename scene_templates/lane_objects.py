@@ -7,11 +7,11 @@ from typing import Literal
 
 from pydantic import Field
 
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.lane_geometry import LaneLine, pose_on_lane
-from gen_data.generator.core.members import Member, add_members
-from gen_data.generator.core.scene import LaneKind, ObjectGroup, Scene
+from gen_data.core.errors import ConfigError
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.lane_geometry import LaneLine, pose_on_lane
+from gen_data.core.members import Member, add_members
+from gen_data.core.scene import LaneKind, ObjectGroup, Scene
 from gen_data.scene_templates.element import Element
 from gen_data.scene_templates.objects import AssetChoice, empty_group
 

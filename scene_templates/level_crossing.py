@@ -8,11 +8,11 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from gen_data.generator.assets.families import declared
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.scene import Scene
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.roads.cross_section import non_default_fields
+from gen_data.assets.families import declared
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.scene import Scene
+from gen_data.core.se3 import SE3
+from gen_data.roads.cross_section import non_default_fields
 from gen_data.scene_templates.element import (
     Element,
     add_background,

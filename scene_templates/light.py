@@ -8,10 +8,10 @@ from typing import Literal
 
 from pydantic import Field, model_validator
 
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.photometry import add_fixture, fixture_asset, level_side, scale_to_flux
-from gen_data.generator.core.scene import PANEL_KINDS, LampKind, Light, Scene
-from gen_data.generator.core.se3 import Vec3
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.photometry import add_fixture, fixture_asset, level_side, scale_to_flux
+from gen_data.core.scene import PANEL_KINDS, LampKind, Light, Scene
+from gen_data.core.se3 import Vec3
 from gen_data.scene_templates.element import Element
 
 

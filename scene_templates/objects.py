@@ -10,14 +10,14 @@ from typing import Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from gen_data.generator.config.base_model import Strict
-from gen_data.generator.core.asset_types import Asset
-from gen_data.generator.core.bounded_cache import ObjectCache
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.members import Member, add_members
-from gen_data.generator.core.scene import ObjectGroup, Placement, Scene, SupportSurface
-from gen_data.generator.core.se3 import SE3, Vec3
+from gen_data.config.base_model import Strict
+from gen_data.core.asset_types import Asset
+from gen_data.core.bounded_cache import ObjectCache
+from gen_data.core.errors import ConfigError
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.members import Member, add_members
+from gen_data.core.scene import ObjectGroup, Placement, Scene, SupportSurface
+from gen_data.core.se3 import SE3, Vec3
 from gen_data.scene_templates.element import (
     Element,
     extent_m,

@@ -6,10 +6,10 @@ from typing import Literal
 
 from pydantic import Field
 
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.scene import Scene
-from gen_data.generator.roads.cross_section import non_default_fields
-from gen_data.generator.roads.parking_shape import ParkingShape, parking_lanes
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.scene import Scene
+from gen_data.roads.cross_section import non_default_fields
+from gen_data.roads.parking_shape import ParkingShape, parking_lanes
 from gen_data.scene_templates.element import PlacedElement, parametric_id
 from gen_data.scene_templates.road import RoadSurface, add_street
 

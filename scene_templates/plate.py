@@ -7,12 +7,12 @@ from typing import Literal
 
 from pydantic import Field
 
-from gen_data.generator.config.base_model import NAME_PATTERN
-from gen_data.generator.core.asset_types import Material
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.plates import CATCHER, EV100, find_plates, show_plate
-from gen_data.generator.core.scene import Body, Camera, Scene
-from gen_data.generator.core.se3 import SE3
+from gen_data.config.base_model import NAME_PATTERN
+from gen_data.core.asset_types import Material
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.plates import CATCHER, EV100, find_plates, show_plate
+from gen_data.core.scene import Body, Camera, Scene
+from gen_data.core.se3 import SE3
 from gen_data.scene_templates.element import Element, parametric_id
 
 _GROUND_M, _GROUND_SCALE = (100.0, 100.0), 6.0

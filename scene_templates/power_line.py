@@ -8,11 +8,11 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from gen_data.generator.assets.families import declared
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.scene import Scene
-from gen_data.generator.core.se3 import SE3, Array
+from gen_data.assets.families import declared
+from gen_data.core.errors import ConfigError
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.scene import Scene
+from gen_data.core.se3 import SE3, Array
 from gen_data.scene_templates.element import Element, add_static, parametric_id
 
 CLEAR_M = 20.0

@@ -8,10 +8,10 @@ from typing import Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.kinematics import link_poses, rigid_group
-from gen_data.generator.core.scene import Body, Instance, Scene
-from gen_data.generator.core.se3 import SE3
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.kinematics import link_poses, rigid_group
+from gen_data.core.scene import Body, Instance, Scene
+from gen_data.core.se3 import SE3
 from gen_data.scene_templates.element import (
     PlacedElement,
     add_background,

@@ -10,16 +10,16 @@ from typing import Any, Literal, TypeVar
 import numpy as np
 from pydantic import Field
 
-from gen_data.generator.assets.asset_ids import parse_asset_id
-from gen_data.generator.config.base_model import Strict
-from gen_data.generator.core.errors import ConfigError, did_you_mean
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.scene import Lane, Scene
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.roads.cross_section import RoadShape, non_default_fields
-from gen_data.generator.roads.junction_shape import JunctionShape, arm_pose
-from gen_data.generator.roads.lane_graph import link_lanes, road_lanes
-from gen_data.generator.roads.roundabout_shape import RoundaboutShape
+from gen_data.assets.asset_ids import parse_asset_id
+from gen_data.config.base_model import Strict
+from gen_data.core.errors import ConfigError, did_you_mean
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.scene import Lane, Scene
+from gen_data.core.se3 import SE3
+from gen_data.roads.cross_section import RoadShape, non_default_fields
+from gen_data.roads.junction_shape import JunctionShape, arm_pose
+from gen_data.roads.lane_graph import link_lanes, road_lanes
+from gen_data.roads.roundabout_shape import RoundaboutShape
 from gen_data.scene_templates.element import (
     Element,
     add_background,

@@ -7,11 +7,11 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from gen_data.generator.assets.families import declared
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.scene import Scene
-from gen_data.generator.roads.cross_section import RoadShape, non_default_fields, strips
+from gen_data.assets.families import declared
+from gen_data.core.errors import ConfigError
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.scene import Scene
+from gen_data.roads.cross_section import RoadShape, non_default_fields, strips
 from gen_data.scene_templates.element import Element, add_background, name_relations, parametric_id
 from gen_data.scene_templates.road import find_road
 

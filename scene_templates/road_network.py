@@ -8,11 +8,11 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.scene import Lane, Scene
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.roads.lane_graph import world_points
+from gen_data.core.errors import ConfigError
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.scene import Lane, Scene
+from gen_data.core.se3 import SE3
+from gen_data.roads.lane_graph import world_points
 from gen_data.scene_templates.element import PlacedElement
 from gen_data.scene_templates.road import add_street
 

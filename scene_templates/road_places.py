@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.lane_geometry import LaneLine
-from gen_data.generator.core.scene import Lane, LaneKind, Scene
-from gen_data.generator.core.se3 import SE3, Vec3
-from gen_data.generator.roads.cross_section import RoadShape, strips
-from gen_data.generator.roads.lane_graph import link_lanes
+from gen_data.core.errors import ConfigError
+from gen_data.core.lane_geometry import LaneLine
+from gen_data.core.scene import Lane, LaneKind, Scene
+from gen_data.core.se3 import SE3, Vec3
+from gen_data.roads.cross_section import RoadShape, strips
+from gen_data.roads.lane_graph import link_lanes
 from gen_data.scene_templates.road import find_road
 
 _SHORTEST_M = 2.0

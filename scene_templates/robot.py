@@ -9,16 +9,11 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
-from gen_data.generator.core.asset_types import RobotModel
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.kinematics import (
-    finger_links,
-    link_poses,
-    make_link_bodies,
-    rigid_group,
-)
-from gen_data.generator.core.scene import Articulation, Instance, Rig, Scene
-from gen_data.generator.core.se3 import SE3, Vec3
+from gen_data.core.asset_types import RobotModel
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.kinematics import finger_links, link_poses, make_link_bodies, rigid_group
+from gen_data.core.scene import Articulation, Instance, Rig, Scene
+from gen_data.core.se3 import SE3, Vec3
 from gen_data.scene_templates.element import PlacedElement, find_surfaces, next_instance_id
 
 CATEGORY = "robot_arm"

@@ -7,11 +7,11 @@ from typing import Literal
 
 from pydantic import Field
 
-from gen_data.generator.assets.asset_ids import ParameterValue
-from gen_data.generator.config.base_model import NAME_PATTERN
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.scene import Scene
-from gen_data.generator.core.se3 import SE3
+from gen_data.assets.asset_ids import ParameterValue
+from gen_data.config.base_model import NAME_PATTERN
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.scene import Scene
+from gen_data.core.se3 import SE3
 from gen_data.scene_templates.element import Element, add_background, parametric_id
 
 CLEARANCE_M = 0.15

@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Literal
 
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.scene import ObjectGroup, Scene
-from gen_data.generator.core.streams import Streams
-from gen_data.generator.rooms.bodies import Builder, Looks
-from gen_data.generator.rooms.floor_plan import Room, draw_plan
-from gen_data.generator.rooms.options import families_of, find_options
-from gen_data.generator.rooms.rules import APARTMENT, find_room_type
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.scene import ObjectGroup, Scene
+from gen_data.core.streams import Streams
+from gen_data.rooms.bodies import Builder, Looks
+from gen_data.rooms.floor_plan import Room, draw_plan
+from gen_data.rooms.options import families_of, find_options
+from gen_data.rooms.rules import APARTMENT, find_room_type
 from gen_data.scene_templates.element import Element
 
 _IN_SHELLS = {"blind", "window"}

@@ -6,9 +6,9 @@ from typing import Literal
 
 from pydantic import Field
 
-from gen_data.generator.assets.families import declared
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.scene import Scene
+from gen_data.assets.families import declared
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.scene import Scene
 from gen_data.scene_templates.element import PlacedElement, add_static, parametric_id
 
 SIDE_M = 0.03

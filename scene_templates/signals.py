@@ -8,11 +8,11 @@ from typing import Literal
 
 from pydantic import Field
 
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.lane_geometry import LaneLine
-from gen_data.generator.core.scene import Lane, Scene
-from gen_data.generator.core.se3 import SE3
+from gen_data.core.errors import ConfigError
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.lane_geometry import LaneLine
+from gen_data.core.scene import Lane, Scene
+from gen_data.core.se3 import SE3
 from gen_data.scene_templates.element import (
     Element,
     add_static,

@@ -9,10 +9,10 @@ from typing import Literal
 
 from pydantic import Field
 
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.scene import Lane, LaneKind, Scene
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.core.variant_rng import VariantRng, variant_rng
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.scene import Lane, LaneKind, Scene
+from gen_data.core.se3 import SE3
+from gen_data.core.variant_rng import VariantRng, variant_rng
 from gen_data.scene_templates.element import (
     Element,
     add_background,

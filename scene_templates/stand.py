@@ -8,9 +8,9 @@ from typing import Literal
 
 from pydantic import Field
 
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.scene import Rig, Scene
-from gen_data.generator.core.se3 import Vec3, turned
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.scene import Rig, Scene
+from gen_data.core.se3 import Vec3, turned
 from gen_data.scene_templates.element import Element
 
 

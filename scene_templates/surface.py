@@ -6,8 +6,8 @@ from typing import Literal
 
 from pydantic import Field
 
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.scene import Scene
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.scene import Scene
 from gen_data.scene_templates.element import (
     PlacedElement,
     add_static,

@@ -8,10 +8,10 @@ from typing import Literal
 
 from pydantic import Field
 
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.scene import Scene
-from gen_data.generator.roads.cross_section import KERB_WIDTH_M, RoadShape, strips
+from gen_data.core.errors import ConfigError
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.scene import Scene
+from gen_data.roads.cross_section import KERB_WIDTH_M, RoadShape, strips
 from gen_data.scene_templates.element import (
     Element,
     add_background,

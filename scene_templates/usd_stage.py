@@ -7,10 +7,10 @@ from typing import Literal
 
 from pydantic import Field
 
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.scene import Body, Instance, Light, Rig, Scene, StageModel, StagePiece
-from gen_data.generator.core.scene_time import RIG_AXES
-from gen_data.generator.core.se3 import SE3, rotate_by_quaternion
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.scene import Body, Instance, Light, Rig, Scene, StageModel, StagePiece
+from gen_data.core.scene_time import RIG_AXES
+from gen_data.core.se3 import SE3, rotate_by_quaternion
 from gen_data.scene_templates.element import PlacedElement, next_instance_id
 
 

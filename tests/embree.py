@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike, NDArray
 
-from gen_data.generator.core.interfaces import AssetLibrary
-from gen_data.generator.core.scene import Body
+from gen_data.core.interfaces import AssetLibrary
+from gen_data.core.scene import Body
 
 pytest.importorskip("embreex", reason="embreex has wheels for x86-64 only")
 from embreex.mesh_construction import TriangleMesh

@@ -27,10 +27,10 @@ def provide_pybullet_data() -> None:
 
 def _fetch() -> Path:
     """The folder that contains the package, which is complete or absent."""
-    from gen_data.generator.assets.library import default_cache_dir
-    from gen_data.generator.packs.archives import extract
-    from gen_data.generator.packs.fetch import check_archive, fetch
-    from gen_data.generator.packs.pack_table import find_pack
+    from gen_data.assets.library import default_cache_dir
+    from gen_data.packs.archives import extract
+    from gen_data.packs.fetch import check_archive, fetch
+    from gen_data.packs.pack_table import find_pack
 
     pack = find_pack("pybullet")
     packages = default_cache_dir() / "tests" / f"pybullet-{pack.version}"

@@ -8,7 +8,7 @@ from typing import Any, get_args
 
 import pytest
 
-from gen_data.generator.physics.physics_config import EngineName, is_installed
+from gen_data.physics.physics_config import EngineName, is_installed
 
 INSTALLED: tuple[EngineName, ...] = tuple(filter(is_installed, get_args(EngineName)))
 """Physics engines."""

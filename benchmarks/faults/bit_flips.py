@@ -8,8 +8,8 @@ from pathlib import Path
 
 from benchmarks.faults.recorded_run import record, reference_digest, tree_digest
 from benchmarks.faults.results import Result, Scale
-from gen_data.generator.core.errors import GenDataError
-from gen_data.generator.runner.verify import find_deviations
+from gen_data.core.errors import GenDataError
+from gen_data.runner.verify import find_deviations
 
 
 def bit_flips(scale: Scale, folder: Path) -> Result:

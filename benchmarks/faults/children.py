@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import BinaryIO, TypeVar
 
 from benchmarks.faults.recorded_run import record
-from gen_data.generator.core.errors import GenDataError
+from gen_data.core.errors import GenDataError
 
 T = TypeVar("T")
 U = TypeVar("U")

@@ -22,8 +22,8 @@ import yaml
 from benchmarks.faults.children import spread
 from benchmarks.faults.results import Result, Scale
 from gen_data import configs
-from gen_data.generator.assemble.config import load_config
-from gen_data.generator.core.errors import ConfigError, GenDataError
+from gen_data.assemble.config import load_config
+from gen_data.core.errors import ConfigError, GenDataError
 
 SHIPPED = sorted(Path(configs.__path__[0]).glob("*.yaml"))
 SHORT = [p for p in SHIPPED if re.match("tabletop|bin_|shelf|wrist|depth", p.stem)]

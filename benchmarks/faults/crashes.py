@@ -25,15 +25,9 @@ from benchmarks.faults.children import (
     trace,
     writing_calls,
 )
-from benchmarks.faults.recorded_run import (
-    RESUME,
-    record,
-    reference_digest,
-    resumes_to,
-    tree_digest,
-)
+from benchmarks.faults.recorded_run import RESUME, record, reference_digest, resumes_to, tree_digest
 from benchmarks.faults.results import Result, Scale
-from gen_data.generator.core.errors import GenDataError, StorageError
+from gen_data.core.errors import GenDataError, StorageError
 from tests.runner.fragile_disk import FragileDisk, Killed
 
 T = TypeVar("T")
@@ -183,7 +177,7 @@ def crash_states(scale: Scale, folder: Path) -> Result:
 
 def _is_caught(folder: Path, digest: str, place: str, bug: object) -> bool:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(f"gen_data.generator.runner.{place}", bug)
+        patch.setattr(f"gen_data.runner.{place}", bug)
         problems = [_cut_power_at(folder, digest, (0, seed))[1] for seed in range(12)]
     return any(problems)
 

@@ -17,19 +17,13 @@ import fsspec
 
 from benchmarks.faults.recorded_run import record, reference_digest, tree_digest
 from benchmarks.faults.results import Result, Scale
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.errors import (
-    CacheWarning,
-    ConfigWarning,
-    GenDataError,
-    NoLabels,
-    StorageError,
-)
-from gen_data.generator.renderers.warp.kernel_cache import OURS, fill_cache
-from gen_data.generator.runner.object_store import ObjectFolder
-from gen_data.generator.runner.shard_record import FileRecord, parse_record
-from gen_data.generator.runner.store import LocalStore
-from gen_data.generator.runner.stored import StoredSamples
+from gen_data.core.capture import Channel
+from gen_data.core.errors import CacheWarning, ConfigWarning, GenDataError, NoLabels, StorageError
+from gen_data.renderers.warp.kernel_cache import OURS, fill_cache
+from gen_data.runner.object_store import ObjectFolder
+from gen_data.runner.shard_record import FileRecord, parse_record
+from gen_data.runner.store import LocalStore
+from gen_data.runner.stored import StoredSamples
 
 URL = "memory://faults/set"
 

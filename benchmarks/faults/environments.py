@@ -153,7 +153,7 @@ def _generate(environment: Environment, folder: Path) -> str:
         if value is not None:
             variables[name] = value.format(**places)
     out = environment.out.format(**places)
-    command = [sys.executable, "-m", "gen_data.generator.cli", "--config", str(CONFIG)]
+    command = [sys.executable, "-m", "gen_data.cli", "--config", str(CONFIG)]
     options = ["--n", str(N), "--out", out, *environment.options]
     old = os.umask(environment.umask)
     try:

@@ -10,9 +10,9 @@ from multiprocessing import get_context
 from pathlib import Path
 
 from benchmarks.faults.results import Result, Scale
-from gen_data.generator.core.errors import GenDataError, WorkerLost
-from gen_data.generator.core.sample import Sample
-from gen_data.generator.runner.run import Settings, run
+from gen_data.core.errors import GenDataError, WorkerLost
+from gen_data.core.sample import Sample
+from gen_data.runner.run import Settings, run
 from tests.runner.doubles import (
     RESUME,
     FakeFactory,

@@ -70,9 +70,9 @@ def orders(scale: Scale, folder: Path) -> Result:
 
 def samples_alone(scale: Scale, folder: Path) -> Result:
     """Samples in random order, whose engines have seen other ones before, and alone."""
-    from gen_data.generator.api.generate import generate
-    from gen_data.generator.core.errors import NoLabels
-    from gen_data.generator.runner.deep_verify import find_irreproducible_samples
+    from gen_data.api.generate import generate
+    from gen_data.core.errors import NoLabels
+    from gen_data.runner.deep_verify import find_irreproducible_samples
 
     result = Result()
     n = scale.pick(200, 10)
@@ -83,7 +83,7 @@ def samples_alone(scale: Scale, folder: Path) -> Result:
     found = list(find_irreproducible_samples(out, indices, False, None))
     for index in indices:
         result.add(not any(f"sample {index}" == f.samples for f in found), f"sample {index}")
-    command = [sys.executable, "-m", "gen_data.generator.cli", "repro", str(out), "--index"]
+    command = [sys.executable, "-m", "gen_data.cli", "repro", str(out), "--index"]
     alone = indices[: scale.pick(5, 0)]
     for index in alone:
         done = subprocess.run(

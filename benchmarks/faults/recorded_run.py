@@ -16,14 +16,14 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from gen_data.generator.api.config import load_config
-from gen_data.generator.assemble.pipeline_factory import PipelineFactory
-from gen_data.generator.core.errors import GenDataError
-from gen_data.generator.core.interfaces import DatasetInfo, Exporter
-from gen_data.generator.core.sample import Sample
-from gen_data.generator.runner.identity import make_plan
-from gen_data.generator.runner.plan import Plan
-from gen_data.generator.runner.run import Settings, Summary, run
+from gen_data.api.config import load_config
+from gen_data.assemble.pipeline_factory import PipelineFactory
+from gen_data.core.errors import GenDataError
+from gen_data.core.interfaces import DatasetInfo, Exporter
+from gen_data.core.sample import Sample
+from gen_data.runner.identity import make_plan
+from gen_data.runner.plan import Plan
+from gen_data.runner.run import Settings, Summary, run
 
 CONFIG = Path(__file__).with_name("tiny.yaml")
 N = 6

@@ -23,7 +23,7 @@ from typing import Any
 from benchmarks.gpu.parts import Result, run_part
 from benchmarks.gpu.references import config_names, write_references
 from benchmarks.gpu.report import format_report
-from gen_data.generator.core.system_calls import usable_cores
+from gen_data.core.system_calls import usable_cores
 
 PARTS = ("card", "modules", "correct", "kernels", "sweeps", "paths", "rates")
 

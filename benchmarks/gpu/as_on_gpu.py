@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from gen_data.generator.renderers.warp import device
+from gen_data.renderers.warp import device
 
 NAME = "cpu-as-gpu"
 """Name of the device in arguments of the measurement."""

@@ -12,14 +12,14 @@ from typing import Any
 import warp as wp
 
 from benchmarks.runs import machine
-from gen_data.generator.core.system_calls import usable_cores
-from gen_data.generator.renderers.warp.device import (
+from gen_data.core.system_calls import usable_cores
+from gen_data.renderers.warp.device import (
     compile_in_parallel,
     kernel_folder,
     load_kernels,
     open_device,
 )
-from gen_data.generator.renderers.warp.kernel_bundle import kernel_modules
+from gen_data.renderers.warp.kernel_bundle import kernel_modules
 
 
 def describe_card(device: str) -> dict[str, Any]:
@@ -77,7 +77,7 @@ def load_modules(device: str) -> dict[str, dict[str, float]]:
         started_s = time.perf_counter()
         load_kernels(alias, [name])
         spent_s = time.perf_counter() - started_s
-        folders = kernel_folder().glob(f"wp_gen_data.generator.renderers.warp.{name}_*")
+        folders = kernel_folder().glob(f"wp_gen_data.renderers.warp.{name}_*")
         latest = max(folders, key=lambda folder: folder.stat().st_mtime)
         size = sum(f.stat().st_size for f in Path(latest).iterdir() if f.suffix in suffixes)
         figures[name] = {"load_s": round(spent_s, 2), "kb": round(size / 1e3)}

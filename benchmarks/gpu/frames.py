@@ -15,11 +15,11 @@ import warp as wp
 
 from benchmarks.bench_render import timed_launches
 from benchmarks.gpu.rates import overrides_of
-from gen_data.generator.assemble.config import load_config
-from gen_data.generator.assemble.pipeline_factory import open_pipeline
-from gen_data.generator.core.capture import LidarRays
-from gen_data.generator.renderers.warp.device import open_device
-from gen_data.generator.sensors.lidar.scan_pattern import Sweep, lidar_model, make_sweep
+from gen_data.assemble.config import load_config
+from gen_data.assemble.pipeline_factory import open_pipeline
+from gen_data.core.capture import LidarRays
+from gen_data.renderers.warp.device import open_device
+from gen_data.sensors.lidar.scan_pattern import Sweep, lidar_model, make_sweep
 
 MODEL = "HDL-64E"
 MANY_RAYS = 4_000_000

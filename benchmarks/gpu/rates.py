@@ -160,11 +160,11 @@ def work(config: str, number: int, folder: Path, texts: Sequence[str]) -> None:
     """Body of a worker: make samples for as long as each request says."""
     from dataclasses import replace
 
-    from gen_data.generator.assemble.config import load_config
-    from gen_data.generator.assemble.pipeline_factory import PipelineFactory
-    from gen_data.generator.runner.identity import make_plan
-    from gen_data.generator.runner.shard import Job, make_shard
-    from gen_data.generator.runner.store import LocalStore
+    from gen_data.assemble.config import load_config
+    from gen_data.assemble.pipeline_factory import PipelineFactory
+    from gen_data.runner.identity import make_plan
+    from gen_data.runner.shard import Job, make_shard
+    from gen_data.runner.store import LocalStore
 
     factory = PipelineFactory(load_config(f"{config}.yaml", seed=1, overrides=texts), _SAMPLES)
     store = LocalStore(folder / str(number))

@@ -19,17 +19,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gen_data import configs
-from gen_data.generator.assemble.config import Config, load_config
-from gen_data.generator.assemble.pipeline_factory import open_pipeline
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.sample import Sample
-from gen_data.generator.core.scene import Scene
-from gen_data.generator.core.scene_time import place_sensors
-from gen_data.generator.core.streams import Streams
-from gen_data.generator.pipeline import Pipeline
-from gen_data.generator.pipeline.pipeline import DrawnView
-from gen_data.generator.runner.labels import labels_line
-from gen_data.generator.runner.provenance import parse_scene, scene_line
+from gen_data.assemble.config import Config, load_config
+from gen_data.assemble.pipeline_factory import open_pipeline
+from gen_data.core.capture import Channel
+from gen_data.core.sample import Sample
+from gen_data.core.scene import Scene
+from gen_data.core.scene_time import place_sensors
+from gen_data.core.streams import Streams
+from gen_data.pipeline import Pipeline
+from gen_data.pipeline.pipeline import DrawnView
+from gen_data.runner.labels import labels_line
+from gen_data.runner.provenance import parse_scene, scene_line
 
 SAMPLES = 2
 """References of each configuration."""

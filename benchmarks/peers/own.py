@@ -8,10 +8,10 @@ from pathlib import Path
 
 from benchmarks.peers.worker import Round, output_folder
 from benchmarks.peers.workload import VIEWS_NAME, Views, make_config
-from gen_data.generator.assemble.pipeline_factory import PipelineFactory
-from gen_data.generator.core.sample import Sample
-from gen_data.generator.pipeline import Pipeline
-from gen_data.generator.runner.shard import drop_pixels, write_images, write_records
+from gen_data.assemble.pipeline_factory import PipelineFactory
+from gen_data.core.sample import Sample
+from gen_data.pipeline import Pipeline
+from gen_data.runner.shard import drop_pixels, write_images, write_records
 
 
 def open_renderer(folder: Path) -> Round:

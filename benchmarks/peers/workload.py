@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.peers.worlds import Lamp, World, write_worlds
-from gen_data.generator.assemble.config import Config, load_config
-from gen_data.generator.assemble.pipeline_factory import PipelineFactory
-from gen_data.generator.core.interfaces import Sensor
-from gen_data.generator.core.scene import Scene
-from gen_data.generator.pipeline.pipeline import DrawnView
+from gen_data.assemble.config import Config, load_config
+from gen_data.assemble.pipeline_factory import PipelineFactory
+from gen_data.core.interfaces import Sensor
+from gen_data.core.scene import Scene
+from gen_data.pipeline.pipeline import DrawnView
 
 OBJECTS = 10
 RINGS, SECTORS = 78, 78

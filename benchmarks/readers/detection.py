@@ -15,7 +15,7 @@ import numpy as np
 
 from benchmarks.readers.truth import image_name
 from benchmarks.readers.views import View, from_corner, thing
-from gen_data.generator.certificate.readers import READERS
+from gen_data.lab.certificate.readers import READERS
 
 
 def annotation_files(root: Path) -> list[Path]:

@@ -12,7 +12,7 @@ import numpy as np
 from benchmarks.readers.detection import import_torchvision, matrix_lens
 from benchmarks.readers.truth import image_name
 from benchmarks.readers.views import Thing, View, cube, thing
-from gen_data.generator.core.se3 import SE3
+from gen_data.core.se3 import SE3
 
 
 def by_nuscenes_devkit(root: Path) -> Iterator[View]:

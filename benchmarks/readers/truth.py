@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 import gen_data
 from benchmarks.readers.views import Thing, View, cube, thing
+from gen_data.api.sample import CameraReading
+from gen_data.core.sample import MaskPx
+from gen_data.core.scene import Instance
+from gen_data.core.se3 import SE3
 from gen_data.exporters import motchallenge
-from gen_data.generator.api.sample import CameraReading
-from gen_data.generator.core.sample import MaskPx
-from gen_data.generator.core.scene import Instance
-from gen_data.generator.core.se3 import SE3
 
 
 def image_name(index: int, sensor: str) -> str:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.core.se3 import SE3
+from gen_data.core.se3 import SE3
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import click
 
 from docs.hooks.plugin_reference import as_fields
-from gen_data.generator.cli.main import cli
+from gen_data.cli.main import cli
 
 
 def command_page() -> str:

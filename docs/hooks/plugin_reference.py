@@ -12,13 +12,13 @@ from typing import Any, get_args
 from pydantic import BaseModel
 
 from docs import pictures
-from gen_data.generator.assemble.plugin_tables import TABLES
-from gen_data.generator.config.base_model import Strict
-from gen_data.generator.config.describe import describe_fields, make_example
-from gen_data.generator.config.distributions import DISTRIBUTIONS
-from gen_data.generator.config.schema import FieldSchema, docstring_summary
-from gen_data.generator.config.yaml_scalars import to_flow_yaml
-from gen_data.generator.core.plugins import PluginTable
+from gen_data.assemble.plugin_tables import TABLES
+from gen_data.config.base_model import Strict
+from gen_data.config.describe import describe_fields, make_example
+from gen_data.config.distributions import DISTRIBUTIONS
+from gen_data.config.schema import FieldSchema, docstring_summary
+from gen_data.config.yaml_scalars import to_flow_yaml
+from gen_data.core.plugins import PluginTable
 
 KINDS = {
     "element": ("Elements", "elements", "An element adds its part to the scene of a template."),

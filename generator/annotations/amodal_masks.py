@@ -7,16 +7,12 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from gen_data.generator.annotations.instance_extents import (
-    find_silhouette,
-    silhouette_box,
-    silhouette_crop,
-)
-from gen_data.generator.config.base_model import Strict
-from gen_data.generator.core.boxes import tight_box
-from gen_data.generator.core.capture import Channel, SensorReading, Silhouette
-from gen_data.generator.core.sample import MaskPx, ObjectTruth
-from gen_data.generator.core.scene import Scene
+from gen_data.annotations.instance_extents import find_silhouette, silhouette_box, silhouette_crop
+from gen_data.config.base_model import Strict
+from gen_data.core.boxes import tight_box
+from gen_data.core.capture import Channel, SensorReading, Silhouette
+from gen_data.core.sample import MaskPx, ObjectTruth
+from gen_data.core.scene import Scene
 
 
 class AmodalMasks(Strict):

@@ -6,21 +6,21 @@ from collections.abc import Mapping, Sequence
 
 from pydantic import Field
 
-from gen_data.generator.annotations.consistency_checks import check_truth
-from gen_data.generator.annotations.instance_extents import find_extents
-from gen_data.generator.config.base_model import Strict
-from gen_data.generator.core.capture import Channel, SensorReading
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import (
+from gen_data.annotations.consistency_checks import check_truth
+from gen_data.annotations.instance_extents import find_extents
+from gen_data.config.base_model import Strict
+from gen_data.core.capture import Channel, SensorReading
+from gen_data.core.errors import ConfigError
+from gen_data.core.interfaces import (
     Annotator,
     AnyAnnotator,
     AssetLibrary,
     FrameAnnotator,
     ImageAnnotator,
 )
-from gen_data.generator.core.sample import EgoTruth, ImageTruth, ObjectTruth
-from gen_data.generator.core.scene import Scene
-from gen_data.generator.core.scene_time import ego_rig, rig_twist
+from gen_data.core.sample import EgoTruth, ImageTruth, ObjectTruth
+from gen_data.core.scene import Scene
+from gen_data.core.scene_time import ego_rig, rig_twist
 
 
 class Thresholds(Strict):

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from gen_data.generator.annotations.bev_raster import (
+from gen_data.annotations.bev_raster import (
     Grid,
     carriageways,
     covered_cells,
@@ -19,14 +19,14 @@ from gen_data.generator.annotations.bev_raster import (
     ribbon,
     strips,
 )
-from gen_data.generator.config.base_model import Strict
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import AssetLibrary
-from gen_data.generator.core.lane_geometry import lane_borders, left_normals
-from gen_data.generator.core.sample import BirdseyeMap, EgoTruth
-from gen_data.generator.core.scene import Body, Instance, Scene
-from gen_data.generator.core.se3 import SE3, Array
+from gen_data.config.base_model import Strict
+from gen_data.core.capture import Channel
+from gen_data.core.errors import ConfigError
+from gen_data.core.interfaces import AssetLibrary
+from gen_data.core.lane_geometry import lane_borders, left_normals
+from gen_data.core.sample import BirdseyeMap, EgoTruth
+from gen_data.core.scene import Body, Instance, Scene
+from gen_data.core.se3 import SE3, Array
 
 LINE_PX = 1.5
 """Width of borders: wide enough that rasterised lines have no gaps."""

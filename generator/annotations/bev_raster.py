@@ -12,10 +12,10 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.core.interfaces import AssetLibrary
-from gen_data.generator.core.lane_geometry import border_line
-from gen_data.generator.core.scene import Body, Lane, Scene
-from gen_data.generator.core.se3 import SE3, Array
+from gen_data.core.interfaces import AssetLibrary
+from gen_data.core.lane_geometry import border_line
+from gen_data.core.scene import Body, Lane, Scene
+from gen_data.core.se3 import SE3, Array
 
 Float32 = NDArray[np.float32]
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import ClassVar, Literal
 
-from gen_data.generator.annotations.instance_extents import find_silhouette, silhouette_box
-from gen_data.generator.config.base_model import Strict
-from gen_data.generator.core.capture import Channel, SensorReading
-from gen_data.generator.core.sample import ObjectTruth
-from gen_data.generator.core.scene import Scene
+from gen_data.annotations.instance_extents import find_silhouette, silhouette_box
+from gen_data.config.base_model import Strict
+from gen_data.core.capture import Channel, SensorReading
+from gen_data.core.sample import ObjectTruth
+from gen_data.core.scene import Scene
 
 
 class Boxes2d(Strict):

@@ -6,13 +6,13 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import ClassVar, Literal
 
-from gen_data.generator.config.base_model import Strict
-from gen_data.generator.core.boxes import OrientedBox
-from gen_data.generator.core.capture import Channel, SensorReading
-from gen_data.generator.core.interfaces import AssetLibrary
-from gen_data.generator.core.sample import EgoTruth, ObjectTruth
-from gen_data.generator.core.scene import Scene
-from gen_data.generator.core.se3 import SE3
+from gen_data.config.base_model import Strict
+from gen_data.core.boxes import OrientedBox
+from gen_data.core.capture import Channel, SensorReading
+from gen_data.core.interfaces import AssetLibrary
+from gen_data.core.sample import EgoTruth, ObjectTruth
+from gen_data.core.scene import Scene
+from gen_data.core.se3 import SE3
 
 
 class Boxes3d(Strict):

@@ -17,10 +17,10 @@ from functools import cache, lru_cache
 
 import numpy as np
 
-from gen_data.generator.core.colorimetry import XYZ_FROM_REC709, srgb_decode
-from gen_data.generator.core.interfaces import AssetLibrary
-from gen_data.generator.core.scene import Body
-from gen_data.generator.core.se3 import Array, Vec3
+from gen_data.core.colorimetry import XYZ_FROM_REC709, srgb_decode
+from gen_data.core.interfaces import AssetLibrary
+from gen_data.core.scene import Body
+from gen_data.core.se3 import Array, Vec3
 
 CENTROIDS = {
     "white": ("F2F3F4",),

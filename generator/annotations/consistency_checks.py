@@ -8,16 +8,16 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.annotations.instance_extents import (
+from gen_data.annotations.instance_extents import (
     instance_error,
     silhouette_box,
     silhouette_crop,
     visible_mask,
 )
-from gen_data.generator.core.boxes import BoxPx
-from gen_data.generator.core.capture import SensorReading
-from gen_data.generator.core.sample import MaskPx, ObjectTruth
-from gen_data.generator.core.se3 import SE3
+from gen_data.core.boxes import BoxPx
+from gen_data.core.capture import SensorReading
+from gen_data.core.sample import MaskPx, ObjectTruth
+from gen_data.core.se3 import SE3
 
 ROTATION_TOLERANCE = 1e-6
 """Largest element of R^T R - I."""

@@ -10,15 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from gen_data.generator.annotations.bev_raster import Float32, Grid, carriageway, heights_m
-from gen_data.generator.config.base_model import Strict
-from gen_data.generator.core.boxes import tight_box
-from gen_data.generator.core.capture import Channel, SensorReading
-from gen_data.generator.core.interfaces import AssetLibrary
-from gen_data.generator.core.rolling_shutter_projection import world_points
-from gen_data.generator.core.sample import ImageTruth, MaskPx
-from gen_data.generator.core.scene import Body, Scene
-from gen_data.generator.core.se3 import SE3
+from gen_data.annotations.bev_raster import Float32, Grid, carriageway, heights_m
+from gen_data.config.base_model import Strict
+from gen_data.core.boxes import tight_box
+from gen_data.core.capture import Channel, SensorReading
+from gen_data.core.interfaces import AssetLibrary
+from gen_data.core.rolling_shutter_projection import world_points
+from gen_data.core.sample import ImageTruth, MaskPx
+from gen_data.core.scene import Body, Scene
+from gen_data.core.se3 import SE3
 
 TILE_M = 16.0
 """Grids are centred on multiples of this, so that the cameras of a rig share one."""

@@ -11,18 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from gen_data.generator.annotations.surface_contacts import (
-    Rows,
-    first_hits,
-    hits_by_rays,
-    triangle_normals,
-)
-from gen_data.generator.config.base_model import Strict
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.interfaces import AssetLibrary
-from gen_data.generator.core.sample import EgoTruth, Grasp, Suction
-from gen_data.generator.core.scene import Instance, Scene
-from gen_data.generator.core.se3 import SE3, Array
+from gen_data.annotations.surface_contacts import Rows, first_hits, hits_by_rays, triangle_normals
+from gen_data.config.base_model import Strict
+from gen_data.core.capture import Channel
+from gen_data.core.interfaces import AssetLibrary
+from gen_data.core.sample import EgoTruth, Grasp, Suction
+from gen_data.core.scene import Instance, Scene
+from gen_data.core.se3 import SE3, Array
 
 PLASTIC = 1.32471795724474602596
 """Additive steps 1/p and 1/p^2 fill a square evenly (Roberts, "The unreasonable effectiveness of

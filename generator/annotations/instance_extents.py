@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.core.boxes import BoxPx
-from gen_data.generator.core.capture import Channel, SensorReading, Silhouette
-from gen_data.generator.core.errors import SampleError
-from gen_data.generator.core.sample import ObjectTruth
-from gen_data.generator.core.scene import Instance
+from gen_data.core.boxes import BoxPx
+from gen_data.core.capture import Channel, SensorReading, Silhouette
+from gen_data.core.errors import SampleError
+from gen_data.core.sample import ObjectTruth
+from gen_data.core.scene import Instance
 
 
 @dataclass(frozen=True, slots=True)

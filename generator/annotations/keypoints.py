@@ -9,13 +9,13 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from gen_data.generator.config.base_model import Strict
-from gen_data.generator.core.asset_types import Keypoint
-from gen_data.generator.core.capture import Channel, SensorReading
-from gen_data.generator.core.rolling_shutter_projection import project_rolling_shutter
-from gen_data.generator.core.sample import KeypointTruth, ObjectTruth
-from gen_data.generator.core.scene import Scene
-from gen_data.generator.core.se3 import Array, Vec3
+from gen_data.config.base_model import Strict
+from gen_data.core.asset_types import Keypoint
+from gen_data.core.capture import Channel, SensorReading
+from gen_data.core.rolling_shutter_projection import project_rolling_shutter
+from gen_data.core.sample import KeypointTruth, ObjectTruth
+from gen_data.core.scene import Scene
+from gen_data.core.se3 import Array, Vec3
 
 LEAST_COSINE = 1.0 / 3.0
 """Lower bound of the cosine of incidence that converts ray lengths to depths below a surface."""

@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from gen_data.generator.config.base_model import Strict
-from gen_data.generator.core.capture import Channel, SensorReading
-from gen_data.generator.core.interfaces import AssetLibrary
-from gen_data.generator.core.lane_geometry import LaneBorder, lane_borders
-from gen_data.generator.core.rolling_shutter_projection import project_rolling_shutter
-from gen_data.generator.core.sample import BorderTruth, EgoTruth, ImageTruth
-from gen_data.generator.core.scene import Scene
-from gen_data.generator.core.se3 import Array
+from gen_data.config.base_model import Strict
+from gen_data.core.capture import Channel, SensorReading
+from gen_data.core.interfaces import AssetLibrary
+from gen_data.core.lane_geometry import LaneBorder, lane_borders
+from gen_data.core.rolling_shutter_projection import project_rolling_shutter
+from gen_data.core.sample import BorderTruth, EgoTruth, ImageTruth
+from gen_data.core.scene import Scene
+from gen_data.core.se3 import Array
 
 FINE_M = 0.1
 """Borders are sampled at this step before they are thinned."""

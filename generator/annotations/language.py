@@ -15,18 +15,18 @@ from typing import Any, ClassVar, Literal
 
 from pydantic import Field
 
-from gen_data.generator.annotations.color_words import color_of
-from gen_data.generator.annotations.instance_extents import find_extents
-from gen_data.generator.annotations.relations import Relations
-from gen_data.generator.annotations.visibility import Visibility
-from gen_data.generator.config.base_model import Strict
-from gen_data.generator.config.data_files import load_data
-from gen_data.generator.core.boxes import BoxPx
-from gen_data.generator.core.capture import Channel, SensorReading
-from gen_data.generator.core.english import count, join, plural, singular
-from gen_data.generator.core.interfaces import AssetLibrary
-from gen_data.generator.core.sample import ImageTruth, ObjectTruth, Utterance, both_ways
-from gen_data.generator.core.scene import ObjectGroup, Scene
+from gen_data.annotations.color_words import color_of
+from gen_data.annotations.instance_extents import find_extents
+from gen_data.annotations.relations import Relations
+from gen_data.annotations.visibility import Visibility
+from gen_data.config.base_model import Strict
+from gen_data.config.data_files import load_data
+from gen_data.core.boxes import BoxPx
+from gen_data.core.capture import Channel, SensorReading
+from gen_data.core.english import count, join, plural, singular
+from gen_data.core.interfaces import AssetLibrary
+from gen_data.core.sample import ImageTruth, ObjectTruth, Utterance, both_ways
+from gen_data.core.scene import ObjectGroup, Scene
 
 CONTACTS = ("inside", "on", "held_by")
 """Predicates that say where a thing is, the most telling one first."""

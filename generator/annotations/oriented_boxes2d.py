@@ -8,12 +8,12 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.annotations.instance_extents import visible_mask
-from gen_data.generator.config.base_model import Strict
-from gen_data.generator.core.capture import Channel, SensorReading
-from gen_data.generator.core.sample import ObjectTruth
-from gen_data.generator.core.scene import Scene
-from gen_data.generator.core.se3 import Array
+from gen_data.annotations.instance_extents import visible_mask
+from gen_data.config.base_model import Strict
+from gen_data.core.capture import Channel, SensorReading
+from gen_data.core.sample import ObjectTruth
+from gen_data.core.scene import Scene
+from gen_data.core.se3 import Array
 
 STEP = 0.01
 """Displacement along an axis that shows its direction in the image, as share of the distance."""

@@ -11,21 +11,21 @@ from typing import ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from gen_data.generator.annotations.instance_extents import find_extents
-from gen_data.generator.annotations.surface_contacts import (
+from gen_data.annotations.instance_extents import find_extents
+from gen_data.annotations.surface_contacts import (
     Contacts,
     are_within,
     find_contacts,
     hits_by_rays,
     meet_along,
 )
-from gen_data.generator.config.base_model import Strict
-from gen_data.generator.core.boxes import BoxPx
-from gen_data.generator.core.capture import Channel, SensorReading
-from gen_data.generator.core.interfaces import AssetLibrary
-from gen_data.generator.core.sample import EgoTruth, ImageTruth, Predicate, Relation
-from gen_data.generator.core.scene import Body, Instance, Motion, Scene
-from gen_data.generator.core.se3 import SE3, Array
+from gen_data.config.base_model import Strict
+from gen_data.core.boxes import BoxPx
+from gen_data.core.capture import Channel, SensorReading
+from gen_data.core.interfaces import AssetLibrary
+from gen_data.core.sample import EgoTruth, ImageTruth, Predicate, Relation
+from gen_data.core.scene import Body, Instance, Motion, Scene
+from gen_data.core.se3 import SE3, Array
 
 UPWARD = 0.5
 """A contact carries what is above it if its normal is at most 60 degrees from the vertical: more

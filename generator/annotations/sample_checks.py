@@ -12,22 +12,15 @@ from collections.abc import Container, Iterable, Iterator, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.annotations.instance_extents import crop
-from gen_data.generator.core.boxes import BoxPx, OrientedBox, tight_box
-from gen_data.generator.core.capture import Channel, Measurements, PointCloud, SensorReading
-from gen_data.generator.core.errors import SampleError
-from gen_data.generator.core.interfaces import DatasetInfo
-from gen_data.generator.core.motion import Twist
-from gen_data.generator.core.sample import (
-    EgoTruth,
-    ImageTruth,
-    MaskPx,
-    ObjectTruth,
-    Relation,
-    Sample,
-)
-from gen_data.generator.core.scene import Instance, Scene
-from gen_data.generator.core.se3 import SE3
+from gen_data.annotations.instance_extents import crop
+from gen_data.core.boxes import BoxPx, OrientedBox, tight_box
+from gen_data.core.capture import Channel, Measurements, PointCloud, SensorReading
+from gen_data.core.errors import SampleError
+from gen_data.core.interfaces import DatasetInfo
+from gen_data.core.motion import Twist
+from gen_data.core.sample import EgoTruth, ImageTruth, MaskPx, ObjectTruth, Relation, Sample
+from gen_data.core.scene import Instance, Scene
+from gen_data.core.se3 import SE3
 
 UNIT_TOLERANCE = 1e-6
 """Largest deviation of a quaternion's length from 1; R^T R deviates from I by twice as much."""

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import ClassVar, Literal
 
-from gen_data.generator.annotations.instance_extents import crop, instance_error, visible_mask
-from gen_data.generator.config.base_model import Strict
-from gen_data.generator.core.capture import Channel, SensorReading
-from gen_data.generator.core.sample import ObjectTruth
-from gen_data.generator.core.scene import Scene
+from gen_data.annotations.instance_extents import crop, instance_error, visible_mask
+from gen_data.config.base_model import Strict
+from gen_data.core.capture import Channel, SensorReading
+from gen_data.core.sample import ObjectTruth
+from gen_data.core.scene import Scene
 
 
 class SemanticMasks(Strict):

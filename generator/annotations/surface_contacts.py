@@ -14,7 +14,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.core.se3 import Array
+from gen_data.core.se3 import Array
 
 Rows = NDArray[np.intp]
 

@@ -8,14 +8,14 @@ from os import PathLike, fspath
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.system_calls import CAN_PASS_FILES, usable_cores
+from gen_data.core.errors import ConfigError
+from gen_data.core.system_calls import CAN_PASS_FILES, usable_cores
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
 
-    from gen_data.generator.assemble.config import Config
-    from gen_data.generator.config.yaml_tree import Node
+    from gen_data.assemble.config import Config
+    from gen_data.config.yaml_tree import Node
 
 Model = TypeVar("Model", bound="BaseModel")
 
@@ -35,7 +35,7 @@ def load_config(
     Raises:
         ConfigError: the message lists all errors with their positions.
     """
-    from gen_data.generator.assemble.config import load_config, parse_config
+    from gen_data.assemble.config import load_config, parse_config
 
     if seed is not None:
         check_whole("seed", seed)
@@ -51,7 +51,7 @@ def read_document(source: ConfigLike, title: str) -> Node:
     Raises:
         ConfigError: it cannot be read; the message has the position.
     """
-    from gen_data.generator.config.yaml_tree import load_yaml, parse_yaml
+    from gen_data.config.yaml_tree import load_yaml, parse_yaml
 
     if isinstance(source, Mapping):
         return parse_yaml(_yaml_text(source), f"<{title}>")
@@ -64,8 +64,8 @@ def read_model(document: Node, model: type[Model]) -> Model:
     Raises:
         ConfigError: the message lists all errors with their positions.
     """
-    from gen_data.generator.config.problems import Problems
-    from gen_data.generator.config.validation import validate
+    from gen_data.config.problems import Problems
+    from gen_data.config.validation import validate
 
     problems = Problems()
     loaded = validate(document, model, problems)

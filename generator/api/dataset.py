@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING, Any, TypeVar, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.api.config import ConfigLike, check_whole, load_config, path_text
-from gen_data.generator.api.relabelling import LabelMapLike, RelabelledSamples, load_label_map
-from gen_data.generator.api.sample import Sample, SampleRecord, SampleSource
-from gen_data.generator.core.errors import (
+from gen_data.api.config import ConfigLike, check_whole, load_config, path_text
+from gen_data.api.relabelling import LabelMapLike, RelabelledSamples, load_label_map
+from gen_data.api.sample import Sample, SampleRecord, SampleSource
+from gen_data.core.errors import (
     ConfigError,
     ConfigWarning,
     IndexKindError,
@@ -27,15 +27,15 @@ from gen_data.generator.core.errors import (
     UnknownNameError,
     did_you_mean,
 )
-from gen_data.generator.runner.stored_objects import open_stored
+from gen_data.runner.stored_objects import open_stored
 
 if TYPE_CHECKING:
     from threadpoolctl import ThreadpoolController
 
-    from gen_data.generator.core.capture import Channel
-    from gen_data.generator.pipeline import Pipeline
-    from gen_data.generator.pipeline.splits import Splits
-    from gen_data.generator.runner.stored import StoredSamples
+    from gen_data.core.capture import Channel
+    from gen_data.pipeline import Pipeline
+    from gen_data.pipeline.splits import Splits
+    from gen_data.runner.stored import StoredSamples
 
 Self = TypeVar("Self", bound="SampleSequence")
 
@@ -207,7 +207,7 @@ class SampleSequence(Sequence[Sample], AbstractContextManager["SampleSequence", 
 
     @property
     def _splits(self) -> Splits:
-        from gen_data.generator.pipeline.splits import Splits
+        from gen_data.pipeline.splits import Splits
 
         return Splits(**self.config.get("splits", {}))
 
@@ -366,7 +366,7 @@ class GeneratedSamples:
     """Samples of a pipeline in this process, which starts with the first access."""
 
     def __init__(self, config: Any, channels: frozenset[Channel]) -> None:
-        from gen_data.generator.assemble.pipeline_factory import PipelineFactory
+        from gen_data.assemble.pipeline_factory import PipelineFactory
 
         self.make_pipeline = PipelineFactory(config, n=1, extra_channels=channels)
         self._pipeline: Pipeline | None = None
@@ -494,7 +494,7 @@ def open_dataset(folder: str | PathLike[str], split: str = "") -> StoredDataset:
 
 
 def _parse_channels(names: Sequence[str]) -> frozenset[Channel]:
-    from gen_data.generator.core.capture import Channel
+    from gen_data.core.capture import Channel
 
     known = {channel.value: channel for channel in Channel if channel is not Channel.AMODAL}
     for name in names:

@@ -11,13 +11,13 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from gen_data.generator.api.config import count_workers
-from gen_data.generator.api.label_gaps import check_label_gaps
-from gen_data.generator.core.errors import ConfigError
+from gen_data.api.config import count_workers
+from gen_data.api.label_gaps import check_label_gaps
+from gen_data.core.errors import ConfigError
 
 if TYPE_CHECKING:
-    from gen_data.generator.assemble.config import Config
-    from gen_data.generator.runner.progress import RunProgress, Summary
+    from gen_data.assemble.config import Config
+    from gen_data.runner.progress import RunProgress, Summary
 
 _EXCERPT = re.compile(r"\s+\d*\s*\|")
 """Lines of messages that quote the source."""
@@ -59,15 +59,15 @@ def export(  # noqa: PLR0913  (keywords of one front door)
         Interrupted: Ctrl-C or SIGTERM; the same call goes on.
         NoLabels: the data set is finished, and the label map leaves no label.
     """
-    from gen_data.generator.runner.store import LocalStore
+    from gen_data.runner.store import LocalStore
 
     LocalStore(Path(out)).check_unlocked()
 
-    from gen_data.generator.assemble.config import load_config
-    from gen_data.generator.assemble.pipeline_factory import check_scene, ready_exporters
-    from gen_data.generator.packs.provision import open_assets
-    from gen_data.generator.runner.exports import export as write_exports
-    from gen_data.generator.runner.stored import StoredSamples
+    from gen_data.assemble.config import load_config
+    from gen_data.assemble.pipeline_factory import check_scene, ready_exporters
+    from gen_data.packs.provision import open_assets
+    from gen_data.runner.exports import export as write_exports
+    from gen_data.runner.stored import StoredSamples
 
     if not formats:
         raise ConfigError("formats: none given; expected at least one exporter, such as coco")
@@ -116,7 +116,7 @@ def label_map_override(path: Path, categories: Sequence[str]) -> str:
         ConfigError: the file is not a label map, or has a class that no object of these
             categories can have; the message lists all errors.
     """
-    from gen_data.generator.api.relabelling import load_label_map
+    from gen_data.api.relabelling import load_label_map
 
     label_map = load_label_map(path, {})
     faults = label_map.faults(categories)
@@ -128,7 +128,7 @@ def label_map_override(path: Path, categories: Sequence[str]) -> str:
 
 def _check_annotations(made: Config, wanted: Config) -> None:
     """Reject exporters that read annotations which the data set was made without."""
-    from gen_data.generator.pipeline.exporter_views import needs_of
+    from gen_data.pipeline.exporter_views import needs_of
 
     exported: set[str] = set().union(*map(needs_of, made.exporters))
     known = {*made.annotations, *exported, *made.general.labels.map.needs}

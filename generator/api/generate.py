@@ -11,19 +11,19 @@ from os import PathLike, fspath
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gen_data.generator.api.config import ConfigLike, check_whole, count_workers, load_config
-from gen_data.generator.api.label_gaps import check_label_gaps
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.urls import is_url
+from gen_data.api.config import ConfigLike, check_whole, count_workers, load_config
+from gen_data.api.label_gaps import check_label_gaps
+from gen_data.core.errors import ConfigError
+from gen_data.core.urls import is_url
 
 if TYPE_CHECKING:
-    from gen_data.generator.assemble.config import Config
-    from gen_data.generator.assemble.pipeline_factory import PipelineFactory
-    from gen_data.generator.runner.processes import Pool, StandbyWorker
-    from gen_data.generator.runner.progress import RunProgress, Summary
-    from gen_data.generator.runner.ray_cluster import RayCluster
-    from gen_data.generator.runner.run import Settings
-    from gen_data.generator.runner.shard import Job
+    from gen_data.assemble.config import Config
+    from gen_data.assemble.pipeline_factory import PipelineFactory
+    from gen_data.runner.processes import Pool, StandbyWorker
+    from gen_data.runner.progress import RunProgress, Summary
+    from gen_data.runner.ray_cluster import RayCluster
+    from gen_data.runner.run import Settings
+    from gen_data.runner.shard import Job
 
 
 def generate(  # noqa: PLR0913  (keywords of one front door)
@@ -74,7 +74,7 @@ def generate(  # noqa: PLR0913  (keywords of one front door)
 
     Raises:
         ConfigError: the configuration or an argument is wrong.
-        GenDataError: any other failure; see ``gen_data.generator.core.errors``.
+        GenDataError: any other failure; see ``gen_data.core.errors``.
         Interrupted: Ctrl-C or SIGTERM; finished shards are kept.
         NoLabels: labels were asked for, and no sample has one; the data set is finished.
 
@@ -111,9 +111,9 @@ def _run(
     on_progress: Callable[[RunProgress], None] | None,
 ) -> Summary:
     """Run the plan of a factory, and name unused contents of the user's files."""
-    from gen_data.generator.assets.file_remarks import warn_of_remarks
-    from gen_data.generator.runner.identity import format_licences, make_plan
-    from gen_data.generator.runner.run import run
+    from gen_data.assets.file_remarks import warn_of_remarks
+    from gen_data.runner.identity import format_licences, make_plan
+    from gen_data.runner.run import run
 
     plan = make_plan(factory)
     told = warn_of_remarks(factory.library, plan.assets)
@@ -138,8 +138,8 @@ def _settings(
     factory: PipelineFactory, skip_failed: bool, sample_timeout_s: float | None
 ) -> Settings:
     """Settings that arguments and the configuration state together."""
-    from gen_data.generator.assemble.size_estimate import estimate_sample_bytes
-    from gen_data.generator.runner.run import Limits, Settings
+    from gen_data.assemble.size_estimate import estimate_sample_bytes
+    from gen_data.runner.run import Limits, Settings
 
     general = factory.config.general
     return Settings(
@@ -154,7 +154,7 @@ def _standby_worker(
     cluster: RayCluster | None, workers: int | None
 ) -> Iterator[StandbyWorker | None]:
     """The first worker of this machine, which prepares itself during planning; None if unused."""
-    from gen_data.generator.runner.processes import StandbyWorker
+    from gen_data.runner.processes import StandbyWorker
 
     if cluster is not None or count_workers(workers) == 0:
         yield None
@@ -166,8 +166,8 @@ def _standby_worker(
 @contextmanager
 def _folder(loaded: Config, out: str | PathLike[str] | None) -> Iterator[Path | str]:
     """Folder or URL of the data set; a finished run remembers its asset folders in a folder."""
-    from gen_data.generator.config.paths import write_locations
-    from gen_data.generator.runner.store import LocalStore
+    from gen_data.config.paths import write_locations
+    from gen_data.runner.store import LocalStore
 
     folder = fspath(out) if out is not None else Path("out") / loaded.name
     yield folder
@@ -184,7 +184,7 @@ def _opened(
     """Opener of the pool of workers, and their number."""
     from threadpoolctl import threadpool_limits
 
-    from gen_data.generator.runner.processes import open_worker_pool
+    from gen_data.runner.processes import open_worker_pool
 
     if cluster is not None and workers == 0:
         raise ConfigError("workers: 0 on a cluster; expected at least 1, or no number")
@@ -204,7 +204,7 @@ def _check_arguments(
     repair: bool,
 ) -> None:
     """Refuse wrong numbers, repair at a URL, and a folder in which another run writes."""
-    from gen_data.generator.runner.object_store import open_store
+    from gen_data.runner.object_store import open_store
 
     check_whole("n", n)
     if n < 1:
@@ -227,9 +227,9 @@ def _check_time_limit(limit_s: float | None) -> None:
 
 def _make_factory(loaded: Config, n: int) -> PipelineFactory:
     """A checked factory of pipelines; warns of splits that stay empty."""
-    from gen_data.generator.assemble.pipeline_factory import PipelineFactory
-    from gen_data.generator.pipeline.splits import warn_of_empty_splits
-    from gen_data.generator.sensors.mounting import warn_of_early_readings
+    from gen_data.assemble.pipeline_factory import PipelineFactory
+    from gen_data.pipeline.splits import warn_of_empty_splits
+    from gen_data.sensors.mounting import warn_of_early_readings
 
     general, stated = loaded.general, loaded.document.get("splits")
     scenes = -(-n // (general.views_per_scene * general.steps_per_scene))

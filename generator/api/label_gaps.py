@@ -5,11 +5,11 @@ from __future__ import annotations
 import warnings
 from typing import TYPE_CHECKING
 
-from gen_data.generator.core.errors import ConfigWarning, NoLabels
-from gen_data.generator.core.urls import is_url
+from gen_data.core.errors import ConfigWarning, NoLabels
+from gen_data.core.urls import is_url
 
 if TYPE_CHECKING:
-    from gen_data.generator.runner.progress import Summary
+    from gen_data.runner.progress import Summary
 
 
 def check_label_gaps(summary: Summary) -> Summary:
@@ -28,8 +28,8 @@ def check_label_gaps(summary: Summary) -> Summary:
     """
     if not summary.dataset_id or is_url(summary.folder):
         return summary
-    from gen_data.generator.report.label_gaps import find_label_gaps
-    from gen_data.generator.runner.stored import StoredSamples
+    from gen_data.report.label_gaps import find_label_gaps
+    from gen_data.runner.stored import StoredSamples
 
     gaps = find_label_gaps(StoredSamples(summary.folder))
     for line in gaps.lines():

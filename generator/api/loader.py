@@ -18,11 +18,11 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.api.config import check_whole
-from gen_data.generator.api.dataset import SampleSequence
-from gen_data.generator.api.sample import Sample
-from gen_data.generator.core.errors import ConfigError, SampleError
-from gen_data.generator.core.streams import Streams
+from gen_data.api.config import check_whole
+from gen_data.api.dataset import SampleSequence
+from gen_data.api.sample import Sample
+from gen_data.core.errors import ConfigError, SampleError
+from gen_data.core.streams import Streams
 
 T = TypeVar("T")
 Indices = NDArray[np.int64]

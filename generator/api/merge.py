@@ -7,12 +7,12 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gen_data.generator.api.label_gaps import check_label_gaps
-from gen_data.generator.api.repair import restore
-from gen_data.generator.core.errors import ConfigError
+from gen_data.api.label_gaps import check_label_gaps
+from gen_data.api.repair import restore
+from gen_data.core.errors import ConfigError
 
 if TYPE_CHECKING:
-    from gen_data.generator.runner.progress import RunProgress, Summary
+    from gen_data.runner.progress import RunProgress, Summary
 
 
 def merge(
@@ -43,8 +43,8 @@ def merge(
         NumericsError: the parts come from machines that compute differently.
         DeterminismError: two parts have the same shard with different bytes.
     """
-    from gen_data.generator.runner.merge import common_plan, gather_shards
-    from gen_data.generator.runner.store import LocalStore
+    from gen_data.runner.merge import common_plan, gather_shards
+    from gen_data.runner.store import LocalStore
 
     folders = [Path(part) for part in parts]
     if not folders:

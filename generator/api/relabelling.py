@@ -8,13 +8,13 @@ from functools import cached_property
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
-from gen_data.generator.api.config import read_document, read_model
-from gen_data.generator.api.sample import SampleRecord, SampleSource
-from gen_data.generator.core.capture import Capture
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import DatasetInfo
-from gen_data.generator.core.sample import EgoTruth, ImageTruth
-from gen_data.generator.core.scene import Scene
+from gen_data.api.config import read_document, read_model
+from gen_data.api.sample import SampleRecord, SampleSource
+from gen_data.core.capture import Capture
+from gen_data.core.errors import ConfigError
+from gen_data.core.interfaces import DatasetInfo
+from gen_data.core.sample import EgoTruth, ImageTruth
+from gen_data.core.scene import Scene
 
 if TYPE_CHECKING:
     from gen_data.exporters.label_map import AppliedLabelMap, LabelMap

@@ -8,12 +8,12 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gen_data.generator.api.config import count_workers
-from gen_data.generator.core.errors import StorageError, no_folder
+from gen_data.api.config import count_workers
+from gen_data.core.errors import StorageError, no_folder
 
 if TYPE_CHECKING:
-    from gen_data.generator.runner.plan import Plan
-    from gen_data.generator.runner.progress import RunProgress, Summary
+    from gen_data.runner.plan import Plan
+    from gen_data.runner.progress import RunProgress, Summary
 
 
 def repair(
@@ -45,9 +45,9 @@ def repair(
         ConfigError: ``source`` is missing or another data set.
         DeterminismError: the repaired data set differs from the sealed one; it stays unfinished.
     """
-    from gen_data.generator.runner.plan import parse_plan
-    from gen_data.generator.runner.repair import read_declared_plan
-    from gen_data.generator.runner.store import LocalStore
+    from gen_data.runner.plan import parse_plan
+    from gen_data.runner.repair import read_declared_plan
+    from gen_data.runner.store import LocalStore
 
     path = Path(folder)
     if not path.exists():
@@ -84,9 +84,9 @@ def restore(  # noqa: PLR0913  (keywords of its callers)
     """Finish the data set in ``path`` from its plan alone; see ``repair`` and ``generate``."""
     from threadpoolctl import threadpool_limits
 
-    from gen_data.generator.runner.regeneration import plan_regeneration, refuse_changes
-    from gen_data.generator.runner.run import Settings, lacks_samples, run
-    from gen_data.generator.runner.store import LocalStore
+    from gen_data.runner.regeneration import plan_regeneration, refuse_changes
+    from gen_data.runner.run import Settings, lacks_samples, run
+    from gen_data.runner.store import LocalStore
 
     made = plan_regeneration(path, plan, source)
     refuse_changes(path, made.changes, "repair it" if repair else "finish it")

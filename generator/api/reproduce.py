@@ -10,11 +10,11 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gen_data.generator.core.errors import ConfigError, StorageError
+from gen_data.core.errors import ConfigError, StorageError
 
 if TYPE_CHECKING:
-    from gen_data.generator.runner.sample_stages import Difference
-    from gen_data.generator.runner.shard import EnteredPipeline
+    from gen_data.runner.sample_stages import Difference
+    from gen_data.runner.shard import EnteredPipeline
 
 
 @dataclass(frozen=True)
@@ -56,14 +56,14 @@ def reproduce(
     """
     from threadpoolctl import threadpool_limits
 
-    from gen_data.generator.assemble.config import load_config
-    from gen_data.generator.assemble.pipeline_factory import PipelineFactory
-    from gen_data.generator.runner.durable_files import storage_errors
-    from gen_data.generator.runner.layout import PLAN_NAME
-    from gen_data.generator.runner.plan import load_plan
-    from gen_data.generator.runner.regeneration import plan_regeneration, write_alone
-    from gen_data.generator.runner.sample_stages import SampleFiles, compare_samples
-    from gen_data.generator.runner.store import LocalStore
+    from gen_data.assemble.config import load_config
+    from gen_data.assemble.pipeline_factory import PipelineFactory
+    from gen_data.runner.durable_files import storage_errors
+    from gen_data.runner.layout import PLAN_NAME
+    from gen_data.runner.plan import load_plan
+    from gen_data.runner.regeneration import plan_regeneration, write_alone
+    from gen_data.runner.sample_stages import SampleFiles, compare_samples
+    from gen_data.runner.store import LocalStore
 
     path = Path(source)
     plan = load_plan(path) if (path / PLAN_NAME).exists() else None

@@ -12,14 +12,14 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gen_data.generator.api.config import count_workers
-from gen_data.generator.api.label_gaps import check_label_gaps
-from gen_data.generator.core.errors import ConfigError, ConfigWarning
+from gen_data.api.config import count_workers
+from gen_data.api.label_gaps import check_label_gaps
+from gen_data.core.errors import ConfigError, ConfigWarning
 
 if TYPE_CHECKING:
-    from gen_data.generator.assemble.config import Config
-    from gen_data.generator.runner.progress import RunProgress, Summary
-    from gen_data.generator.runner.stored import StoredSamples
+    from gen_data.assemble.config import Config
+    from gen_data.runner.progress import RunProgress, Summary
+    from gen_data.runner.stored import StoredSamples
 
 
 def rerender(  # noqa: PLR0913  (keywords of one front door)
@@ -62,15 +62,15 @@ def rerender(  # noqa: PLR0913  (keywords of one front door)
     Warns:
         ConfigWarning: an exporter of the data set is left out; or a sensor has no label.
     """
-    from gen_data.generator.runner.store import LocalStore
+    from gen_data.runner.store import LocalStore
 
     LocalStore(Path(out)).check_unlocked()
 
     from threadpoolctl import threadpool_limits
 
-    from gen_data.generator.assemble.config import load_config
-    from gen_data.generator.runner.rerender import rerender as render_again
-    from gen_data.generator.runner.stored import StoredSamples
+    from gen_data.assemble.config import load_config
+    from gen_data.runner.rerender import rerender as render_again
+    from gen_data.runner.stored import StoredSamples
 
     stored, source = StoredSamples(folder), os.fspath(folder)
     was = load_config(source)
@@ -104,8 +104,8 @@ def _with_fitting_exporters(
     Warns:
         ConfigWarning: an exporter is left out; the text has the reason.
     """
-    from gen_data.generator.assemble.pipeline_factory import dataset_info, ready_exporters
-    from gen_data.generator.packs.provision import open_assets
+    from gen_data.assemble.pipeline_factory import dataset_info, ready_exporters
+    from gen_data.packs.provision import open_assets
 
     if now.general.labels.map.faults(stored.categories):
         return now  # Refused by the run, whatever the exporters are.
@@ -135,7 +135,7 @@ def _complete(override: str, randomizers: set[str]) -> str:
 
 
 def _sensors_override(path: Path) -> str:
-    from gen_data.generator.config.yaml_tree import load_yaml
+    from gen_data.config.yaml_tree import load_yaml
 
     listed = load_yaml(path).plain().get("sensors")
     if not listed:

@@ -10,12 +10,12 @@ from typing import Any, Generic, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.core.boxes import BoxPx, OrientedBox
-from gen_data.generator.core.capture import Capture, Channel, PointCloud, SensorReading
-from gen_data.generator.core.errors import UnknownNameError, did_you_mean
-from gen_data.generator.core.sample import EgoTruth, ImageTruth, ObjectTruth
-from gen_data.generator.core.scene import Scene
-from gen_data.generator.core.se3 import Array
+from gen_data.core.boxes import BoxPx, OrientedBox
+from gen_data.core.capture import Capture, Channel, PointCloud, SensorReading
+from gen_data.core.errors import UnknownNameError, did_you_mean
+from gen_data.core.sample import EgoTruth, ImageTruth, ObjectTruth
+from gen_data.core.scene import Scene
+from gen_data.core.se3 import Array
 
 T = TypeVar("T")
 

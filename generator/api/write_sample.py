@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
 
-from gen_data.generator.api.config import ConfigLike, load_config
-from gen_data.generator.core.errors import ConfigError, StorageError
+from gen_data.api.config import ConfigLike, load_config
+from gen_data.core.errors import ConfigError, StorageError
 
 
 def write_sample(
@@ -44,9 +44,9 @@ def write_sample(
     """
     from threadpoolctl import threadpool_limits
 
-    from gen_data.generator.assemble.pipeline_factory import PipelineFactory
-    from gen_data.generator.runner.durable_files import storage_errors
-    from gen_data.generator.runner.shard import drop_pixels, write_images, write_records
+    from gen_data.assemble.pipeline_factory import PipelineFactory
+    from gen_data.runner.durable_files import storage_errors
+    from gen_data.runner.shard import drop_pixels, write_images, write_records
 
     if index < 0:
         raise ConfigError(f"index: {index} is negative; expected 0 or more")

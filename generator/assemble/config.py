@@ -12,14 +12,13 @@ from typing import Any, TypedDict, TypeVar, cast
 from pydantic import Field
 from typing_extensions import Unpack
 
-from gen_data.exporters.label_map import LabelMap
-from gen_data.generator.annotations.annotate import Thresholds
-from gen_data.generator.assemble.documents import (
+from gen_data.annotations.annotate import Thresholds
+from gen_data.assemble.documents import (
     load_config_document,
     parse_config_document,
     resolve_document,
 )
-from gen_data.generator.assemble.plugin_tables import (
+from gen_data.assemble.plugin_tables import (
     ANNOTATIONS,
     ELEMENTS,
     EXPORTERS,
@@ -27,10 +26,10 @@ from gen_data.generator.assemble.plugin_tables import (
     RENDERERS,
     SENSORS,
 )
-from gen_data.generator.config.base_model import Strict
-from gen_data.generator.config.paths import PLAN, find_path
-from gen_data.generator.config.problems import Problems
-from gen_data.generator.config.shared_values import (
+from gen_data.config.base_model import Strict
+from gen_data.config.paths import PLAN, find_path
+from gen_data.config.problems import Problems
+from gen_data.config.shared_values import (
     draw_shared,
     is_reference,
     names_in,
@@ -39,11 +38,11 @@ from gen_data.generator.config.shared_values import (
     resolve_shared,
     varying_place,
 )
-from gen_data.generator.config.validation import validate
-from gen_data.generator.config.yaml_tree import Node
-from gen_data.generator.core.bounded_cache import ObjectCache
-from gen_data.generator.core.errors import ConfigError, did_you_mean
-from gen_data.generator.core.interfaces import (
+from gen_data.config.validation import validate
+from gen_data.config.yaml_tree import Node
+from gen_data.core.bounded_cache import ObjectCache
+from gen_data.core.errors import ConfigError, did_you_mean
+from gen_data.core.interfaces import (
     AnyAnnotator,
     Element,
     Exporter,
@@ -51,11 +50,12 @@ from gen_data.generator.core.interfaces import (
     RendererSettings,
     Sensor,
 )
-from gen_data.generator.core.plugins import PluginTable
-from gen_data.generator.core.scene import Box3dExtent, SharedValue
-from gen_data.generator.core.streams import Streams
-from gen_data.generator.physics import PhysicsConfig
-from gen_data.generator.pipeline.splits import Splits
+from gen_data.core.plugins import PluginTable
+from gen_data.core.scene import Box3dExtent, SharedValue
+from gen_data.core.streams import Streams
+from gen_data.exporters.label_map import LabelMap
+from gen_data.physics import PhysicsConfig
+from gen_data.pipeline.splits import Splits
 
 SHARD_SIZE = 20
 """Small, so that a crash loses few samples and all workers stay busy."""

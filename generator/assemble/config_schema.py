@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from typing import Any
 
-from gen_data.generator.assemble.config import (
+from gen_data.assemble.config import (
     CONSTANT,
     DEFAULT_RENDERER,
     PLUGIN_LISTS,
     VARYING,
     GeneralSettings,
 )
-from gen_data.generator.assemble.documents import ALL, NAMED
-from gen_data.generator.assemble.plugin_tables import ANNOTATIONS, RENDERERS
-from gen_data.generator.config.schema import json_schema, with_shared_values
-from gen_data.generator.core.plugins import PluginTable
+from gen_data.assemble.documents import ALL, NAMED
+from gen_data.assemble.plugin_tables import ANNOTATIONS, RENDERERS
+from gen_data.config.schema import json_schema, with_shared_values
+from gen_data.core.plugins import PluginTable
 
 INHERITED = {
     "type": "object",

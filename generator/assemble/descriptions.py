@@ -8,10 +8,10 @@ from typing import Any, get_args
 
 from pydantic import BaseModel
 
-from gen_data.generator.assemble.config import GeneralSettings
-from gen_data.generator.assemble.plugin_tables import TABLES, find_plugin
-from gen_data.generator.config.describe import TEXT_WIDTH, describe
-from gen_data.generator.core.errors import ConfigError, did_you_mean
+from gen_data.assemble.config import GeneralSettings
+from gen_data.assemble.plugin_tables import TABLES, find_plugin
+from gen_data.config.describe import TEXT_WIDTH, describe
+from gen_data.core.errors import ConfigError, did_you_mean
 
 SECTION = "section"
 """Kind of the mappings of a configuration that are no plug-ins."""

@@ -12,17 +12,17 @@ from pathlib import Path
 from types import ModuleType
 
 from gen_data import configs, scene_templates
-from gen_data.generator.config.merging import merge_named, merge_nodes, node_name, with_entry
-from gen_data.generator.config.paths import find_path
-from gen_data.generator.config.problems import Position, Problems, format_path, refuse
-from gen_data.generator.config.renamed_keys import refuse_moved_keys, replace_old_words
-from gen_data.generator.config.yaml_scalars import quote_value
-from gen_data.generator.config.yaml_tree import Node, load_yaml, parse_yaml, with_override
-from gen_data.generator.core.errors import ConfigError, did_you_mean
-from gen_data.generator.pipeline.splits import SHARES
-from gen_data.generator.sensors.calibration.load_calibrations import load_calibrations
-from gen_data.generator.sensors.lidar.datasheets import load_sheets
+from gen_data.config.merging import merge_named, merge_nodes, node_name, with_entry
+from gen_data.config.paths import find_path
+from gen_data.config.problems import Position, Problems, format_path, refuse
+from gen_data.config.renamed_keys import refuse_moved_keys, replace_old_words
+from gen_data.config.yaml_scalars import quote_value
+from gen_data.config.yaml_tree import Node, load_yaml, parse_yaml, with_override
+from gen_data.core.errors import ConfigError, did_you_mean
+from gen_data.pipeline.splits import SHARES
 from gen_data.randomizers.arm_task_table import load_tasks
+from gen_data.sensors.calibration.load_calibrations import load_calibrations
+from gen_data.sensors.lidar.datasheets import load_sheets
 
 LISTS = ("randomizers", "sensors", "annotations", "exporters")
 """Lists of plug-ins of a configuration, besides its elements."""

@@ -9,23 +9,17 @@ from functools import cached_property, lru_cache, partial
 
 import cv2
 
-from gen_data.exporters.base import ExporterBase, check_image_formats
-from gen_data.exporters.label_map import MappedExporter
-from gen_data.generator.annotations.annotate import annotate_ego, annotate_reading
-from gen_data.generator.assemble.config import Config, SceneConfig
-from gen_data.generator.assemble.plugin_tables import ANNOTATIONS, default_plugin
-from gen_data.generator.assemble.preflight import (
-    cameras_that_look_away,
-    far_sensors,
-    unrectified_pairs,
-)
-from gen_data.generator.assets.library import Library
-from gen_data.generator.config.error_positions import located_errors
-from gen_data.generator.config.problems import Problems, refuse
-from gen_data.generator.config.yaml_tree import find_text
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.errors import ConfigError, ConfigWarning, Refusals, UnknownAsset
-from gen_data.generator.core.interfaces import (
+from gen_data.annotations.annotate import annotate_ego, annotate_reading
+from gen_data.assemble.config import Config, SceneConfig
+from gen_data.assemble.plugin_tables import ANNOTATIONS, default_plugin
+from gen_data.assemble.preflight import cameras_that_look_away, far_sensors, unrectified_pairs
+from gen_data.assets.library import Library
+from gen_data.config.error_positions import located_errors
+from gen_data.config.problems import Problems, refuse
+from gen_data.config.yaml_tree import find_text
+from gen_data.core.capture import Channel
+from gen_data.core.errors import ConfigError, ConfigWarning, Refusals, UnknownAsset
+from gen_data.core.interfaces import (
     AnyAnnotator,
     AssetIndex,
     DatasetInfo,
@@ -37,18 +31,20 @@ from gen_data.generator.core.interfaces import (
     Sensor,
     SensorInfo,
 )
-from gen_data.generator.core.path_names import CATEGORY_MAX, check_name
-from gen_data.generator.core.plates import has_plate
-from gen_data.generator.core.scene import LABEL_IDS_MAX, Scene, SharedValue
-from gen_data.generator.packs.provision import open_assets
-from gen_data.generator.physics import missing_engine, open_engine
-from gen_data.generator.pipeline import Pipeline
-from gen_data.generator.pipeline.exporter_views import ExporterView, needs_of, view_of
-from gen_data.generator.pipeline.pipeline import PipelineConfig, SceneSource
-from gen_data.generator.sensors.camera.plate_camera import PlateCamera
-from gen_data.generator.sensors.mounting import check_not_buried, stride, within_steps
+from gen_data.core.path_names import CATEGORY_MAX, check_name
+from gen_data.core.plates import has_plate
+from gen_data.core.scene import LABEL_IDS_MAX, Scene, SharedValue
+from gen_data.exporters.base import ExporterBase, check_image_formats
+from gen_data.exporters.label_map import MappedExporter
+from gen_data.packs.provision import open_assets
+from gen_data.physics import missing_engine, open_engine
+from gen_data.pipeline import Pipeline
+from gen_data.pipeline.exporter_views import ExporterView, needs_of, view_of
+from gen_data.pipeline.pipeline import PipelineConfig, SceneSource
 from gen_data.randomizers.base import RandomizerBase
 from gen_data.scene_templates.builder import build_scene
+from gen_data.sensors.camera.plate_camera import PlateCamera
+from gen_data.sensors.mounting import check_not_buried, stride, within_steps
 
 NOMINAL_SCENES_KEPT = 32
 

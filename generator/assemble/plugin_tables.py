@@ -5,16 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any, TypeVar
 
-import gen_data.generator.annotations
-from gen_data import exporters, randomizers, scene_templates
-from gen_data.generator import renderers, sensors
-from gen_data.generator.core.errors import ConfigError, did_you_mean
-from gen_data.generator.core.plugins import PluginTable, package_of, third_party
+import gen_data.annotations
+from gen_data import exporters, randomizers, renderers, scene_templates, sensors
+from gen_data.core.errors import ConfigError, did_you_mean
+from gen_data.core.plugins import PluginTable, package_of, third_party
 
 ELEMENTS = scene_templates.TABLE
 RANDOMIZERS = randomizers.TABLE
 SENSORS = sensors.TABLE
-ANNOTATIONS = gen_data.generator.annotations.TABLE
+ANNOTATIONS = gen_data.annotations.TABLE
 EXPORTERS = exporters.TABLE
 RENDERERS = renderers.TABLE
 

@@ -7,13 +7,13 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from gen_data.generator.assemble.config import SceneConfig
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.scene import Camera, Region, Scene
-from gen_data.generator.core.scene_time import place_sensors
-from gen_data.generator.core.stereo import baseline_m
-from gen_data.generator.core.streams import Streams
+from gen_data.assemble.config import SceneConfig
+from gen_data.core.errors import ConfigError
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.scene import Camera, Region, Scene
+from gen_data.core.scene_time import place_sensors
+from gen_data.core.stereo import baseline_m
+from gen_data.core.streams import Streams
 from gen_data.randomizers.rig_calibration import RigCalibration
 from gen_data.randomizers.room_path import RoomPath
 from gen_data.scene_templates.carrier import Carrier

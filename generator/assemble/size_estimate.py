@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from gen_data.generator.assemble.config import Config
-from gen_data.generator.core.capture import POINT
-from gen_data.generator.core.interfaces import DatasetInfo
+from gen_data.assemble.config import Config
+from gen_data.core.capture import POINT
+from gen_data.core.interfaces import DatasetInfo
 
 BYTES_PER_PIXEL = {
     "rgb": 1.3,

@@ -8,18 +8,11 @@ from functools import lru_cache
 
 import numpy as np
 
-from gen_data.generator.assets.asset_cache import Arrays
-from gen_data.generator.assets.importer import FileRemarks, ImportedMesh
-from gen_data.generator.core.asset_types import (
-    ConvexParts,
-    Keypoint,
-    Material,
-    MeshData,
-    TextureData,
-    UInt8,
-)
-from gen_data.generator.core.se3 import Vec3
-from gen_data.generator.core.serialization import canonical_json, from_plain
+from gen_data.assets.asset_cache import Arrays
+from gen_data.assets.importer import FileRemarks, ImportedMesh
+from gen_data.core.asset_types import ConvexParts, Keypoint, Material, MeshData, TextureData, UInt8
+from gen_data.core.se3 import Vec3
+from gen_data.core.serialization import canonical_json, from_plain
 
 _MESH_ARRAYS = ("vertices_m", "faces", "normals", "uvs", "face_slots")
 _IMAGE = "image/"

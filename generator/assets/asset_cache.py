@@ -29,9 +29,9 @@ import numpy as np
 from deflate import crc32
 from numpy.typing import NDArray
 
-from gen_data.generator.core.bounded_cache import ByteCache, CountCache, Sized
-from gen_data.generator.core.mapped_files import map_file, owned_bytes
-from gen_data.generator.core.serialization import canonical_json
+from gen_data.core.bounded_cache import ByteCache, CountCache, Sized
+from gen_data.core.mapped_files import map_file, owned_bytes
+from gen_data.core.serialization import canonical_json
 
 S = TypeVar("S", bound=Sized)
 T = TypeVar("T")

@@ -15,8 +15,8 @@ from fnmatch import fnmatchcase
 from hashlib import sha256
 from pathlib import Path, PurePosixPath
 
-from gen_data.generator.core.errors import AssetError
-from gen_data.generator.core.system_calls import READ_FLAGS
+from gen_data.core.errors import AssetError
+from gen_data.core.system_calls import READ_FLAGS
 
 MAX_FILE_BYTES = 512 * 1024 * 1024
 _MAX_REFERENCE = 1024

@@ -11,7 +11,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from gen_data.generator.core.errors import AssetError
+from gen_data.core.errors import AssetError
 
 ParameterValue = float | int | str | tuple[float, ...]
 

@@ -9,17 +9,12 @@ from pathlib import Path
 
 import numpy as np
 
-from gen_data.generator.assets.folder_index import (
-    METRES_PER_UNIT,
-    IndexedAsset,
-    MeshEntry,
-    user_folder,
-)
-from gen_data.generator.assets.library import Library
-from gen_data.generator.core.errors import AssetError
-from gen_data.generator.core.kinematics import link_poses
-from gen_data.generator.core.plates import ground_rectangle, horizon_px
-from gen_data.generator.core.se3 import SE3, Vec3
+from gen_data.assets.folder_index import METRES_PER_UNIT, IndexedAsset, MeshEntry, user_folder
+from gen_data.assets.library import Library
+from gen_data.core.errors import AssetError
+from gen_data.core.kinematics import link_poses
+from gen_data.core.plates import ground_rectangle, horizon_px
+from gen_data.core.se3 import SE3, Vec3
 
 NO_LICENCE = "no licence is given"
 _SMALLEST_M, _LARGEST_M = 0.001, 20.0

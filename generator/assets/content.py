@@ -1,4 +1,4 @@
-"""The seam between the core and its content: the tables of ``generator/content``."""
+"""The seam between the core and its content: the tables of ``content``."""
 
 from __future__ import annotations
 
@@ -8,4 +8,4 @@ from types import ModuleType
 
 def content() -> ModuleType:
     """The package of content."""
-    return importlib.import_module("gen_data.generator.content")
+    return importlib.import_module("gen_data.content")

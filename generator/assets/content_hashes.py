@@ -17,20 +17,16 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 from urllib.parse import unquote
 
-from gen_data.generator.assets.asset_cache import DiskCache
-from gen_data.generator.assets.asset_folder import Folder
-from gen_data.generator.assets.parsing import (
-    parse_described_files,
-    parse_layer_references,
-    unpack_value,
-)
-from gen_data.generator.assets.readers.mesh_source import locate_file
-from gen_data.generator.assets.readers.obj import mtl_references, obj_references
-from gen_data.generator.assets.readers.ply import ply_references
-from gen_data.generator.assets.robot_formats import is_description, is_foreign, read_description
-from gen_data.generator.assets.sandbox import run_sandboxed
-from gen_data.generator.core.errors import AssetError
-from gen_data.generator.usd.stage_reader import SUFFIXES
+from gen_data.assets.asset_cache import DiskCache
+from gen_data.assets.asset_folder import Folder
+from gen_data.assets.parsing import parse_described_files, parse_layer_references, unpack_value
+from gen_data.assets.readers.mesh_source import locate_file
+from gen_data.assets.readers.obj import mtl_references, obj_references
+from gen_data.assets.readers.ply import ply_references
+from gen_data.assets.robot_formats import is_description, is_foreign, read_description
+from gen_data.assets.sandbox import run_sandboxed
+from gen_data.core.errors import AssetError
+from gen_data.usd.stage_reader import SUFFIXES
 
 _NAME = "digests.json"
 _MISSING = ""

@@ -14,14 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from gen_data.generator.assets.triangle_soup import (
-    Float64,
-    TriangleSoup,
-    face_crosses,
-    first_occurrences,
-)
-from gen_data.generator.core.asset_types import ConvexParts
-from gen_data.generator.core.errors import AssetError
+from gen_data.assets.triangle_soup import Float64, TriangleSoup, face_crosses, first_occurrences
+from gen_data.core.asset_types import ConvexParts
+from gen_data.core.errors import AssetError
 
 MAX_PARTS = 24
 MAX_VERTICES = 64

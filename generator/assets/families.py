@@ -1,6 +1,6 @@
 """Families of assets by name, and the facts that they declare.
 
-``generator/content`` lists the packages of families; third-party packages add families through the
+``content`` lists the packages of families; third-party packages add families through the
 entry-point group ``gen_data.asset_family``.
 """
 
@@ -11,15 +11,10 @@ from collections.abc import Iterator, Mapping
 from functools import cache
 from typing import Any
 
-from gen_data.generator.assets.content import content
-from gen_data.generator.assets.family import (
-    EnvironmentFamily,
-    Family,
-    Lazy,
-    TextureFamily,
-)
-from gen_data.generator.core.errors import AssetError, ConfigError
-from gen_data.generator.core.plugins import loaded, package_of, third_party
+from gen_data.assets.content import content
+from gen_data.assets.family import EnvironmentFamily, Family, Lazy, TextureFamily
+from gen_data.core.errors import AssetError, ConfigError
+from gen_data.core.plugins import loaded, package_of, third_party
 
 AnyFamily = Family | TextureFamily | EnvironmentFamily
 KIND = "asset_family"
@@ -64,7 +59,7 @@ def third_party_families() -> Mapping[str, tuple[AnyFamily, str]]:
         if not isinstance(family, (Family, TextureFamily, EnvironmentFamily)):
             raise ConfigError(
                 f"{KIND} '{name}': {entry.value} is not a Family, TextureFamily or "
-                "EnvironmentFamily; see gen_data.generator.assets.family"
+                "EnvironmentFamily; see gen_data.assets.family"
             )
         found[_PREFIXES[kind_of(family)] + name] = (family, package_of(entry))
     return found

@@ -8,17 +8,12 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, NamedTuple
 
-from gen_data.generator.assets.content import content
-from gen_data.generator.config.data_files import load_data
-from gen_data.generator.core.asset_types import (
-    ConvexParts,
-    Keypoint,
-    MeshData,
-    Symmetry,
-)
-from gen_data.generator.core.errors import AssetError, did_you_mean
-from gen_data.generator.core.se3 import Vec3
-from gen_data.generator.core.variant_rng import in_turn
+from gen_data.assets.content import content
+from gen_data.config.data_files import load_data
+from gen_data.core.asset_types import ConvexParts, Keypoint, MeshData, Symmetry
+from gen_data.core.errors import AssetError, did_you_mean
+from gen_data.core.se3 import Vec3
+from gen_data.core.variant_rng import in_turn
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -14,11 +14,12 @@ from typing import Any
 
 import numpy as np
 
-from gen_data.generator.assets.asset_arrays import unpack_imported
-from gen_data.generator.assets.asset_cache import FORMAT, Arrays, DiskCache, Store, content_key
-from gen_data.generator.assets.asset_folder import Folder
-from gen_data.generator.assets.content_hashes import ContentHashes
-from gen_data.generator.assets.folder_index import (
+from gen_data.assets.asset_arrays import unpack_imported
+from gen_data.assets.asset_cache import FORMAT, Arrays, DiskCache, Store, content_key
+from gen_data.assets.asset_folder import Folder
+from gen_data.assets.content import content
+from gen_data.assets.content_hashes import ContentHashes
+from gen_data.assets.folder_index import (
     INDEX_NAME,
     ROAD_SUFFIX,
     Entry,
@@ -32,16 +33,16 @@ from gen_data.generator.assets.folder_index import (
     read_index,
     user_folder,
 )
-from gen_data.generator.assets.image_decoding import DECODER_VERSION
-from gen_data.generator.assets.importer import (
+from gen_data.assets.image_decoding import DECODER_VERSION
+from gen_data.assets.importer import (
     ROADS_VERSION,
     VERSION,
     FileRemarks,
     ImportedMesh,
     RoadNetworkContent,
 )
-from gen_data.generator.assets.installed_packs import RECORD_NAME, pack_assets
-from gen_data.generator.assets.parsing import (
+from gen_data.assets.installed_packs import RECORD_NAME, pack_assets
+from gen_data.assets.parsing import (
     parse_image,
     parse_lanes,
     parse_link,
@@ -53,29 +54,22 @@ from gen_data.generator.assets.parsing import (
     parse_surroundings,
     unpack_value,
 )
-from gen_data.generator.assets.robot_description import DescriptionParts, RobotDescription
-from gen_data.generator.assets.robot_formats import is_description, is_foreign
-from gen_data.generator.assets.robot_models import describe_robot, robot_model
-from gen_data.generator.assets.robot_tools import VERSION as TOOLS_VERSION
-from gen_data.generator.assets.sandbox import run_sandboxed
-from gen_data.generator.assets.texture_maps import compose_texture, find_maps
-from gen_data.generator.assets.usd_stages import is_stage
-from gen_data.generator.core.asset_types import (
-    Asset,
-    Float32,
-    RobotModel,
-    Symmetry,
-    TextureData,
-    UInt8,
-)
-from gen_data.generator.core.errors import AssetError
-from gen_data.generator.core.plates import Plate
-from gen_data.generator.core.scene import Lane, StageModel
+from gen_data.assets.robot_description import DescriptionParts, RobotDescription
+from gen_data.assets.robot_formats import is_description, is_foreign
+from gen_data.assets.robot_models import describe_robot, robot_model
+from gen_data.assets.robot_tools import VERSION as TOOLS_VERSION
+from gen_data.assets.sandbox import run_sandboxed
+from gen_data.assets.texture_maps import compose_texture, find_maps
+from gen_data.assets.usd_stages import is_stage
+from gen_data.core.asset_types import Asset, Float32, RobotModel, Symmetry, TextureData, UInt8
+from gen_data.core.errors import AssetError
+from gen_data.core.plates import Plate
+from gen_data.core.scene import Lane, StageModel
 
 PYBULLET = "pybullet"
 """Name of the pack with those files of pybullet that its index describes."""
 _PYBULLET = Path(__file__).with_name("pybullet.yaml")
-_RENDERED = Path(__file__).parent / "plates" / "rendered"
+_RENDERED = Path(str(content().__file__)).parent / "plates"
 PLATES_VERSION = 1
 """Changes with what is measured in photographs."""
 

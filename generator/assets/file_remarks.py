@@ -5,9 +5,9 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterable, Iterator, Set
 
-from gen_data.generator.assets.importer import FileRemarks
-from gen_data.generator.assets.library import Library
-from gen_data.generator.core.errors import AssetError, AssetWarning
+from gen_data.assets.importer import FileRemarks
+from gen_data.assets.library import Library
+from gen_data.core.errors import AssetError, AssetWarning
 
 _USER = "user/"
 READ_MAX = 64

@@ -19,7 +19,7 @@ from typing import Annotated, Literal, TypeVar
 
 from pydantic import AfterValidator, Field, model_validator
 
-from gen_data.generator.assets.asset_folder import (
+from gen_data.assets.asset_folder import (
     Folder,
     asset_id_from_path,
     category_from_path,
@@ -28,24 +28,24 @@ from gen_data.generator.assets.asset_folder import (
     match_files,
     sanitize_word,
 )
-from gen_data.generator.assets.readers import MESH_SUFFIXES
-from gen_data.generator.assets.robot_formats import (
+from gen_data.assets.readers import MESH_SUFFIXES
+from gen_data.assets.robot_formats import (
     LISTED_SUFFIXES,
     MJCF_SUFFIX,
     is_description,
     is_foreign,
     read_description,
 )
-from gen_data.generator.assets.texture_maps import TextureMaps as Maps
-from gen_data.generator.config.base_model import Strict
-from gen_data.generator.config.problems import Problems
-from gen_data.generator.config.validation import validate
-from gen_data.generator.config.yaml_tree import Node, find_text, load_yaml
-from gen_data.generator.core.asset_types import WORKSPACE_FROM_M
-from gen_data.generator.core.errors import AssetError, did_you_mean
-from gen_data.generator.core.path_names import CATEGORY_MAX, check_name
-from gen_data.generator.core.scene import LaneKind
-from gen_data.generator.core.se3 import Vec3
+from gen_data.assets.texture_maps import TextureMaps as Maps
+from gen_data.config.base_model import Strict
+from gen_data.config.problems import Problems
+from gen_data.config.validation import validate
+from gen_data.config.yaml_tree import Node, find_text, load_yaml
+from gen_data.core.asset_types import WORKSPACE_FROM_M
+from gen_data.core.errors import AssetError, did_you_mean
+from gen_data.core.path_names import CATEGORY_MAX, check_name
+from gen_data.core.scene import LaneKind
+from gen_data.core.se3 import Vec3
 
 INDEX_NAME = "assets.yaml"
 ROAD_SUFFIX = ".xodr"
@@ -147,7 +147,7 @@ class Finish(Strict):
 
 
 class Point(Strict):
-    """A keypoint; see ``gen_data.generator.core.asset_types``."""
+    """A keypoint; see ``gen_data.core.asset_types``."""
 
     name: Word
     position_m: tuple[float, float, float]
@@ -277,7 +277,7 @@ class MeshEntry(Origin):
 
 
 class GripperEntry(Strict):
-    """Gripper of a robot; see ``gen_data.generator.core.asset_types.Gripper``."""
+    """Gripper of a robot; see ``gen_data.core.asset_types.Gripper``."""
 
     link: str
     grasp_offset_m: float
@@ -367,7 +367,7 @@ class TextureEntry(Origin):
         return self
 
     def texture_name(self) -> str:
-        """Name of its image or images; see ``gen_data.generator.assets.texture_maps``."""
+        """Name of its image or images; see ``gen_data.assets.texture_maps``."""
         return self.maps.name() if self.maps else self.file
 
     def files(self) -> tuple[str, ...]:

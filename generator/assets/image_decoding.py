@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.core.asset_types import Float32, UInt8
-from gen_data.generator.core.colorimetry import luminance
-from gen_data.generator.core.errors import AssetError
-from gen_data.generator.core.optional_packages import missing_packages
+from gen_data.core.asset_types import Float32, UInt8
+from gen_data.core.colorimetry import luminance
+from gen_data.core.errors import AssetError
+from gen_data.core.optional_packages import missing_packages
 
 DECODER_VERSION = 2
 """Increased whenever the same file is decoded to other pixels."""

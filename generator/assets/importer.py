@@ -15,34 +15,29 @@ from fnmatch import fnmatchcase
 
 import numpy as np
 
-from gen_data.generator.assets.asset_folder import Folder
-from gen_data.generator.assets.content import content
-from gen_data.generator.assets.convex_decomposition import convex_parts, single_hull
-from gen_data.generator.assets.family import Lazy, Solid
-from gen_data.generator.assets.folder_index import Finish, MeshEntry, Region, RobotEntry
-from gen_data.generator.assets.image_decoding import decode_image
-from gen_data.generator.assets.mesh_decimation import decimate
-from gen_data.generator.assets.normal_form import check_coordinates, normal_form
-from gen_data.generator.assets.readers import read_mesh
-from gen_data.generator.assets.readers.mesh_source import MeshSource, srgb_to_linear
-from gen_data.generator.assets.readers.usd import open_stage
-from gen_data.generator.assets.robot_description import RobotDescription, Shape
-from gen_data.generator.assets.robot_formats import is_description, read_description
-from gen_data.generator.assets.robot_shapes import read_shape
-from gen_data.generator.assets.texture_maps import texel_indices, trim_unreached_holes
-from gen_data.generator.assets.triangle_soup import (
-    Float64,
-    MaterialSlot,
-    TriangleSoup,
-    join_soups,
-)
-from gen_data.generator.assets.vertex_colors import IMAGE, resolve_colors
-from gen_data.generator.core.asset_types import ConvexParts, Keypoint, Material, MeshData, UInt8
-from gen_data.generator.core.errors import AssetError
-from gen_data.generator.core.scene import Lane
-from gen_data.generator.core.se3 import SE3, Vec3
-from gen_data.generator.roads.opendrive import Network, read_opendrive
-from gen_data.generator.roads.opendrive_lanes import network_lanes
+from gen_data.assets.asset_folder import Folder
+from gen_data.assets.content import content
+from gen_data.assets.convex_decomposition import convex_parts, single_hull
+from gen_data.assets.family import Lazy, Solid
+from gen_data.assets.folder_index import Finish, MeshEntry, Region, RobotEntry
+from gen_data.assets.image_decoding import decode_image
+from gen_data.assets.mesh_decimation import decimate
+from gen_data.assets.normal_form import check_coordinates, normal_form
+from gen_data.assets.readers import read_mesh
+from gen_data.assets.readers.mesh_source import MeshSource, srgb_to_linear
+from gen_data.assets.readers.usd import open_stage
+from gen_data.assets.robot_description import RobotDescription, Shape
+from gen_data.assets.robot_formats import is_description, read_description
+from gen_data.assets.robot_shapes import read_shape
+from gen_data.assets.texture_maps import texel_indices, trim_unreached_holes
+from gen_data.assets.triangle_soup import Float64, MaterialSlot, TriangleSoup, join_soups
+from gen_data.assets.vertex_colors import IMAGE, resolve_colors
+from gen_data.core.asset_types import ConvexParts, Keypoint, Material, MeshData, UInt8
+from gen_data.core.errors import AssetError
+from gen_data.core.scene import Lane
+from gen_data.core.se3 import SE3, Vec3
+from gen_data.roads.opendrive import Network, read_opendrive
+from gen_data.roads.opendrive_lanes import network_lanes
 
 VERSION = 8
 """Increased whenever the same files are imported as different geometry."""
@@ -79,7 +74,7 @@ class ImportedMesh:
         collision: None for a robot link without collision geometry.
         images: ``{name: uint8 [h, w, 3 or 4]}`` of embedded images; transparent ones have four
             channels. A material's texture ``<asset id>#<name>`` refers to one of these, to a file
-            of the folder, or to several images (``gen_data.generator.assets.texture_maps``).
+            of the folder, or to several images (``gen_data.assets.texture_maps``).
         keypoints: Named points in the asset's frame.
         body_bounds_m: Bounds of the mesh without a vehicle's exterior mirrors; None if it has none.
         shift_m: What was added to the coordinates of the file, scaled and turned upright, to reach

@@ -2,7 +2,7 @@
 
 A pack is a folder below ``packs_dir()`` with a record, ``pack.json``, and, if it offers assets by
 id, an index: the content of ``assets.yaml`` as JSON, which loads a hundred times faster.
-``gen_data.generator.packs`` installs packs.
+``gen_data.packs`` installs packs.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
-from gen_data.generator.assets.folder_index import FolderIndex, IndexedAsset, list_assets
-from gen_data.generator.core.errors import AssetError
-from gen_data.generator.core.serialization import canonical_json, from_plain
+from gen_data.assets.folder_index import FolderIndex, IndexedAsset, list_assets
+from gen_data.core.errors import AssetError
+from gen_data.core.serialization import canonical_json, from_plain
 
 RECORD_NAME = "pack.json"
 INDEX_NAME = "index.json"

@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
-from gen_data.generator.assets.asset_cache import Arrays, DiskCache, Store, content_key
-from gen_data.generator.assets.asset_ids import parse_asset_id
-from gen_data.generator.assets.file_library import FileLibrary
-from gen_data.generator.assets.importer import FileRemarks, ImportedMesh
-from gen_data.generator.assets.paths import packs_dir
-from gen_data.generator.assets.procedural_library import ProceduralLibrary
-from gen_data.generator.core.asset_types import (
+from gen_data.assets.asset_cache import Arrays, DiskCache, Store, content_key
+from gen_data.assets.asset_ids import parse_asset_id
+from gen_data.assets.file_library import FileLibrary
+from gen_data.assets.importer import FileRemarks, ImportedMesh
+from gen_data.assets.paths import packs_dir
+from gen_data.assets.procedural_library import ProceduralLibrary
+from gen_data.core.asset_types import (
     Asset,
     ConvexParts,
     Float32,
@@ -24,13 +24,13 @@ from gen_data.generator.core.asset_types import (
     RobotModel,
     TextureData,
 )
-from gen_data.generator.core.bounded_cache import CountCache
-from gen_data.generator.core.colorimetry import srgb_decode
-from gen_data.generator.core.errors import AssetError, UnknownAsset, did_you_mean
-from gen_data.generator.core.plates import Plate
-from gen_data.generator.core.scene import Lane, StageModel
-from gen_data.generator.core.se3 import Vec3
-from gen_data.generator.core.serialization import find_not_finite, to_plain
+from gen_data.core.bounded_cache import CountCache
+from gen_data.core.colorimetry import srgb_decode
+from gen_data.core.errors import AssetError, UnknownAsset, did_you_mean
+from gen_data.core.plates import Plate
+from gen_data.core.scene import Lane, StageModel
+from gen_data.core.se3 import Vec3
+from gen_data.core.serialization import find_not_finite, to_plain
 
 VEHICLES = frozenset(
     {"bus", "car", "caravan", "minibus", "motorcycle", "suv", "trailer", "tram", "truck", "van"}

@@ -6,12 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gen_data.generator.assets.triangle_soup import (
-    Float64,
-    TriangleSoup,
-    first_occurrences,
-    join_soups,
-)
+from gen_data.assets.triangle_soup import Float64, TriangleSoup, first_occurrences, join_soups
 
 _AGGRESSIVENESS = 3.0
 """From 1 to 10; slower but smoother than the library's default 7."""

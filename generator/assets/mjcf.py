@@ -17,8 +17,8 @@ from xml.etree.ElementTree import Element, tostring
 
 import numpy as np
 
-from gen_data.generator.assets.asset_folder import Folder
-from gen_data.generator.assets.robot_description import (
+from gen_data.assets.asset_folder import Folder
+from gen_data.assets.robot_description import (
     FORMAT_ROOTS,
     MAX_LINKS,
     Link,
@@ -28,11 +28,11 @@ from gen_data.generator.assets.robot_description import (
     Shape,
     jointed,
 )
-from gen_data.generator.core.asset_types import Joint
-from gen_data.generator.core.distribution import install_command
-from gen_data.generator.core.errors import AssetError
-from gen_data.generator.core.safe_xml import parse_xml
-from gen_data.generator.core.se3 import SE3, Vec3, rotation_to_quaternion
+from gen_data.core.asset_types import Joint
+from gen_data.core.distribution import install_command
+from gen_data.core.errors import AssetError
+from gen_data.core.safe_xml import parse_xml
+from gen_data.core.se3 import SE3, Vec3, rotation_to_quaternion
 
 _MAX_ELEMENTS = 200_000
 _ROOT = FORMAT_ROOTS[0]

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from gen_data.generator.assets.mesh_decimation import decimate
-from gen_data.generator.assets.triangle_soup import (
+from gen_data.assets.mesh_decimation import decimate
+from gen_data.assets.triangle_soup import (
     Bools,
     Float64,
     Int64,
@@ -22,8 +22,8 @@ from gen_data.generator.assets.triangle_soup import (
     face_crosses,
     first_occurrences,
 )
-from gen_data.generator.core.asset_types import Material, MeshData
-from gen_data.generator.core.errors import AssetError
+from gen_data.core.asset_types import Material, MeshData
+from gen_data.core.errors import AssetError
 
 CREASE_DEG = 40.0
 MAX_FACES = 20_000

@@ -12,24 +12,24 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from gen_data.generator.assets.asset_arrays import encode_text, pack_imported
-from gen_data.generator.assets.asset_cache import Arrays
-from gen_data.generator.assets.asset_folder import Folder
-from gen_data.generator.assets.folder_index import MeshEntry, PlateEntry, RobotEntry
-from gen_data.generator.assets.image_decoding import decode_image, decode_radiance
-from gen_data.generator.assets.importer import (
+from gen_data.assets.asset_arrays import encode_text, pack_imported
+from gen_data.assets.asset_cache import Arrays
+from gen_data.assets.asset_folder import Folder
+from gen_data.assets.folder_index import MeshEntry, PlateEntry, RobotEntry
+from gen_data.assets.image_decoding import decode_image, decode_radiance
+from gen_data.assets.importer import (
     import_link,
     import_object,
     import_road_network,
     road_network_content,
 )
-from gen_data.generator.assets.robot_formats import read_description
-from gen_data.generator.assets.robot_models import describe_robot
-from gen_data.generator.assets.usd_stages import stage_model
-from gen_data.generator.core.errors import AssetError
-from gen_data.generator.core.plates import Plate
-from gen_data.generator.core.serialization import canonical_json, from_plain
-from gen_data.generator.usd.stage_reader import layer_references
+from gen_data.assets.robot_formats import read_description
+from gen_data.assets.robot_models import describe_robot
+from gen_data.assets.usd_stages import stage_model
+from gen_data.core.errors import AssetError
+from gen_data.core.plates import Plate
+from gen_data.core.serialization import canonical_json, from_plain
+from gen_data.usd.stage_reader import layer_references
 
 T = TypeVar("T")
 Digests = Mapping[str, str]
@@ -101,7 +101,7 @@ def parse_image(root: Path, digests: Digests, name: str, channels: str) -> Array
 
 def parse_plate(root: Path, digests: Digests, entry: PlateEntry) -> Arrays:
     """Read a photograph's plate, for ``unpack_value``."""
-    from gen_data.generator.assets.plates.plate_import import import_plate
+    from gen_data.assets.plates.plate_import import import_plate
 
     folder = Folder(root)
     return _checked(folder, digests, _pack_value(import_plate(folder, entry)))
@@ -109,7 +109,7 @@ def parse_plate(root: Path, digests: Digests, entry: PlateEntry) -> Arrays:
 
 def parse_surroundings(root: Path, digests: Digests, file: str, plate: Plate) -> Arrays:
     """Continue a photograph to all sides: ``{"radiance": pixels}``."""
-    from gen_data.generator.assets.plates.surroundings import surroundings
+    from gen_data.assets.plates.surroundings import surroundings
 
     folder = Folder(root)
     rgb = decode_image(folder.read(file), str(root / file))

@@ -6,30 +6,20 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any, TypeVar
 
-from gen_data.generator.assets.asset_arrays import (
+from gen_data.assets.asset_arrays import (
     pack_imported,
     pack_texture,
     unpack_imported,
     unpack_texture,
 )
-from gen_data.generator.assets.asset_cache import Arrays, Store, content_key
-from gen_data.generator.assets.asset_ids import AssetId, ParameterValue, format_parameter
-from gen_data.generator.assets.families import (
-    AnyFamily,
-    kind_of,
-    own_families,
-    third_party_families,
-)
-from gen_data.generator.assets.family import (
-    EnvironmentFamily,
-    Facts,
-    Family,
-    TextureFamily,
-)
-from gen_data.generator.assets.importer import ImportedMesh
-from gen_data.generator.core.asset_types import Asset, Float32, Symmetry, TextureData
-from gen_data.generator.core.bounded_cache import CountCache, Sized
-from gen_data.generator.core.errors import AssetError, did_you_mean
+from gen_data.assets.asset_cache import Arrays, Store, content_key
+from gen_data.assets.asset_ids import AssetId, ParameterValue, format_parameter
+from gen_data.assets.families import AnyFamily, kind_of, own_families, third_party_families
+from gen_data.assets.family import EnvironmentFamily, Facts, Family, TextureFamily
+from gen_data.assets.importer import ImportedMesh
+from gen_data.core.asset_types import Asset, Float32, Symmetry, TextureData
+from gen_data.core.bounded_cache import CountCache, Sized
+from gen_data.core.errors import AssetError, did_you_mean
 
 VERSION = 4
 """Increased whenever code shared by all families generates different geometry."""

@@ -8,9 +8,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from gen_data.generator.core.asset_types import Joint
-from gen_data.generator.core.kinematics import joint_transform
-from gen_data.generator.core.se3 import SE3, Vec3
+from gen_data.core.asset_types import Joint
+from gen_data.core.kinematics import joint_transform
+from gen_data.core.se3 import SE3, Vec3
 
 MAX_LINKS = 500
 FORMAT_ROOTS = ("world", "__model__")

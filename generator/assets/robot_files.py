@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from pathlib import PurePosixPath
 
-from gen_data.generator.assets.asset_folder import Folder
-from gen_data.generator.core.errors import AssetError
+from gen_data.assets.asset_folder import Folder
+from gen_data.core.errors import AssetError
 
 _PACKAGE_FILE = "package.xml"
 _URI = re.compile(r"(?:package|model)://")

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import PurePosixPath
 
-from gen_data.generator.assets.asset_folder import Folder
-from gen_data.generator.assets.mjcf import read_mjcf
-from gen_data.generator.assets.robot_description import RobotDescription
-from gen_data.generator.assets.sdf import read_sdf
-from gen_data.generator.assets.urdf import read_urdf
-from gen_data.generator.core.errors import AssetError
+from gen_data.assets.asset_folder import Folder
+from gen_data.assets.mjcf import read_mjcf
+from gen_data.assets.robot_description import RobotDescription
+from gen_data.assets.sdf import read_sdf
+from gen_data.assets.urdf import read_urdf
+from gen_data.core.errors import AssetError
 
 _READERS: dict[str, Callable[[Folder, str], RobotDescription]] = {
     ".urdf": read_urdf,

@@ -5,15 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 from itertools import combinations
 
-from gen_data.generator.assets.asset_folder import Folder
-from gen_data.generator.assets.folder_index import RobotEntry
-from gen_data.generator.assets.robot_description import RobotDescription
-from gen_data.generator.assets.robot_formats import read_description
-from gen_data.generator.assets.robot_tools import tool_gripper, with_tool
-from gen_data.generator.core.asset_types import Gripper, RobotModel
-from gen_data.generator.core.errors import AssetError, did_you_mean
-from gen_data.generator.core.kinematics import POSITION_DECIMALS, finger_links, positions_of
-from gen_data.generator.core.se3 import SE3
+from gen_data.assets.asset_folder import Folder
+from gen_data.assets.folder_index import RobotEntry
+from gen_data.assets.robot_description import RobotDescription
+from gen_data.assets.robot_formats import read_description
+from gen_data.assets.robot_tools import tool_gripper, with_tool
+from gen_data.core.asset_types import Gripper, RobotModel
+from gen_data.core.errors import AssetError, did_you_mean
+from gen_data.core.kinematics import POSITION_DECIMALS, finger_links, positions_of
+from gen_data.core.se3 import SE3
 
 _TOLERANCE = 10.0**-POSITION_DECIMALS
 """Tolerance when comparing positions [rad or m]."""

@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from gen_data.generator.assets.asset_folder import Folder
-from gen_data.generator.assets.readers import read_mesh
-from gen_data.generator.assets.readers.mesh_source import MeshSource, srgb_to_linear
-from gen_data.generator.assets.robot_description import Look, Shape
-from gen_data.generator.assets.texture_maps import find_maps
-from gen_data.generator.assets.triangle_soup import (
+from gen_data.assets.asset_folder import Folder
+from gen_data.assets.readers import read_mesh
+from gen_data.assets.readers.mesh_source import MeshSource, srgb_to_linear
+from gen_data.assets.robot_description import Look, Shape
+from gen_data.assets.texture_maps import find_maps
+from gen_data.assets.triangle_soup import (
     Float64,
     MaterialSlot,
     TriangleSoup,
@@ -22,8 +22,8 @@ from gen_data.generator.assets.triangle_soup import (
     face_crosses,
     sphere,
 )
-from gen_data.generator.core.errors import AssetError, did_you_mean
-from gen_data.generator.core.se3 import SE3
+from gen_data.core.errors import AssetError, did_you_mean
+from gen_data.core.se3 import SE3
 
 
 def read_shape(

@@ -9,17 +9,11 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from gen_data.generator.assets.folder_index import ToolEntry
-from gen_data.generator.assets.robot_description import (
-    FORMAT_ROOTS,
-    Link,
-    Look,
-    RobotDescription,
-    Shape,
-)
-from gen_data.generator.core.asset_types import Gripper, Joint, SuctionCup
-from gen_data.generator.core.errors import AssetError, did_you_mean
-from gen_data.generator.core.se3 import SE3, Vec3
+from gen_data.assets.folder_index import ToolEntry
+from gen_data.assets.robot_description import FORMAT_ROOTS, Link, Look, RobotDescription, Shape
+from gen_data.core.asset_types import Gripper, Joint, SuctionCup
+from gen_data.core.errors import AssetError, did_you_mean
+from gen_data.core.se3 import SE3, Vec3
 
 VERSION = 2
 """Increased whenever a tool gets another geometry."""

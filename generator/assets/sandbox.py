@@ -22,10 +22,10 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from gen_data.generator.assets.asset_cache import Arrays, decode_arrays
-from gen_data.generator.core.errors import AssetError
-from gen_data.generator.core.processes import SINGLE_THREADED
-from gen_data.generator.core.system_calls import KILLED
+from gen_data.assets.asset_cache import Arrays, decode_arrays
+from gen_data.core.errors import AssetError
+from gen_data.core.processes import SINGLE_THREADED
+from gen_data.core.system_calls import KILLED
 
 LENGTH = struct.Struct("<Q")
 """Length prefix of requests and replies on the pipes between both processes."""
@@ -38,7 +38,7 @@ A mesh of 100 MB thus has 210 s and 5 GB; the largest packs need a tenth of that
 _START = (
     "import os, sys; sys.path[:] = sys.argv[3:]; "
     f"os.environ.update(dict.fromkeys({(*SINGLE_THREADED, 'PXR_WORK_THREAD_LIMIT')!r}, '1')); "
-    "from gen_data.generator.assets.sandbox_process import main; "
+    "from gen_data.assets.sandbox_process import main; "
     "main(int(sys.argv[1]), sys.argv[2])"
 )
 """Modules are found as in this process, whatever the working directory holds."""

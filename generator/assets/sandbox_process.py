@@ -18,11 +18,11 @@ from typing import Any
 
 import numpy as np
 
-from gen_data.generator.assets.asset_cache import Arrays, encode_arrays
-from gen_data.generator.assets.sandbox import LENGTH
-from gen_data.generator.core.errors import AssetError
-from gen_data.generator.core.processes import end_with_parent, forbid_core_dumps
-from gen_data.generator.core.system_calls import read_binary
+from gen_data.assets.asset_cache import Arrays, encode_arrays
+from gen_data.assets.sandbox import LENGTH
+from gen_data.core.errors import AssetError
+from gen_data.core.processes import end_with_parent, forbid_core_dumps
+from gen_data.core.system_calls import read_binary
 
 try:
     resource: Any = import_module("resource")

@@ -14,8 +14,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import PurePosixPath
 from xml.etree.ElementTree import Element
 
-from gen_data.generator.assets.asset_folder import Folder
-from gen_data.generator.assets.robot_description import (
+from gen_data.assets.asset_folder import Folder
+from gen_data.assets.robot_description import (
     FORMAT_ROOTS,
     MAX_LINKS,
     Link,
@@ -25,12 +25,12 @@ from gen_data.generator.assets.robot_description import (
     Shape,
     jointed,
 )
-from gen_data.generator.assets.robot_files import resolve_uri
-from gen_data.generator.assets.urdf import rpy_to_quaternion
-from gen_data.generator.core.asset_types import Joint
-from gen_data.generator.core.errors import AssetError
-from gen_data.generator.core.safe_xml import format_position, parse_xml
-from gen_data.generator.core.se3 import SE3, Vec3
+from gen_data.assets.robot_files import resolve_uri
+from gen_data.assets.urdf import rpy_to_quaternion
+from gen_data.core.asset_types import Joint
+from gen_data.core.errors import AssetError
+from gen_data.core.safe_xml import format_position, parse_xml
+from gen_data.core.se3 import SE3, Vec3
 
 _MAX_ELEMENTS = 100_000
 _MAX_DEPTH = 8

@@ -10,14 +10,8 @@ from urllib.parse import quote, unquote
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.assets.triangle_soup import (
-    Float64,
-    Int64,
-    MaterialSlot,
-    TriangleSoup,
-    face_crosses,
-)
-from gen_data.generator.core.asset_types import TextureData, UInt8
+from gen_data.assets.triangle_soup import Float64, Int64, MaterialSlot, TriangleSoup, face_crosses
+from gen_data.core.asset_types import TextureData, UInt8
 
 _MARK = "maps;"
 HOLES_MIN = 0.02

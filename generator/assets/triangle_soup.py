@@ -9,8 +9,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.core.asset_types import Material
-from gen_data.generator.core.se3 import Vec3
+from gen_data.core.asset_types import Material
+from gen_data.core.se3 import Vec3
 
 Float64 = NDArray[np.float64]
 Int64 = NDArray[np.int64]

@@ -13,8 +13,8 @@ from dataclasses import replace
 from pathlib import PurePosixPath
 from xml.etree.ElementTree import Element
 
-from gen_data.generator.assets.asset_folder import Folder
-from gen_data.generator.assets.robot_description import (
+from gen_data.assets.asset_folder import Folder
+from gen_data.assets.robot_description import (
     MAX_LINKS,
     Link,
     Look,
@@ -23,12 +23,12 @@ from gen_data.generator.assets.robot_description import (
     Shape,
     sort_links,
 )
-from gen_data.generator.assets.robot_files import resolve_uri
-from gen_data.generator.core.asset_types import Joint
-from gen_data.generator.core.errors import AssetError
-from gen_data.generator.core.kinematics import leader_of
-from gen_data.generator.core.safe_xml import format_position, parse_xml
-from gen_data.generator.core.se3 import SE3, Quaternion, Vec3
+from gen_data.assets.robot_files import resolve_uri
+from gen_data.core.asset_types import Joint
+from gen_data.core.errors import AssetError
+from gen_data.core.kinematics import leader_of
+from gen_data.core.safe_xml import format_position, parse_xml
+from gen_data.core.se3 import SE3, Quaternion, Vec3
 
 _MAX_ELEMENTS = 50_000
 _KINDS = {"fixed", "revolute", "continuous", "prismatic"}

@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import PurePosixPath
 
-from gen_data.generator.assets.asset_folder import Folder
-from gen_data.generator.assets.folder_index import Entry, MeshEntry
-from gen_data.generator.assets.importer import scale_and_shift, upright_transform
-from gen_data.generator.assets.readers.usd import ARCHIVE, open_stage
-from gen_data.generator.core.errors import AssetError
-from gen_data.generator.core.scene import Light, StageModel, StagePiece
-from gen_data.generator.core.se3 import SE3, rotate_by_quaternion
-from gen_data.generator.usd.stage_reader import SUFFIXES
+from gen_data.assets.asset_folder import Folder
+from gen_data.assets.folder_index import Entry, MeshEntry
+from gen_data.assets.importer import scale_and_shift, upright_transform
+from gen_data.assets.readers.usd import ARCHIVE, open_stage
+from gen_data.core.errors import AssetError
+from gen_data.core.scene import Light, StageModel, StagePiece
+from gen_data.core.se3 import SE3, rotate_by_quaternion
+from gen_data.usd.stage_reader import SUFFIXES
 
 
 def is_stage(entry: Entry) -> bool:

@@ -10,16 +10,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gen_data.generator.assets.mesh_decimation import decimate
-from gen_data.generator.assets.triangle_soup import (
+from gen_data.assets.mesh_decimation import decimate
+from gen_data.assets.triangle_soup import (
     Float64,
     Int64,
     MaterialSlot,
     TriangleSoup,
     first_occurrences,
 )
-from gen_data.generator.core.asset_types import Material, UInt8
-from gen_data.generator.core.colorimetry import srgb_encode
+from gen_data.core.asset_types import Material, UInt8
+from gen_data.core.colorimetry import srgb_encode
 
 IMAGE = "vertex_colors"
 """Name of the image that holds gradients."""

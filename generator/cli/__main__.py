@@ -1,4 +1,4 @@
-"""``gen-data``, also as ``python -m gen_data.generator.cli``; Ctrl-C is handled from here on."""
+"""``gen-data``, also as ``python -m gen_data.cli``; Ctrl-C is handled from here on."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def main() -> None:
     # Modules, configuration and tables of assets stay: searching them for garbage at Python's
     # pace of every 700 objects takes a tenth of the start.
     gc.set_threshold(50_000, 20, 100)
-    from gen_data.generator.cli.main import main as run
+    from gen_data.cli.main import main as run
 
     try:
         run()

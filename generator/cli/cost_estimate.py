@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
-from gen_data.generator.runner.durable_files import format_bytes
+from gen_data.runner.durable_files import format_bytes
 
 
 @dataclass(frozen=True)

@@ -27,13 +27,13 @@ from typing import Any
 
 import click
 
-from gen_data.generator.core.distribution import DISTRIBUTION, install_command
-from gen_data.generator.core.errors import GenDataError, SampleError
-from gen_data.generator.core.optional_packages import missing_packages
-from gen_data.generator.core.processes import silence_stdio
-from gen_data.generator.core.system_calls import usable_cores
-from gen_data.generator.core.temporary_folders import temporary_folder
-from gen_data.generator.core.version import __version__
+from gen_data.core.distribution import DISTRIBUTION, install_command
+from gen_data.core.errors import GenDataError, SampleError
+from gen_data.core.optional_packages import missing_packages
+from gen_data.core.processes import silence_stdio
+from gen_data.core.system_calls import usable_cores
+from gen_data.core.temporary_folders import temporary_folder
+from gen_data.core.version import __version__
 
 FILES_MIN = 64
 MEMORY_MIN_BYTES = 2_000_000_000
@@ -129,7 +129,7 @@ def _try_name() -> str:
 
 
 def _try_cache() -> str:
-    from gen_data.generator.assets.library import default_cache_dir
+    from gen_data.assets.library import default_cache_dir
 
     folder = default_cache_dir()
     folder.mkdir(parents=True, exist_ok=True)
@@ -160,7 +160,7 @@ def _try_limits() -> str:
 def _try_renderer() -> str:
     import warp as wp
 
-    from gen_data.generator.renderers.warp.device import open_device
+    from gen_data.renderers.warp.device import open_device
 
     device = open_device("auto")
     total = float(wp.full(1000, 2.0, dtype=float, device=device).numpy().sum())
@@ -172,7 +172,7 @@ def _try_gpu() -> str:
     """The first GPU: its name, and one computation on it."""
     import warp as wp
 
-    from gen_data.generator.renderers.warp.device import open_device, why_no_gpu
+    from gen_data.renderers.warp.device import open_device, why_no_gpu
 
     _expect(not (reason := why_no_gpu()), reason)
     device = open_device("cuda:0")
@@ -186,11 +186,11 @@ def _try_gpu() -> str:
 def _try_physics() -> str:
     import numpy as np
 
-    from gen_data.generator.core.asset_types import ConvexParts
-    from gen_data.generator.core.se3 import SE3
-    from gen_data.generator.physics import PhysicsConfig
-    from gen_data.generator.physics.collision_shapes import collision_shape
-    from gen_data.generator.physics.open_world import open_world
+    from gen_data.core.asset_types import ConvexParts
+    from gen_data.core.se3 import SE3
+    from gen_data.physics import PhysicsConfig
+    from gen_data.physics.collision_shapes import collision_shape
+    from gen_data.physics.open_world import open_world
 
     config = PhysicsConfig()
     corners = np.array([(x, y, z) for x in (-0.1, 0.1) for y in (-0.1, 0.1) for z in (-0.1, 0.1)])
@@ -279,9 +279,9 @@ def _try_preview() -> str:
 
 def _try_sample() -> str:
     """Generate one small sample of the shipped tabletop, through every stage."""
-    from gen_data.generator.annotations.sample_checks import sample_faults
-    from gen_data.generator.assemble.config import load_config
-    from gen_data.generator.assemble.pipeline_factory import open_pipeline
+    from gen_data.annotations.sample_checks import sample_faults
+    from gen_data.assemble.config import load_config
+    from gen_data.assemble.pipeline_factory import open_pipeline
 
     config = load_config("tabletop.yaml", overrides=("sensors[0].size_px=[160, 120]",))
     with open_pipeline(config) as pipeline:
@@ -298,9 +298,9 @@ def _try_sample() -> str:
 
 def _try_speed() -> str:
     """Generate one scene's samples of the shipped tabletop again and again for a few seconds."""
-    from gen_data.generator.assemble.config import load_config
-    from gen_data.generator.assemble.pipeline_factory import open_pipeline
-    from gen_data.generator.renderers.warp.device import open_device
+    from gen_data.assemble.config import load_config
+    from gen_data.assemble.pipeline_factory import open_pipeline
+    from gen_data.renderers.warp.device import open_device
 
     made, spent_s = 0, 0.0
     with open_pipeline(load_config("tabletop.yaml")) as pipeline:
@@ -326,8 +326,8 @@ def _try_denoiser() -> str:
 
 
 def _try_packs() -> str:
-    from gen_data.generator.assets.installed_packs import installed_packs
-    from gen_data.generator.assets.paths import packs_dir
+    from gen_data.assets.installed_packs import installed_packs
+    from gen_data.assets.paths import packs_dir
 
     records = installed_packs(packs_dir())
     _expect(bool(records), f"none installed in {packs_dir()}")

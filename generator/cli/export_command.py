@@ -12,7 +12,7 @@ from typing import Any
 
 import click
 
-from gen_data.generator.core.errors import ConfigError
+from gen_data.core.errors import ConfigError
 
 HELP = """Write a finished data set in other formats, without rendering it again.
 
@@ -50,9 +50,9 @@ def export(
     force: bool,
 ) -> None:
     """Export a finished data set."""
-    from gen_data.generator.api.export import export as write_exports
-    from gen_data.generator.cli.generate_command import print_summary, progress_bar
-    from gen_data.generator.runner.stored import StoredSamples
+    from gen_data.api.export import export as write_exports
+    from gen_data.cli.generate_command import print_summary, progress_bar
+    from gen_data.runner.stored import StoredSamples
 
     with _named_options(formats), progress_bar(StoredSamples(folder).n) as show:
         summary = write_exports(
@@ -84,7 +84,7 @@ def _named_options(formats: Sequence[str]) -> Iterator[None]:
 
 def _parse_format(text: str) -> str | Mapping[str, Any]:
     """Parse a name, or a YAML mapping as in a configuration."""
-    from gen_data.generator.config.yaml_tree import parse_yaml
+    from gen_data.config.yaml_tree import parse_yaml
 
     if not text.lstrip().startswith("{"):
         return text

@@ -9,15 +9,15 @@ from contextlib import contextmanager
 from functools import cache
 from typing import TYPE_CHECKING
 
-from gen_data.generator.api.generate import generate
-from gen_data.generator.cli.options import ConfigurationOptions
-from gen_data.generator.core.errors import SamplesSkipped
+from gen_data.api.generate import generate
+from gen_data.cli.options import ConfigurationOptions
+from gen_data.core.errors import SamplesSkipped
 
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
 
-    from gen_data.generator.runner.progress import RunProgress, Summary
-    from gen_data.generator.runner.ray_cluster import RayCluster
+    from gen_data.runner.progress import RunProgress, Summary
+    from gen_data.runner.ray_cluster import RayCluster
 
 
 def generate_with_progress(
@@ -37,7 +37,7 @@ def generate_with_progress(
     """Generate samples 0 to n - 1, or the missing ones, and print a summary.
 
     Raises:
-        GenDataError: see ``gen_data.generator.api.generate``, which has the same arguments.
+        GenDataError: see ``gen_data.api.generate``, which has the same arguments.
     """
     with progress_bar(n) as show:
         summary = generate(

@@ -18,12 +18,8 @@ def describe(name: str | None) -> None:
     NAME may be a nested mapping: labels.map, rgb_camera.lens, brown_conrady. Without NAME,
     all are listed.
     """
-    from gen_data.generator.assemble.descriptions import (
-        describe_name,
-        list_names_of,
-        section_names,
-    )
-    from gen_data.generator.assemble.plugin_tables import TABLES
+    from gen_data.assemble.descriptions import describe_name, list_names_of, section_names
+    from gen_data.assemble.plugin_tables import TABLES
 
     shipped = _shipped_texts()
     if name is None:
@@ -42,7 +38,7 @@ def _shipped_texts() -> dict[str, dict[str, str]]:
     """Texts of distributions, templates and configurations, by kind and name."""
     from importlib.resources import files
 
-    from gen_data.generator.config.distributions import DISTRIBUTIONS
+    from gen_data.config.distributions import DISTRIBUTIONS
 
     documented = {name: DISTRIBUTIONS.load(name).__doc__ or "" for name in DISTRIBUTIONS}
     texts = {"distribution": {name: inspect.cleandoc(text) for name, text in documented.items()}}
@@ -58,9 +54,9 @@ def _shipped_texts() -> dict[str, dict[str, str]]:
 @click.command()
 def formats() -> None:
     """List the output formats."""
+    from gen_data.config.describe import TEXT_WIDTH
+    from gen_data.config.schema import docstring_summary
     from gen_data.exporters import TABLE
-    from gen_data.generator.config.describe import TEXT_WIDTH
-    from gen_data.generator.config.schema import docstring_summary
 
     width = max(map(len, TABLE)) + 2
     for name in TABLE:
@@ -72,6 +68,6 @@ def formats() -> None:
 @click.command()
 def schema() -> None:
     """Print the JSON Schema of configurations, for completion in editors."""
-    from gen_data.generator.assemble.config_schema import config_schema
+    from gen_data.assemble.config_schema import config_schema
 
     click.echo(json.dumps(config_schema(), indent=2, sort_keys=True))

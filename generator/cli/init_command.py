@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING
 
 import click
 
-from gen_data.generator.core.errors import ConfigError, did_you_mean
+from gen_data.core.errors import ConfigError, did_you_mean
 
 if TYPE_CHECKING:
-    from gen_data.generator.cli.own_meshes import OwnMesh
+    from gen_data.cli.own_meshes import OwnMesh
 
 ASSETS = "assets"
 """Folder of the user's meshes, next to the configuration."""
@@ -44,8 +44,8 @@ def init(template: str, paths: tuple[Path, ...], categories: tuple[str, ...], ou
     With --mesh, the scenes hold your objects: their files are copied to assets/, with the materials
     and images that they refer to, and assets/assets.yaml shows the guessed units and axes.
     """
-    from gen_data.generator.cli.own_meshes import find_meshes, write_assets
-    from gen_data.generator.core.temporary_folders import temporary_folder
+    from gen_data.cli.own_meshes import find_meshes, write_assets
+    from gen_data.core.temporary_folders import temporary_folder
 
     if categories and not paths:
         raise ConfigError("--class: names the class of a mesh; expected --mesh with it")
@@ -73,9 +73,9 @@ def init(template: str, paths: tuple[Path, ...], categories: tuple[str, ...], ou
 
 def _echo_remarks(folder: Path) -> None:
     """Print unused contents of the meshes."""
-    from gen_data.generator.assets.file_remarks import collect_remarks
-    from gen_data.generator.assets.folder_index import user_folder
-    from gen_data.generator.packs.provision import open_assets
+    from gen_data.assets.file_remarks import collect_remarks
+    from gen_data.assets.folder_index import user_folder
+    from gen_data.packs.provision import open_assets
 
     ids = [one.asset_id for one in user_folder(folder)]
     for remarks in collect_remarks(open_assets([folder]), ids):
@@ -105,8 +105,8 @@ def starter_files(template: str, meshes: Sequence[OwnMesh]) -> Iterator[tuple[st
         ConfigError: there is no such configuration, or its scenes take no objects.
     """
     from gen_data import configs, scene_templates
-    from gen_data.generator.assemble.config import load_config
-    from gen_data.generator.cli.own_meshes import own_objects
+    from gen_data.assemble.config import load_config
+    from gen_data.cli.own_meshes import own_objects
 
     folder = Path(configs.__path__[0])
     known = sorted(path.stem for path in folder.glob("*.yaml"))
@@ -142,7 +142,7 @@ def completion(shell: str) -> None:
     """Print the completion script of a shell: eval "$(gen-data completion bash)"."""
     from click.shell_completion import get_completion_class
 
-    from gen_data.generator.cli.main import cli
+    from gen_data.cli.main import cli
 
     kind = get_completion_class(shell)
     assert kind is not None, "the shells are click's own"

@@ -16,19 +16,15 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
-from gen_data.generator.cli.options import (
+from gen_data.cli.options import (
     ConfigurationOptions,
     choose_cluster,
     cluster_options,
     configuration_options,
     parse_shards,
 )
-from gen_data.generator.cli.stop_signals import (
-    handle_stop_signals,
-    ignore_stop_signals,
-    is_stop_requested,
-)
-from gen_data.generator.core.errors import (
+from gen_data.cli.stop_signals import handle_stop_signals, ignore_stop_signals, is_stop_requested
+from gen_data.core.errors import (
     AssetWarning,
     CacheWarning,
     ConfigError,
@@ -39,9 +35,9 @@ from gen_data.generator.core.errors import (
     did_you_mean,
     lack_of_memory,
 )
-from gen_data.generator.core.processes import SINGLE_THREADED
-from gen_data.generator.core.urls import is_url, needs_folder
-from gen_data.generator.core.version import __version__
+from gen_data.core.processes import SINGLE_THREADED
+from gen_data.core.urls import is_url, needs_folder
+from gen_data.core.version import __version__
 
 FOLDERS_ONLY = frozenset(
     "adapt certify contact-sheet diff export match merge preview repair report repro".split()  # noqa: SIM905
@@ -53,30 +49,30 @@ class LazyCommands(click.Group):
     """A group of commands that are imported on demand."""
 
     modules = {  # noqa: RUF012
-        "init": "gen_data.generator.cli.init_command:init",
-        "plan": "gen_data.generator.cli.plan_command:plan",
-        "sample": "gen_data.generator.cli.sample_command:sample",
-        "export": "gen_data.generator.cli.export_command:export",
-        "rerender": "gen_data.generator.cli.rerender_command:rerender",
-        "preview": "gen_data.generator.cli.preview_commands:preview",
-        "contact-sheet": "gen_data.generator.cli.preview_commands:contact_sheet",
-        "assets": "gen_data.generator.cli.asset_commands:assets",
-        "cache": "gen_data.generator.cli.cache_commands:cache",
-        "report": "gen_data.generator.cli.report_command:report",
-        "study": "gen_data.generator.study.study_command:study",
-        "adapt": "gen_data.generator.study.adapt_command:adapt",
-        "match": "gen_data.generator.matching.match_command:match",
-        "verify": "gen_data.generator.cli.verification_commands:verify",
-        "certify": "gen_data.generator.certificate.certify_command:certify",
-        "merge": "gen_data.generator.cli.merge_command:merge",
-        "repair": "gen_data.generator.cli.verification_commands:repair",
-        "diff": "gen_data.generator.cli.verification_commands:diff",
-        "repro": "gen_data.generator.cli.verification_commands:repro",
-        "describe": "gen_data.generator.cli.info_commands:describe",
-        "formats": "gen_data.generator.cli.info_commands:formats",
-        "schema": "gen_data.generator.cli.info_commands:schema",
-        "completion": "gen_data.generator.cli.init_command:completion",
-        "doctor": "gen_data.generator.cli.doctor:doctor",
+        "init": "gen_data.cli.init_command:init",
+        "plan": "gen_data.cli.plan_command:plan",
+        "sample": "gen_data.cli.sample_command:sample",
+        "export": "gen_data.cli.export_command:export",
+        "rerender": "gen_data.cli.rerender_command:rerender",
+        "preview": "gen_data.cli.preview_commands:preview",
+        "contact-sheet": "gen_data.cli.preview_commands:contact_sheet",
+        "assets": "gen_data.cli.asset_commands:assets",
+        "cache": "gen_data.cli.cache_commands:cache",
+        "report": "gen_data.cli.report_command:report",
+        "study": "gen_data.lab.study.study_command:study",
+        "adapt": "gen_data.lab.study.adapt_command:adapt",
+        "match": "gen_data.lab.matching.match_command:match",
+        "verify": "gen_data.cli.verification_commands:verify",
+        "certify": "gen_data.lab.certificate.certify_command:certify",
+        "merge": "gen_data.cli.merge_command:merge",
+        "repair": "gen_data.cli.verification_commands:repair",
+        "diff": "gen_data.cli.verification_commands:diff",
+        "repro": "gen_data.cli.verification_commands:repro",
+        "describe": "gen_data.cli.info_commands:describe",
+        "formats": "gen_data.cli.info_commands:formats",
+        "schema": "gen_data.cli.info_commands:schema",
+        "completion": "gen_data.cli.init_command:completion",
+        "doctor": "gen_data.cli.doctor:doctor",
     }
     summaries = {  # noqa: RUF012
         "init": "Write a commented configuration and template to start from.",
@@ -247,7 +243,7 @@ def cli(
         return
     if n is None:
         raise ConfigError("--n is missing: how many samples?")
-    from gen_data.generator.cli.generate_command import generate_with_progress
+    from gen_data.cli.generate_command import generate_with_progress
 
     choice = ConfigurationOptions(config, seed, overrides, without)
     generate_with_progress(

@@ -32,9 +32,9 @@ def merge(
 
     The result has the same bytes as one run. Shards that no part has are generated; parts stay.
     """
-    from gen_data.generator.api.merge import merge as join
-    from gen_data.generator.cli.generate_command import print_summary, progress_bar
-    from gen_data.generator.runner.merge import common_plan
+    from gen_data.api.merge import merge as join
+    from gen_data.cli.generate_command import print_summary, progress_bar
+    from gen_data.runner.merge import common_plan
 
     with progress_bar(common_plan(parts).n) as show:
         summary = join(

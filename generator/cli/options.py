@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from gen_data.generator.core.errors import ConfigError
+from gen_data.core.errors import ConfigError
 
 if TYPE_CHECKING:
-    from gen_data.generator.assemble.config import Config
-    from gen_data.generator.runner.ray_cluster import RayCluster
+    from gen_data.assemble.config import Config
+    from gen_data.runner.ray_cluster import RayCluster
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -34,7 +34,7 @@ class ConfigurationOptions:
 
     def config(self) -> Config:
         """Load and validate the configuration."""
-        from gen_data.generator.assemble.config import load_config
+        from gen_data.assemble.config import load_config
 
         return load_config(
             self.source, seed=self.seed, overrides=self.overrides, without=self.without
@@ -103,6 +103,6 @@ def choose_cluster(
         if extra:
             raise ConfigError(f"{extra[0]} belongs to a cluster; expected --runner ray with it")
         return None
-    from gen_data.generator.runner.ray_cluster import RayCluster
+    from gen_data.runner.ray_cluster import RayCluster
 
     return RayCluster(address or "", 1.0 if cpus is None else cpus, gpus or 0.0)

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 
-from gen_data.generator.core.errors import AssetError, ConfigError
+from gen_data.core.errors import AssetError, ConfigError
 
 IN_METRES = (".glb", ".gltf")
 """Suffixes of formats whose unit is the metre and whose Y axis points up."""
@@ -40,14 +40,14 @@ class OwnMesh:
     @property
     def asset_id(self) -> str:
         """Id of the asset."""
-        from gen_data.generator.assets.asset_folder import asset_id_from_path
+        from gen_data.assets.asset_folder import asset_id_from_path
 
         return f"user/{asset_id_from_path(self.place)}"
 
     def files(self) -> Iterator[tuple[Path, str]]:
         """The mesh and the files that it refers to, with their paths below ``assets/``."""
-        from gen_data.generator.assets.asset_folder import Folder
-        from gen_data.generator.assets.content_hashes import find_referenced_files
+        from gen_data.assets.asset_folder import Folder
+        from gen_data.assets.content_hashes import find_referenced_files
 
         for name in find_referenced_files(Folder(self.root), self.file):
             yield self.root / name, str(PurePosixPath(self.folder, name))
@@ -105,8 +105,8 @@ def find_meshes(paths: Sequence[Path], categories: Sequence[str]) -> tuple[OwnMe
 
 
 def _meshes_at(path: Path) -> Iterator[OwnMesh]:
-    from gen_data.generator.assets.asset_folder import list_files
-    from gen_data.generator.assets.readers import MESH_SUFFIXES
+    from gen_data.assets.asset_folder import list_files
+    from gen_data.assets.readers import MESH_SUFFIXES
 
     kinds = ", ".join(sorted(MESH_SUFFIXES))
     if not path.is_dir():
@@ -129,8 +129,8 @@ def write_assets(meshes: Sequence[OwnMesh], folder: Path) -> None:
     Raises:
         AssetError: an asset cannot be used; the text names each of them.
     """
-    from gen_data.generator.assets.checking import check_folder
-    from gen_data.generator.packs.provision import open_assets
+    from gen_data.assets.checking import check_folder
+    from gen_data.packs.provision import open_assets
 
     for mesh in meshes:
         for source, place in mesh.files():
@@ -160,8 +160,8 @@ def _size_lines(mesh: OwnMesh) -> Iterator[str]:
     """Unit and axis of a mesh, or where they come from."""
     import numpy as np
 
-    from gen_data.generator.assets.asset_folder import Folder
-    from gen_data.generator.assets.readers import read_mesh
+    from gen_data.assets.asset_folder import Folder
+    from gen_data.assets.readers import read_mesh
 
     suffix = PurePosixPath(mesh.file).suffix.lower()
     if suffix in STATES_UNIT:

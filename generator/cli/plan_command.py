@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING
 
 import click
 
-from gen_data.generator.cli.cost_estimate import Prices, Probe, estimate_rows
-from gen_data.generator.cli.options import ConfigurationOptions, configuration_options
-from gen_data.generator.core.errors import ConfigError, NoLabels
-from gen_data.generator.core.system_calls import usable_cores
+from gen_data.cli.cost_estimate import Prices, Probe, estimate_rows
+from gen_data.cli.options import ConfigurationOptions, configuration_options
+from gen_data.core.errors import ConfigError, NoLabels
+from gen_data.core.system_calls import usable_cores
 
 if TYPE_CHECKING:
-    from gen_data.generator.assemble.config import Config
-    from gen_data.generator.assemble.pipeline_factory import PipelineFactory
-    from gen_data.generator.runner.progress import RunProgress
+    from gen_data.assemble.config import Config
+    from gen_data.assemble.pipeline_factory import PipelineFactory
+    from gen_data.runner.progress import RunProgress
 
 
 @click.command("plan")
@@ -67,13 +67,13 @@ def plan(
 
 
 def _rows(config: Config, n: int) -> Iterator[tuple[str, str]]:
-    from gen_data.generator.assemble.pipeline_factory import PipelineFactory
-    from gen_data.generator.assemble.size_estimate import estimate_image_bytes
-    from gen_data.generator.assets.file_remarks import collect_remarks
-    from gen_data.generator.config.schema import docstring_summary
-    from gen_data.generator.pipeline.splits import split_of
-    from gen_data.generator.runner.durable_files import format_bytes
-    from gen_data.generator.runner.identity import possible_assets
+    from gen_data.assemble.pipeline_factory import PipelineFactory
+    from gen_data.assemble.size_estimate import estimate_image_bytes
+    from gen_data.assets.file_remarks import collect_remarks
+    from gen_data.config.schema import docstring_summary
+    from gen_data.pipeline.splits import split_of
+    from gen_data.runner.durable_files import format_bytes
+    from gen_data.runner.identity import possible_assets
 
     general = config.general
     per_scene = general.views_per_scene * general.steps_per_scene
@@ -125,11 +125,11 @@ def _product(scenes: int, views: int, steps: int) -> str:
 
 def _measure(choice: ConfigurationOptions, count: int) -> Probe:
     """Generate ``count`` samples in a temporary folder, in this process."""
-    from gen_data.generator.api.generate import generate
-    from gen_data.generator.core.temporary_folders import temporary_folder
-    from gen_data.generator.renderers.warp.device import open_device
-    from gen_data.generator.report.label_gaps import count_objects
-    from gen_data.generator.runner.stored import StoredSamples
+    from gen_data.api.generate import generate
+    from gen_data.core.temporary_folders import temporary_folder
+    from gen_data.renderers.warp.device import open_device
+    from gen_data.report.label_gaps import count_objects
+    from gen_data.runner.stored import StoredSamples
 
     done_s: dict[int, float] = {}
 

@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING
 
 import click
 
-from gen_data.generator.cli.options import ConfigurationOptions, configuration_options
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.optional_packages import missing_packages
-from gen_data.generator.core.sample import Sample
+from gen_data.cli.options import ConfigurationOptions, configuration_options
+from gen_data.core.capture import Channel
+from gen_data.core.errors import ConfigError
+from gen_data.core.optional_packages import missing_packages
+from gen_data.core.sample import Sample
 
 if TYPE_CHECKING:
-    from gen_data.generator.preview.overlay import Image
-    from gen_data.generator.preview.sensor_views import PointColors
+    from gen_data.preview.overlay import Image
+    from gen_data.preview.sensor_views import PointColors
 
 
 WRITTEN = "written"
@@ -60,13 +60,13 @@ def preview(
     SOURCE is a configuration (a path or a shipped name), or the folder of a data set, whose
     samples are generated again from its plan.
     """
-    from gen_data.generator.assemble.pipeline_factory import open_pipeline
+    from gen_data.assemble.pipeline_factory import open_pipeline
 
     missing = missing_packages("rerun")
     if missing:
         raise ConfigError(f"gen-data preview {missing}; gen-data contact-sheet draws without it")
-    from gen_data.generator.preview.rerun_recording import save_recording, send_samples
-    from gen_data.generator.preview.viewer import open_window, serve_web
+    from gen_data.preview.rerun_recording import save_recording, send_samples
+    from gen_data.preview.viewer import open_window, serve_web
 
     config = ConfigurationOptions(source, seed, overrides, without).config()
     with open_pipeline(config) as pipeline:
@@ -129,13 +129,8 @@ def contact_sheet(
     SOURCES are configurations (paths or shipped names) or folders of data sets, in the order of
     the tiles.
     """
-    from gen_data.generator.assemble.pipeline_factory import open_pipeline
-    from gen_data.generator.preview.contact_sheet import (
-        arrange_tiles,
-        make_tiles,
-        render_tiles,
-        write_sheet,
-    )
+    from gen_data.assemble.pipeline_factory import open_pipeline
+    from gen_data.preview.contact_sheet import arrange_tiles, make_tiles, render_tiles, write_sheet
 
     own = channels == WRITTEN
     wanted = () if own else tuple(_channel(name.strip()) for name in channels.split(","))

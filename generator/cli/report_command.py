@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from gen_data.generator.cli.tables import print_tables
-from gen_data.generator.core.errors import ConfigError, StorageError
-from gen_data.generator.core.whole_files import write_whole
+from gen_data.cli.tables import print_tables
+from gen_data.core.errors import ConfigError, StorageError
+from gen_data.core.whole_files import write_whole
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -69,11 +69,7 @@ def report(folder: Path, compare: Path | None, html: Path | None, scenes: int) -
 
 
 def _describe(folder: Path, scenes: int, sets: int, console: Console) -> dict[str, Any]:
-    from gen_data.generator.report.report_data import (
-        BROWSER_BYTES_MAX,
-        describe_dataset,
-        describe_folder,
-    )
+    from gen_data.report.report_data import BROWSER_BYTES_MAX, describe_dataset, describe_folder
 
     if not (folder / "plan.json").is_file():
         return describe_folder(folder)
@@ -87,8 +83,8 @@ def _describe(folder: Path, scenes: int, sets: int, console: Console) -> dict[st
 
 
 def _write(page: Path, sets: list[dict[str, Any]]) -> None:
-    from gen_data.generator.report.html_page import format_page
-    from gen_data.generator.report.report_data import without_pictures
+    from gen_data.report.html_page import format_page
+    from gen_data.report.report_data import without_pictures
 
     figures = [without_pictures(described) for described in sets]
     text = json.dumps({"sets": figures}, ensure_ascii=False, indent=1) + "\n"

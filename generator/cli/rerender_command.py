@@ -53,9 +53,9 @@ def rerender(
     force: bool,
 ) -> None:
     """Render a finished data set again."""
-    from gen_data.generator.api.rerender import rerender as render_again
-    from gen_data.generator.cli.generate_command import print_summary, progress_bar
-    from gen_data.generator.runner.stored import StoredSamples
+    from gen_data.api.rerender import rerender as render_again
+    from gen_data.cli.generate_command import print_summary, progress_bar
+    from gen_data.runner.stored import StoredSamples
 
     with progress_bar(StoredSamples(folder).n) as show:
         summary = render_again(

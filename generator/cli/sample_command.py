@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from gen_data.generator.cli.options import configuration_options
+from gen_data.cli.options import configuration_options
 
 
 @click.command("sample")
@@ -28,7 +28,7 @@ def sample(
 
     Its files have the same bytes as in the whole data set.
     """
-    from gen_data.generator.api.write_sample import write_sample
+    from gen_data.api.write_sample import write_sample
 
     folder = write_sample(source, index, out, seed=seed, overrides=overrides, without=without)
     click.echo(f"{folder}: sample {index}")

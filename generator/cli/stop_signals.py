@@ -1,7 +1,7 @@
 """Requests to stop a command, by signal: clean up and end, within seconds, and at once if repeated.
 
 The first request raises KeyboardInterrupt in the main thread, unless a run handles it
-(``gen_data.generator.runner.termination_signals``). Python delivers it between two steps of Python
+(``gen_data.runner.termination_signals``). Python delivers it between two steps of Python
 code only, and drops it in some places, such as destructors. Therefore a thread watches: the process
 ends ``PATIENCE_S`` after the first request, or at the second one.
 """
@@ -16,7 +16,7 @@ import threading
 import time
 from types import FrameType
 
-from gen_data.generator.core.system_calls import stop_signals, wake_channel
+from gen_data.core.system_calls import stop_signals, wake_channel
 
 SIGNALS = stop_signals()
 PATIENCE_S = 8.0
@@ -24,7 +24,7 @@ REPEATED_S = 0.1
 """Signals that follow within this time are the same request: ``timeout`` signals a process, and
 then its group."""
 INTERRUPTED = 130
-"""Exit code of ``gen_data.generator.core.errors.Interrupted``."""
+"""Exit code of ``gen_data.core.errors.Interrupted``."""
 SHOW_CURSOR = "\x1b[?25h"
 
 _installed: list[signal.Signals] = []

@@ -11,18 +11,13 @@ from typing import TYPE_CHECKING
 
 import click
 
-from gen_data.generator.core.errors import (
-    ConfigError,
-    DeterminismError,
-    GenDataError,
-    VerificationError,
-)
-from gen_data.generator.core.urls import is_url
+from gen_data.core.errors import ConfigError, DeterminismError, GenDataError, VerificationError
+from gen_data.core.urls import is_url
 
 if TYPE_CHECKING:
-    from gen_data.generator.runner.verify import Finding
+    from gen_data.runner.verify import Finding
 
-_CHECK_CERTIFICATE = "gen_data.generator.certificate.verification:check_certificate"
+_CHECK_CERTIFICATE = "gen_data.lab.certificate.verification:check_certificate"
 """Function of the laboratory, which stands above the command line."""
 
 VERIFY_HELP = """Check a data set against its manifest. Exit code 7 if it deviates.
@@ -68,8 +63,8 @@ def verify(
     if not is_url(place):
         _verify(Path(place), full, deep, regenerate, semantic, source, as_json)
         return
-    from gen_data.generator.core.temporary_folders import temporary_folder
-    from gen_data.generator.runner.object_store import ObjectFolder, copy_outline
+    from gen_data.core.temporary_folders import temporary_folder
+    from gen_data.runner.object_store import ObjectFolder, copy_outline
 
     objects = ObjectFolder(place.rstrip("/"))
     with temporary_folder("verify") as folder:
@@ -98,13 +93,8 @@ def _verify(
 ) -> None:
     """Check a data set in a folder; ``place`` is its name in the result, empty = the folder."""
     place = place or str(folder)
-    from gen_data.generator.runner.deep_verify import choose_samples
-    from gen_data.generator.runner.verify import (
-        describe_findings,
-        find_deviations,
-        scan_finished,
-        summarize,
-    )
+    from gen_data.runner.deep_verify import choose_samples
+    from gen_data.runner.verify import describe_findings, find_deviations, scan_finished, summarize
 
     if semantic and regenerate is None:
         raise ConfigError("--semantic: needs --regenerate K, whose comparison it changes")
@@ -142,16 +132,16 @@ def _verify(
 
 
 def _find_invalid(folder: Path) -> list[Finding]:
-    from gen_data.generator.runner.deep_verify import find_invalid_samples
+    from gen_data.runner.deep_verify import find_invalid_samples
 
     return list(find_invalid_samples(folder))
 
 
 def _check_certificate(folder: Path, deep: bool, notes: list[str]) -> list[Finding]:
     """Compare a certificate with the manifest, and with ``deep`` with one that is made now."""
-    from gen_data.generator.core.plugins import loaded
-    from gen_data.generator.runner.layout import CERTIFICATE_NAME
-    from gen_data.generator.runner.verify import Finding
+    from gen_data.core.plugins import loaded
+    from gen_data.runner.layout import CERTIFICATE_NAME
+    from gen_data.runner.verify import Finding
 
     contradictions, compared = loaded(_CHECK_CERTIFICATE, "certificate")(folder, deep)
     notes += compared
@@ -163,7 +153,7 @@ def _find_irreproducible(
 ) -> list[Finding]:
     from threadpoolctl import threadpool_limits
 
-    from gen_data.generator.runner.deep_verify import find_irreproducible_samples
+    from gen_data.runner.deep_verify import find_irreproducible_samples
 
     with threadpool_limits(limits=1):
         return list(find_irreproducible_samples(folder, indices, semantic, source))
@@ -187,10 +177,10 @@ def repair(folder: Path, source: Path | None, workers: int | None) -> None:
 
     Damaged and foreign files are moved to FOLDER/run/quarantine.
     """
-    from gen_data.generator.api.repair import repair as restore
-    from gen_data.generator.cli.generate_command import print_summary, progress_bar
-    from gen_data.generator.runner.layout import PLAN_NAME
-    from gen_data.generator.runner.plan import load_plan
+    from gen_data.api.repair import repair as restore
+    from gen_data.cli.generate_command import print_summary, progress_bar
+    from gen_data.runner.layout import PLAN_NAME
+    from gen_data.runner.plan import load_plan
 
     # A damaged plan is restored below; until then the number of samples is not known.
     try:
@@ -218,7 +208,7 @@ def diff(one: Path, other: Path, semantic: bool) -> None:
     Stages are scene, geometry, render, labels and encode. Two folders of one shard can be compared,
     too. Exit code 5 if there is a difference.
     """
-    from gen_data.generator.runner.diff import compare
+    from gen_data.runner.diff import compare
 
     result = compare(one, other, semantic)
     for line in _listed(result.plan, 20):
@@ -247,7 +237,7 @@ def repro(source: str, index: int, out: Path | None, rerendered_from: Path | Non
 
     Prints a digest per stage. Exit code 5 if a stage differs, 6 if the sample cannot be generated.
     """
-    from gen_data.generator.api.reproduce import reproduce
+    from gen_data.api.reproduce import reproduce
 
     result = reproduce(source, index, out, rerendered_from=rerendered_from)
     for stage, digest in result.digests.items():

@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 import yaml
 
-from gen_data.generator.core.serialization import from_plain
+from gen_data.core.serialization import from_plain
 
 T = TypeVar("T")
 

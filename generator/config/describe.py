@@ -12,14 +12,14 @@ from typing import Any, NamedTuple
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
-from gen_data.generator.config.distributions import Bounds
-from gen_data.generator.config.schema import (
+from gen_data.config.distributions import Bounds
+from gen_data.config.schema import (
     FieldSchema,
     docstring_summary,
     documented_attributes,
     to_plain_yaml,
 )
-from gen_data.generator.config.yaml_scalars import to_flow_yaml
+from gen_data.config.yaml_scalars import to_flow_yaml
 
 TEXT_WIDTH = 80
 """Columns of a terminal, also where the output is piped."""

@@ -6,9 +6,9 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from gen_data.generator.config.problems import refuse
-from gen_data.generator.config.yaml_tree import Node
-from gen_data.generator.core.errors import ConfigError
+from gen_data.config.problems import refuse
+from gen_data.config.yaml_tree import Node
+from gen_data.core.errors import ConfigError
 
 _FIELD = re.compile(
     r"(?P<list>elements|randomizers|sensors)\.(?P<name>[\w-]+)(\.(?P<field>[\w.]+))?: (?P<fact>.*)",

@@ -14,8 +14,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from gen_data.generator.config.shared_values import is_reference
-from gen_data.generator.config.yaml_tree import Node, is_distribution
+from gen_data.config.shared_values import is_reference
+from gen_data.config.yaml_tree import Node, is_distribution
 
 ASSET_KEYS = frozenset({"asset", "ids", "tags", "any_of"})
 """Alternatives: a mapping that gives one of these keys inherits none of them."""

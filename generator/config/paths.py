@@ -12,10 +12,10 @@ import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from gen_data.generator.config.problems import Position, Problem
-from gen_data.generator.config.yaml_scalars import abbreviate
-from gen_data.generator.core.errors import ConfigError, did_you_mean
-from gen_data.generator.core.urls import is_url
+from gen_data.config.problems import Position, Problem
+from gen_data.config.yaml_scalars import abbreviate
+from gen_data.core.errors import ConfigError, did_you_mean
+from gen_data.core.urls import is_url
 
 PLAN = "plan.json"
 """Record of a data set; its paths are relative to its configuration, which lies elsewhere."""

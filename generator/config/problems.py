@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass, field
 from typing import NoReturn
 
-from gen_data.generator.core.errors import ConfigError
+from gen_data.core.errors import ConfigError
 
 FieldPath = tuple[str | int, ...]
 """Keys and indices from the root of a document: ``("randomizers", 0, "count")``."""

@@ -12,19 +12,12 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 
-from gen_data.generator.config.data_files import load_data
-from gen_data.generator.config.merging import merge_nodes
-from gen_data.generator.config.paths import PLAN
-from gen_data.generator.config.problems import (
-    FieldPath,
-    Position,
-    Problem,
-    Problems,
-    format_path,
-    refuse,
-)
-from gen_data.generator.config.shared_values import SWITCH
-from gen_data.generator.config.yaml_tree import Node
+from gen_data.config.data_files import load_data
+from gen_data.config.merging import merge_nodes
+from gen_data.config.paths import PLAN
+from gen_data.config.problems import FieldPath, Position, Problem, Problems, format_path, refuse
+from gen_data.config.shared_values import SWITCH
+from gen_data.config.yaml_tree import Node
 
 Words = Mapping[str, str]
 """Current words by deprecated ones."""

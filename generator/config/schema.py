@@ -17,8 +17,8 @@ from typing import Any
 from pydantic import BaseModel
 from pydantic.json_schema import GenerateJsonSchema
 
-from gen_data.generator.config.distributions import DISTRIBUTION_TITLE, Bounds, Distribution
-from gen_data.generator.config.yaml_scalars import to_flow_yaml
+from gen_data.config.distributions import DISTRIBUTION_TITLE, Bounds, Distribution
+from gen_data.config.yaml_scalars import to_flow_yaml
 
 SHARED_VALUE = "shared_value"
 """Name of the definition for references to shared values."""

@@ -21,21 +21,15 @@ from dataclasses import replace
 from graphlib import CycleError, TopologicalSorter
 from typing import Any
 
-from gen_data.generator.config.distributions import (
-    FLAG,
-    NAME,
-    NUMBER,
-    WHOLE_NUMBER,
-    Distribution,
-)
-from gen_data.generator.config.distributions.base import Kind, Malformed, read_distribution
-from gen_data.generator.config.problems import FieldPath, Position, refuse
-from gen_data.generator.config.yaml_scalars import abbreviate, quote_value, resolve_scalar
-from gen_data.generator.config.yaml_tree import Node, is_distribution
-from gen_data.generator.core.bounded_cache import ObjectCache
-from gen_data.generator.core.errors import did_you_mean
-from gen_data.generator.core.scene import SharedValue
-from gen_data.generator.core.streams import Streams
+from gen_data.config.distributions import FLAG, NAME, NUMBER, WHOLE_NUMBER, Distribution
+from gen_data.config.distributions.base import Kind, Malformed, read_distribution
+from gen_data.config.problems import FieldPath, Position, refuse
+from gen_data.config.yaml_scalars import abbreviate, quote_value, resolve_scalar
+from gen_data.config.yaml_tree import Node, is_distribution
+from gen_data.core.bounded_cache import ObjectCache
+from gen_data.core.errors import did_you_mean
+from gen_data.core.scene import SharedValue
+from gen_data.core.streams import Streams
 
 REFERENCE = "$shared."
 SWITCH = "switch"

@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from gen_data.generator.config.distributions import MEANT, Malformed
-from gen_data.generator.config.problems import FieldPath, Position, Problems, format_path
-from gen_data.generator.config.schema import FieldSchema
-from gen_data.generator.config.yaml_scalars import quote_value, to_flow_yaml
-from gen_data.generator.config.yaml_tree import Node
-from gen_data.generator.core.errors import did_you_mean
+from gen_data.config.distributions import MEANT, Malformed
+from gen_data.config.problems import FieldPath, Position, Problems, format_path
+from gen_data.config.schema import FieldSchema
+from gen_data.config.yaml_scalars import quote_value, to_flow_yaml
+from gen_data.config.yaml_tree import Node
+from gen_data.core.errors import did_you_mean
 
 if TYPE_CHECKING:
     from pydantic_core import ErrorDetails

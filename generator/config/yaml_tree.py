@@ -23,15 +23,10 @@ from yaml.events import (
     SequenceEndEvent,
 )
 
-from gen_data.generator.config.distributions.base import DISTRIBUTIONS
-from gen_data.generator.config.problems import FieldPath, Position, Problems, format_path, refuse
-from gen_data.generator.config.yaml_scalars import (
-    PlainScalar,
-    abbreviate,
-    quote_value,
-    resolve_scalar,
-)
-from gen_data.generator.core.errors import ConfigError, did_you_mean
+from gen_data.config.distributions.base import DISTRIBUTIONS
+from gen_data.config.problems import FieldPath, Position, Problems, format_path, refuse
+from gen_data.config.yaml_scalars import PlainScalar, abbreviate, quote_value, resolve_scalar
+from gen_data.core.errors import ConfigError, did_you_mean
 
 MAX_FILE_BYTES = 1024 * 1024
 MAX_DEPTH = 32

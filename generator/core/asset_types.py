@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.core.se3 import SE3, Vec3
+from gen_data.core.se3 import SE3, Vec3
 
 Float32 = NDArray[np.float32]
 Int32 = NDArray[np.int32]

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.core.se3 import SE3, Array, Vec3
+from gen_data.core.se3 import SE3, Array, Vec3
 
 
 @dataclass(frozen=True, slots=True)

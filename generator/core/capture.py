@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.core.scene import Camera, Device, Lidar
+from gen_data.core.scene import Camera, Device, Lidar
 
 ImageFormat = Literal["png", "jpeg", "webp", "webp_lossless"]
 
@@ -192,7 +192,7 @@ class Measurements:
 
     Attributes:
         rows: Records [n] of
-            ``gen_data.generator.core.measurement_dtypes.table_dtype(device.kind)``; may be empty.
+            ``gen_data.core.measurement_dtypes.table_dtype(device.kind)``; may be empty.
         time_s: The instant that ``device`` refers to.
     """
 
@@ -258,7 +258,7 @@ class LidarHits:
             float32; 0.
         incidence_cos: Cosine of the angle of incidence, float32; 0.
         instance_id, category_id: uint16; 0.
-        surface: Index in ``gen_data.generator.core.asset_types.SURFACES``, uint8; 0.
+        surface: Index in ``gen_data.core.asset_types.SURFACES``, uint8; 0.
         detours: Secondary hits; None = none.
     """
 

@@ -12,7 +12,7 @@ from typing import Any, TypeVar, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.core.se3 import Array
+from gen_data.core.se3 import Array
 
 Real = TypeVar("Real", bound=np.floating[Any])
 

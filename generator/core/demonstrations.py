@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
-from gen_data.generator.core.asset_types import RobotModel
-from gen_data.generator.core.kinematics import gripper_opening, link_poses
-from gen_data.generator.core.scene import Articulation, Episode, Span
-from gen_data.generator.core.se3 import SE3, Vec3
+from gen_data.core.asset_types import RobotModel
+from gen_data.core.kinematics import gripper_opening, link_poses
+from gen_data.core.scene import Articulation, Episode, Span
+from gen_data.core.se3 import SE3, Vec3
 
 AnySpan = TypeVar("AnySpan", bound=Span)
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gen_data.generator.core.se3 import Array
+from gen_data.core.se3 import Array
 
 EQUATOR_M = 6_378_137.0
 FLATTENING = 1.0 / 298.257223563

@@ -4,7 +4,7 @@ Writing a plug-in
 -----------------
 A plug-in is a class listed in the ``TABLE`` of its package, or an entry point of the group
 ``gen_data.<kind>``. Classes of the kinds ``element``, ``randomizer``, ``sensor``, ``annotation``,
-``exporter`` and ``renderer`` derive from ``gen_data.generator.config.base_model.Strict``: their
+``exporter`` and ``renderer`` derive from ``gen_data.config.base_model.Strict``: their
 fields are the keys of their entry in YAML, and instances are created by validating that entry. The
 field ``type`` is ``Literal["<name in the table>"]`` (``renderer`` instead of ``type`` for a
 renderer) with the name as its default. Instances are frozen, picklable, and created before any
@@ -12,11 +12,11 @@ engine is opened, so importing their module must not import heavy libraries.
 
 Every member of a Protocol below is required. Base classes provide those that few plug-ins need:
 ``gen_data.randomizers.base.RandomizerBase``, ``gen_data.scene_templates.element.Element``,
-``gen_data.generator.sensors.mounting.Mounted`` and ``Instrument``,
+``gen_data.sensors.mounting.Mounted`` and ``Instrument``,
 ``gen_data.exporters.base.ExporterBase``. A class that lacks a member is refused when it is loaded.
 
 The kind ``asset_family`` differs: its entry points name instances of
-``gen_data.generator.assets.family.Family``, ``TextureFamily`` or ``EnvironmentFamily``.
+``gen_data.assets.family.Family``, ``TextureFamily`` or ``EnvironmentFamily``.
 
 Forbidden operations are impossible by design: randomizers get no engine, annotators no rng, and
 exporters process one shard at a time and compute ids instead of counting.
@@ -33,7 +33,7 @@ from typing import Any, Protocol, runtime_checkable
 
 from numpy.typing import NDArray
 
-from gen_data.generator.core.asset_types import (
+from gen_data.core.asset_types import (
     Asset,
     ConvexParts,
     Float32,
@@ -43,7 +43,7 @@ from gen_data.generator.core.asset_types import (
     RobotModel,
     TextureData,
 )
-from gen_data.generator.core.capture import (
+from gen_data.core.capture import (
     PNG,
     Channel,
     ImageEncoding,
@@ -53,14 +53,14 @@ from gen_data.generator.core.capture import (
     PointCloud,
     SensorReading,
 )
-from gen_data.generator.core.errors import Rejection
-from gen_data.generator.core.lens import LensModel
-from gen_data.generator.core.measurement_dtypes import Column
-from gen_data.generator.core.plates import Plate
-from gen_data.generator.core.sample import EgoTruth, ImageTruth, ObjectTruth, Sample
-from gen_data.generator.core.scene import Camera, Lane, Lidar, Scene, StageModel
-from gen_data.generator.core.se3 import Vec3
-from gen_data.generator.core.streams import Rng
+from gen_data.core.errors import Rejection
+from gen_data.core.lens import LensModel
+from gen_data.core.measurement_dtypes import Column
+from gen_data.core.plates import Plate
+from gen_data.core.sample import EgoTruth, ImageTruth, ObjectTruth, Sample
+from gen_data.core.scene import Camera, Lane, Lidar, Scene, StageModel
+from gen_data.core.se3 import Vec3
+from gen_data.core.streams import Rng
 
 
 class Stage(str, Enum):
@@ -362,7 +362,7 @@ class SensorInfo:
         channels: Cameras: channels written as images, in the order of ``Channel``.
         lens: Cameras: model of the lens.
         columns: Devices: columns of its rows; the first is
-            ``gen_data.generator.core.measurement_dtypes.TIME``.
+            ``gen_data.core.measurement_dtypes.TIME``.
         rate_hz: Readings per second; None = one per step. Cameras and laser scanners read at most
             once per step.
         time_offset_s: Delay of readings after the step's instant [s].

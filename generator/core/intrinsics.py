@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.core.bounded_cache import ByteCache
-from gen_data.generator.core.lens import PINHOLE, Lens
-from gen_data.generator.core.se3 import Array
+from gen_data.core.bounded_cache import ByteCache
+from gen_data.core.lens import PINHOLE, Lens
+from gen_data.core.se3 import Array
 
 _ROWS_AT_ONCE = 64
 
@@ -23,7 +23,7 @@ _ROWS_AT_ONCE = 64
 class Intrinsics:
     """A camera's inner geometry; values in pixels.
 
-    A point of the lens's plane (see ``gen_data.generator.core.lens``) is in the image at
+    A point of the lens's plane (see ``gen_data.core.lens``) is in the image at
     ``(fx_px * x + cx_px, fy_px * y + cy_px)``.
     """
 

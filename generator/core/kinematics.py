@@ -8,10 +8,10 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from gen_data.generator.core.asset_types import Gripper, Joint, RobotModel
-from gen_data.generator.core.errors import did_you_mean
-from gen_data.generator.core.scene import Articulation, Body
-from gen_data.generator.core.se3 import SE3
+from gen_data.core.asset_types import Gripper, Joint, RobotModel
+from gen_data.core.errors import did_you_mean
+from gen_data.core.scene import Articulation, Body
+from gen_data.core.se3 import SE3
 
 POSITION_DECIMALS = 6
 """Decimals of joint positions [rad or m] that physics returns."""

@@ -10,9 +10,9 @@ from typing import Literal
 
 import numpy as np
 
-from gen_data.generator.core.bounded_cache import ObjectCache
-from gen_data.generator.core.scene import Lane
-from gen_data.generator.core.se3 import SE3, Array, Vec3
+from gen_data.core.bounded_cache import ObjectCache
+from gen_data.core.scene import Lane
+from gen_data.core.se3 import SE3, Array, Vec3
 
 Side = Literal["left", "right"]
 SIDES: tuple[Side, Side] = ("left", "right")

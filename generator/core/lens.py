@@ -29,7 +29,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.core.se3 import Array
+from gen_data.core.se3 import Array
 
 LensModel = Literal["pinhole", "brown_conrady", "kannala_brandt", "equirectangular"]
 

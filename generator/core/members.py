@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.scene import Body, Instance, Motion, ObjectGroup, Scene
-from gen_data.generator.core.se3 import SE3
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.scene import Body, Instance, Motion, ObjectGroup, Scene
+from gen_data.core.se3 import SE3
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.core.asset_types import Material
-from gen_data.generator.core.se3 import (
+from gen_data.core.asset_types import Material
+from gen_data.core.se3 import (
     SE3,
     Array,
     Vec3,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from importlib.util import find_spec
 
-from gen_data.generator.core.distribution import install_command
+from gen_data.core.distribution import install_command
 
 EXTRAS = {
     "OpenEXR": ("OpenEXR", "exr"),

@@ -8,9 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from gen_data.generator.core.asset_types import Material
-from gen_data.generator.core.scene import PANEL_KINDS, Body, Light, Scene
-from gen_data.generator.core.se3 import SE3, Vec3
+from gen_data.core.asset_types import Material
+from gen_data.core.scene import PANEL_KINDS, Body, Light, Scene
+from gen_data.core.se3 import SE3, Vec3
 
 
 def flux_to_intensity_cd(light: Light, flux_lm: float) -> float:

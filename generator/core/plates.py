@@ -14,20 +14,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.core.asset_types import Asset, Material
-from gen_data.generator.core.colorimetry import luminance
-from gen_data.generator.core.errors import ConfigError, did_you_mean
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.scene import (
-    Body,
-    Camera,
-    Environment,
-    Lane,
-    Light,
-    Scene,
-    SupportSurface,
-)
-from gen_data.generator.core.se3 import SE3, Array, Vec3, rotation_to_quaternion
+from gen_data.core.asset_types import Asset, Material
+from gen_data.core.colorimetry import luminance
+from gen_data.core.errors import ConfigError, did_you_mean
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.scene import Body, Camera, Environment, Lane, Light, Scene, SupportSurface
+from gen_data.core.se3 import SE3, Array, Vec3, rotation_to_quaternion
 
 PointPx = tuple[float, float]
 

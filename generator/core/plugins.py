@@ -9,7 +9,7 @@ from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any, Generic, TypeVar
 
-from gen_data.generator.core.errors import ConfigError, one_of
+from gen_data.core.errors import ConfigError, one_of
 
 P = TypeVar("P")
 """The Protocol that the plug-ins of a table implement."""
@@ -67,19 +67,13 @@ class PluginTable(Generic[P]):
         if not self.protocols:
             return ""
         if not hasattr(plugin, "model_validate_json"):
-            return (
-                "cannot be read from YAML: derive it from "
-                "gen_data.generator.config.base_model.Strict"
-            )
+            return "cannot be read from YAML: derive it from gen_data.config.base_model.Strict"
         own = {m for base in plugin.__mro__ for m in (*vars(base), *_annotations(base))}
         lacking: list[list[str]] = [sorted(_members(protocol) - own) for protocol in self.protocols]
         if all(lacking):
             fewest = min(lacking, key=len)
             protocol = self.protocols[lacking.index(fewest)]
-            return (
-                f"lacks {', '.join(fewest)}; see "
-                f"gen_data.generator.core.interfaces.{protocol.__name__}"
-            )
+            return f"lacks {', '.join(fewest)}; see gen_data.core.interfaces.{protocol.__name__}"
         if f"'{name}'" not in str(_field_type(plugin, self.tag)).replace('"', "'"):
             return f"""needs a field `{self.tag}: Literal["{name}"] = "{name}"`"""
         return ""

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.core.scene import Camera, Instance, Scene
-from gen_data.generator.core.se3 import IDENTITY, SE3, Array
+from gen_data.core.scene import Camera, Instance, Scene
+from gen_data.core.se3 import IDENTITY, SE3, Array
 
 _ITERATIONS = 5
 """The row of a point depends on its instant and vice versa. Fixed-point iteration shrinks the error

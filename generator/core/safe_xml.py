@@ -7,7 +7,7 @@ from typing import Any
 from xml.etree.ElementTree import Element, TreeBuilder
 from xml.parsers import expat
 
-from gen_data.generator.core.errors import AssetError
+from gen_data.core.errors import AssetError
 
 MAX_DEPTH = 64
 _OTHER_VERSION = re.compile(rb"""\A((?:\xef\xbb\xbf)?<\?xml\s+version\s*=\s*["'])(?!1\.)[^"']+""")

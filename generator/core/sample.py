@@ -10,12 +10,12 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.core.boxes import BoxPx, OrientedBox
-from gen_data.generator.core.capture import Capture
-from gen_data.generator.core.lane_geometry import LaneBorder
-from gen_data.generator.core.motion import STILL, Twist
-from gen_data.generator.core.scene import Camera, Instance, Scene
-from gen_data.generator.core.se3 import IDENTITY, SE3, Vec3
+from gen_data.core.boxes import BoxPx, OrientedBox
+from gen_data.core.capture import Capture
+from gen_data.core.lane_geometry import LaneBorder
+from gen_data.core.motion import STILL, Twist
+from gen_data.core.scene import Camera, Instance, Scene
+from gen_data.core.se3 import IDENTITY, SE3, Vec3
 
 
 @dataclass(frozen=True, eq=False, slots=True)

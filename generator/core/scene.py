@@ -10,13 +10,13 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import Literal, Protocol, TypeVar, get_args
 
-from gen_data.generator.core.asset_types import Keypoint, Material
-from gen_data.generator.core.boxes import OrientedBox
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.motion import STILL, JointTrajectory, StateChange, Trajectory, Twist
-from gen_data.generator.core.se3 import IDENTITY, SE3, Vec3
-from gen_data.generator.core.serialization import SPARSE
-from gen_data.generator.core.shutter import INSTANT, Shutter
+from gen_data.core.asset_types import Keypoint, Material
+from gen_data.core.boxes import OrientedBox
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.motion import STILL, JointTrajectory, StateChange, Trajectory, Twist
+from gen_data.core.se3 import IDENTITY, SE3, Vec3
+from gen_data.core.serialization import SPARSE
+from gen_data.core.shutter import INSTANT, Shutter
 
 SharedValue = str | float | int | bool
 Motion = Literal["static", "dynamic", "kinematic"]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from gen_data.generator.core.scene import Scene
+from gen_data.core.scene import Scene
 
 
 def assets_in(scene: Scene) -> set[str]:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from gen_data.generator.core.motion import STILL, StateChange, Twist
-from gen_data.generator.core.scene import (
+from gen_data.core.motion import STILL, StateChange, Twist
+from gen_data.core.scene import (
     Articulation,
     Body,
     Camera,
@@ -17,7 +17,7 @@ from gen_data.generator.core.scene import (
     Rig,
     Scene,
 )
-from gen_data.generator.core.se3 import SE3, Vec3, rotate_by_quaternion
+from gen_data.core.se3 import SE3, Vec3, rotate_by_quaternion
 
 RIG_AXES = SE3((0.0, 0.0, 0.0), (0.5, 0.5, -0.5, 0.5))
 """``T_camera_rig``: X forward, Y left, Z up in the camera's X right, Y down, Z forward."""
@@ -38,7 +38,7 @@ def scene_at(scene: Scene, time_s: float) -> Scene:
     change.
 
     Boxes of instances with several bodies (robots) are not updated, as that takes geometry: scenes
-    for sensors and labels come from ``gen_data.generator.pipeline.finalize_scene.Timeline``.
+    for sensors and labels come from ``gen_data.pipeline.finalize_scene.Timeline``.
     """
     if time_s == scene.time_s:
         return scene

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from gen_data.generator.core.se3 import Array
+from gen_data.core.se3 import Array
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.core.asset_types import Float32
-from gen_data.generator.core.scene import Camera
+from gen_data.core.asset_types import Float32
+from gen_data.core.scene import Camera
 
 ALIGNED = 1e-6
 """Largest deviation, in metres and as a sine, of cameras that look the same way."""

@@ -16,7 +16,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from gen_data.generator.core.system_calls import try_lock
+from gen_data.core.system_calls import try_lock
 
 PREFIX = "gen-data-"
 _LOCKS_FOLDERS = hasattr(os, "O_DIRECTORY")

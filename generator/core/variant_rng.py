@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TypeVar
 
-from gen_data.generator.core.streams import Rng, Streams
+from gen_data.core.streams import Rng, Streams
 
 T = TypeVar("T")
 

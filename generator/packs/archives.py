@@ -25,7 +25,7 @@ from functools import partial
 from pathlib import Path
 from typing import IO
 
-from gen_data.generator.core.errors import AssetError
+from gen_data.core.errors import AssetError
 
 _INNER = (".sh3f", ".zip")
 """Suffixes of members that are archives themselves and are searched too."""

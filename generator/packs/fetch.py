@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 
-from gen_data.generator.config.data_files import load_data
-from gen_data.generator.core.errors import AssetError
-from gen_data.generator.core.processes import tie
-from gen_data.generator.packs.pack_table import ClientName, Pack
+from gen_data.config.data_files import load_data
+from gen_data.core.errors import AssetError
+from gen_data.core.processes import tie
+from gen_data.packs.pack_table import ClientName, Pack
 
 _TIMEOUT_S = 1800
 

@@ -13,13 +13,13 @@ import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from gen_data.generator.assets.installed_packs import RECORD_NAME, Record, StoredFile, read_record
-from gen_data.generator.core.errors import AssetError, GenDataError, StorageError, VerificationError
-from gen_data.generator.core.serialization import canonical_json
-from gen_data.generator.core.system_calls import try_lock, wait_for_lock
-from gen_data.generator.packs.archives import extract
-from gen_data.generator.packs.fetch import check_archive, fetch, file_digest
-from gen_data.generator.packs.pack_table import Pack
+from gen_data.assets.installed_packs import RECORD_NAME, Record, StoredFile, read_record
+from gen_data.core.errors import AssetError, GenDataError, StorageError, VerificationError
+from gen_data.core.serialization import canonical_json
+from gen_data.core.system_calls import try_lock, wait_for_lock
+from gen_data.packs.archives import extract
+from gen_data.packs.fetch import check_archive, fetch, file_digest
+from gen_data.packs.pack_table import Pack
 
 _SCRATCH = ".scratch-"
 _LOCK = ".lock"

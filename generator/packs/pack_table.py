@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from gen_data.generator.assets.content import content
-from gen_data.generator.config.data_files import load_data
-from gen_data.generator.core.errors import ConfigError, did_you_mean
+from gen_data.assets.content import content
+from gen_data.config.data_files import load_data
+from gen_data.core.errors import ConfigError, did_you_mean
 
 ClientName = Literal["pip", "apt", "npm"]
 

@@ -6,10 +6,10 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from gen_data.generator.assets.file_library import PYBULLET
-from gen_data.generator.assets.library import Library, open_library
-from gen_data.generator.assets.paths import OFFLINE, may_fetch
-from gen_data.generator.core.errors import AssetError
+from gen_data.assets.file_library import PYBULLET
+from gen_data.assets.library import Library, open_library
+from gen_data.assets.paths import OFFLINE, may_fetch
+from gen_data.core.errors import AssetError
 
 
 def open_assets(user_roots: Sequence[Path] = ()) -> Library:
@@ -30,8 +30,8 @@ def provide_pybullet(folder: Path) -> None:
     """
     if not may_fetch():
         return
-    from gen_data.generator.packs.install import install_once
-    from gen_data.generator.packs.pack_table import find_pack
+    from gen_data.packs.install import install_once
+    from gen_data.packs.pack_table import find_pack
 
     pack = find_pack(PYBULLET)
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from gen_data.generator.core.interfaces import AssetLibrary
-from gen_data.generator.physics.physics_config import PhysicsConfig, missing_engine
+from gen_data.core.interfaces import AssetLibrary
+from gen_data.physics.physics_config import PhysicsConfig, missing_engine
 
 if TYPE_CHECKING:
-    from gen_data.generator.physics.engine import Engine
+    from gen_data.physics.engine import Engine
 
 __all__ = ["PhysicsConfig", "missing_engine", "open_engine"]
 
@@ -19,6 +19,6 @@ def open_engine(assets: AssetLibrary, config: PhysicsConfig) -> Engine:
     Raises:
         ConfigError: the configured one is not installed.
     """
-    from gen_data.generator.physics.engine import Engine
+    from gen_data.physics.engine import Engine
 
     return Engine(assets, config)

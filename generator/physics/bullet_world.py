@@ -12,12 +12,12 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from gen_data.generator.core.processes import silence_stdio
-from gen_data.generator.core.scene import BodyJoint
-from gen_data.generator.core.se3 import IDENTITY, SE3, Array, Vec3
-from gen_data.generator.core.temporary_folders import TemporaryFolder
-from gen_data.generator.physics.collision_shapes import CollisionShape, scale_step
-from gen_data.generator.physics.world import (
+from gen_data.core.processes import silence_stdio
+from gen_data.core.scene import BodyJoint
+from gen_data.core.se3 import IDENTITY, SE3, Array, Vec3
+from gen_data.core.temporary_folders import TemporaryFolder
+from gen_data.physics.collision_shapes import CollisionShape, scale_step
+from gen_data.physics.world import (
     ANGULAR_DAMPING_PER_S,
     GRAVITY_M_S2,
     ROLLING_FRICTION_SHARE,

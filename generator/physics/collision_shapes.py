@@ -19,9 +19,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.core.asset_types import ConvexParts
-from gen_data.generator.core.code_digests import code_digest
-from gen_data.generator.core.se3 import SE3, Array, Vec3
+from gen_data.core.asset_types import ConvexParts
+from gen_data.core.code_digests import code_digest
+from gen_data.core.se3 import SE3, Array, Vec3
 
 if TYPE_CHECKING:
     from scipy.spatial import ConvexHull

@@ -5,30 +5,26 @@ from __future__ import annotations
 from dataclasses import replace
 from types import TracebackType
 
-from gen_data.generator.core.bounded_cache import CountCache
-from gen_data.generator.core.errors import Rejection
-from gen_data.generator.core.interfaces import AssetLibrary, DerivedArrays, Settled
-from gen_data.generator.core.kinematics import make_link_bodies
-from gen_data.generator.core.scene import Articulation, Body, BodyJoint, Episode, Scene
-from gen_data.generator.physics.collision_shapes import (
+from gen_data.core.bounded_cache import CountCache
+from gen_data.core.errors import Rejection
+from gen_data.core.interfaces import AssetLibrary, DerivedArrays, Settled
+from gen_data.core.kinematics import make_link_bodies
+from gen_data.core.scene import Articulation, Body, BodyJoint, Episode, Scene
+from gen_data.physics.collision_shapes import (
     CollisionShape,
     collision_shape,
     pack_shape,
     shape_version,
     unpack_shape,
 )
-from gen_data.generator.physics.manipulation.arm_goals import Arm, ArmState
-from gen_data.generator.physics.manipulation.arm_simulation import (
-    ArmSimulation,
-    Servo,
-    SimulatedBodies,
-)
-from gen_data.generator.physics.manipulation.demonstration import demonstrate
-from gen_data.generator.physics.manipulation.joint_trajectories import TrajectoryRecording
-from gen_data.generator.physics.manipulation.manipulation_planner import TaskPlanner
-from gen_data.generator.physics.open_world import open_world
-from gen_data.generator.physics.physics_config import PhysicsConfig
-from gen_data.generator.physics.settling import Settling, candidate_surfaces
+from gen_data.physics.manipulation.arm_goals import Arm, ArmState
+from gen_data.physics.manipulation.arm_simulation import ArmSimulation, Servo, SimulatedBodies
+from gen_data.physics.manipulation.demonstration import demonstrate
+from gen_data.physics.manipulation.joint_trajectories import TrajectoryRecording
+from gen_data.physics.manipulation.manipulation_planner import TaskPlanner
+from gen_data.physics.open_world import open_world
+from gen_data.physics.physics_config import PhysicsConfig
+from gen_data.physics.settling import Settling, candidate_surfaces
 
 _SHAPES = 512
 """Capacity of the cache of collision shapes, about 20 kB each."""

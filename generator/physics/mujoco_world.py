@@ -17,10 +17,10 @@ from dataclasses import dataclass, field
 import mujoco
 import numpy as np
 
-from gen_data.generator.core.scene import BodyJoint
-from gen_data.generator.core.se3 import SE3, Array
-from gen_data.generator.physics.collision_shapes import CollisionShape, Hull
-from gen_data.generator.physics.world import (
+from gen_data.core.scene import BodyJoint
+from gen_data.core.se3 import SE3, Array
+from gen_data.physics.collision_shapes import CollisionShape, Hull
+from gen_data.physics.world import (
     ANGULAR_DAMPING_PER_S,
     GRAVITY_M_S2,
     JOINT_DAMPING_S,

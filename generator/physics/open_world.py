@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.physics.physics_config import PhysicsConfig, missing_engine
-from gen_data.generator.physics.world import World
+from gen_data.core.errors import ConfigError
+from gen_data.physics.physics_config import PhysicsConfig, missing_engine
+from gen_data.physics.world import World
 
 
 def open_world(config: PhysicsConfig) -> World:
@@ -17,9 +17,9 @@ def open_world(config: PhysicsConfig) -> World:
     if missing:
         raise ConfigError(f"physics.engine: {missing}")
     if config.engine == "mujoco":
-        from gen_data.generator.physics.mujoco_world import MujocoWorld
+        from gen_data.physics.mujoco_world import MujocoWorld
 
         return MujocoWorld(config.time_step_s, config.solver_iterations)
-    from gen_data.generator.physics.bullet_world import BulletWorld
+    from gen_data.physics.bullet_world import BulletWorld
 
     return BulletWorld(config.time_step_s, config.solver_iterations)

@@ -7,7 +7,7 @@ from typing import Literal, get_args
 
 from pydantic import Field
 
-from gen_data.generator.config.base_model import Strict
+from gen_data.config.base_model import Strict
 
 EngineName = Literal["pybullet", "mujoco"]
 

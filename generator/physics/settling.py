@@ -6,12 +6,12 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
-from gen_data.generator.core.errors import Rejection
-from gen_data.generator.core.scene import Body, Scene, SupportSurface
-from gen_data.generator.core.se3 import SE3, Array
-from gen_data.generator.physics.collision_shapes import CollisionShape, box_shape
-from gen_data.generator.physics.physics_config import PhysicsConfig
-from gen_data.generator.physics.world import World
+from gen_data.core.errors import Rejection
+from gen_data.core.scene import Body, Scene, SupportSurface
+from gen_data.core.se3 import SE3, Array
+from gen_data.physics.collision_shapes import CollisionShape, box_shape
+from gen_data.physics.physics_config import PhysicsConfig
+from gen_data.physics.world import World
 
 _CHECK_EVERY_S = 0.05
 _LIFTS_MAX = 32

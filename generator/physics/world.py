@@ -6,9 +6,9 @@ import math
 from collections.abc import Iterable
 from typing import NamedTuple, Protocol
 
-from gen_data.generator.core.scene import BodyJoint
-from gen_data.generator.core.se3 import SE3, Array, Vec3
-from gen_data.generator.physics.collision_shapes import CollisionShape
+from gen_data.core.scene import BodyJoint
+from gen_data.core.se3 import SE3, Array, Vec3
+from gen_data.physics.collision_shapes import CollisionShape
 
 GRAVITY_M_S2 = 9.81
 ANGULAR_DAMPING_PER_S = 0.5

@@ -12,11 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.core.capture import Channel, LidarHits, LidarRays, SensorReading
-from gen_data.generator.core.errors import SampleError
-from gen_data.generator.core.interfaces import FindTones, Renderer
-from gen_data.generator.core.scene import Camera, Lidar, Scene
-from gen_data.generator.core.serialization import find_not_finite, to_plain
+from gen_data.core.capture import Channel, LidarHits, LidarRays, SensorReading
+from gen_data.core.errors import SampleError
+from gen_data.core.interfaces import FindTones, Renderer
+from gen_data.core.scene import Camera, Lidar, Scene
+from gen_data.core.serialization import find_not_finite, to_plain
 
 DISTANCES = frozenset({Channel.Z_DEPTH, Channel.RANGE})
 """Channels with infinity for nothing."""

@@ -14,17 +14,10 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import TypeVar
 
-from gen_data.exporters.base import (
-    ExporterBase,
-    Rectify,
-    check_image_formats,
-    select_names,
-)
-from gen_data.exporters.image_files import encode_channel, link_or_copy, read_image
-from gen_data.generator.annotations.annotate import Thresholds
-from gen_data.generator.core.capture import Capture, Channel
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import (
+from gen_data.annotations.annotate import Thresholds
+from gen_data.core.capture import Capture, Channel
+from gen_data.core.errors import ConfigError
+from gen_data.core.interfaces import (
     AssetLibrary,
     DatasetInfo,
     Exporter,
@@ -32,9 +25,11 @@ from gen_data.generator.core.interfaces import (
     cloud_path,
     table_path,
 )
-from gen_data.generator.core.sample import ImageTruth, Sample
-from gen_data.generator.core.scene import Camera, Device, Lidar, Scene
-from gen_data.generator.pipeline.rectification import NOTHING, rectification, rectified_truth
+from gen_data.core.sample import ImageTruth, Sample
+from gen_data.core.scene import Camera, Device, Lidar, Scene
+from gen_data.exporters.base import ExporterBase, Rectify, check_image_formats, select_names
+from gen_data.exporters.image_files import encode_channel, link_or_copy, read_image
+from gen_data.pipeline.rectification import NOTHING, rectification, rectified_truth
 
 T = TypeVar("T")
 

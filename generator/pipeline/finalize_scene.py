@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from gen_data.generator.core.asset_types import Keypoint
-from gen_data.generator.core.interfaces import AssetLibrary
-from gen_data.generator.core.scene import Body, Box3dExtent, Instance, Scene
-from gen_data.generator.core.scene_time import add_twists, scene_at
-from gen_data.generator.core.se3 import SE3, Array, Vec3
+from gen_data.core.asset_types import Keypoint
+from gen_data.core.interfaces import AssetLibrary
+from gen_data.core.scene import Body, Box3dExtent, Instance, Scene
+from gen_data.core.scene_time import add_twists, scene_at
+from gen_data.core.se3 import SE3, Array, Vec3
 
 
 @dataclass(frozen=True, eq=False)

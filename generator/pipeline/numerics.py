@@ -11,13 +11,13 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.interfaces import PhysicsEngine, Renderer
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.scene import Body, Camera, Instance, Light, Scene
-from gen_data.generator.core.se3 import SE3, look_at
-from gen_data.generator.core.serialization import canonical_json
-from gen_data.generator.core.streams import Streams
+from gen_data.core.capture import Channel
+from gen_data.core.interfaces import PhysicsEngine, Renderer
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.scene import Body, Camera, Instance, Light, Scene
+from gen_data.core.se3 import SE3, look_at
+from gen_data.core.serialization import canonical_json
+from gen_data.core.streams import Streams
 
 SIZE_PX = 64
 CHANNELS = frozenset({Channel.RADIANCE, Channel.Z_DEPTH, Channel.NORMALS, Channel.INSTANCE})

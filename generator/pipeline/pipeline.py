@@ -12,21 +12,9 @@ from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
-from gen_data.generator.core.capture import (
-    Capture,
-    Channel,
-    Measurements,
-    PointCloud,
-    SensorReading,
-)
-from gen_data.generator.core.errors import (
-    ConfigError,
-    LayoutRejected,
-    Rejection,
-    SceneRejected,
-    in_stage,
-)
-from gen_data.generator.core.interfaces import (
+from gen_data.core.capture import Capture, Channel, Measurements, PointCloud, SensorReading
+from gen_data.core.errors import ConfigError, LayoutRejected, Rejection, SceneRejected, in_stage
+from gen_data.core.interfaces import (
     AssetLibrary,
     DatasetInfo,
     Exporter,
@@ -36,14 +24,14 @@ from gen_data.generator.core.interfaces import (
     Sensor,
     Stage,
 )
-from gen_data.generator.core.sample import EgoTruth, ImageTruth, Sample
-from gen_data.generator.core.scene import LABEL_IDS_MAX, Scene
-from gen_data.generator.core.scene_time import place_sensors
-from gen_data.generator.core.streams import Streams
-from gen_data.generator.pipeline.checked_renderer import CheckedRenderer
-from gen_data.generator.pipeline.finalize_scene import Timeline, finalize_scene
-from gen_data.generator.pipeline.numerics import numerics_digests
-from gen_data.generator.pipeline.splits import Assignment, split_of
+from gen_data.core.sample import EgoTruth, ImageTruth, Sample
+from gen_data.core.scene import LABEL_IDS_MAX, Scene
+from gen_data.core.scene_time import place_sensors
+from gen_data.core.streams import Streams
+from gen_data.pipeline.checked_renderer import CheckedRenderer
+from gen_data.pipeline.finalize_scene import Timeline, finalize_scene
+from gen_data.pipeline.numerics import numerics_digests
+from gen_data.pipeline.splits import Assignment, split_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

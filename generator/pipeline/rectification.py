@@ -20,30 +20,24 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gen_data.annotations.amodal_masks import AmodalMasks
+from gen_data.annotations.annotate import Thresholds, is_listed
+from gen_data.annotations.boxes2d import Boxes2d
+from gen_data.annotations.instance_extents import find_extents
+from gen_data.annotations.instance_masks import InstanceMasks
+from gen_data.annotations.lanes import runs
+from gen_data.annotations.oriented_boxes2d import OrientedBoxes2d
+from gen_data.annotations.part_masks import PartMasks
+from gen_data.annotations.visibility import Visibility
+from gen_data.core.boxes import BoxPx, tight_box
+from gen_data.core.capture import Channel, SensorReading, Silhouette
+from gen_data.core.errors import ConfigError
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.lens import PINHOLE
+from gen_data.core.sample import BorderTruth, ImageTruth, KeypointTruth, MaskPx, ObjectTruth
+from gen_data.core.scene import Scene
+from gen_data.core.se3 import Array
 from gen_data.exporters.base import Rectify
-from gen_data.generator.annotations.amodal_masks import AmodalMasks
-from gen_data.generator.annotations.annotate import Thresholds, is_listed
-from gen_data.generator.annotations.boxes2d import Boxes2d
-from gen_data.generator.annotations.instance_extents import find_extents
-from gen_data.generator.annotations.instance_masks import InstanceMasks
-from gen_data.generator.annotations.lanes import runs
-from gen_data.generator.annotations.oriented_boxes2d import OrientedBoxes2d
-from gen_data.generator.annotations.part_masks import PartMasks
-from gen_data.generator.annotations.visibility import Visibility
-from gen_data.generator.core.boxes import BoxPx, tight_box
-from gen_data.generator.core.capture import Channel, SensorReading, Silhouette
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.lens import PINHOLE
-from gen_data.generator.core.sample import (
-    BorderTruth,
-    ImageTruth,
-    KeypointTruth,
-    MaskPx,
-    ObjectTruth,
-)
-from gen_data.generator.core.scene import Scene
-from gen_data.generator.core.se3 import Array
 
 WIDEST_DEG = 150.0
 """Widest field that is chosen without being asked for: beyond, nearly all pixels show the rim."""

@@ -9,9 +9,9 @@ from typing import Any, Literal
 
 from pydantic import Field, model_validator
 
-from gen_data.generator.config.base_model import Strict
-from gen_data.generator.core.errors import ConfigWarning
-from gen_data.generator.core.streams import Streams
+from gen_data.config.base_model import Strict
+from gen_data.core.errors import ConfigWarning
+from gen_data.core.streams import Streams
 
 Assignment = Literal["random", "round_robin"]
 """``random``: every scene draws its split. ``round_robin``: splits take turns by their shares."""

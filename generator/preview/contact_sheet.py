@@ -10,13 +10,13 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.errors import ConfigError, StorageError
-from gen_data.generator.core.sample import Sample
-from gen_data.generator.core.whole_files import write_whole
-from gen_data.generator.preview.overlay import Image, channel_image, draw_labels
-from gen_data.generator.preview.sensor_views import event_view, radar_view, range_view, top_view
-from gen_data.generator.sensors.lidar import pseudo_lidar
+from gen_data.core.capture import Channel
+from gen_data.core.errors import ConfigError, StorageError
+from gen_data.core.sample import Sample
+from gen_data.core.whole_files import write_whole
+from gen_data.preview.overlay import Image, channel_image, draw_labels
+from gen_data.preview.sensor_views import event_view, radar_view, range_view, top_view
+from gen_data.sensors.lidar import pseudo_lidar
 
 GAP_PX = 4
 BACKGROUND = 24

@@ -10,12 +10,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.core.boxes import BoxPx, OrientedBox
-from gen_data.generator.core.capture import Channel, SensorReading
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.sample import ImageTruth, KeypointTruth, ObjectTruth
-from gen_data.generator.core.skeletons import find_skeleton
-from gen_data.generator.preview.palette import (
+from gen_data.core.boxes import BoxPx, OrientedBox
+from gen_data.core.capture import Channel, SensorReading
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.sample import ImageTruth, KeypointTruth, ObjectTruth
+from gen_data.core.skeletons import find_skeleton
+from gen_data.preview.palette import (
     Rgb,
     color_depth,
     color_flow,

@@ -7,10 +7,10 @@ import math
 import cv2
 import numpy as np
 
-from gen_data.generator.core.asset_types import UInt8
-from gen_data.generator.core.plates import Plate, ground_points, horizon_px
-from gen_data.generator.core.se3 import Array
-from gen_data.generator.preview.overlay import Image
+from gen_data.core.asset_types import UInt8
+from gen_data.core.plates import Plate, ground_points, horizon_px
+from gen_data.core.se3 import Array
+from gen_data.preview.overlay import Image
 
 _HORIZON, _CORNERS, _GRID, _LANE = (255, 60, 60), (255, 220, 0), (0, 220, 255), (120, 255, 80)
 _LINES_MAX = 60

@@ -17,20 +17,20 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
-from gen_data.generator.core.asset_types import MeshData
-from gen_data.generator.core.boxes import OrientedBox
-from gen_data.generator.core.capture import Channel, PointCloud, SensorReading
-from gen_data.generator.core.errors import StorageError
-from gen_data.generator.core.interfaces import AssetLibrary, DatasetInfo
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.sample import ImageTruth, Sample
-from gen_data.generator.core.scene import Body, Instance, Scene
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.core.skeletons import Skeleton, find_skeleton
-from gen_data.generator.core.whole_files import whole_file
-from gen_data.generator.preview.overlay import channel_image
-from gen_data.generator.preview.palette import id_color
-from gen_data.generator.preview.sensor_views import PointColors, point_colors
+from gen_data.core.asset_types import MeshData
+from gen_data.core.boxes import OrientedBox
+from gen_data.core.capture import Channel, PointCloud, SensorReading
+from gen_data.core.errors import StorageError
+from gen_data.core.interfaces import AssetLibrary, DatasetInfo
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.sample import ImageTruth, Sample
+from gen_data.core.scene import Body, Instance, Scene
+from gen_data.core.se3 import SE3
+from gen_data.core.skeletons import Skeleton, find_skeleton
+from gen_data.core.whole_files import whole_file
+from gen_data.preview.overlay import channel_image
+from gen_data.preview.palette import id_color
+from gen_data.preview.sensor_views import PointColors, point_colors
 
 TIMELINE = "sample"
 TIME = "time"

@@ -11,13 +11,13 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from gen_data.generator.core.asset_types import SURFACES
-from gen_data.generator.core.boxes import OrientedBox
-from gen_data.generator.core.capture import Measurements, PointCloud
-from gen_data.generator.core.scene import Scene
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.preview.overlay import BOX_EDGES, Image
-from gen_data.generator.preview.palette import color_shares, id_color
+from gen_data.core.asset_types import SURFACES
+from gen_data.core.boxes import OrientedBox
+from gen_data.core.capture import Measurements, PointCloud
+from gen_data.core.scene import Scene
+from gen_data.core.se3 import SE3
+from gen_data.preview.overlay import BOX_EDGES, Image
+from gen_data.preview.palette import color_shares, id_color
 
 PointColors = Literal["class", "intensity"]
 """Property that determines the colour of a point."""

@@ -8,17 +8,17 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.core.asset_types import Asset
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.interfaces import AssetLibrary, Renderer
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.kinematics import make_link_bodies
-from gen_data.generator.core.scene import Articulation, Body, Camera, Environment, Light, Scene
-from gen_data.generator.core.se3 import SE3, look_at
-from gen_data.generator.core.streams import Streams
-from gen_data.generator.preview.overlay import Image
-from gen_data.generator.preview.plate_overlay import plate_overlay
-from gen_data.generator.sensors.camera.image_pipeline import ImagePipeline, capture_photograph
+from gen_data.core.asset_types import Asset
+from gen_data.core.capture import Channel
+from gen_data.core.interfaces import AssetLibrary, Renderer
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.kinematics import make_link_bodies
+from gen_data.core.scene import Articulation, Body, Camera, Environment, Light, Scene
+from gen_data.core.se3 import SE3, look_at
+from gen_data.core.streams import Streams
+from gen_data.preview.overlay import Image
+from gen_data.preview.plate_overlay import plate_overlay
+from gen_data.sensors.camera.image_pipeline import ImagePipeline, capture_photograph
 
 _HALF_FIELD_RAD = math.radians(15.0)
 _AZIMUTH_RAD, _ELEVATION_RAD = math.radians(35.0), math.radians(25.0)

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import quote
 
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.processes import tie
+from gen_data.core.errors import ConfigError
+from gen_data.core.processes import tie
 
 LOOPBACK = "127.0.0.1"
 GRPC_PORT = 9876

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from gen_data.generator.core.interfaces import RendererSettings
-from gen_data.generator.core.plugins import PluginTable
+from gen_data.core.interfaces import RendererSettings
+from gen_data.core.plugins import PluginTable
 
 TABLE = PluginTable[RendererSettings](
     "renderer",
-    {"warp": "gen_data.generator.renderers.warp.plugin:WarpPlugin"},
+    {"warp": "gen_data.renderers.warp.plugin:WarpPlugin"},
     (RendererSettings,),
     tag="renderer",
 )

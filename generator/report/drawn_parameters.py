@@ -17,24 +17,24 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from gen_data.generator.assemble.config import Config, load_config
-from gen_data.generator.assemble.pipeline_factory import scene_source
-from gen_data.generator.assets.library import Library
-from gen_data.generator.config.distributions import Constant, Distribution, Numeric
-from gen_data.generator.config.shared_values import Shared, read_shared
-from gen_data.generator.config.yaml_scalars import to_flow_yaml
-from gen_data.generator.core.errors import LayoutRejected
-from gen_data.generator.core.interfaces import PhysicsEngine, Randomizer, Stage
-from gen_data.generator.core.scene import Scene
-from gen_data.generator.core.scene_time import place_sensors
-from gen_data.generator.core.serialization import canonical_json, to_plain
-from gen_data.generator.core.streams import Rng, Streams
-from gen_data.generator.packs.provision import open_assets
-from gen_data.generator.physics import open_engine
-from gen_data.generator.pipeline.finalize_scene import finalize_scene
-from gen_data.generator.runner.plan import differences
-from gen_data.generator.runner.provenance import KeptScene
-from gen_data.generator.runner.stored import StoredSamples
+from gen_data.assemble.config import Config, load_config
+from gen_data.assemble.pipeline_factory import scene_source
+from gen_data.assets.library import Library
+from gen_data.config.distributions import Constant, Distribution, Numeric
+from gen_data.config.shared_values import Shared, read_shared
+from gen_data.config.yaml_scalars import to_flow_yaml
+from gen_data.core.errors import LayoutRejected
+from gen_data.core.interfaces import PhysicsEngine, Randomizer, Stage
+from gen_data.core.scene import Scene
+from gen_data.core.scene_time import place_sensors
+from gen_data.core.serialization import canonical_json, to_plain
+from gen_data.core.streams import Rng, Streams
+from gen_data.packs.provision import open_assets
+from gen_data.physics import open_engine
+from gen_data.pipeline.finalize_scene import finalize_scene
+from gen_data.runner.plan import differences
+from gen_data.runner.provenance import KeptScene
+from gen_data.runner.stored import StoredSamples
 
 ROUNDING = 1e-5
 """Numbers of a scene that differ by less are equal: processors may differ in last bits, and poses

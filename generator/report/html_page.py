@@ -22,7 +22,7 @@ def format_page(sets: Sequence[Mapping[str, Any]]) -> str:
     """Format the HTML document of one data set, or of two for comparison.
 
     Args:
-        sets: Reports as in ``gen_data.generator.report.report_data``.
+        sets: Reports as in ``gen_data.report.report_data``.
     """
     title = " and ".join(str(report["name"]) for report in sets)
     body = (

@@ -17,7 +17,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.core.errors import StorageError
+from gen_data.core.errors import StorageError
 
 SIDE_PX = 32
 """Side of the grey image that is hashed."""

@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from gen_data.generator.core.boxes import OrientedBox, tight_box
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.scene import Instance
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.core.serialization import from_plain
-from gen_data.generator.report.stored_labels import ImageLabels, decode_mask
+from gen_data.core.boxes import OrientedBox, tight_box
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.scene import Instance
+from gen_data.core.se3 import SE3
+from gen_data.core.serialization import from_plain
+from gen_data.report.stored_labels import ImageLabels, decode_mask
 
 Item = Mapping[str, Any]
 

@@ -15,10 +15,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from gen_data.core.errors import StorageError, no_folder
+from gen_data.core.scene import Instance
+from gen_data.core.se3 import Vec3
 from gen_data.exporters.kitti import occlusion_level, official_type
-from gen_data.generator.core.errors import StorageError, no_folder
-from gen_data.generator.core.scene import Instance
-from gen_data.generator.core.se3 import Vec3
 
 INSTANCES = "instances_"
 SCANS_MAX = 200

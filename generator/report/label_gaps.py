@@ -6,10 +6,10 @@ import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
+from gen_data.core.sample import ImageTruth
 from gen_data.exporters.label_map import AppliedLabelMap, LabelMap
-from gen_data.generator.core.sample import ImageTruth
-from gen_data.generator.runner.layout import MANIFEST_NAME
-from gen_data.generator.runner.stored import LabelledImages, StoredSamples
+from gen_data.runner.layout import MANIFEST_NAME
+from gen_data.runner.stored import LabelledImages, StoredSamples
 
 FEW_IMAGES = 5
 """With fewer images or scans, a sensor without labels proves nothing."""

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.report.label_files import Label, Picture, Points
+from gen_data.report.label_files import Label, Picture, Points
 
 Column = NDArray[np.float64]
 

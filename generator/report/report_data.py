@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.errors import GenDataError
-from gen_data.generator.core.interfaces import media_path
-from gen_data.generator.core.system_calls import usable_cores
-from gen_data.generator.report.drawn_parameters import DrawnParameters, Parameter, draw_parameters
-from gen_data.generator.report.image_statistics import (
+from gen_data.core.capture import Channel
+from gen_data.core.errors import GenDataError
+from gen_data.core.interfaces import media_path
+from gen_data.core.system_calls import usable_cores
+from gen_data.report.drawn_parameters import DrawnParameters, Parameter, draw_parameters
+from gen_data.report.image_statistics import (
     DISTANCE_MAX,
     DuplicateGroup,
     ImageFile,
@@ -25,11 +25,11 @@ from gen_data.generator.report.image_statistics import (
     group_duplicates,
     measure_images,
 )
-from gen_data.generator.report.label_checks import CheckResult, LabelChecks
-from gen_data.generator.report.label_files import read_records, read_scans
-from gen_data.generator.report.label_gaps import count_objects, find_label_gaps, read_label_map
-from gen_data.generator.report.label_statistics import Column, Survey, collect_statistics
-from gen_data.generator.report.report_tables import (
+from gen_data.report.label_checks import CheckResult, LabelChecks
+from gen_data.report.label_files import read_records, read_scans
+from gen_data.report.label_gaps import count_objects, find_label_gaps, read_label_map
+from gen_data.report.label_statistics import Column, Survey, collect_statistics
+from gen_data.report.report_tables import (
     Histogram,
     Table,
     count_values,
@@ -37,10 +37,10 @@ from gen_data.generator.report.report_tables import (
     make_scan_tables,
     make_tables,
 )
-from gen_data.generator.report.sample_browser import browser_images, thumbnail
-from gen_data.generator.report.stored_labels import ObjectStatistics, read_images
-from gen_data.generator.runner.layout import LICENCES_NAME, MANIFEST_NAME, RUN_NAME
-from gen_data.generator.runner.stored import StoredSamples
+from gen_data.report.sample_browser import browser_images, thumbnail
+from gen_data.report.stored_labels import ObjectStatistics, read_images
+from gen_data.runner.layout import LICENCES_NAME, MANIFEST_NAME, RUN_NAME
+from gen_data.runner.stored import StoredSamples
 
 BROWSER_BYTES_MAX = 9_000_000
 """Limit of the pictures of a page, shared by its data sets."""

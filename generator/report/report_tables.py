@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.config.data_files import load_data
-from gen_data.generator.report.label_files import Scan
-from gen_data.generator.report.label_statistics import Column, Survey
+from gen_data.config.data_files import load_data
+from gen_data.report.label_files import Scan
+from gen_data.report.label_statistics import Column, Survey
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,14 +12,14 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.core.boxes import OrientedBox
-from gen_data.generator.core.capture import Channel, SensorReading
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.sample import ImageTruth, KeypointTruth, ObjectTruth
-from gen_data.generator.core.skeletons import find_skeleton
-from gen_data.generator.preview.overlay import BOX_EDGES
-from gen_data.generator.preview.palette import color_depth, color_shares
-from gen_data.generator.runner.stored import LabelledImages, StoredSamples
+from gen_data.core.boxes import OrientedBox
+from gen_data.core.capture import Channel, SensorReading
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.sample import ImageTruth, KeypointTruth, ObjectTruth
+from gen_data.core.skeletons import find_skeleton
+from gen_data.preview.overlay import BOX_EDGES
+from gen_data.preview.palette import color_depth, color_shares
+from gen_data.runner.stored import LabelledImages, StoredSamples
 
 WIDTH_PX = 640
 """Largest width of an image in the page."""

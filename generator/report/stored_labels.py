@@ -16,15 +16,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gen_data.core.errors import StorageError
+from gen_data.core.scene import Instance
+from gen_data.core.se3 import SE3
+from gen_data.core.serialization import from_plain
 from gen_data.exporters.kitti import occlusion_level, official_type
-from gen_data.generator.core.errors import StorageError
-from gen_data.generator.core.scene import Instance
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.core.serialization import from_plain
-from gen_data.generator.report.label_files import Label, Picture, Points
-from gen_data.generator.report.label_statistics import Column, Survey, add_record
-from gen_data.generator.runner.labels import LABELS_NAME
-from gen_data.generator.runner.stored import StoredSamples
+from gen_data.report.label_files import Label, Picture, Points
+from gen_data.report.label_statistics import Column, Survey, add_record
+from gen_data.runner.labels import LABELS_NAME
+from gen_data.runner.stored import StoredSamples
 
 COLUMNS = (
     "index", "camera", "category", "width_px", "height_px", "visible_px", "visible_fraction",

@@ -12,7 +12,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from gen_data.generator.roads.reference_line import Array, ReferenceLine, bend_line
+from gen_data.roads.reference_line import Array, ReferenceLine, bend_line
 
 StripKind = Literal[
     "median", "driving", "bicycle", "shoulder", "parking", "kerb", "verge", "sidewalk", "garden"

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gen_data.generator.core.se3 import Array
-from gen_data.generator.core.variant_rng import variant_rng
-from gen_data.generator.roads.reference_line import ReferenceLine, bend_line
+from gen_data.core.se3 import Array
+from gen_data.core.variant_rng import variant_rng
+from gen_data.roads.reference_line import ReferenceLine, bend_line
 
 TRACK_M = 3.0
 

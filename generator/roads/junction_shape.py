@@ -10,11 +10,11 @@ from typing import Protocol
 
 import numpy as np
 
-from gen_data.generator.core.scene import Lane, LaneKind
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.roads.cross_section import FALL, KERB_WIDTH_M
-from gen_data.generator.roads.lane_graph import FURNITURE_M, world_points
-from gen_data.generator.roads.reference_line import Array
+from gen_data.core.scene import Lane, LaneKind
+from gen_data.core.se3 import SE3
+from gen_data.roads.cross_section import FALL, KERB_WIDTH_M
+from gen_data.roads.lane_graph import FURNITURE_M, world_points
+from gen_data.roads.reference_line import Array
 
 CROSSWALK_M = (0.5, 3.5)
 """Extent of a crosswalk along an arm, from the end of the corners' curves."""

@@ -9,9 +9,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from gen_data.generator.core.scene import Lane, LaneKind
-from gen_data.generator.core.se3 import SE3, Vec3
-from gen_data.generator.roads.cross_section import (
+from gen_data.core.scene import Lane, LaneKind
+from gen_data.core.se3 import SE3, Vec3
+from gen_data.roads.cross_section import (
     BAY_WIDTH_M,
     KERB_WIDTH_M,
     RoadShape,
@@ -20,7 +20,7 @@ from gen_data.generator.roads.cross_section import (
     side_index,
     strips,
 )
-from gen_data.generator.roads.reference_line import Array, ReferenceLine
+from gen_data.roads.reference_line import Array, ReferenceLine
 
 FURNITURE_M = 0.5
 """Distance of poles and bins from the kerb."""

@@ -17,10 +17,10 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from gen_data.generator.core.errors import AssetError
-from gen_data.generator.core.safe_xml import parse_xml
-from gen_data.generator.roads.opendrive_unused import count_unused
-from gen_data.generator.roads.reference_line import (
+from gen_data.core.errors import AssetError
+from gen_data.core.safe_xml import parse_xml
+from gen_data.roads.opendrive_unused import count_unused
+from gen_data.roads.reference_line import (
     Arc,
     Array,
     Curve,

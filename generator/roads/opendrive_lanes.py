@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gen_data.generator.core.errors import AssetError
-from gen_data.generator.core.scene import Lane, LaneKind
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.roads.lane_graph import FURNITURE_M, stations, world_points
-from gen_data.generator.roads.opendrive import Contact, LaneRecord, Network, Road, Section
-from gen_data.generator.roads.reference_line import Array
+from gen_data.core.errors import AssetError
+from gen_data.core.scene import Lane, LaneKind
+from gen_data.core.se3 import SE3
+from gen_data.roads.lane_graph import FURNITURE_M, stations, world_points
+from gen_data.roads.opendrive import Contact, LaneRecord, Network, Road, Section
+from gen_data.roads.reference_line import Array
 
 _DRIVEN = ("driving", "entry", "exit", "onRamp", "offRamp", "connectingRamp", "bidirectional",
            "bus", "taxi")  # fmt: skip

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gen_data.generator.core.scene import Lane
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.roads.lane_graph import world_points
+from gen_data.core.scene import Lane
+from gen_data.core.se3 import SE3
+from gen_data.roads.lane_graph import world_points
 
 EDGE_M = 0.6
 """Asphalt beyond the outermost lines."""

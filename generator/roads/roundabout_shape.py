@@ -7,16 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gen_data.generator.core.scene import Lane
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.roads.junction_shape import (
-    ArmsShape,
-    corner_lanes,
-    curve,
-    lane_points,
-    on_arm,
-)
-from gen_data.generator.roads.reference_line import Array
+from gen_data.core.scene import Lane
+from gen_data.core.se3 import SE3
+from gen_data.roads.junction_shape import ArmsShape, corner_lanes, curve, lane_points, on_arm
+from gen_data.roads.reference_line import Array
 
 _ARC_STEP_RAD = math.radians(6.0)
 _LANE_STEP_M = 1.0

@@ -7,16 +7,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from gen_data.generator.assets.asset_ids import AssetId, ParameterValue
-from gen_data.generator.assets.families import declared
-from gen_data.generator.core.asset_types import Material
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.members import free_instance_ids
-from gen_data.generator.core.scene import Body, Instance, Scene
-from gen_data.generator.core.se3 import SE3, Vec3
-from gen_data.generator.rooms.floor_plan import WALL_M, Opening, Room, direction, walls_of
-from gen_data.generator.rooms.layout import Piece
-from gen_data.generator.rooms.outlook import Outlook
+from gen_data.assets.asset_ids import AssetId, ParameterValue
+from gen_data.assets.families import declared
+from gen_data.core.asset_types import Material
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.members import free_instance_ids
+from gen_data.core.scene import Body, Instance, Scene
+from gen_data.core.se3 import SE3, Vec3
+from gen_data.rooms.floor_plan import WALL_M, Opening, Room, direction, walls_of
+from gen_data.rooms.layout import Piece
+from gen_data.rooms.outlook import Outlook
 
 OUTSIDE = "outside"
 LEADS_OUT = "leads_out"

@@ -12,8 +12,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-from gen_data.generator.core.streams import Rng
-from gen_data.generator.rooms.rules import APARTMENT, Range, RoomType, find_room_type
+from gen_data.core.streams import Rng
+from gen_data.rooms.rules import APARTMENT, Range, RoomType, find_room_type
 
 WALL_M = 0.1
 """Thickness of the walls of one room; rooms that touch share a wall of twice as much."""

@@ -15,8 +15,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from gen_data.generator.core.scene import IrradianceVolume, Light
-from gen_data.generator.core.se3 import Array, Vec3
+from gen_data.core.scene import IrradianceVolume, Light
+from gen_data.core.se3 import Array, Vec3
 
 _PATCH_M, _PATCHES = 0.7, (3, 9)
 """Wanted size of patches, and their number along a side."""

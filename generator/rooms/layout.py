@@ -14,16 +14,16 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.assets.families import declared
-from gen_data.generator.core.bounded_cache import ObjectCache
-from gen_data.generator.core.boxes import Rectangle, overlap_of
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.keypoint_names import BACKREST, INSIDE, SUPPORT
-from gen_data.generator.core.se3 import SE3, Array, Quaternion, Vec3
-from gen_data.generator.core.streams import Rng
-from gen_data.generator.rooms.floor_plan import Opening, Room, between, direction, draw_count
-from gen_data.generator.rooms.resting import UPRIGHT, turn_to_rest
-from gen_data.generator.rooms.rules import RoomType, Rule
+from gen_data.assets.families import declared
+from gen_data.core.bounded_cache import ObjectCache
+from gen_data.core.boxes import Rectangle, overlap_of
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.keypoint_names import BACKREST, INSIDE, SUPPORT
+from gen_data.core.se3 import SE3, Array, Quaternion, Vec3
+from gen_data.core.streams import Rng
+from gen_data.rooms.floor_plan import Opening, Room, between, direction, draw_count
+from gen_data.rooms.resting import UPRIGHT, turn_to_rest
+from gen_data.rooms.rules import RoomType, Rule
 
 Options = Mapping[str, Sequence[str]]
 """Ids of assets by family."""

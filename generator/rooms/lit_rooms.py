@@ -8,12 +8,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from gen_data.generator.assets.asset_ids import parse_asset_id
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.scene import Body, Scene
-from gen_data.generator.core.se3 import Vec3
-from gen_data.generator.rooms.floor_plan import WALL_M
-from gen_data.generator.rooms.interreflection import Hole, LitRoom
+from gen_data.assets.asset_ids import parse_asset_id
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.scene import Body, Scene
+from gen_data.core.se3 import Vec3
+from gen_data.rooms.floor_plan import WALL_M
+from gen_data.rooms.interreflection import Hole, LitRoom
 
 _SIDES = {"wall_0": 1, "wall_1": 3, "wall_2": 0, "wall_3": 2, "ceiling": 4, "floor": 5}
 """Sides of ``interreflection.AXES`` by the names of bodies."""

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from gen_data.generator.core.asset_types import Asset
-from gen_data.generator.core.bounded_cache import ObjectCache
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.rooms.rules import APARTMENT, find_room_type
+from gen_data.core.asset_types import Asset
+from gen_data.core.bounded_cache import ObjectCache
+from gen_data.core.interfaces import AssetIndex
+from gen_data.rooms.rules import APARTMENT, find_room_type
 
 IN_APARTMENTS = ("bathroom", "bedroom", "kitchen", "living_room")
 _ALSO_FROM_PACKS = frozenset(

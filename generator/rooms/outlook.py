@@ -6,10 +6,10 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from gen_data.generator.assets.families import declared
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.core.streams import Rng
-from gen_data.generator.rooms.floor_plan import Room, between, draw_count, outer_radius_m
+from gen_data.assets.families import declared
+from gen_data.core.se3 import SE3
+from gen_data.core.streams import Rng
+from gen_data.rooms.floor_plan import Room, between, draw_count, outer_radius_m
 
 _STOREY_M = 3.0
 _STEP_M = 0.3

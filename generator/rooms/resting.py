@@ -11,7 +11,7 @@ import math
 
 import numpy as np
 
-from gen_data.generator.core.se3 import Array, Quaternion
+from gen_data.core.se3 import Array, Quaternion
 
 STEEPEST = math.cos(math.radians(50.0))
 """Facets that are turned further from below than this are another way to lie, not this one."""

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Literal
 
-from gen_data.generator.config.data_files import load_data
-from gen_data.generator.core.errors import ConfigError, did_you_mean
-from gen_data.generator.core.serialization import from_plain
+from gen_data.config.data_files import load_data
+from gen_data.core.errors import ConfigError, did_you_mean
+from gen_data.core.serialization import from_plain
 
 Range = tuple[float, float]
 Place = Literal[

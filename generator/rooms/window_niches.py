@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gen_data.generator.core.scene import VOLUME_REACH_M, IrradianceVolume
-from gen_data.generator.core.se3 import Array, Vec3
-from gen_data.generator.rooms.interreflection import AXES, Hole, LitRoom
+from gen_data.core.scene import VOLUME_REACH_M, IrradianceVolume
+from gen_data.core.se3 import Array, Vec3
+from gen_data.rooms.interreflection import AXES, Hole, LitRoom
 
 _SILL_M = 0.06
 """Reach into the room: sills stand out of the wall by 0.05 m."""

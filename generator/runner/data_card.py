@@ -13,6 +13,12 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
+from gen_data.annotations.annotate import Thresholds
+from gen_data.config.data_files import load_data
+from gen_data.config.yaml_scalars import to_flow_yaml
+from gen_data.core.capture import Channel
+from gen_data.core.interfaces import DatasetInfo, Modality, SensorInfo
+from gen_data.core.markdown import plain
 from gen_data.exporters.croissant_metadata import (
     croissant_document,
     describe_dataset,
@@ -22,18 +28,12 @@ from gen_data.exporters.croissant_metadata import (
     record_set,
     title_of,
 )
-from gen_data.generator.annotations.annotate import Thresholds
-from gen_data.generator.config.data_files import load_data
-from gen_data.generator.config.yaml_scalars import to_flow_yaml
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.interfaces import DatasetInfo, Modality, SensorInfo
-from gen_data.generator.core.markdown import plain
-from gen_data.generator.runner.labels import LABELS_NAME
-from gen_data.generator.runner.layout import PLAN_NAME
-from gen_data.generator.runner.licence_table import licences_in
-from gen_data.generator.runner.plan import Plan, plan_bytes
-from gen_data.generator.runner.provenance import SCENES_NAME
-from gen_data.generator.runner.shard_record import SplitCount
+from gen_data.runner.labels import LABELS_NAME
+from gen_data.runner.layout import PLAN_NAME
+from gen_data.runner.licence_table import licences_in
+from gen_data.runner.plan import Plan, plan_bytes
+from gen_data.runner.provenance import SCENES_NAME
+from gen_data.runner.shard_record import SplitCount
 
 CARD_NAME = "README.md"
 CROISSANT_NAME = "croissant.json"

@@ -11,16 +11,16 @@ import secrets
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from gen_data.generator.annotations.sample_checks import sample_faults
-from gen_data.generator.core.errors import GenDataError
-from gen_data.generator.runner.labels import LABELS_NAME
-from gen_data.generator.runner.layout import SHARDS_NAME
-from gen_data.generator.runner.plan import load_plan
-from gen_data.generator.runner.provenance import SCENES_NAME
-from gen_data.generator.runner.regeneration import compare_regenerated, plan_regeneration
-from gen_data.generator.runner.store import LocalStore
-from gen_data.generator.runner.stored import StoredSamples
-from gen_data.generator.runner.verify import Finding
+from gen_data.annotations.sample_checks import sample_faults
+from gen_data.core.errors import GenDataError
+from gen_data.runner.labels import LABELS_NAME
+from gen_data.runner.layout import SHARDS_NAME
+from gen_data.runner.plan import load_plan
+from gen_data.runner.provenance import SCENES_NAME
+from gen_data.runner.regeneration import compare_regenerated, plan_regeneration
+from gen_data.runner.store import LocalStore
+from gen_data.runner.stored import StoredSamples
+from gen_data.runner.verify import Finding
 
 
 def find_invalid_samples(folder: Path) -> Iterator[Finding]:

@@ -8,16 +8,16 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from gen_data.generator.core.errors import StorageError
-from gen_data.generator.runner.durable_files import tree_sizes
-from gen_data.generator.runner.labels import LABELS_NAME
-from gen_data.generator.runner.layout import MANIFEST_NAME, PLAN_NAME, SHARDS_NAME
-from gen_data.generator.runner.plan import Plan, compare_plans, load_plan
-from gen_data.generator.runner.provenance import SCENES_NAME
-from gen_data.generator.runner.sample_stages import Difference, SampleFiles, compare_samples
-from gen_data.generator.runner.seal import read_sums
-from gen_data.generator.runner.shard_record import ShardRecord
-from gen_data.generator.runner.store import LocalStore
+from gen_data.core.errors import StorageError
+from gen_data.runner.durable_files import tree_sizes
+from gen_data.runner.labels import LABELS_NAME
+from gen_data.runner.layout import MANIFEST_NAME, PLAN_NAME, SHARDS_NAME
+from gen_data.runner.plan import Plan, compare_plans, load_plan
+from gen_data.runner.provenance import SCENES_NAME
+from gen_data.runner.sample_stages import Difference, SampleFiles, compare_samples
+from gen_data.runner.seal import read_sums
+from gen_data.runner.shard_record import ShardRecord
+from gen_data.runner.store import LocalStore
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 
-from gen_data.generator.core.errors import StorageError
+from gen_data.core.errors import StorageError
 
 FULL = frozenset({errno.ENOSPC, getattr(errno, "EDQUOT", errno.ENOSPC)})
 IS_WINDOWS = sys.platform == "win32"

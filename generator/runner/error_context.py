@@ -6,12 +6,7 @@ import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from gen_data.generator.core.errors import (
-    GenDataError,
-    OutOfMemory,
-    SampleError,
-    lack_of_memory,
-)
+from gen_data.core.errors import GenDataError, OutOfMemory, SampleError, lack_of_memory
 
 TRACE_LINES = 12
 CACHE_DAMAGE = ("Failed to find forward kernel", "Failed to load CPU module")

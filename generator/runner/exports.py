@@ -13,31 +13,26 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from gen_data.core.interfaces import DatasetInfo, Exporter, cloud_path, table_path
+from gen_data.core.sample import Sample
 from gen_data.exporters.image_files import link_or_copy
-from gen_data.generator.core.interfaces import (
-    DatasetInfo,
-    Exporter,
-    cloud_path,
-    table_path,
-)
-from gen_data.generator.core.sample import Sample
-from gen_data.generator.runner.durable_files import Inode, get_inode
-from gen_data.generator.runner.labels import LABELS_NAME
-from gen_data.generator.runner.layout import LICENCES_NAME, SUMS_NAME
-from gen_data.generator.runner.plan import FORMAT_VERSION
-from gen_data.generator.runner.progress import RunProgress, Summary
-from gen_data.generator.runner.provenance import SCENES_NAME
-from gen_data.generator.runner.run import Settings, run
-from gen_data.generator.runner.seal import read_sums
-from gen_data.generator.runner.shard_record import FileRecord
-from gen_data.generator.runner.stored import RECORDED, CheckedSamples, StoredSamples, check_digest
-from gen_data.generator.runner.verify import check_source
+from gen_data.runner.durable_files import Inode, get_inode
+from gen_data.runner.labels import LABELS_NAME
+from gen_data.runner.layout import LICENCES_NAME, SUMS_NAME
+from gen_data.runner.plan import FORMAT_VERSION
+from gen_data.runner.progress import RunProgress, Summary
+from gen_data.runner.provenance import SCENES_NAME
+from gen_data.runner.run import Settings, run
+from gen_data.runner.seal import read_sums
+from gen_data.runner.shard_record import FileRecord
+from gen_data.runner.stored import RECORDED, CheckedSamples, StoredSamples, check_digest
+from gen_data.runner.verify import check_source
 
 NEW_BYTES = 8_000.0
 """Least size of what exports add to a sample: labels, and entries in records and sums."""
 
 if TYPE_CHECKING:
-    from gen_data.generator.assemble.config import Config
+    from gen_data.assemble.config import Config
 
 
 @dataclass(frozen=True)
@@ -69,8 +64,8 @@ class StoredPipeline:
         # Sensors with an offset see the scene of another instant, which files do not hold.
         ids = {name: number for number, name in enumerate(self.info.categories, 1)}
         # Loads all kinds of assets, which most exports do without.
-        from gen_data.generator.packs.provision import open_assets
-        from gen_data.generator.pipeline.finalize_scene import Timeline
+        from gen_data.packs.provision import open_assets
+        from gen_data.pipeline.finalize_scene import Timeline
 
         timeline = Timeline(sample.scene, open_assets(self.asset_folders), ids)
         return replace(sample, instants={name: timeline.at(t) for name, t in apart.items()})

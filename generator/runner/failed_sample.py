@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from gen_data.generator.core.errors import (
+from gen_data.core.errors import (
     DeterminismError,
     GenDataError,
     Interrupted,

@@ -8,17 +8,17 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
-from gen_data.generator.core.errors import SampleError, StorageError
-from gen_data.generator.core.interfaces import DatasetInfo
-from gen_data.generator.core.serialization import canonical_json
-from gen_data.generator.runner.data_card import (
+from gen_data.core.errors import SampleError, StorageError
+from gen_data.core.interfaces import DatasetInfo
+from gen_data.core.serialization import canonical_json
+from gen_data.runner.data_card import (
     CARD_NAME,
     CROISSANT_NAME,
     DatasetFacts,
     croissant_json,
     data_card,
 )
-from gen_data.generator.runner.durable_files import (
+from gen_data.runner.durable_files import (
     Inode,
     empty_folders,
     get_inode,
@@ -27,19 +27,13 @@ from gen_data.generator.runner.durable_files import (
     sync_tree,
     tree_sizes,
 )
-from gen_data.generator.runner.error_context import explain_errors
-from gen_data.generator.runner.layout import (
-    LICENCES_NAME,
-    MANIFEST_NAME,
-    PLAN_NAME,
-    SHARDS_NAME,
-    SUMS_NAME,
-)
-from gen_data.generator.runner.plan import Plan, plan_bytes
-from gen_data.generator.runner.seal import Entry, SealedBefore, dataset_id, sums_text
-from gen_data.generator.runner.shard import PipelineLike
-from gen_data.generator.runner.shard_record import ShardRecord, sum_counts
-from gen_data.generator.runner.store import LocalStore
+from gen_data.runner.error_context import explain_errors
+from gen_data.runner.layout import LICENCES_NAME, MANIFEST_NAME, PLAN_NAME, SHARDS_NAME, SUMS_NAME
+from gen_data.runner.plan import Plan, plan_bytes
+from gen_data.runner.seal import Entry, SealedBefore, dataset_id, sums_text
+from gen_data.runner.shard import PipelineLike
+from gen_data.runner.shard_record import ShardRecord, sum_counts
+from gen_data.runner.store import LocalStore
 
 LicencesOf = Callable[[Sequence[str]], str]
 """Formats the licences of the assets with these ids."""

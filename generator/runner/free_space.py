@@ -7,11 +7,11 @@ import os
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from gen_data.generator.core.errors import StorageError
-from gen_data.generator.runner.durable_files import format_bytes
+from gen_data.core.errors import StorageError
+from gen_data.runner.durable_files import format_bytes
 
 if TYPE_CHECKING:
-    from gen_data.generator.runner.store import LocalStore
+    from gen_data.runner.store import LocalStore
 
 MARGIN = 1.05
 DOCUMENTS_BYTES = 192 << 10

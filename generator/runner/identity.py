@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
 
-from gen_data.generator.assemble.config import RUN_KEYS
-from gen_data.generator.assemble.pipeline_factory import PipelineFactory, annotators_of
-from gen_data.generator.assemble.plugin_tables import third_party_packages
-from gen_data.generator.assets.installed_packs import TAG, installed_packs
-from gen_data.generator.assets.paths import packs_dir
-from gen_data.generator.core.asset_types import Asset
-from gen_data.generator.core.scene import Scene
-from gen_data.generator.core.version import __version__
-from gen_data.generator.runner.licence_table import licence_table
-from gen_data.generator.runner.plan import Plan
+from gen_data.assemble.config import RUN_KEYS
+from gen_data.assemble.pipeline_factory import PipelineFactory, annotators_of
+from gen_data.assemble.plugin_tables import third_party_packages
+from gen_data.assets.installed_packs import TAG, installed_packs
+from gen_data.assets.paths import packs_dir
+from gen_data.core.asset_types import Asset
+from gen_data.core.scene import Scene
+from gen_data.core.version import __version__
+from gen_data.runner.licence_table import licence_table
+from gen_data.runner.plan import Plan
 
 BYTES_DEPEND_ON = {
     "OpenEXR": "OpenEXR",

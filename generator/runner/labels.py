@@ -13,10 +13,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any
 
-from gen_data.generator.core.path_names import check_name
-from gen_data.generator.core.sample import EgoTruth, ImageTruth, ObjectTruth, Sample
-from gen_data.generator.core.scene import Device, Instance, Lidar
-from gen_data.generator.core.serialization import canonical_json, from_plain, to_plain
+from gen_data.core.path_names import check_name
+from gen_data.core.sample import EgoTruth, ImageTruth, ObjectTruth, Sample
+from gen_data.core.scene import Device, Instance, Lidar
+from gen_data.core.serialization import canonical_json, from_plain, to_plain
 
 LABELS_NAME = "labels.jsonl"
 

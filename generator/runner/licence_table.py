@@ -6,8 +6,8 @@ import html
 import re
 from collections.abc import Iterable
 
-from gen_data.generator.core.asset_types import Asset
-from gen_data.generator.core.markdown import plain
+from gen_data.core.asset_types import Asset
+from gen_data.core.markdown import plain
 
 _BAR = re.compile(r"(?<!\\)\|")
 _HEADER = ("source", "licence", "author", "assets")

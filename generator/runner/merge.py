@@ -5,18 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from gen_data.core.errors import StorageError
 from gen_data.exporters.image_files import link_or_copy
-from gen_data.generator.core.errors import StorageError
-from gen_data.generator.runner.durable_files import format_bytes, nearest_folder
-from gen_data.generator.runner.free_space import (
-    DOCUMENTS_BYTES,
-    MARGIN,
-    RESERVE_BYTES,
-    full_disk,
-)
-from gen_data.generator.runner.numerics_guard import gather_numerics
-from gen_data.generator.runner.plan import Plan, compare_plans, load_plan, plan_bytes
-from gen_data.generator.runner.store import FolderState, LocalStore
+from gen_data.runner.durable_files import format_bytes, nearest_folder
+from gen_data.runner.free_space import DOCUMENTS_BYTES, MARGIN, RESERVE_BYTES, full_disk
+from gen_data.runner.numerics_guard import gather_numerics
+from gen_data.runner.plan import Plan, compare_plans, load_plan, plan_bytes
+from gen_data.runner.store import FolderState, LocalStore
 
 
 def common_plan(parts: Sequence[Path]) -> Plan:

@@ -12,14 +12,14 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gen_data.generator.core.errors import NumericsError
-from gen_data.generator.core.serialization import canonical_json
-from gen_data.generator.runner.durable_files import write_durably
-from gen_data.generator.runner.seal import read_or_empty
+from gen_data.core.errors import NumericsError
+from gen_data.core.serialization import canonical_json
+from gen_data.runner.durable_files import write_durably
+from gen_data.runner.seal import read_or_empty
 
 if TYPE_CHECKING:
-    from gen_data.generator.runner.shard import EnteredPipeline, Job, PipelineLike
-    from gen_data.generator.runner.store import LocalStore
+    from gen_data.runner.shard import EnteredPipeline, Job, PipelineLike
+    from gen_data.runner.store import LocalStore
 
 NUMERICS_NAME = "numerics.json"
 

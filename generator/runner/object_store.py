@@ -21,11 +21,11 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from gen_data.generator.core.distribution import install_command
-from gen_data.generator.core.errors import ConfigError, GenDataError, StorageError
-from gen_data.generator.core.path_names import check_inner_path
-from gen_data.generator.core.urls import is_url
-from gen_data.generator.runner.durable_files import (
+from gen_data.core.distribution import install_command
+from gen_data.core.errors import ConfigError, GenDataError, StorageError
+from gen_data.core.path_names import check_inner_path
+from gen_data.core.urls import is_url
+from gen_data.runner.durable_files import (
     Inode,
     format_bytes,
     free_bytes,
@@ -34,8 +34,8 @@ from gen_data.generator.runner.durable_files import (
     make_folder,
     tree_sizes,
 )
-from gen_data.generator.runner.failed_sample import FailedSample
-from gen_data.generator.runner.layout import (
+from gen_data.runner.failed_sample import FailedSample
+from gen_data.runner.layout import (
     CERTIFICATE_NAME,
     CERTIFICATE_NAMES,
     MANIFEST_NAME,
@@ -44,10 +44,10 @@ from gen_data.generator.runner.layout import (
     SHARDS_NAME,
     SUMS_NAME,
 )
-from gen_data.generator.runner.plan import Plan, parse_plan, plan_bytes
-from gen_data.generator.runner.seal import parse_object, parse_sums
-from gen_data.generator.runner.shard_record import FileRecord, ShardRecord, parse_record
-from gen_data.generator.runner.store import FolderState, LocalStore, Scan
+from gen_data.runner.plan import Plan, parse_plan, plan_bytes
+from gen_data.runner.seal import parse_object, parse_sums
+from gen_data.runner.shard_record import FileRecord, ShardRecord, parse_record
+from gen_data.runner.store import FolderState, LocalStore, Scan
 
 BATCH = 1000
 """Number of objects that one request to ``fsspec`` reads or writes."""
@@ -465,7 +465,7 @@ class ObjectStore(LocalStore):
 
     def is_intact(self, extra_matters: bool, on_progress: Callable[[float], None]) -> bool:
         """Whether a finished data set is undamaged: every object is read and hashed."""
-        from gen_data.generator.runner.verify import find_deviations
+        from gen_data.runner.verify import find_deviations
 
         make_folder(self.scratch_root)
         folder = self.scratch_dir()

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from gen_data.generator.core.errors import StorageError, no_folder
-from gen_data.generator.core.serialization import canonical_json, from_plain, to_plain
-from gen_data.generator.runner.durable_files import write_durably
-from gen_data.generator.runner.layout import PLAN_NAME
+from gen_data.core.errors import StorageError, no_folder
+from gen_data.core.serialization import canonical_json, from_plain, to_plain
+from gen_data.runner.durable_files import write_durably
+from gen_data.runner.layout import PLAN_NAME
 
 FORMAT_VERSION = 2
 """Version of the folder layout, the shard records and the manifest.

@@ -23,12 +23,12 @@ from pathlib import Path
 from socket import socket
 from typing import IO, TYPE_CHECKING, Protocol
 
-from gen_data.generator.core.errors import GenDataError
-from gen_data.generator.core.processes import SINGLE_THREADED, interrupts_blocked
-from gen_data.generator.core.system_calls import KILLED, anonymous_file
-from gen_data.generator.runner.supervisor import Supervisor
-from gen_data.generator.runner.termination_signals import Interruption
-from gen_data.generator.runner.worker_events import (
+from gen_data.core.errors import GenDataError
+from gen_data.core.processes import SINGLE_THREADED, interrupts_blocked
+from gen_data.core.system_calls import KILLED, anonymous_file
+from gen_data.runner.supervisor import Supervisor
+from gen_data.runner.termination_signals import Interruption
+from gen_data.runner.worker_events import (
     Abort,
     Action,
     Assign,
@@ -41,7 +41,7 @@ from gen_data.generator.runner.worker_events import (
 )
 
 if TYPE_CHECKING:
-    from gen_data.generator.runner.shard import Job
+    from gen_data.runner.shard import Job
 
 TICK_S = 0.5
 ENDING_TICK_S = 0.02
@@ -54,7 +54,7 @@ must not block the run; its parent-death signal is pending."""
 START_WORKER = (
     "import os, sys; sys.path[:] = sys.argv[5:]; "
     f"os.environ.update(dict.fromkeys({SINGLE_THREADED!r}, '1')); "
-    "from gen_data.generator.runner.worker import main; main(*map(int, sys.argv[1:5]))"
+    "from gen_data.runner.worker import main; main(*map(int, sys.argv[1:5]))"
 )
 """Program of a worker; it has the module search path of this process, and so its plug-ins.
 

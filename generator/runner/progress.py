@@ -8,12 +8,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from gen_data.generator.core.errors import CacheWarning, GenDataError
-from gen_data.generator.core.serialization import canonical_json
-from gen_data.generator.runner.durable_files import format_bytes
-from gen_data.generator.runner.free_space import SpaceCheck
-from gen_data.generator.runner.layout import LOG_NAME
-from gen_data.generator.runner.worker_events import (
+from gen_data.core.errors import CacheWarning, GenDataError
+from gen_data.core.serialization import canonical_json
+from gen_data.runner.durable_files import format_bytes
+from gen_data.runner.free_space import SpaceCheck
+from gen_data.runner.layout import LOG_NAME
+from gen_data.runner.worker_events import (
     Action,
     Event,
     Exited,
@@ -26,8 +26,8 @@ from gen_data.generator.runner.worker_events import (
 )
 
 if TYPE_CHECKING:
-    from gen_data.generator.runner.failed_sample import FailedSample
-    from gen_data.generator.runner.store import LocalStore, Scan
+    from gen_data.runner.failed_sample import FailedSample
+    from gen_data.runner.store import LocalStore, Scan
 
 
 SKIPPED_SHOWN = 10

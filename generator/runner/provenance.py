@@ -12,11 +12,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 
-from gen_data.generator.core.bounded_cache import ObjectCache
-from gen_data.generator.core.path_names import check_name
-from gen_data.generator.core.sample import Sample
-from gen_data.generator.core.scene import Scene
-from gen_data.generator.core.serialization import canonical_json, fields_from_plain, from_plain
+from gen_data.core.bounded_cache import ObjectCache
+from gen_data.core.path_names import check_name
+from gen_data.core.sample import Sample
+from gen_data.core.scene import Scene
+from gen_data.core.serialization import canonical_json, fields_from_plain, from_plain
 
 SCENES_NAME = "scenes.jsonl"
 

@@ -9,13 +9,13 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from gen_data.generator.core.distribution import install_command
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.runner.termination_signals import SIGNALS
+from gen_data.core.distribution import install_command
+from gen_data.core.errors import ConfigError
+from gen_data.runner.termination_signals import SIGNALS
 
 if TYPE_CHECKING:
-    from gen_data.generator.runner.processes import Pool
-    from gen_data.generator.runner.shard import Job
+    from gen_data.runner.processes import Pool
+    from gen_data.runner.shard import Job
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,7 @@ class RayCluster:
 
     def open_pool(self, job: Job) -> Pool:
         """Open a pool of workers of the connected cluster."""
-        from gen_data.generator.runner.ray_pool import RayPool
+        from gen_data.runner.ray_pool import RayPool
 
         return RayPool(job, cpus=self.cpus, gpus=self.gpus)
 

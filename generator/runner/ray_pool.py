@@ -14,10 +14,10 @@ from dataclasses import dataclass
 from socket import socket
 from typing import TYPE_CHECKING, Any
 
-from gen_data.generator.core.processes import SINGLE_THREADED
-from gen_data.generator.core.system_calls import KILLED
-from gen_data.generator.runner.ray_worker import Placed, ShardWorker
-from gen_data.generator.runner.worker_events import (
+from gen_data.core.processes import SINGLE_THREADED
+from gen_data.core.system_calls import KILLED
+from gen_data.runner.ray_worker import Placed, ShardWorker
+from gen_data.runner.worker_events import (
     Action,
     Assign,
     Dismiss,
@@ -31,7 +31,7 @@ from gen_data.generator.runner.worker_events import (
 )
 
 if TYPE_CHECKING:
-    from gen_data.generator.runner.shard import Job
+    from gen_data.runner.shard import Job
 
 FAILED = 1
 """Exit code of a worker without one."""

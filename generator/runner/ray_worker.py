@@ -19,22 +19,16 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
-from gen_data.generator.core.errors import NumericsError
-from gen_data.generator.core.sample import Sample
-from gen_data.generator.runner.durable_files import make_folder
-from gen_data.generator.runner.failed_sample import FailedSample
-from gen_data.generator.runner.identity import installation_differences
-from gen_data.generator.runner.numerics_guard import admit_numerics
-from gen_data.generator.runner.resident_memory import release_memory
-from gen_data.generator.runner.shard import Job, PipelineLike, make_shard
-from gen_data.generator.runner.worker import done_event, make_sendable
-from gen_data.generator.runner.worker_events import (
-    Event,
-    Failed,
-    Ready,
-    SampleDone,
-    SampleSkipped,
-)
+from gen_data.core.errors import NumericsError
+from gen_data.core.sample import Sample
+from gen_data.runner.durable_files import make_folder
+from gen_data.runner.failed_sample import FailedSample
+from gen_data.runner.identity import installation_differences
+from gen_data.runner.numerics_guard import admit_numerics
+from gen_data.runner.resident_memory import release_memory
+from gen_data.runner.shard import Job, PipelineLike, make_shard
+from gen_data.runner.worker import done_event, make_sendable
+from gen_data.runner.worker_events import Event, Failed, Ready, SampleDone, SampleSkipped
 
 BATCH_S = 1.0
 """Time between two batches of events [s]: a driver of a thousand workers reads so many per second.

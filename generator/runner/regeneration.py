@@ -11,23 +11,18 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from gen_data.generator.assemble.config import parse_config
-from gen_data.generator.assemble.pipeline_factory import PipelineFactory
-from gen_data.generator.core.errors import ConfigError, StorageError
-from gen_data.generator.runner.finalize import LicencesOf
-from gen_data.generator.runner.identity import format_licences, make_plan
-from gen_data.generator.runner.layout import PLAN_NAME
-from gen_data.generator.runner.plan import Plan, compare_plans
-from gen_data.generator.runner.rerender import rerender_plan
-from gen_data.generator.runner.sample_stages import Difference, SampleFiles, compare_samples
-from gen_data.generator.runner.shard import (
-    EnteredPipeline,
-    PipelineLike,
-    write_images,
-    write_records,
-)
-from gen_data.generator.runner.store import LocalStore
-from gen_data.generator.runner.stored import StoredSamples
+from gen_data.assemble.config import parse_config
+from gen_data.assemble.pipeline_factory import PipelineFactory
+from gen_data.core.errors import ConfigError, StorageError
+from gen_data.runner.finalize import LicencesOf
+from gen_data.runner.identity import format_licences, make_plan
+from gen_data.runner.layout import PLAN_NAME
+from gen_data.runner.plan import Plan, compare_plans
+from gen_data.runner.rerender import rerender_plan
+from gen_data.runner.sample_stages import Difference, SampleFiles, compare_samples
+from gen_data.runner.shard import EnteredPipeline, PipelineLike, write_images, write_records
+from gen_data.runner.store import LocalStore
+from gen_data.runner.stored import StoredSamples
 
 
 @dataclass(frozen=True)

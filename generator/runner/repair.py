@@ -8,13 +8,13 @@ from __future__ import annotations
 import hashlib
 import os
 
-from gen_data.generator.core.errors import StorageError
-from gen_data.generator.runner.durable_files import make_folder, write_durably
-from gen_data.generator.runner.layout import PLAN_NAME
-from gen_data.generator.runner.plan import Plan, plan_bytes
-from gen_data.generator.runner.seal import read_or_empty, read_sums
-from gen_data.generator.runner.store import LocalStore
-from gen_data.generator.runner.verify import find_deviations
+from gen_data.core.errors import StorageError
+from gen_data.runner.durable_files import make_folder, write_durably
+from gen_data.runner.layout import PLAN_NAME
+from gen_data.runner.plan import Plan, plan_bytes
+from gen_data.runner.seal import read_or_empty, read_sums
+from gen_data.runner.store import LocalStore
+from gen_data.runner.verify import find_deviations
 
 
 def read_declared_plan(store: LocalStore) -> bytes | None:

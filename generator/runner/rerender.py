@@ -12,27 +12,27 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
-from gen_data.generator.assemble.config import Config
-from gen_data.generator.assemble.pipeline_factory import PipelineFactory
-from gen_data.generator.assemble.size_estimate import estimate_sample_bytes
-from gen_data.generator.config.shared_values import REFERENCE
-from gen_data.generator.core.errors import ConfigError, ConfigWarning, did_you_mean
-from gen_data.generator.core.interfaces import DatasetInfo, Exporter, Randomizer, Sensor, Stage
-from gen_data.generator.core.sample import Sample
-from gen_data.generator.core.scene import Scene
-from gen_data.generator.core.scene_time import place_sensors
-from gen_data.generator.core.serialization import canonical_json
-from gen_data.generator.core.streams import Streams
-from gen_data.generator.pipeline import Pipeline
-from gen_data.generator.pipeline.finalize_scene import finalize_scene
-from gen_data.generator.pipeline.pipeline import DrawnView
-from gen_data.generator.runner.failed_sample import FailedSample
-from gen_data.generator.runner.identity import format_licences, make_plan
-from gen_data.generator.runner.plan import Plan
-from gen_data.generator.runner.progress import RunProgress, Summary
-from gen_data.generator.runner.run import Settings, run
-from gen_data.generator.runner.stored import CheckedSamples, StoredSamples
-from gen_data.generator.runner.verify import check_source
+from gen_data.assemble.config import Config
+from gen_data.assemble.pipeline_factory import PipelineFactory
+from gen_data.assemble.size_estimate import estimate_sample_bytes
+from gen_data.config.shared_values import REFERENCE
+from gen_data.core.errors import ConfigError, ConfigWarning, did_you_mean
+from gen_data.core.interfaces import DatasetInfo, Exporter, Randomizer, Sensor, Stage
+from gen_data.core.sample import Sample
+from gen_data.core.scene import Scene
+from gen_data.core.scene_time import place_sensors
+from gen_data.core.serialization import canonical_json
+from gen_data.core.streams import Streams
+from gen_data.pipeline import Pipeline
+from gen_data.pipeline.finalize_scene import finalize_scene
+from gen_data.pipeline.pipeline import DrawnView
+from gen_data.runner.failed_sample import FailedSample
+from gen_data.runner.identity import format_licences, make_plan
+from gen_data.runner.plan import Plan
+from gen_data.runner.progress import RunProgress, Summary
+from gen_data.runner.run import Settings, run
+from gen_data.runner.stored import CheckedSamples, StoredSamples
+from gen_data.runner.verify import check_source
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from gen_data.generator.core.mapped_files import drop_pages, limit_mapped_pages, read_statm
+from gen_data.core.mapped_files import drop_pages, limit_mapped_pages, read_statm
 
 HEAP_GROWTH_BYTES = 48 * 1024 * 1024
 """Private memory that may be freed but not returned; trimming takes some milliseconds."""

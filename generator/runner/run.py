@@ -9,20 +9,20 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from gen_data.generator.core.errors import GenDataError
-from gen_data.generator.core.sample import Sample
-from gen_data.generator.runner.failed_sample import FailedSample, parse_failed
-from gen_data.generator.runner.finalize import LicencesOf, finalize
-from gen_data.generator.runner.free_space import DOCUMENTS_BYTES, SpaceCheck
-from gen_data.generator.runner.layout import MANIFEST_NAME, PLAN_NAME, SUMS_NAME
-from gen_data.generator.runner.numerics_guard import admit_numerics
-from gen_data.generator.runner.object_store import open_store
-from gen_data.generator.runner.plan import Plan, plan_bytes
-from gen_data.generator.runner.processes import Pool, open_worker_pool, run_supervisor
-from gen_data.generator.runner.progress import RunMonitor, RunProgress, Summary
-from gen_data.generator.runner.repair import quarantine_extra, restore_plan
-from gen_data.generator.runner.seal import SealedBefore, parse_seal
-from gen_data.generator.runner.shard import (
+from gen_data.core.errors import GenDataError
+from gen_data.core.sample import Sample
+from gen_data.runner.failed_sample import FailedSample, parse_failed
+from gen_data.runner.finalize import LicencesOf, finalize
+from gen_data.runner.free_space import DOCUMENTS_BYTES, SpaceCheck
+from gen_data.runner.layout import MANIFEST_NAME, PLAN_NAME, SUMS_NAME
+from gen_data.runner.numerics_guard import admit_numerics
+from gen_data.runner.object_store import open_store
+from gen_data.runner.plan import Plan, plan_bytes
+from gen_data.runner.processes import Pool, open_worker_pool, run_supervisor
+from gen_data.runner.progress import RunMonitor, RunProgress, Summary
+from gen_data.runner.repair import quarantine_extra, restore_plan
+from gen_data.runner.seal import SealedBefore, parse_seal
+from gen_data.runner.shard import (
     EnteredPipeline,
     Job,
     LinkedDigests,
@@ -33,11 +33,11 @@ from gen_data.generator.runner.shard import (
     write_images,
     write_records,
 )
-from gen_data.generator.runner.store import FolderState, LocalStore, Scan
-from gen_data.generator.runner.supervisor import Limits, Supervisor
-from gen_data.generator.runner.termination_signals import Interruption
-from gen_data.generator.runner.worker import done_event
-from gen_data.generator.runner.worker_events import SampleDone, SampleSkipped
+from gen_data.runner.store import FolderState, LocalStore, Scan
+from gen_data.runner.supervisor import Limits, Supervisor
+from gen_data.runner.termination_signals import Interruption
+from gen_data.runner.worker import done_event
+from gen_data.runner.worker_events import SampleDone, SampleSkipped
 
 __all__ = ["Limits", "RunProgress", "Settings", "Summary", "run"]
 

@@ -26,13 +26,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.errors import StorageError
-from gen_data.generator.core.serialization import canonical_json
-from gen_data.generator.runner.durable_files import hash_file
-from gen_data.generator.runner.labels import LABELS_NAME
-from gen_data.generator.runner.plan import differences
-from gen_data.generator.runner.provenance import SCENES_NAME
+from gen_data.core.capture import Channel
+from gen_data.core.errors import StorageError
+from gen_data.core.serialization import canonical_json
+from gen_data.runner.durable_files import hash_file
+from gen_data.runner.labels import LABELS_NAME
+from gen_data.runner.plan import differences
+from gen_data.runner.provenance import SCENES_NAME
 
 STAGES = ("scene", "geometry", "render", "labels", "encode")
 SENSED = frozenset(

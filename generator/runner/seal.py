@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from gen_data.generator.core.errors import DeterminismError
-from gen_data.generator.runner.layout import MANIFEST_NAME, SHARDS_NAME, SUMS_NAME
+from gen_data.core.errors import DeterminismError
+from gen_data.runner.layout import MANIFEST_NAME, SHARDS_NAME, SUMS_NAME
 
 SUM_LINE = re.compile(r"([0-9a-f]{64})  (\S.*)")
 

@@ -9,24 +9,20 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol
 
-from gen_data.generator.core.capture import Capture, SensorReading
-from gen_data.generator.core.errors import GenDataError, SampleError, in_stage
-from gen_data.generator.core.interfaces import DatasetInfo, Exporter
-from gen_data.generator.core.sample import Sample
-from gen_data.generator.core.serialization import find_not_finite, to_plain
-from gen_data.generator.runner.durable_files import Inode
-from gen_data.generator.runner.error_context import explain_errors
-from gen_data.generator.runner.failed_sample import (
-    FailedSample,
-    describe_failure,
-    may_be_skipped,
-)
-from gen_data.generator.runner.labels import LABELS_NAME, labels_line
-from gen_data.generator.runner.plan import Plan
-from gen_data.generator.runner.provenance import SCENES_NAME, scene_line
-from gen_data.generator.runner.resident_memory import HeapTrimmer
-from gen_data.generator.runner.shard_record import ShardRecord, describe_shard
-from gen_data.generator.runner.store import LocalStore
+from gen_data.core.capture import Capture, SensorReading
+from gen_data.core.errors import GenDataError, SampleError, in_stage
+from gen_data.core.interfaces import DatasetInfo, Exporter
+from gen_data.core.sample import Sample
+from gen_data.core.serialization import find_not_finite, to_plain
+from gen_data.runner.durable_files import Inode
+from gen_data.runner.error_context import explain_errors
+from gen_data.runner.failed_sample import FailedSample, describe_failure, may_be_skipped
+from gen_data.runner.labels import LABELS_NAME, labels_line
+from gen_data.runner.plan import Plan
+from gen_data.runner.provenance import SCENES_NAME, scene_line
+from gen_data.runner.resident_memory import HeapTrimmer
+from gen_data.runner.shard_record import ShardRecord, describe_shard
+from gen_data.runner.store import LocalStore
 
 MediaWriter = Callable[[DatasetInfo, Sample, Path], object]
 """Writes the images of a sample to their places in a shard folder."""
@@ -86,8 +82,8 @@ def write_images(info: DatasetInfo, sample: Sample, shard_dir: Path) -> None:
     Raises:
         SampleError: the sample is not valid; the message names the field.
     """
+    from gen_data.annotations.sample_checks import check_sample
     from gen_data.exporters.image_files import write_media
-    from gen_data.generator.annotations.sample_checks import check_sample
 
     check_sample(info, sample)
     write_media(info, sample, shard_dir)

@@ -14,12 +14,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
 
-from gen_data.generator.core.errors import StorageError
-from gen_data.generator.core.path_names import check_inner_path
-from gen_data.generator.core.sample import Sample
-from gen_data.generator.core.scene_assets import assets_in
-from gen_data.generator.core.serialization import SPARSE, canonical_json, from_plain, to_plain
-from gen_data.generator.runner.durable_files import (
+from gen_data.core.errors import StorageError
+from gen_data.core.path_names import check_inner_path
+from gen_data.core.sample import Sample
+from gen_data.core.scene_assets import assets_in
+from gen_data.core.serialization import SPARSE, canonical_json, from_plain, to_plain
+from gen_data.runner.durable_files import (
     IRREGULAR,
     Inode,
     empty_folders,
@@ -27,7 +27,7 @@ from gen_data.generator.runner.durable_files import (
     hash_file,
     tree_sizes,
 )
-from gen_data.generator.runner.failed_sample import FailedSample
+from gen_data.runner.failed_sample import FailedSample
 
 
 @dataclass(frozen=True, slots=True)

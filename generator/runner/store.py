@@ -18,9 +18,9 @@ from dataclasses import dataclass, replace
 from enum import Enum
 from pathlib import Path
 
-from gen_data.generator.core.errors import ConfigError, DeterminismError, StorageError
-from gen_data.generator.core.system_calls import try_lock
-from gen_data.generator.runner.durable_files import (
+from gen_data.core.errors import ConfigError, DeterminismError, StorageError
+from gen_data.core.system_calls import try_lock
+from gen_data.runner.durable_files import (
     Inode,
     free_bytes,
     hash_file,
@@ -32,8 +32,8 @@ from gen_data.generator.runner.durable_files import (
     sync_tree,
     write_durably,
 )
-from gen_data.generator.runner.failed_sample import FailedSample
-from gen_data.generator.runner.layout import (
+from gen_data.runner.failed_sample import FailedSample
+from gen_data.runner.layout import (
     CERTIFICATE_NAMES,
     LICENCES_NAME,
     MANIFEST_NAME,
@@ -44,8 +44,8 @@ from gen_data.generator.runner.layout import (
     record_path,
     shard_path,
 )
-from gen_data.generator.runner.plan import Plan, compare_plans, load_plan, plan_bytes, write_plan
-from gen_data.generator.runner.shard_record import ShardRecord, parse_record
+from gen_data.runner.plan import Plan, compare_plans, load_plan, plan_bytes, write_plan
+from gen_data.runner.shard_record import ShardRecord, parse_record
 
 REMEDY = "choose another folder with --out"
 SCRATCH_FOLDERS_MAX = 1_000_000
@@ -149,7 +149,7 @@ class LocalStore:
 
         ``on_progress`` is called with the share of bytes that were hashed, where it is known.
         """
-        from gen_data.generator.runner.verify import find_deviations
+        from gen_data.runner.verify import find_deviations
 
         del on_progress
         found = find_deviations(self.root, full=True)

@@ -18,29 +18,22 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.core.capture import (
-    POINT,
-    Capture,
-    Channel,
-    Measurements,
-    PointCloud,
-    SensorReading,
-)
-from gen_data.generator.core.errors import SampleIndexError, StorageError
-from gen_data.generator.core.interfaces import DatasetInfo, cloud_path, table_path
-from gen_data.generator.core.measurement_dtypes import columns_dtype
-from gen_data.generator.core.path_names import check_name
-from gen_data.generator.core.sample import EgoTruth, ImageTruth, Sample
-from gen_data.generator.core.scene import Camera, Scene
-from gen_data.generator.core.serialization import from_plain
-from gen_data.generator.core.urls import is_url, needs_folder
-from gen_data.generator.runner.durable_files import hash_file
-from gen_data.generator.runner.failed_sample import FailedSample, parse_failed
-from gen_data.generator.runner.labels import LABELS_NAME, Labels, parse_labels
-from gen_data.generator.runner.layout import MANIFEST_NAME, SHARDS_NAME
-from gen_data.generator.runner.plan import DAMAGE, load_plan
-from gen_data.generator.runner.provenance import SCENES_NAME, KeptScene, parse_scene
-from gen_data.generator.runner.store import LocalStore
+from gen_data.core.capture import POINT, Capture, Channel, Measurements, PointCloud, SensorReading
+from gen_data.core.errors import SampleIndexError, StorageError
+from gen_data.core.interfaces import DatasetInfo, cloud_path, table_path
+from gen_data.core.measurement_dtypes import columns_dtype
+from gen_data.core.path_names import check_name
+from gen_data.core.sample import EgoTruth, ImageTruth, Sample
+from gen_data.core.scene import Camera, Scene
+from gen_data.core.serialization import from_plain
+from gen_data.core.urls import is_url, needs_folder
+from gen_data.runner.durable_files import hash_file
+from gen_data.runner.failed_sample import FailedSample, parse_failed
+from gen_data.runner.labels import LABELS_NAME, Labels, parse_labels
+from gen_data.runner.layout import MANIFEST_NAME, SHARDS_NAME
+from gen_data.runner.plan import DAMAGE, load_plan
+from gen_data.runner.provenance import SCENES_NAME, KeptScene, parse_scene
+from gen_data.runner.store import LocalStore
 
 T = TypeVar("T")
 

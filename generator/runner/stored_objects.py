@@ -10,13 +10,13 @@ from pathlib import Path
 from tempfile import mkdtemp
 from typing import Any
 
-from gen_data.generator.core.errors import StorageError
-from gen_data.generator.core.urls import is_url
-from gen_data.generator.runner.layout import MANIFEST_NAME, PLAN_NAME, SHARDS_NAME
-from gen_data.generator.runner.object_store import ObjectFolder, fetch_shard
-from gen_data.generator.runner.seal import parse_object
-from gen_data.generator.runner.shard_record import parse_unchecked_record
-from gen_data.generator.runner.stored import StoredSamples, parse_dataset_id
+from gen_data.core.errors import StorageError
+from gen_data.core.urls import is_url
+from gen_data.runner.layout import MANIFEST_NAME, PLAN_NAME, SHARDS_NAME
+from gen_data.runner.object_store import ObjectFolder, fetch_shard
+from gen_data.runner.seal import parse_object
+from gen_data.runner.shard_record import parse_unchecked_record
+from gen_data.runner.stored import StoredSamples, parse_dataset_id
 
 
 def open_stored(place: str | os.PathLike[str]) -> StoredSamples:

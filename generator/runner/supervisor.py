@@ -12,16 +12,16 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 
-from gen_data.generator.core.errors import (
+from gen_data.core.errors import (
     DeterminismError,
     GenDataError,
     NumericsError,
     StorageError,
     WorkerLost,
 )
-from gen_data.generator.core.system_calls import KILLED
-from gen_data.generator.runner.failed_sample import FailedSample
-from gen_data.generator.runner.worker_events import (
+from gen_data.core.system_calls import KILLED
+from gen_data.runner.failed_sample import FailedSample
+from gen_data.runner.worker_events import (
     Abort,
     Action,
     Assign,

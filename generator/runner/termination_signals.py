@@ -8,8 +8,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from types import FrameType
 
-from gen_data.generator.core.errors import Interrupted
-from gen_data.generator.core.system_calls import stop_signals, wake_channel
+from gen_data.core.errors import Interrupted
+from gen_data.core.system_calls import stop_signals, wake_channel
 
 SIGNALS = stop_signals()
 

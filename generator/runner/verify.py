@@ -11,8 +11,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from gen_data.generator.core.errors import StorageError, VerificationError, no_folder
-from gen_data.generator.runner.durable_files import (
+from gen_data.core.errors import StorageError, VerificationError, no_folder
+from gen_data.runner.durable_files import (
     IRREGULAR,
     Contents,
     Inode,
@@ -21,7 +21,7 @@ from gen_data.generator.runner.durable_files import (
     hash_file,
     scan_tree,
 )
-from gen_data.generator.runner.layout import (
+from gen_data.runner.layout import (
     CERTIFICATE_NAMES,
     MANIFEST_NAME,
     PLAN_NAME,
@@ -31,9 +31,9 @@ from gen_data.generator.runner.layout import (
     record_path,
     shard_path,
 )
-from gen_data.generator.runner.plan import Plan, load_plan
-from gen_data.generator.runner.seal import parse_object, read_or_empty, read_sums
-from gen_data.generator.runner.shard_record import ShardRecord, parse_unchecked_record
+from gen_data.runner.plan import Plan, load_plan
+from gen_data.runner.seal import parse_object, read_or_empty, read_sums
+from gen_data.runner.shard_record import ShardRecord, parse_unchecked_record
 
 SAMPLE_NAME = re.compile(r"(?:^|[/_])(\d{6,9})[._]")
 SHARD_PATH = re.compile(rf"{SHARDS_NAME}/(\d+)[/.]")

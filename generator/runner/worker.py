@@ -23,22 +23,16 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from gen_data.generator.core.errors import CacheWarning, ConfigWarning, GenDataError
-from gen_data.generator.core.processes import end_with_parent, forbid_core_dumps, ignore_interrupts
-from gen_data.generator.runner.error_context import unexpected_error
-from gen_data.generator.runner.resident_memory import release_memory, resident_bytes
-from gen_data.generator.runner.worker_events import (
-    Failed,
-    Ready,
-    SampleDone,
-    SampleSkipped,
-    ShardDone,
-)
+from gen_data.core.errors import CacheWarning, ConfigWarning, GenDataError
+from gen_data.core.processes import end_with_parent, forbid_core_dumps, ignore_interrupts
+from gen_data.runner.error_context import unexpected_error
+from gen_data.runner.resident_memory import release_memory, resident_bytes
+from gen_data.runner.worker_events import Failed, Ready, SampleDone, SampleSkipped, ShardDone
 
 if TYPE_CHECKING:
-    from gen_data.generator.core.sample import Sample
-    from gen_data.generator.runner.failed_sample import FailedSample
-    from gen_data.generator.runner.shard import Job, MadeShard, PipelineLike
+    from gen_data.core.sample import Sample
+    from gen_data.runner.failed_sample import FailedSample
+    from gen_data.runner.shard import Job, MadeShard, PipelineLike
 
 
 def main(number: int, connection_fd: int, job_fd: int, parent_pid: int) -> None:
@@ -82,10 +76,10 @@ def main(number: int, connection_fd: int, job_fd: int, parent_pid: int) -> None:
 
 def _prepare() -> None:
     """Import and load what most jobs need."""
-    from gen_data.generator.assemble import pipeline_factory
-    from gen_data.generator.renderers.warp import renderer
-    from gen_data.generator.renderers.warp.device import prepare_device
-    from gen_data.generator.runner import numerics_guard, shard
+    from gen_data.assemble import pipeline_factory
+    from gen_data.renderers.warp import renderer
+    from gen_data.renderers.warp.device import prepare_device
+    from gen_data.runner import numerics_guard, shard
 
     del pipeline_factory, renderer, numerics_guard, shard
     try:
@@ -149,7 +143,7 @@ def _make_shards(number: int, connection: Connection, job: Job, notices: list[st
         gc.freeze()
         release_memory()
         # Imports numpy, therefore only after ``end_with_parent``.
-        from gen_data.generator.runner.numerics_guard import admit_numerics
+        from gen_data.runner.numerics_guard import admit_numerics
 
         admit_numerics(job, pipeline)
         connection.send(Ready(number, tuple(notices)))
@@ -187,7 +181,7 @@ def _make_shard(
         connection.send(SampleSkipped(number, shard, failure, text))
 
     # Imports numpy, therefore only after ``end_with_parent``.
-    from gen_data.generator.runner.shard import make_shard
+    from gen_data.runner.shard import make_shard
 
     made = make_shard(job, pipeline, shard, report, report_failure, failed)
     connection.send(done_event(number, made))

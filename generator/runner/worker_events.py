@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
-from gen_data.generator.core.errors import GenDataError
-from gen_data.generator.runner.failed_sample import FailedSample
+from gen_data.core.errors import GenDataError
+from gen_data.runner.failed_sample import FailedSample
 
 
 @dataclass(frozen=True, slots=True)

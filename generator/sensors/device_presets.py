@@ -7,11 +7,11 @@ from importlib.resources import files
 from pathlib import Path
 from typing import TypeVar
 
-from gen_data.generator.config.base_model import Strict
-from gen_data.generator.config.problems import Problems
-from gen_data.generator.config.validation import validate
-from gen_data.generator.config.yaml_tree import load_yaml
-from gen_data.generator.core.errors import ConfigError, did_you_mean
+from gen_data.config.base_model import Strict
+from gen_data.config.problems import Problems
+from gen_data.config.validation import validate
+from gen_data.config.yaml_tree import load_yaml
+from gen_data.core.errors import ConfigError, did_you_mean
 
 M = TypeVar("M", bound=Strict)
 

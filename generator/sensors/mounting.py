@@ -12,14 +12,14 @@ import numpy as np
 from pydantic import Field, model_validator
 from typing_extensions import Self
 
-from gen_data.generator.config.base_model import NAME_PATTERN, Strict
-from gen_data.generator.core.errors import ConfigError, ConfigWarning, did_you_mean
-from gen_data.generator.core.interfaces import AssetIndex, Modality, Sensor, SensorInfo
-from gen_data.generator.core.measurement_dtypes import TABLE_COLUMNS, TIME_DECIMALS
-from gen_data.generator.core.motion import STILL, Trajectory, Twist
-from gen_data.generator.core.scene import Camera, Device, Lidar, Scene
-from gen_data.generator.core.scene_time import RIG_AXES
-from gen_data.generator.core.se3 import SE3, Array, turned
+from gen_data.config.base_model import NAME_PATTERN, Strict
+from gen_data.core.errors import ConfigError, ConfigWarning, did_you_mean
+from gen_data.core.interfaces import AssetIndex, Modality, Sensor, SensorInfo
+from gen_data.core.measurement_dtypes import TABLE_COLUMNS, TIME_DECIMALS
+from gen_data.core.motion import STILL, Trajectory, Twist
+from gen_data.core.scene import Camera, Device, Lidar, Scene
+from gen_data.core.scene_time import RIG_AXES
+from gen_data.core.se3 import SE3, Array, turned
 
 BURIED_M = 0.05
 """Allowed depth of a sensor inside its body's bounding box, which is larger than the body."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.se3 import SE3
+from gen_data.core.interfaces import AssetIndex
+from gen_data.core.se3 import SE3
 
 _OVERHANG = 0.2
 """Overhang beyond either axle, as a fraction of the length, without wheel keypoints."""

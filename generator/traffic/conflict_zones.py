@@ -9,9 +9,9 @@ from typing import Literal
 
 import numpy as np
 
-from gen_data.generator.core.lane_geometry import LaneLine
-from gen_data.generator.core.se3 import Array, Vec3
-from gen_data.generator.traffic.lane_routes import LaneGraph
+from gen_data.core.lane_geometry import LaneLine
+from gen_data.core.se3 import Array, Vec3
+from gen_data.traffic.lane_routes import LaneGraph
 
 _STEP_M = 0.5
 _SAME_M = 0.5

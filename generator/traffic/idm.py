@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gen_data.generator.core.se3 import Array
+from gen_data.core.se3 import Array
 
 HARDEST_M_S2 = 8.0
 """Largest deceleration: the limit of tyres on a dry road."""

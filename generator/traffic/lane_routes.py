@@ -9,11 +9,11 @@ from itertools import accumulate, pairwise
 
 import numpy as np
 
-from gen_data.generator.core.errors import ConfigError, did_you_mean
-from gen_data.generator.core.lane_geometry import LaneLine
-from gen_data.generator.core.scene import Lane
-from gen_data.generator.core.se3 import Array
-from gen_data.generator.core.streams import Rng
+from gen_data.core.errors import ConfigError, did_you_mean
+from gen_data.core.lane_geometry import LaneLine
+from gen_data.core.scene import Lane
+from gen_data.core.se3 import Array
+from gen_data.core.streams import Rng
 
 STATION_M = 0.5
 """Distance between stations."""

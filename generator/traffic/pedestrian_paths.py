@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gen_data.generator.core.lane_geometry import LaneLine
-from gen_data.generator.core.se3 import Array, Vec3
-from gen_data.generator.core.streams import Rng
-from gen_data.generator.traffic.lane_routes import LaneGraph, project_on_lane
+from gen_data.core.lane_geometry import LaneLine
+from gen_data.core.se3 import Array, Vec3
+from gen_data.core.streams import Rng
+from gen_data.traffic.lane_routes import LaneGraph, project_on_lane
 
 GRID_M = 0.25
 """Distance between stations of a path."""

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.core.se3 import Array
-from gen_data.generator.traffic.pedestrian_paths import GRID_M, Path
-from gen_data.generator.traffic.signal_cycles import Approach
-from gen_data.generator.traffic.steering import normalize
-from gen_data.generator.traffic.vehicle_model import CrossingPedestrian
+from gen_data.core.se3 import Array
+from gen_data.traffic.pedestrian_paths import GRID_M, Path
+from gen_data.traffic.signal_cycles import Approach
+from gen_data.traffic.steering import normalize
+from gen_data.traffic.vehicle_model import CrossingPedestrian
 
 Indices = NDArray[np.int64]
 

@@ -9,14 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.core.boxes import rectangles_overlap
-from gen_data.generator.core.motion import Trajectory
-from gen_data.generator.core.se3 import SE3, Array, Vec3
-from gen_data.generator.traffic.lane_routes import STATION_M
-from gen_data.generator.traffic.pedestrians import Pedestrian, Pedestrians
-from gen_data.generator.traffic.signal_cycles import Approach
-from gen_data.generator.traffic.vehicle_model import VehicleModel
-from gen_data.generator.traffic.vehicles import Vehicles
+from gen_data.core.boxes import rectangles_overlap
+from gen_data.core.motion import Trajectory
+from gen_data.core.se3 import SE3, Array, Vec3
+from gen_data.traffic.lane_routes import STATION_M
+from gen_data.traffic.pedestrians import Pedestrian, Pedestrians
+from gen_data.traffic.signal_cycles import Approach
+from gen_data.traffic.vehicle_model import VehicleModel
+from gen_data.traffic.vehicles import Vehicles
 
 STEP_S = 0.05
 KNOT_S = 0.1

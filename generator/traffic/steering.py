@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.core.se3 import Array
+from gen_data.core.se3 import Array
 
 
 @dataclass(frozen=True, eq=False, slots=True)

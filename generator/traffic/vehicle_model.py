@@ -7,17 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gen_data.generator.core.se3 import Array
-from gen_data.generator.traffic.conflict_zones import Zone
-from gen_data.generator.traffic.idm import (
-    HARDEST_M_S2,
-    equilibrium_speed,
-    free_acceleration,
-    interaction,
-)
-from gen_data.generator.traffic.lane_routes import STATION_M
-from gen_data.generator.traffic.signal_cycles import Approach
-from gen_data.generator.traffic.vehicles import EASY_M_S2, Entry, Vehicles
+from gen_data.core.se3 import Array
+from gen_data.traffic.conflict_zones import Zone
+from gen_data.traffic.idm import HARDEST_M_S2, equilibrium_speed, free_acceleration, interaction
+from gen_data.traffic.lane_routes import STATION_M
+from gen_data.traffic.signal_cycles import Approach
+from gen_data.traffic.vehicles import EASY_M_S2, Entry, Vehicles
 
 SEEN_M = 12.0
 """Smallest distance at which drivers decide about a junction; more at higher speeds."""

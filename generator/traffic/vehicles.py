@@ -8,18 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gen_data.generator.core.boxes import rectangles_overlap
-from gen_data.generator.core.se3 import Array
-from gen_data.generator.traffic.conflict_zones import (
-    Overlap,
-    Zone,
-    crosswalk_zones,
-    find_overlaps,
-    heading,
-)
-from gen_data.generator.traffic.idm import Drivers
-from gen_data.generator.traffic.lane_routes import STATION_M, LaneGraph, Route, points_at
-from gen_data.generator.traffic.steering import Courses, follow_lines, normalize
+from gen_data.core.boxes import rectangles_overlap
+from gen_data.core.se3 import Array
+from gen_data.traffic.conflict_zones import Overlap, Zone, crosswalk_zones, find_overlaps, heading
+from gen_data.traffic.idm import Drivers
+from gen_data.traffic.lane_routes import STATION_M, LaneGraph, Route, points_at
+from gen_data.traffic.steering import Courses, follow_lines, normalize
 
 LOOKAHEAD_S, LOOKAHEAD_M = 0.6, (3.0, 10.0)
 """Lookahead of the steering: a time at the vehicle's speed, within bounds."""

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from gen_data.generator.core.asset_types import Float32, Material, MeshData
-from gen_data.generator.usd.prims import open_stage_for_writing
+from gen_data.core.asset_types import Float32, Material, MeshData
+from gen_data.usd.prims import open_stage_for_writing
 
 MESH = "Mesh"
 ASSET = "/Asset"

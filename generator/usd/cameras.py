@@ -10,9 +10,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from gen_data.generator.core.scene import Camera
-from gen_data.generator.core.se3 import SE3, Array
-from gen_data.generator.usd.prims import T_CAMERA_USD, set_transforms
+from gen_data.core.scene import Camera
+from gen_data.core.se3 import SE3, Array
+from gen_data.usd.prims import T_CAMERA_USD, set_transforms
 
 PIXEL = 2.0**-11
 """Pixel width on the sensor in tenths of a scene unit, USD's unit for apertures: about 49

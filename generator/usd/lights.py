@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from gen_data.generator.core.colorimetry import luminance
-from gen_data.generator.core.errors import AssetError
-from gen_data.generator.core.photometry import luminance_cd_m2
-from gen_data.generator.core.scene import Environment, Light
-from gen_data.generator.core.se3 import SE3, Array, Vec3
-from gen_data.generator.usd.prims import along_minus_z, rotation_from_axes, set_transforms
+from gen_data.core.colorimetry import luminance
+from gen_data.core.errors import AssetError
+from gen_data.core.photometry import luminance_cd_m2
+from gen_data.core.scene import Environment, Light
+from gen_data.core.se3 import SE3, Array, Vec3
+from gen_data.usd.prims import along_minus_z, rotation_from_axes, set_transforms
 
 RADIUS_M_MIN = 1e-3
 """Smallest radius of exported spheres: USD gives radiance, which points do not have."""

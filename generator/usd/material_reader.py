@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from gen_data.generator.core.asset_types import Material
-from gen_data.generator.core.errors import AssetError
-from gen_data.generator.core.se3 import Array, Vec3
+from gen_data.core.asset_types import Material
+from gen_data.core.errors import AssetError
+from gen_data.core.se3 import Array, Vec3
 
 _IDENTITY = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.core.errors import AssetError
-from gen_data.generator.core.se3 import Array
-from gen_data.generator.usd.material_reader import PLAIN, BoundMaterial, read_bound_material
-from gen_data.generator.usd.primitives import primitive_corners
+from gen_data.core.errors import AssetError
+from gen_data.core.se3 import Array
+from gen_data.usd.material_reader import PLAIN, BoundMaterial, read_bound_material
+from gen_data.usd.primitives import primitive_corners
 
 Int64 = NDArray[np.int64]
 

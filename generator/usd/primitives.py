@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from gen_data.generator.core.errors import AssetError
-from gen_data.generator.core.se3 import Array
+from gen_data.core.errors import AssetError
+from gen_data.core.se3 import Array
 
 KINDS = ("Cube", "Sphere", "Cylinder", "Cone", "Capsule", "Plane")
 SEGMENTS = 32

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from gen_data.generator.core.errors import StorageError
-from gen_data.generator.core.se3 import SE3, Array
+from gen_data.core.errors import StorageError
+from gen_data.core.se3 import SE3, Array
 
 T_CAMERA_USD = SE3((0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0))
 """USD's camera looks along -Z with +Y up, this project's along +Z with -Y up."""

@@ -16,15 +16,15 @@ from typing import Any
 
 import numpy as np
 
-from gen_data.generator.core.errors import AssetError
-from gen_data.generator.core.optional_packages import missing_packages
-from gen_data.generator.core.scene import Light
-from gen_data.generator.core.se3 import SE3, Array
-from gen_data.generator.usd.cameras import read_camera_pose
-from gen_data.generator.usd.lights import check_light, read_light
-from gen_data.generator.usd.mesh_reader import MeshPrim, read_mesh_prim, read_primitive
-from gen_data.generator.usd.primitives import KINDS
-from gen_data.generator.usd.prims import unique_name
+from gen_data.core.errors import AssetError
+from gen_data.core.optional_packages import missing_packages
+from gen_data.core.scene import Light
+from gen_data.core.se3 import SE3, Array
+from gen_data.usd.cameras import read_camera_pose
+from gen_data.usd.lights import check_light, read_light
+from gen_data.usd.mesh_reader import MeshPrim, read_mesh_prim, read_primitive
+from gen_data.usd.primitives import KINDS
+from gen_data.usd.prims import unique_name
 
 SUFFIXES = (".usd", ".usda", ".usdc")
 """Suffixes of layers; ``.usdz`` is an archive of layers."""

@@ -22,13 +22,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from gen_data.generator.core.asset_types import Material
-from gen_data.generator.core.scene import Body, Instance, Scene
-from gen_data.generator.core.se3 import IDENTITY, SE3
-from gen_data.generator.usd.asset_layer import MESH, TextureFinder, bind_materials
-from gen_data.generator.usd.cameras import define_camera
-from gen_data.generator.usd.lights import define_light, define_sky
-from gen_data.generator.usd.prims import (
+from gen_data.core.asset_types import Material
+from gen_data.core.scene import Body, Instance, Scene
+from gen_data.core.se3 import IDENTITY, SE3
+from gen_data.usd.asset_layer import MESH, TextureFinder, bind_materials
+from gen_data.usd.cameras import define_camera
+from gen_data.usd.lights import define_light, define_sky
+from gen_data.usd.prims import (
     open_stage_for_writing,
     scale_pose,
     set_transforms,

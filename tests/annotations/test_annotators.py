@@ -12,17 +12,17 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from gen_data.generator.annotations import TABLE
-from gen_data.generator.annotations.annotate import Thresholds, annotate_objects
-from gen_data.generator.annotations.boxes3d import annotate_boxes
-from gen_data.generator.core.boxes import BoxPx
-from gen_data.generator.core.capture import Channel, SensorReading, Silhouette
-from gen_data.generator.core.errors import ConfigError, SampleError
-from gen_data.generator.core.interfaces import Annotator
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.sample import KeypointTruth, ObjectTruth
-from gen_data.generator.core.scene import Camera, Instance, Scene
-from gen_data.generator.core.se3 import SE3, look_at
+from gen_data.annotations import TABLE
+from gen_data.annotations.annotate import Thresholds, annotate_objects
+from gen_data.annotations.boxes3d import annotate_boxes
+from gen_data.core.boxes import BoxPx
+from gen_data.core.capture import Channel, SensorReading, Silhouette
+from gen_data.core.errors import ConfigError, SampleError
+from gen_data.core.interfaces import Annotator
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.sample import KeypointTruth, ObjectTruth
+from gen_data.core.scene import Camera, Instance, Scene
+from gen_data.core.se3 import SE3, look_at
 
 W, H = 20, 12
 CAMERA = Camera(

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gen_data.generator.annotations.bev_raster import Grid, covered_cells, heights_m
-from gen_data.generator.core.se3 import SE3, Array
-from gen_data.generator.core.streams import Streams
+from gen_data.annotations.bev_raster import Grid, covered_cells, heights_m
+from gen_data.core.se3 import SE3, Array
+from gen_data.core.streams import Streams
 
 
 def centres(grid: Grid) -> Array:

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 import trimesh
 
-from gen_data.generator.annotations.annotate import annotate_ego
-from gen_data.generator.annotations.grasps import Grasps
-from gen_data.generator.assemble.config import load_config
-from gen_data.generator.assemble.pipeline_factory import open_pipeline
-from gen_data.generator.core.sample import EgoTruth
-from gen_data.generator.core.scene import Scene
+from gen_data.annotations.annotate import annotate_ego
+from gen_data.annotations.grasps import Grasps
+from gen_data.assemble.config import load_config
+from gen_data.assemble.pipeline_factory import open_pipeline
+from gen_data.core.sample import EgoTruth
+from gen_data.core.scene import Scene
 from tests.embree import RayCaster
 
 SETTINGS = Grasps(tried=48, most=4)

@@ -6,8 +6,8 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gen_data.generator.annotations.instance_extents import Extent, find_extents
-from gen_data.generator.core.boxes import BoxPx, tight_box
+from gen_data.annotations.instance_extents import Extent, find_extents
+from gen_data.core.boxes import BoxPx, tight_box
 
 
 @settings(max_examples=200, deadline=None)

@@ -9,16 +9,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gen_data.generator.annotations.annotate import Thresholds, annotate_objects
-from gen_data.generator.annotations.keypoints import Keypoints
-from gen_data.generator.core.asset_types import Keypoint
-from gen_data.generator.core.capture import Channel, SensorReading
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.lens import Lens
-from gen_data.generator.core.sample import KeypointTruth
-from gen_data.generator.core.scene import Camera, Instance, Scene
-from gen_data.generator.core.se3 import IDENTITY, SE3
-from gen_data.generator.core.skeletons import PERSON, VEHICLE, find_skeleton
+from gen_data.annotations.annotate import Thresholds, annotate_objects
+from gen_data.annotations.keypoints import Keypoints
+from gen_data.core.asset_types import Keypoint
+from gen_data.core.capture import Channel, SensorReading
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.lens import Lens
+from gen_data.core.sample import KeypointTruth
+from gen_data.core.scene import Camera, Instance, Scene
+from gen_data.core.se3 import IDENTITY, SE3
+from gen_data.core.skeletons import PERSON, VEHICLE, find_skeleton
 
 W, H = 20, 12
 CAMERA = Camera("color", IDENTITY, Intrinsics(W, H, 10.0, 10.0, 10.0, 6.0))

@@ -12,18 +12,18 @@ import cv2
 import numpy as np
 import pytest
 
-from gen_data.generator.annotations.annotate import Thresholds, annotate_reading
-from gen_data.generator.annotations.color_words import cielab, color_word
-from gen_data.generator.annotations.instance_masks import InstanceMasks
-from gen_data.generator.annotations.language import Language, Thing, View, kin
-from gen_data.generator.annotations.relations import Relations
-from gen_data.generator.assemble.config import load_config
-from gen_data.generator.assemble.pipeline_factory import open_pipeline
-from gen_data.generator.core.boxes import BoxPx
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.colorimetry import srgb_decode
-from gen_data.generator.core.sample import ImageTruth, Utterance
-from gen_data.generator.core.scene import Scene
+from gen_data.annotations.annotate import Thresholds, annotate_reading
+from gen_data.annotations.color_words import cielab, color_word
+from gen_data.annotations.instance_masks import InstanceMasks
+from gen_data.annotations.language import Language, Thing, View, kin
+from gen_data.annotations.relations import Relations
+from gen_data.assemble.config import load_config
+from gen_data.assemble.pipeline_factory import open_pipeline
+from gen_data.core.boxes import BoxPx
+from gen_data.core.capture import Channel
+from gen_data.core.colorimetry import srgb_decode
+from gen_data.core.sample import ImageTruth, Utterance
+from gen_data.core.scene import Scene
 
 
 @dataclass(frozen=True)

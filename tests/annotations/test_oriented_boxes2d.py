@@ -10,13 +10,13 @@ import cv2
 import numpy as np
 import pytest
 
-from gen_data.generator.annotations.annotate import Thresholds, annotate_objects
-from gen_data.generator.annotations.oriented_boxes2d import OrientedBoxes2d, mask_corners
-from gen_data.generator.core.capture import Channel, SensorReading
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.sample import ObjectTruth
-from gen_data.generator.core.scene import Camera, Instance, Scene
-from gen_data.generator.core.se3 import SE3, Array, look_at
+from gen_data.annotations.annotate import Thresholds, annotate_objects
+from gen_data.annotations.oriented_boxes2d import OrientedBoxes2d, mask_corners
+from gen_data.core.capture import Channel, SensorReading
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.sample import ObjectTruth
+from gen_data.core.scene import Camera, Instance, Scene
+from gen_data.core.se3 import SE3, Array, look_at
 
 LENS = Intrinsics.from_hfov(640, 480, math.radians(60.0))
 TARGET = (0.0, 0.0, 0.5)

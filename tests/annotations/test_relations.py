@@ -13,15 +13,15 @@ import trimesh
 from scipy.spatial import ConvexHull
 from trimesh.collision import CollisionManager
 
-from gen_data.generator.annotations.annotate import Thresholds, annotate_ego, annotate_reading
-from gen_data.generator.annotations.instance_masks import InstanceMasks
-from gen_data.generator.annotations.relations import Relations
-from gen_data.generator.annotations.surface_contacts import are_within, find_contacts, hits_by_rays
-from gen_data.generator.assemble.config import load_config
-from gen_data.generator.assemble.pipeline_factory import open_pipeline
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.sample import ImageTruth, Relation
-from gen_data.generator.core.scene import Scene
+from gen_data.annotations.annotate import Thresholds, annotate_ego, annotate_reading
+from gen_data.annotations.instance_masks import InstanceMasks
+from gen_data.annotations.relations import Relations
+from gen_data.annotations.surface_contacts import are_within, find_contacts, hits_by_rays
+from gen_data.assemble.config import load_config
+from gen_data.assemble.pipeline_factory import open_pipeline
+from gen_data.core.capture import Channel
+from gen_data.core.sample import ImageTruth, Relation
+from gen_data.core.scene import Scene
 from tests.embree import RayCaster
 from tests.tiers import cases, slow
 from tests.wheels import INSTALLED

@@ -7,16 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gen_data.generator.annotations.keypoints import Keypoints
-from gen_data.generator.annotations.lanes import Lanes
-from gen_data.generator.core.asset_types import Keypoint
-from gen_data.generator.core.capture import Channel, SensorReading
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.motion import Trajectory
-from gen_data.generator.core.sample import ImageTruth, KeypointTruth, ObjectTruth
-from gen_data.generator.core.scene import Body, Camera, Instance, Lane, Rig, Scene
-from gen_data.generator.core.se3 import SE3, look_at
-from gen_data.generator.core.shutter import INSTANT, Shutter
+from gen_data.annotations.keypoints import Keypoints
+from gen_data.annotations.lanes import Lanes
+from gen_data.core.asset_types import Keypoint
+from gen_data.core.capture import Channel, SensorReading
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.motion import Trajectory
+from gen_data.core.sample import ImageTruth, KeypointTruth, ObjectTruth
+from gen_data.core.scene import Body, Camera, Instance, Lane, Rig, Scene
+from gen_data.core.se3 import SE3, look_at
+from gen_data.core.shutter import INSTANT, Shutter
 
 LENS = Intrinsics(100, 80, 100.0, 100.0, 50.0, 40.0)
 SPEED_M_S = 5.0

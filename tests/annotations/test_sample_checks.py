@@ -12,21 +12,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gen_data.generator.annotations.sample_checks import check_sample, sample_faults
-from gen_data.generator.core.boxes import BoxPx, OrientedBox
-from gen_data.generator.core.capture import (
-    POINT,
-    Capture,
-    Channel,
-    Measurements,
-    PointCloud,
-    SensorReading,
-)
-from gen_data.generator.core.errors import SampleError
-from gen_data.generator.core.interfaces import DatasetInfo, Modality, SensorInfo
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.motion import Twist
-from gen_data.generator.core.sample import (
+from gen_data.annotations.sample_checks import check_sample, sample_faults
+from gen_data.core.boxes import BoxPx, OrientedBox
+from gen_data.core.capture import POINT, Capture, Channel, Measurements, PointCloud, SensorReading
+from gen_data.core.errors import SampleError
+from gen_data.core.interfaces import DatasetInfo, Modality, SensorInfo
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.motion import Twist
+from gen_data.core.sample import (
     EgoTruth,
     ImageTruth,
     KeypointTruth,
@@ -35,8 +28,8 @@ from gen_data.generator.core.sample import (
     ObjectTruth,
     Sample,
 )
-from gen_data.generator.core.scene import Body, Camera, Device, Instance, Lidar, Scene
-from gen_data.generator.core.se3 import SE3, look_at
+from gen_data.core.scene import Body, Camera, Device, Instance, Lidar, Scene
+from gen_data.core.se3 import SE3, look_at
 
 WIDTH_PX, HEIGHT_PX = 640, 480
 CATEGORIES = ("book", "bowl", "mug")

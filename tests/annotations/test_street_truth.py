@@ -9,21 +9,21 @@ from functools import cache
 import numpy as np
 import pytest
 
-from gen_data.generator.annotations.annotate import Thresholds, annotate_ego, annotate_reading
-from gen_data.generator.annotations.bev_map import BevMap, level_pose
-from gen_data.generator.annotations.boxes3d import Boxes3d
-from gen_data.generator.annotations.free_space import FreeSpace
-from gen_data.generator.annotations.lanes import Lanes
-from gen_data.generator.annotations.motion import Motion
-from gen_data.generator.assets.library import Library, open_library
-from gen_data.generator.core.capture import Channel, SensorReading
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.motion import Trajectory
-from gen_data.generator.core.sample import EgoTruth, ImageTruth, ObjectTruth
-from gen_data.generator.core.scene import Body, Camera, Instance, Lidar, Rig, Scene
-from gen_data.generator.core.scene_time import RIG_AXES, add_twists, place_sensors, scene_at
-from gen_data.generator.core.se3 import SE3, Array
+from gen_data.annotations.annotate import Thresholds, annotate_ego, annotate_reading
+from gen_data.annotations.bev_map import BevMap, level_pose
+from gen_data.annotations.boxes3d import Boxes3d
+from gen_data.annotations.free_space import FreeSpace
+from gen_data.annotations.lanes import Lanes
+from gen_data.annotations.motion import Motion
+from gen_data.assets.library import Library, open_library
+from gen_data.core.capture import Channel, SensorReading
+from gen_data.core.errors import ConfigError
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.motion import Trajectory
+from gen_data.core.sample import EgoTruth, ImageTruth, ObjectTruth
+from gen_data.core.scene import Body, Camera, Instance, Lidar, Rig, Scene
+from gen_data.core.scene_time import RIG_AXES, add_twists, place_sensors, scene_at
+from gen_data.core.se3 import SE3, Array
 from gen_data.scene_templates.builder import build_scene
 from gen_data.scene_templates.crosswalk import Crosswalk
 from gen_data.scene_templates.road import Road

@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 import gen_data
-from gen_data.generator.core.errors import ConfigError
+from gen_data.core.errors import ConfigError
 
 VIEWS = 3
 

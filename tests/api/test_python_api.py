@@ -13,12 +13,12 @@ import pytest
 import yaml
 
 import gen_data
+from gen_data.assemble.config import parse_config
+from gen_data.assemble.pipeline_factory import PipelineFactory
+from gen_data.core.capture import Channel
+from gen_data.core.serialization import to_plain
 from gen_data.exporters.image_files import SIGNED_ZERO, encode_channel, read_image
-from gen_data.generator.assemble.config import parse_config
-from gen_data.generator.assemble.pipeline_factory import PipelineFactory
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.serialization import to_plain
-from gen_data.generator.runner.processes import START_WORKER
+from gen_data.runner.processes import START_WORKER
 from tests.end_to_end.running import environment
 
 SMALL = (
@@ -158,7 +158,7 @@ def test_typed_plug_ins_can_stand_in_a_dictionary() -> None:
     """An object of a plug-in's class means what its YAML means."""
     sensor = {"type": "rgb_camera", "name": "color", "size_px": [64, 48], "hfov_deg": 70.0}
     typed = gen_data.Dataset({**MINIMAL, "sensors": [sensor]})
-    from gen_data.generator.sensors.camera.rgb_camera import RgbCamera
+    from gen_data.sensors.camera.rgb_camera import RgbCamera
 
     camera = RgbCamera(name="color", size_px=(64, 48), hfov_deg=70.0)
     assert gen_data.Dataset({**MINIMAL, "sensors": [camera]}).config == typed.config

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import gen_data
-from gen_data.generator.core.errors import ConfigError
+from gen_data.core.errors import ConfigError
 
 N, VIEWS = 40, 2
 CONFIG = {

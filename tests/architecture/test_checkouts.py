@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.architecture.test_import_root import FOLDERS, ROOT
+from tests.architecture.test_import_root import FOLDERS, LINKS, ROOT
 
 BUILT = ("pyproject.toml", "setup.py", "README.md", "LICENSE")
 
@@ -23,13 +23,13 @@ def checkout(folder: Path, links: bool) -> Path:
         shutil.copytree(ROOT / name, folder / name, symlinks=True, ignore=ignored)
     for name in BUILT:
         shutil.copy(ROOT / name, folder)
-    for name in FOLDERS:
+    for name, target in LINKS.items():
         place = folder / "gen_data" / name
         place.unlink()
         if links:
-            place.symlink_to(Path("..") / name)
+            place.symlink_to(target)
         else:
-            place.write_text(f"../{name}")
+            place.write_text(target)
     return folder
 
 
@@ -57,8 +57,8 @@ def test_a_checkout_imports_its_own_folders(tmp_path: Path, links: bool) -> None
     code = (
         "import pickle\n"
         "from importlib.resources import files\n"
-        "import gen_data.exporters, gen_data.generator.core.se3 as se3\n"
-        "from gen_data.generator.assemble.config import load_config\n"
+        "import gen_data.exporters, gen_data.core.se3 as se3\n"
+        "from gen_data.assemble.config import load_config\n"
         "assert pickle.loads(pickle.dumps(se3.SE3())) == se3.SE3()\n"
         "assert files('gen_data.configs').joinpath('tabletop.yaml').is_file()\n"
         "print(load_config('tabletop.yaml').name)\n"
@@ -89,7 +89,7 @@ def test_wheels_are_equal_with_and_without_links_and_complete(tmp_path: Path) ->
         with zipfile.ZipFile(next(built.glob("*.whl"))) as wheel:
             contents.append({item.filename: item.CRC for item in wheel.infolist()})
     expected = {
-        f"gen_data/{path.relative_to(ROOT).as_posix()}"
+        f"gen_data/{path.relative_to(ROOT).as_posix().removeprefix('generator/')}"
         for folder in FOLDERS
         for path in (ROOT / folder).rglob("*")
         if path.is_file() and not {"__pycache__", "compiled"} & {*path.parts}

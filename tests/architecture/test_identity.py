@@ -9,9 +9,9 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from gen_data.generator.assemble.config import load_config
-from gen_data.generator.assemble.pipeline_factory import PipelineFactory
-from gen_data.generator.runner.identity import BYTES_DEPEND_ON, make_plan
+from gen_data.assemble.config import load_config
+from gen_data.assemble.pipeline_factory import PipelineFactory
+from gen_data.runner.identity import BYTES_DEPEND_ON, make_plan
 from tests.architecture.test_rules import OURS, ROOT, python_files
 
 BYTES_DO_NOT_DEPEND_ON = {

@@ -11,7 +11,7 @@ from pathlib import Path
 from tests.end_to_end.running import environment
 
 ROOT = Path(__file__).parents[2]
-OURS = ("generator", "randomizers", "exporters", "scene_templates")
+OURS = ("generator", "content", "lab", "randomizers", "exporters", "scene_templates")
 LINES_PER_FUNCTION_MAX = 70
 
 
@@ -147,10 +147,7 @@ def output_of(program: str, *arguments: str) -> list[str]:
 
 def test_help_imports_click_and_nothing_else() -> None:
     """``gen-data --help`` answers at once because it loads no library but its own parser."""
-    program = (
-        "from gen_data.generator.cli.main import main\n"
-        "try:\n    main()\nexcept SystemExit:\n    pass"
-    )
+    program = "from gen_data.cli.main import main\ntry:\n    main()\nexcept SystemExit:\n    pass"
 
     *shown, loaded = output_of(program, "--help")
 
@@ -160,9 +157,7 @@ def test_help_imports_click_and_nothing_else() -> None:
 
 def test_nothing_is_imported_before_the_first_worker_prepares_itself() -> None:
     """A worker's imports take longest, and begin when the command has read its arguments."""
-    program = (
-        "import gen_data.generator.cli.generate_command\nimport gen_data.generator.runner.processes"
-    )
+    program = "import gen_data.cli.generate_command\nimport gen_data.runner.processes"
 
     assert output_of(program)[-1] == "LOADED click gen_data"
 
@@ -170,10 +165,10 @@ def test_nothing_is_imported_before_the_first_worker_prepares_itself() -> None:
 def test_planning_a_tabletop_loads_no_engine() -> None:
     """The command reads, checks and plans; physics, rendering and tables belong to workers."""
     program = (
-        "from gen_data.generator.assemble.config import load_config\n"
-        "from gen_data.generator.assemble.pipeline_factory import PipelineFactory\n"
-        "from gen_data.generator.runner.identity import make_plan\n"
-        "from gen_data.generator.runner import run\n"
+        "from gen_data.assemble.config import load_config\n"
+        "from gen_data.assemble.pipeline_factory import PipelineFactory\n"
+        "from gen_data.runner.identity import make_plan\n"
+        "from gen_data.runner import run\n"
         "factory = PipelineFactory(load_config('tabletop.yaml'), n=1)\n"
         "factory.check()\n"
         "make_plan(factory)"

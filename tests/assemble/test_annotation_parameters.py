@@ -6,14 +6,14 @@ from pathlib import Path
 
 import pytest
 
-from gen_data.generator.annotations import TABLE
-from gen_data.generator.annotations.bev_map import BevMap
-from gen_data.generator.annotations.boxes2d import Boxes2d
-from gen_data.generator.annotations.lanes import Lanes
-from gen_data.generator.assemble.config import load_config
-from gen_data.generator.assemble.config_schema import config_schema
-from gen_data.generator.config.describe import describe
-from gen_data.generator.core.errors import ConfigError
+from gen_data.annotations import TABLE
+from gen_data.annotations.bev_map import BevMap
+from gen_data.annotations.boxes2d import Boxes2d
+from gen_data.annotations.lanes import Lanes
+from gen_data.assemble.config import load_config
+from gen_data.assemble.config_schema import config_schema
+from gen_data.config.describe import describe
+from gen_data.core.errors import ConfigError
 
 CAMERA = "template: tabletop\nsensors:\n  - {type: rgb_camera, name: color}\n"
 

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from gen_data.generator.assemble.config import load_config
-from gen_data.generator.assemble.pipeline_factory import open_pipeline
-from gen_data.generator.config.paths import write_locations
-from gen_data.generator.core.errors import ConfigError, UnknownAsset
+from gen_data.assemble.config import load_config
+from gen_data.assemble.pipeline_factory import open_pipeline
+from gen_data.config.paths import write_locations
+from gen_data.core.errors import ConfigError, UnknownAsset
 
 
 @pytest.mark.parametrize("wrong", ["../../../etc/passwd", "pybullet/teddie", "muug?seed=3"])

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from gen_data.generator.assemble.config import load_config
-from gen_data.generator.assemble.pipeline_factory import PipelineFactory
-from gen_data.generator.core.errors import ConfigError
+from gen_data.assemble.config import load_config
+from gen_data.assemble.pipeline_factory import PipelineFactory
+from gen_data.core.errors import ConfigError
 
 LONG = "a" * 65
 

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from gen_data.generator.assemble.config import load_config
-from gen_data.generator.assemble.documents import load_config_document
-from gen_data.generator.core.errors import ConfigError
+from gen_data.assemble.config import load_config
+from gen_data.assemble.documents import load_config_document
+from gen_data.core.errors import ConfigError
 
 BASE = """\
 seed: 3

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pickle
 
-from gen_data.generator.assemble.config import load_config
-from gen_data.generator.assemble.pipeline_factory import PipelineFactory
+from gen_data.assemble.config import load_config
+from gen_data.assemble.pipeline_factory import PipelineFactory
 
 
 def test_a_factory_takes_its_categories_along_and_leaves_its_scenes_behind() -> None:

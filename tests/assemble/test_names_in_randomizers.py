@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from gen_data.generator.assemble.config import load_config
-from gen_data.generator.assemble.pipeline_factory import PipelineFactory
-from gen_data.generator.assets.library import open_library
-from gen_data.generator.core.errors import ConfigError
+from gen_data.assemble.config import load_config
+from gen_data.assemble.pipeline_factory import PipelineFactory
+from gen_data.assets.library import open_library
+from gen_data.core.errors import ConfigError
 from gen_data.randomizers.base import find_textures
 
 HEAD = (

@@ -10,10 +10,10 @@ import yaml
 from click.testing import CliRunner
 
 import gen_data
-from gen_data.generator.api.config import load_config
-from gen_data.generator.assemble.pipeline_factory import PipelineFactory
-from gen_data.generator.cli.main import cli
-from gen_data.generator.core.errors import ConfigError
+from gen_data.api.config import load_config
+from gen_data.assemble.pipeline_factory import PipelineFactory
+from gen_data.cli.main import cli
+from gen_data.core.errors import ConfigError
 
 CAMERA = {"type": "rgb_camera", "size_px": [64, 48], "hfov_deg": 60}
 BENT = {**CAMERA, "lens": {"model": "kannala_brandt", "k1": 0.01}}

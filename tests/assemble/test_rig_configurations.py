@@ -8,15 +8,15 @@ from functools import cache
 import numpy as np
 import pytest
 
-from gen_data.generator.assemble.config import load_config
-from gen_data.generator.assemble.pipeline_factory import nominal_scene, open_pipeline
-from gen_data.generator.assets.library import Library, open_library
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.scene import Scene
-from gen_data.generator.core.scene_time import place_sensors
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.sensors.camera.rgb_camera import RgbCamera
-from gen_data.generator.sensors.lidar.lidar_sensor import LidarSensor
+from gen_data.assemble.config import load_config
+from gen_data.assemble.pipeline_factory import nominal_scene, open_pipeline
+from gen_data.assets.library import Library, open_library
+from gen_data.core.errors import ConfigError
+from gen_data.core.scene import Scene
+from gen_data.core.scene_time import place_sensors
+from gen_data.core.se3 import SE3
+from gen_data.sensors.camera.rgb_camera import RgbCamera
+from gen_data.sensors.lidar.lidar_sensor import LidarSensor
 
 
 @cache

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 import gen_data
-from gen_data.generator.assemble.config import load_config
-from gen_data.generator.core.streams import Streams
+from gen_data.assemble.config import load_config
+from gen_data.core.streams import Streams
 
 
 def test_four_samples_of_all_weathers_are_four_scenes_in_different_weather() -> None:

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from gen_data.generator.assemble.config import load_config
-from gen_data.generator.assemble.plugin_tables import find_plugin
-from gen_data.generator.config.distributions import Constant
-from gen_data.generator.core.errors import ConfigError
+from gen_data.assemble.config import load_config
+from gen_data.assemble.plugin_tables import find_plugin
+from gen_data.config.distributions import Constant
+from gen_data.core.errors import ConfigError
 
 CAMERA = "sensors: [{type: rgb_camera, name: color, size_px: [64, 48], hfov_deg: 60}]\n"
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from gen_data.generator.api.config import load_config
-from gen_data.generator.core.errors import ConfigError
+from gen_data.api.config import load_config
+from gen_data.core.errors import ConfigError
 
 KEYS = (" eed", "a.b", "a\nb")
 ENTRIES = {

@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from gen_data.generator.assets.checking import Finding, check_folder
-from gen_data.generator.assets.folder_index import FolderIndex
-from gen_data.generator.assets.library import open_library
-from gen_data.generator.cli.asset_commands import assets
-from gen_data.generator.config.problems import Problems
-from gen_data.generator.config.validation import validate
-from gen_data.generator.config.yaml_tree import parse_yaml
-from gen_data.generator.core.errors import AssetError
+from gen_data.assets.checking import Finding, check_folder
+from gen_data.assets.folder_index import FolderIndex
+from gen_data.assets.library import open_library
+from gen_data.cli.asset_commands import assets
+from gen_data.config.problems import Problems
+from gen_data.config.validation import validate
+from gen_data.config.yaml_tree import parse_yaml
+from gen_data.core.errors import AssetError
 from tests.assets.test_user_folders import ARM, write_box
 
 

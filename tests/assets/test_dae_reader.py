@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gen_data.generator.assets.asset_folder import Folder
-from gen_data.generator.assets.library import open_library
-from gen_data.generator.assets.readers import read_mesh
-from gen_data.generator.core.errors import AssetError
+from gen_data.assets.asset_folder import Folder
+from gen_data.assets.library import open_library
+from gen_data.assets.readers import read_mesh
+from gen_data.core.errors import AssetError
 
 HEAD = """<?xml version="1.0" encoding="utf-8"?>
 <COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from gen_data.generator.assets.image_decoding import decode_image, decode_radiance, read_exr
-from gen_data.generator.core.errors import AssetError
+from gen_data.assets.image_decoding import decode_image, decode_radiance, read_exr
+from gen_data.core.errors import AssetError
 
 
 def encoded(image: Image.Image, kind: str, **options: object) -> bytes:

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from gen_data.generator.assets import content_hashes
-from gen_data.generator.assets.asset_cache import DiskCache
-from gen_data.generator.assets.asset_folder import Folder
-from gen_data.generator.assets.content_hashes import ContentHashes, find_referenced_files
+from gen_data.assets import content_hashes
+from gen_data.assets.asset_cache import DiskCache
+from gen_data.assets.asset_folder import Folder
+from gen_data.assets.content_hashes import ContentHashes, find_referenced_files
 
 OLD = b"o " + b"a" * 40 + b"\n"
 NEW = b"o " + b"b" * 40 + b"\n"

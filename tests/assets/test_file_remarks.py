@@ -9,12 +9,12 @@ import pytest
 from click.testing import CliRunner
 from PIL import Image
 
-from gen_data.generator.assets.checking import NO_LICENCE, Finding, check_folder
-from gen_data.generator.assets.file_remarks import collect_remarks, warn_of_remarks
-from gen_data.generator.assets.importer import FileRemarks
-from gen_data.generator.assets.library import Library, open_library
-from gen_data.generator.cli.asset_commands import assets
-from gen_data.generator.core.errors import AssetError, AssetWarning
+from gen_data.assets.checking import NO_LICENCE, Finding, check_folder
+from gen_data.assets.file_remarks import collect_remarks, warn_of_remarks
+from gen_data.assets.importer import FileRemarks
+from gen_data.assets.library import Library, open_library
+from gen_data.cli.asset_commands import assets
+from gen_data.core.errors import AssetError, AssetWarning
 
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\n"
 FACE = "f 1/1 2/2 3/3\n"
@@ -164,8 +164,8 @@ def test_digests_cover_images_with_spaces_and_other_case(folder: Path) -> None:
 
 def test_bop_models_state_the_files_origin(folder: Path) -> None:
     """Added to the coordinates of the file; with ``origin: file``, models keep them."""
+    from gen_data.core.se3 import IDENTITY
     from gen_data.exporters.rigid_models import Piece, build_model
-    from gen_data.generator.core.se3 import IDENTITY
 
     for origin, offset, low in (("center", [-500, -500, 0], -500), ("file", [0, 0, 0], 0)):
         (folder / "assets.yaml").write_text(

@@ -15,11 +15,11 @@ import pytest
 from numpy.typing import NDArray
 from PIL import Image
 
-from gen_data.generator.assets.asset_folder import Folder
-from gen_data.generator.assets.folder_index import MeshEntry
-from gen_data.generator.assets.importer import import_object
-from gen_data.generator.assets.readers import MeshSource, read_mesh
-from gen_data.generator.core.errors import AssetError
+from gen_data.assets.asset_folder import Folder
+from gen_data.assets.folder_index import MeshEntry
+from gen_data.assets.importer import import_object
+from gen_data.assets.readers import MeshSource, read_mesh
+from gen_data.core.errors import AssetError
 
 POINTS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], "<f4")
 UVS = np.array([[0.0, 0.0], [0.25, 0.0], [0.0, 0.5]], "<f4")

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gen_data.generator.assets.procedural import FAMILIES, TEXTURES, fruit
-from gen_data.generator.assets.procedural.bottles import choose_bottle
-from gen_data.generator.assets.procedural.vessel_contents import CONTENTS, DRINKS, FOODS
-from gen_data.generator.assets.procedural.vessels import STYLES, choose
-from gen_data.generator.core.errors import AssetError
+from gen_data.content.procedural import FAMILIES, TEXTURES, fruit
+from gen_data.content.procedural.bottles import choose_bottle
+from gen_data.content.procedural.vessel_contents import CONTENTS, DRINKS, FOODS
+from gen_data.content.procedural.vessels import STYLES, choose
+from gen_data.core.errors import AssetError
 
 # Categories of COCO that lie on tables, and the families that have them.
 OF_COCO = {

@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gen_data.generator.assets.asset_cache import DiskCache, Store, content_key
-from gen_data.generator.assets.library import open_library
-from gen_data.generator.core.asset_types import MeshData
+from gen_data.assets.asset_cache import DiskCache, Store, content_key
+from gen_data.assets.library import open_library
+from gen_data.core.asset_types import MeshData
 
 ROOT = Path(__file__).parents[2]
 ASSET = "random_urdfs/007"
@@ -162,7 +162,7 @@ def test_several_processes_may_share_a_cache(tmp_path: Path) -> None:
     """Three processes import the same asset at once and agree."""
     program = (
         "import sys; from pathlib import Path; from hashlib import sha256\n"
-        "from gen_data.generator.assets.library import open_library\n"
+        "from gen_data.assets.library import open_library\n"
         "mesh = open_library(cache_dir=Path(sys.argv[1])).mesh(sys.argv[2])\n"
         "print(sha256(mesh.vertices_m.tobytes() + mesh.faces.tobytes()).hexdigest())\n"
     )

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gen_data.generator.assets.library import Library, open_library
-from gen_data.generator.core.errors import AssetError
+from gen_data.assets.library import Library, open_library
+from gen_data.core.errors import AssetError
 
 
 @pytest.fixture

@@ -9,8 +9,8 @@ import numpy as np
 import pybullet_data
 import pytest
 
-from gen_data.generator.assets.library import Library, open_library
-from gen_data.generator.core.errors import AssetError
+from gen_data.assets.library import Library, open_library
+from gen_data.core.errors import AssetError
 
 OBJECTS = ("domino", "jenga", "lego", "mug", "soccerball", "table", "teddy", "tray")
 

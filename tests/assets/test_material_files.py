@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from gen_data.generator.assets.asset_folder import Folder
-from gen_data.generator.assets.library import open_library
-from gen_data.generator.assets.readers import read_mesh
-from gen_data.generator.assets.texture_maps import TextureMaps, compose_texture, find_maps
-from gen_data.generator.core.asset_types import Material, TextureData
-from gen_data.generator.core.errors import AssetError, ConfigError
+from gen_data.assets.asset_folder import Folder
+from gen_data.assets.library import open_library
+from gen_data.assets.readers import read_mesh
+from gen_data.assets.texture_maps import TextureMaps, compose_texture, find_maps
+from gen_data.core.asset_types import Material, TextureData
+from gen_data.core.errors import AssetError, ConfigError
 
 TRIANGLE_OBJ = (
     "mtllib m.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n"

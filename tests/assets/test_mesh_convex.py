@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from gen_data.generator.assets.convex_decomposition import convex_parts, hull_vertices
-from gen_data.generator.assets.triangle_soup import TriangleSoup, box, join_soups, sphere
-from gen_data.generator.core.errors import AssetError
+from gen_data.assets.convex_decomposition import convex_parts, hull_vertices
+from gen_data.assets.triangle_soup import TriangleSoup, box, join_soups, sphere
+from gen_data.core.errors import AssetError
 
 
 def moved(corners: np.ndarray, by: tuple[float, float, float]) -> np.ndarray:

@@ -16,13 +16,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gen_data.generator.assets.asset_folder import Folder
-from gen_data.generator.assets.folder_index import FolderIndex, MeshEntry, list_assets
-from gen_data.generator.assets.library import open_library
-from gen_data.generator.assets.readers import read_mesh
-from gen_data.generator.assets.triangle_soup import TriangleSoup
-from gen_data.generator.assets.urdf import read_urdf
-from gen_data.generator.core.errors import AssetError
+from gen_data.assets.asset_folder import Folder
+from gen_data.assets.folder_index import FolderIndex, MeshEntry, list_assets
+from gen_data.assets.library import open_library
+from gen_data.assets.readers import read_mesh
+from gen_data.assets.triangle_soup import TriangleSoup
+from gen_data.assets.urdf import read_urdf
+from gen_data.core.errors import AssetError
 
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n"
 TETRAHEDRON = TRIANGLE + "f 1 2 3\nf 1 2 4\nf 1 3 4\nf 2 3 4\n"
@@ -488,7 +488,7 @@ def test_an_stl_with_too_many_triangles_is_refused_before_it_is_decoded(
 ) -> None:
     """The header states their number."""
     (tmp_path / "a.stl").write_bytes(stl(4, 4))
-    monkeypatch.setattr("gen_data.generator.assets.readers.mesh_source.MAX_FACES", 3)
+    monkeypatch.setattr("gen_data.assets.readers.mesh_source.MAX_FACES", 3)
     monkeypatch.setattr(TriangleSoup, "of", lambda *_: pytest.fail("decoded"))
     with pytest.raises(AssetError, match="4 triangles, at most 3"):
         read_mesh(Folder(tmp_path), "a.stl")

@@ -8,16 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gen_data.generator.assets.normal_form import normal_form
-from gen_data.generator.assets.triangle_soup import (
-    MaterialSlot,
-    TriangleSoup,
-    box,
-    cylinder,
-    sphere,
-)
-from gen_data.generator.core.asset_types import Material, MeshData
-from gen_data.generator.core.errors import AssetError
+from gen_data.assets.normal_form import normal_form
+from gen_data.assets.triangle_soup import MaterialSlot, TriangleSoup, box, cylinder, sphere
+from gen_data.core.asset_types import Material, MeshData
+from gen_data.core.errors import AssetError
 
 
 def volume_m3(mesh: MeshData) -> float:

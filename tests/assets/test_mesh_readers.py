@@ -13,10 +13,10 @@ import pytest
 import trimesh
 from PIL import Image
 
-from gen_data.generator.assets.asset_folder import Folder
-from gen_data.generator.assets.library import open_library
-from gen_data.generator.assets.readers import read_mesh
-from gen_data.generator.assets.triangle_soup import box, sphere
+from gen_data.assets.asset_folder import Folder
+from gen_data.assets.library import open_library
+from gen_data.assets.readers import read_mesh
+from gen_data.assets.triangle_soup import box, sphere
 
 CUBE_OBJ = """mtllib cube.mtl
 v 0 0 0

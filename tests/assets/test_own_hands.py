@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from gen_data.generator.assets.library import open_library
-from gen_data.generator.core.asset_types import RobotModel
-from gen_data.generator.core.errors import AssetError, ConfigError
-from gen_data.generator.core.kinematics import link_poses
-from gen_data.generator.core.se3 import SE3
+from gen_data.assets.library import open_library
+from gen_data.core.asset_types import RobotModel
+from gen_data.core.errors import AssetError, ConfigError
+from gen_data.core.kinematics import link_poses
+from gen_data.core.se3 import SE3
 
 BOX = '<geometry><box size="0.1 0.1 0.2"/></geometry>'
 ARM = f"""<robot name="arm"><link name="base"><visual>{BOX}</visual></link>

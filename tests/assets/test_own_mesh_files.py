@@ -12,13 +12,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gen_data.generator.assets.asset_folder import Folder
-from gen_data.generator.assets.folder_index import MeshEntry
-from gen_data.generator.assets.importer import ImportedMesh, import_object
-from gen_data.generator.assets.library import Library, open_library
-from gen_data.generator.assets.readers import read_mesh
-from gen_data.generator.core.asset_types import Material
-from gen_data.generator.core.errors import AssetError
+from gen_data.assets.asset_folder import Folder
+from gen_data.assets.folder_index import MeshEntry
+from gen_data.assets.importer import ImportedMesh, import_object
+from gen_data.assets.library import Library, open_library
+from gen_data.assets.readers import read_mesh
+from gen_data.core.asset_types import Material
+from gen_data.core.errors import AssetError
 
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
 RED = "newmtl red\nKd 1 0 0\n"

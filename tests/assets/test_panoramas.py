@@ -10,10 +10,10 @@ import numpy as np
 import OpenEXR
 import pytest
 
-from gen_data.generator.assets.image_decoding import decode_radiance
-from gen_data.generator.assets.library import open_library
-from gen_data.generator.core.errors import AssetError
-from gen_data.generator.packs.panoramas import encode_radiance
+from gen_data.assets.image_decoding import decode_radiance
+from gen_data.assets.library import open_library
+from gen_data.content.packs.panoramas import encode_radiance
+from gen_data.core.errors import AssetError
 
 
 def pixels(height: int = 8) -> np.ndarray:

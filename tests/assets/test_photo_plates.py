@@ -10,19 +10,15 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from gen_data.generator.assets.checking import check_folder
-from gen_data.generator.assets.library import Library, open_library
-from gen_data.generator.assets.plates.vanishing_points import (
-    NoHorizonError,
-    estimate_camera,
-    find_edges,
-)
-from gen_data.generator.core.asset_types import UInt8
-from gen_data.generator.core.colorimetry import luminance
-from gen_data.generator.core.errors import AssetError, ConfigError
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.plates import Plate, ground_illuminance, horizon_px
-from gen_data.generator.core.se3 import SE3, look_at
+from gen_data.assets.checking import check_folder
+from gen_data.assets.library import Library, open_library
+from gen_data.assets.plates.vanishing_points import NoHorizonError, estimate_camera, find_edges
+from gen_data.core.asset_types import UInt8
+from gen_data.core.colorimetry import luminance
+from gen_data.core.errors import AssetError, ConfigError
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.plates import Plate, ground_illuminance, horizon_px
+from gen_data.core.se3 import SE3, look_at
 
 SIZE_PX = (960, 640)
 GROUND = "[[200, 630], [760, 630], [600, 420], [420, 420]]"

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gen_data.generator.assets.procedural import ENVIRONMENTS
-from gen_data.generator.assets.skies.equirectangular import normalize_luminance, pixel_directions
+from gen_data.content.procedural import ENVIRONMENTS
+from gen_data.sky.equirectangular import normalize_luminance, pixel_directions
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 

@@ -6,15 +6,11 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from gen_data.generator.assets.families import declared
-from gen_data.generator.assets.family import Solid
-from gen_data.generator.assets.procedural import FAMILIES
-from gen_data.generator.assets.procedural.furniture import (
-    bin_interior_m,
-    shelf_clearance_m,
-    shelf_levels_m,
-)
-from gen_data.generator.core.errors import AssetError
+from gen_data.assets.families import declared
+from gen_data.assets.family import Solid
+from gen_data.content.procedural import FAMILIES
+from gen_data.content.procedural.furniture import bin_interior_m, shelf_clearance_m, shelf_levels_m
+from gen_data.core.errors import AssetError
 
 FURNITURE = sorted(name for name, family in FAMILIES.items() if not family.variants)
 SIZED = ("table", "shelf", "bin", "box", "pedestal", "gantry")

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from gen_data.generator.assets.family import Solid
-from gen_data.generator.assets.procedural import FAMILIES, TEXTURES
-from gen_data.generator.assets.procedural.vessel_contents import CONTENTS, FOODS
-from gen_data.generator.assets.procedural.vessels import choose
-from gen_data.generator.core.asset_types import MeshData
+from gen_data.assets.family import Solid
+from gen_data.content.procedural import FAMILIES, TEXTURES
+from gen_data.content.procedural.vessel_contents import CONTENTS, FOODS
+from gen_data.content.procedural.vessels import choose
+from gen_data.core.asset_types import MeshData
 from tests.every_value import for_every
 
 SEEDS = (0, 1, 7, 11)

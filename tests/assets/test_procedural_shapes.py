@@ -7,13 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from gen_data.generator.assets.procedural.patches import (
-    CREASE_DEG,
-    Patch,
-    finish_mesh,
-    join_patches,
-)
-from gen_data.generator.assets.procedural.surface_shapes import (
+from gen_data.content.procedural.patches import CREASE_DEG, Patch, finish_mesh, join_patches
+from gen_data.content.procedural.surface_shapes import (
     ball,
     block,
     circle,
@@ -27,7 +22,7 @@ from gen_data.generator.assets.procedural.surface_shapes import (
     sweep,
     triangulate,
 )
-from gen_data.generator.core.asset_types import Material
+from gen_data.core.asset_types import Material
 
 
 def test_a_turned_cylinder_has_the_volume_of_its_prism() -> None:

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gen_data.generator.assets.library import Library, open_library
-from gen_data.generator.core.asset_types import MeshData, Symmetry
-from gen_data.generator.core.se3 import SE3
+from gen_data.assets.library import Library, open_library
+from gen_data.core.asset_types import MeshData, Symmetry
+from gen_data.core.se3 import SE3
 from tests.distances import distances_m
 
 TOLERANCE = 0.005

@@ -7,12 +7,12 @@ from pathlib import Path
 import pytest
 import yaml
 
-from gen_data.generator import assets
-from gen_data.generator.assets.procedural.bottles import BOTTLES, BottleStyle
-from gen_data.generator.assets.vehicles.car_design import DESIGNS, Design
-from gen_data.generator.config.data_files import load_table
+from gen_data import assets
+from gen_data.config.data_files import load_table
+from gen_data.content.procedural.bottles import BOTTLES, BottleStyle
+from gen_data.content.vehicles.car_design import DESIGNS, Design
 
-VEHICLES = "gen_data.generator.assets.vehicles"
+VEHICLES = "gen_data.content.vehicles"
 TABLES = sorted(Path(assets.__path__[0]).rglob("*.yaml"))
 
 

@@ -7,11 +7,11 @@ from functools import cache
 import numpy as np
 import pytest
 
-from gen_data.generator.assets.procedural import TEXTURES
-from gen_data.generator.assets.procedural.noise import fbm, perlin, worley
-from gen_data.generator.assets.procedural.packaging import can_size
-from gen_data.generator.core.asset_types import TextureData
-from gen_data.generator.core.streams import Streams
+from gen_data.content.procedural import TEXTURES
+from gen_data.content.procedural.packaging import can_size
+from gen_data.core.asset_types import TextureData
+from gen_data.core.noise import fbm, perlin, worley
+from gen_data.core.streams import Streams
 
 PRINTED = {"label", "front_label", "can_label", "carton", "milk_label", "book_cover"}
 FOOD = {"apple_skin", "citrus_peel", "banana_peel", "pear_skin", "ball_cover"}

@@ -10,13 +10,13 @@ import pytest
 import trimesh
 from PIL import Image
 
-from gen_data.generator.assets.asset_folder import Folder
-from gen_data.generator.assets.library import Library, open_library
-from gen_data.generator.assets.robot_description import RobotDescription
-from gen_data.generator.assets.robot_formats import read_description
-from gen_data.generator.assets.robot_shapes import read_shape
-from gen_data.generator.core.errors import AssetError
-from gen_data.generator.core.se3 import SE3
+from gen_data.assets.asset_folder import Folder
+from gen_data.assets.library import Library, open_library
+from gen_data.assets.robot_description import RobotDescription
+from gen_data.assets.robot_formats import read_description
+from gen_data.assets.robot_shapes import read_shape
+from gen_data.core.errors import AssetError
+from gen_data.core.se3 import SE3
 
 BOX = '<geometry><box size="0.1 0.2 0.3"/></geometry>'
 TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"

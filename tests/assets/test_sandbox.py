@@ -19,11 +19,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from gen_data.generator.assets import sandbox
-from gen_data.generator.assets.parsing import parse_image
-from gen_data.generator.assets.readers.stl import read_stl
-from gen_data.generator.assets.sandbox import Sandbox
-from gen_data.generator.core.errors import AssetError
+from gen_data.assets import sandbox
+from gen_data.assets.parsing import parse_image
+from gen_data.assets.readers.stl import read_stl
+from gen_data.assets.sandbox import Sandbox
+from gen_data.core.errors import AssetError
 
 
 @pytest.fixture(scope="module")
@@ -130,7 +130,7 @@ def test_an_idle_process_ends_and_the_next_call_starts_another() -> None:
 def test_the_process_ends_with_its_parent(tmp_path: Path) -> None:
     """A killed program leaves nothing behind (prctl(2), PR_SET_PDEATHSIG)."""
     program = (
-        "import sys, os, time; from gen_data.generator.assets.sandbox import SANDBOX; "
+        "import sys, os, time; from gen_data.assets.sandbox import SANDBOX; "
         "SANDBOX.run(dict, place='x', input_bytes=0); "
         "print(SANDBOX._child.pid, flush=True); "
         "SANDBOX.run(time.sleep, 60.0, place='x', input_bytes=0)"

@@ -7,9 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from gen_data.generator.assets.library import open_library
-from gen_data.generator.assets.skies import daylight
-from gen_data.generator.assets.skies.sky import (
+from gen_data.assets.library import open_library
+from gen_data.core.errors import AssetError
+from gen_data.sky import daylight
+from gen_data.sky.sky import (
     SkyModel,
     clear_sky,
     luminance_cd_m2,
@@ -19,7 +20,6 @@ from gen_data.generator.assets.skies.sky import (
     sky,
     sun_lux,
 )
-from gen_data.generator.core.errors import AssetError
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 

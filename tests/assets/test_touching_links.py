@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from gen_data.generator.assets.folder_index import RobotEntry
-from gen_data.generator.assets.robot_description import Link, RobotDescription
-from gen_data.generator.assets.robot_models import robot_model
-from gen_data.generator.core.asset_types import Joint
-from gen_data.generator.core.se3 import SE3
+from gen_data.assets.folder_index import RobotEntry
+from gen_data.assets.robot_description import Link, RobotDescription
+from gen_data.assets.robot_models import robot_model
+from gen_data.core.asset_types import Joint
+from gen_data.core.se3 import SE3
 
 
 def test_a_shell_fixed_to_a_link_may_touch_the_next_link_wherever_it_is_listed() -> None:

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from gen_data.generator.assets.library import Library, open_library
-from gen_data.generator.core.asset_types import RobotModel
-from gen_data.generator.core.se3 import SE3
+from gen_data.assets.library import Library, open_library
+from gen_data.core.asset_types import RobotModel
+from gen_data.core.se3 import SE3
 
 ROBOTS = ("franka_panda", "kuka_iiwa", "xarm6")
 TOOLED = ("franka_panda_suction", "kuka_iiwa_gripper", "kuka_iiwa_suction", "xarm6_gripper")

@@ -12,15 +12,15 @@ import pytest
 import trimesh
 from PIL import Image
 
-from gen_data.generator.assets import asset_folder
-from gen_data.generator.assets.folder_index import MeshEntry
-from gen_data.generator.assets.importer import upright_transform
-from gen_data.generator.assets.library import open_library
-from gen_data.generator.assets.triangle_soup import box
-from gen_data.generator.core.asset_types import Symmetry
-from gen_data.generator.core.errors import AssetError, ConfigError, UnknownAsset
-from gen_data.generator.core.kinematics import link_poses
-from gen_data.generator.core.se3 import SE3
+from gen_data.assets import asset_folder
+from gen_data.assets.folder_index import MeshEntry
+from gen_data.assets.importer import upright_transform
+from gen_data.assets.library import open_library
+from gen_data.assets.triangle_soup import box
+from gen_data.core.asset_types import Symmetry
+from gen_data.core.errors import AssetError, ConfigError, UnknownAsset
+from gen_data.core.kinematics import link_poses
+from gen_data.core.se3 import SE3
 
 ARM = """<robot name="arm">
   <link name="base"><visual><geometry><box size="0.2 0.2 0.1"/></geometry>

@@ -7,11 +7,11 @@ from functools import cache
 import numpy as np
 import pytest
 
-from gen_data.generator.assets.family import Worn
-from gen_data.generator.assets.procedural import FAMILIES, TEXTURES
-from gen_data.generator.assets.procedural.textures import printed_matter
-from gen_data.generator.assets.procedural.wear import Film, draw_wear, dust_share, lay_films
-from gen_data.generator.core.asset_types import MeshData, TextureData
+from gen_data.assets.family import Worn
+from gen_data.content.procedural import FAMILIES, TEXTURES
+from gen_data.content.procedural.textures import printed_matter
+from gen_data.content.procedural.wear import Film, draw_wear, dust_share, lay_films
+from gen_data.core.asset_types import MeshData, TextureData
 from tests.every_value import for_every
 
 LABELS = ("label", "front_label", "can_label", "carton", "milk_label", "book_cover")

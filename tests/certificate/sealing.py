@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from gen_data.generator.runner.shard_record import FileRecord, parse_unchecked_record
+from gen_data.runner.shard_record import FileRecord, parse_unchecked_record
 
 SMALL: dict[str, Any] = {
     "overrides": (

@@ -16,19 +16,14 @@ import numpy as np
 import pytest
 
 import gen_data
-from gen_data.generator.certificate import certificate, readers
-from gen_data.generator.certificate.certificate import Certificate, describe_failures
-from gen_data.generator.certificate.claims import CLAIMS, Claim
-from gen_data.generator.certificate.finding import Finding, Status
-from gen_data.generator.cli.main import cli
-from gen_data.generator.core.distribution import install_command
-from gen_data.generator.core.errors import (
-    CertificationError,
-    ConfigError,
-    StorageError,
-    VerificationError,
-)
-from gen_data.generator.runner.verify import verify
+from gen_data.cli.main import cli
+from gen_data.core.distribution import install_command
+from gen_data.core.errors import CertificationError, ConfigError, StorageError, VerificationError
+from gen_data.lab.certificate import certificate, readers
+from gen_data.lab.certificate.certificate import Certificate, describe_failures
+from gen_data.lab.certificate.claims import CLAIMS, Claim
+from gen_data.lab.certificate.finding import Finding, Status
+from gen_data.runner.verify import verify
 from tests.certificate.sealing import SMALL, edit_lines, reseal
 from tests.wheels import needs_open3d
 
@@ -409,9 +404,7 @@ def test_what_is_not_installed_is_not_checked(
 ) -> None:
     """The reason names the remedy; nothing counts as passed."""
     unknown = replace(readers.READERS["coco"], package="no-such-reader")
-    monkeypatch.setattr(
-        "gen_data.generator.certificate.exports.READERS", {"coco": unknown}, raising=True
-    )
+    monkeypatch.setattr("gen_data.lab.certificate.exports.READERS", {"coco": unknown}, raising=True)
 
     finding = findings(gen_data.certify(damaged(), samples=0, scenes=0))["exports: coco"]
 

@@ -16,8 +16,8 @@ import numpy as np
 import pytest
 
 import gen_data
-from gen_data.generator.certificate.certificate import Certificate
-from gen_data.generator.certificate.finding import Status
+from gen_data.lab.certificate.certificate import Certificate
+from gen_data.lab.certificate.finding import Status
 from tests.certificate.sealing import SMALL, edit_lines, reseal
 
 pytestmark = [

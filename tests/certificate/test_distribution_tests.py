@@ -13,17 +13,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from gen_data.generator.certificate.finding import Finding, Status
-from gen_data.generator.certificate.parameters import (
-    Comparison,
-    can_refuse_constant,
-    check_parameters,
-    compare_with_uniform,
-    found_deviation,
-    refused,
-)
-from gen_data.generator.certificate.uniform_scores import uniform_scores
-from gen_data.generator.config.distributions import (
+from gen_data.config.distributions import (
     AboutZ,
     Box,
     Cap,
@@ -41,8 +31,18 @@ from gen_data.generator.config.distributions import (
     Uniform,
     UniformInteger,
 )
-from gen_data.generator.core.streams import Rng, Streams
-from gen_data.generator.report.drawn_parameters import Parameter
+from gen_data.core.streams import Rng, Streams
+from gen_data.lab.certificate.finding import Finding, Status
+from gen_data.lab.certificate.parameters import (
+    Comparison,
+    can_refuse_constant,
+    check_parameters,
+    compare_with_uniform,
+    found_deviation,
+    refused,
+)
+from gen_data.lab.certificate.uniform_scores import uniform_scores
+from gen_data.report.drawn_parameters import Parameter
 
 ALPHA = 1e-4
 DRAWS = 5_000

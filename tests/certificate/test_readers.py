@@ -8,17 +8,13 @@ from pathlib import Path
 import pytest
 
 import gen_data
-from gen_data.generator.certificate.examined import Examined, Scope
-from gen_data.generator.certificate.exports import check_exports
-from gen_data.generator.certificate.finding import Finding, Status
-from gen_data.generator.certificate.labelled_images import (
-    LabelledImage,
-    LabelledObject,
-    compare_images,
-)
-from gen_data.generator.certificate.readers import READERS
-from gen_data.generator.certificate.scoring import average_precision
-from gen_data.generator.runner.stored import StoredSamples
+from gen_data.lab.certificate.examined import Examined, Scope
+from gen_data.lab.certificate.exports import check_exports
+from gen_data.lab.certificate.finding import Finding, Status
+from gen_data.lab.certificate.labelled_images import LabelledImage, LabelledObject, compare_images
+from gen_data.lab.certificate.readers import READERS
+from gen_data.lab.certificate.scoring import average_precision
+from gen_data.runner.stored import StoredSamples
 from tests.certificate.sealing import SMALL
 
 # pycocotools' decoder predates numpy 2's __array__(copy=...).

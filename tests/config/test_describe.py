@@ -9,9 +9,9 @@ from typing import Annotated, Any, Literal
 import pytest
 from pydantic import Field
 
-from gen_data.generator.config.base_model import Strict
-from gen_data.generator.config.describe import describe, describe_fields, make_example
-from gen_data.generator.config.distributions import (
+from gen_data.config.base_model import Strict
+from gen_data.config.describe import describe, describe_fields, make_example
+from gen_data.config.distributions import (
     Bounds,
     Constant,
     Count,
@@ -26,10 +26,10 @@ from gen_data.generator.config.distributions import (
     So3,
     Uniform,
 )
-from gen_data.generator.config.problems import Problems
-from gen_data.generator.config.schema import json_schema
-from gen_data.generator.config.validation import validate
-from gen_data.generator.config.yaml_tree import parse_yaml
+from gen_data.config.problems import Problems
+from gen_data.config.schema import json_schema
+from gen_data.config.validation import validate
+from gen_data.config.yaml_tree import parse_yaml
 
 
 class Falloff(str, Enum):

@@ -10,8 +10,8 @@ from typing import Annotated, Any
 
 import pytest
 
-from gen_data.generator.config.base_model import Strict
-from gen_data.generator.config.distributions import (
+from gen_data.config.base_model import Strict
+from gen_data.config.distributions import (
     DISTRIBUTIONS,
     NUMBER,
     AboutZ,
@@ -44,12 +44,12 @@ from gen_data.generator.config.distributions import (
     Uniform,
     UniformInteger,
 )
-from gen_data.generator.config.problems import Problems
-from gen_data.generator.config.validation import validate
-from gen_data.generator.config.yaml_scalars import to_flow_yaml
-from gen_data.generator.config.yaml_tree import parse_yaml
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.streams import Rng, Streams
+from gen_data.config.problems import Problems
+from gen_data.config.validation import validate
+from gen_data.config.yaml_scalars import to_flow_yaml
+from gen_data.config.yaml_tree import parse_yaml
+from gen_data.core.errors import ConfigError
+from gen_data.core.streams import Rng, Streams
 
 
 def rng_of(index: int) -> Rng:
@@ -400,7 +400,7 @@ def test_a_distribution_of_a_third_party_needs_fields_and_a_draw_only(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Its YAML form, messages and JSON Schema follow from its fields."""
-    from gen_data.generator.config.distributions import base
+    from gen_data.config.distributions import base
 
     @base.parameters
     class Triangular(Numeric[float], key="triangular", kinds=("number",)):

@@ -11,9 +11,9 @@ import yaml
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from gen_data.generator.config.problems import Position
-from gen_data.generator.config.yaml_tree import load_yaml, parse_yaml
-from gen_data.generator.core.errors import ConfigError
+from gen_data.config.problems import Position
+from gen_data.config.yaml_tree import load_yaml, parse_yaml
+from gen_data.core.errors import ConfigError
 
 TABLETOP = """\
 # a comment
@@ -278,7 +278,7 @@ def test_without_the_c_parser_the_same_is_refused(
     case: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """PyYAML can be built without libyaml; its Python parser gives the same events."""
-    monkeypatch.setattr("gen_data.generator.config.yaml_tree._LOADER", yaml.SafeLoader)
+    monkeypatch.setattr("gen_data.config.yaml_tree._LOADER", yaml.SafeLoader)
     text, fact = {**REFUSED, **NASTY}[case]
 
     assert parse_yaml(TABLETOP, "t.yaml").get("randomizers", 0, "count") is not None

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from gen_data.generator.config.merging import merge_named, merge_nodes
-from gen_data.generator.config.yaml_tree import parse_yaml
+from gen_data.config.merging import merge_named, merge_nodes
+from gen_data.config.yaml_tree import parse_yaml
 
 
 def test_merging_lays_mappings_over_each_other() -> None:

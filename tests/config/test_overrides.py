@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gen_data.generator.config.yaml_tree import Node, parse_yaml, with_override
-from gen_data.generator.core.errors import ConfigError
+from gen_data.config.yaml_tree import Node, parse_yaml, with_override
+from gen_data.core.errors import ConfigError
 
 TEXT = """\
 seed: 7

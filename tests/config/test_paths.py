@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from gen_data.generator.assemble.config import load_config
-from gen_data.generator.config.paths import find_path
-from gen_data.generator.config.problems import Position
-from gen_data.generator.core.errors import ConfigError
+from gen_data.assemble.config import load_config
+from gen_data.config.paths import find_path
+from gen_data.config.problems import Position
+from gen_data.core.errors import ConfigError
 
 SENSOR = "sensors: [{type: rgb_camera, name: color, size_px: [64, 48], hfov_deg: 60}]\n"
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from gen_data.generator.config.problems import Position, Problems, format_path
-from gen_data.generator.core.errors import ConfigError
+from gen_data.config.problems import Position, Problems, format_path
+from gen_data.core.errors import ConfigError
 
 
 def told(problems: Problems) -> str:

@@ -9,12 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from gen_data.generator.assemble.config import load_config
-from gen_data.generator.assemble.plugin_tables import TABLES
-from gen_data.generator.config.distributions import Constant
-from gen_data.generator.config.renamed_keys import PLUGINS, RANDOMIZERS, TYPES, replace_old_words
-from gen_data.generator.config.yaml_tree import parse_yaml
-from gen_data.generator.core.errors import ConfigError
+from gen_data.assemble.config import load_config
+from gen_data.assemble.plugin_tables import TABLES
+from gen_data.config.distributions import Constant
+from gen_data.config.renamed_keys import PLUGINS, RANDOMIZERS, TYPES, replace_old_words
+from gen_data.config.yaml_tree import parse_yaml
+from gen_data.core.errors import ConfigError
 
 OLD = """\
 template: street
@@ -133,7 +133,7 @@ def test_the_command_line_shows_a_warning_as_one_plain_line(tmp_path: Path) -> N
     path.write_text("extends: street.yaml\nrandomizers: [{type: along, name: x, sped: 1}]\n")
 
     done = subprocess.run(
-        [sys.executable, "-m", "gen_data.generator.cli", "--config", str(path), "--n", "1"],
+        [sys.executable, "-m", "gen_data.cli", "--config", str(path), "--n", "1"],
         capture_output=True,
         text=True,
         check=False,

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gen_data.generator.config.yaml_scalars import quote_value, resolve_scalar, to_flow_yaml
-from gen_data.generator.config.yaml_tree import parse_yaml
+from gen_data.config.yaml_scalars import quote_value, resolve_scalar, to_flow_yaml
+from gen_data.config.yaml_tree import parse_yaml
 
 # Expected values: YAML 1.2.2, sections 10.2.1 and 10.3.2.
 CORE_SCHEMA = [

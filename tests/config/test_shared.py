@@ -7,16 +7,11 @@ from collections import Counter
 
 import pytest
 
-from gen_data.generator.assemble.config import load_config
-from gen_data.generator.config.shared_values import (
-    draw_shared,
-    probe_values,
-    refers,
-    resolve_shared,
-)
-from gen_data.generator.config.yaml_tree import parse_yaml
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.streams import Streams
+from gen_data.assemble.config import load_config
+from gen_data.config.shared_values import draw_shared, probe_values, refers, resolve_shared
+from gen_data.config.yaml_tree import parse_yaml
+from gen_data.core.errors import ConfigError
+from gen_data.core.streams import Streams
 
 SECTION = """
 lanes: {switch: road, highway: 3, default: {uniform_integer: [1, 2]}}

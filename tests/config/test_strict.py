@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from pydantic import ValidationError
 
-from gen_data.generator.config.base_model import Strict
+from gen_data.config.base_model import Strict
 
 
 class Values(Strict):

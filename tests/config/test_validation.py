@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import Field, model_validator
 
-from gen_data.generator.config.base_model import Strict
-from gen_data.generator.config.distributions import (
+from gen_data.config.base_model import Strict
+from gen_data.config.distributions import (
     Bounds,
     Constant,
     Count,
@@ -22,10 +22,10 @@ from gen_data.generator.config.distributions import (
     Uniform,
     UnitInterval,
 )
-from gen_data.generator.config.problems import Problems
-from gen_data.generator.config.validation import validate
-from gen_data.generator.config.yaml_tree import parse_yaml, with_override
-from gen_data.generator.core.errors import ConfigError
+from gen_data.config.problems import Problems
+from gen_data.config.validation import validate
+from gen_data.config.yaml_tree import parse_yaml, with_override
+from gen_data.core.errors import ConfigError
 
 
 class Mode(str, Enum):
@@ -331,7 +331,7 @@ YAML_LIKE = st.recursive(
 @given(st.dictionaries(st.sampled_from([*Config.model_fields, "zzz"]), YAML_LIKE, max_size=4))
 def test_any_document_gives_a_model_or_problems(plain: dict[str, Any]) -> None:
     """Every field with every shape of value: no other exception, always a place and a field."""
-    from gen_data.generator.config.yaml_scalars import to_flow_yaml
+    from gen_data.config.yaml_scalars import to_flow_yaml
 
     text, problems = to_flow_yaml(plain), Problems()
     made = validate(parse_yaml(text, "x.yaml"), Config, problems)

@@ -19,11 +19,11 @@ from pathlib import Path
 import numpy as np
 import PIL
 
-from gen_data.generator.assets.asset_arrays import pack_imported, pack_texture
-from gen_data.generator.assets.asset_cache import Arrays, DiskCache, Store
-from gen_data.generator.assets.asset_ids import AssetId, parse_asset_id
-from gen_data.generator.assets.procedural_library import ProceduralLibrary
-from gen_data.generator.pipeline.numerics import host_digests
+from gen_data.assets.asset_arrays import pack_imported, pack_texture
+from gen_data.assets.asset_cache import Arrays, DiskCache, Store
+from gen_data.assets.asset_ids import AssetId, parse_asset_id
+from gen_data.assets.procedural_library import ProceduralLibrary
+from gen_data.pipeline.numerics import host_digests
 
 FILE = Path(__file__).with_name("asset_digests.json")
 

@@ -3,7 +3,7 @@
 ``python -m tests.contracts.stage_digests [NAME ...]``
 
 They name the first stage that an accidental change of bytes altered (see
-``gen_data.generator.runner.diff``). A deliberate change renews them in its own commit.
+``gen_data.runner.diff``). A deliberate change renews them in its own commit.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from gen_data.generator.runner.diff import SampleFiles
+from gen_data.runner.diff import SampleFiles
 
 FILE = Path(__file__).with_name("stage_digests.json")
 STAGES = ("scene", "geometry", "render", "labels")

@@ -6,12 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.contracts.asset_digests import (
-    digests_of,
-    numerics,
-    open_procedural,
-    read_stored,
-)
+from tests.contracts.asset_digests import digests_of, numerics, open_procedural, read_stored
 
 
 @pytest.mark.slow

@@ -17,16 +17,16 @@ import numpy as np
 import pytest
 from stranger.annotation import Distance
 
-from gen_data.generator.annotations import TABLE
-from gen_data.generator.annotations.annotate import Thresholds, annotate_ego, annotate_reading
-from gen_data.generator.assemble.config import load_config
-from gen_data.generator.assemble.pipeline_factory import open_pipeline
-from gen_data.generator.core.capture import Channel, SensorReading
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import Annotator, AnyAnnotator, AssetLibrary, ImageAnnotator
-from gen_data.generator.core.sample import EgoTruth, ImageTruth, ObjectTruth
-from gen_data.generator.core.scene import Scene
-from gen_data.generator.core.serialization import canonical_json, to_plain
+from gen_data.annotations import TABLE
+from gen_data.annotations.annotate import Thresholds, annotate_ego, annotate_reading
+from gen_data.assemble.config import load_config
+from gen_data.assemble.pipeline_factory import open_pipeline
+from gen_data.core.capture import Channel, SensorReading
+from gen_data.core.errors import ConfigError
+from gen_data.core.interfaces import Annotator, AnyAnnotator, AssetLibrary, ImageAnnotator
+from gen_data.core.sample import EgoTruth, ImageTruth, ObjectTruth
+from gen_data.core.scene import Scene
+from gen_data.core.serialization import canonical_json, to_plain
 
 ANNOTATORS: dict[str, type[AnyAnnotator]] = {
     **{name: TABLE.load(name) for name in TABLE},

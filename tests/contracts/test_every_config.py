@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 
 from gen_data import configs
-from gen_data.generator.assemble.config import load_config
-from gen_data.generator.core.interfaces import Modality, Sensor
-from gen_data.generator.runner.verify import verify
+from gen_data.assemble.config import load_config
+from gen_data.core.interfaces import Modality, Sensor
+from gen_data.runner.verify import verify
 from tests.contracts.stage_digests import find_change
 from tests.end_to_end.running import gen_data
 

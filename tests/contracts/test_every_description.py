@@ -6,10 +6,10 @@ from typing import Any
 
 import pytest
 
-from gen_data.generator.assemble.descriptions import describe_name, described_models, list_names_of
-from gen_data.generator.assemble.plugin_tables import TABLES
-from gen_data.generator.config.describe import describe_fields
-from gen_data.generator.core.errors import ConfigError
+from gen_data.assemble.descriptions import describe_name, described_models, list_names_of
+from gen_data.assemble.plugin_tables import TABLES
+from gen_data.config.describe import describe_fields
+from gen_data.core.errors import ConfigError
 
 COLUMNS = 80
 

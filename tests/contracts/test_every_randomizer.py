@@ -12,15 +12,15 @@ from typing import Any
 import pytest
 from pydantic import ValidationError
 
-from gen_data.generator.assets.library import open_library
-from gen_data.generator.config.describe import describe
-from gen_data.generator.config.schema import json_schema
-from gen_data.generator.core.asset_types import Material
-from gen_data.generator.core.interfaces import AssetIndex, Stage
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.members import Member, add_members
-from gen_data.generator.core.plates import CATCHER
-from gen_data.generator.core.scene import (
+from gen_data.assets.library import open_library
+from gen_data.config.describe import describe
+from gen_data.config.schema import json_schema
+from gen_data.core.asset_types import Material
+from gen_data.core.interfaces import AssetIndex, Stage
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.members import Member, add_members
+from gen_data.core.plates import CATCHER
+from gen_data.core.scene import (
     Body,
     Camera,
     Instance,
@@ -31,8 +31,8 @@ from gen_data.generator.core.scene import (
     Scene,
     Weather,
 )
-from gen_data.generator.core.se3 import SE3, look_at
-from gen_data.generator.core.serialization import canonical_json, from_plain, to_plain
+from gen_data.core.se3 import SE3, look_at
+from gen_data.core.serialization import canonical_json, from_plain, to_plain
 from gen_data.randomizers import TABLE
 from gen_data.scene_templates.builder import build_scene
 from gen_data.scene_templates.carrier import Carrier

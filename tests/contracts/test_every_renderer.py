@@ -14,12 +14,12 @@ import numpy as np
 import pytest
 from stranger.renderer import BoxesPlugin
 
-from gen_data.generator.core.capture import Channel, LidarRays, SensorReading
-from gen_data.generator.core.interfaces import Renderer, RendererSettings
-from gen_data.generator.core.scene import Body, Instance, Lidar, Light, Scene
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.core.serialization import canonical_json
-from gen_data.generator.renderers import TABLE
+from gen_data.core.capture import Channel, LidarRays, SensorReading
+from gen_data.core.interfaces import Renderer, RendererSettings
+from gen_data.core.scene import Body, Instance, Lidar, Light, Scene
+from gen_data.core.se3 import SE3
+from gen_data.core.serialization import canonical_json
+from gen_data.renderers import TABLE
 from tests.renderers.fake_library import FakeLibrary, box_mesh, camera_at
 
 SETTINGS: Mapping[str, type[RendererSettings]] = {

@@ -12,21 +12,21 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from gen_data.generator.config.describe import describe
-from gen_data.generator.config.schema import json_schema
-from gen_data.generator.core.capture import POINT, Channel, Measurements, PointCloud, SensorReading
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import Modality, Renderer
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.measurement_dtypes import TIME, columns_dtype
-from gen_data.generator.core.motion import Trajectory
-from gen_data.generator.core.scene import Body, Camera, Environment, Instance, Light, Rig, Scene
-from gen_data.generator.core.scene_time import add_twists, place_sensors, scene_at
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.core.serialization import canonical_json, from_plain
-from gen_data.generator.core.streams import Streams
-from gen_data.generator.renderers.warp.renderer import WarpRenderer
-from gen_data.generator.sensors import TABLE
+from gen_data.config.describe import describe
+from gen_data.config.schema import json_schema
+from gen_data.core.capture import POINT, Channel, Measurements, PointCloud, SensorReading
+from gen_data.core.errors import ConfigError
+from gen_data.core.interfaces import Modality, Renderer
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.measurement_dtypes import TIME, columns_dtype
+from gen_data.core.motion import Trajectory
+from gen_data.core.scene import Body, Camera, Environment, Instance, Light, Rig, Scene
+from gen_data.core.scene_time import add_twists, place_sensors, scene_at
+from gen_data.core.se3 import SE3
+from gen_data.core.serialization import canonical_json, from_plain
+from gen_data.core.streams import Streams
+from gen_data.renderers.warp.renderer import WarpRenderer
+from gen_data.sensors import TABLE
 from tests.renderers.fake_library import FakeLibrary, box_mesh, plane_mesh
 
 GIVEN: dict[str, dict[str, Any]] = {

@@ -10,19 +10,19 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from gen_data import configs, scene_templates
-from gen_data.generator.assemble.config import Config, load_config
-from gen_data.generator.assemble.config_schema import config_schema
-from gen_data.generator.assemble.pipeline_factory import nominal_scene
-from gen_data.generator.assets.library import Library, open_library
-from gen_data.generator.config.describe import describe
-from gen_data.generator.config.schema import json_schema
-from gen_data.generator.config.yaml_tree import load_yaml
-from gen_data.generator.core.errors import LayoutRejected
-from gen_data.generator.core.interfaces import Stage
-from gen_data.generator.core.scene import Body, Scene
-from gen_data.generator.core.scene_time import place_sensors
-from gen_data.generator.core.serialization import canonical_json
-from gen_data.generator.core.streams import Streams
+from gen_data.assemble.config import Config, load_config
+from gen_data.assemble.config_schema import config_schema
+from gen_data.assemble.pipeline_factory import nominal_scene
+from gen_data.assets.library import Library, open_library
+from gen_data.config.describe import describe
+from gen_data.config.schema import json_schema
+from gen_data.config.yaml_tree import load_yaml
+from gen_data.core.errors import LayoutRejected
+from gen_data.core.interfaces import Stage
+from gen_data.core.scene import Body, Scene
+from gen_data.core.scene_time import place_sensors
+from gen_data.core.serialization import canonical_json
+from gen_data.core.streams import Streams
 from tests.tiers import cases, slow
 
 CONFIGS = sorted(path.stem for path in Path(configs.__path__[0]).glob("*.yaml"))

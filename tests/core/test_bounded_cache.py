@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gen_data.generator.core.bounded_cache import ByteCache, CountCache
+from gen_data.core.bounded_cache import ByteCache, CountCache
 
 
 def test_bytes_are_bounded_whatever_the_sizes() -> None:

@@ -7,8 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from gen_data.generator.core.boxes import BoxPx, OrientedBox, tight_box
-from gen_data.generator.core.se3 import SE3
+from gen_data.core.boxes import BoxPx, OrientedBox, tight_box
+from gen_data.core.se3 import SE3
 
 
 def test_a_single_pixel_has_a_box_of_one_by_one() -> None:

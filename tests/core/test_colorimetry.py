@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gen_data.generator.core.colorimetry import (
+from gen_data.core.colorimetry import (
     REC709_FROM_XYZ,
     REC709_LUMINANCE,
     XYZ_FROM_REC709,

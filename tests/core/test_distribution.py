@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from gen_data.generator.cli.doctor import CHECKS
-from gen_data.generator.core import distribution
-from gen_data.generator.core.distribution import DISTRIBUTION, install_command
-from gen_data.generator.core.errors import SampleError
+from gen_data.cli.doctor import CHECKS
+from gen_data.core import distribution
+from gen_data.core.distribution import DISTRIBUTION, install_command
+from gen_data.core.errors import SampleError
 
 ROOT = Path(__file__).parents[2]
 HISTORY = {"CHANGELOG.md", "tests/core/test_distribution.py"}

@@ -9,8 +9,8 @@ from importlib.resources import files
 import pytest
 import yaml
 
-from gen_data.generator.content import FAMILIES
-from gen_data.generator.core.english import count, plural
+from gen_data.content import FAMILIES
+from gen_data.core.english import count, plural
 
 BY_HAND = {
     "bread": ("a loaf of bread", "two loaves of bread"),
@@ -58,7 +58,7 @@ def categories() -> frozenset[str]:
     """Of all families and of the objects of all packs, in words."""
     modules = [importlib.import_module(name) for name in FAMILIES]
     found = {f.category for m in modules for f in getattr(m, "FAMILIES", {}).values()}
-    for path in files("gen_data.generator.packs").iterdir():
+    for path in files("gen_data.packs").iterdir():
         if path.name.endswith(".yaml"):
             found |= named_in(yaml.safe_load(path.read_text("utf-8")))
     return frozenset(name.replace("_", " ") for name in found)

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gen_data.generator.core.intrinsics import Intrinsics
+from gen_data.core.intrinsics import Intrinsics
 
 VGA = Intrinsics(640, 480, 500.0, 510.0, 320.0, 240.0)
 

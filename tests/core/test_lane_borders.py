@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gen_data.generator.core.lane_geometry import LaneBorder, border_line, lane_borders
-from gen_data.generator.core.scene import Lane
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.roads.cross_section import RoadShape, height_m
-from gen_data.generator.roads.lane_graph import road_lanes
+from gen_data.core.lane_geometry import LaneBorder, border_line, lane_borders
+from gen_data.core.scene import Lane
+from gen_data.core.se3 import SE3
+from gen_data.roads.cross_section import RoadShape, height_m
+from gen_data.roads.lane_graph import road_lanes
 
 
 def road(**given: object) -> tuple[Lane, ...]:

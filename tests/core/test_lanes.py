@@ -6,9 +6,9 @@ import math
 
 import pytest
 
-from gen_data.generator.core.lane_geometry import LaneLine, pose_on_lane
-from gen_data.generator.core.scene import Lane
-from gen_data.generator.core.se3 import SE3
+from gen_data.core.lane_geometry import LaneLine, pose_on_lane
+from gen_data.core.scene import Lane
+from gen_data.core.se3 import SE3
 
 RADIUS_M = 50.0
 

@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.lens import Lens
-from gen_data.generator.core.serialization import from_plain, to_plain
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.lens import Lens
+from gen_data.core.serialization import from_plain, to_plain
 
 KITTI = Lens(
     "brown_conrady", (-0.3691481, 0.1968681, 1.353473e-3, 5.677587e-4, -0.06770705, 0.0, 0.0, 0.0)

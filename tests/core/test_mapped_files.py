@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gen_data.generator.assets.asset_cache import Arrays, DiskCache
-from gen_data.generator.core.mapped_files import (
+from gen_data.assets.asset_cache import Arrays, DiskCache
+from gen_data.core.mapped_files import (
     PageLimiter,
     limit_mapped_pages,
     map_file,

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from gen_data.generator.core.members import Member, add_members, free_instance_ids, remove_members
-from gen_data.generator.core.scene import Instance, ObjectGroup, Scene
-from gen_data.generator.core.se3 import SE3
+from gen_data.core.members import Member, add_members, free_instance_ids, remove_members
+from gen_data.core.scene import Instance, ObjectGroup, Scene
+from gen_data.core.se3 import SE3
 from tests.randomizers.doubles import FakeAssets
 
 GROUP = ObjectGroup("things", (), ("brick", "bottle"), 0, "drop", annotated=False)

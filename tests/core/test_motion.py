@@ -13,17 +13,11 @@ from scipy.interpolate import CubicHermiteSpline
 from scipy.spatial.transform import Rotation
 from scipy.special import fresnel
 
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.motion import (
-    STILL,
-    JointTrajectory,
-    StateChange,
-    Trajectory,
-    interpolate_poses,
-)
-from gen_data.generator.core.scene import Body, Camera, Device, Instance, Lidar, Light, Rig, Scene
-from gen_data.generator.core.scene_time import place_sensors, scene_at
-from gen_data.generator.core.se3 import SE3
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.motion import STILL, JointTrajectory, StateChange, Trajectory, interpolate_poses
+from gen_data.core.scene import Body, Camera, Device, Instance, Lidar, Light, Rig, Scene
+from gen_data.core.scene_time import place_sensors, scene_at
+from gen_data.core.se3 import SE3
 
 QUICK = settings(max_examples=60, deadline=None, derandomize=True)
 

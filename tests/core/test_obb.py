@@ -9,8 +9,8 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.optimize import linprog
 
-from gen_data.generator.core.boxes import boxes_touch, rectangles_overlap
-from gen_data.generator.core.se3 import SE3, Array, Vec3
+from gen_data.core.boxes import boxes_touch, rectangles_overlap
+from gen_data.core.se3 import SE3, Array, Vec3
 
 PLACES = st.tuples(*[st.floats(-2.0, 2.0)] * 3)
 HALVES = st.tuples(*[st.floats(0.05, 1.5)] * 3)

@@ -8,15 +8,15 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
+from gen_data.assets.image_decoding import read_exr
+from gen_data.cli.main import cli
+from gen_data.core import optional_packages
+from gen_data.core.distribution import install_command
+from gen_data.core.errors import AssetError, ConfigError
+from gen_data.core.optional_packages import EXTRAS, missing_packages
 from gen_data.exporters.rerun import Rerun
 from gen_data.exporters.usd import Usd
-from gen_data.generator.assets.image_decoding import read_exr
-from gen_data.generator.cli.main import cli
-from gen_data.generator.core import optional_packages
-from gen_data.generator.core.distribution import install_command
-from gen_data.generator.core.errors import AssetError, ConfigError
-from gen_data.generator.core.optional_packages import EXTRAS, missing_packages
-from gen_data.generator.usd.stage_reader import OpenStage
+from gen_data.usd.stage_reader import OpenStage
 from tests.wheels import HAS_RERUN
 
 PROJECT = Path(__file__).parents[2] / "pyproject.toml"

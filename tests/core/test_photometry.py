@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.integrate import dblquad, quad
 
-from gen_data.generator.core.asset_types import Material
-from gen_data.generator.core.photometry import (
+from gen_data.core.asset_types import Material
+from gen_data.core.photometry import (
     add_fixture,
     flux_to_intensity_cd,
     illuminance_to_intensity_cd,
@@ -18,7 +18,7 @@ from gen_data.generator.core.photometry import (
     remove_lights,
     scale_to_flux,
 )
-from gen_data.generator.core.scene import Body, Light, Scene
+from gen_data.core.scene import Body, Light, Scene
 
 SPHERE, SPOT = Light("s", "sphere"), Light("p", "spot", cone_rad=0.5, even=0.6)
 RECTANGLE = Light("r", "rectangle", size_m=(1.2, 0.5))

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.plates import (
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.plates import (
     Plate,
     crop_to,
     fitted_intrinsics,
@@ -19,7 +19,7 @@ from gen_data.generator.core.plates import (
     upright_pose,
     zenith_from_horizon,
 )
-from gen_data.generator.core.se3 import SE3, look_at
+from gen_data.core.se3 import SE3, look_at
 
 SIZE_PX, FOCAL_PX, HEIGHT_M = (1200, 800), 900.0, 1.7
 CORNERS_PX = ((200.0, 790.0), (1000.0, 790.0), (700.0, 480.0), (500.0, 480.0))

@@ -7,8 +7,8 @@ from typing import Literal, Protocol
 import pytest
 from pydantic import BaseModel
 
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.plugins import PluginTable
+from gen_data.core.errors import ConfigError
+from gen_data.core.plugins import PluginTable
 
 TABLE = PluginTable("noun", {"fraction": "fractions:Fraction", "decimal": "decimal:Decimal"})
 

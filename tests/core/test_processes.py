@@ -12,7 +12,7 @@ from tests.runner.test_processes import processes_of_session, wait_for
 
 PARENT = (
     "import subprocess, sys, time\n"
-    "from gen_data.generator.core.processes import interrupts_blocked, tie\n"
+    "from gen_data.core.processes import interrupts_blocked, tie\n"
     "with interrupts_blocked():\n"
     "    helper = subprocess.Popen(tie(['sleep', '600']))\n"
     "print(helper.pid, flush=True)\n"

@@ -7,8 +7,8 @@ from xml.parsers import expat
 
 import pytest
 
-from gen_data.generator.core.errors import AssetError
-from gen_data.generator.core.safe_xml import format_position, parse_xml
+from gen_data.core.errors import AssetError
+from gen_data.core.safe_xml import format_position, parse_xml
 
 CREATE = expat.ParserCreate
 

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from gen_data.generator.core.se3 import IDENTITY, SE3, look_at, rotation_to_quaternion
+from gen_data.core.se3 import IDENTITY, SE3, look_at, rotation_to_quaternion
 
 QUICK = settings(max_examples=150, deadline=None, derandomize=True)
 

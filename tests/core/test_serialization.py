@@ -14,16 +14,9 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 from numpy.typing import NDArray
 
-from gen_data.generator.core.scene import (
-    Body,
-    Environment,
-    IrradianceVolume,
-    Light,
-    Scene,
-    SupportSurface,
-)
-from gen_data.generator.core.se3 import IDENTITY, SE3
-from gen_data.generator.core.serialization import canonical_json, from_plain, to_plain
+from gen_data.core.scene import Body, Environment, IrradianceVolume, Light, Scene, SupportSurface
+from gen_data.core.se3 import IDENTITY, SE3
+from gen_data.core.serialization import canonical_json, from_plain, to_plain
 
 
 class Colour(str, Enum):

@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.scene import Camera
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.core.stereo import baseline_m, disparity_px, is_seen_by_both
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.scene import Camera
+from gen_data.core.se3 import SE3
+from gen_data.core.stereo import baseline_m, disparity_px, is_seen_by_both
 
 FOCAL_PX, BASELINE_M, WIDTH_PX = 100.0, 0.2, 160
 WALL_M, BOARD_M, BOARD_FROM_M, BOARD_TO_M = 4.0, 1.0, -0.163, 0.207

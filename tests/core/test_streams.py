@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from gen_data.generator.core.streams import Streams
+from gen_data.core.streams import Streams
 
 BASE = Streams(seed=7, scene=3, view=1, attempt=0, index=16)
 

@@ -16,15 +16,15 @@ from pathlib import Path
 
 import pytest
 
-from gen_data.generator.core import system_calls
-from gen_data.generator.core.system_calls import anonymous_file, try_lock, wake_channel
+from gen_data.core import system_calls
+from gen_data.core.system_calls import anonymous_file, try_lock, wake_channel
 from tests.runner.test_processes import wait_for
 
 ROOT = Path(__file__).parents[2]
 
 MACOS = """
     import os, sys
-    from gen_data.generator.core import processes
+    from gen_data.core import processes
     for name in ("memfd_create", "pipe2", "sched_getaffinity"):
         delattr(os, name)
     processes._has_death_signal = lambda: False
@@ -33,7 +33,7 @@ MACOS = """
 
 WINDOWS = """
     import fcntl, os, resource, select, signal, sys, types
-    import gen_data.generator.core.processes as processes
+    import gen_data.core.processes as processes
 
     class Msvcrt(types.ModuleType):
         LK_NBLCK = 2
@@ -116,7 +116,7 @@ def test_a_data_set_in_use_is_locked(system: str, tmp_path: Path) -> None:
     """A second process does not get the lock until the first one has ended."""
     code = """
         import os
-        from gen_data.generator.core.system_calls import try_lock
+        from gen_data.core.system_calls import try_lock
         got = try_lock(os.open("lock", os.O_RDWR | os.O_CREAT))
         print(got, flush=True)
         sys.stdin.read()
@@ -142,7 +142,7 @@ def test_a_helper_ends_with_its_parent_where_no_kernel_ends_it(tmp_path: Path) -
     helper = tmp_path / "helper.py"
     helper.write_text(
         "import sys\n"
-        "from gen_data.generator.core import processes\n"
+        "from gen_data.core import processes\n"
         "processes._has_death_signal = lambda: False\n"
         "processes._main(int(sys.argv[1]), sys.argv[2:])\n"
     )
@@ -213,7 +213,7 @@ def test_no_other_module_calls_what_only_some_systems_have() -> None:
     few = re.compile(r"\bimport (fcntl|resource)$|os\.(pipe2|memfd_create|sched_getaffinity)")
     found = [
         f"{path.relative_to(ROOT)}: {line.strip()}"
-        for folder in ("generator", "exporters", "randomizers", "scene_templates")
+        for folder in ("generator", "content", "lab", "randomizers", "exporters", "scene_templates")
         for path in sorted((ROOT / folder).rglob("*.py"))
         if path != Path(system_calls.__file__).resolve()
         for line in path.read_text().splitlines()

@@ -9,12 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from gen_data.generator.core import temporary_folders
-from gen_data.generator.core.temporary_folders import remove_abandoned, temporary_folder
+from gen_data.core import temporary_folders
+from gen_data.core.temporary_folders import remove_abandoned, temporary_folder
 
 OWNER = (
     "import sys, time\n"
-    "from gen_data.generator.core.temporary_folders import TemporaryFolder\n"
+    "from gen_data.core.temporary_folders import TemporaryFolder\n"
     "folder = TemporaryFolder('physics')\n"
     "print(folder.path, flush=True)\n"
     "time.sleep(600)\n"

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gen_data.generator.cli import report_command
-from gen_data.generator.core.errors import StorageError
-from gen_data.generator.core.whole_files import whole_file, write_whole
-from gen_data.generator.preview.contact_sheet import write_sheet
+from gen_data.cli import report_command
+from gen_data.core.errors import StorageError
+from gen_data.core.whole_files import whole_file, write_whole
+from gen_data.preview.contact_sheet import write_sheet
 
 
 @pytest.fixture
@@ -67,9 +67,7 @@ def test_a_full_disk_leaves_no_half_of_a_contact_sheet(tmp_path: Path, full_disk
 def test_a_full_disk_leaves_no_half_of_a_report(
     tmp_path: Path, full_disk: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(
-        "gen_data.generator.report.html_page.format_page", lambda sets: "<p>" * 1000
-    )
+    monkeypatch.setattr("gen_data.report.html_page.format_page", lambda sets: "<p>" * 1000)
     with pytest.raises(StorageError, match="No space left"):
         report_command._write(tmp_path / "report.html", [])
     assert not list(tmp_path.iterdir())

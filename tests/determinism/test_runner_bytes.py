@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from gen_data.generator.runner.run import Limits, Settings
-from gen_data.generator.runner.verify import verify
+from gen_data.runner.run import Limits, Settings
+from gen_data.runner.verify import verify
 from tests.runner.doubles import make, notes_of, tree_digest, write_raw_images
 from tests.runner.fake_run import DELAY_S, SHARD_SIZE, N
 from tests.runner.test_processes import start_fake_run

@@ -11,9 +11,9 @@ import click
 import pytest
 import yaml
 
-from gen_data.generator.assemble.config import load_config
-from gen_data.generator.assemble.pipeline_factory import PipelineFactory
-from gen_data.generator.cli.main import cli
+from gen_data.assemble.config import load_config
+from gen_data.assemble.pipeline_factory import PipelineFactory
+from gen_data.cli.main import cli
 from tests.tiers import slow
 
 ROOT = Path(__file__).parents[2]
@@ -91,7 +91,10 @@ def test_modules_exist(page: Path) -> None:
     """Dotted names below ``gen_data``, and paths of files in the repository."""
     text = page.read_text("utf-8")
     for dotted in set(
-        re.findall(r"\bgen_data\.(?:generator|randomizers|exporters|scene_templates)[\w.]*", text)
+        re.findall(
+            r"\bgen_data\.(?:annotations|api|assemble|assets|cli|config|configs|content|core|exporters|lab|packs|physics|pipeline|preview|randomizers|renderers|report|roads|rooms|runner|scene_templates|sensors|sky|traffic|usd)\b[\w.]*",
+            text,
+        )
     ):
         parts = dotted.rstrip(".").split(".")
         while parts and not (parts[-1][0].islower() and importlib.util.find_spec(".".join(parts))):
@@ -99,7 +102,8 @@ def test_modules_exist(page: Path) -> None:
             assert attribute[0].isupper() or attribute.isupper(), dotted
     for name in set(
         re.findall(
-            r"`((?:generator|randomizers|exporters|configs|tests|docs|examples)/[\w./]+)`", text
+            r"`((?:generator|content|lab|randomizers|exporters|configs|tests|docs|examples)/[\w./]+)`",
+            text,
         )
     ):
         assert (ROOT / name).exists(), name

@@ -22,10 +22,10 @@ from docs.hooks.plugin_reference import (
     template_page,
 )
 from gen_data import configs, scene_templates
-from gen_data.generator.assemble.plugin_tables import TABLES
-from gen_data.generator.cli.main import cli
-from gen_data.generator.config.distributions import DISTRIBUTIONS
-from gen_data.generator.config.yaml_tree import parse_yaml
+from gen_data.assemble.plugin_tables import TABLES
+from gen_data.cli.main import cli
+from gen_data.config.distributions import DISTRIBUTIONS
+from gen_data.config.yaml_tree import parse_yaml
 from gen_data.randomizers.lighting import Lighting
 
 PICTURES_MAX_MB = 4.0

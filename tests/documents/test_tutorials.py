@@ -21,7 +21,7 @@ import pytest
 import yaml
 
 from docs import pictures
-from gen_data.generator.cli.main import cli
+from gen_data.cli.main import cli
 from tests.documents import test_documents
 
 ROOT = Path(__file__).parents[2]

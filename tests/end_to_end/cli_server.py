@@ -20,7 +20,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NoReturn
 
-PACKAGES = ("generator", "randomizers", "exporters", "scene_templates")
+import gen_data
+
+PACKAGES = tuple(
+    module.name
+    for module in pkgutil.iter_modules(gen_data.__path__)
+    if module.ispkg and module.name not in ("configs", "generator", "tests", "gen_data")
+)
 LEFT_OUT = (
     "__main__", "rerun_recording", "study.detector", "study.run_training", "study.training"
 )  # fmt: skip
@@ -29,14 +35,14 @@ LEFT_OUT = (
 
 def serve() -> None:
     """Answer requests until the input ends; a fork ends with the exit code of its command."""
-    from gen_data.generator.core.processes import SINGLE_THREADED
+    from gen_data.core.processes import SINGLE_THREADED
 
     # As the command line does, before NumPy is imported.
     os.environ.update(dict.fromkeys(SINGLE_THREADED, "1"))
     _import_all()
-    from gen_data.generator.assemble.config import load_config
-    from gen_data.generator.assets.library import open_library
-    from gen_data.generator.cli.main import main
+    from gen_data.assemble.config import load_config
+    from gen_data.assets.library import open_library
+    from gen_data.cli.main import main
 
     # Models of plug-ins, and the list of built-in assets.
     load_config("tabletop.yaml")

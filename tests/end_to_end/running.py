@@ -20,7 +20,7 @@ SMALL = ("--set", "sensors[0].size_px=[160, 120]", "--set", "shard_size=5")
 
 def command(*arguments: str) -> list[str]:
     """The command line of ``gen-data`` with these arguments, in this environment."""
-    return [sys.executable, "-m", "gen_data.generator.cli", *arguments]
+    return [sys.executable, "-m", "gen_data.cli", *arguments]
 
 
 def environment(*before: Path) -> dict[str, str]:

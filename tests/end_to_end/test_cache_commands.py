@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from gen_data.generator.assets.library import open_library
-from gen_data.generator.cli import cache_commands
-from gen_data.generator.cli.cache_commands import Cache, cache
+from gen_data.assets.library import open_library
+from gen_data.cli import cache_commands
+from gen_data.cli.cache_commands import Cache, cache
 
 
 @pytest.fixture

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from gen_data.generator.cli.cost_estimate import Prices, Probe, estimate_rows
+from gen_data.cli.cost_estimate import Prices, Probe, estimate_rows
 from tests.end_to_end.running import gen_data
 
 BILLION = 1_000_000_000

@@ -81,9 +81,9 @@ def test_sample_made_alone_equals_the_one_in_its_shard(dataset: Path) -> None:
     """Pixels of sample 7, made in another process with no other sample before it."""
     program = (
         "import sys, numpy as np\n"
-        "from gen_data.generator.assemble.pipeline_factory import open_pipeline\n"
-        "from gen_data.generator.assemble.config import load_config as config_of_source\n"
-        "from gen_data.generator.core.capture import Channel\n"
+        "from gen_data.assemble.pipeline_factory import open_pipeline\n"
+        "from gen_data.assemble.config import load_config as config_of_source\n"
+        "from gen_data.core.capture import Channel\n"
         f"with open_pipeline(config_of_source({str(dataset)!r})) as pipeline:\n"
         "    reading = pipeline.sample(7).capture.readings['color']\n"
         "np.savez('alone.npz', rgb=reading.channels[Channel.RGB],\n"
@@ -103,11 +103,11 @@ def test_sample_made_alone_equals_the_one_in_its_shard(dataset: Path) -> None:
 
 def test_kept_scene_renders_to_the_same_pixels(dataset: Path) -> None:
     """The Scene in scenes.jsonl is the whole provenance: no randomizer, no physics needed."""
-    from gen_data.generator.assemble.config import load_config
-    from gen_data.generator.assemble.pipeline_factory import PipelineFactory
-    from gen_data.generator.core.capture import Channel
-    from gen_data.generator.core.streams import Streams
-    from gen_data.generator.runner.stored import StoredSamples
+    from gen_data.assemble.config import load_config
+    from gen_data.assemble.pipeline_factory import PipelineFactory
+    from gen_data.core.capture import Channel
+    from gen_data.core.streams import Streams
+    from gen_data.runner.stored import StoredSamples
 
     kept = StoredSamples(dataset).kept_scene(13)
     scene = kept.scene
@@ -148,7 +148,7 @@ def test_every_object_is_labelled_where_it_is_seen(dataset: Path) -> None:
 
 def test_licences_name_what_was_used_and_nothing_else(dataset: Path) -> None:
     """The families in LICENSES-ASSETS.md are those of the scenes that were kept."""
-    from gen_data.generator.runner.stored import StoredSamples
+    from gen_data.runner.stored import StoredSamples
 
     used, stored = set(), StoredSamples(dataset)
     for scene in (stored.kept_scene(index).scene for index in range(stored.n)):

@@ -12,9 +12,9 @@ from pathlib import Path
 import pytest
 
 import gen_data as package
-from gen_data.generator.core.errors import StorageError
-from gen_data.generator.runner import exports, store
-from gen_data.generator.runner.stored import StoredSamples
+from gen_data.core.errors import StorageError
+from gen_data.runner import exports, store
+from gen_data.runner.stored import StoredSamples
 from tests.end_to_end.running import digest, gen_data
 
 

@@ -8,12 +8,12 @@ from pathlib import Path
 import pytest
 
 import gen_data
-from gen_data.generator.cli.main import cli
-from gen_data.generator.core.errors import SampleIndexError, SamplesSkipped
-from gen_data.generator.core.sample import Sample
-from gen_data.generator.pipeline.pipeline import Pipeline
-from gen_data.generator.runner.deep_verify import find_invalid_samples
-from gen_data.generator.runner.verify import verify
+from gen_data.cli.main import cli
+from gen_data.core.errors import SampleIndexError, SamplesSkipped
+from gen_data.core.sample import Sample
+from gen_data.pipeline.pipeline import Pipeline
+from gen_data.runner.deep_verify import find_invalid_samples
+from gen_data.runner.verify import verify
 
 TINY = [
     "sensors.color.size_px=[48, 32]",

@@ -12,12 +12,12 @@ import pytest
 import trimesh
 from trimesh.exchange.gltf import export_gltf
 
+from gen_data.assemble.config import load_config
+from gen_data.assemble.pipeline_factory import PipelineFactory
+from gen_data.assets.library import open_library
+from gen_data.cli.own_meshes import guess_unit
+from gen_data.core.asset_types import Asset
 from gen_data.exporters import TABLE
-from gen_data.generator.assemble.config import load_config
-from gen_data.generator.assemble.pipeline_factory import PipelineFactory
-from gen_data.generator.assets.library import open_library
-from gen_data.generator.cli.own_meshes import guess_unit
-from gen_data.generator.core.asset_types import Asset
 from tests.end_to_end.running import gen_data
 
 SHIPPED = ("tabletop", "street", "pedestrians", "bin_picking", "kitti_rig", "shelf")

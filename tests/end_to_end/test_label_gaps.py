@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 import gen_data
-from gen_data.generator.report.report_data import describe_dataset
+from gen_data.report.report_data import describe_dataset
 from tests.end_to_end.running import gen_data as run
 
 pytestmark = pytest.mark.slow

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import gen_data
-from gen_data.generator.assemble.config import load_config
+from gen_data.assemble.config import load_config
 from tests.end_to_end.running import gen_data as run
 
 BASE = """\

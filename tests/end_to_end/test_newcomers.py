@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 import gen_data
-from gen_data.generator.core.errors import GenDataError, did_you_mean, one_of
+from gen_data.core.errors import GenDataError, did_you_mean, one_of
 from tests.end_to_end.running import gen_data as run
 
 

@@ -13,8 +13,8 @@ import cv2
 import numpy as np
 
 import gen_data
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.se3 import Array
+from gen_data.core.capture import Channel
+from gen_data.core.se3 import Array
 
 K0 = np.array([[203.1, 0.0, 79.4], [0.0, 202.7, 64.8], [0.0, 0.0, 1.0]])
 K1 = np.array([[201.3, 0.0, 81.7], [0.0, 202.2, 62.1], [0.0, 0.0, 1.0]])

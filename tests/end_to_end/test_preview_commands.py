@@ -97,7 +97,7 @@ def test_doctor_finds_an_engine_that_cannot_be_used(
     (tmp_path / f"{module}.py").write_text(text)
     # Only the checks: a sample takes long, and is tried above.
     program = (
-        "from gen_data.generator.cli import doctor, main\n"
+        "from gen_data.cli import doctor, main\n"
         f"doctor.CHECKS = tuple(c for c in doctor.CHECKS if c.name == {check!r})\n"
         "main.main()\n"
     )

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_limits
 
-from gen_data.generator.report.drawn_parameters import DrawnParameters, draw_parameters
-from gen_data.generator.runner.stored import StoredSamples
+from gen_data.report.drawn_parameters import DrawnParameters, draw_parameters
+from gen_data.runner.stored import StoredSamples
 
 
 @pytest.fixture(scope="module")

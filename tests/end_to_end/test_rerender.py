@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import gen_data as package
-from gen_data.generator.api.repair import repair
-from gen_data.generator.core.errors import ConfigError, ConfigWarning
+from gen_data.api.repair import repair
+from gen_data.core.errors import ConfigError, ConfigWarning
 from tests.end_to_end.running import digest, gen_data
 
 

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 import gen_data
-from gen_data.generator.assemble.config import load_config
-from gen_data.generator.assemble.size_estimate import FILE_BYTES, estimate_point_bytes
-from gen_data.generator.core.capture import POINT
+from gen_data.assemble.config import load_config
+from gen_data.assemble.size_estimate import FILE_BYTES, estimate_point_bytes
+from gen_data.core.capture import POINT
 
 
 def test_every_ray_of_a_scan_counts_as_a_point() -> None:

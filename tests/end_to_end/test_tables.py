@@ -10,8 +10,8 @@ import pytest
 from click.testing import CliRunner
 from rich.console import Console
 
-from gen_data.generator.cli.main import cli
-from gen_data.generator.cli.tables import print_tables
+from gen_data.cli.main import cli
+from gen_data.cli.tables import print_tables
 
 
 def printed(table: dict[str, Any], columns: int = 80) -> str:

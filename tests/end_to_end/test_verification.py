@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from gen_data.generator.api.reproduce import reproduce
-from gen_data.generator.cli.main import cli
-from gen_data.generator.core.errors import ConfigError, VerificationError
-from gen_data.generator.runner.deep_verify import find_invalid_samples, find_irreproducible_samples
+from gen_data.api.reproduce import reproduce
+from gen_data.cli.main import cli
+from gen_data.core.errors import ConfigError, VerificationError
+from gen_data.runner.deep_verify import find_invalid_samples, find_irreproducible_samples
 
 
 def test_a_good_data_set_passes_every_check(

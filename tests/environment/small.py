@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from gen_data.generator.core.scene import Articulation
-from gen_data.generator.environment.env import Env
-from gen_data.generator.physics.manipulation.arm_simulation import ArmSimulation
+from gen_data.core.scene import Articulation
+from gen_data.lab.environment.env import Env
+from gen_data.physics.manipulation.arm_simulation import ArmSimulation
 from tests.wheels import INSTALLED
 
 CONFIG: dict[str, Any] = {

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from gen_data.generator.environment.env import Env
-from gen_data.generator.physics.manipulation.arm_simulation import Servo
-from gen_data.generator.physics.mujoco_world import MujocoWorld
+from gen_data.lab.environment.env import Env
+from gen_data.physics.manipulation.arm_simulation import Servo
+from gen_data.physics.mujoco_world import MujocoWorld
 from tests.environment.small import NOMINAL, nominal, simulation_of, small
 from tests.physics.panda import urdf_path
 from tests.wheels import INSTALLED

@@ -15,12 +15,12 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 import gen_data
-from gen_data.generator.api.config import read_model
-from gen_data.generator.config.yaml_tree import parse_yaml
-from gen_data.generator.core.distribution import install_command
-from gen_data.generator.core.errors import AssetError, ConfigError, SceneRejected
-from gen_data.generator.environment.env import ENV_ID, Env, make_vec
-from gen_data.generator.environment.settings import EnvSettings
+from gen_data.api.config import read_model
+from gen_data.config.yaml_tree import parse_yaml
+from gen_data.core.distribution import install_command
+from gen_data.core.errors import AssetError, ConfigError, SceneRejected
+from gen_data.lab.environment.env import ENV_ID, Env, make_vec
+from gen_data.lab.environment.settings import EnvSettings
 from tests.environment.small import CONFIG, arm_of, nominal, same, simulation_of, small
 from tests.wheels import INSTALLED
 

@@ -8,12 +8,12 @@ from typing import Any
 import cv2
 import numpy as np
 
-from gen_data.generator.annotations.annotate import Thresholds
-from gen_data.generator.core.boxes import tight_box
-from gen_data.generator.core.capture import Capture, Channel, SensorReading, Silhouette
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.lens import Lens
-from gen_data.generator.core.scene import Camera, Scene
+from gen_data.annotations.annotate import Thresholds
+from gen_data.core.boxes import tight_box
+from gen_data.core.capture import Capture, Channel, SensorReading, Silhouette
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.lens import Lens
+from gen_data.core.scene import Camera, Scene
 from tests.exporters import conftest
 
 BROWN = Intrinsics(

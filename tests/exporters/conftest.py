@@ -17,11 +17,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from gen_data.exporters.image_files import write_media
-from gen_data.generator import annotations
-from gen_data.generator.annotations.annotate import Thresholds, annotate_objects
-from gen_data.generator.annotations.language import Language
-from gen_data.generator.core.asset_types import (
+from gen_data import annotations
+from gen_data.annotations.annotate import Thresholds, annotate_objects
+from gen_data.annotations.language import Language
+from gen_data.core.asset_types import (
     SURFACES,
     Asset,
     Joint,
@@ -31,8 +30,8 @@ from gen_data.generator.core.asset_types import (
     RobotModel,
     Symmetry,
 )
-from gen_data.generator.core.boxes import BoxPx, tight_box
-from gen_data.generator.core.capture import (
+from gen_data.core.boxes import BoxPx, tight_box
+from gen_data.core.capture import (
     POINT,
     Capture,
     Channel,
@@ -41,14 +40,14 @@ from gen_data.generator.core.capture import (
     SensorReading,
     Silhouette,
 )
-from gen_data.generator.core.interfaces import DatasetInfo, Exporter, Modality, SensorInfo
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.lane_geometry import LaneBorder
-from gen_data.generator.core.lens import LensModel
-from gen_data.generator.core.measurement_dtypes import TABLE_COLUMNS, table_rows
-from gen_data.generator.core.motion import JointTrajectory, Trajectory
-from gen_data.generator.core.sample import BirdseyeMap, EgoTruth, ImageTruth, Sample
-from gen_data.generator.core.scene import (
+from gen_data.core.interfaces import DatasetInfo, Exporter, Modality, SensorInfo
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.lane_geometry import LaneBorder
+from gen_data.core.lens import LensModel
+from gen_data.core.measurement_dtypes import TABLE_COLUMNS, table_rows
+from gen_data.core.motion import JointTrajectory, Trajectory
+from gen_data.core.sample import BirdseyeMap, EgoTruth, ImageTruth, Sample
+from gen_data.core.scene import (
     ArmGoal,
     Articulation,
     Body,
@@ -59,9 +58,10 @@ from gen_data.generator.core.scene import (
     Rig,
     Scene,
 )
-from gen_data.generator.core.scene_time import RIG_AXES, add_twists, place_sensors, scene_at
-from gen_data.generator.core.se3 import SE3, Array, look_at
-from gen_data.generator.runner.shard import drop_pixels
+from gen_data.core.scene_time import RIG_AXES, add_twists, place_sensors, scene_at
+from gen_data.core.se3 import SE3, Array, look_at
+from gen_data.exporters.image_files import write_media
+from gen_data.runner.shard import drop_pixels
 from tests.exporters.drives import drive_info
 from tests.wheels import NO_RERUN
 

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gen_data.core.asset_types import Material, MeshData
+from gen_data.core.capture import Channel
+from gen_data.core.scene import Body
 from gen_data.exporters.background_surfaces import SURFACES, read_surfaces
 from gen_data.exporters.image_files import write_media
-from gen_data.generator.core.asset_types import Material, MeshData
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.scene import Body
 
 EDGE_M = 1.3
 """Asphalt is to the left (y) of this, grass to the right."""

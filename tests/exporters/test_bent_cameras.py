@@ -14,11 +14,11 @@ import pytest
 from tfrecord import example_pb2
 from tfrecord.reader import tfrecord_iterator
 
+from gen_data.core.errors import ConfigError
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.lens import Lens
 from gen_data.exporters import TABLE
 from gen_data.exporters.hdf5 import fields_rad
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.lens import Lens
 from tests.exporters.bent import LENSES, bent_samples, opencv_rays
 
 

@@ -11,10 +11,10 @@ import cv2
 import numpy as np
 import pytest
 
+from gen_data.core.motion import Twist
+from gen_data.core.sample import BorderTruth, MaskPx, MotionTruth, Sample
 from gen_data.exporters.birdseye import Birdseye, columns_at
 from gen_data.exporters.coco import Coco
-from gen_data.generator.core.motion import Twist
-from gen_data.generator.core.sample import BorderTruth, MaskPx, MotionTruth, Sample
 
 BORDER = BorderTruth(
     "main/forward0:left", "road", ((80.5, 110.5), (80.5, 90.5), (60.5, 70.5)), (True, True, False)

@@ -20,13 +20,13 @@ from pycocotools.coco import COCO
 from scipy.spatial import KDTree
 from scipy.spatial.distance import cdist
 
+from gen_data.annotations.annotate import Thresholds
+from gen_data.core.asset_types import Symmetry
+from gen_data.core.errors import AssetError, ConfigError
+from gen_data.core.scene import Articulation
+from gen_data.core.se3 import IDENTITY, SE3
 from gen_data.exporters.bop import Bop
 from gen_data.exporters.rigid_models import Piece, build_model
-from gen_data.generator.annotations.annotate import Thresholds
-from gen_data.generator.core.asset_types import Symmetry
-from gen_data.generator.core.errors import AssetError, ConfigError
-from gen_data.generator.core.scene import Articulation
-from gen_data.generator.core.se3 import IDENTITY, SE3
 from tests.embree import RayCaster
 
 pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")

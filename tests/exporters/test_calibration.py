@@ -12,15 +12,15 @@ import numpy as np
 import pytest
 import yaml
 
+from gen_data.core.errors import ConfigError
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.lens import Lens
+from gen_data.core.scene import Camera, Device, Rig, Scene
+from gen_data.core.scene_time import RIG_AXES, place_sensors
+from gen_data.core.se3 import SE3, turned
 from gen_data.exporters.calibration import CalibrationFiles, calibration_texts
 from gen_data.exporters.calibration_texts import colmap_camera
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.lens import Lens
-from gen_data.generator.core.scene import Camera, Device, Rig, Scene
-from gen_data.generator.core.scene_time import RIG_AXES, place_sensors
-from gen_data.generator.core.se3 import SE3, turned
-from gen_data.generator.sensors.calibration.read_calibration import read_calibration
+from gen_data.sensors.calibration.read_calibration import read_calibration
 
 BENT = Lens("brown_conrady", (-0.21, 0.09, 0.0007, -0.0004, 0.0, 0.0, 0.0, 0.0))
 STRONG = Lens("brown_conrady", (-0.21, 0.09, 0.0007, -0.0004, -0.012, 0.01, 0.002, 0.0005))

@@ -8,6 +8,9 @@ from typing import Any
 
 import pytest
 
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.scene import Environment, Lane, Light, Scene, Weather
+from gen_data.core.se3 import look_at
 from gen_data.exporters.captions import (
     caption,
     describe_light,
@@ -15,9 +18,6 @@ from gen_data.exporters.captions import (
     describe_weather,
     list_objects,
 )
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.scene import Environment, Lane, Light, Scene, Weather
-from gen_data.generator.core.se3 import look_at
 
 STREET = Lane("lane", "driving", ((0.0, 0.0, 0.0), (9.0, 0.0, 0.0)), 3.0)
 

@@ -15,11 +15,11 @@ import numpy as np
 import pytest
 from PIL import Image, ImageDraw
 
+from gen_data.core.capture import Channel
+from gen_data.core.errors import ConfigError
 from gen_data.exporters.cityscapes import Cityscapes
 from gen_data.exporters.cityscapes_classes import city_classes
 from gen_data.exporters.coco import Coco
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.errors import ConfigError
 from tests.exporters.coco_masks import drawn_mask
 
 # pycocotools' decoder predates numpy 2's __array__(copy=...).

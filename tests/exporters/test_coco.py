@@ -17,14 +17,14 @@ from pycocotools import mask as coco_mask
 from pycocotools.coco import COCO
 from pycocotools.cocoeval import COCOeval
 
+from gen_data.annotations.annotate import Thresholds
+from gen_data.core.capture import Channel
+from gen_data.core.errors import ConfigError
+from gen_data.core.lens import Lens
+from gen_data.core.scene import Weather
+from gen_data.core.se3 import SE3
 from gen_data.exporters.coco import Coco
 from gen_data.exporters.label_map import LabelMap, MappedExporter
-from gen_data.generator.annotations.annotate import Thresholds
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.lens import Lens
-from gen_data.generator.core.scene import Weather
-from gen_data.generator.core.se3 import SE3
 
 # pycocotools' decoder predates numpy 2's __array__(copy=...).
 pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")

@@ -15,10 +15,10 @@ import pytest
 from numpy.typing import NDArray
 from PIL import Image
 
+from gen_data.core.capture import Channel
+from gen_data.core.errors import ConfigError
 from gen_data.exporters.coco import Coco
 from gen_data.exporters.coco_panoptic import CocoPanoptic
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.errors import ConfigError
 from tests.exporters.coco_masks import drawn_mask
 
 # pycocotools' decoder predates numpy 2's __array__(copy=...).

@@ -14,9 +14,9 @@ import cv2
 import numpy as np
 import pytest
 
+from gen_data.core.capture import Channel
+from gen_data.core.errors import ConfigError
 from gen_data.exporters.control_clips import ControlClips, inverse_depth
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.errors import ConfigError
 
 FIXED = ControlClips(near_m=5.0, far_m=60.0)
 

@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 
 from docs import conventions as page
+from gen_data.core.capture import POINT, Channel
 from gen_data.exporters import TABLE
 from gen_data.exporters.conventions import Conventions
 from gen_data.exporters.nuscenes_files import lidar_bytes
 from gen_data.exporters.point_cloud_io import xyzi_bytes
 from gen_data.exporters.pointclouds import file_points
-from gen_data.generator.core.capture import POINT, Channel
 from tests.exporters.drives import calibration
 
 EYE_M = 1.6

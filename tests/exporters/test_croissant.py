@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from gen_data.core.errors import ConfigError
+from gen_data.core.interfaces import DatasetInfo, Publication
 from gen_data.exporters.croissant import Croissant
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import DatasetInfo, Publication
 
 
 @pytest.fixture(scope="module")

@@ -15,9 +15,9 @@ import pytest
 from numpy.typing import NDArray
 from pycocotools import mask as coco_mask
 
+from gen_data.core.sample import MaskPx
 from gen_data.exporters.coco import Coco
 from gen_data.exporters.cvat import Cvat, row_runs
-from gen_data.generator.core.sample import MaskPx
 from tests.exporters.coco_masks import drawn_mask
 
 # pycocotools' decoder predates numpy 2's __array__(copy=...).

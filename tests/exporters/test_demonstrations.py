@@ -16,11 +16,11 @@ from PIL import Image
 from tfrecord import example_pb2
 from tfrecord.reader import tfrecord_iterator
 
+from gen_data.core.demonstrations import demonstration_step
+from gen_data.core.scene import Assignment, ContactSpan, Episode, Span
+from gen_data.core.se3 import SE3
 from gen_data.exporters.lerobot import LeRobot
 from gen_data.exporters.rlds import Rlds
-from gen_data.generator.core.demonstrations import demonstration_step
-from gen_data.generator.core.scene import Assignment, ContactSpan, Episode, Span
-from gen_data.generator.core.se3 import SE3
 from tests.exporters.drives import drive_info
 from tests.randomizers.doubles import two_link_arm
 

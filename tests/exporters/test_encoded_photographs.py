@@ -19,6 +19,8 @@ import pyarrow.parquet
 import pytest
 from PIL import Image
 
+from gen_data.core.capture import Channel, ImageEncoding
+from gen_data.core.errors import ConfigError
 from gen_data.exporters.base import check_image_formats
 from gen_data.exporters.birdseye import Birdseye
 from gen_data.exporters.bop import Bop
@@ -37,8 +39,6 @@ from gen_data.exporters.rerun import Rerun
 from gen_data.exporters.semantickitti import SemanticKitti
 from gen_data.exporters.solo import Solo
 from gen_data.exporters.usd import Usd
-from gen_data.generator.core.capture import Channel, ImageEncoding
-from gen_data.generator.core.errors import ConfigError
 from tests.exporters.drives import drive_info
 
 JPEG, WEBP = ImageEncoding("jpeg", 92), ImageEncoding("webp", 92)

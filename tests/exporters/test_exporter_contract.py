@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
+from gen_data import annotations
 from gen_data.exporters import TABLE
 from gen_data.exporters.label_map import LabelMap, MappedExporter
-from gen_data.generator import annotations
 from tests.exporters.drives import drive_info
 
 PACKED = {"huggingface", "rlds", "tfrecord", "webdataset", "rerun"}

@@ -12,14 +12,14 @@ import cv2
 import numpy as np
 import pytest
 
+from gen_data.annotations.annotate import Thresholds
+from gen_data.core.capture import Channel
+from gen_data.core.errors import ConfigError
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.lens import Lens
+from gen_data.core.scene import Scene
 from gen_data.exporters import TABLE
-from gen_data.generator.annotations.annotate import Thresholds
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.lens import Lens
-from gen_data.generator.core.scene import Scene
-from gen_data.generator.pipeline.exporter_views import ExporterView, view_of
+from gen_data.pipeline.exporter_views import ExporterView, view_of
 from tests.exporters.bent import LENSES, bent_samples, opencv_maps
 
 PINHOLES_ONLY = ("bop", "cityscapes", "kitti", "scannet", "semantickitti", "solo", "tum_rgbd")

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from gen_data.core.capture import Channel
+from gen_data.core.shutter import Shutter
 from gen_data.exporters.coco import Coco
 from gen_data.exporters.image_files import encode_channel
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.shutter import Shutter
 
 H, W = 7, 9
 

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from gen_data.core.sample import Grasp, Sample, Suction
+from gen_data.core.se3 import SE3
 from gen_data.exporters.graspnet import GraspNet
-from gen_data.generator.core.sample import Grasp, Sample, Suction
-from gen_data.generator.core.se3 import SE3
 
 POSE = SE3.about_z(0.3, (5.0, 1.0, 0.4))
 

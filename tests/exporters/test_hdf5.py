@@ -13,10 +13,10 @@ import h5py
 import numpy as np
 import pytest
 
+from gen_data.core.capture import Channel
+from gen_data.core.errors import ConfigError
 from gen_data.exporters.hdf5 import Hdf5, write_hdf5
 from gen_data.exporters.npz import npz_bytes
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.errors import ConfigError
 from tests.exporters.conftest import MEDIA, SIZES_M
 
 CONTAINERS = ("hdf5", "npz")
@@ -206,7 +206,7 @@ def test_each_camera_has_a_container(world: Any, samples: Any, tmp_path: Path) -
 
 def test_a_missing_package_is_named(world: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """Before anything is rendered; NumPy's archives need none."""
-    monkeypatch.setattr("gen_data.generator.core.optional_packages.find_spec", lambda name: None)
+    monkeypatch.setattr("gen_data.core.optional_packages.find_spec", lambda name: None)
 
     with pytest.raises(ConfigError, match=r"pip install .*\[formats\]'"):
         Hdf5().check(world.info(1))

@@ -20,10 +20,10 @@ import yaml
 from PIL import Image
 from pycocotools import mask as coco_mask
 
+from gen_data.core.errors import ConfigError
 from gen_data.exporters import huggingface
 from gen_data.exporters.huggingface import HuggingFace
 from gen_data.exporters.label_map import LabelMap, MappedExporter
-from gen_data.generator.core.errors import ConfigError
 
 # pycocotools' decoder predates numpy 2's __array__(copy=...).
 pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")

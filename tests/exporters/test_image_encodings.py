@@ -13,6 +13,8 @@ import h5py
 import numpy as np
 import pytest
 
+from gen_data.core.capture import PNG, Channel, ImageEncoding
+from gen_data.core.errors import ConfigError
 from gen_data.exporters import TABLE
 from gen_data.exporters.base import check_image_formats
 from gen_data.exporters.coco import Coco
@@ -22,10 +24,8 @@ from gen_data.exporters.kitti import Kitti
 from gen_data.exporters.voc import Voc
 from gen_data.exporters.webdataset import WebDataset
 from gen_data.exporters.yolo import Yolo
-from gen_data.generator.core.capture import PNG, Channel, ImageEncoding
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.runner.stored import ImageFiles
-from gen_data.generator.sensors.camera.rgb_encoding import RgbEncoding
+from gen_data.runner.stored import ImageFiles
+from gen_data.sensors.camera.rgb_encoding import RgbEncoding
 
 JPEG, WEBP, LOSSLESS = (
     ImageEncoding("jpeg", 92),

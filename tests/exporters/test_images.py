@@ -14,10 +14,10 @@ import pytest
 from numpy.typing import NDArray
 from PIL import Image
 
+from gen_data.core.capture import Channel
+from gen_data.core.errors import ConfigError, SampleError
+from gen_data.core.interfaces import media_path
 from gen_data.exporters.image_files import depth_units, encode_channel, link_or_copy, write_media
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.errors import ConfigError, SampleError
-from gen_data.generator.core.interfaces import media_path
 
 H, W = 37, 53
 

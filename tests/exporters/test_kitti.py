@@ -14,6 +14,14 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from PIL import Image
 
+from gen_data.annotations.annotate import Thresholds
+from gen_data.core.boxes import BoxPx, OrientedBox
+from gen_data.core.capture import Channel
+from gen_data.core.errors import ConfigError
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.sample import ImageTruth, ObjectTruth
+from gen_data.core.scene import Camera, Instance
+from gen_data.core.se3 import IDENTITY, SE3
 from gen_data.exporters.kitti import (
     Kitti,
     calib_text,
@@ -22,14 +30,6 @@ from gen_data.exporters.kitti import (
     official_type,
     upright_box,
 )
-from gen_data.generator.annotations.annotate import Thresholds
-from gen_data.generator.core.boxes import BoxPx, OrientedBox
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.sample import ImageTruth, ObjectTruth
-from gen_data.generator.core.scene import Camera, Instance
-from gen_data.generator.core.se3 import IDENTITY, SE3
 from tests.exporters import kitti_evaluation
 
 Array = NDArray[np.float64]

@@ -13,10 +13,10 @@ import cv2
 import numpy as np
 import pytest
 
+from gen_data.core.errors import ConfigError
+from gen_data.core.se3 import SE3
 from gen_data.exporters.kitti_raw import KittiRaw, luma
 from gen_data.exporters.sequences import timestamp
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.se3 import SE3
 from tests.exporters.drives import DRIVE, calibration, drive_info, rigid, stems
 
 

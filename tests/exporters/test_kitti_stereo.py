@@ -10,11 +10,11 @@ import cv2
 import numpy as np
 import pytest
 
+from gen_data.core.capture import Channel
+from gen_data.core.errors import ConfigError
+from gen_data.core.interfaces import Modality, SensorInfo
+from gen_data.core.se3 import SE3
 from gen_data.exporters.kitti_stereo import KittiStereo
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import Modality, SensorInfo
-from gen_data.generator.core.se3 import SE3
 
 BASELINE_M = 0.54
 

@@ -12,12 +12,12 @@ import pytest
 import yaml
 from pydantic import ValidationError
 
+from gen_data.assemble.config import load_config
+from gen_data.assemble.pipeline_factory import PipelineFactory
+from gen_data.core.errors import ConfigError, ConfigWarning
 from gen_data.exporters.coco import Coco
 from gen_data.exporters.kitti import Kitti
 from gen_data.exporters.label_map import AppliedLabelMap, LabelMap, MappedExporter, public_classes
-from gen_data.generator.assemble.config import load_config
-from gen_data.generator.assemble.pipeline_factory import PipelineFactory
-from gen_data.generator.core.errors import ConfigError, ConfigWarning
 
 CITYSCAPES_THINGS = ["person", "rider", "car", "truck", "bus", "train", "motorcycle", "bicycle"]
 """Classes with instances, in the order of their ids: Cordts et al., CVPR 2016, table 1."""

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from pycocotools import mask as coco_mask
 
+from gen_data.core.sample import Relation, Sample
 from gen_data.exporters.coco import Coco
 from gen_data.exporters.label_map import AppliedLabelMap, LabelMap
 from gen_data.exporters.language import LanguageJsonl
-from gen_data.generator.core.sample import Relation, Sample
 from tests.exporters.test_birdseye import lines
 
 # pycocotools' decoder predates numpy 2's __array__(copy=...).

@@ -19,13 +19,13 @@ import pyarrow.parquet
 import pytest
 from PIL import Image
 
+from gen_data.assemble.config import load_config
+from gen_data.assemble.pipeline_factory import PipelineFactory
+from gen_data.core.errors import ConfigError
+from gen_data.core.scene import ArmGoal
 from gen_data.exporters import lerobot_files
 from gen_data.exporters.lerobot import LeRobot, task_sentence
 from gen_data.exporters.lerobot_statistics import image_sums
-from gen_data.generator.assemble.config import load_config
-from gen_data.generator.assemble.pipeline_factory import PipelineFactory
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.scene import ArmGoal
 from tests.exporters.drives import drive_info
 
 

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from PIL import Image
 
+from gen_data.core.sample import MaskPx
 from gen_data.exporters.mask_png import adler32_of_runs, encode_mask
-from gen_data.generator.core.sample import MaskPx
 
 
 def decoded(png: bytes) -> np.ndarray:

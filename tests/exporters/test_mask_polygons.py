@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw
 from pycocotools import mask as coco_mask
 
+from gen_data.core.sample import MaskPx
 from gen_data.exporters.mask_polygons import drawable_polygons, join_polygons, mask_polygons
-from gen_data.generator.core.sample import MaskPx
 
 # pycocotools' decoder predates numpy 2's __array__(copy=...).
 pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")

@@ -16,11 +16,11 @@ from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 from PIL import Image
 
+from gen_data.core import optional_packages
+from gen_data.core.capture import POINT
+from gen_data.core.errors import ConfigError
+from gen_data.core.se3 import SE3
 from gen_data.exporters.mcap import START_NS, Mcap, point_fields
-from gen_data.generator.core import optional_packages
-from gen_data.generator.core.capture import POINT
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.se3 import SE3
 from tests.exporters.drives import drive_info
 
 STEP_NS = 100_000_000

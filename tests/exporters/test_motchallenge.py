@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
+from gen_data.core.errors import ConfigError
 from gen_data.exporters.motchallenge import MotChallenge, mot_class
-from gen_data.generator.core.errors import ConfigError
 from tests.exporters.drives import stems
 
 

@@ -12,6 +12,13 @@ import cv2
 import numpy as np
 import pytest
 
+from gen_data.core.asset_types import SURFACES
+from gen_data.core.capture import POINT
+from gen_data.core.errors import ConfigError
+from gen_data.core.measurement_dtypes import table_rows
+from gen_data.core.motion import Trajectory, Twist
+from gen_data.core.scene import Body, Lane, ObjectGroup, Scene
+from gen_data.core.se3 import SE3
 from gen_data.exporters.nuscenes import NuScenes
 from gen_data.exporters.nuscenes_classes import attribute_of, category_of, classes
 from gen_data.exporters.nuscenes_files import (
@@ -23,13 +30,6 @@ from gen_data.exporters.nuscenes_files import (
     radar_bytes,
 )
 from gen_data.exporters.nuscenes_frames import annotated_things, views_by_instance, visibility_level
-from gen_data.generator.core.asset_types import SURFACES
-from gen_data.generator.core.capture import POINT
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.measurement_dtypes import table_rows
-from gen_data.generator.core.motion import Trajectory, Twist
-from gen_data.generator.core.scene import Body, Lane, ObjectGroup, Scene
-from gen_data.generator.core.se3 import SE3
 from tests.exporters.drives import drive_info
 
 ORIGIN_M = (50.0, 50.0, 0.0)

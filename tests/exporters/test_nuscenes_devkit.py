@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from gen_data.core.capture import Capture, Measurements
+from gen_data.core.measurement_dtypes import table_rows
+from gen_data.core.scene import Device
+from gen_data.core.scene_time import place_sensors
+from gen_data.core.se3 import SE3
 from gen_data.exporters.nuscenes import NuScenes
-from gen_data.generator.core.capture import Capture, Measurements
-from gen_data.generator.core.measurement_dtypes import table_rows
-from gen_data.generator.core.scene import Device
-from gen_data.generator.core.scene_time import place_sensors
-from gen_data.generator.core.se3 import SE3
 from tests.exporters import nuscenes_devkit as checks
 from tests.exporters.nuscenes_devkit import find_faults, open_devkit
 

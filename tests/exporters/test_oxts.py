@@ -12,6 +12,11 @@ import numpy as np
 import pytest
 from scipy.special import fresnel
 
+from gen_data.core.errors import ConfigError
+from gen_data.core.motion import STILL, Twist
+from gen_data.core.scene import Device
+from gen_data.core.scene_time import scene_at
+from gen_data.core.se3 import SE3
 from gen_data.exporters.kitti_raw import KittiRaw
 from gen_data.exporters.oxts import (
     GRAVITY_M_S2,
@@ -22,11 +27,6 @@ from gen_data.exporters.oxts import (
     roll_pitch_yaw,
 )
 from gen_data.exporters.sequences import Mount
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.motion import STILL, Twist
-from gen_data.generator.core.scene import Device
-from gen_data.generator.core.scene_time import scene_at
-from gen_data.generator.core.se3 import SE3
 from tests.exporters.drives import DRIVE
 from tests.sensors.streetcar import world as driving
 

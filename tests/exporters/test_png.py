@@ -12,10 +12,10 @@ import pytest
 from numpy.typing import NDArray
 from PIL import Image
 
+from gen_data.core.boxes import tight_box
 from gen_data.exporters.label_png import encode_label_png
 from gen_data.exporters.label_regions import find_regions
 from gen_data.exporters.png import SIGNATURE, RowFilter, decode_png, encode_png
-from gen_data.generator.core.boxes import tight_box
 
 
 def noise(shape: tuple[int, ...], dtype: Any) -> NDArray[Any]:

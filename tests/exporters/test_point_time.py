@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from gen_data.core.capture import Capture, PointCloud
+from gen_data.core.scene_time import scene_at
+from gen_data.core.se3 import SE3
 from gen_data.exporters.mcap import Mcap
 from gen_data.exporters.pointclouds import PointClouds
-from gen_data.generator.core.capture import Capture, PointCloud
-from gen_data.generator.core.scene_time import scene_at
-from gen_data.generator.core.se3 import SE3
 from tests.exporters.conftest import driving_scene, ego_pose, scan
 from tests.exporters.drives import drive_info
 

@@ -10,17 +10,13 @@ import numpy as np
 import pytest
 from scipy.ndimage import maximum_filter, minimum_filter
 
+from gen_data.annotations.annotate import Thresholds
+from gen_data.core.capture import Channel
+from gen_data.core.errors import ConfigError
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.lens import Lens
 from gen_data.exporters.base import Rectify
-from gen_data.generator.annotations.annotate import Thresholds
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.lens import Lens
-from gen_data.generator.pipeline.rectification import (
-    Rectification,
-    rectified_intrinsics,
-    rectified_truth,
-)
+from gen_data.pipeline.rectification import Rectification, rectified_intrinsics, rectified_truth
 from tests.exporters import conftest
 from tests.exporters.bent import LENSES, bent_samples, opencv_maps, opencv_matrix
 

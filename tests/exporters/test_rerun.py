@@ -14,11 +14,11 @@ import pytest
 import rerun as rr
 import rerun.chunk
 
+from gen_data.core.capture import Channel
+from gen_data.core.errors import StorageError
+from gen_data.core.interfaces import media_path
 from gen_data.exporters.rerun import Rerun
 from gen_data.exporters.rrd_container import write_recording, xxh32
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.errors import StorageError
-from gen_data.generator.core.interfaces import media_path
 
 CLI = (
     sys.executable,

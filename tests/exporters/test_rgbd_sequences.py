@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from gen_data.core.capture import Channel
+from gen_data.core.errors import ConfigError
+from gen_data.core.sample import Sample
 from gen_data.exporters.scannet import ScanNet
 from gen_data.exporters.tum_rgbd import TumRgbd
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.sample import Sample
 from tests.exporters.drives import drive_info
 
 NYU40 = {"pedestrian": 31, "crate": 29, "car": 0}

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from pycocotools import mask as coco_mask
 
+from gen_data.core.boxes import tight_box
+from gen_data.core.sample import MaskPx
 from gen_data.exporters.rle import encode_rle, run_lengths
-from gen_data.generator.core.boxes import tight_box
-from gen_data.generator.core.sample import MaskPx
 
 # pycocotools' decoder predates numpy 2's __array__(copy=...).
 pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")

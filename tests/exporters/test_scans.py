@@ -12,6 +12,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from gen_data.core.asset_types import SURFACES
+from gen_data.core.capture import POINT
+from gen_data.core.errors import ConfigError, StorageError
+from gen_data.core.motion import Twist
 from gen_data.exporters.kitti import (
     Kitti,
     label_rows,
@@ -25,10 +29,6 @@ from gen_data.exporters.point_cloud_io import read_points
 from gen_data.exporters.pointclouds import PointClouds
 from gen_data.exporters.semantickitti import SemanticKitti
 from gen_data.exporters.semantickitti import point_labels as semantic_labels
-from gen_data.generator.core.asset_types import SURFACES
-from gen_data.generator.core.capture import POINT
-from gen_data.generator.core.errors import ConfigError, StorageError
-from gen_data.generator.core.motion import Twist
 from tests.wheels import needs_open3d
 
 POINT_FIELDS = [

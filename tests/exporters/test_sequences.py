@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from gen_data.core.errors import ConfigError
 from gen_data.exporters.coco import Coco
 from gen_data.exporters.kitti import Kitti
 from gen_data.exporters.kitti_raw import KittiRaw
@@ -15,7 +16,6 @@ from gen_data.exporters.kitti_tracking import KittiTracking
 from gen_data.exporters.motchallenge import MotChallenge
 from gen_data.exporters.pointclouds import PointClouds
 from gen_data.exporters.semantickitti import SemanticKitti
-from gen_data.generator.core.errors import ConfigError
 from tests.exporters.drives import DRIVE, drive_info, stems
 
 

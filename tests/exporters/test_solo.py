@@ -15,9 +15,9 @@ import pytest
 from PIL import Image
 from scipy.spatial.transform import Rotation
 
+from gen_data.core.errors import ConfigError
 from gen_data.exporters.id_colors import id_color, id_colors
 from gen_data.exporters.solo import Solo
-from gen_data.generator.core.errors import ConfigError
 
 SIGNS = np.stack(np.meshgrid([-1, 1], [-1, 1], [-1, 1]), -1).reshape(-1, 3)
 

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from gen_data.core.errors import ConfigError, StorageError
+from gen_data.core.interfaces import Modality, SensorInfo, table_path
+from gen_data.core.measurement_dtypes import TABLE_COLUMNS
 from gen_data.exporters.image_files import write_media
 from gen_data.exporters.measurement_tables import Tables, read_rows
-from gen_data.generator.core.errors import ConfigError, StorageError
-from gen_data.generator.core.interfaces import Modality, SensorInfo, table_path
-from gen_data.generator.core.measurement_dtypes import TABLE_COLUMNS
 
 IMU = SensorInfo("imu", Modality.DEVICE, "imu", columns=TABLE_COLUMNS["imu"])
 

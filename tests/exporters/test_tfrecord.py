@@ -16,12 +16,12 @@ import pytest
 from PIL import Image
 from tfrecord.reader import tfrecord_iterator
 
+from gen_data.core import optional_packages
+from gen_data.core.capture import Channel, ImageEncoding
+from gen_data.core.errors import ConfigError
 from gen_data.exporters import tfrecord
 from gen_data.exporters.label_map import LabelMap, MappedExporter
 from gen_data.exporters.tfrecord import TfRecord, encode_features, frame_record, label_map
-from gen_data.generator.core import optional_packages
-from gen_data.generator.core.capture import Channel, ImageEncoding
-from gen_data.generator.core.errors import ConfigError
 
 
 @pytest.fixture(scope="module")

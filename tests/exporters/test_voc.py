@@ -14,11 +14,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from gen_data.core.errors import ConfigError
 from gen_data.exporters.coco import Coco
 from gen_data.exporters.label_colors import voc_palette
 from gen_data.exporters.label_map import LabelMap, MappedExporter
 from gen_data.exporters.voc import YEAR, Voc
-from gen_data.generator.core.errors import ConfigError
 
 
 @pytest.fixture(scope="module")

@@ -19,10 +19,10 @@ import webdataset
 from numpy.typing import NDArray
 from pycocotools import mask as coco_mask
 
+from gen_data.core.capture import POINT
+from gen_data.core.errors import ConfigError
 from gen_data.exporters.label_map import LabelMap, MappedExporter
 from gen_data.exporters.webdataset import WebDataset
-from gen_data.generator.core.capture import POINT
-from gen_data.generator.core.errors import ConfigError
 
 # pycocotools' decoder predates numpy 2's __array__(copy=...).
 pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")

@@ -16,10 +16,10 @@ import yaml
 from PIL import Image
 from pycocotools import mask as coco_mask
 
+from gen_data.core.errors import ConfigError
+from gen_data.core.se3 import SE3
 from gen_data.exporters.coco import Coco
 from gen_data.exporters.yolo import Yolo, inner_rectangle
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.se3 import SE3
 from tests.exporters.coco_masks import drawn_mask
 
 # pycocotools' decoder predates numpy 2's __array__(copy=...).

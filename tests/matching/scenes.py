@@ -13,15 +13,15 @@ from typing import Any
 import cv2
 import numpy as np
 
-from gen_data.generator.core.asset_types import Float32
-from gen_data.generator.core.capture import LidarHits
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.scene import Camera, Lidar, Scene, Weather
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.core.streams import Streams
-from gen_data.generator.matching.simulation import Exposure, Illumination
-from gen_data.generator.sensors.camera.image_pipeline import ImagePipeline
-from gen_data.generator.sensors.lidar.lidar_sensor import LidarSensor
+from gen_data.core.asset_types import Float32
+from gen_data.core.capture import LidarHits
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.scene import Camera, Lidar, Scene, Weather
+from gen_data.core.se3 import SE3
+from gen_data.core.streams import Streams
+from gen_data.lab.matching.simulation import Exposure, Illumination
+from gen_data.sensors.camera.image_pipeline import ImagePipeline
+from gen_data.sensors.lidar.lidar_sensor import LidarSensor
 
 WIDTH_PX, HEIGHT_PX, FINER = 320, 240, 4
 CAMERA = Camera("color", SE3(), Intrinsics.from_hfov(WIDTH_PX, HEIGHT_PX, math.radians(60.0)))

@@ -6,10 +6,10 @@ from typing import Any
 
 import pytest
 
-from gen_data.generator.assemble.config import parse_config
-from gen_data.generator.matching.quantities import box_positions, box_sizes
-from gen_data.generator.matching.quantities.base import FieldChange, NoParameter, map_numbers
-from gen_data.generator.matching.recordings import ImageLabels
+from gen_data.assemble.config import parse_config
+from gen_data.lab.matching.quantities import box_positions, box_sizes
+from gen_data.lab.matching.quantities.base import FieldChange, NoParameter, map_numbers
+from gen_data.lab.matching.recordings import ImageLabels
 
 TABLETOP = """\
 template: tabletop

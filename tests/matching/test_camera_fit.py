@@ -7,14 +7,14 @@ import math
 import numpy as np
 import pytest
 
-from gen_data.generator.config.distributions import Constant
-from gen_data.generator.matching.camera_fit import fit_camera, measure_photo
-from gen_data.generator.matching.picture import Picture
-from gen_data.generator.matching.quantities import blur, exposure, jpeg_quality, noise
-from gen_data.generator.matching.recordings import Photo
-from gen_data.generator.matching.results import FittedQuantity, Part
-from gen_data.generator.matching.simulation import photograph
-from gen_data.generator.sensors.camera.image_pipeline import ImagePipeline
+from gen_data.config.distributions import Constant
+from gen_data.lab.matching.camera_fit import fit_camera, measure_photo
+from gen_data.lab.matching.picture import Picture
+from gen_data.lab.matching.quantities import blur, exposure, jpeg_quality, noise
+from gen_data.lab.matching.recordings import Photo
+from gen_data.lab.matching.results import FittedQuantity, Part
+from gen_data.lab.matching.simulation import photograph
+from gen_data.sensors.camera.image_pipeline import ImagePipeline
 from tests.matching.scenes import exposures
 
 BASE = ImagePipeline.model_validate({"preset": "industrial", "focus": None})

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from gen_data.generator.core.se3 import Array
-from gen_data.generator.matching.indirect_inference import (
+from gen_data.core.se3 import Array
+from gen_data.lab.matching.indirect_inference import (
     Axis,
     direct_estimate,
     estimate,

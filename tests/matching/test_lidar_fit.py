@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from gen_data.generator.matching.lidar_fit import fit_lidar
-from gen_data.generator.matching.results import Part
-from gen_data.generator.matching.simulation import rescan
-from gen_data.generator.sensors.lidar.scan_pattern import LidarModel
+from gen_data.lab.matching.lidar_fit import fit_lidar
+from gen_data.lab.matching.results import Part
+from gen_data.lab.matching.simulation import rescan
+from gen_data.sensors.lidar.scan_pattern import LidarModel
 from tests.matching.scenes import RESPONSE, illuminations, scanner
 
 TRUTH = scanner(

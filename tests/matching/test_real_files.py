@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from gen_data.core.capture import POINT
+from gen_data.core.errors import StorageError
 from gen_data.exporters.pointclouds import file_points, pcd_bytes, ply_bytes
-from gen_data.generator.core.capture import POINT
-from gen_data.generator.core.errors import StorageError
-from gen_data.generator.matching.inventory_table import inventory_rows
-from gen_data.generator.matching.point_files import read_point_file
-from gen_data.generator.matching.real_files import (
+from gen_data.lab.matching.inventory_table import inventory_rows
+from gen_data.lab.matching.point_files import read_point_file
+from gen_data.lab.matching.real_files import (
     Inventory,
     choose_evenly,
     find_files,

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from gen_data.generator.core.errors import AssetError
-from gen_data.generator.packs.archives import Limits, extract
+from gen_data.core.errors import AssetError
+from gen_data.packs.archives import Limits, extract
 
 Maker = Callable[[Path, dict[str, bytes]], Path]
 CONTENT = {"data/a.txt": b"alpha", "data/sub/b.txt": b"beta", "code/evil.py": b"print()"}

@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gen_data.generator.assemble.config import load_config
-from gen_data.generator.assemble.pipeline_factory import open_pipeline
-from gen_data.generator.assets.library import Library, open_library
-from gen_data.generator.core.asset_types import RobotModel
-from gen_data.generator.core.errors import AssetError
-from gen_data.generator.core.kinematics import link_poses
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.packs import example_robot_data
+from gen_data.assemble.config import load_config
+from gen_data.assemble.pipeline_factory import open_pipeline
+from gen_data.assets.library import Library, open_library
+from gen_data.content.packs import example_robot_data
+from gen_data.core.asset_types import RobotModel
+from gen_data.core.errors import AssetError
+from gen_data.core.kinematics import link_poses
+from gen_data.core.se3 import SE3
 from tests.people.bodies import VARIABLE
 
 PACKS = Path(os.environ.get(VARIABLE, "missing"), "packs")

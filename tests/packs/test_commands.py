@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from gen_data.generator.cli.main import cli
-from gen_data.generator.core.errors import AssetError
+from gen_data.cli.main import cli
+from gen_data.core.errors import AssetError
 from tests.end_to_end import running
 
 
@@ -85,7 +85,7 @@ def test_errors_have_one_message_and_their_exit_code(
 def test_help_imports_nothing_heavy(tmp_path: Path) -> None:
     """``--help`` must be fast: neither numpy nor pydantic is loaded."""
     code = (
-        "import sys; from gen_data.generator.cli.main import cli;"
+        "import sys; from gen_data.cli.main import cli;"
         "cli.main(['--help'], standalone_mode=False);"
         "sys.exit(any(name in sys.modules for name in ('numpy', 'pydantic', 'yaml')))"
     )

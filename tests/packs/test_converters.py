@@ -11,14 +11,11 @@ import cv2
 import numpy as np
 import pytest
 
-from gen_data.generator.assets.image_decoding import decode_radiance
-from gen_data.generator.assets.installed_packs import TAG
-from gen_data.generator.assets.library import open_library
-from gen_data.generator.core.errors import AssetError
-from gen_data.generator.core.kinematics import link_poses
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.packs import panoramas, robosuite, sweethome3d
-from gen_data.generator.packs.sweethome3d import (
+from gen_data.assets.image_decoding import decode_radiance
+from gen_data.assets.installed_packs import TAG
+from gen_data.assets.library import open_library
+from gen_data.content.packs import panoramas, robosuite, sweethome3d
+from gen_data.content.packs.sweethome3d import (
     Group,
     Lamp,
     Model,
@@ -26,6 +23,9 @@ from gen_data.generator.packs.sweethome3d import (
     mesh_entry,
     read_selection,
 )
+from gen_data.core.errors import AssetError
+from gen_data.core.kinematics import link_poses
+from gen_data.core.se3 import SE3
 from tests.packs.converters import BOX
 
 FACTS = """
@@ -301,7 +301,7 @@ def test_gimbal_lock_keeps_the_rotation(tmp_path: Path) -> None:
     """A quarter turn about Y has no unique roll and yaw, but one rotation."""
     from xml.etree.ElementTree import Element
 
-    from gen_data.generator.packs.mjcf import _add_origin
+    from gen_data.content.packs.mjcf import _add_origin
 
     for w, x, y, z in ((1, 0, 1, 0), (1, 0, -1, 0), (0.5, 0.5, 0.5, 0.5), (1, 2, 3, 4)):
         element = Element("visual")

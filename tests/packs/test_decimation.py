@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from gen_data.generator.assets.mesh_decimation import decimate
-from gen_data.generator.assets.triangle_soup import MaterialSlot, TriangleSoup
-from gen_data.generator.core.asset_types import Material
+from gen_data.assets.mesh_decimation import decimate
+from gen_data.assets.triangle_soup import MaterialSlot, TriangleSoup
+from gen_data.core.asset_types import Material
 
 
 def sheet(n: int, textured: bool) -> TriangleSoup:

@@ -8,13 +8,13 @@ from pathlib import Path
 
 import pytest
 
-from gen_data.generator.assemble.config import load_config
-from gen_data.generator.assemble.pipeline_factory import PipelineFactory
-from gen_data.generator.assets.paths import packs_dir
-from gen_data.generator.packs.install import install
-from gen_data.generator.packs.pack_table import Pack
-from gen_data.generator.runner.identity import format_licences, make_plan
-from gen_data.generator.runner.plan import compare_plans
+from gen_data.assemble.config import load_config
+from gen_data.assemble.pipeline_factory import PipelineFactory
+from gen_data.assets.paths import packs_dir
+from gen_data.packs.install import install
+from gen_data.packs.pack_table import Pack
+from gen_data.runner.identity import format_licences, make_plan
+from gen_data.runner.plan import compare_plans
 from tests.packs.converters import BOX
 
 

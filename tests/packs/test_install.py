@@ -13,11 +13,11 @@ from pathlib import Path
 
 import pytest
 
-from gen_data.generator.assets.installed_packs import installed_packs
-from gen_data.generator.assets.library import Library, open_library
-from gen_data.generator.core.errors import AssetError, StorageError, VerificationError
-from gen_data.generator.packs.install import install, is_installed, remove, verify
-from gen_data.generator.packs.pack_table import PACKS, ClientName, Pack, find_pack
+from gen_data.assets.installed_packs import installed_packs
+from gen_data.assets.library import Library, open_library
+from gen_data.core.errors import AssetError, StorageError, VerificationError
+from gen_data.packs.install import install, is_installed, remove, verify
+from gen_data.packs.pack_table import PACKS, ClientName, Pack, find_pack
 from tests.packs.converters import BOX
 
 

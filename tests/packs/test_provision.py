@@ -10,12 +10,12 @@ from pathlib import Path
 
 import pytest
 
-from gen_data.generator.assemble.config import load_config
-from gen_data.generator.assemble.pipeline_factory import PipelineFactory
-from gen_data.generator.assets.library import open_library
-from gen_data.generator.core.errors import AssetError
-from gen_data.generator.packs import pack_table
-from gen_data.generator.packs.provision import open_assets, provide_pybullet
+from gen_data.assemble.config import load_config
+from gen_data.assemble.pipeline_factory import PipelineFactory
+from gen_data.assets.library import open_library
+from gen_data.core.errors import AssetError
+from gen_data.packs import pack_table
+from gen_data.packs.provision import open_assets, provide_pybullet
 from tests.end_to_end.running import ROOT
 from tests.packs.test_pybullet_pack import KINDS, pack_wheel, without_pybullet
 
@@ -154,7 +154,7 @@ def test_programs_open_the_library_that_provides_them() -> None:
     """``open_assets``; only ``assets check`` and ``install`` work on what is there already."""
     opened = {
         path.relative_to(ROOT).as_posix()
-        for folder in ("generator", "exporters", "randomizers", "scene_templates")
+        for folder in ("generator", "content", "lab", "randomizers", "exporters", "scene_templates")
         for path in (ROOT / folder).rglob("*.py")
         if "open_library(" in path.read_text("utf-8")
     }

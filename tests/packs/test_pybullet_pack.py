@@ -12,12 +12,12 @@ from pathlib import Path
 import pybullet_data
 import pytest
 
-from gen_data.generator.assemble.config import load_config
-from gen_data.generator.assemble.pipeline_factory import PipelineFactory
-from gen_data.generator.assets.library import Library, open_library
-from gen_data.generator.core.errors import UnknownAsset
-from gen_data.generator.packs.install import install
-from gen_data.generator.packs.pack_table import find_pack
+from gen_data.assemble.config import load_config
+from gen_data.assemble.pipeline_factory import PipelineFactory
+from gen_data.assets.library import Library, open_library
+from gen_data.core.errors import UnknownAsset
+from gen_data.packs.install import install
+from gen_data.packs.pack_table import find_pack
 
 KINDS = ("colors16.png", "franka_panda", "lego", "soccerball", "teddy")
 

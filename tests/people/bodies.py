@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from gen_data.generator.assets.people.analytic_body import simple_body
-from gen_data.generator.assets.people.body import BodyTemplate, load
-from gen_data.generator.assets.people.person_mesh import pack_file
+from gen_data.content.people.analytic_body import simple_body
+from gen_data.content.people.body import BodyTemplate, load
+from gen_data.content.people.person_mesh import pack_file
 
 VARIABLE = "GEN_DATA_TEST_ASSETS"
 """Names a folder with the people pack, installed for these tests alone:

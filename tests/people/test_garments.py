@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gen_data.generator.assets.people.analytic_body import simple_body
-from gen_data.generator.assets.people.garment_layout import (
+from gen_data.content.people.analytic_body import simple_body
+from gen_data.content.people.garment_layout import (
     BACK_M,
     FRONT_M,
     LIMB_M,
@@ -14,10 +14,10 @@ from gen_data.generator.assets.people.garment_layout import (
     TILE_M,
     lay_out,
 )
-from gen_data.generator.assets.people.garment_textures import hi_vis, printed_jersey
-from gen_data.generator.assets.people.person import draw_person
-from gen_data.generator.assets.people.person_mesh import simple_person
-from gen_data.generator.core.asset_types import Material
+from gen_data.content.people.garment_textures import hi_vis, printed_jersey
+from gen_data.content.people.person import draw_person
+from gen_data.content.people.person_mesh import simple_person
+from gen_data.core.asset_types import Material
 
 SIZE_PX = 512
 

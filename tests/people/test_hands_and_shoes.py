@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gen_data.generator.assets.people.body import Array
-from gen_data.generator.assets.people.person import draw_person
-from gen_data.generator.assets.people.person_mesh import build_person, dress_person
-from gen_data.generator.assets.people.posing import bone_rotations, bone_transforms, stance
-from gen_data.generator.assets.people.shoe_textures import DESIGNS, lay_out_shoes, shoe
-from gen_data.generator.core.colorimetry import srgb_decode
+from gen_data.content.people.body import Array
+from gen_data.content.people.person import draw_person
+from gen_data.content.people.person_mesh import build_person, dress_person
+from gen_data.content.people.posing import bone_rotations, bone_transforms, stance
+from gen_data.content.people.shoe_textures import DESIGNS, lay_out_shoes, shoe
+from gen_data.core.colorimetry import srgb_decode
 from tests.people.bodies import NEEDS_PACK, body_of
 
 FINGERS = ("index", "middle", "ring", "pinky")

@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gen_data.generator.assets.people.analytic_body import simple_body
-from gen_data.generator.assets.people.carried_things import Sheet, make_things
-from gen_data.generator.assets.people.edges import border_edges, calm
-from gen_data.generator.assets.people.face_textures import EYES, FACES, eyes, face
-from gen_data.generator.assets.people.head_layout import lay_out_eyes, lay_out_head
-from gen_data.generator.assets.people.person import draw_person
-from gen_data.generator.assets.people.person_mesh import build_person, dress_person
-from gen_data.generator.assets.procedural.material_presets import hex_to_srgb8
-from gen_data.generator.core.asset_types import MeshData, TextureData
+from gen_data.content.people.analytic_body import simple_body
+from gen_data.content.people.carried_things import Sheet, make_things
+from gen_data.content.people.edges import border_edges, calm
+from gen_data.content.people.face_textures import EYES, FACES, eyes, face
+from gen_data.content.people.head_layout import lay_out_eyes, lay_out_head
+from gen_data.content.people.person import draw_person
+from gen_data.content.people.person_mesh import build_person, dress_person
+from gen_data.content.procedural.material_presets import hex_to_srgb8
+from gen_data.core.asset_types import MeshData, TextureData
 
 
 def texel(texture: TextureData, uv: np.ndarray) -> np.ndarray:
@@ -161,6 +161,6 @@ def test_an_open_umbrella_has_eight_ribs_with_struts() -> None:
         return made
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("gen_data.generator.assets.people.person_mesh.make_things", kept)
+        patch.setattr("gen_data.content.people.person_mesh.make_things", kept)
         build_person(person, figure)
     assert sum(len(sheet.faces) == 6 for sheet in made) == 3 * 8

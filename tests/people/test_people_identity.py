@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gen_data.generator.assets import people
-from gen_data.generator.assets.library import open_library
-from gen_data.generator.assets.paths import packs_dir
-from gen_data.generator.assets.people.body import load
-from gen_data.generator.assets.people.convert import convert
-from gen_data.generator.assets.people.person import draw_person, facts
-from gen_data.generator.core.errors import AssetError
+from gen_data.assets.library import open_library
+from gen_data.assets.paths import packs_dir
+from gen_data.content import people
+from gen_data.content.people.body import load
+from gen_data.content.people.convert import convert
+from gen_data.content.people.person import draw_person, facts
+from gen_data.core.errors import AssetError
 
 
 def test_grown_people_are_from_145_to_200_cm_and_about_as_tall_as_the_population() -> None:

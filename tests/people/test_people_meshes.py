@@ -7,11 +7,11 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from gen_data.generator.assets.family import Solid
-from gen_data.generator.assets.people.person import Person, draw_person
-from gen_data.generator.assets.people.person_mesh import build_person, dress_person, simple_person
-from gen_data.generator.assets.people.posing import HELD
-from gen_data.generator.core.asset_types import MeshData
+from gen_data.assets.family import Solid
+from gen_data.content.people.person import Person, draw_person
+from gen_data.content.people.person_mesh import build_person, dress_person, simple_person
+from gen_data.content.people.posing import HELD
+from gen_data.core.asset_types import MeshData
 from tests.people.bodies import KINDS, body_of
 
 # https://cocodataset.org/#keypoints-2020, in the order of its annotation files.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from gen_data.generator.assets.library import open_library
+from gen_data.assets.library import open_library
 
 
 def test_people_that_are_offered_are_kept_and_other_poses_are_not(tmp_path: Path) -> None:

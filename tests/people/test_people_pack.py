@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gen_data.generator.assets.people.analytic_body import simple_body
-from gen_data.generator.assets.people.body import DELTA_M, FILE, load
-from gen_data.generator.assets.people.convert import FACES, convert
-from gen_data.generator.assets.people.person import draw_person
-from gen_data.generator.assets.people.person_mesh import build_person, dress_person
+from gen_data.content.people.analytic_body import simple_body
+from gen_data.content.people.body import DELTA_M, FILE, load
+from gen_data.content.people.convert import FACES, convert
+from gen_data.content.people.person import draw_person
+from gen_data.content.people.person_mesh import build_person, dress_person
 
 # Which zones of the body from formulas stand in for the groups of the pack's base mesh.
 GROUPS = {

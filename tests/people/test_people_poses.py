@@ -8,8 +8,8 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from gen_data.generator.assets.people.person import draw_person
-from gen_data.generator.assets.people.posing import (
+from gen_data.content.people.person import draw_person
+from gen_data.content.people.posing import (
     BEHAVIOURS,
     MOVING_POSES,
     PHASES,

@@ -6,8 +6,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from gen_data.generator.assets.people.carried_things import _strap
-from gen_data.generator.core.asset_types import Material
+from gen_data.content.people.carried_things import _strap
+from gen_data.core.asset_types import Material
 
 
 def test_a_strap_lies_on_the_clothes_and_never_below_them() -> None:

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 
 import pytest
 
-from gen_data.generator.physics import PhysicsConfig
-from gen_data.generator.physics.engine import Engine
-from gen_data.generator.physics.physics_config import EngineName
+from gen_data.physics import PhysicsConfig
+from gen_data.physics.engine import Engine
+from gen_data.physics.physics_config import EngineName
 from tests.physics.doubles import Solids
 from tests.wheels import INSTALLED
 

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from gen_data.generator.core.asset_types import ConvexParts, Joint, RobotModel
-from gen_data.generator.core.errors import AssetError
-from gen_data.generator.core.scene import Body, ObjectGroup, Scene, SupportSurface
-from gen_data.generator.core.se3 import SE3
+from gen_data.core.asset_types import ConvexParts, Joint, RobotModel
+from gen_data.core.errors import AssetError
+from gen_data.core.scene import Body, ObjectGroup, Scene, SupportSurface
+from gen_data.core.se3 import SE3
 from tests.physics.panda import mesh_vertices, panda
 
 TABLE_TOP_Z_M = 0.75

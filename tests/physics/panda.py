@@ -10,8 +10,8 @@ from xml.etree import ElementTree
 import numpy as np
 import pybullet_data
 
-from gen_data.generator.core.asset_types import Gripper, Joint, RobotModel
-from gen_data.generator.core.se3 import SE3, multiply_quaternions
+from gen_data.core.asset_types import Gripper, Joint, RobotModel
+from gen_data.core.se3 import SE3, multiply_quaternions
 
 HOME = (0.0, -0.4, 0.0, -2.2, 0.0, 1.9, 0.785398, 0.04, 0.04)
 HAND, GRASP = "panda_hand", "panda_grasptarget"

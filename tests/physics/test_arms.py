@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gen_data.generator.core.kinematics import link_poses
-from gen_data.generator.core.scene import ArmGoal, Articulation, Body, Instance, Scene
-from gen_data.generator.core.se3 import IDENTITY, SE3, multiply_quaternions
-from gen_data.generator.physics.engine import Engine
+from gen_data.core.kinematics import link_poses
+from gen_data.core.scene import ArmGoal, Articulation, Body, Instance, Scene
+from gen_data.core.se3 import IDENTITY, SE3, multiply_quaternions
+from gen_data.physics.engine import Engine
 from tests.physics.doubles import TABLE_TOP_Z_M, table_scene, thing, world_vertices
 from tests.physics.panda import HOME, panda
 

@@ -10,22 +10,22 @@ import numpy as np
 import pytest
 import trimesh
 
-from gen_data.generator.core.asset_types import ConvexParts
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.physics import PhysicsConfig, open_engine
-from gen_data.generator.physics.collision_shapes import collision_shape
-from gen_data.generator.runner.resident_memory import release_memory, resident_bytes
+from gen_data.core.asset_types import ConvexParts
+from gen_data.core.se3 import SE3
+from gen_data.physics import PhysicsConfig, open_engine
+from gen_data.physics.collision_shapes import collision_shape
+from gen_data.runner.resident_memory import release_memory, resident_bytes
 from tests.physics.doubles import Solids, table_scene, thing
 
 pytest.importorskip("pybullet")
 
-from gen_data.generator.physics.bullet_world import BulletWorld
+from gen_data.physics.bullet_world import BulletWorld
 
 
 def test_a_world_that_is_never_closed_leaves_no_folder(tmp_path: Path) -> None:
     """A program may end, or forget a data set, without closing it."""
     code = (
-        "from gen_data.generator.physics.bullet_world import BulletWorld\n"
+        "from gen_data.physics.bullet_world import BulletWorld\n"
         "import os\n"
         "world = BulletWorld(1 / 240, 50)\n"
         "print(len(os.listdir(os.environ['TMPDIR'])))\n"
@@ -56,7 +56,7 @@ def test_shapes_at_new_scales_take_neither_memory_nor_disk() -> None:
 
     world = BulletWorld(1 / 240, 10)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("gen_data.generator.physics.bullet_world._HULL_FILES", 20)
+        patch.setattr("gen_data.physics.bullet_world._HULL_FILES", 20)
         for step in range(-230, -200):
             files_after_a_fall(step)
         release_memory()

@@ -8,23 +8,15 @@ from functools import cache
 
 import pytest
 
-from gen_data.generator.core.scene import (
-    ArmGoal,
-    Assignment,
-    Body,
-    BodyJoint,
-    Condition,
-    FailureKind,
-    Scene,
-)
-from gen_data.generator.core.scene_time import scene_at
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.physics import PhysicsConfig
-from gen_data.generator.physics.collision_shapes import collision_shape
-from gen_data.generator.physics.engine import Engine
-from gen_data.generator.physics.open_world import open_world
-from gen_data.generator.physics.physics_config import EngineName
-from gen_data.generator.physics.world import joint_position, jointed_pose
+from gen_data.core.scene import ArmGoal, Assignment, Body, BodyJoint, Condition, FailureKind, Scene
+from gen_data.core.scene_time import scene_at
+from gen_data.core.se3 import SE3
+from gen_data.physics import PhysicsConfig
+from gen_data.physics.collision_shapes import collision_shape
+from gen_data.physics.engine import Engine
+from gen_data.physics.open_world import open_world
+from gen_data.physics.physics_config import EngineName
+from gen_data.physics.world import joint_position, jointed_pose
 from tests.physics.doubles import TABLE_TOP_Z_M, Solids, _parts, table_scene, thing
 from tests.physics.test_arms import above_table
 from tests.physics.test_manipulation_planner import going, spot

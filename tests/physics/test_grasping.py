@@ -8,19 +8,15 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from gen_data.generator.core.asset_types import ConvexParts, Gripper, Joint, RobotModel
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.physics import PhysicsConfig
-from gen_data.generator.physics.collision_shapes import collision_shape
-from gen_data.generator.physics.manipulation.grasping import Hand
-from gen_data.generator.physics.manipulation.joint_trajectories import (
-    Leg,
-    limit_speed,
-    sample_positions,
-)
-from gen_data.generator.physics.open_world import open_world
-from gen_data.generator.physics.physics_config import EngineName
-from gen_data.generator.physics.world import World
+from gen_data.core.asset_types import ConvexParts, Gripper, Joint, RobotModel
+from gen_data.core.se3 import SE3
+from gen_data.physics import PhysicsConfig
+from gen_data.physics.collision_shapes import collision_shape
+from gen_data.physics.manipulation.grasping import Hand
+from gen_data.physics.manipulation.joint_trajectories import Leg, limit_speed, sample_positions
+from gen_data.physics.open_world import open_world
+from gen_data.physics.physics_config import EngineName
+from gen_data.physics.world import World
 from tests.physics.doubles import box, cylinder
 
 STROKE_M = 0.08

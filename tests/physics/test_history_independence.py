@@ -9,15 +9,15 @@ from pathlib import Path
 
 import pytest
 
-from gen_data.generator.core.asset_types import ConvexParts
-from gen_data.generator.core.scene import ArmGoal, Articulation, Scene
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.core.serialization import canonical_json
-from gen_data.generator.physics import PhysicsConfig, open_engine
-from gen_data.generator.physics.collision_shapes import collision_shape
-from gen_data.generator.physics.engine import Engine
-from gen_data.generator.physics.open_world import open_world
-from gen_data.generator.physics.physics_config import EngineName
+from gen_data.core.asset_types import ConvexParts
+from gen_data.core.scene import ArmGoal, Articulation, Scene
+from gen_data.core.se3 import SE3
+from gen_data.core.serialization import canonical_json
+from gen_data.physics import PhysicsConfig, open_engine
+from gen_data.physics.collision_shapes import collision_shape
+from gen_data.physics.engine import Engine
+from gen_data.physics.open_world import open_world
+from gen_data.physics.physics_config import EngineName
 from tests.physics.doubles import TABLE_TOP_Z_M, Solids, box, dropped_clutter, table_scene, thing
 from tests.physics.panda import HOME
 

@@ -7,15 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from gen_data.generator.core.asset_types import Gripper, Joint, RobotModel
-from gen_data.generator.core.kinematics import (
-    all_positions,
-    is_arm_joint,
-    is_within_limits,
-    link_poses,
-)
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.physics.manipulation.inverse_kinematics import Chain, make_chain, solve_all
+from gen_data.core.asset_types import Gripper, Joint, RobotModel
+from gen_data.core.kinematics import all_positions, is_arm_joint, is_within_limits, link_poses
+from gen_data.core.se3 import SE3
+from gen_data.physics.manipulation.inverse_kinematics import Chain, make_chain, solve_all
 from tests.physics.panda import panda
 
 ROBOT = panda()

@@ -8,8 +8,8 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from gen_data.generator.core.asset_types import Gripper, Joint, RobotModel
-from gen_data.generator.core.kinematics import (
+from gen_data.core.asset_types import Gripper, Joint, RobotModel
+from gen_data.core.kinematics import (
     all_positions,
     finger_links,
     gripper_opening,
@@ -20,8 +20,8 @@ from gen_data.generator.core.kinematics import (
     rigid_group,
     round_positions,
 )
-from gen_data.generator.core.scene import Articulation
-from gen_data.generator.core.se3 import SE3
+from gen_data.core.scene import Articulation
+from gen_data.core.se3 import SE3
 from tests.physics.panda import HOME, panda, urdf_path
 
 

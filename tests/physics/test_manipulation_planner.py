@@ -9,14 +9,14 @@ from functools import cache
 import numpy as np
 import pytest
 
-from gen_data.generator.core.kinematics import link_poses
-from gen_data.generator.core.scene import ArmGoal, Body, Scene
-from gen_data.generator.core.scene_time import scene_at
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.physics import PhysicsConfig
-from gen_data.generator.physics.engine import Engine
-from gen_data.generator.physics.manipulation.joint_trajectories import smooth_step, speed_max
-from gen_data.generator.physics.physics_config import EngineName
+from gen_data.core.kinematics import link_poses
+from gen_data.core.scene import ArmGoal, Body, Scene
+from gen_data.core.scene_time import scene_at
+from gen_data.core.se3 import SE3
+from gen_data.physics import PhysicsConfig
+from gen_data.physics.engine import Engine
+from gen_data.physics.manipulation.joint_trajectories import smooth_step, speed_max
+from gen_data.physics.physics_config import EngineName
 from tests.physics.doubles import TABLE_TOP_Z_M, Solids, table_scene, thing, world_vertices
 from tests.physics.panda import panda
 from tests.physics.test_arms import above_table, armed

@@ -9,11 +9,11 @@ from pathlib import Path
 import pytest
 from pydantic import ValidationError
 
-from gen_data.generator.assemble.config import load_config
-from gen_data.generator.assemble.pipeline_factory import PipelineFactory
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.physics import PhysicsConfig, open_engine
-from gen_data.generator.runner.identity import make_plan
+from gen_data.assemble.config import load_config
+from gen_data.assemble.pipeline_factory import PipelineFactory
+from gen_data.core.errors import ConfigError
+from gen_data.physics import PhysicsConfig, open_engine
+from gen_data.runner.identity import make_plan
 from tests.physics.doubles import Solids
 
 
@@ -40,10 +40,7 @@ def test_every_field_says_what_it_means() -> None:
 
 def test_reading_a_configuration_loads_no_engine() -> None:
     """The command line starts without pybullet and MuJoCo."""
-    code = (
-        "import sys, gen_data.generator.physics\n"
-        "sys.exit(bool({'pybullet', 'mujoco'} & {*sys.modules}))"
-    )
+    code = "import sys, gen_data.physics\nsys.exit(bool({'pybullet', 'mujoco'} & {*sys.modules}))"
 
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
@@ -53,9 +50,7 @@ def test_the_default_engine_is_pybullet_where_it_is_installed(
 ) -> None:
     """Elsewhere mujoco, which has wheels for every platform."""
     for installed, expected in (({"pybullet", "mujoco"}, "pybullet"), ({"mujoco"}, "mujoco")):
-        monkeypatch.setattr(
-            "gen_data.generator.physics.physics_config.is_installed", installed.__contains__
-        )
+        monkeypatch.setattr("gen_data.physics.physics_config.is_installed", installed.__contains__)
         assert PhysicsConfig().engine == expected
 
 
@@ -63,9 +58,7 @@ def test_an_engine_that_is_not_installed_is_refused_with_both_remedies(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """The other engine, or its package."""
-    monkeypatch.setattr(
-        "gen_data.generator.physics.physics_config.is_installed", {"mujoco"}.__contains__
-    )
+    monkeypatch.setattr("gen_data.physics.physics_config.is_installed", {"mujoco"}.__contains__)
     with (
         pytest.raises(ConfigError, match=r"physics\.engine: 'pybullet'.*'mujoco'.*pip install py"),
         open_engine(Solids(), PhysicsConfig(engine="pybullet")),
@@ -77,9 +70,7 @@ def test_the_place_of_a_missing_engine_is_named(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Line and column of the value, before anything is generated."""
-    monkeypatch.setattr(
-        "gen_data.generator.physics.physics_config.is_installed", {"mujoco"}.__contains__
-    )
+    monkeypatch.setattr("gen_data.physics.physics_config.is_installed", {"mujoco"}.__contains__)
     config = tmp_path / "mine.yaml"
     config.write_text("extends: tabletop.yaml\nphysics: {engine: pybullet}\n")
 

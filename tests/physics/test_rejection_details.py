@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pickle
 
-from gen_data.generator.core.errors import Rejection, SceneRejected
+from gen_data.core.errors import Rejection, SceneRejected
 
 
 def test_the_best_attempt_is_named_with_its_number_and_objects() -> None:

@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gen_data.generator.core.scene import Body, ObjectGroup, Scene, SupportSurface
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.physics import PhysicsConfig
-from gen_data.generator.physics.engine import Engine
-from gen_data.generator.physics.physics_config import EngineName
+from gen_data.core.scene import Body, ObjectGroup, Scene, SupportSurface
+from gen_data.core.se3 import SE3
+from gen_data.physics import PhysicsConfig
+from gen_data.physics.engine import Engine
+from gen_data.physics.physics_config import EngineName
 from tests.physics.doubles import (
     HOUSEHOLD,
     TABLE_TOP_Z_M,

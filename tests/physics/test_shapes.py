@@ -7,8 +7,8 @@ import itertools
 import numpy as np
 import pytest
 
-from gen_data.generator.core.asset_types import ConvexParts
-from gen_data.generator.physics.collision_shapes import (
+from gen_data.core.asset_types import ConvexParts
+from gen_data.physics.collision_shapes import (
     SHELL_M,
     box_shape,
     collision_shape,

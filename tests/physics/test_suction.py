@@ -7,15 +7,15 @@ import math
 import numpy as np
 import pytest
 
-from gen_data.generator.core.asset_types import SuctionCup
-from gen_data.generator.core.scene import BodyJoint
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.physics import PhysicsConfig
-from gen_data.generator.physics.collision_shapes import collision_shape
-from gen_data.generator.physics.manipulation.suction import is_sealed, needed_force_n
-from gen_data.generator.physics.open_world import open_world
-from gen_data.generator.physics.physics_config import EngineName
-from gen_data.generator.physics.world import World, joint_position
+from gen_data.core.asset_types import SuctionCup
+from gen_data.core.scene import BodyJoint
+from gen_data.core.se3 import SE3
+from gen_data.physics import PhysicsConfig
+from gen_data.physics.collision_shapes import collision_shape
+from gen_data.physics.manipulation.suction import is_sealed, needed_force_n
+from gen_data.physics.open_world import open_world
+from gen_data.physics.physics_config import EngineName
+from gen_data.physics.world import World, joint_position
 from tests.physics.doubles import _parts
 
 CUP = SuctionCup(0.015, 40.0)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from gen_data.generator.assemble.config import load_config
-from gen_data.generator.assemble.pipeline_factory import open_pipeline
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.sample import Sample
-from gen_data.generator.core.serialization import canonical_json
+from gen_data.assemble.config import load_config
+from gen_data.assemble.pipeline_factory import open_pipeline
+from gen_data.core.capture import Channel
+from gen_data.core.sample import Sample
+from gen_data.core.serialization import canonical_json
 
 SMALL = (
     "sensors.color.size_px=[96,72]", "sensors.wrist.size_px=[96,72]", "steps_per_scene=10",

@@ -9,12 +9,12 @@ from pathlib import Path
 import pytest
 import trimesh
 
-from gen_data.generator.assemble.config import load_config
-from gen_data.generator.assemble.pipeline_factory import open_pipeline
-from gen_data.generator.core.errors import AssetError, ConfigError, SceneRejected
-from gen_data.generator.core.sample import Sample
-from gen_data.generator.core.scene import Scene
-from gen_data.generator.core.serialization import canonical_json
+from gen_data.assemble.config import load_config
+from gen_data.assemble.pipeline_factory import open_pipeline
+from gen_data.core.errors import AssetError, ConfigError, SceneRejected
+from gen_data.core.sample import Sample
+from gen_data.core.scene import Scene
+from gen_data.core.serialization import canonical_json
 from gen_data.randomizers.arm_task_table import tasks
 from tests.tiers import cases
 

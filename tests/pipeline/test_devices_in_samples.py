@@ -7,23 +7,23 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from gen_data.generator.assemble.config import load_config
-from gen_data.generator.assemble.pipeline_factory import open_pipeline, pipeline_config
-from gen_data.generator.assets.library import open_library
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import DatasetInfo, Settled
-from gen_data.generator.core.scene import Instance
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.core.streams import Streams
-from gen_data.generator.pipeline import Pipeline
-from gen_data.generator.pipeline.pipeline import PipelineConfig
-from gen_data.generator.sensors.events.event_detector import EventDetector
-from gen_data.generator.sensors.mounting import Instrument
-from gen_data.generator.sensors.navigation.gnss import Gnss
-from gen_data.generator.sensors.navigation.imu import Imu
-from gen_data.generator.sensors.navigation.odometer import Odometer
-from gen_data.generator.sensors.radar.radar_sensor import Radar
+from gen_data.assemble.config import load_config
+from gen_data.assemble.pipeline_factory import open_pipeline, pipeline_config
+from gen_data.assets.library import open_library
+from gen_data.core.capture import Channel
+from gen_data.core.errors import ConfigError
+from gen_data.core.interfaces import DatasetInfo, Settled
+from gen_data.core.scene import Instance
+from gen_data.core.se3 import SE3
+from gen_data.core.streams import Streams
+from gen_data.pipeline import Pipeline
+from gen_data.pipeline.pipeline import PipelineConfig
+from gen_data.sensors.events.event_detector import EventDetector
+from gen_data.sensors.mounting import Instrument
+from gen_data.sensors.navigation.gnss import Gnss
+from gen_data.sensors.navigation.imu import Imu
+from gen_data.sensors.navigation.odometer import Odometer
+from gen_data.sensors.radar.radar_sensor import Radar
 from tests.sensors.streetcar import CAR_M, BoxRays, thing, world
 
 SENSORS: tuple[Instrument, ...] = (

@@ -8,9 +8,9 @@ import cv2
 import numpy as np
 import pytest
 
-from gen_data.generator.assemble.config import load_config
-from gen_data.generator.assemble.pipeline_factory import open_pipeline
-from gen_data.generator.core.sample import Sample
+from gen_data.assemble.config import load_config
+from gen_data.assemble.pipeline_factory import open_pipeline
+from gen_data.core.sample import Sample
 
 SMALL = (
     "sensors.color.size_px=[200, 160]",

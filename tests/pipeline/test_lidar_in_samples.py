@@ -8,11 +8,11 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from gen_data.generator.assemble.config import load_config
-from gen_data.generator.assemble.pipeline_factory import PipelineFactory
-from gen_data.generator.core.sample import Sample
-from gen_data.generator.core.scene import Scene
-from gen_data.generator.core.serialization import from_plain, to_plain
+from gen_data.assemble.config import load_config
+from gen_data.assemble.pipeline_factory import PipelineFactory
+from gen_data.core.sample import Sample
+from gen_data.core.scene import Scene
+from gen_data.core.serialization import from_plain, to_plain
 
 SMALL = (
     "sensors[0].size_px=[128, 64]",

@@ -11,22 +11,22 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gen_data.generator.assemble.config import load_config
-from gen_data.generator.assemble.pipeline_factory import PipelineFactory
-from gen_data.generator.assets.library import check_finite, open_library
-from gen_data.generator.core.asset_types import Material
-from gen_data.generator.core.capture import Channel, LidarHits, SensorReading
-from gen_data.generator.core.errors import AssetError, SampleError
-from gen_data.generator.core.interfaces import AssetLibrary, Renderer, Stage
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.scene import Camera, Lidar, Scene, Weather
-from gen_data.generator.core.se3 import IDENTITY, SE3
-from gen_data.generator.core.streams import Rng, Streams
-from gen_data.generator.pipeline.checked_renderer import CheckedRenderer
-from gen_data.generator.pipeline.pipeline import Pipeline
-from gen_data.generator.runner.regeneration import write_alone
-from gen_data.generator.sensors.camera.image_pipeline import ImagePipeline, develop
-from gen_data.generator.sensors.camera.image_sensor import ImageSensor
+from gen_data.assemble.config import load_config
+from gen_data.assemble.pipeline_factory import PipelineFactory
+from gen_data.assets.library import check_finite, open_library
+from gen_data.core.asset_types import Material
+from gen_data.core.capture import Channel, LidarHits, SensorReading
+from gen_data.core.errors import AssetError, SampleError
+from gen_data.core.interfaces import AssetLibrary, Renderer, Stage
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.scene import Camera, Lidar, Scene, Weather
+from gen_data.core.se3 import IDENTITY, SE3
+from gen_data.core.streams import Rng, Streams
+from gen_data.pipeline.checked_renderer import CheckedRenderer
+from gen_data.pipeline.pipeline import Pipeline
+from gen_data.runner.regeneration import write_alone
+from gen_data.sensors.camera.image_pipeline import ImagePipeline, develop
+from gen_data.sensors.camera.image_sensor import ImageSensor
 
 SMALL = ("sensors.color.size_px=[32, 24]", "sensors.color.ev100=9")
 NAN, INF = math.nan, math.inf

@@ -11,18 +11,18 @@ from typing import Any, Literal
 import numpy as np
 import pytest
 
-from gen_data.generator.core.asset_types import Asset, Keypoint, MeshData
-from gen_data.generator.core.capture import Channel, SensorReading
-from gen_data.generator.core.errors import ConfigError, LayoutRejected, Rejection, SceneRejected
-from gen_data.generator.core.interfaces import DatasetInfo, Modality, SensorInfo, Settled, Stage
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.sample import ImageTruth
-from gen_data.generator.core.scene import Articulation, Body, Camera, Instance, Scene
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.core.serialization import canonical_json, from_plain
-from gen_data.generator.pipeline import Pipeline
-from gen_data.generator.pipeline.finalize_scene import finalize_scene
-from gen_data.generator.pipeline.pipeline import PipelineConfig
+from gen_data.core.asset_types import Asset, Keypoint, MeshData
+from gen_data.core.capture import Channel, SensorReading
+from gen_data.core.errors import ConfigError, LayoutRejected, Rejection, SceneRejected
+from gen_data.core.interfaces import DatasetInfo, Modality, SensorInfo, Settled, Stage
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.sample import ImageTruth
+from gen_data.core.scene import Articulation, Body, Camera, Instance, Scene
+from gen_data.core.se3 import SE3
+from gen_data.core.serialization import canonical_json, from_plain
+from gen_data.pipeline import Pipeline
+from gen_data.pipeline.finalize_scene import finalize_scene
+from gen_data.pipeline.pipeline import PipelineConfig
 
 CAMERA = Camera("color", SE3(), Intrinsics.from_hfov(8, 6, 1.0))
 

@@ -8,15 +8,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gen_data.generator.assemble.config import load_config
-from gen_data.generator.assemble.pipeline_factory import open_pipeline
-from gen_data.generator.core.capture import Channel, SensorReading
-from gen_data.generator.core.sample import Sample
-from gen_data.generator.core.scene_time import scene_at
-from gen_data.generator.core.shutter import INSTANT
-from gen_data.generator.core.streams import Streams
-from gen_data.generator.pipeline import Pipeline
-from gen_data.generator.sensors.camera.image_pipeline import ImagePipeline, capture_photograph
+from gen_data.assemble.config import load_config
+from gen_data.assemble.pipeline_factory import open_pipeline
+from gen_data.core.capture import Channel, SensorReading
+from gen_data.core.sample import Sample
+from gen_data.core.scene_time import scene_at
+from gen_data.core.shutter import INSTANT
+from gen_data.core.streams import Streams
+from gen_data.pipeline import Pipeline
+from gen_data.sensors.camera.image_pipeline import ImagePipeline, capture_photograph
 
 SIZE_PX = (240, 136)
 

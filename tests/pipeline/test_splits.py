@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from gen_data.generator.api.generate import _make_factory
-from gen_data.generator.assemble.config import load_config
-from gen_data.generator.core.errors import ConfigWarning
-from gen_data.generator.pipeline.splits import Assignment, split_of, warn_of_empty_splits
+from gen_data.api.generate import _make_factory
+from gen_data.assemble.config import load_config
+from gen_data.core.errors import ConfigWarning
+from gen_data.pipeline.splits import Assignment, split_of, warn_of_empty_splits
 
 SHARES = {"train": 0.8, "val": 0.1, "test": 0.1}
 

@@ -1,6 +1,6 @@
 """A third-party package with one plug-in of every kind, installed and run from the command line.
 
-It is written from the Protocols of ``gen_data.generator.core.interfaces`` and inherits nothing but
+It is written from the Protocols of ``gen_data.core.interfaces`` and inherits nothing but
 ``Strict``; ``mypy`` checks it with the rest of the project (``pyproject.toml``).
 """
 

@@ -8,15 +8,15 @@ import math
 import numpy as np
 import pytest
 
-from gen_data.generator.core.capture import Capture, Channel, SensorReading
-from gen_data.generator.core.interfaces import DatasetInfo, Modality, SensorInfo
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.sample import ImageTruth, Sample
-from gen_data.generator.core.scene import Camera, Scene
-from gen_data.generator.core.se3 import IDENTITY
-from gen_data.generator.preview.overlay import channel_image
-from gen_data.generator.preview.palette import color_flow
-from gen_data.generator.preview.rerun_recording import Recorder
+from gen_data.core.capture import Capture, Channel, SensorReading
+from gen_data.core.interfaces import DatasetInfo, Modality, SensorInfo
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.sample import ImageTruth, Sample
+from gen_data.core.scene import Camera, Scene
+from gen_data.core.se3 import IDENTITY
+from gen_data.preview.overlay import channel_image
+from gen_data.preview.palette import color_flow
+from gen_data.preview.rerun_recording import Recorder
 
 
 def color_of_flow(u: float, v: float) -> tuple[int, int, int]:

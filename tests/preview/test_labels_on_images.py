@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gen_data.generator.core.boxes import BoxPx
-from gen_data.generator.core.capture import Channel, SensorReading
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.sample import ImageTruth, MaskPx, ObjectTruth
-from gen_data.generator.core.scene import Camera, Instance
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.preview.overlay import draw_labels
+from gen_data.core.boxes import BoxPx
+from gen_data.core.capture import Channel, SensorReading
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.sample import ImageTruth, MaskPx, ObjectTruth
+from gen_data.core.scene import Camera, Instance
+from gen_data.core.se3 import SE3
+from gen_data.preview.overlay import draw_labels
 
 GREY = 120
 

@@ -8,24 +8,24 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gen_data.generator.core.asset_types import Keypoint, Material, MeshData
-from gen_data.generator.core.boxes import BoxPx, OrientedBox
-from gen_data.generator.core.capture import POINT, Capture, Channel, PointCloud, SensorReading
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import DatasetInfo, Modality, SensorInfo
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.lens import Lens
-from gen_data.generator.core.motion import Trajectory
-from gen_data.generator.core.sample import ImageTruth, KeypointTruth, ObjectTruth, Sample
-from gen_data.generator.core.scene import Body, Camera, Instance, Lidar, Rig, Scene
-from gen_data.generator.core.scene_time import scene_at
-from gen_data.generator.core.se3 import IDENTITY, SE3, look_at
-from gen_data.generator.core.skeletons import PERSON
-from gen_data.generator.preview.contact_sheet import GAP_PX, arrange_tiles
-from gen_data.generator.preview.overlay import BOX_EDGES, draw_box3d, draw_keypoints
-from gen_data.generator.preview.palette import color_depth, color_ids, color_shares, id_color
-from gen_data.generator.preview.rerun_recording import Recorder
-from gen_data.generator.preview.sensor_views import ROW_PX, point_colors, range_view, top_view
+from gen_data.core.asset_types import Keypoint, Material, MeshData
+from gen_data.core.boxes import BoxPx, OrientedBox
+from gen_data.core.capture import POINT, Capture, Channel, PointCloud, SensorReading
+from gen_data.core.errors import ConfigError
+from gen_data.core.interfaces import DatasetInfo, Modality, SensorInfo
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.lens import Lens
+from gen_data.core.motion import Trajectory
+from gen_data.core.sample import ImageTruth, KeypointTruth, ObjectTruth, Sample
+from gen_data.core.scene import Body, Camera, Instance, Lidar, Rig, Scene
+from gen_data.core.scene_time import scene_at
+from gen_data.core.se3 import IDENTITY, SE3, look_at
+from gen_data.core.skeletons import PERSON
+from gen_data.preview.contact_sheet import GAP_PX, arrange_tiles
+from gen_data.preview.overlay import BOX_EDGES, draw_box3d, draw_keypoints
+from gen_data.preview.palette import color_depth, color_ids, color_shares, id_color
+from gen_data.preview.rerun_recording import Recorder
+from gen_data.preview.sensor_views import ROW_PX, point_colors, range_view, top_view
 
 
 def test_box_edges_join_corners_that_differ_in_one_axis() -> None:

@@ -9,15 +9,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gen_data.generator.assemble.config import load_config
-from gen_data.generator.core.capture import Capture, Channel, Measurements, SensorReading
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.measurement_dtypes import table_rows
-from gen_data.generator.core.sample import ImageTruth, Sample
-from gen_data.generator.core.scene import Camera, Device, Instance, Scene
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.preview.contact_sheet import CAPTION_PX, Tile, make_tiles, render_tiles
-from gen_data.generator.preview.sensor_views import BRIGHTER, DARKER, GREY, event_view, radar_view
+from gen_data.assemble.config import load_config
+from gen_data.core.capture import Capture, Channel, Measurements, SensorReading
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.measurement_dtypes import table_rows
+from gen_data.core.sample import ImageTruth, Sample
+from gen_data.core.scene import Camera, Device, Instance, Scene
+from gen_data.core.se3 import SE3
+from gen_data.preview.contact_sheet import CAPTION_PX, Tile, make_tiles, render_tiles
+from gen_data.preview.sensor_views import BRIGHTER, DARKER, GREY, event_view, radar_view
 
 DOCS = Path(__file__).parents[2] / "docs"
 SHEETS = sorted((DOCS / "sheets").glob("*.yaml"))

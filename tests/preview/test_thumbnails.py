@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from gen_data.generator.assets.library import open_library
-from gen_data.generator.preview.thumbnails import thumbnail
-from gen_data.generator.renderers import TABLE
+from gen_data.assets.library import open_library
+from gen_data.preview.thumbnails import thumbnail
+from gen_data.renderers import TABLE
 
 
 def test_an_object_is_shown_in_the_middle_of_its_picture() -> None:

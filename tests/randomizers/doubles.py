@@ -8,21 +8,13 @@ from itertools import combinations, product
 
 import numpy as np
 
-from gen_data.generator.assets.asset_ids import parse_asset_id
-from gen_data.generator.core.asset_types import (
-    Asset,
-    Float32,
-    Gripper,
-    Joint,
-    Keypoint,
-    Material,
-    RobotModel,
-)
-from gen_data.generator.core.errors import AssetError, did_you_mean
-from gen_data.generator.core.plates import Plate, upright_pose
-from gen_data.generator.core.scene import Body, ObjectGroup, Scene, SupportSurface
-from gen_data.generator.core.se3 import SE3, Array, Vec3
-from gen_data.generator.core.streams import Rng, Streams
+from gen_data.assets.asset_ids import parse_asset_id
+from gen_data.core.asset_types import Asset, Float32, Gripper, Joint, Keypoint, Material, RobotModel
+from gen_data.core.errors import AssetError, did_you_mean
+from gen_data.core.plates import Plate, upright_pose
+from gen_data.core.scene import Body, ObjectGroup, Scene, SupportSurface
+from gen_data.core.se3 import SE3, Array, Vec3
+from gen_data.core.streams import Rng, Streams
 
 FURNITURE_M: dict[str, tuple[float, ...]] = {
     "table": (1.2, 0.8, 0.74),

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from gen_data.generator.config.distributions import Choice, Constant, Uniform
-from gen_data.generator.core.asset_types import RobotModel
-from gen_data.generator.core.scene import ArmGoal, Articulation, Body, Scene
-from gen_data.generator.core.se3 import SE3
+from gen_data.config.distributions import Choice, Constant, Uniform
+from gen_data.core.asset_types import RobotModel
+from gen_data.core.scene import ArmGoal, Articulation, Body, Scene
+from gen_data.core.se3 import SE3
 from gen_data.randomizers.arm_configuration import ArmConfiguration
 from tests.randomizers.doubles import FakeAssets, rng_of, two_link_arm
 

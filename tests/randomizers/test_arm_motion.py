@@ -9,17 +9,10 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from gen_data.generator.config.distributions import Constant
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.scene import (
-    ArmGoal,
-    Articulation,
-    Body,
-    ObjectGroup,
-    Scene,
-    SupportSurface,
-)
-from gen_data.generator.core.se3 import SE3
+from gen_data.config.distributions import Constant
+from gen_data.core.errors import ConfigError
+from gen_data.core.scene import ArmGoal, Articulation, Body, ObjectGroup, Scene, SupportSurface
+from gen_data.core.se3 import SE3
 from gen_data.randomizers.arm_motion import ArmMotion, Stop
 from tests.randomizers.doubles import FakeAssets, rng_of, two_link_arm
 

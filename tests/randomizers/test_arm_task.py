@@ -10,19 +10,12 @@ import pytest
 from pydantic import ValidationError
 from scipy import stats
 
-from gen_data.generator.config.distributions import Constant
-from gen_data.generator.core.asset_types import RobotModel
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.scene import (
-    HAND,
-    Articulation,
-    Episode,
-    ObjectGroup,
-    Scene,
-    SupportSurface,
-)
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.core.streams import Streams
+from gen_data.config.distributions import Constant
+from gen_data.core.asset_types import RobotModel
+from gen_data.core.errors import ConfigError
+from gen_data.core.scene import HAND, Articulation, Episode, ObjectGroup, Scene, SupportSurface
+from gen_data.core.se3 import SE3
+from gen_data.core.streams import Streams
 from gen_data.randomizers.arm_task import ArmTask, Failures
 from gen_data.randomizers.arm_task_table import Step, Task, tasks
 from tests.randomizers.doubles import FakeAssets, two_link_arm

@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gen_data.generator.config.distributions import Constant, Uniform
-from gen_data.generator.core.errors import ConfigError, LayoutRejected
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.scene import Body, Camera, Region, Scene
-from gen_data.generator.core.se3 import SE3
+from gen_data.config.distributions import Constant, Uniform
+from gen_data.core.errors import ConfigError, LayoutRejected
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.scene import Body, Camera, Region, Scene
+from gen_data.core.se3 import SE3
 from gen_data.randomizers.camera_intrinsics import CameraIntrinsics
 from gen_data.randomizers.camera_pose import CameraPose
 from gen_data.randomizers.exposure import Exposure

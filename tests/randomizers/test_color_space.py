@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from gen_data.generator.core.colorimetry import temperature_to_chromaticity
+from gen_data.core.colorimetry import temperature_to_chromaticity
 from gen_data.randomizers.color_space import hsv_to_linear, temperature_to_linear
 
 PLANCKIAN_XY = {

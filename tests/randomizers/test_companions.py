@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 import trimesh
 
-from gen_data.generator.assets.library import open_library
-from gen_data.generator.assets.people.posing import MOVING_POSES
-from gen_data.generator.config.distributions import Constant
-from gen_data.generator.core.interfaces import AssetLibrary
-from gen_data.generator.core.members import Member, add_members
-from gen_data.generator.core.scene import ObjectGroup, Scene
-from gen_data.generator.core.se3 import SE3
+from gen_data.assets.library import open_library
+from gen_data.config.distributions import Constant
+from gen_data.content.people.posing import MOVING_POSES
+from gen_data.core.interfaces import AssetLibrary
+from gen_data.core.members import Member, add_members
+from gen_data.core.scene import ObjectGroup, Scene
+from gen_data.core.se3 import SE3
 from gen_data.randomizers.companions import Companions
 from tests.randomizers.doubles import rng_of
 

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gen_data.generator.assets.library import open_library
-from gen_data.generator.core.interfaces import AssetLibrary
-from gen_data.generator.core.members import Member, add_members
-from gen_data.generator.core.scene import Lane, ObjectGroup, Scene
-from gen_data.generator.core.se3 import SE3
+from gen_data.assets.library import open_library
+from gen_data.core.interfaces import AssetLibrary
+from gen_data.core.members import Member, add_members
+from gen_data.core.scene import Lane, ObjectGroup, Scene
+from gen_data.core.se3 import SE3
 from gen_data.randomizers.door_paths import DoorPaths
 from tests.randomizers.doubles import rng_of
 

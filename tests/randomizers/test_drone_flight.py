@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gen_data.generator.assemble.config import load_config
-from gen_data.generator.assemble.pipeline_factory import open_pipeline
-from gen_data.generator.core.errors import ConfigError, LayoutRejected
-from gen_data.generator.core.scene import Body, Lane, Rig, Scene
-from gen_data.generator.core.se3 import SE3, Array
+from gen_data.assemble.config import load_config
+from gen_data.assemble.pipeline_factory import open_pipeline
+from gen_data.core.errors import ConfigError, LayoutRejected
+from gen_data.core.scene import Body, Lane, Rig, Scene
+from gen_data.core.se3 import SE3, Array
 from gen_data.randomizers.drone_flight import GRAVITY_M_S2, LEAN_PER_M_S, DroneFlight
 
 ROAD = Lane("road", "driving", ((-200.0, 0.0, 3.0), (200.0, 0.0, 3.0)), 3.5, road="main")

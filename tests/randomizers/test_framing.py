@@ -15,12 +15,12 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from gen_data.generator.config.distributions import Choice, Constant, LogUniform, Normal, Uniform
-from gen_data.generator.core.errors import ConfigError, LayoutRejected
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.lens import Lens
-from gen_data.generator.core.scene import Body, Camera, ObjectGroup, Region, Scene, SupportSurface
-from gen_data.generator.core.se3 import SE3, Array
+from gen_data.config.distributions import Choice, Constant, LogUniform, Normal, Uniform
+from gen_data.core.errors import ConfigError, LayoutRejected
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.lens import Lens
+from gen_data.core.scene import Body, Camera, ObjectGroup, Region, Scene, SupportSurface
+from gen_data.core.se3 import SE3, Array
 from gen_data.randomizers.camera_pose import CameraPose
 from gen_data.randomizers.framing import Framing, Thing, frame, long_side_share
 from tests.randomizers.doubles import FakeAssets, rng_of

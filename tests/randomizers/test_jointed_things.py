@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gen_data.generator.assets.library import Library, open_library
-from gen_data.generator.core.scene import Body, Instance, Scene
-from gen_data.generator.core.se3 import SE3
+from gen_data.assets.library import Library, open_library
+from gen_data.core.scene import Body, Instance, Scene
+from gen_data.core.se3 import SE3
 from gen_data.randomizers.object_states import ObjectStates
 from gen_data.scene_templates.prop import Prop
 from tests.randomizers.doubles import rng_of

@@ -12,11 +12,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from gen_data.generator.config.distributions import Constant, Probability, Uniform
-from gen_data.generator.core.errors import ConfigError, LayoutRejected
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.scene import Body, Camera, Lane, ObjectGroup, Scene
-from gen_data.generator.core.se3 import SE3, look_at
+from gen_data.config.distributions import Constant, Probability, Uniform
+from gen_data.core.errors import ConfigError, LayoutRejected
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.scene import Body, Camera, Lane, ObjectGroup, Scene
+from gen_data.core.se3 import SE3, look_at
 from gen_data.randomizers.camera_on_lane import CameraOnLane
 from gen_data.randomizers.free_space import Footprint, Ground, hidden_share
 from gen_data.randomizers.lane_objects import LaneObjects

@@ -10,12 +10,12 @@ from typing import Any
 import pytest
 from pydantic import ValidationError
 
-from gen_data.generator.config.distributions import Constant, Uniform
-from gen_data.generator.core.errors import ConfigError, LayoutRejected
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.lens import Lens
-from gen_data.generator.core.scene import Camera, Scene
-from gen_data.generator.core.se3 import SE3
+from gen_data.config.distributions import Constant, Uniform
+from gen_data.core.errors import ConfigError, LayoutRejected
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.lens import Lens
+from gen_data.core.scene import Camera, Scene
+from gen_data.core.se3 import SE3
 from gen_data.randomizers.camera_intrinsics import CameraIntrinsics, Coefficients
 from tests.randomizers.doubles import FakeAssets, rng_of
 

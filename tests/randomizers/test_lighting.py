@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from gen_data.generator.config.distributions import Choice, Constant, Sequence, Uniform
-from gen_data.generator.core.errors import ConfigError, LayoutRejected
-from gen_data.generator.core.scene import Body, Light, Region, Scene
-from gen_data.generator.core.se3 import SE3
+from gen_data.config.distributions import Choice, Constant, Sequence, Uniform
+from gen_data.core.errors import ConfigError, LayoutRejected
+from gen_data.core.scene import Body, Light, Region, Scene
+from gen_data.core.se3 import SE3
 from gen_data.randomizers.ceiling_lights import CeilingLights
 from gen_data.randomizers.environment import EnvironmentLight
 from gen_data.randomizers.free_space import is_clear

@@ -11,14 +11,14 @@ from typing import Any
 import pytest
 from PIL import Image
 
-from gen_data.generator.assets.library import open_library
-from gen_data.generator.config.distributions import Constant, Probability, Uniform
-from gen_data.generator.config.problems import Problems
-from gen_data.generator.config.validation import validate
-from gen_data.generator.config.yaml_tree import parse_yaml
-from gen_data.generator.core.asset_types import Material
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.scene import Body, Instance, ObjectGroup, Scene
+from gen_data.assets.library import open_library
+from gen_data.config.distributions import Constant, Probability, Uniform
+from gen_data.config.problems import Problems
+from gen_data.config.validation import validate
+from gen_data.config.yaml_tree import parse_yaml
+from gen_data.core.asset_types import Material
+from gen_data.core.errors import ConfigError
+from gen_data.core.scene import Body, Instance, ObjectGroup, Scene
 from gen_data.randomizers import TABLE
 from gen_data.randomizers.backdrop import Backdrop
 from gen_data.randomizers.base import RandomizerBase

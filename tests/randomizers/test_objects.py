@@ -11,17 +11,10 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from gen_data.generator.config.distributions import (
-    Constant,
-    Count,
-    Flag,
-    Sequence,
-    Uniform,
-    UniformInteger,
-)
-from gen_data.generator.core.errors import ConfigError, LayoutRejected
-from gen_data.generator.core.scene import Body, Instance, Scene
-from gen_data.generator.core.se3 import SE3, Vec3
+from gen_data.config.distributions import Constant, Count, Flag, Sequence, Uniform, UniformInteger
+from gen_data.core.errors import ConfigError, LayoutRejected
+from gen_data.core.scene import Body, Instance, Scene
+from gen_data.core.se3 import SE3, Vec3
 from gen_data.randomizers.distractors import Distractors
 from gen_data.randomizers.objects import Objects
 from tests.randomizers.doubles import (

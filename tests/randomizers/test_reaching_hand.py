@@ -8,14 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gen_data.generator.assets.library import Library, open_library
-from gen_data.generator.assets.procedural import FAMILIES
-from gen_data.generator.assets.procedural.hands import JOINTS, held_axis_m
-from gen_data.generator.config.distributions import Constant, Probability
-from gen_data.generator.core.errors import AssetError
-from gen_data.generator.core.scene import ObjectGroup, Scene, SupportSurface
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.core.skeletons import find_skeleton
+from gen_data.assets.library import Library, open_library
+from gen_data.config.distributions import Constant, Probability
+from gen_data.content.procedural import FAMILIES
+from gen_data.content.procedural.hands import JOINTS, held_axis_m
+from gen_data.core.errors import AssetError
+from gen_data.core.scene import ObjectGroup, Scene, SupportSurface
+from gen_data.core.se3 import SE3
+from gen_data.core.skeletons import find_skeleton
 from gen_data.randomizers.reaching_hand import ReachingHand, measure_radii
 from tests.randomizers.doubles import rng_of
 

@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gen_data.generator.config.distributions import Constant, Uniform
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.scene import Body, Camera, Device, Lidar, Rig, Scene
-from gen_data.generator.core.scene_time import RIG_AXES, place_sensors
-from gen_data.generator.core.se3 import SE3
+from gen_data.config.distributions import Constant, Uniform
+from gen_data.core.errors import ConfigError
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.scene import Body, Camera, Device, Lidar, Rig, Scene
+from gen_data.core.scene_time import RIG_AXES, place_sensors
+from gen_data.core.se3 import SE3
 from gen_data.randomizers.rig_calibration import RigCalibration
 from tests.randomizers.doubles import FakeAssets, rng_of
 

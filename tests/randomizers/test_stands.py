@@ -8,17 +8,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gen_data.generator.config.distributions import Constant
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.scene import Region, Scene
-from gen_data.generator.core.scene_time import place_sensors
-from gen_data.generator.core.se3 import SE3, turned, turns_of
-from gen_data.generator.core.stereo import baseline_m
-from gen_data.generator.sensors.camera.rgb_camera import RgbCamera
-from gen_data.generator.sensors.lidar.lidar_sensor import LidarSensor
+from gen_data.config.distributions import Constant
+from gen_data.core.errors import ConfigError
+from gen_data.core.scene import Region, Scene
+from gen_data.core.scene_time import place_sensors
+from gen_data.core.se3 import SE3, turned, turns_of
+from gen_data.core.stereo import baseline_m
 from gen_data.randomizers.camera_pose import CameraPose
 from gen_data.randomizers.rig_calibration import RigCalibration
 from gen_data.scene_templates.stand import Stand
+from gen_data.sensors.camera.rgb_camera import RgbCamera
+from gen_data.sensors.lidar.lidar_sensor import LidarSensor
 from tests.randomizers.doubles import FakeAssets, rng_of
 
 FOCUS = Region((0.3, -0.2, 0.8), (1.2, 0.8, 0.25))

@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import pytest
 
-from gen_data.generator.assets.library import Library, open_library
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.members import Member, add_members
-from gen_data.generator.core.scene import ObjectGroup, Scene, Weather
-from gen_data.generator.core.se3 import SE3
+from gen_data.assets.library import Library, open_library
+from gen_data.core.errors import ConfigError
+from gen_data.core.members import Member, add_members
+from gen_data.core.scene import ObjectGroup, Scene, Weather
+from gen_data.core.se3 import SE3
 from gen_data.randomizers.umbrellas import Umbrellas
 from tests.randomizers.doubles import rng_of
 

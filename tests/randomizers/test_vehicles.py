@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 from scipy.stats import chisquare
 
-from gen_data.generator.assets.skies.sky import SkyModel
-from gen_data.generator.config.distributions import Constant
-from gen_data.generator.core.asset_types import Material
-from gen_data.generator.core.colorimetry import luminance
-from gen_data.generator.core.scene import Body, Instance, Light, ObjectGroup, Scene
-from gen_data.generator.core.se3 import SE3
+from gen_data.config.distributions import Constant
+from gen_data.core.asset_types import Material
+from gen_data.core.colorimetry import luminance
+from gen_data.core.scene import Body, Instance, Light, ObjectGroup, Scene
+from gen_data.core.se3 import SE3
 from gen_data.randomizers.daylight import set_daylight
 from gen_data.randomizers.vehicle_lights import VehicleLights
 from gen_data.randomizers.vehicle_paint import ON_ROADS, PAINTS, VehiclePaint
+from gen_data.sky.sky import SkyModel
 from tests.randomizers.doubles import FakeAssets, rng_of
 
 

@@ -11,16 +11,16 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from gen_data.generator.assets.skies import daylight
-from gen_data.generator.assets.skies.sky import SkyModel, mean_luminance_cd_m2
-from gen_data.generator.core.asset_types import Material
-from gen_data.generator.core.scene import Body, Light, Scene
-from gen_data.generator.core.scene import Weather as SceneWeather
-from gen_data.generator.core.se3 import SE3
+from gen_data.core.asset_types import Material
+from gen_data.core.scene import Body, Light, Scene
+from gen_data.core.scene import Weather as SceneWeather
+from gen_data.core.se3 import SE3
 from gen_data.randomizers import TABLE
 from gen_data.randomizers.street_lights import StreetLights, spot_intensity_cd, white_balanced_color
 from gen_data.randomizers.time_of_day import TimeOfDay
 from gen_data.randomizers.weather import ALTITUDES_DEG, CONDITIONS, PRESETS
+from gen_data.sky import daylight
+from gen_data.sky.sky import SkyModel, mean_luminance_cd_m2
 from tests.randomizers.doubles import FakeAssets, rng_of
 
 CARLA = (

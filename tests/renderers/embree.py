@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from gen_data.generator.core.interfaces import AssetLibrary
-from gen_data.generator.core.scene import Camera, Scene
+from gen_data.core.interfaces import AssetLibrary
+from gen_data.core.scene import Camera, Scene
 from tests.embree import RayCaster, placed
 
 

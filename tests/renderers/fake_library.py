@@ -7,7 +7,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from gen_data.generator.core.asset_types import (
+from gen_data.core.asset_types import (
     Asset,
     ConvexParts,
     Float32,
@@ -17,10 +17,10 @@ from gen_data.generator.core.asset_types import (
     RobotModel,
     TextureData,
 )
-from gen_data.generator.core.errors import AssetError
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.scene import Camera, Environment
-from gen_data.generator.core.se3 import SE3, Vec3, look_at
+from gen_data.core.errors import AssetError
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.scene import Camera, Environment
+from gen_data.core.se3 import SE3, Vec3, look_at
 
 
 def box_mesh(

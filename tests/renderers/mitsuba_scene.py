@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from gen_data.generator.core.asset_types import MeshData
-from gen_data.generator.core.scene import Body, Camera, Light, Scene
+from gen_data.core.asset_types import MeshData
+from gen_data.core.scene import Body, Camera, Light, Scene
 from tests.renderers.fake_library import FakeLibrary
 
 MIRROR_XY = np.diag([-1.0, -1.0, 1.0, 1.0])

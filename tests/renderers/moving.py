@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from gen_data.generator.core.asset_types import Material
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.motion import StateChange, Trajectory
-from gen_data.generator.core.scene import Body, Camera, Instance, Rig, Scene
-from gen_data.generator.core.scene_time import place_sensors, scene_at
-from gen_data.generator.core.se3 import IDENTITY, SE3, Vec3
-from gen_data.generator.core.shutter import INSTANT, Shutter
+from gen_data.core.asset_types import Material
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.motion import StateChange, Trajectory
+from gen_data.core.scene import Body, Camera, Instance, Rig, Scene
+from gen_data.core.scene_time import place_sensors, scene_at
+from gen_data.core.se3 import IDENTITY, SE3, Vec3
+from gen_data.core.shutter import INSTANT, Shutter
 from tests.renderers.fake_library import DARK, FakeLibrary, box_mesh, plane_mesh
 
 LENS = Intrinsics(96, 64, 80.0, 80.0, 48.0, 32.0)

@@ -7,14 +7,14 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from gen_data.generator.assemble.config import load_config
-from gen_data.generator.assemble.pipeline_factory import open_pipeline
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.interfaces import AssetLibrary, Renderer
-from gen_data.generator.core.scene import Body, Camera, Scene
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.pipeline import Pipeline
-from gen_data.generator.renderers.warp.renderer import WarpRenderer
+from gen_data.assemble.config import load_config
+from gen_data.assemble.pipeline_factory import open_pipeline
+from gen_data.core.capture import Channel
+from gen_data.core.interfaces import AssetLibrary, Renderer
+from gen_data.core.scene import Body, Camera, Scene
+from gen_data.core.se3 import SE3
+from gen_data.pipeline import Pipeline
+from gen_data.renderers.warp.renderer import WarpRenderer
 from tests.renderers.embree import cast, near_edges
 from tests.renderers.fake_library import FakeLibrary, box_mesh, camera_at, room_mesh, sphere_mesh
 

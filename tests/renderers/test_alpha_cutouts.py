@@ -8,15 +8,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gen_data.generator.core.asset_types import Material, MeshData, TextureData
-from gen_data.generator.core.capture import Channel, LidarRays
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.lens import Lens
-from gen_data.generator.core.scene import Body, Camera, Environment, Instance, Lidar, Light, Scene
-from gen_data.generator.core.se3 import SE3, look_at
-from gen_data.generator.renderers.warp.renderer import WarpRenderer
-from gen_data.generator.renderers.warp.scene.device_assets import remove_fringe
-from gen_data.generator.renderers.warp.settings import RenderSettings
+from gen_data.core.asset_types import Material, MeshData, TextureData
+from gen_data.core.capture import Channel, LidarRays
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.lens import Lens
+from gen_data.core.scene import Body, Camera, Environment, Instance, Lidar, Light, Scene
+from gen_data.core.se3 import SE3, look_at
+from gen_data.renderers.warp.renderer import WarpRenderer
+from gen_data.renderers.warp.scene.device_assets import remove_fringe
+from gen_data.renderers.warp.settings import RenderSettings
 from tests.embree import RayCaster, placed
 from tests.renderers.embree import cast
 from tests.renderers.fake_library import DARK, FakeLibrary, camera_at, plane_mesh

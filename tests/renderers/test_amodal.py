@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gen_data.generator.core.capture import Channel, SensorReading, Silhouette
-from gen_data.generator.core.scene import Body, Camera, Instance, Scene
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.renderers.warp.renderer import WarpRenderer
-from gen_data.generator.renderers.warp.settings import RenderSettings
+from gen_data.core.capture import Channel, SensorReading, Silhouette
+from gen_data.core.scene import Body, Camera, Instance, Scene
+from gen_data.core.se3 import SE3
+from gen_data.renderers.warp.renderer import WarpRenderer
+from gen_data.renderers.warp.settings import RenderSettings
 from tests.renderers.fake_library import FakeLibrary, box_mesh, forward_camera, sphere_mesh
 
 MESHES = {"box": box_mesh(), "ball": sphere_mesh(0.5, rings=24)}

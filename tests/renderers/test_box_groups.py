@@ -6,16 +6,12 @@ import numpy as np
 import pytest
 import warp as wp
 
-from gen_data.generator.core.se3 import Array
-from gen_data.generator.core.streams import Streams
-from gen_data.generator.renderers.warp.device import open_device
-from gen_data.generator.renderers.warp.scene.bvh import group_boxes
-from gen_data.generator.renderers.warp.scene.kernels.box_groups import (
-    high_corner,
-    low_corner,
-    next_in_shaft,
-)
-from gen_data.generator.renderers.warp.scene.kernels.records import reciprocals
+from gen_data.core.se3 import Array
+from gen_data.core.streams import Streams
+from gen_data.renderers.warp.device import open_device
+from gen_data.renderers.warp.scene.bvh import group_boxes
+from gen_data.renderers.warp.scene.kernels.box_groups import high_corner, low_corner, next_in_shaft
+from gen_data.renderers.warp.scene.kernels.records import reciprocals
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 

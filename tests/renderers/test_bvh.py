@@ -7,19 +7,19 @@ import pytest
 import trimesh
 import warp as wp
 
-from gen_data.generator.core.scene import Body, Scene
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.renderers.warp.device import open_device
-from gen_data.generator.renderers.warp.device_cache import DeviceCache
-from gen_data.generator.renderers.warp.scene.bvh import body_tree, face_boxes, mesh_tree
-from gen_data.generator.renderers.warp.scene.kernels.bvh_traverse import any_in_mesh, first_in_mesh
-from gen_data.generator.renderers.warp.scene.kernels.ray_queries import (
+from gen_data.core.scene import Body, Scene
+from gen_data.core.se3 import SE3
+from gen_data.renderers.warp.device import open_device
+from gen_data.renderers.warp.device_cache import DeviceCache
+from gen_data.renderers.warp.scene.bvh import body_tree, face_boxes, mesh_tree
+from gen_data.renderers.warp.scene.kernels.bvh_traverse import any_in_mesh, first_in_mesh
+from gen_data.renderers.warp.scene.kernels.ray_queries import (
     closest_hit,
     is_intersected,
     path_along,
 )
-from gen_data.generator.renderers.warp.scene.kernels.records import HOLES, World
-from gen_data.generator.renderers.warp.scene.scene_packing import pack_world
+from gen_data.renderers.warp.scene.kernels.records import HOLES, World
+from gen_data.renderers.warp.scene.scene_packing import pack_world
 from tests.embree import NOTHING, RayCaster, placed
 from tests.renderers.fake_library import FakeLibrary, box_mesh, forward_camera, sphere_mesh
 

@@ -13,22 +13,22 @@ from pathlib import Path
 import pytest
 import warp as wp
 
-from gen_data.generator.renderers import warp
-from gen_data.generator.renderers.warp.device import EVERY_FRAME, compile_in_parallel, open_device
-from gen_data.generator.renderers.warp.kernel_cache import copy_modules
+from gen_data.renderers import warp
+from gen_data.renderers.warp.device import EVERY_FRAME, compile_in_parallel, open_device
+from gen_data.renderers.warp.kernel_cache import copy_modules
 
 _REPORT_MODULES = """
 import sys
 import warp as wp
-from gen_data.generator.renderers.warp import device
+from gen_data.renderers.warp import device
 
 alias = device.open_device("cpu").alias
 wp.config.log_level = wp.LOG_INFO
 """
 _EVERY_FRAME = "device.load_kernels(alias, device.EVERY_FRAME)"
 _FIRST_SAMPLE = """
-from gen_data.generator.assemble.pipeline_factory import open_pipeline
-from gen_data.generator.assemble.config import load_config
+from gen_data.assemble.pipeline_factory import open_pipeline
+from gen_data.assemble.config import load_config
 
 spec = load_config("tabletop.yaml", overrides=["sensors=[{type: rgb_camera, size_px: [64, 48]}]"])
 with open_pipeline(spec) as pipeline:
@@ -36,15 +36,15 @@ with open_pipeline(spec) as pipeline:
 """
 
 _FIRST_TABLETOP = """
-from gen_data.generator.assemble.pipeline_factory import open_pipeline
-from gen_data.generator.assemble.config import load_config
+from gen_data.assemble.pipeline_factory import open_pipeline
+from gen_data.assemble.config import load_config
 
 with open_pipeline(load_config("tabletop.yaml")) as pipeline:
     pipeline.sample(0)
 """
 _MAKE_BUNDLE = """
 from pathlib import Path
-from gen_data.generator.renderers.warp import kernel_cache
+from gen_data.renderers.warp import kernel_cache
 
 device.BUNDLES = Path(sys.argv[1])
 device.load_kernels(alias, [sys.argv[2]])

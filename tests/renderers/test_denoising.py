@@ -7,12 +7,12 @@ import sys
 import numpy as np
 import pytest
 
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.scene import Body, Light, Scene
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.renderers.warp.renderer import WarpRenderer
-from gen_data.generator.renderers.warp.settings import RenderSettings
+from gen_data.core.capture import Channel
+from gen_data.core.errors import ConfigError
+from gen_data.core.scene import Body, Light, Scene
+from gen_data.core.se3 import SE3
+from gen_data.renderers.warp.renderer import WarpRenderer
+from gen_data.renderers.warp.settings import RenderSettings
 from tests.renderers.fake_library import DARK, MATTE, FakeLibrary, box_mesh, camera_at, room_mesh
 
 DENOISED = RenderSettings(tier="pathtraced", samples=4, denoise=True)

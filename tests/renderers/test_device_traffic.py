@@ -12,19 +12,19 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from benchmarks.bench_device_traffic import Frame, count_frames, counted_traffic, format_callers
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.scene import Camera
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.renderers.warp.device import open_device
-from gen_data.generator.renderers.warp.device_cache import DeviceCache
-from gen_data.generator.renderers.warp.readback import Readback
-from gen_data.generator.renderers.warp.scene.kernels import records
-from gen_data.generator.renderers.warp.scene.scene_packing import pack_view
-from gen_data.generator.renderers.warp.scene.struct_dtypes import take_rows
-from gen_data.generator.renderers.warp.visibility.amodal import clipped_box_px
-from gen_data.generator.renderers.warp.visibility.gbuffer import CORNERS
-from gen_data.generator.renderers.warp.visibility.kernels.amodal import pack_bits
-from gen_data.generator.renderers.warp.visibility.kernels.rasterizer import Z_NEAR_M
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.scene import Camera
+from gen_data.core.se3 import SE3
+from gen_data.renderers.warp.device import open_device
+from gen_data.renderers.warp.device_cache import DeviceCache
+from gen_data.renderers.warp.readback import Readback
+from gen_data.renderers.warp.scene.kernels import records
+from gen_data.renderers.warp.scene.scene_packing import pack_view
+from gen_data.renderers.warp.scene.struct_dtypes import take_rows
+from gen_data.renderers.warp.visibility.amodal import clipped_box_px
+from gen_data.renderers.warp.visibility.gbuffer import CORNERS
+from gen_data.renderers.warp.visibility.kernels.amodal import pack_bits
+from gen_data.renderers.warp.visibility.kernels.rasterizer import Z_NEAR_M
 from tests.renderers.fake_library import FakeLibrary
 
 DOWN = 64_000

@@ -8,16 +8,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gen_data.generator.assets.library import open_library
-from gen_data.generator.core.asset_types import Float32, Material, MeshData
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.scene import Body, Camera, Environment, Instance, Light, Scene, Weather
-from gen_data.generator.core.se3 import SE3, Vec3
-from gen_data.generator.renderers.warp.device import open_device
-from gen_data.generator.renderers.warp.device_cache import DeviceCache
-from gen_data.generator.renderers.warp.renderer import WarpRenderer
-from gen_data.generator.renderers.warp.scene.material_packing import body_materials
-from gen_data.generator.renderers.warp.settings import RenderSettings
+from gen_data.assets.library import open_library
+from gen_data.core.asset_types import Float32, Material, MeshData
+from gen_data.core.capture import Channel
+from gen_data.core.scene import Body, Camera, Environment, Instance, Light, Scene, Weather
+from gen_data.core.se3 import SE3, Vec3
+from gen_data.renderers.warp.device import open_device
+from gen_data.renderers.warp.device_cache import DeviceCache
+from gen_data.renderers.warp.renderer import WarpRenderer
+from gen_data.renderers.warp.scene.material_packing import body_materials
+from gen_data.renderers.warp.settings import RenderSettings
 from tests.renderers.fake_library import DARK, FakeLibrary, box_mesh, camera_at, plane_mesh
 from tests.renderers.paths import ASKED, MET, radiance_of, replicates_of, settings_of
 
@@ -170,8 +170,8 @@ def test_snow_on_a_leaf_hides_the_light_below_it() -> None:
 @pytest.mark.parametrize("azimuth_deg", [0.0, 90.0, 180.0])
 def test_a_crown_is_as_bright_as_in_the_path_tracer(azimuth_deg: float) -> None:
     """Mean luminance of an oak before the sun, beside and after it, within 25 %."""
-    from gen_data.generator.assets.skies.sky import SkyModel
     from gen_data.randomizers.daylight import set_daylight
+    from gen_data.sky.sky import SkyModel
 
     asset = "tree/oak?seed=0"
     library = open_library()

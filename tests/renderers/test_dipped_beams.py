@@ -7,14 +7,14 @@ import math
 import numpy as np
 import pytest
 
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.scene import Body, Light, Scene
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.renderers.warp.renderer import WarpRenderer
-from gen_data.generator.renderers.warp.scene.kernels import records
-from gen_data.generator.renderers.warp.scene.light_selection import dipped_share, main_lamps
-from gen_data.generator.renderers.warp.settings import RenderSettings
+from gen_data.core.capture import Channel
+from gen_data.core.scene import Body, Light, Scene
+from gen_data.core.se3 import SE3
 from gen_data.randomizers.vehicle_lights import dipped_beam
+from gen_data.renderers.warp.renderer import WarpRenderer
+from gen_data.renderers.warp.scene.kernels import records
+from gen_data.renderers.warp.scene.light_selection import dipped_share, main_lamps
+from gen_data.renderers.warp.settings import RenderSettings
 from tests.renderers.fake_library import DARK, MATTE, FakeLibrary, box_mesh, camera_at
 
 BEAMS_CD = (9000.0, 11_500.0, 14_000.0)

@@ -8,19 +8,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gen_data.generator.core.asset_types import Float32, Material
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.scene import Body, Environment, Light, Region, Scene
-from gen_data.generator.core.se3 import SE3, Vec3
-from gen_data.generator.renderers.warp.device import open_device
-from gen_data.generator.renderers.warp.renderer import WarpRenderer
-from gen_data.generator.renderers.warp.scene.environment_maps import (
+from gen_data.core.asset_types import Float32, Material
+from gen_data.core.capture import Channel
+from gen_data.core.scene import Body, Environment, Light, Region, Scene
+from gen_data.core.se3 import SE3, Vec3
+from gen_data.renderers.warp.device import open_device
+from gen_data.renderers.warp.renderer import WarpRenderer
+from gen_data.renderers.warp.scene.environment_maps import (
     SkyLamp,
     remove_peaks,
     upload_environment,
     upload_split,
 )
-from gen_data.generator.renderers.warp.settings import RenderSettings
+from gen_data.renderers.warp.settings import RenderSettings
 from tests.embree import RayCaster, placed
 from tests.renderers.fake_library import (
     MATTE,

@@ -8,16 +8,16 @@ import cv2
 import numpy as np
 import pytest
 
-from gen_data.generator.core.asset_types import MeshData
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.lens import Lens
-from gen_data.generator.core.motion import StateChange
-from gen_data.generator.core.scene import Body, Scene
-from gen_data.generator.core.scene_time import scene_at
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.core.shutter import Shutter
-from gen_data.generator.renderers.warp.renderer import WarpRenderer
+from gen_data.core.asset_types import MeshData
+from gen_data.core.capture import Channel
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.lens import Lens
+from gen_data.core.motion import StateChange
+from gen_data.core.scene import Body, Scene
+from gen_data.core.scene_time import scene_at
+from gen_data.core.se3 import SE3
+from gen_data.core.shutter import Shutter
+from gen_data.renderers.warp.renderer import WarpRenderer
 from tests.renderers.fake_library import FakeLibrary, box_mesh
 from tests.renderers.moving import FACING, LENS, MESHES, STEP_S, even_track, world
 

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
-from gen_data.generator.core.errors import CacheWarning, StorageError
-from gen_data.generator.renderers.warp.kernel_cache import (
+from gen_data.core.errors import CacheWarning, StorageError
+from gen_data.renderers.warp.kernel_cache import (
     fill_cache,
     link_modules,
     private_folder,

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gen_data.generator.core.capture import LidarRays
-from gen_data.generator.core.scene import Body, Instance, Lidar, Scene
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.renderers.warp.renderer import WarpRenderer
+from gen_data.core.capture import LidarRays
+from gen_data.core.scene import Body, Instance, Lidar, Scene
+from gen_data.core.se3 import SE3
+from gen_data.renderers.warp.renderer import WarpRenderer
 from tests.embree import RayCaster, placed
 from tests.renderers.fake_library import FakeLibrary, box_mesh, plane_mesh, room_mesh, sphere_mesh
 

@@ -7,12 +7,12 @@ import math
 import numpy as np
 import pytest
 
-from gen_data.generator.core.asset_types import SURFACES, Material
-from gen_data.generator.core.capture import Channel, LidarHits, LidarRays
-from gen_data.generator.core.scene import Body, Lidar, Scene
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.renderers.warp.lidar.infrared_materials import infrared_fields, oren_nayar
-from gen_data.generator.renderers.warp.renderer import WarpRenderer
+from gen_data.core.asset_types import SURFACES, Material
+from gen_data.core.capture import Channel, LidarHits, LidarRays
+from gen_data.core.scene import Body, Lidar, Scene
+from gen_data.core.se3 import SE3
+from gen_data.renderers.warp.lidar.infrared_materials import infrared_fields, oren_nayar
+from gen_data.renderers.warp.renderer import WarpRenderer
 from tests.renderers.fake_library import FakeLibrary, box_mesh, camera_at, plane_mesh, sphere_mesh
 
 MATTE = Material(base_color=(0.4, 0.4, 0.4), roughness=1.0, specular=0.0)

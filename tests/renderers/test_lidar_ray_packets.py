@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.core.asset_types import Material
-from gen_data.generator.core.capture import LidarHits, LidarRays
-from gen_data.generator.core.motion import Trajectory
-from gen_data.generator.core.scene import Body, Lidar, Scene
-from gen_data.generator.core.se3 import SE3, Array
-from gen_data.generator.core.streams import Streams
-from gen_data.generator.renderers.warp.lidar.kernels.ray_packets import LISTED_MAX
-from gen_data.generator.renderers.warp.lidar.lidar_tracing import RUN
-from gen_data.generator.renderers.warp.renderer import WarpRenderer
+from gen_data.core.asset_types import Material
+from gen_data.core.capture import LidarHits, LidarRays
+from gen_data.core.motion import Trajectory
+from gen_data.core.scene import Body, Lidar, Scene
+from gen_data.core.se3 import SE3, Array
+from gen_data.core.streams import Streams
+from gen_data.renderers.warp.lidar.kernels.ray_packets import LISTED_MAX
+from gen_data.renderers.warp.lidar.lidar_tracing import RUN
+from gen_data.renderers.warp.renderer import WarpRenderer
 from tests.renderers.fake_library import FakeLibrary, box_mesh
 
 SIDE_M = 0.4

@@ -7,14 +7,14 @@ import math
 import numpy as np
 import pytest
 
-from gen_data.generator.core.asset_types import SURFACES, Material
-from gen_data.generator.core.capture import LidarHits, LidarRays
-from gen_data.generator.core.scene import Body, Instance, Lidar, Scene, Weather
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.renderers.warp.lidar.infrared_materials import CLEAR, MIRRORS, oren_nayar
-from gen_data.generator.renderers.warp.renderer import WarpRenderer
-from gen_data.generator.sensors.lidar.lidar_detection import received_light
-from gen_data.generator.sensors.lidar.scan_pattern import lidar_model
+from gen_data.core.asset_types import SURFACES, Material
+from gen_data.core.capture import LidarHits, LidarRays
+from gen_data.core.scene import Body, Instance, Lidar, Scene, Weather
+from gen_data.core.se3 import SE3
+from gen_data.renderers.warp.lidar.infrared_materials import CLEAR, MIRRORS, oren_nayar
+from gen_data.renderers.warp.renderer import WarpRenderer
+from gen_data.sensors.lidar.lidar_detection import received_light
+from gen_data.sensors.lidar.scan_pattern import lidar_model
 from tests.renderers.fake_library import FakeLibrary, box_mesh, plane_mesh
 
 GREY = Material((0.4, 0.4, 0.4), 1.0, specular=0.0)

@@ -11,9 +11,9 @@ from typing import Any
 import pytest
 import warp as wp
 
-from gen_data.generator.core.errors import ConfigError, OutOfMemory, SampleError
-from gen_data.generator.renderers.warp.device import open_device, why_no_gpu
-from gen_data.generator.runner.error_context import explain_errors
+from gen_data.core.errors import ConfigError, OutOfMemory, SampleError
+from gen_data.renderers.warp.device import open_device, why_no_gpu
+from gen_data.runner.error_context import explain_errors
 
 
 @pytest.fixture

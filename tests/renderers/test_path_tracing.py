@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from scipy import integrate
 
-from gen_data.generator.core.asset_types import Material, TextureData
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.scene import Body, Camera, Environment, Light, Scene, Weather
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.renderers.warp.renderer import WarpRenderer
+from gen_data.core.asset_types import Material, TextureData
+from gen_data.core.capture import Channel
+from gen_data.core.scene import Body, Camera, Environment, Light, Scene, Weather
+from gen_data.core.se3 import SE3
+from gen_data.renderers.warp.renderer import WarpRenderer
 from tests.renderers.fake_library import (
     DARK,
     MATTE,
@@ -391,14 +391,14 @@ def test_snow_whitens_and_puddles_mirror() -> None:
 def test_the_other_tier_never_loads_the_kernels_of_paths() -> None:
     """A cold start of the realtime tier takes as long as before."""
     code = (
-        "import sys; from gen_data.generator.renderers.warp.settings import RenderSettings;"
-        "from gen_data.generator.renderers.warp.renderer import WarpRenderer;"
-        "from gen_data.generator.core.capture import Channel; from tests.renderers import "
+        "import sys; from gen_data.renderers.warp.settings import RenderSettings;"
+        "from gen_data.renderers.warp.renderer import WarpRenderer;"
+        "from gen_data.core.capture import Channel; from tests.renderers import "
         "fake_library as f;"
-        "from gen_data.generator.core.scene import Scene;"
+        "from gen_data.core.scene import Scene;"
         "WarpRenderer(f.FakeLibrary({}), 'cpu').render("
         "Scene('t', ()), f.camera_at((0, 0, 1), (1, 0, 1), (8, 8)), frozenset({Channel.RADIANCE}));"
-        "assert 'gen_data.generator.renderers.warp.realtime.realtime_shading' in sys.modules;"
+        "assert 'gen_data.renderers.warp.realtime.realtime_shading' in sys.modules;"
         "loaded = [name for name in sys.modules if '.path' in name and 'renderers' in name];"
         "assert not loaded, loaded"
     )

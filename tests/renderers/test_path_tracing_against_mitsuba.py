@@ -16,12 +16,12 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from gen_data.generator.core.asset_types import Material, TextureData
-from gen_data.generator.core.scene import Body, Camera, Environment, Light, Scene
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.renderers.warp.scene.environment_maps import texel_directions
-from gen_data.generator.sensors.camera.exposure import meter_ev100, saturation_cd_m2
-from gen_data.generator.sensors.camera.isp import display_values
+from gen_data.core.asset_types import Material, TextureData
+from gen_data.core.scene import Body, Camera, Environment, Light, Scene
+from gen_data.core.se3 import SE3
+from gen_data.renderers.warp.scene.environment_maps import texel_directions
+from gen_data.sensors.camera.exposure import meter_ev100, saturation_cd_m2
+from gen_data.sensors.camera.isp import display_values
 from tests.renderers.fake_library import (
     DARK,
     FakeLibrary,

@@ -7,11 +7,11 @@ from typing import Literal
 import numpy as np
 import pytest
 
-from gen_data.generator.core.asset_types import Material, TextureData
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.scene import Body, Environment, Scene
-from gen_data.generator.renderers.warp.renderer import WarpRenderer
-from gen_data.generator.renderers.warp.settings import RenderSettings
+from gen_data.core.asset_types import Material, TextureData
+from gen_data.core.capture import Channel
+from gen_data.core.scene import Body, Environment, Scene
+from gen_data.renderers.warp.renderer import WarpRenderer
+from gen_data.renderers.warp.settings import RenderSettings
 from tests.renderers.fake_library import FakeLibrary, camera_at, plane_mesh
 
 LIGHT = Environment(luminance_cd_m2=100.0)

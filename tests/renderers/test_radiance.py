@@ -7,13 +7,13 @@ import math
 import numpy as np
 import pytest
 
-from gen_data.generator.core.asset_types import Material
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.scene import Body, Camera, Environment, Light, Scene
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.renderers.warp.realtime.realtime_shading import pixel_samples
-from gen_data.generator.renderers.warp.renderer import WarpRenderer
-from gen_data.generator.renderers.warp.settings import RenderSettings
+from gen_data.core.asset_types import Material
+from gen_data.core.capture import Channel
+from gen_data.core.scene import Body, Camera, Environment, Light, Scene
+from gen_data.core.se3 import SE3
+from gen_data.renderers.warp.realtime.realtime_shading import pixel_samples
+from gen_data.renderers.warp.renderer import WarpRenderer
+from gen_data.renderers.warp.settings import RenderSettings
 from tests.renderers.fake_library import (
     DARK,
     FakeLibrary,

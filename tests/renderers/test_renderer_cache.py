@@ -7,15 +7,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from gen_data.generator.core.asset_types import Material, TextureData
-from gen_data.generator.core.bounded_cache import ObjectCache
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.scene import Body, Light, Scene, Weather
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.renderers.warp.device import open_device
-from gen_data.generator.renderers.warp.device_cache import DeviceCache
-from gen_data.generator.renderers.warp.renderer import WarpRenderer
-from gen_data.generator.renderers.warp.scene.scene_packing import pack_world
+from gen_data.core.asset_types import Material, TextureData
+from gen_data.core.bounded_cache import ObjectCache
+from gen_data.core.capture import Channel
+from gen_data.core.scene import Body, Light, Scene, Weather
+from gen_data.core.se3 import SE3
+from gen_data.renderers.warp.device import open_device
+from gen_data.renderers.warp.device_cache import DeviceCache
+from gen_data.renderers.warp.renderer import WarpRenderer
+from gen_data.renderers.warp.scene.scene_packing import pack_world
 from tests.renderers.fake_library import FakeLibrary, box_mesh, camera_at, plane_mesh
 
 CHECKER = TextureData(np.full((4, 4, 3), 128, np.uint8))

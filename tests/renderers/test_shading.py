@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 import warp as wp
 
-from gen_data.generator.core.asset_types import Float32, Material, TextureData
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.scene import Body, Camera, Environment, Light, Scene
-from gen_data.generator.core.se3 import SE3, Vec3
-from gen_data.generator.renderers.warp.device import open_device
-from gen_data.generator.renderers.warp.renderer import WarpRenderer
-from gen_data.generator.renderers.warp.scene.brdf_albedo_lut import lobe_albedo
-from gen_data.generator.renderers.warp.scene.kernels.brdf import make_brdf, specular_lobe
-from gen_data.generator.renderers.warp.settings import RenderSettings
+from gen_data.core.asset_types import Float32, Material, TextureData
+from gen_data.core.capture import Channel
+from gen_data.core.scene import Body, Camera, Environment, Light, Scene
+from gen_data.core.se3 import SE3, Vec3
+from gen_data.renderers.warp.device import open_device
+from gen_data.renderers.warp.renderer import WarpRenderer
+from gen_data.renderers.warp.scene.brdf_albedo_lut import lobe_albedo
+from gen_data.renderers.warp.scene.kernels.brdf import make_brdf, specular_lobe
+from gen_data.renderers.warp.settings import RenderSettings
 from tests.renderers.fake_library import (
     DARK,
     MATTE,

@@ -9,17 +9,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gen_data.generator.core.capture import Channel, SensorReading
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.lens import PINHOLE, Lens
-from gen_data.generator.core.rolling_shutter_projection import project_rolling_shutter, world_points
-from gen_data.generator.core.scene import Body, Scene
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.core.shutter import INSTANT, Shutter
-from gen_data.generator.renderers.warp.frame_context import CameraState, render_view
-from gen_data.generator.renderers.warp.renderer import WarpRenderer
-from gen_data.generator.renderers.warp.shutter_integration import integrate_light, split_slices
-from gen_data.generator.renderers.warp.visibility.reprojection import make_bands, render_bands
+from gen_data.core.capture import Channel, SensorReading
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.lens import PINHOLE, Lens
+from gen_data.core.rolling_shutter_projection import project_rolling_shutter, world_points
+from gen_data.core.scene import Body, Scene
+from gen_data.core.se3 import SE3
+from gen_data.core.shutter import INSTANT, Shutter
+from gen_data.renderers.warp.frame_context import CameraState, render_view
+from gen_data.renderers.warp.renderer import WarpRenderer
+from gen_data.renderers.warp.shutter_integration import integrate_light, split_slices
+from gen_data.renderers.warp.visibility.reprojection import make_bands, render_bands
 from tests.renderers.moving import FACING, LENS, MESHES, even_track, world
 
 LABELS = frozenset(

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import warp as wp
 
-from gen_data.generator.renderers.warp.device import open_device
-from gen_data.generator.renderers.warp.scene.kernels.records import TextureRecord, World
-from gen_data.generator.renderers.warp.scene.kernels.texture_sampling import (
+from gen_data.renderers.warp.device import open_device
+from gen_data.renderers.warp.scene.kernels.records import TextureRecord, World
+from gen_data.renderers.warp.scene.kernels.texture_sampling import (
     SAMPLE_QUAD,
     Sampler,
     make_sampler,

@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 import warp as wp
 
-from gen_data.generator.core.asset_types import Material
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.interfaces import FindTones, Tones
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.scene import Body, Camera, Environment, Light, Scene
-from gen_data.generator.core.se3 import SE3, Vec3, look_at
-from gen_data.generator.renderers.warp.device import open_device
-from gen_data.generator.renderers.warp.renderer import Images, WarpRenderer
-from gen_data.generator.renderers.warp.scene.kernels.ambient_light import interreflected_share
-from gen_data.generator.renderers.warp.settings import RenderSettings
+from gen_data.core.asset_types import Material
+from gen_data.core.capture import Channel
+from gen_data.core.interfaces import FindTones, Tones
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.scene import Body, Camera, Environment, Light, Scene
+from gen_data.core.se3 import SE3, Vec3, look_at
+from gen_data.renderers.warp.device import open_device
+from gen_data.renderers.warp.renderer import Images, WarpRenderer
+from gen_data.renderers.warp.scene.kernels.ambient_light import interreflected_share
+from gen_data.renderers.warp.settings import RenderSettings
 from tests.renderers.fake_library import DARK, MATTE, FakeLibrary, box_mesh, plane_mesh
 
 CHANNELS = frozenset({Channel.RADIANCE, Channel.Z_DEPTH, Channel.NORMALS, Channel.INSTANCE})

@@ -14,12 +14,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from gen_data.generator.core.asset_types import Asset, Material, TextureData
-from gen_data.generator.core.capture import Channel, SensorReading
-from gen_data.generator.core.colorimetry import srgb_encode
-from gen_data.generator.core.errors import SampleError
-from gen_data.generator.core.motion import Trajectory
-from gen_data.generator.core.plates import (
+from gen_data.core.asset_types import Asset, Material, TextureData
+from gen_data.core.capture import Channel, SensorReading
+from gen_data.core.colorimetry import srgb_encode
+from gen_data.core.errors import SampleError
+from gen_data.core.motion import Trajectory
+from gen_data.core.plates import (
     CATCHER,
     EV100,
     WHITE_CD_M2,
@@ -28,10 +28,10 @@ from gen_data.generator.core.plates import (
     fit_camera,
     show_plate,
 )
-from gen_data.generator.core.scene import Body, Camera, Instance, Scene, Weather
-from gen_data.generator.core.se3 import SE3, look_at
-from gen_data.generator.renderers.warp.renderer import WarpRenderer
-from gen_data.generator.renderers.warp.settings import RenderSettings
+from gen_data.core.scene import Body, Camera, Instance, Scene, Weather
+from gen_data.core.se3 import SE3, look_at
+from gen_data.renderers.warp.renderer import WarpRenderer
+from gen_data.renderers.warp.settings import RenderSettings
 from tests.renderers.fake_library import FakeLibrary, box_mesh, plane_mesh, uniform_sky
 
 SIZE_PX = (120, 80)

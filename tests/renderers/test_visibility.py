@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gen_data.generator.core.asset_types import Material, MeshData
-from gen_data.generator.core.capture import Channel, SensorReading
-from gen_data.generator.core.scene import Body, Camera, Instance, Scene
-from gen_data.generator.core.se3 import SE3, Vec3
-from gen_data.generator.renderers.warp.renderer import WarpRenderer
-from gen_data.generator.renderers.warp.settings import RenderSettings
-from gen_data.generator.renderers.warp.visibility.optical_flow import FLOW
+from gen_data.core.asset_types import Material, MeshData
+from gen_data.core.capture import Channel, SensorReading
+from gen_data.core.scene import Body, Camera, Instance, Scene
+from gen_data.core.se3 import SE3, Vec3
+from gen_data.renderers.warp.renderer import WarpRenderer
+from gen_data.renderers.warp.settings import RenderSettings
+from gen_data.renderers.warp.visibility.optical_flow import FLOW
 from tests.renderers.fake_library import (
     FakeLibrary,
     box_mesh,

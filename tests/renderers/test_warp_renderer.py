@@ -10,16 +10,16 @@ import numpy as np
 import psutil
 import pytest
 
-from gen_data.generator.core.asset_types import Material
-from gen_data.generator.core.bounded_cache import ByteCache
-from gen_data.generator.core.capture import Channel, SensorReading
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.scene import Body, Camera, Light, Scene
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.renderers import TABLE
-from gen_data.generator.renderers.warp.renderer import WarpRenderer
-from gen_data.generator.renderers.warp.scene.device_assets import is_convex_solid
-from gen_data.generator.renderers.warp.settings import RenderSettings
+from gen_data.core.asset_types import Material
+from gen_data.core.bounded_cache import ByteCache
+from gen_data.core.capture import Channel, SensorReading
+from gen_data.core.errors import ConfigError
+from gen_data.core.scene import Body, Camera, Light, Scene
+from gen_data.core.se3 import SE3
+from gen_data.renderers import TABLE
+from gen_data.renderers.warp.renderer import WarpRenderer
+from gen_data.renderers.warp.scene.device_assets import is_convex_solid
+from gen_data.renderers.warp.settings import RenderSettings
 from tests.renderers.fake_library import (
     FakeLibrary,
     box_mesh,

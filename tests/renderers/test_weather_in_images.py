@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 import warp as wp
 
-from gen_data.generator.core.asset_types import Material
-from gen_data.generator.core.capture import Channel, SensorReading
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.motion import Trajectory
-from gen_data.generator.core.scene import (
+from gen_data.core.asset_types import Material
+from gen_data.core.capture import Channel, SensorReading
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.motion import Trajectory
+from gen_data.core.scene import (
     Body,
     Camera,
     Environment,
@@ -25,8 +25,8 @@ from gen_data.generator.core.scene import (
     Scene,
     Weather,
 )
-from gen_data.generator.core.se3 import SE3, look_at
-from gen_data.generator.renderers.warp.atmosphere.precipitation import (
+from gen_data.core.se3 import SE3, look_at
+from gen_data.renderers.warp.atmosphere.precipitation import (
     light_level_ev100,
     make_streaks,
     poisson,
@@ -34,12 +34,12 @@ from gen_data.generator.renderers.warp.atmosphere.precipitation import (
     snow,
     usual_exposure_s,
 )
-from gen_data.generator.renderers.warp.device import open_device
-from gen_data.generator.renderers.warp.device_cache import DeviceCache
-from gen_data.generator.renderers.warp.renderer import WarpRenderer
-from gen_data.generator.renderers.warp.scene.light_selection import main_lamps
-from gen_data.generator.renderers.warp.scene.scene_packing import pack_world
-from gen_data.generator.renderers.warp.settings import RenderSettings
+from gen_data.renderers.warp.device import open_device
+from gen_data.renderers.warp.device_cache import DeviceCache
+from gen_data.renderers.warp.renderer import WarpRenderer
+from gen_data.renderers.warp.scene.light_selection import main_lamps
+from gen_data.renderers.warp.scene.scene_packing import pack_world
+from gen_data.renderers.warp.settings import RenderSettings
 from tests.randomizers.doubles import rng_of
 from tests.renderers.fake_library import FakeLibrary, box_mesh, plane_mesh
 

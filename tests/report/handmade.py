@@ -13,22 +13,16 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.core.boxes import BoxPx, OrientedBox
-from gen_data.generator.core.capture import POINT, Capture, Channel, PointCloud, SensorReading
-from gen_data.generator.core.interfaces import (
-    DatasetInfo,
-    Modality,
-    SensorInfo,
-    cloud_path,
-    media_path,
-)
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.sample import ImageTruth, KeypointTruth, MaskPx, ObjectTruth, Sample
-from gen_data.generator.core.scene import Camera, Instance, Lidar, Scene
-from gen_data.generator.core.se3 import IDENTITY, SE3
-from gen_data.generator.core.serialization import to_plain
-from gen_data.generator.runner.labels import labels_line
-from gen_data.generator.runner.plan import Plan, plan_bytes
+from gen_data.core.boxes import BoxPx, OrientedBox
+from gen_data.core.capture import POINT, Capture, Channel, PointCloud, SensorReading
+from gen_data.core.interfaces import DatasetInfo, Modality, SensorInfo, cloud_path, media_path
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.sample import ImageTruth, KeypointTruth, MaskPx, ObjectTruth, Sample
+from gen_data.core.scene import Camera, Instance, Lidar, Scene
+from gen_data.core.se3 import IDENTITY, SE3
+from gen_data.core.serialization import to_plain
+from gen_data.runner.labels import labels_line
+from gen_data.runner.plan import Plan, plan_bytes
 
 WIDTH_PX, HEIGHT_PX = 64, 48
 CAMERA = Camera("color", IDENTITY, Intrinsics.from_hfov(WIDTH_PX, HEIGHT_PX, math.radians(60)))

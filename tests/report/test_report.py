@@ -10,18 +10,11 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from gen_data.generator.cli.report_command import report
-from gen_data.generator.core.errors import StorageError
-from gen_data.generator.report.label_files import (
-    SCANS_MAX,
-    Label,
-    Picture,
-    Points,
-    read_records,
-    read_scans,
-)
-from gen_data.generator.report.label_statistics import Survey, collect_statistics
-from gen_data.generator.report.report_tables import (
+from gen_data.cli.report_command import report
+from gen_data.core.errors import StorageError
+from gen_data.report.label_files import SCANS_MAX, Label, Picture, Points, read_records, read_scans
+from gen_data.report.label_statistics import Survey, collect_statistics
+from gen_data.report.report_tables import (
     DIFFICULTIES,
     TYPES,
     Table,

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from gen_data.generator.report.html_page import format_page
-from gen_data.generator.report.report_data import describe_dataset
+from gen_data.report.html_page import format_page
+from gen_data.report.report_data import describe_dataset
 from tests.report.handmade import HOSTILE, HOSTILE_NAME, make_image, make_object, write_dataset
 
 if TYPE_CHECKING:

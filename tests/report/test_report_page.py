@@ -16,22 +16,17 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from gen_data.generator.cli.report_command import report
-from gen_data.generator.core.boxes import BoxPx
-from gen_data.generator.core.errors import ConfigError, StorageError
-from gen_data.generator.core.sample import KeypointTruth, MaskPx, ObjectTruth
-from gen_data.generator.report.html_page import format_page
-from gen_data.generator.report.image_statistics import (
-    DISTANCE_MAX,
-    ImageFile,
-    group_duplicates,
-    measure_look,
-)
-from gen_data.generator.report.label_checks import CHECKS, LabelChecks
-from gen_data.generator.report.report_data import describe_dataset, without_pictures
-from gen_data.generator.report.sample_browser import evenly_spread
-from gen_data.generator.report.stored_labels import read_images
-from gen_data.generator.runner.stored import StoredSamples
+from gen_data.cli.report_command import report
+from gen_data.core.boxes import BoxPx
+from gen_data.core.errors import ConfigError, StorageError
+from gen_data.core.sample import KeypointTruth, MaskPx, ObjectTruth
+from gen_data.report.html_page import format_page
+from gen_data.report.image_statistics import DISTANCE_MAX, ImageFile, group_duplicates, measure_look
+from gen_data.report.label_checks import CHECKS, LabelChecks
+from gen_data.report.report_data import describe_dataset, without_pictures
+from gen_data.report.sample_browser import evenly_spread
+from gen_data.report.stored_labels import read_images
+from gen_data.runner.stored import StoredSamples
 from tests.report.handmade import HOSTILE, HOSTILE_NAME, make_image, make_object, write_dataset
 
 Json = dict[str, Any]

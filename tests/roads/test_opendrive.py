@@ -9,11 +9,11 @@ from pathlib import Path
 
 import pytest
 
-from gen_data.generator.assets.library import open_library
-from gen_data.generator.core.errors import AssetError, ConfigError
-from gen_data.generator.core.scene import Scene
-from gen_data.generator.roads.opendrive import read_opendrive
-from gen_data.generator.roads.opendrive_lanes import network_lanes, origin_m
+from gen_data.assets.library import open_library
+from gen_data.core.errors import AssetError, ConfigError
+from gen_data.core.scene import Scene
+from gen_data.roads.opendrive import read_opendrive
+from gen_data.roads.opendrive_lanes import network_lanes, origin_m
 from gen_data.scene_templates.road_network import RoadNetwork
 from tests.roads.xodr import LANES, town
 

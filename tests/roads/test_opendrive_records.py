@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gen_data.generator.assets.checking import check_folder
-from gen_data.generator.assets.library import open_library
-from gen_data.generator.assets.roads.network_surface import network_solid
-from gen_data.generator.core.errors import AssetError
-from gen_data.generator.core.scene import Lane
-from gen_data.generator.roads.opendrive import read_opendrive
-from gen_data.generator.roads.opendrive_lanes import network_lanes
+from gen_data.assets.checking import check_folder
+from gen_data.assets.library import open_library
+from gen_data.content.roads.network_surface import network_solid
+from gen_data.core.errors import AssetError
+from gen_data.core.scene import Lane
+from gen_data.roads.opendrive import read_opendrive
+from gen_data.roads.opendrive_lanes import network_lanes
 
 WIDTH = '<width sOffset="0" a="3.5" b="0" c="0" d="0"/>'
 SOLID = '<roadMark sOffset="0" type="solid" width="0.12"/>'

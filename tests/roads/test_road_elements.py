@@ -12,9 +12,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gen_data.generator.assets.library import Library, open_library
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.scene import Lane, Scene
+from gen_data.assets.library import Library, open_library
+from gen_data.core.errors import ConfigError
+from gen_data.core.scene import Lane, Scene
 from gen_data.scene_templates import TABLE
 from gen_data.scene_templates.builder import build_scene
 from gen_data.scene_templates.element import Element

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 from scipy.special import fresnel
 
-from gen_data.generator.roads.reference_line import (
+from gen_data.roads.reference_line import (
     Arc,
     Curve,
     Line,

@@ -7,15 +7,15 @@ import math
 import numpy as np
 import pytest
 
-from gen_data.generator.assets.roads import FAMILIES, TEXTURES
-from gen_data.generator.assets.roads.lane_textures import asphalt_color, asphalt_lane
-from gen_data.generator.assets.roads.markings import stripes
-from gen_data.generator.assets.roads.painted_signs import ARROWS, arrow, word_polygons
-from gen_data.generator.core.asset_types import MeshData
-from gen_data.generator.core.errors import AssetError
-from gen_data.generator.roads.cross_section import RoadShape, height_m
-from gen_data.generator.roads.junction_shape import JunctionShape, make_fan
-from gen_data.generator.roads.roundabout_shape import RoundaboutShape
+from gen_data.content.roads import FAMILIES, TEXTURES
+from gen_data.content.roads.lane_textures import asphalt_color, asphalt_lane
+from gen_data.content.roads.markings import stripes
+from gen_data.content.roads.painted_signs import ARROWS, arrow, word_polygons
+from gen_data.core.asset_types import MeshData
+from gen_data.core.errors import AssetError
+from gen_data.roads.cross_section import RoadShape, height_m
+from gen_data.roads.junction_shape import JunctionShape, make_fan
+from gen_data.roads.roundabout_shape import RoundaboutShape
 
 SLOTS = ("asphalt", "asphalt_new", "marking", "kerb", "pavement", "verge", "ground")
 

@@ -7,13 +7,13 @@ from functools import cache
 import numpy as np
 import pytest
 
-from gen_data.generator.assets.library import Library, open_library
-from gen_data.generator.assets.roads import FAMILIES
-from gen_data.generator.core.asset_types import MeshData
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.scene import Scene
-from gen_data.generator.roads.cross_section import RoadShape, height_m
-from gen_data.generator.roads.junction_shape import JunctionShape, make_fan
+from gen_data.assets.library import Library, open_library
+from gen_data.content.roads import FAMILIES
+from gen_data.core.asset_types import MeshData
+from gen_data.core.errors import ConfigError
+from gen_data.core.scene import Scene
+from gen_data.roads.cross_section import RoadShape, height_m
+from gen_data.roads.junction_shape import JunctionShape, make_fan
 from gen_data.scene_templates.builder import build_scene
 from gen_data.scene_templates.element import Element
 from gen_data.scene_templates.junction import Junction

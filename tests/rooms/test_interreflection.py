@@ -8,21 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.scene import (
-    Body,
-    Camera,
-    Environment,
-    IrradianceVolume,
-    Light,
-    Scene,
-)
-from gen_data.generator.core.se3 import SE3, Vec3, look_at
-from gen_data.generator.renderers.warp.renderer import WarpRenderer
-from gen_data.generator.renderers.warp.settings import RenderSettings
-from gen_data.generator.rooms.interreflection import AXES, Hole, LitRoom, find_interreflection
-from gen_data.generator.rooms.lit_rooms import find_lit_rooms
+from gen_data.core.capture import Channel
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.scene import Body, Camera, Environment, IrradianceVolume, Light, Scene
+from gen_data.core.se3 import SE3, Vec3, look_at
+from gen_data.renderers.warp.renderer import WarpRenderer
+from gen_data.renderers.warp.settings import RenderSettings
+from gen_data.rooms.interreflection import AXES, Hole, LitRoom, find_interreflection
+from gen_data.rooms.lit_rooms import find_lit_rooms
 from tests.rooms.test_layouts import library, nominal
 
 WHITE: Vec3 = (1.0, 1.0, 1.0)

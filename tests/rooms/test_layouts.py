@@ -15,12 +15,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from gen_data.generator.assets.library import Library, open_library
-from gen_data.generator.config import distributions as dist
-from gen_data.generator.core.errors import ConfigError, LayoutRejected
-from gen_data.generator.core.scene import Body, Scene
-from gen_data.generator.core.serialization import canonical_json
-from gen_data.generator.core.streams import Streams
+from gen_data.assets.library import Library, open_library
+from gen_data.config import distributions as dist
+from gen_data.core.errors import ConfigError, LayoutRejected
+from gen_data.core.scene import Body, Scene
+from gen_data.core.serialization import canonical_json
+from gen_data.core.streams import Streams
 from gen_data.randomizers.furnish import Furnish
 from gen_data.scene_templates.builder import build_scene
 from gen_data.scene_templates.room_layout import RoomLayout

@@ -19,13 +19,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from gen_data.generator.assets.families import declared
-from gen_data.generator.assets.library import open_library
-from gen_data.generator.core.interfaces import AssetLibrary
-from gen_data.generator.core.scene import Body, Scene
-from gen_data.generator.core.se3 import SE3, Array
-from gen_data.generator.rooms.resting import turn_to_rest
-from gen_data.generator.rooms.rules import room_types
+from gen_data.assets.families import declared
+from gen_data.assets.library import open_library
+from gen_data.core.interfaces import AssetLibrary
+from gen_data.core.scene import Body, Scene
+from gen_data.core.se3 import SE3, Array
+from gen_data.rooms.resting import turn_to_rest
+from gen_data.rooms.rules import room_types
 from tests.rooms.test_layouts import KINDS, family, furnished, library
 
 HUNG = {

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gen_data.generator.core.keypoint_names import SUPPORT
+from gen_data.core.keypoint_names import SUPPORT
 from tests.embree import RayCaster
 from tests.rooms.test_layouts import library
 

@@ -7,9 +7,9 @@ from functools import cache
 
 import numpy as np
 
-from gen_data.generator.core.asset_types import Material
-from gen_data.generator.core.colorimetry import srgb_encode
-from gen_data.generator.core.scene import Body, Scene
+from gen_data.core.asset_types import Material
+from gen_data.core.colorimetry import srgb_encode
+from gen_data.core.scene import Body, Scene
 from tests.rooms.test_layouts import family, furnished, library, world_vertices
 
 ROOMS = 24

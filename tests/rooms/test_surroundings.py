@@ -7,13 +7,13 @@ import math
 import numpy as np
 import pytest
 
-from gen_data.generator.config import distributions as dist
-from gen_data.generator.core.scene import Body, Scene
-from gen_data.generator.core.streams import Streams
-from gen_data.generator.rooms.outlook import outlook_assets
+from gen_data.config import distributions as dist
+from gen_data.core.scene import Body, Scene
+from gen_data.core.streams import Streams
 from gen_data.randomizers.furnish import Furnish
 from gen_data.randomizers.object_states import ObjectStates
 from gen_data.randomizers.room_lighting import RoomLighting
+from gen_data.rooms.outlook import outlook_assets
 from tests.rooms.test_layouts import family, floors, furnished, heights_m, library, outline
 
 ON, OFF = dist.Constant(True), dist.Constant(False)

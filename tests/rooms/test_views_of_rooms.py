@@ -10,16 +10,16 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from gen_data.generator.annotations.bev_map import BevMap
-from gen_data.generator.assets.library import open_library
-from gen_data.generator.config import distributions as dist
-from gen_data.generator.core.errors import ConfigError, LayoutRejected
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.sample import EgoTruth
-from gen_data.generator.core.scene import Camera, Scene
-from gen_data.generator.core.scene_time import scene_at
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.core.streams import Streams
+from gen_data.annotations.bev_map import BevMap
+from gen_data.assets.library import open_library
+from gen_data.config import distributions as dist
+from gen_data.core.errors import ConfigError, LayoutRejected
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.sample import EgoTruth
+from gen_data.core.scene import Camera, Scene
+from gen_data.core.scene_time import scene_at
+from gen_data.core.se3 import SE3
+from gen_data.core.streams import Streams
 from gen_data.randomizers.ceiling_camera import CeilingCamera
 from gen_data.randomizers.furnish import Furnish
 from gen_data.randomizers.object_states import ObjectStates

@@ -8,8 +8,8 @@ from itertools import combinations
 import cv2
 import numpy as np
 
-from gen_data.generator.assets.interiors.wall_art import is_upright, wall_art
-from gen_data.generator.core.asset_types import UInt8
+from gen_data.content.interiors.wall_art import is_upright, wall_art
+from gen_data.core.asset_types import UInt8
 from tests.rooms.test_layouts import library
 from tests.tiers import seeds
 

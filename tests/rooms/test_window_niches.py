@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gen_data.generator.core.scene import VOLUME_REACH_M, IrradianceVolume
-from gen_data.generator.core.se3 import Vec3
-from gen_data.generator.rooms.interreflection import AXES, Hole, LitRoom
-from gen_data.generator.rooms.window_niches import find_niches
+from gen_data.core.scene import VOLUME_REACH_M, IrradianceVolume
+from gen_data.core.se3 import Vec3
+from gen_data.rooms.interreflection import AXES, Hole, LitRoom
+from gen_data.rooms.window_niches import find_niches
 
 ROOM_CD_M2, OUTSIDE_CD_M2 = 40.0, 900.0
 GREY: tuple[Vec3, ...] = ((0.5, 0.5, 0.5),) * 6

@@ -17,24 +17,18 @@ from pathlib import Path
 
 import numpy as np
 
-from gen_data.generator.core.boxes import BoxPx
-from gen_data.generator.core.capture import Capture, Channel, SensorReading
-from gen_data.generator.core.errors import Rejection, SampleError, SceneRejected
-from gen_data.generator.core.interfaces import (
-    DatasetInfo,
-    Exporter,
-    Modality,
-    SensorInfo,
-    media_path,
-)
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.sample import ImageTruth, MaskPx, ObjectTruth, Sample
-from gen_data.generator.core.scene import Camera, Instance, Light, Scene
-from gen_data.generator.core.se3 import IDENTITY
-from gen_data.generator.core.serialization import canonical_json
-from gen_data.generator.core.streams import Streams
-from gen_data.generator.runner.plan import Plan
-from gen_data.generator.runner.run import Settings, Summary, run
+from gen_data.core.boxes import BoxPx
+from gen_data.core.capture import Capture, Channel, SensorReading
+from gen_data.core.errors import Rejection, SampleError, SceneRejected
+from gen_data.core.interfaces import DatasetInfo, Exporter, Modality, SensorInfo, media_path
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.sample import ImageTruth, MaskPx, ObjectTruth, Sample
+from gen_data.core.scene import Camera, Instance, Light, Scene
+from gen_data.core.se3 import IDENTITY
+from gen_data.core.serialization import canonical_json
+from gen_data.core.streams import Streams
+from gen_data.runner.plan import Plan
+from gen_data.runner.run import Settings, Summary, run
 
 WIDTH_PX, HEIGHT_PX = 8, 6
 CATEGORIES = ("bowl", "mug")

@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 import sys
 
-from gen_data.generator.core.errors import GenDataError
+from gen_data.core.errors import GenDataError
 from tests.runner.doubles import Trouble, make
 
 N, SHARD_SIZE = 24, 2

@@ -20,9 +20,9 @@ import time
 from collections import Counter
 from dataclasses import dataclass, field, replace
 
-from gen_data.generator.core.errors import GenDataError, Interrupted, StorageError, WorkerLost
-from gen_data.generator.runner.supervisor import Limits, Supervisor
-from gen_data.generator.runner.worker_events import (
+from gen_data.core.errors import GenDataError, Interrupted, StorageError, WorkerLost
+from gen_data.runner.supervisor import Limits, Supervisor
+from gen_data.runner.worker_events import (
     Abort,
     Action,
     Assign,

@@ -14,12 +14,12 @@ from typing import Any
 
 import pytest
 
-from gen_data.generator.core.asset_types import Asset
-from gen_data.generator.core.interfaces import DatasetInfo, Publication
-from gen_data.generator.runner.data_card import DatasetFacts, croissant_json, data_card
-from gen_data.generator.runner.licence_table import licence_table, licences_in
-from gen_data.generator.runner.run import Settings
-from gen_data.generator.runner.shard_record import SplitCount
+from gen_data.core.asset_types import Asset
+from gen_data.core.interfaces import DatasetInfo, Publication
+from gen_data.runner.data_card import DatasetFacts, croissant_json, data_card
+from gen_data.runner.licence_table import licence_table, licences_in
+from gen_data.runner.run import Settings
+from gen_data.runner.shard_record import SplitCount
 from tests.runner.doubles import FakePipeline, Trouble, fake_plan, make
 
 PUBLICATION = Publication(

@@ -10,20 +10,20 @@ from typing import Any
 
 import pytest
 
-from gen_data.generator.core.errors import (
+from gen_data.core.errors import (
     OutOfMemory,
     SampleError,
     SampleIndexError,
     StorageError,
     WorkerLost,
 )
-from gen_data.generator.runner.deep_verify import choose_samples
-from gen_data.generator.runner.diff import compare
-from gen_data.generator.runner.failed_sample import FailedSample
-from gen_data.generator.runner.run import Limits, Settings
-from gen_data.generator.runner.sample_stages import SampleFiles
-from gen_data.generator.runner.stored import StoredSamples
-from gen_data.generator.runner.verify import verify
+from gen_data.runner.deep_verify import choose_samples
+from gen_data.runner.diff import compare
+from gen_data.runner.failed_sample import FailedSample
+from gen_data.runner.run import Limits, Settings
+from gen_data.runner.sample_stages import SampleFiles
+from gen_data.runner.stored import StoredSamples
+from gen_data.runner.verify import verify
 from tests.runner.doubles import Trouble, make, tree_digest, write_raw_images
 
 SKIP = Settings(write_media=write_raw_images, skip_failed=True)

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import gen_data
+from gen_data.core.capture import POINT, Channel
+from gen_data.core.errors import StorageError
 from gen_data.exporters.png import RowFilter, encode_png
-from gen_data.generator.core.capture import POINT, Channel
-from gen_data.generator.core.errors import StorageError
-from gen_data.generator.runner.stored import StoredSamples
+from gen_data.runner.stored import StoredSamples
 
 pytestmark = pytest.mark.filterwarnings("ignore:splits")
 

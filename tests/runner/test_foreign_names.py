@@ -14,19 +14,19 @@ from typing import Any
 import fsspec
 import pytest
 
+from gen_data.assets.folder_index import MeshEntry
+from gen_data.core.errors import StorageError
+from gen_data.core.path_names import check_inner_path, check_name
+from gen_data.core.serialization import canonical_json
 from gen_data.exporters.label_map import LabelMap
-from gen_data.generator.assets.folder_index import MeshEntry
-from gen_data.generator.core.errors import StorageError
-from gen_data.generator.core.path_names import check_inner_path, check_name
-from gen_data.generator.core.serialization import canonical_json
-from gen_data.generator.runner.labels import parse_labels
-from gen_data.generator.runner.merge import common_plan, gather_shards
-from gen_data.generator.runner.object_store import ObjectFolder, copy_outline
-from gen_data.generator.runner.run import Settings
-from gen_data.generator.runner.shard_record import parse_record, parse_unchecked_record
-from gen_data.generator.runner.store import LocalStore
-from gen_data.generator.runner.stored import StoredSamples
-from gen_data.generator.runner.stored_objects import StoredObjects
+from gen_data.runner.labels import parse_labels
+from gen_data.runner.merge import common_plan, gather_shards
+from gen_data.runner.object_store import ObjectFolder, copy_outline
+from gen_data.runner.run import Settings
+from gen_data.runner.shard_record import parse_record, parse_unchecked_record
+from gen_data.runner.store import LocalStore
+from gen_data.runner.stored import StoredSamples
+from gen_data.runner.stored_objects import StoredObjects
 from tests.runner.doubles import make, write_raw_images
 
 UP = "../../../../../../marker.txt"

@@ -7,13 +7,13 @@ from typing import NoReturn
 
 import pytest
 
-from gen_data.generator.core.errors import StorageError
-from gen_data.generator.runner import merge, store
-from gen_data.generator.runner.free_space import DOCUMENTS_BYTES, RESERVE_BYTES, SpaceCheck
-from gen_data.generator.runner.merge import gather_shards
-from gen_data.generator.runner.plan import plan_bytes
-from gen_data.generator.runner.run import Settings
-from gen_data.generator.runner.store import LocalStore
+from gen_data.core.errors import StorageError
+from gen_data.runner import merge, store
+from gen_data.runner.free_space import DOCUMENTS_BYTES, RESERVE_BYTES, SpaceCheck
+from gen_data.runner.merge import gather_shards
+from gen_data.runner.plan import plan_bytes
+from gen_data.runner.run import Settings
+from gen_data.runner.store import LocalStore
 from tests.runner.doubles import fake_plan, make, write_raw_images
 
 FREE_BYTES = 8_000_000

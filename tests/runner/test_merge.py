@@ -7,18 +7,13 @@ from pathlib import Path
 
 import pytest
 
-from gen_data.generator.api.generate import check_shards
-from gen_data.generator.core.errors import (
-    ConfigError,
-    DeterminismError,
-    NumericsError,
-    StorageError,
-)
-from gen_data.generator.runner.merge import common_plan, gather_shards
-from gen_data.generator.runner.numerics_guard import NUMERICS_NAME
-from gen_data.generator.runner.run import Settings
-from gen_data.generator.runner.store import LocalStore
-from gen_data.generator.runner.verify import find_deviations
+from gen_data.api.generate import check_shards
+from gen_data.core.errors import ConfigError, DeterminismError, NumericsError, StorageError
+from gen_data.runner.merge import common_plan, gather_shards
+from gen_data.runner.numerics_guard import NUMERICS_NAME
+from gen_data.runner.run import Settings
+from gen_data.runner.store import LocalStore
+from gen_data.runner.verify import find_deviations
 from tests.runner.doubles import make, tree_digest, write_raw_images
 
 N, SHARD_SIZE = 11, 2

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from gen_data.generator.core.errors import NumericsError
-from gen_data.generator.runner.numerics_guard import admit_numerics
-from gen_data.generator.runner.shard import Job
-from gen_data.generator.runner.store import LocalStore
-from gen_data.generator.runner.supervisor import Supervisor
-from gen_data.generator.runner.worker_events import Assign, Failed, Note, Ready
+from gen_data.core.errors import NumericsError
+from gen_data.runner.numerics_guard import admit_numerics
+from gen_data.runner.shard import Job
+from gen_data.runner.store import LocalStore
+from gen_data.runner.supervisor import Supervisor
+from gen_data.runner.worker_events import Assign, Failed, Note, Ready
 from tests.runner.doubles import FakeFactory, FakePipeline, Trouble, fake_plan
 
 

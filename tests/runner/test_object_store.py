@@ -15,28 +15,17 @@ from typing import Any
 import fsspec
 import pytest
 
-from gen_data.generator.api.generate import generate
-from gen_data.generator.cli.main import cli
-from gen_data.generator.core.errors import (
-    ConfigError,
-    DeterminismError,
-    StorageError,
-    VerificationError,
-)
-from gen_data.generator.runner import object_store
-from gen_data.generator.runner.object_store import ObjectFolder, copy_outline, open_store
-from gen_data.generator.runner.progress import RunProgress
-from gen_data.generator.runner.run import Settings, Summary, run
-from gen_data.generator.runner.stored import StoredSamples
-from gen_data.generator.runner.stored_objects import open_stored
-from gen_data.generator.runner.verify import find_deviations
-from tests.runner.doubles import (
-    FakeFactory,
-    fake_plan,
-    make,
-    tree_digest,
-    write_raw_images,
-)
+from gen_data.api.generate import generate
+from gen_data.cli.main import cli
+from gen_data.core.errors import ConfigError, DeterminismError, StorageError, VerificationError
+from gen_data.runner import object_store
+from gen_data.runner.object_store import ObjectFolder, copy_outline, open_store
+from gen_data.runner.progress import RunProgress
+from gen_data.runner.run import Settings, Summary, run
+from gen_data.runner.stored import StoredSamples
+from gen_data.runner.stored_objects import open_stored
+from gen_data.runner.verify import find_deviations
+from tests.runner.doubles import FakeFactory, fake_plan, make, tree_digest, write_raw_images
 from tests.runner.fake_run import SHARD_SIZE, N
 from tests.runner.test_processes import ROOT, wait_for
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from gen_data.generator.core.errors import StorageError
-from gen_data.generator.runner.plan import compare_plans, load_plan, plan_bytes, write_plan
+from gen_data.core.errors import StorageError
+from gen_data.runner.plan import compare_plans, load_plan, plan_bytes, write_plan
 from tests.runner.doubles import fake_plan
 
 

@@ -14,10 +14,10 @@ from pathlib import Path
 
 import pytest
 
-from gen_data.generator.core.errors import OutOfMemory, SampleError, SceneRejected, WorkerLost
-from gen_data.generator.runner.processes import StandbyWorker, open_worker_pool
-from gen_data.generator.runner.run import Limits, Settings
-from gen_data.generator.runner.worker import make_sendable
+from gen_data.core.errors import OutOfMemory, SampleError, SceneRejected, WorkerLost
+from gen_data.runner.processes import StandbyWorker, open_worker_pool
+from gen_data.runner.run import Limits, Settings
+from gen_data.runner.worker import make_sendable
 from tests.runner.doubles import RESUME, Trouble, make, notes_of, tree_digest, write_raw_images
 
 ROOT = Path(__file__).parents[2]

@@ -13,9 +13,9 @@ from typing import Any
 
 import pytest
 
-from gen_data.generator.core.errors import ConfigError, Interrupted
-from gen_data.generator.runner.ray_cluster import RayCluster
-from gen_data.generator.runner.run import Settings, Summary, run
+from gen_data.core.errors import ConfigError, Interrupted
+from gen_data.runner.ray_cluster import RayCluster
+from gen_data.runner.run import Settings, Summary, run
 from tests.runner.doubles import (
     FakeFactory,
     Trouble,

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from gen_data.generator.core.errors import DeterminismError, StorageError
-from gen_data.generator.runner.run import Settings
-from gen_data.generator.runner.verify import find_deviations
+from gen_data.core.errors import DeterminismError, StorageError
+from gen_data.runner.run import Settings
+from gen_data.runner.verify import find_deviations
 from tests.runner.doubles import make, tree_digest, write_raw_images
 
 N, SHARD_SIZE = 6, 2

@@ -11,10 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gen_data.generator.runner.resident_memory import (
-    release_memory,
-    resident_file_bytes,
-)
+from gen_data.runner.resident_memory import release_memory, resident_file_bytes
 
 SIZE = 8 << 20
 
@@ -74,7 +71,7 @@ def test_modified_pages_that_became_read_only_are_kept(tmp_path: Path) -> None:
 
 FILL_AND_TRIM = """
 import ctypes
-from gen_data.generator.runner.resident_memory import (
+from gen_data.runner.resident_memory import (
     HEAP_GROWTH_BYTES, HeapTrimmer, private_bytes
 )
 

@@ -12,13 +12,13 @@ import cv2
 import numpy as np
 import pytest
 
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.interfaces import DatasetInfo
-from gen_data.generator.core.sample import Sample
-from gen_data.generator.runner.diff import compare
-from gen_data.generator.runner.regeneration import write_alone
-from gen_data.generator.runner.run import Settings
-from gen_data.generator.runner.sample_stages import STAGES, SampleFiles, compare_samples
+from gen_data.core.capture import Channel
+from gen_data.core.interfaces import DatasetInfo
+from gen_data.core.sample import Sample
+from gen_data.runner.diff import compare
+from gen_data.runner.regeneration import write_alone
+from gen_data.runner.run import Settings
+from gen_data.runner.sample_stages import STAGES, SampleFiles, compare_samples
 from tests.runner.doubles import HEIGHT_PX, WIDTH_PX, FakePipeline, Trouble, fake_sample, make
 
 INDEX = 3

@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 
-from gen_data.generator.core.errors import Interrupted, StorageError, WorkerLost
-from gen_data.generator.runner.supervisor import State, Supervisor
-from gen_data.generator.runner.worker_events import Action, Exited
+from gen_data.core.errors import Interrupted, StorageError, WorkerLost
+from gen_data.runner.supervisor import State, Supervisor
+from gen_data.runner.worker_events import Action, Exited
 from tests.runner.simulation import Run
 
 SEEDS = range(300)

@@ -17,7 +17,7 @@ import pathlib, signal, sys, time
 import click
 # nohup(1), as around a whole test run, lets children ignore it.
 signal.signal(signal.SIGHUP, signal.SIG_DFL)
-from gen_data.generator.cli import main as command_line, stop_signals
+from gen_data.cli import main as command_line, stop_signals
 stop_signals.PATIENCE_S = 1.0
 def begun():
     pathlib.Path(sys.argv[1]).touch()

@@ -15,19 +15,19 @@ from pathlib import Path
 import pytest
 
 import gen_data
-from gen_data.generator.core.capture import Capture
-from gen_data.generator.core.errors import ConfigError, DeterminismError, SampleError, StorageError
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.sample import Sample
-from gen_data.generator.core.scene import Body, Camera, Scene
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.runner import durable_files
-from gen_data.generator.runner.plan import load_plan
-from gen_data.generator.runner.provenance import parse_scene, scene_line
-from gen_data.generator.runner.run import run
-from gen_data.generator.runner.shard import Job, make_shard
-from gen_data.generator.runner.store import FolderState, LocalStore
-from gen_data.generator.runner.verify import verify
+from gen_data.core.capture import Capture
+from gen_data.core.errors import ConfigError, DeterminismError, SampleError, StorageError
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.sample import Sample
+from gen_data.core.scene import Body, Camera, Scene
+from gen_data.core.se3 import SE3
+from gen_data.runner import durable_files
+from gen_data.runner.plan import load_plan
+from gen_data.runner.provenance import parse_scene, scene_line
+from gen_data.runner.run import run
+from gen_data.runner.shard import Job, make_shard
+from gen_data.runner.store import FolderState, LocalStore
+from gen_data.runner.verify import verify
 from tests.runner.doubles import (
     RESUME,
     FakeFactory,
@@ -589,7 +589,7 @@ def test_the_power_cut_harness_catches_a_missing_fsync(
     mutant: object,
 ) -> None:
     """With one kind of fsync planted out, a cut after the end damages a finished data set."""
-    monkeypatch.setattr(f"gen_data.generator.runner.{place}", mutant)
+    monkeypatch.setattr(f"gen_data.runner.{place}", mutant)
 
     survived = [
         survives_power_cut(tmp_path, monkeypatch, reference_digest, 0, seed) for seed in range(12)
@@ -630,7 +630,7 @@ def test_a_run_that_will_not_fit_stops_after_its_first_shard(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """6 of 10 samples to go at about 1.2 kB each: 2 kB free are not enough, the shard stays."""
-    monkeypatch.setattr("gen_data.generator.runner.store.free_bytes", lambda path: 2_000)
+    monkeypatch.setattr("gen_data.runner.store.free_bytes", lambda path: 2_000)
 
     with pytest.raises(StorageError, match="other 6 samples need about") as caught:
         make(tmp_path / "out")

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import pytest
 
-from gen_data.generator.core.errors import (
+from gen_data.core.errors import (
     AssetError,
     GenDataError,
     Interrupted,
@@ -16,8 +16,8 @@ from gen_data.generator.core.errors import (
     StorageError,
     WorkerLost,
 )
-from gen_data.generator.runner.supervisor import Limits, Supervisor
-from gen_data.generator.runner.worker_events import (
+from gen_data.runner.supervisor import Limits, Supervisor
+from gen_data.runner.worker_events import (
     Abort,
     Action,
     Assign,

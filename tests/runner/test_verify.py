@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from gen_data.generator.core.errors import VerificationError
-from gen_data.generator.runner.verify import find_deviations, verify
+from gen_data.core.errors import VerificationError
+from gen_data.runner.verify import find_deviations, verify
 from tests.runner.doubles import make
 
 

@@ -21,7 +21,7 @@ PIPE_BYTES = 65_536
 AT_BIRTH = """
 import os, signal, sys
 # The command that starts a worker names its module; helpers of the standard library do not.
-if any("gen_data.generator.runner.worker" in a for a in sys.orig_argv):
+if any("gen_data.runner.worker" in a for a in sys.orig_argv):
     try:
         os.close(os.open({marker!r}, os.O_CREAT | os.O_EXCL))
     except FileExistsError:
@@ -93,7 +93,7 @@ def test_a_signal_while_a_worker_starts_ends_the_run(
 
 def test_a_worker_that_cannot_be_imported_is_reported_in_the_run_folder(tmp_path: Path) -> None:
     """The terminal shows no traceback of a process that the user never started."""
-    environment = with_action_at_birth(tmp_path, "sys.modules['gen_data.generator.runner'] = None")
+    environment = with_action_at_birth(tmp_path, "sys.modules['gen_data.runner'] = None")
 
     process = start_fake_run(tmp_path / "out", 1, 0.0, environment=environment)
     message = finish(process)
@@ -120,7 +120,7 @@ def test_a_worker_that_cannot_be_killed_does_not_keep_the_run(tmp_path: Path) ->
     program = (
         "import subprocess, sys, types\n"
         "from tests.runner import fake_run\n"
-        "from gen_data.generator.runner import processes\n"
+        "from gen_data.runner import processes\n"
         "processes.JOIN_S = 0.2\n"
         "subprocess.Popen.kill = lambda self: None\n"
         "sys.exit(fake_run.main())\n"

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from gen_data.generator.core.errors import AssetError, ConfigError
-from gen_data.generator.core.scene import Scene
+from gen_data.core.errors import AssetError, ConfigError
+from gen_data.core.scene import Scene
 from gen_data.scene_templates import TABLE
 from gen_data.scene_templates.builder import build_scene
 from gen_data.scene_templates.element import Element

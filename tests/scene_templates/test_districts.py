@@ -7,15 +7,15 @@ from functools import cache
 import numpy as np
 import pytest
 
-from gen_data.generator.assemble.config import Config, load_config
-from gen_data.generator.assets.library import Library, open_library
-from gen_data.generator.config.distributions import Constant
-from gen_data.generator.config.problems import Problems
-from gen_data.generator.config.shared_values import resolve_shared
-from gen_data.generator.config.validation import validate
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.scene import Scene, SharedValue
-from gen_data.generator.core.streams import Streams
+from gen_data.assemble.config import Config, load_config
+from gen_data.assets.library import Library, open_library
+from gen_data.config.distributions import Constant
+from gen_data.config.problems import Problems
+from gen_data.config.shared_values import resolve_shared
+from gen_data.config.validation import validate
+from gen_data.core.errors import ConfigError
+from gen_data.core.scene import Scene, SharedValue
+from gen_data.core.streams import Streams
 from gen_data.randomizers.lane_objects import LaneObjects as DrawLaneObjects
 from gen_data.randomizers.weather import PRESETS
 from gen_data.scene_templates.builder import build_scene

@@ -8,12 +8,12 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from gen_data.generator.assets.library import Library, open_library
-from gen_data.generator.assets.roads import FAMILIES
-from gen_data.generator.assets.scenery.farmland_things import power_pylon
-from gen_data.generator.core.errors import AssetError, ConfigError
-from gen_data.generator.core.scene import Scene
-from gen_data.generator.roads.fields_shape import FieldsShape
+from gen_data.assets.library import Library, open_library
+from gen_data.content.roads import FAMILIES
+from gen_data.content.scenery.farmland_things import power_pylon
+from gen_data.core.errors import AssetError, ConfigError
+from gen_data.core.scene import Scene
+from gen_data.roads.fields_shape import FieldsShape
 from gen_data.scene_templates.builder import build_scene
 from gen_data.scene_templates.element import Element
 from gen_data.scene_templates.fields import Fields

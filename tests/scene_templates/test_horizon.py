@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from gen_data.generator.assets.library import Library, open_library
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.scene import Scene
+from gen_data.assets.library import Library, open_library
+from gen_data.core.errors import ConfigError
+from gen_data.core.scene import Scene
 from gen_data.scene_templates.horizon import Horizon, convex_outline, offset_outline
 from gen_data.scene_templates.road import Road
 

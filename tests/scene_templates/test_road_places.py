@@ -8,10 +8,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-from gen_data.generator.assets.library import Library, open_library
-from gen_data.generator.assets.scenery.shelters import pump_islands_m
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.scene import Scene
+from gen_data.assets.library import Library, open_library
+from gen_data.content.scenery.shelters import pump_islands_m
+from gen_data.core.errors import ConfigError
+from gen_data.core.scene import Scene
 from gen_data.scene_templates.builder import build_scene
 from gen_data.scene_templates.element import Element
 from gen_data.scene_templates.level_crossing import LevelCrossing

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gen_data.generator.core.errors import AssetError
-from gen_data.generator.core.scene import Scene
+from gen_data.core.errors import AssetError
+from gen_data.core.scene import Scene
 from gen_data.scene_templates.robot import Robot
 from tests.randomizers.doubles import FakeAssets, two_link_arm
 

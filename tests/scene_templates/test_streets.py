@@ -8,9 +8,9 @@ from functools import cache
 import numpy as np
 import pytest
 
-from gen_data.generator.assets.library import Library, open_library
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.scene import Body, Scene
+from gen_data.assets.library import Library, open_library
+from gen_data.core.errors import ConfigError
+from gen_data.core.scene import Body, Scene
 from gen_data.scene_templates.builder import build_scene
 from gen_data.scene_templates.junction import Junction
 from gen_data.scene_templates.lane_objects import LaneObjects

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.core.asset_types import MeshData
-from gen_data.generator.core.bounded_cache import ObjectCache
+from gen_data.core.asset_types import MeshData
+from gen_data.core.bounded_cache import ObjectCache
 from tests.embree import RayCaster
 
 Array = NDArray[np.float64]

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from gen_data.generator.assets.procedural.patches import join_patches
-from gen_data.generator.assets.scenery.awnings import awning_cloth, hanging_cloth
+from gen_data.content.procedural.patches import join_patches
+from gen_data.content.scenery.awnings import awning_cloth, hanging_cloth
 
 
 def test_an_awning_sags_between_its_bars_and_has_two_sides() -> None:

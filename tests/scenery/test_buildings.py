@@ -8,17 +8,17 @@ from functools import cache
 import numpy as np
 import pytest
 
-from gen_data.generator.assets.family import Solid
-from gen_data.generator.assets.library import open_library
-from gen_data.generator.assets.scenery.building_designs import (
+from gen_data.assets.family import Solid
+from gen_data.assets.library import open_library
+from gen_data.content.scenery.building_designs import (
     REGIONS,
     STYLES,
     TEXTURE_ALBEDOS,
     building_materials,
     draw_design,
 )
-from gen_data.generator.assets.scenery.buildings import building, building_facts
-from gen_data.generator.core.colorimetry import luminance, srgb_decode
+from gen_data.content.scenery.buildings import building, building_facts
+from gen_data.core.colorimetry import luminance, srgb_decode
 from tests.every_value import for_every
 from tests.scenery.rays import cast
 

@@ -7,12 +7,12 @@ from functools import cache
 import numpy as np
 import pytest
 
-from gen_data.generator.assets.scenery.branching import Lobe, grow_skeleton, points_in
-from gen_data.generator.assets.scenery.textures.leaves import leaves
-from gen_data.generator.assets.scenery.trees import SPECIES, tree, tree_facts
-from gen_data.generator.core.asset_types import MeshData
-from gen_data.generator.core.colorimetry import luminance
-from gen_data.generator.core.variant_rng import variant_rng
+from gen_data.content.scenery.branching import Lobe, grow_skeleton, points_in
+from gen_data.content.scenery.textures.leaves import leaves
+from gen_data.content.scenery.trees import SPECIES, tree, tree_facts
+from gen_data.core.asset_types import MeshData
+from gen_data.core.colorimetry import luminance
+from gen_data.core.variant_rng import variant_rng
 from tests.scenery.rays import cast
 
 LEAFY = [name for name in SPECIES if name != "conifer"]

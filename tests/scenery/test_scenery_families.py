@@ -8,10 +8,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-from gen_data.generator.assets.families import own_families
-from gen_data.generator.assets.family import Solid
-from gen_data.generator.assets.scenery import FAMILIES, TEXTURES
-from gen_data.generator.core.errors import AssetError
+from gen_data.assets.families import own_families
+from gen_data.assets.family import Solid
+from gen_data.content.scenery import FAMILIES, TEXTURES
+from gen_data.core.errors import AssetError
 from tests.every_value import for_every
 from tests.scenery.clutter_limits import CLUTTER
 from tests.tiers import first_and_all

@@ -5,13 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gen_data.generator.assets.scenery.signs import (
-    SIGNS,
-    plate_outline,
-    traffic_sign,
-    traffic_sign_facts,
-)
-from gen_data.generator.assets.scenery.textures import sign_faces
+from gen_data.content.scenery.signs import SIGNS, plate_outline, traffic_sign, traffic_sign_facts
+from gen_data.content.scenery.textures import sign_faces
 
 # Which colours a sign must show, by the convention's annex 1, and which it must not.
 SHOWS = {

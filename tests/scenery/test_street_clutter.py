@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gen_data.generator.assets.family import Solid
-from gen_data.generator.assets.scenery import FAMILIES
-from gen_data.generator.assets.scenery.utility_lines import utility_pole
-from gen_data.generator.core.asset_types import Asset
-from gen_data.generator.core.errors import AssetError
-from gen_data.generator.core.scene import Body, Scene
-from gen_data.generator.core.se3 import SE3, Vec3
+from gen_data.assets.family import Solid
+from gen_data.content.scenery import FAMILIES
+from gen_data.content.scenery.utility_lines import utility_pole
+from gen_data.core.asset_types import Asset
+from gen_data.core.errors import AssetError
+from gen_data.core.scene import Body, Scene
+from gen_data.core.se3 import SE3, Vec3
 from gen_data.randomizers.free_space import Footprint, is_clear, make_ground
 from tests.randomizers.doubles import FakeAssets
 from tests.scenery.clutter_limits import CLUTTER

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gen_data.generator.assets.family import Worn
-from gen_data.generator.assets.scenery import FAMILIES, TEXTURES
+from gen_data.assets.family import Worn
+from gen_data.content.scenery import FAMILIES, TEXTURES
 from tests.every_value import for_every
 
 GRIMY = sorted(name for name, family in FAMILIES.items() if isinstance(family.build, Worn))

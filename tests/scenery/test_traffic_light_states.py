@@ -9,16 +9,16 @@ import pytest
 from pydantic import ValidationError
 from scipy.stats import chisquare
 
-from gen_data.generator.assets.library import Library, open_library
-from gen_data.generator.assets.scenery.traffic_lights import (
+from gen_data.assets.library import Library, open_library
+from gen_data.content.scenery.traffic_lights import (
     PEDESTRIAN_LENSES,
     VEHICLE_LENSES,
     pedestrian_signal,
     traffic_light,
 )
-from gen_data.generator.core.scene import Body, Instance, Scene
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.core.streams import Rng, Streams
+from gen_data.core.scene import Body, Instance, Scene
+from gen_data.core.se3 import SE3
+from gen_data.core.streams import Rng, Streams
 from gen_data.randomizers.traffic_lights import COLORS, TrafficLights
 
 Draw = Callable[..., Scene]

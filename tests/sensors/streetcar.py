@@ -8,20 +8,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from gen_data.generator.core.asset_types import SURFACES
-from gen_data.generator.core.capture import (
-    Channel,
-    LidarHits,
-    LidarRays,
-    Measurements,
-    SensorReading,
-)
-from gen_data.generator.core.motion import Trajectory
-from gen_data.generator.core.scene import Body, Camera, Instance, Lane, Lidar, Rig, Scene
-from gen_data.generator.core.scene_time import add_twists, place_sensors, scene_at
-from gen_data.generator.core.se3 import SE3, Vec3
-from gen_data.generator.core.streams import Rng, Streams
-from gen_data.generator.sensors.mounting import Instrument
+from gen_data.core.asset_types import SURFACES
+from gen_data.core.capture import Channel, LidarHits, LidarRays, Measurements, SensorReading
+from gen_data.core.motion import Trajectory
+from gen_data.core.scene import Body, Camera, Instance, Lane, Lidar, Rig, Scene
+from gen_data.core.scene_time import add_twists, place_sensors, scene_at
+from gen_data.core.se3 import SE3, Vec3
+from gen_data.core.streams import Rng, Streams
+from gen_data.sensors.mounting import Instrument
 
 CAR_M = ((-2.2, -0.9, 0.0), (2.2, 0.9, 1.5))
 PERSON_M = ((-0.25, -0.3, 0.0), (0.25, 0.3, 1.8))

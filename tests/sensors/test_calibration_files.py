@@ -15,11 +15,11 @@ import cv2
 import numpy as np
 import pytest
 
-from gen_data.generator.assemble.config import load_config
-from gen_data.generator.core.errors import ConfigError, ConfigWarning
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.se3 import SE3, Array
-from gen_data.generator.core.serialization import canonical_json
+from gen_data.assemble.config import load_config
+from gen_data.core.errors import ConfigError, ConfigWarning
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.se3 import SE3, Array
+from gen_data.core.serialization import canonical_json
 
 K = np.array([[812.4, 0.0, 318.7], [0.0, 811.9, 259.3], [0.0, 0.0, 1.0]])
 D5 = np.array([-0.21, 0.09, 0.0007, -0.0004, -0.012])
@@ -118,7 +118,7 @@ LENS = "lens: {model: calibrated, file: FILE}"
 
 def test_intrinsics_are_those_of_opencv() -> None:
     """Different focal lengths, and a principal point whose pixel centres are at integers."""
-    from gen_data.generator.sensors.camera.rgb_camera import RgbCamera
+    from gen_data.sensors.camera.rgb_camera import RgbCamera
 
     given = {"fx_px": 812.4, "fy_px": 811.9, "cx_px": 318.7, "cy_px": 259.3}
     lens = dict(zip(("k1", "k2", "p1", "p2", "k3"), D5, strict=True))

@@ -10,20 +10,20 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from gen_data.generator.core.asset_types import Material
-from gen_data.generator.core.capture import Channel, SensorReading
-from gen_data.generator.core.errors import ConfigError, SampleError
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.lens import Lens
-from gen_data.generator.core.scene import Body, Camera, Environment, Light, Scene
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.core.streams import Streams
-from gen_data.generator.renderers.warp.renderer import WarpRenderer
-from gen_data.generator.sensors.camera.rgb_camera import RgbCamera
-from gen_data.generator.sensors.depth.depth_camera import DepthCamera, DepthModel
-from gen_data.generator.sensors.depth.structured_light import axial_noise_m, lateral_noise_px
-from gen_data.generator.sensors.depth.time_of_flight import unwrap_phases
-from gen_data.generator.sensors.device_presets import preset_names
+from gen_data.core.asset_types import Material
+from gen_data.core.capture import Channel, SensorReading
+from gen_data.core.errors import ConfigError, SampleError
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.lens import Lens
+from gen_data.core.scene import Body, Camera, Environment, Light, Scene
+from gen_data.core.se3 import SE3
+from gen_data.core.streams import Streams
+from gen_data.renderers.warp.renderer import WarpRenderer
+from gen_data.sensors.camera.rgb_camera import RgbCamera
+from gen_data.sensors.depth.depth_camera import DepthCamera, DepthModel
+from gen_data.sensors.depth.structured_light import axial_noise_m, lateral_noise_px
+from gen_data.sensors.depth.time_of_flight import unwrap_phases
+from gen_data.sensors.device_presets import preset_names
 from tests.renderers.fake_library import FakeLibrary, box_mesh
 
 SIZE_PX = (200, 150)
@@ -104,7 +104,7 @@ def test_an_ideal_device_reports_the_truth_within_its_range() -> None:
     assert seen_share(far_m) == 0.0
 
 
-@pytest.mark.parametrize("name", preset_names("gen_data.generator.sensors.depth"))
+@pytest.mark.parametrize("name", preset_names("gen_data.sensors.depth"))
 def test_every_device_sees_a_grey_wall_at_a_metre_and_a_half(name: str) -> None:
     """Nearly everywhere, and to within a few centimetres."""
     sensor = DepthCamera(model=name, size_px=SIZE_PX)

@@ -10,8 +10,8 @@ import textwrap
 import pytest
 import yaml
 
-from gen_data.generator.core.measurement_dtypes import TABLE_COLUMNS
-from gen_data.generator.sensors import TABLE
+from gen_data.core.measurement_dtypes import TABLE_COLUMNS
+from gen_data.sensors import TABLE
 
 
 @pytest.mark.parametrize("kind", ["gnss", "imu", "odometer"])

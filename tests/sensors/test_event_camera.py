@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from gen_data.generator.core.capture import Channel, Measurements, SensorReading
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import Renderer
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.scene import Camera, Scene, Weather
-from gen_data.generator.core.scene_time import place_sensors, scene_at
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.sensors.event_camera.event_camera import (
+from gen_data.core.capture import Channel, Measurements, SensorReading
+from gen_data.core.errors import ConfigError
+from gen_data.core.interfaces import Renderer
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.scene import Camera, Scene, Weather
+from gen_data.core.scene_time import place_sensors, scene_at
+from gen_data.core.se3 import SE3
+from gen_data.sensors.event_camera.event_camera import (
     DARK_CD_M2,
     EventCamera,
     Events,

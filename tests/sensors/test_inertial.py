@@ -9,18 +9,13 @@ import pytest
 from pydantic import ValidationError
 from scipy.special import fresnel
 
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.geodesy import (
-    GeodeticOrigin,
-    ecef_to_geodetic,
-    geodetic_to_ecef,
-    to_geodetic,
-)
-from gen_data.generator.core.scene import Scene
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.sensors.navigation.gnss import Gnss
-from gen_data.generator.sensors.navigation.imu import Imu
-from gen_data.generator.sensors.navigation.odometer import Odometer
+from gen_data.core.errors import ConfigError
+from gen_data.core.geodesy import GeodeticOrigin, ecef_to_geodetic, geodetic_to_ecef, to_geodetic
+from gen_data.core.scene import Scene
+from gen_data.core.se3 import SE3
+from gen_data.sensors.navigation.gnss import Gnss
+from gen_data.sensors.navigation.imu import Imu
+from gen_data.sensors.navigation.odometer import Odometer
 from tests.sensors.streetcar import WALL_M, circle, reading, readings, straight, thing, world
 
 GRAVITY = 9.80665

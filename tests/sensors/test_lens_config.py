@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from gen_data.generator.core.capture import Channel, SensorReading
-from gen_data.generator.core.lens import COEFFICIENTS
-from gen_data.generator.core.scene import Camera, Region, Scene
-from gen_data.generator.core.streams import Streams
-from gen_data.generator.sensors.camera.lens_models import CALIBRATIONS
-from gen_data.generator.sensors.camera.rgb_camera import RgbCamera
+from gen_data.core.capture import Channel, SensorReading
+from gen_data.core.lens import COEFFICIENTS
+from gen_data.core.scene import Camera, Region, Scene
+from gen_data.core.streams import Streams
+from gen_data.sensors.camera.lens_models import CALIBRATIONS
+from gen_data.sensors.camera.rgb_camera import RgbCamera
 
 
 def camera(**given: Any) -> Camera:

@@ -8,15 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gen_data.generator.assemble.config import Config, load_config
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.scene import Body, Rig, Scene
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.core.serialization import canonical_json
-from gen_data.generator.sensors.camera.rgb_camera import RgbCamera
-from gen_data.generator.sensors.lidar.lidar_sensor import LidarSensor
-from gen_data.generator.sensors.lidar.scan_pattern import make_sweep
-from gen_data.generator.sensors.mounting import check_not_buried
+from gen_data.assemble.config import Config, load_config
+from gen_data.core.errors import ConfigError
+from gen_data.core.scene import Body, Rig, Scene
+from gen_data.core.se3 import SE3
+from gen_data.core.serialization import canonical_json
+from gen_data.sensors.camera.rgb_camera import RgbCamera
+from gen_data.sensors.lidar.lidar_sensor import LidarSensor
+from gen_data.sensors.lidar.scan_pattern import make_sweep
+from gen_data.sensors.mounting import check_not_buried
 from tests.renderers.fake_library import FakeLibrary, box_mesh
 
 SHEET = """\

@@ -6,14 +6,9 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.sensors.device_presets import preset_names
-from gen_data.generator.sensors.lidar.scan_pattern import (
-    PRESETS,
-    LidarModel,
-    lidar_model,
-    make_sweep,
-)
+from gen_data.core.errors import ConfigError
+from gen_data.sensors.device_presets import preset_names
+from gen_data.sensors.lidar.scan_pattern import PRESETS, LidarModel, lidar_model, make_sweep
 
 
 def angles_deg(name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gen_data.generator.core.capture import PointCloud
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.motion import Trajectory
-from gen_data.generator.core.scene import Body, Camera, Lidar, Rig, Scene
-from gen_data.generator.core.scene_time import scene_at
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.core.streams import Streams
-from gen_data.generator.renderers.warp.renderer import WarpRenderer
-from gen_data.generator.sensors.lidar.lidar_sensor import LidarSensor
+from gen_data.core.capture import PointCloud
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.motion import Trajectory
+from gen_data.core.scene import Body, Camera, Lidar, Rig, Scene
+from gen_data.core.scene_time import scene_at
+from gen_data.core.se3 import SE3
+from gen_data.core.streams import Streams
+from gen_data.renderers.warp.renderer import WarpRenderer
+from gen_data.sensors.lidar.lidar_sensor import LidarSensor
 from tests.renderers.fake_library import FakeLibrary, box_mesh, room_mesh
 
 MESHES = {"wall": box_mesh((0.2, 80.0, 30.0)), "box": box_mesh((4.0, 2.0, 1.6)),

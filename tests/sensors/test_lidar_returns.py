@@ -8,20 +8,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gen_data.generator.core.asset_types import SURFACES
-from gen_data.generator.core.capture import POINT, LidarHits, LidarRays, PointCloud, SecondaryHits
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.scene import Camera, Lidar, Scene, Weather
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.core.streams import Rng, Streams
-from gen_data.generator.sensors.camera.rgb_camera import RgbCamera
-from gen_data.generator.sensors.lidar.lidar_atmosphere import (
+from gen_data.core.asset_types import SURFACES
+from gen_data.core.capture import POINT, LidarHits, LidarRays, PointCloud, SecondaryHits
+from gen_data.core.errors import ConfigError
+from gen_data.core.scene import Camera, Lidar, Scene, Weather
+from gen_data.core.se3 import SE3
+from gen_data.core.streams import Rng, Streams
+from gen_data.sensors.camera.rgb_camera import RgbCamera
+from gen_data.sensors.lidar.lidar_atmosphere import (
     add_atmosphere,
     fog_peak,
     optical_depth,
     rain_extinction_per_m,
 )
-from gen_data.generator.sensors.lidar.lidar_detection import (
+from gen_data.sensors.lidar.lidar_detection import (
     Kept,
     is_detected,
     laser_gains,
@@ -31,8 +31,8 @@ from gen_data.generator.sensors.lidar.lidar_detection import (
     report_intensity,
     select_returns,
 )
-from gen_data.generator.sensors.lidar.lidar_sensor import LidarSensor
-from gen_data.generator.sensors.lidar.scan_pattern import lidar_model
+from gen_data.sensors.lidar.lidar_sensor import LidarSensor
+from gen_data.sensors.lidar.scan_pattern import lidar_model
 
 MODEL = lidar_model("VLP-16")
 

@@ -8,14 +8,14 @@ from typing import Any
 import pytest
 from pydantic import ValidationError
 
-from gen_data.generator.assemble.config import load_config
-from gen_data.generator.assemble.pipeline_factory import nominal_scene
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.plates import EV100, fitted_intrinsics, has_plate
-from gen_data.generator.core.scene import Scene
-from gen_data.generator.sensors.camera.plate_camera import PlateCamera
+from gen_data.assemble.config import load_config
+from gen_data.assemble.pipeline_factory import nominal_scene
+from gen_data.core.errors import ConfigError
+from gen_data.core.plates import EV100, fitted_intrinsics, has_plate
+from gen_data.core.scene import Scene
 from gen_data.scene_templates.builder import build_scene
 from gen_data.scene_templates.plate import PlateElement
+from gen_data.sensors.camera.plate_camera import PlateCamera
 from tests.randomizers.doubles import PLATE, FakeAssets
 
 

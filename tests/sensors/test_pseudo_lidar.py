@@ -9,16 +9,16 @@ from functools import cache
 import numpy as np
 import pytest
 
-from gen_data.generator.core.capture import POINT, Channel, PointCloud
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.lens import Lens
-from gen_data.generator.core.scene import Body, Camera, Instance, Scene
-from gen_data.generator.core.scene_time import place_sensors
-from gen_data.generator.core.se3 import SE3, look_at
-from gen_data.generator.core.streams import Streams
-from gen_data.generator.renderers.warp.renderer import WarpRenderer
-from gen_data.generator.sensors.lidar.pseudo_lidar import PseudoLidar, every_nth_pixel
+from gen_data.core.capture import POINT, Channel, PointCloud
+from gen_data.core.errors import ConfigError
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.lens import Lens
+from gen_data.core.scene import Body, Camera, Instance, Scene
+from gen_data.core.scene_time import place_sensors
+from gen_data.core.se3 import SE3, look_at
+from gen_data.core.streams import Streams
+from gen_data.renderers.warp.renderer import WarpRenderer
+from gen_data.sensors.lidar.pseudo_lidar import PseudoLidar, every_nth_pixel
 from tests.renderers.fake_library import FakeLibrary, box_mesh, plane_mesh
 
 BOX_M = (2.0, 1.0, 1.5)

@@ -9,17 +9,17 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from gen_data.generator.core.asset_types import SURFACES
-from gen_data.generator.core.scene import Body, Instance, Scene, Weather
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.sensors.device_presets import load_preset, preset_names
-from gen_data.generator.sensors.radar.radar_detection import (
+from gen_data.core.asset_types import SURFACES
+from gen_data.core.scene import Body, Instance, Scene, Weather
+from gen_data.core.se3 import SE3
+from gen_data.sensors.device_presets import load_preset, preset_names
+from gen_data.sensors.radar.radar_detection import (
     TARGETS,
     area_factor,
     cross_section_m2,
     silhouette_m2,
 )
-from gen_data.generator.sensors.radar.radar_sensor import PRESETS, Radar, RadarModel
+from gen_data.sensors.radar.radar_sensor import PRESETS, Radar, RadarModel
 from tests.sensors.streetcar import (
     PERSON_M,
     WALL_M,

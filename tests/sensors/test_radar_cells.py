@@ -7,15 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from gen_data.generator.sensors.device_presets import load_preset
-from gen_data.generator.sensors.radar.radar_detection import (
-    Cells,
-    Echo,
-    find_peaks,
-    make_cells,
-    merge_echoes,
-)
-from gen_data.generator.sensors.radar.radar_sensor import PRESETS, RadarModel
+from gen_data.sensors.device_presets import load_preset
+from gen_data.sensors.radar.radar_detection import Cells, Echo, find_peaks, make_cells, merge_echoes
+from gen_data.sensors.radar.radar_sensor import PRESETS, RadarModel
 
 NEAR = load_preset(PRESETS, "ARS408-21", RadarModel).looks[0]
 

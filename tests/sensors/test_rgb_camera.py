@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from gen_data.generator.core.capture import Channel, SensorReading
-from gen_data.generator.core.scene import Camera, Region, Scene
-from gen_data.generator.core.streams import Rng, Streams
-from gen_data.generator.sensors import TABLE
-from gen_data.generator.sensors.camera.rgb_camera import RgbCamera
+from gen_data.core.capture import Channel, SensorReading
+from gen_data.core.scene import Camera, Region, Scene
+from gen_data.core.streams import Rng, Streams
+from gen_data.sensors import TABLE
+from gen_data.sensors.camera.rgb_camera import RgbCamera
 
 FOCUS = Region((0.5, -0.2, 0.75), (1.2, 0.8, 0.4))
 

@@ -10,24 +10,24 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gen_data.generator.assets.library import open_library
-from gen_data.generator.core.capture import POINT, PointCloud, SensorReading
-from gen_data.generator.core.errors import ConfigError, ConfigWarning
-from gen_data.generator.core.interfaces import DatasetInfo, Modality, SensorInfo, Settled
-from gen_data.generator.core.motion import StateChange, Trajectory
-from gen_data.generator.core.sample import EgoTruth, ImageTruth, Sample
-from gen_data.generator.core.scene import Body, Lane, Rig, Scene
-from gen_data.generator.core.scene_time import place_sensors, scene_at
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.pipeline import Pipeline
-from gen_data.generator.pipeline.finalize_scene import Timeline
-from gen_data.generator.pipeline.pipeline import PipelineConfig
-from gen_data.generator.sensors.camera.rgb_camera import RgbCamera
-from gen_data.generator.sensors.lidar.lidar_sensor import LidarSensor
-from gen_data.generator.sensors.mounting import stride, warn_of_early_readings
+from gen_data.assets.library import open_library
+from gen_data.core.capture import POINT, PointCloud, SensorReading
+from gen_data.core.errors import ConfigError, ConfigWarning
+from gen_data.core.interfaces import DatasetInfo, Modality, SensorInfo, Settled
+from gen_data.core.motion import StateChange, Trajectory
+from gen_data.core.sample import EgoTruth, ImageTruth, Sample
+from gen_data.core.scene import Body, Lane, Rig, Scene
+from gen_data.core.scene_time import place_sensors, scene_at
+from gen_data.core.se3 import SE3
+from gen_data.pipeline import Pipeline
+from gen_data.pipeline.finalize_scene import Timeline
+from gen_data.pipeline.pipeline import PipelineConfig
 from gen_data.randomizers.camera_on_lane import CameraOnLane
 from gen_data.randomizers.camera_pose import CameraPose
 from gen_data.scene_templates.robot import Robot
+from gen_data.sensors.camera.rgb_camera import RgbCamera
+from gen_data.sensors.lidar.lidar_sensor import LidarSensor
+from gen_data.sensors.mounting import stride, warn_of_early_readings
 from tests.randomizers.doubles import FakeAssets, rng_of
 
 CAR = "car?seed=0"

@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 from pydantic import ValidationError
 
-from gen_data.generator.core.scene import Scene
-from gen_data.generator.core.shutter import INSTANT, Shutter
-from gen_data.generator.sensors.camera.rgb_camera import RgbCamera
+from gen_data.core.scene import Scene
+from gen_data.core.shutter import INSTANT, Shutter
+from gen_data.sensors.camera.rgb_camera import RgbCamera
 
 
 def shutter(**fields: Any) -> Shutter:

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from gen_data.generator.config.distributions import (
+from gen_data.config.distributions import (
     Choice,
     Constant,
     Distribution,
@@ -24,7 +24,7 @@ from gen_data.generator.config.distributions import (
     Uniform,
     UniformInteger,
 )
-from gen_data.generator.core.streams import Rng, Streams
+from gen_data.core.streams import Rng, Streams
 
 ALPHA = 1e-4
 DRAWS = 20_000

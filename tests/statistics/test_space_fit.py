@@ -13,7 +13,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy import stats
 
-from gen_data.generator.config.distributions import (
+from gen_data.config.distributions import (
     AboutZ,
     Box,
     Cap,
@@ -24,8 +24,8 @@ from gen_data.generator.config.distributions import (
     So3,
     Sphere,
 )
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.core.streams import Rng, Streams
+from gen_data.core.se3 import SE3
+from gen_data.core.streams import Rng, Streams
 
 ALPHA = 1e-4
 DRAWS = 8_000

@@ -10,8 +10,8 @@ import cv2
 import numpy as np
 import pytest
 
-from gen_data.generator.matching.label_files import RealObject
-from gen_data.generator.study.real_pictures import RealPicture, RealSet
+from gen_data.lab.matching.label_files import RealObject
+from gen_data.lab.study.real_pictures import RealPicture, RealSet
 
 
 def write_picture(path: Path, size_px: tuple[int, int] = (64, 48), value: int = 128) -> None:

@@ -11,11 +11,11 @@ import pytest
 import yaml
 
 import gen_data
-from gen_data.generator.assemble.config import load_config
-from gen_data.generator.core.errors import ConfigError, StorageError
-from gen_data.generator.report.drawn_parameters import replay_scenes
-from gen_data.generator.runner.stored import StoredSamples
-from gen_data.generator.study.adapt import Round, adapt, tabulate
+from gen_data.assemble.config import load_config
+from gen_data.core.errors import ConfigError, StorageError
+from gen_data.lab.study.adapt import Round, adapt, tabulate
+from gen_data.report.drawn_parameters import replay_scenes
+from gen_data.runner.stored import StoredSamples
 
 CONFIG = """\
 extends: tabletop.yaml

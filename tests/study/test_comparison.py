@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from gen_data.generator.study.comparison import Scores, adjust, interval
+from gen_data.lab.study.comparison import Scores, adjust, interval
 
 
 def simulate(

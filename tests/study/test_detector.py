@@ -13,7 +13,7 @@ def test_the_focal_loss_has_the_slope_of_its_formula() -> None:
     """Equation 1 of "Objects as Points", differentiated by torch, in 64 bits."""
     import torch
 
-    from gen_data.generator.study.detector import CentreLoss, encode
+    from gen_data.lab.study.detector import CentreLoss, encode
 
     rng = np.random.default_rng(0)
     corners = rng.uniform(0.0, 60.0, (2, 6, 2)).astype(np.float32)

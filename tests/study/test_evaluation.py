@@ -12,9 +12,9 @@ import pytest
 from pycocotools.coco import COCO
 from pycocotools.cocoeval import COCOeval
 
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.study.evaluation import evaluate, match_objects, read_results
-from gen_data.generator.study.real_pictures import RealSet, read_real
+from gen_data.core.errors import ConfigError
+from gen_data.lab.study.evaluation import evaluate, match_objects, read_results
+from gen_data.lab.study.real_pictures import RealSet, read_real
 from tests.study.conftest import draw_results, write_coco
 
 

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from gen_data.generator.core.errors import ConfigError, StorageError
-from gen_data.generator.matching.label_files import RealObject
-from gen_data.generator.study.real_pictures import check_judges, read_real
+from gen_data.core.errors import ConfigError, StorageError
+from gen_data.lab.matching.label_files import RealObject
+from gen_data.lab.study.real_pictures import check_judges, read_real
 from tests.study.conftest import write_coco, write_picture
 
 LABELS = """\

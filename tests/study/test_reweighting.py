@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from gen_data.generator.config.distributions import (
+from gen_data.config.distributions import (
     Choice,
     Constant,
     Distribution,
@@ -19,9 +19,9 @@ from gen_data.generator.config.distributions import (
     Uniform,
     UniformInteger,
 )
-from gen_data.generator.core.streams import Streams
-from gen_data.generator.report.drawn_parameters import Drawn
-from gen_data.generator.study.reweighting import Dependence, Tally, divide, find_dependences
+from gen_data.core.streams import Streams
+from gen_data.lab.study.reweighting import Dependence, Tally, divide, find_dependences
+from gen_data.report.drawn_parameters import Drawn
 
 DECLARED: list[Distribution[Any]] = [
     Uniform(-2.0, 10.0),

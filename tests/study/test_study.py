@@ -15,10 +15,10 @@ from pathlib import Path
 import pytest
 
 import gen_data
-from gen_data.generator.core.errors import ConfigError, StorageError
-from gen_data.generator.study.experiment import Experiment, Variant, perform, prepare
-from gen_data.generator.study.study import compare_results, run_study
-from gen_data.generator.study.study_command import list_variants
+from gen_data.core.errors import ConfigError, StorageError
+from gen_data.lab.study.experiment import Experiment, Variant, perform, prepare
+from gen_data.lab.study.study import compare_results, run_study
+from gen_data.lab.study.study_command import list_variants
 from tests.study.conftest import write_coco
 from tests.study.test_adapt import CONFIG
 

@@ -6,13 +6,13 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from gen_data.generator.core.scene import Lane, LaneKind
-from gen_data.generator.core.streams import Rng, Streams
-from gen_data.generator.traffic.lane_routes import LaneGraph, draw_route
-from gen_data.generator.traffic.pedestrians import Pedestrian
-from gen_data.generator.traffic.signal_cycles import Approach
-from gen_data.generator.traffic.simulation import SimulatedMotion, simulate
-from gen_data.generator.traffic.vehicles import Vehicle, Vehicles, make_vehicles
+from gen_data.core.scene import Lane, LaneKind
+from gen_data.core.streams import Rng, Streams
+from gen_data.traffic.lane_routes import LaneGraph, draw_route
+from gen_data.traffic.pedestrians import Pedestrian
+from gen_data.traffic.signal_cycles import Approach
+from gen_data.traffic.simulation import SimulatedMotion, simulate
+from gen_data.traffic.vehicles import Vehicle, Vehicles, make_vehicles
 
 NO_BOXES = np.zeros((0, 6))
 REACH_M = 400.0

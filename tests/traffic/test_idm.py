@@ -7,15 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from gen_data.generator.traffic.idm import (
-    Drivers,
-    equilibrium_speed,
-    free_acceleration,
-    interaction,
-)
-from gen_data.generator.traffic.lane_routes import LaneGraph
-from gen_data.generator.traffic.simulation import simulate
-from gen_data.generator.traffic.vehicles import make_vehicles
+from gen_data.traffic.idm import Drivers, equilibrium_speed, free_acceleration, interaction
+from gen_data.traffic.lane_routes import LaneGraph
+from gen_data.traffic.simulation import simulate
+from gen_data.traffic.vehicles import make_vehicles
 from tests.traffic.roads import NO_BOXES, car, driven, fronts_m, lane
 
 

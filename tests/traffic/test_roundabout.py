@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.roads.cross_section import RoadShape
-from gen_data.generator.roads.junction_shape import arm_pose
-from gen_data.generator.roads.lane_graph import link_lanes, road_lanes
-from gen_data.generator.roads.roundabout_shape import RoundaboutShape, roundabout_lanes
-from gen_data.generator.traffic.simulation import first_overlap
+from gen_data.core.se3 import SE3
+from gen_data.roads.cross_section import RoadShape
+from gen_data.roads.junction_shape import arm_pose
+from gen_data.roads.lane_graph import link_lanes, road_lanes
+from gen_data.roads.roundabout_shape import RoundaboutShape, roundabout_lanes
+from gen_data.traffic.simulation import first_overlap
 from tests.traffic.roads import driven
 
 

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gen_data.generator.traffic.lane_routes import LaneGraph, project_on_lane
-from gen_data.generator.traffic.pedestrian_paths import draw_path, make_walk_network
-from gen_data.generator.traffic.pedestrians import Pedestrian
-from gen_data.generator.traffic.signal_cycles import AMBER_S, Approach, Cycle
-from gen_data.generator.traffic.simulation import SimulatedMotion, first_overlap, simulate
-from gen_data.generator.traffic.vehicles import Vehicles, make_vehicles
+from gen_data.traffic.lane_routes import LaneGraph, project_on_lane
+from gen_data.traffic.pedestrian_paths import draw_path, make_walk_network
+from gen_data.traffic.pedestrians import Pedestrian
+from gen_data.traffic.signal_cycles import AMBER_S, Approach, Cycle
+from gen_data.traffic.simulation import SimulatedMotion, first_overlap, simulate
+from gen_data.traffic.vehicles import Vehicles, make_vehicles
 from tests.traffic.roads import NO_BOXES, car, crossing, driven, fronts_m, lane, rng_of
 
 LINE_M = 140.0

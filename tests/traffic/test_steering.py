@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from gen_data.generator.traffic.lane_routes import STATION_M
-from gen_data.generator.traffic.simulation import make_upright_trajectories
-from gen_data.generator.traffic.steering import follow_lines, normalize, rotate_small
+from gen_data.traffic.lane_routes import STATION_M
+from gen_data.traffic.simulation import make_upright_trajectories
+from gen_data.traffic.steering import follow_lines, normalize, rotate_small
 
 
 def circle(radius_m: float, count: int) -> np.ndarray:

@@ -7,24 +7,20 @@ from functools import cache
 import numpy as np
 import pytest
 
-from gen_data.generator.assemble.config import Config, load_config
-from gen_data.generator.assemble.pipeline_factory import (
-    PipelineFactory,
-    pipeline_config,
-    scene_source,
-)
-from gen_data.generator.assets.library import Library, open_library
-from gen_data.generator.core.errors import ConfigError, LayoutRejected
-from gen_data.generator.core.sample import Sample
-from gen_data.generator.core.scene import Body, ObjectGroup, Scene
-from gen_data.generator.core.scene_time import scene_at
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.core.serialization import canonical_json
-from gen_data.generator.core.streams import Streams
-from gen_data.generator.traffic.lane_routes import LaneGraph
+from gen_data.assemble.config import Config, load_config
+from gen_data.assemble.pipeline_factory import PipelineFactory, pipeline_config, scene_source
+from gen_data.assets.library import Library, open_library
+from gen_data.core.errors import ConfigError, LayoutRejected
+from gen_data.core.sample import Sample
+from gen_data.core.scene import Body, ObjectGroup, Scene
+from gen_data.core.scene_time import scene_at
+from gen_data.core.se3 import SE3
+from gen_data.core.serialization import canonical_json
+from gen_data.core.streams import Streams
 from gen_data.randomizers.free_space import Footprint, Ground
 from gen_data.randomizers.traffic_actors import find_drivers
 from gen_data.randomizers.traffic_flow import TrafficFlow
+from gen_data.traffic.lane_routes import LaneGraph
 from tests.traffic.roads import lane
 
 SMALL = (

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, Vt
 
-from gen_data.generator.assets.asset_folder import Folder
-from gen_data.generator.assets.folder_index import MeshEntry
-from gen_data.generator.assets.importer import import_object
-from gen_data.generator.assets.readers import MeshSource, read_mesh
-from gen_data.generator.assets.usd_stages import stage_model
-from gen_data.generator.core.errors import AssetError
+from gen_data.assets.asset_folder import Folder
+from gen_data.assets.folder_index import MeshEntry
+from gen_data.assets.importer import import_object
+from gen_data.assets.readers import MeshSource, read_mesh
+from gen_data.assets.usd_stages import stage_model
+from gen_data.core.errors import AssetError
 
 RED, BLUE = Gf.Vec3f(1, 0, 0), Gf.Vec3f(0, 0, 1)
 

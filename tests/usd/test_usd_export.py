@@ -15,18 +15,18 @@ import numpy as np
 import pytest
 from pxr import Sdf, Tf, Usd, UsdGeom, UsdLux, UsdSemantics, UsdShade, UsdUtils, UsdValidation
 
+from gen_data.assets.library import Library, open_library
+from gen_data.core.capture import Capture, Channel
+from gen_data.core.errors import StorageError
+from gen_data.core.interfaces import DatasetInfo
+from gen_data.core.lens import Lens
+from gen_data.core.motion import StateChange
+from gen_data.core.sample import Sample
+from gen_data.core.scene import Rig, Scene
+from gen_data.core.scene_time import place_sensors, scene_at
 from gen_data.exporters.usd import Usd as UsdExporter
-from gen_data.generator.assets.library import Library, open_library
-from gen_data.generator.core.capture import Capture, Channel
-from gen_data.generator.core.errors import StorageError
-from gen_data.generator.core.interfaces import DatasetInfo
-from gen_data.generator.core.lens import Lens
-from gen_data.generator.core.motion import StateChange
-from gen_data.generator.core.sample import Sample
-from gen_data.generator.core.scene import Rig, Scene
-from gen_data.generator.core.scene_time import place_sensors, scene_at
-from gen_data.generator.renderers.warp.renderer import WarpRenderer
-from gen_data.generator.usd.prims import open_stage_for_writing
+from gen_data.renderers.warp.renderer import WarpRenderer
+from gen_data.usd.prims import open_stage_for_writing
 from tests.usd.worlds import STEP_S, STEPS, exported, off_centre_camera, table_world
 
 
@@ -185,7 +185,7 @@ def test_other_processes_write_the_same_bytes(kind: str, library: Library, tmp_p
     here = exported(table_world(library), library, tmp_path / "a", format=kind)
     program = (
         "import sys; from pathlib import Path\n"
-        "from gen_data.generator.assets.library import open_library\n"
+        "from gen_data.assets.library import open_library\n"
         "from tests.usd.worlds import exported, table_world\n"
         "cache, packs = Path(sys.argv[1]) / 'cache', Path('/nonexistent')\n"
         "library = open_library(cache_dir=cache, packs=packs)\n"

@@ -7,9 +7,9 @@ import math
 import pytest
 from pxr import Usd, UsdGeom, UsdLux
 
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.usd.lights import define_light
+from gen_data.core.se3 import SE3
 from gen_data.randomizers.vehicle_lights import dipped_beam
+from gen_data.usd.lights import define_light
 
 
 def test_the_spot_of_a_dipped_headlight_lies_below_its_cutoff() -> None:

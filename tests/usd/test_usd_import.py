@@ -10,11 +10,11 @@ import pytest
 from PIL import Image
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, UsdShade, UsdUtils
 
-from gen_data.generator.assets.library import Library, open_library
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.errors import AssetError
-from gen_data.generator.core.scene import Scene
-from gen_data.generator.renderers.warp.renderer import WarpRenderer
+from gen_data.assets.library import Library, open_library
+from gen_data.core.capture import Channel
+from gen_data.core.errors import AssetError
+from gen_data.core.scene import Scene
+from gen_data.renderers.warp.renderer import WarpRenderer
 from gen_data.scene_templates.usd_stage import UsdStage
 from tests.usd.worlds import exported, table_world
 

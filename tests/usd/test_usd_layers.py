@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from pxr import Sdf, Usd, UsdShade
 
+from gen_data.assets.library import open_library
+from gen_data.core.asset_types import Material, MeshData, TextureData
+from gen_data.core.errors import AssetError
 from gen_data.exporters.usd import _SharedFiles
-from gen_data.generator.assets.library import open_library
-from gen_data.generator.core.asset_types import Material, MeshData, TextureData
-from gen_data.generator.core.errors import AssetError
 from tests.renderers.fake_library import FakeLibrary, plane_mesh
 
 

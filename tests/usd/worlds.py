@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from gen_data.assets.library import Library
+from gen_data.core.asset_types import Material
+from gen_data.core.capture import Capture
+from gen_data.core.interfaces import DatasetInfo, Modality, SensorInfo
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.motion import Trajectory
+from gen_data.core.sample import Sample
+from gen_data.core.scene import Body, Camera, Environment, Instance, Light, Scene
+from gen_data.core.se3 import SE3, look_at
 from gen_data.exporters.usd import Usd
-from gen_data.generator.assets.library import Library
-from gen_data.generator.core.asset_types import Material
-from gen_data.generator.core.capture import Capture
-from gen_data.generator.core.interfaces import DatasetInfo, Modality, SensorInfo
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.motion import Trajectory
-from gen_data.generator.core.sample import Sample
-from gen_data.generator.core.scene import Body, Camera, Environment, Instance, Light, Scene
-from gen_data.generator.core.se3 import SE3, look_at
 
 STEPS, STEP_S = 3, 0.1
 RED = Material(base_color=(0.7, 0.05, 0.05), roughness=0.3)

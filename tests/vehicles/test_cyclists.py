@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gen_data.generator.assets.vehicles import FAMILIES
-from gen_data.generator.assets.vehicles.bicycle import cyclist, cyclist_facts
-from gen_data.generator.core.asset_types import MeshData
-from gen_data.generator.core.errors import AssetError
+from gen_data.content.vehicles import FAMILIES
+from gen_data.content.vehicles.bicycle import cyclist, cyclist_facts
+from gen_data.core.asset_types import MeshData
+from gen_data.core.errors import AssetError
 
 VARIANTS = [cyclist(seed).mesh for seed in range(FAMILIES["cyclist"].variants)]
 

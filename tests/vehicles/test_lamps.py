@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gen_data.generator.assets.vehicles.cars import car
+from gen_data.content.vehicles.cars import car
 from gen_data.randomizers.vehicle_lights import VehicleLights
 
 LIMITS_CD = {

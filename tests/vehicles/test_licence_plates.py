@@ -7,8 +7,8 @@ import re
 import numpy as np
 import pytest
 
-from gen_data.generator.assets.vehicles import FAMILIES, TEXTURES
-from gen_data.generator.assets.vehicles.plates import (
+from gen_data.content.vehicles import FAMILIES, TEXTURES
+from gen_data.content.vehicles.plates import (
     FORMATS,
     GLYPHS,
     SEEDS,
@@ -16,8 +16,8 @@ from gen_data.generator.assets.vehicles.plates import (
     plate_text,
     reseed_plate,
 )
-from gen_data.generator.core.asset_types import Material
-from gen_data.generator.core.scene import Body, ObjectGroup, Scene
+from gen_data.core.asset_types import Material
+from gen_data.core.scene import Body, ObjectGroup, Scene
 from gen_data.randomizers.vehicle_paint import VehiclePaint
 from tests.randomizers.doubles import FakeAssets, rng_of
 from tests.vehicles.test_vehicle_families import variant

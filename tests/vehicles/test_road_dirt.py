@@ -7,20 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gen_data.generator.assets.family import Solid, Worn
-from gen_data.generator.assets.procedural.wear import draw_wear
-from gen_data.generator.assets.vehicles import FAMILIES, TEXTURES
-from gen_data.generator.assets.vehicles.road_dirt import (
-    DUST,
-    SEEDS,
-    cleaned,
-    is_soiled,
-    soiled,
-)
-from gen_data.generator.config.distributions import Constant
-from gen_data.generator.core.asset_types import Material
-from gen_data.generator.core.colorimetry import srgb_decode
-from gen_data.generator.core.scene import Body, ObjectGroup, Scene
+from gen_data.assets.family import Solid, Worn
+from gen_data.config.distributions import Constant
+from gen_data.content.procedural.wear import draw_wear
+from gen_data.content.vehicles import FAMILIES, TEXTURES
+from gen_data.content.vehicles.road_dirt import DUST, SEEDS, cleaned, is_soiled, soiled
+from gen_data.core.asset_types import Material
+from gen_data.core.colorimetry import srgb_decode
+from gen_data.core.scene import Body, ObjectGroup, Scene
 from gen_data.randomizers.vehicle_paint import VehiclePaint
 from tests.every_value import for_every
 from tests.randomizers.doubles import FakeAssets, rng_of

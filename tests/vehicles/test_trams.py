@@ -7,10 +7,10 @@ from functools import cache
 import numpy as np
 import pytest
 
-from gen_data.generator.assets.family import Solid
-from gen_data.generator.assets.roads.tram_wires import WIRE_M
-from gen_data.generator.assets.vehicles import FAMILIES
-from gen_data.generator.assets.vehicles.tram import tram, tram_facts
+from gen_data.assets.family import Solid
+from gen_data.content.roads.tram_wires import WIRE_M
+from gen_data.content.vehicles import FAMILIES
+from gen_data.content.vehicles.tram import tram, tram_facts
 
 SEEDS = range(FAMILIES["tram"].variants)
 

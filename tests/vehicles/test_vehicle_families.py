@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from gen_data.generator.assets.family import Solid
-from gen_data.generator.assets.vehicles import FAMILIES as VEHICLES
-from gen_data.generator.assets.vehicles.car_design import MODELS
-from gen_data.generator.assets.vehicles.cars import draw_car
-from gen_data.generator.assets.vehicles.vehicle_materials import draw_paint
-from gen_data.generator.core.asset_types import MeshData
-from gen_data.generator.core.variant_rng import variant_rng
+from gen_data.assets.family import Solid
+from gen_data.content.vehicles import FAMILIES as VEHICLES
+from gen_data.content.vehicles.car_design import MODELS
+from gen_data.content.vehicles.cars import draw_car
+from gen_data.content.vehicles.vehicle_materials import draw_paint
+from gen_data.core.asset_types import MeshData
+from gen_data.core.variant_rng import variant_rng
 from tests.every_value import for_every
 from tests.scenery.rays import cast
 from tests.tiers import first_and_all

@@ -11,21 +11,21 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.assets.asset_folder import Folder
-from gen_data.generator.assets.folder_index import LevelHorizon, PlateEntry, PlateLane
-from gen_data.generator.assets.image_decoding import decode_image
-from gen_data.generator.assets.plates.surroundings import surroundings
-from gen_data.generator.assets.plates.vanishing_points import (
+from gen_data.assets.asset_folder import Folder
+from gen_data.assets.folder_index import LevelHorizon, PlateEntry, PlateLane
+from gen_data.assets.image_decoding import decode_image
+from gen_data.assets.plates.surroundings import surroundings
+from gen_data.assets.plates.vanishing_points import (
     CameraEstimate,
     NoHorizonError,
     estimate_camera,
     find_edges,
 )
-from gen_data.generator.core.asset_types import UInt8
-from gen_data.generator.core.colorimetry import srgb_decode
-from gen_data.generator.core.errors import AssetError
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.plates import (
+from gen_data.core.asset_types import UInt8
+from gen_data.core.colorimetry import srgb_decode
+from gen_data.core.errors import AssetError
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.plates import (
     FARTHEST_M,
     Plate,
     PlateSun,
@@ -35,8 +35,8 @@ from gen_data.generator.core.plates import (
     upright_pose,
     zenith_from_horizon,
 )
-from gen_data.generator.core.scene import Lane
-from gen_data.generator.core.se3 import Vec3
+from gen_data.core.scene import Lane
+from gen_data.core.se3 import Vec3
 
 _EXIF_IFD, _FOCAL_35MM = 0x8769, 0xA405
 _FILM_DIAGONAL_MM = math.hypot(36.0, 24.0)

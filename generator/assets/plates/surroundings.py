@@ -15,10 +15,10 @@ from dataclasses import replace
 import cv2
 import numpy as np
 
-from gen_data.generator.core.asset_types import Float32, UInt8
-from gen_data.generator.core.colorimetry import luminance, srgb_decode
-from gen_data.generator.core.plates import Plate, ground_illuminance
-from gen_data.generator.core.se3 import Array
+from gen_data.core.asset_types import Float32, UInt8
+from gen_data.core.colorimetry import luminance, srgb_decode
+from gen_data.core.plates import Plate, ground_illuminance
+from gen_data.core.se3 import Array
 
 _ROWS = 64
 _SMALL_PX = 48

@@ -17,8 +17,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.core.asset_types import UInt8
-from gen_data.generator.core.se3 import Array
+from gen_data.core.asset_types import UInt8
+from gen_data.core.se3 import Array
 
 _LONG_SIDE_PX = 1000
 """Size of the image in which edges are found."""

@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import PurePosixPath
 
-from gen_data.generator.assets.asset_folder import Folder
-from gen_data.generator.assets.readers.dae import read_dae
-from gen_data.generator.assets.readers.gltf import read_gltf
-from gen_data.generator.assets.readers.mesh_source import MeshSource, check_face_count
-from gen_data.generator.assets.readers.obj import read_obj
-from gen_data.generator.assets.readers.ply import read_ply
-from gen_data.generator.assets.readers.step import read_step
-from gen_data.generator.assets.readers.stl import read_stl
-from gen_data.generator.assets.readers.threemf import read_3mf
-from gen_data.generator.assets.readers.usd import read_usd
-from gen_data.generator.core.errors import AssetError, did_you_mean
+from gen_data.assets.asset_folder import Folder
+from gen_data.assets.readers.dae import read_dae
+from gen_data.assets.readers.gltf import read_gltf
+from gen_data.assets.readers.mesh_source import MeshSource, check_face_count
+from gen_data.assets.readers.obj import read_obj
+from gen_data.assets.readers.ply import read_ply
+from gen_data.assets.readers.step import read_step
+from gen_data.assets.readers.stl import read_stl
+from gen_data.assets.readers.threemf import read_3mf
+from gen_data.assets.readers.usd import read_usd
+from gen_data.core.errors import AssetError, did_you_mean
 
 __all__ = ["MESH_SUFFIXES", "MeshSource", "read_mesh"]
 

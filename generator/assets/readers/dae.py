@@ -16,17 +16,13 @@ from xml.etree.ElementTree import fromstring, tostring
 
 import numpy as np
 
-from gen_data.generator.assets.asset_folder import Folder
-from gen_data.generator.assets.readers.mesh_source import (
-    MeshSource,
-    locate_file,
-    srgb_to_linear,
-)
-from gen_data.generator.assets.triangle_soup import Float64, MaterialSlot, TriangleSoup, join_soups
-from gen_data.generator.core.asset_types import Material
-from gen_data.generator.core.errors import AssetError
-from gen_data.generator.core.safe_xml import parse_xml
-from gen_data.generator.core.se3 import Vec3
+from gen_data.assets.asset_folder import Folder
+from gen_data.assets.readers.mesh_source import MeshSource, locate_file, srgb_to_linear
+from gen_data.assets.triangle_soup import Float64, MaterialSlot, TriangleSoup, join_soups
+from gen_data.core.asset_types import Material
+from gen_data.core.errors import AssetError
+from gen_data.core.safe_xml import parse_xml
+from gen_data.core.se3 import Vec3
 
 _MAX_ELEMENTS = 1_000_000
 _UP = {"X_UP": "x", "Y_UP": "y", "Z_UP": "z"}
@@ -44,12 +40,7 @@ def read_dae(folder: Folder, relative: str, materials: bool) -> MeshSource:
     # Checked first, because pycollada's parser would expand entities.
     parse_xml(data, place, "COLLADA", "a COLLADA file", _MAX_ELEMENTS)
     from collada import Collada
-    from collada.common import (
-        DaeBrokenRefError,
-        DaeError,
-        DaeIncompleteError,
-        DaeUnsupportedError,
-    )
+    from collada.common import DaeBrokenRefError, DaeError, DaeIncompleteError, DaeUnsupportedError
 
     remarks: list[str] = []
     try:

@@ -15,9 +15,9 @@ from urllib.parse import unquote
 
 import numpy as np
 
-from gen_data.generator.assets.asset_folder import Folder
-from gen_data.generator.assets.image_decoding import decode_image
-from gen_data.generator.assets.readers.gltf_document import (
+from gen_data.assets.asset_folder import Folder
+from gen_data.assets.image_decoding import decode_image
+from gen_data.assets.readers.gltf_document import (
     Document,
     get_item,
     parse_document,
@@ -25,23 +25,12 @@ from gen_data.generator.assets.readers.gltf_document import (
     read_uri,
     view_bytes,
 )
-from gen_data.generator.assets.readers.gltf_materials import Images, gltf_material
-from gen_data.generator.assets.readers.gltf_nodes import MAX_PARTS, PlacedMesh, placed_meshes
-from gen_data.generator.assets.readers.mesh_source import (
-    MAX_FACES,
-    WHITE,
-    MeshSource,
-    locate_file,
-)
-from gen_data.generator.assets.triangle_soup import (
-    Float64,
-    Int64,
-    MaterialSlot,
-    TriangleSoup,
-    join_soups,
-)
-from gen_data.generator.core.asset_types import UInt8
-from gen_data.generator.core.errors import AssetError
+from gen_data.assets.readers.gltf_materials import Images, gltf_material
+from gen_data.assets.readers.gltf_nodes import MAX_PARTS, PlacedMesh, placed_meshes
+from gen_data.assets.readers.mesh_source import MAX_FACES, WHITE, MeshSource, locate_file
+from gen_data.assets.triangle_soup import Float64, Int64, MaterialSlot, TriangleSoup, join_soups
+from gen_data.core.asset_types import UInt8
+from gen_data.core.errors import AssetError
 
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
 _REPEAT = 10497

@@ -14,8 +14,8 @@ from urllib.parse import unquote
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.assets.asset_folder import Folder
-from gen_data.generator.assets.readers.mesh_source import locate_file
+from gen_data.assets.asset_folder import Folder
+from gen_data.assets.readers.mesh_source import locate_file
 
 _JSON_CHUNK, _BINARY_CHUNK = 0x4E4F534A, 0x004E4942
 _COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}

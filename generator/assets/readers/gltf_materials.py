@@ -16,10 +16,10 @@ from typing import Any
 
 import numpy as np
 
-from gen_data.generator.assets.readers.mesh_source import EVEN, clamp_min, fraction
-from gen_data.generator.assets.texture_maps import TextureMaps
-from gen_data.generator.core.asset_types import Material, UInt8
-from gen_data.generator.core.colorimetry import srgb_decode
+from gen_data.assets.readers.mesh_source import EVEN, clamp_min, fraction
+from gen_data.assets.texture_maps import TextureMaps
+from gen_data.core.asset_types import Material, UInt8
+from gen_data.core.colorimetry import srgb_decode
 
 _MIN_COVERAGE = 8
 """Texels of a blended image with less coverage [1/255] are holes."""

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from gen_data.generator.assets.readers.gltf_document import Document, get_item, read_accessor
-from gen_data.generator.assets.triangle_soup import Float64
+from gen_data.assets.readers.gltf_document import Document, get_item, read_accessor
+from gen_data.assets.triangle_soup import Float64
 
 MAX_PARTS = 50_000
 """Bound on nodes, and on primitives of all nodes: each takes about 0.1 ms."""

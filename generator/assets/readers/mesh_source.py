@@ -9,13 +9,13 @@ from pathlib import PurePosixPath
 
 import numpy as np
 
-from gen_data.generator.assets.asset_folder import Folder
-from gen_data.generator.assets.robot_files import resolve_uri
-from gen_data.generator.assets.triangle_soup import Int64, TriangleSoup
-from gen_data.generator.core.asset_types import Material
-from gen_data.generator.core.colorimetry import srgb_decode
-from gen_data.generator.core.errors import AssetError
-from gen_data.generator.core.se3 import Vec3
+from gen_data.assets.asset_folder import Folder
+from gen_data.assets.robot_files import resolve_uri
+from gen_data.assets.triangle_soup import Int64, TriangleSoup
+from gen_data.core.asset_types import Material
+from gen_data.core.colorimetry import srgb_decode
+from gen_data.core.errors import AssetError
+from gen_data.core.se3 import Vec3
 
 MAX_FACES = 5_000_000
 WHITE = Material(base_color=(1.0, 1.0, 1.0))

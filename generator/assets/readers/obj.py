@@ -18,8 +18,8 @@ from typing import Any
 
 import numpy as np
 
-from gen_data.generator.assets.asset_folder import Folder
-from gen_data.generator.assets.readers.mesh_source import (
+from gen_data.assets.asset_folder import Folder
+from gen_data.assets.readers.mesh_source import (
     MAX_FACES,
     WHITE,
     MeshSource,
@@ -30,11 +30,11 @@ from gen_data.generator.assets.readers.mesh_source import (
     split_fans,
     srgb_to_linear,
 )
-from gen_data.generator.assets.texture_maps import TextureMaps
-from gen_data.generator.assets.triangle_soup import Float64, Int64, MaterialSlot, TriangleSoup
-from gen_data.generator.core.asset_types import Material
-from gen_data.generator.core.colorimetry import srgb_decode
-from gen_data.generator.core.errors import AssetError, did_you_mean
+from gen_data.assets.texture_maps import TextureMaps
+from gen_data.assets.triangle_soup import Float64, Int64, MaterialSlot, TriangleSoup
+from gen_data.core.asset_types import Material
+from gen_data.core.colorimetry import srgb_decode
+from gen_data.core.errors import AssetError, did_you_mean
 
 
 @dataclass

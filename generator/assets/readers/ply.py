@@ -12,19 +12,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.assets.asset_folder import Folder
-from gen_data.generator.assets.readers.mesh_source import (
+from gen_data.assets.asset_folder import Folder
+from gen_data.assets.readers.mesh_source import (
     MAX_FACES,
     WHITE,
     MeshSource,
     locate_file,
     split_fans,
 )
-from gen_data.generator.assets.triangle_soup import Float64, Int64, MaterialSlot, TriangleSoup
-from gen_data.generator.config.yaml_scalars import abbreviate
-from gen_data.generator.core.asset_types import Material
-from gen_data.generator.core.colorimetry import srgb_decode
-from gen_data.generator.core.errors import AssetError
+from gen_data.assets.triangle_soup import Float64, Int64, MaterialSlot, TriangleSoup
+from gen_data.config.yaml_scalars import abbreviate
+from gen_data.core.asset_types import Material
+from gen_data.core.colorimetry import srgb_decode
+from gen_data.core.errors import AssetError
 
 _MAX_HEADER_BYTES = 65536
 _TYPES = {

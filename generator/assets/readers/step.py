@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import os
 
-from gen_data.generator.assets.asset_folder import Folder
-from gen_data.generator.assets.readers.gltf import read_gltf_bytes
-from gen_data.generator.assets.readers.mesh_source import MeshSource
-from gen_data.generator.core.errors import AssetError
-from gen_data.generator.core.optional_packages import missing_packages
-from gen_data.generator.core.temporary_folders import temporary_folder
+from gen_data.assets.asset_folder import Folder
+from gen_data.assets.readers.gltf import read_gltf_bytes
+from gen_data.assets.readers.mesh_source import MeshSource
+from gen_data.core.errors import AssetError
+from gen_data.core.optional_packages import missing_packages
+from gen_data.core.temporary_folders import temporary_folder
 
 _TOLERANCE, _ANGLE_RAD = 0.001, 0.3
 """Largest distance from the surface, as a share of an edge's length, and between normals."""

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from gen_data.generator.assets.asset_folder import Folder
-from gen_data.generator.assets.readers.mesh_source import WHITE, MeshSource, check_face_count
-from gen_data.generator.assets.triangle_soup import Float64, MaterialSlot, TriangleSoup
-from gen_data.generator.core.colorimetry import srgb_decode
-from gen_data.generator.core.errors import AssetError
+from gen_data.assets.asset_folder import Folder
+from gen_data.assets.readers.mesh_source import WHITE, MeshSource, check_face_count
+from gen_data.assets.triangle_soup import Float64, MaterialSlot, TriangleSoup
+from gen_data.core.colorimetry import srgb_decode
+from gen_data.core.errors import AssetError
 
 _HEADER_BYTES = 84
 _RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])

@@ -14,12 +14,12 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from gen_data.generator.assets.asset_folder import Folder
-from gen_data.generator.assets.readers.mesh_source import MAX_FACES, WHITE, MeshSource
-from gen_data.generator.assets.triangle_soup import Float64, MaterialSlot, TriangleSoup, join_soups
-from gen_data.generator.core.colorimetry import srgb_decode
-from gen_data.generator.core.errors import AssetError
-from gen_data.generator.core.safe_xml import parse_xml
+from gen_data.assets.asset_folder import Folder
+from gen_data.assets.readers.mesh_source import MAX_FACES, WHITE, MeshSource
+from gen_data.assets.triangle_soup import Float64, MaterialSlot, TriangleSoup, join_soups
+from gen_data.core.colorimetry import srgb_decode
+from gen_data.core.errors import AssetError
+from gen_data.core.safe_xml import parse_xml
 
 _METRES = {
     "micron": 1e-6, "millimeter": 1e-3, "centimeter": 1e-2, "inch": 0.0254, "foot": 0.3048,

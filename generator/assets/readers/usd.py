@@ -16,16 +16,16 @@ from pathlib import Path, PurePosixPath
 
 import numpy as np
 
-from gen_data.generator.assets.asset_folder import Folder
-from gen_data.generator.assets.image_decoding import decode_image
-from gen_data.generator.assets.readers.mesh_source import EVEN, MeshSource
-from gen_data.generator.assets.texture_maps import TextureMaps
-from gen_data.generator.assets.triangle_soup import MaterialSlot, TriangleSoup, join_soups
-from gen_data.generator.core.asset_types import Material, UInt8
-from gen_data.generator.core.errors import AssetError
-from gen_data.generator.core.temporary_folders import temporary_folder
-from gen_data.generator.usd.material_reader import BoundMaterial
-from gen_data.generator.usd.stage_reader import SUFFIXES, OpenStage, StagePart, layer_references
+from gen_data.assets.asset_folder import Folder
+from gen_data.assets.image_decoding import decode_image
+from gen_data.assets.readers.mesh_source import EVEN, MeshSource
+from gen_data.assets.texture_maps import TextureMaps
+from gen_data.assets.triangle_soup import MaterialSlot, TriangleSoup, join_soups
+from gen_data.core.asset_types import Material, UInt8
+from gen_data.core.errors import AssetError
+from gen_data.core.temporary_folders import temporary_folder
+from gen_data.usd.material_reader import BoundMaterial
+from gen_data.usd.stage_reader import SUFFIXES, OpenStage, StagePart, layer_references
 
 ARCHIVE = ".usdz"
 

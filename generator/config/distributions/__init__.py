@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from pydantic import TypeAdapter
 from pydantic_core import core_schema
 
-from gen_data.generator.config.distributions.base import (
+from gen_data.config.distributions.base import (
     DISTRIBUTIONS,
     Distribution,
     Kind,
@@ -28,15 +28,10 @@ from gen_data.generator.config.distributions.base import (
     read_number,
     reader,
 )
-from gen_data.generator.config.distributions.discrete import Choice, Constant, Probability, Sequence
-from gen_data.generator.config.distributions.mixture import Mixture
-from gen_data.generator.config.distributions.numeric import (
-    LogUniform,
-    Normal,
-    Uniform,
-    UniformInteger,
-)
-from gen_data.generator.config.distributions.space import (
+from gen_data.config.distributions.discrete import Choice, Constant, Probability, Sequence
+from gen_data.config.distributions.mixture import Mixture
+from gen_data.config.distributions.numeric import LogUniform, Normal, Uniform, UniformInteger
+from gen_data.config.distributions.space import (
     AboutZ,
     Box,
     Cap,
@@ -48,9 +43,9 @@ from gen_data.generator.config.distributions.space import (
     UnitQuaternion,
     UnitVector,
 )
-from gen_data.generator.config.yaml_scalars import format_number, quote_value
-from gen_data.generator.core.errors import did_you_mean
-from gen_data.generator.core.se3 import Quaternion, Vec3
+from gen_data.config.yaml_scalars import format_number, quote_value
+from gen_data.core.errors import did_you_mean
+from gen_data.core.se3 import Quaternion, Vec3
 
 __all__ = [
     "CHANCE", "DIRECTION", "DISTRIBUTIONS", "DISTRIBUTION_TITLE", "FLAG", "MEANT", "NAME", "NUMBER",

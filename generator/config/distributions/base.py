@@ -17,20 +17,15 @@ from pydantic import BeforeValidator, ConfigDict, Field, TypeAdapter, Validation
 from pydantic.dataclasses import dataclass as pydantic_dataclass
 from typing_extensions import dataclass_transform
 
-from gen_data.generator.config.yaml_scalars import (
-    abbreviate,
-    format_number,
-    quote_value,
-    resolve_scalar,
-)
-from gen_data.generator.core.errors import did_you_mean
-from gen_data.generator.core.plugins import PluginTable
+from gen_data.config.yaml_scalars import abbreviate, format_number, quote_value, resolve_scalar
+from gen_data.core.errors import did_you_mean
+from gen_data.core.plugins import PluginTable
 
 if TYPE_CHECKING:
     from pydantic.fields import FieldInfo
     from pydantic_core import ErrorDetails
 
-    from gen_data.generator.core.streams import Rng
+    from gen_data.core.streams import Rng
 
 T = TypeVar("T")
 T_co = TypeVar("T_co", covariant=True)
@@ -38,23 +33,23 @@ T_co = TypeVar("T_co", covariant=True)
 DISTRIBUTIONS: PluginTable[Distribution[Any]] = PluginTable(
     "distribution",
     {
-        "constant": "gen_data.generator.config.distributions.discrete:Constant",
-        "choice": "gen_data.generator.config.distributions.discrete:Choice",
-        "sequence": "gen_data.generator.config.distributions.discrete:Sequence",
-        "probability": "gen_data.generator.config.distributions.discrete:Probability",
-        "uniform": "gen_data.generator.config.distributions.numeric:Uniform",
-        "log_uniform": "gen_data.generator.config.distributions.numeric:LogUniform",
-        "normal": "gen_data.generator.config.distributions.numeric:Normal",
-        "uniform_integer": "gen_data.generator.config.distributions.numeric:UniformInteger",
-        "mixture": "gen_data.generator.config.distributions.mixture:Mixture",
-        "quaternion_wxyz": "gen_data.generator.config.distributions.space:QuaternionWxyz",
-        "euler_deg": "gen_data.generator.config.distributions.space:EulerDeg",
-        "so3": "gen_data.generator.config.distributions.space:So3",
-        "about_z": "gen_data.generator.config.distributions.space:AboutZ",
-        "sphere": "gen_data.generator.config.distributions.space:Sphere",
-        "cap": "gen_data.generator.config.distributions.space:Cap",
-        "box": "gen_data.generator.config.distributions.space:Box",
-        "shell": "gen_data.generator.config.distributions.space:Shell",
+        "constant": "gen_data.config.distributions.discrete:Constant",
+        "choice": "gen_data.config.distributions.discrete:Choice",
+        "sequence": "gen_data.config.distributions.discrete:Sequence",
+        "probability": "gen_data.config.distributions.discrete:Probability",
+        "uniform": "gen_data.config.distributions.numeric:Uniform",
+        "log_uniform": "gen_data.config.distributions.numeric:LogUniform",
+        "normal": "gen_data.config.distributions.numeric:Normal",
+        "uniform_integer": "gen_data.config.distributions.numeric:UniformInteger",
+        "mixture": "gen_data.config.distributions.mixture:Mixture",
+        "quaternion_wxyz": "gen_data.config.distributions.space:QuaternionWxyz",
+        "euler_deg": "gen_data.config.distributions.space:EulerDeg",
+        "so3": "gen_data.config.distributions.space:So3",
+        "about_z": "gen_data.config.distributions.space:AboutZ",
+        "sphere": "gen_data.config.distributions.space:Sphere",
+        "cap": "gen_data.config.distributions.space:Cap",
+        "box": "gen_data.config.distributions.space:Box",
+        "shell": "gen_data.config.distributions.space:Shell",
     },
 )
 

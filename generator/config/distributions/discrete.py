@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import Field
 
-from gen_data.generator.config.distributions.base import (
+from gen_data.config.distributions.base import (
     Kind,
     Malformed,
     Numeric,
@@ -21,10 +21,10 @@ from gen_data.generator.config.distributions.base import (
     read_number,
     to_plain,
 )
-from gen_data.generator.config.yaml_scalars import format_number, quote_value, to_flow_yaml
+from gen_data.config.yaml_scalars import format_number, quote_value, to_flow_yaml
 
 if TYPE_CHECKING:
-    from gen_data.generator.core.streams import Rng
+    from gen_data.core.streams import Rng
 
 EVERY_KIND = ("number", "whole number", "name", "flag", "rotation", "direction", "position")
 

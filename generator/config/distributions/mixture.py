@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from itertools import accumulate
 from typing import TYPE_CHECKING, Any
 
-from gen_data.generator.config.distributions.base import (
+from gen_data.config.distributions.base import (
     Kind,
     Malformed,
     Numeric,
@@ -17,10 +17,10 @@ from gen_data.generator.config.distributions.base import (
     read_distribution,
     read_number,
 )
-from gen_data.generator.config.yaml_scalars import format_number, quote_value
+from gen_data.config.yaml_scalars import format_number, quote_value
 
 if TYPE_CHECKING:
-    from gen_data.generator.core.streams import Rng
+    from gen_data.core.streams import Rng
 
 
 @dataclass(frozen=True)

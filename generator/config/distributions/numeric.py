@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from pydantic import Field, WithJsonSchema
 
-from gen_data.generator.config.distributions.base import (
+from gen_data.config.distributions.base import (
     Malformed,
     Numeric,
     T_co,
@@ -17,10 +17,10 @@ from gen_data.generator.config.distributions.base import (
     round_significant,
     sized,
 )
-from gen_data.generator.config.yaml_scalars import format_number
+from gen_data.config.yaml_scalars import format_number
 
 if TYPE_CHECKING:
-    from gen_data.generator.core.streams import Rng
+    from gen_data.core.streams import Rng
 
 _STANDARD = NormalDist()
 _LEAST_PROBABILITY = 1e-280

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from pydantic import AfterValidator, Field
 
-from gen_data.generator.config.distributions.base import (
+from gen_data.config.distributions.base import (
     Distribution,
     Malformed,
     Vector,
@@ -16,11 +16,11 @@ from gen_data.generator.config.distributions.base import (
     round_significant,
     sized,
 )
-from gen_data.generator.config.yaml_scalars import format_number
-from gen_data.generator.core.se3 import Quaternion, Vec3, multiply_quaternions, rotate_by_quaternion
+from gen_data.config.yaml_scalars import format_number
+from gen_data.core.se3 import Quaternion, Vec3, multiply_quaternions, rotate_by_quaternion
 
 if TYPE_CHECKING:
-    from gen_data.generator.core.streams import Rng
+    from gen_data.core.streams import Rng
 
 
 def _unit(parts: tuple[float, ...], noun: str) -> tuple[float, ...]:

@@ -8,9 +8,9 @@ from enum import Enum
 
 import numpy as np
 
-from gen_data.generator.core.asset_types import RobotModel
-from gen_data.generator.core.errors import Rejection
-from gen_data.generator.core.kinematics import (
+from gen_data.core.asset_types import RobotModel
+from gen_data.core.errors import Rejection
+from gen_data.core.kinematics import (
     all_positions,
     finger_links,
     is_arm_joint,
@@ -19,12 +19,12 @@ from gen_data.generator.core.kinematics import (
     rigid_group,
     round_positions,
 )
-from gen_data.generator.core.scene import ArmGoal, Articulation
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.physics.collision_shapes import CollisionShape
-from gen_data.generator.physics.manipulation.grasping import Grasp, Hand
-from gen_data.generator.physics.manipulation.inverse_kinematics import make_chain, solve_all
-from gen_data.generator.physics.world import World
+from gen_data.core.scene import ArmGoal, Articulation
+from gen_data.core.se3 import SE3
+from gen_data.physics.collision_shapes import CollisionShape
+from gen_data.physics.manipulation.grasping import Grasp, Hand
+from gen_data.physics.manipulation.inverse_kinematics import make_chain, solve_all
+from gen_data.physics.world import World
 
 
 class Failure(Enum):

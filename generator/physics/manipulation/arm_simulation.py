@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gen_data.generator.core.kinematics import (
+from gen_data.core.kinematics import (
     all_positions,
     arm_joints,
     finger_links,
@@ -20,13 +20,13 @@ from gen_data.generator.core.kinematics import (
     link_poses,
     position_limits,
 )
-from gen_data.generator.core.scene import BodyJoint
-from gen_data.generator.core.se3 import SE3, Array
-from gen_data.generator.physics.manipulation.arm_goals import Arm
-from gen_data.generator.physics.manipulation.demonstration import has_moved
-from gen_data.generator.physics.manipulation.joint_trajectories import speed_max
-from gen_data.generator.physics.manipulation.measures import Measures
-from gen_data.generator.physics.world import World
+from gen_data.core.scene import BodyJoint
+from gen_data.core.se3 import SE3, Array
+from gen_data.physics.manipulation.arm_goals import Arm
+from gen_data.physics.manipulation.demonstration import has_moved
+from gen_data.physics.manipulation.joint_trajectories import speed_max
+from gen_data.physics.manipulation.measures import Measures
+from gen_data.physics.world import World
 
 _TOUCH_M = 0.0005
 """Fingers nearer than this to a body touch it."""

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gen_data.generator.core.asset_types import RobotModel
-from gen_data.generator.core.kinematics import finger_links, rigid_group
-from gen_data.generator.physics.manipulation.arm_goals import Arm
-from gen_data.generator.physics.manipulation.joint_trajectories import Held, Leg
-from gen_data.generator.physics.world import World
+from gen_data.core.asset_types import RobotModel
+from gen_data.core.kinematics import finger_links, rigid_group
+from gen_data.physics.manipulation.arm_goals import Arm
+from gen_data.physics.manipulation.joint_trajectories import Held, Leg
+from gen_data.physics.world import World
 
 CLEARANCE_M = 0.003
 """Default distance between an arm and its obstacles."""

@@ -14,21 +14,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from gen_data.generator.core.errors import Rejection
-from gen_data.generator.core.kinematics import finger_links
-from gen_data.generator.core.scene import BodyJoint, Condition, ContactSpan, Episode, Span
-from gen_data.generator.core.se3 import SE3, Vec3
-from gen_data.generator.physics.manipulation.arm_goals import Arm
-from gen_data.generator.physics.manipulation.joint_trajectories import (
-    STEP_S,
-    Held,
-    Leg,
-    smooth_step,
-)
-from gen_data.generator.physics.manipulation.manipulation_planner import TaskPlanner
-from gen_data.generator.physics.manipulation.measures import Measures
-from gen_data.generator.physics.manipulation.suction import is_sealed, needed_force_n
-from gen_data.generator.physics.world import Contact, World
+from gen_data.core.errors import Rejection
+from gen_data.core.kinematics import finger_links
+from gen_data.core.scene import BodyJoint, Condition, ContactSpan, Episode, Span
+from gen_data.core.se3 import SE3, Vec3
+from gen_data.physics.manipulation.arm_goals import Arm
+from gen_data.physics.manipulation.joint_trajectories import STEP_S, Held, Leg, smooth_step
+from gen_data.physics.manipulation.manipulation_planner import TaskPlanner
+from gen_data.physics.manipulation.measures import Measures
+from gen_data.physics.manipulation.suction import is_sealed, needed_force_n
+from gen_data.physics.world import Contact, World
 
 _TOUCH_M = 0.0005
 """Bodies nearer than this touch."""

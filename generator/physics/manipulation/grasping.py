@@ -8,15 +8,11 @@ from functools import cached_property
 
 import numpy as np
 
-from gen_data.generator.core.asset_types import Gripper, RobotModel
-from gen_data.generator.core.kinematics import all_positions, finger_links, link_poses, rigid_group
-from gen_data.generator.core.se3 import IDENTITY, SE3, Array, Vec3
-from gen_data.generator.physics.manipulation.suction import (
-    is_sealed,
-    needed_force_n,
-    rim_depths_m,
-)
-from gen_data.generator.physics.world import World
+from gen_data.core.asset_types import Gripper, RobotModel
+from gen_data.core.kinematics import all_positions, finger_links, link_poses, rigid_group
+from gen_data.core.se3 import IDENTITY, SE3, Array, Vec3
+from gen_data.physics.manipulation.suction import is_sealed, needed_force_n, rim_depths_m
+from gen_data.physics.world import World
 
 _PALM_GAP_M = 0.002
 _PAD_GAP_M = 0.002

@@ -12,14 +12,9 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from gen_data.generator.core.asset_types import Gripper, Joint, RobotModel
-from gen_data.generator.core.kinematics import (
-    arm_joints,
-    joint_transform,
-    leader_of,
-    position_limits,
-)
-from gen_data.generator.core.se3 import SE3, Vec3, rotate_by_quaternion
+from gen_data.core.asset_types import Gripper, Joint, RobotModel
+from gen_data.core.kinematics import arm_joints, joint_transform, leader_of, position_limits
+from gen_data.core.se3 import SE3, Vec3, rotate_by_quaternion
 
 POSITION_TOLERANCE_M = 1e-3
 ANGLE_TOLERANCE_RAD = math.radians(0.5)

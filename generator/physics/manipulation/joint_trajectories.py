@@ -13,11 +13,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
-from gen_data.generator.core.asset_types import Joint, RobotModel
-from gen_data.generator.core.kinematics import link_poses, round_positions
-from gen_data.generator.core.motion import JointTrajectory, Trajectory
-from gen_data.generator.core.se3 import SE3, Vec3
-from gen_data.generator.physics.manipulation.arm_goals import Arm
+from gen_data.core.asset_types import Joint, RobotModel
+from gen_data.core.kinematics import link_poses, round_positions
+from gen_data.core.motion import JointTrajectory, Trajectory
+from gen_data.core.se3 import SE3, Vec3
+from gen_data.physics.manipulation.arm_goals import Arm
 
 STEP_S = 0.05
 """Time between the knots of a track; legs last a whole number of steps."""

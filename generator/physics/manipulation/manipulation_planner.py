@@ -8,27 +8,22 @@ from dataclasses import replace
 
 import numpy as np
 
-from gen_data.generator.core.errors import Rejection
-from gen_data.generator.core.kinematics import (
+from gen_data.core.errors import Rejection
+from gen_data.core.kinematics import (
     all_positions,
     gripper_opening,
     is_within_limits,
     round_positions,
 )
-from gen_data.generator.core.scene import ArmGoal, SupportSurface
-from gen_data.generator.core.se3 import SE3, Vec3
-from gen_data.generator.physics.manipulation.arm_goals import Arm, ArmState
-from gen_data.generator.physics.manipulation.continuous_collision import ITSELF, Obstacles
-from gen_data.generator.physics.manipulation.grasping import Grasp, Hand
-from gen_data.generator.physics.manipulation.joint_trajectories import (
-    Held,
-    Leg,
-    limit_speed,
-    time_leg,
-)
-from gen_data.generator.physics.manipulation.motion_planner import MotionPlanner, Positions
-from gen_data.generator.physics.settling import home_surface, is_within
-from gen_data.generator.physics.world import World
+from gen_data.core.scene import ArmGoal, SupportSurface
+from gen_data.core.se3 import SE3, Vec3
+from gen_data.physics.manipulation.arm_goals import Arm, ArmState
+from gen_data.physics.manipulation.continuous_collision import ITSELF, Obstacles
+from gen_data.physics.manipulation.grasping import Grasp, Hand
+from gen_data.physics.manipulation.joint_trajectories import Held, Leg, limit_speed, time_leg
+from gen_data.physics.manipulation.motion_planner import MotionPlanner, Positions
+from gen_data.physics.settling import home_surface, is_within
+from gen_data.physics.world import World
 
 CANNOT_REACH = "its pose or joint positions are out of reach"
 NOTHING_TO_GRASP = "no listed object lies free and fits between the fingers"

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from gen_data.generator.core.scene import HAND, BodyJoint, Condition
-from gen_data.generator.core.se3 import SE3, Array
-from gen_data.generator.physics.world import World, joint_position
+from gen_data.core.scene import HAND, BodyJoint, Condition
+from gen_data.core.se3 import SE3, Array
+from gen_data.physics.world import World, joint_position
 
 GAP_MAX_M = 0.1
 """Gaps are measured up to this distance."""

@@ -6,19 +6,19 @@ import math
 from collections.abc import Iterator, Sequence
 from itertools import islice, pairwise
 
-from gen_data.generator.core.kinematics import all_positions, is_arm_joint, round_positions
-from gen_data.generator.core.motion import Trajectory
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.physics.manipulation.arm_goals import Arm
-from gen_data.generator.physics.manipulation.continuous_collision import CollisionSweep, Obstacles
-from gen_data.generator.physics.manipulation.inverse_kinematics import (
+from gen_data.core.kinematics import all_positions, is_arm_joint, round_positions
+from gen_data.core.motion import Trajectory
+from gen_data.core.se3 import SE3
+from gen_data.physics.manipulation.arm_goals import Arm
+from gen_data.physics.manipulation.continuous_collision import CollisionSweep, Obstacles
+from gen_data.physics.manipulation.inverse_kinematics import (
     EXACT,
     make_chain,
     solve_all,
     solve_near,
 )
-from gen_data.generator.physics.manipulation.joint_trajectories import Held, Leg, speed_max
-from gen_data.generator.physics.world import World
+from gen_data.physics.manipulation.joint_trajectories import Held, Leg, speed_max
+from gen_data.physics.world import World
 
 Positions = tuple[float, ...]
 

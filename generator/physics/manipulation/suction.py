@@ -11,9 +11,9 @@ import math
 
 import numpy as np
 
-from gen_data.generator.core.asset_types import SuctionCup
-from gen_data.generator.core.se3 import SE3, Array
-from gen_data.generator.physics.world import GRAVITY_M_S2, World
+from gen_data.core.asset_types import SuctionCup
+from gen_data.core.se3 import SE3, Array
+from gen_data.physics.world import GRAVITY_M_S2, World
 
 CONTACT_M = 0.0015
 """Largest distance between the rim and the surface below any of its points, which a soft lip of

@@ -22,10 +22,10 @@ from typing import Any
 
 import warp as wp
 
-from gen_data.generator.core.errors import CacheWarning, ConfigError
-from gen_data.generator.core.processes import interrupts_blocked, silence_stdio, tie
-from gen_data.generator.core.system_calls import keep_freed_memory, usable_cores, wait_for_lock
-from gen_data.generator.renderers.warp.kernel_cache import (
+from gen_data.core.errors import CacheWarning, ConfigError
+from gen_data.core.processes import interrupts_blocked, silence_stdio, tie
+from gen_data.core.system_calls import keep_freed_memory, usable_cores, wait_for_lock
+from gen_data.renderers.warp.kernel_cache import (
     copy_modules,
     fill_cache,
     no_private_folder,

@@ -10,13 +10,13 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from gen_data.generator.core.asset_types import Material
-from gen_data.generator.core.bounded_cache import ByteCache, CountCache, ObjectCache
-from gen_data.generator.core.interfaces import AssetLibrary, DerivedArrays
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.mapped_files import PageLimiter
-from gen_data.generator.renderers.warp.scene.brdf_albedo_lut import lobe_albedo
-from gen_data.generator.renderers.warp.scene.device_assets import (
+from gen_data.core.asset_types import Material
+from gen_data.core.bounded_cache import ByteCache, CountCache, ObjectCache
+from gen_data.core.interfaces import AssetLibrary, DerivedArrays
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.mapped_files import PageLimiter
+from gen_data.renderers.warp.scene.brdf_albedo_lut import lobe_albedo
+from gen_data.renderers.warp.scene.device_assets import (
     Arrays,
     DeviceMesh,
     DeviceTexture,
@@ -26,13 +26,13 @@ from gen_data.generator.renderers.warp.scene.device_assets import (
     upload_mesh,
     upload_texture,
 )
-from gen_data.generator.renderers.warp.scene.environment_maps import (
+from gen_data.renderers.warp.scene.environment_maps import (
     DeviceEnvironment,
     upload_environment,
     upload_split,
 )
-from gen_data.generator.renderers.warp.scene.struct_dtypes import to_device
-from gen_data.generator.renderers.warp.visibility.distortion_lut import DeviceOptics, upload_optics
+from gen_data.renderers.warp.scene.struct_dtypes import to_device
+from gen_data.renderers.warp.visibility.distortion_lut import DeviceOptics, upload_optics
 
 _MESH_BYTES, _TEXTURE_BYTES = 176 << 20, 384 << 20
 """Of a GPU."""

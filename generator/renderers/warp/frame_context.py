@@ -10,22 +10,22 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from gen_data.generator.core.asset_types import Float32
-from gen_data.generator.core.interfaces import FindTones
-from gen_data.generator.core.scene import Camera, Scene
-from gen_data.generator.core.scene_time import scene_at
-from gen_data.generator.renderers.warp.device import launch
-from gen_data.generator.renderers.warp.device_cache import DeviceCache
-from gen_data.generator.renderers.warp.scene.kernels import records
-from gen_data.generator.renderers.warp.scene.scene_packing import (
+from gen_data.core.asset_types import Float32
+from gen_data.core.interfaces import FindTones
+from gen_data.core.scene import Camera, Scene
+from gen_data.core.scene_time import scene_at
+from gen_data.renderers.warp.device import launch
+from gen_data.renderers.warp.device_cache import DeviceCache
+from gen_data.renderers.warp.scene.kernels import records
+from gen_data.renderers.warp.scene.scene_packing import (
     PackedWorld,
     pack_view,
     pack_world,
     repack_moved,
 )
-from gen_data.generator.renderers.warp.scene.struct_dtypes import copy_struct
-from gen_data.generator.renderers.warp.settings import RenderSettings
-from gen_data.generator.renderers.warp.visibility.gbuffer import GBuffer, find_visible
+from gen_data.renderers.warp.scene.struct_dtypes import copy_struct
+from gen_data.renderers.warp.settings import RenderSettings
+from gen_data.renderers.warp.visibility.gbuffer import GBuffer, find_visible
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -1,6 +1,6 @@
 """Compile all CPU kernels into the source tree, for a wheel that is then built from it.
 
-``python -m gen_data.generator.renderers.warp.kernel_bundle`` before ``python -m build --wheel``.
+``python -m gen_data.renderers.warp.kernel_bundle`` before ``python -m build --wheel``.
 Kinds of GPUs may follow, such as ``sm_80 sm_90``: their kernels are compiled too, without a GPU.
 The machine code fits every processor on which Warp compiles CPU kernels, because the compiler's
 flags name none; Warp's own names of the files contain its LLVM and the target triple.
@@ -14,13 +14,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from gen_data.generator.renderers.warp.device import (
-    BUNDLES,
-    EVERY_FRAME,
-    bundle_folder,
-    compile_in_parallel,
-)
-from gen_data.generator.renderers.warp.kernel_cache import copy_modules
+from gen_data.renderers.warp.device import BUNDLES, EVERY_FRAME, bundle_folder, compile_in_parallel
+from gen_data.renderers.warp.kernel_cache import copy_modules
 
 
 def kernel_modules() -> tuple[str, ...]:

@@ -27,7 +27,7 @@ from contextlib import contextmanager, suppress
 from hashlib import sha256
 from pathlib import Path
 
-from gen_data.generator.core.errors import CacheWarning, StorageError
+from gen_data.core.errors import CacheWarning, StorageError
 
 OURS = "wp_gen_data."
 SUMS_NAME = "gen-data-sums.json"

@@ -18,12 +18,12 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from gen_data.generator.core.asset_types import Float32
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.colorimetry import srgb_decode
-from gen_data.generator.core.errors import SampleError
-from gen_data.generator.core.interfaces import AssetLibrary
-from gen_data.generator.core.plates import (
+from gen_data.core.asset_types import Float32
+from gen_data.core.capture import Channel
+from gen_data.core.colorimetry import srgb_decode
+from gen_data.core.errors import SampleError
+from gen_data.core.interfaces import AssetLibrary
+from gen_data.core.plates import (
     WHITE_CD_M2,
     Plate,
     crop_to,
@@ -32,10 +32,10 @@ from gen_data.generator.core.plates import (
     is_catcher,
     is_inside,
 )
-from gen_data.generator.core.scene import Camera, Scene, Weather
-from gen_data.generator.core.se3 import Array
-from gen_data.generator.renderers.warp.frame_context import Backdrop, CameraView
-from gen_data.generator.renderers.warp.visibility.kernels import photographs as kernels
+from gen_data.core.scene import Camera, Scene, Weather
+from gen_data.core.se3 import Array
+from gen_data.renderers.warp.frame_context import Backdrop, CameraView
+from gen_data.renderers.warp.visibility.kernels import photographs as kernels
 
 _RATIO_MAX = 16.0
 """Headlights on dark ground multiply its light; more is an error of a nearly black ratio."""

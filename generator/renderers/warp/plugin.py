@@ -6,8 +6,8 @@ from typing import Literal
 
 from pydantic import Field
 
-from gen_data.generator.core.interfaces import AssetLibrary, Renderer
-from gen_data.generator.renderers.warp.settings import RenderSettings
+from gen_data.core.interfaces import AssetLibrary, Renderer
+from gen_data.renderers.warp.settings import RenderSettings
 
 
 class WarpPlugin(RenderSettings):
@@ -32,6 +32,6 @@ class WarpPlugin(RenderSettings):
         Raises:
             ConfigError: the device does not exist, or the denoiser is requested but not installed.
         """
-        from gen_data.generator.renderers.warp.renderer import WarpRenderer
+        from gen_data.renderers.warp.renderer import WarpRenderer
 
         return WarpRenderer(assets, self.device, self.settings)

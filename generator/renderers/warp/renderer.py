@@ -8,30 +8,30 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from gen_data.generator.core.capture import Channel, LidarHits, LidarRays, SensorReading
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import AssetLibrary, FindTones
-from gen_data.generator.core.scene import Camera, Lidar, Scene
-from gen_data.generator.renderers.warp.device import compile_kernels, open_device
-from gen_data.generator.renderers.warp.device_cache import DeviceCache
-from gen_data.generator.renderers.warp.frame_context import CameraState, CameraView, RenderContext
-from gen_data.generator.renderers.warp.lidar.lidar_tracing import trace_scan
-from gen_data.generator.renderers.warp.plates import open_backdrop
-from gen_data.generator.renderers.warp.realtime.realtime_shading import (
+from gen_data.core.capture import Channel, LidarHits, LidarRays, SensorReading
+from gen_data.core.errors import ConfigError
+from gen_data.core.interfaces import AssetLibrary, FindTones
+from gen_data.core.scene import Camera, Lidar, Scene
+from gen_data.renderers.warp.device import compile_kernels, open_device
+from gen_data.renderers.warp.device_cache import DeviceCache
+from gen_data.renderers.warp.frame_context import CameraState, CameraView, RenderContext
+from gen_data.renderers.warp.lidar.lidar_tracing import trace_scan
+from gen_data.renderers.warp.plates import open_backdrop
+from gen_data.renderers.warp.realtime.realtime_shading import (
     add_precipitation,
     radiance_image,
     render_bare_ground,
     shade_pixels,
     smooth_edges,
 )
-from gen_data.generator.renderers.warp.scene.scene_packing import pack_view, pack_world
-from gen_data.generator.renderers.warp.settings import RenderSettings
-from gen_data.generator.renderers.warp.shutter_integration import expose_shutter
-from gen_data.generator.renderers.warp.visibility.amodal import render_silhouettes
-from gen_data.generator.renderers.warp.visibility.gbuffer import find_visible
-from gen_data.generator.renderers.warp.visibility.label_images import label_images
-from gen_data.generator.renderers.warp.visibility.optical_flow import FLOW, flow_images
-from gen_data.generator.renderers.warp.visibility.reprojection import copy_gbuffer
+from gen_data.renderers.warp.scene.scene_packing import pack_view, pack_world
+from gen_data.renderers.warp.settings import RenderSettings
+from gen_data.renderers.warp.shutter_integration import expose_shutter
+from gen_data.renderers.warp.visibility.amodal import render_silhouettes
+from gen_data.renderers.warp.visibility.gbuffer import find_visible
+from gen_data.renderers.warp.visibility.label_images import label_images
+from gen_data.renderers.warp.visibility.optical_flow import FLOW, flow_images
+from gen_data.renderers.warp.visibility.reprojection import copy_gbuffer
 
 Images = Mapping[Channel, NDArray[Any]]
 
@@ -70,7 +70,7 @@ class WarpRenderer:
         self._context = RenderContext(self._cache, self._settings)
         if self._settings.tier == "pathtraced":
             # Its kernels take long to compile, and the realtime tier does not need them.
-            from gen_data.generator.renderers.warp.pathtraced.path_tracer import PathTracer
+            from gen_data.renderers.warp.pathtraced.path_tracer import PathTracer
 
             tracer = PathTracer(self._cache, self._settings)
             self._context = replace(self._context, paths=tracer)

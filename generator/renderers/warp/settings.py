@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from gen_data.generator.config.base_model import Strict
+from gen_data.config.base_model import Strict
 
 
 class RenderSettings(Strict):

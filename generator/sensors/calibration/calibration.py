@@ -8,13 +8,13 @@ from typing import NoReturn
 
 import numpy as np
 
-from gen_data.generator.config.problems import Position, refuse
-from gen_data.generator.config.yaml_scalars import quote_value
-from gen_data.generator.config.yaml_tree import Node
-from gen_data.generator.core.errors import did_you_mean
-from gen_data.generator.core.lens import LensModel
-from gen_data.generator.core.scene_time import RIG_AXES
-from gen_data.generator.core.se3 import IDENTITY, SE3, Array
+from gen_data.config.problems import Position, refuse
+from gen_data.config.yaml_scalars import quote_value
+from gen_data.config.yaml_tree import Node
+from gen_data.core.errors import did_you_mean
+from gen_data.core.lens import LensModel
+from gen_data.core.scene_time import RIG_AXES
+from gen_data.core.se3 import IDENTITY, SE3, Array
 
 ROTATION_ERROR_MAX = 1e-2
 """Largest entry of ``R R^T - 1`` of matrices that were printed with few digits."""

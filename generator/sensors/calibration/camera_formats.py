@@ -15,12 +15,12 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from gen_data.generator.config.problems import Position, refuse
-from gen_data.generator.config.yaml_tree import Node
-from gen_data.generator.core.errors import did_you_mean
-from gen_data.generator.core.lens import COEFFICIENTS, LensModel
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.sensors.calibration.calibration import (
+from gen_data.config.problems import Position, refuse
+from gen_data.config.yaml_tree import Node
+from gen_data.core.errors import did_you_mean
+from gen_data.core.lens import COEFFICIENTS, LensModel
+from gen_data.core.se3 import SE3
+from gen_data.sensors.calibration.calibration import (
     CalibratedCamera,
     Calibration,
     Frame,

@@ -20,11 +20,11 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from gen_data.generator.config.problems import Position, refuse
-from gen_data.generator.config.yaml_tree import Node
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.se3 import SE3, turned
-from gen_data.generator.sensors.calibration.calibration import (
+from gen_data.config.problems import Position, refuse
+from gen_data.config.yaml_tree import Node
+from gen_data.core.errors import ConfigError
+from gen_data.core.se3 import SE3, turned
+from gen_data.sensors.calibration.calibration import (
     CalibratedCamera,
     Calibration,
     Frame,
@@ -34,7 +34,7 @@ from gen_data.generator.sensors.calibration.calibration import (
     numbers,
     rigid,
 )
-from gen_data.generator.sensors.calibration.camera_formats import lens_of, shifted
+from gen_data.sensors.calibration.camera_formats import lens_of, shifted
 
 _NAMES = {
     "R_rect": "R0_rect",

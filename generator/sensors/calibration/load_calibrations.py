@@ -11,18 +11,18 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, TypeVar
 
-from gen_data.generator.config.base_model import Strict
-from gen_data.generator.config.paths import find_path
-from gen_data.generator.config.problems import Position, Problems, refuse
-from gen_data.generator.config.validation import validate
-from gen_data.generator.config.yaml_tree import Node
-from gen_data.generator.core.errors import ConfigWarning
-from gen_data.generator.core.lens import COEFFICIENTS
-from gen_data.generator.core.se3 import SE3, turns_of
-from gen_data.generator.sensors.calibration.calibration import CalibratedCamera, Calibration
-from gen_data.generator.sensors.calibration.read_calibration import read_calibration
-from gen_data.generator.sensors.camera.lens_models import CalibratedLens
-from gen_data.generator.sensors.mounting import Mounting
+from gen_data.config.base_model import Strict
+from gen_data.config.paths import find_path
+from gen_data.config.problems import Position, Problems, refuse
+from gen_data.config.validation import validate
+from gen_data.config.yaml_tree import Node
+from gen_data.core.errors import ConfigWarning
+from gen_data.core.lens import COEFFICIENTS
+from gen_data.core.se3 import SE3, turns_of
+from gen_data.sensors.calibration.calibration import CalibratedCamera, Calibration
+from gen_data.sensors.calibration.read_calibration import read_calibration
+from gen_data.sensors.camera.lens_models import CalibratedLens
+from gen_data.sensors.mounting import Mounting
 
 M = TypeVar("M", bound=Strict)
 _UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001}

@@ -7,18 +7,14 @@ import re
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
-from gen_data.generator.config.problems import Position
-from gen_data.generator.config.yaml_scalars import resolve_scalar
-from gen_data.generator.config.yaml_tree import Node, parse_yaml
-from gen_data.generator.core.errors import AssetError, ConfigError
-from gen_data.generator.core.safe_xml import PlacedElement, parse_xml
-from gen_data.generator.sensors.calibration.calibration import Calibration
-from gen_data.generator.sensors.calibration.camera_formats import (
-    camera_file,
-    colmap_cameras,
-    kalibr_chain,
-)
-from gen_data.generator.sensors.calibration.frame_formats import (
+from gen_data.config.problems import Position
+from gen_data.config.yaml_scalars import resolve_scalar
+from gen_data.config.yaml_tree import Node, parse_yaml
+from gen_data.core.errors import AssetError, ConfigError
+from gen_data.core.safe_xml import PlacedElement, parse_xml
+from gen_data.sensors.calibration.calibration import Calibration
+from gen_data.sensors.calibration.camera_formats import camera_file, colmap_cameras, kalibr_chain
+from gen_data.sensors.calibration.frame_formats import (
     kitti_calibration,
     nuscenes_frames,
     tf_frames,

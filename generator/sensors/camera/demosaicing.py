@@ -13,8 +13,8 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from gen_data.generator.core.asset_types import Float32
-from gen_data.generator.sensors.camera.image_sensor import FILTERS, Pattern
+from gen_data.core.asset_types import Float32
+from gen_data.sensors.camera.image_sensor import FILTERS, Pattern
 
 _MEDIAN_PX = 5
 """Width of the median filter: false colours of a line repeat at every second pixel."""

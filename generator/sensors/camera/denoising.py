@@ -14,8 +14,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.core.asset_types import Float32
-from gen_data.generator.core.colorimetry import MIDDLE_GREY, REC709_LUMINANCE
+from gen_data.core.asset_types import Float32
+from gen_data.core.colorimetry import MIDDLE_GREY, REC709_LUMINANCE
 
 VISIBLE_NOISE = 0.05
 """Noise over signal at middle grey below which cameras leave pictures alone (assumed)."""

@@ -10,11 +10,11 @@ from typing import Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from gen_data.generator.config.base_model import Strict
-from gen_data.generator.core.asset_types import Float32
-from gen_data.generator.core.colorimetry import MIDDLE_GREY, luminance
-from gen_data.generator.core.se3 import Array
-from gen_data.generator.core.shutter import Shutter
+from gen_data.config.base_model import Strict
+from gen_data.core.asset_types import Float32
+from gen_data.core.colorimetry import MIDDLE_GREY, luminance
+from gen_data.core.se3 import Array
+from gen_data.core.shutter import Shutter
 
 EV100_RANGE = (1.0, 17.0)
 """Of a camera without limits of its own: from 1/30 s at f/1.4 and ISO 3200 to sunlit snow.

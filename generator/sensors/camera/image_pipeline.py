@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from gen_data.generator.config.base_model import Strict
-from gen_data.generator.config.distributions import (
+from gen_data.config.base_model import Strict
+from gen_data.config.distributions import (
     Bounds,
     Constant,
     NonNegative,
@@ -21,17 +21,17 @@ from gen_data.generator.config.distributions import (
     Scalar,
     UnitInterval,
 )
-from gen_data.generator.config.yaml_tree import load_yaml
-from gen_data.generator.core.asset_types import Float32
-from gen_data.generator.core.capture import Channel, SensorReading
-from gen_data.generator.core.errors import SampleError
-from gen_data.generator.core.interfaces import FindTones, Renderer, Tones
-from gen_data.generator.core.scene import Camera, Scene, Weather
-from gen_data.generator.core.se3 import Array
-from gen_data.generator.core.streams import Rng
-from gen_data.generator.sensors.camera import isp, optics
-from gen_data.generator.sensors.camera.denoising import denoise, is_noisy
-from gen_data.generator.sensors.camera.exposure import (
+from gen_data.config.yaml_tree import load_yaml
+from gen_data.core.asset_types import Float32
+from gen_data.core.capture import Channel, SensorReading
+from gen_data.core.errors import SampleError
+from gen_data.core.interfaces import FindTones, Renderer, Tones
+from gen_data.core.scene import Camera, Scene, Weather
+from gen_data.core.se3 import Array
+from gen_data.core.streams import Rng
+from gen_data.sensors.camera import isp, optics
+from gen_data.sensors.camera.denoising import denoise, is_noisy
+from gen_data.sensors.camera.exposure import (
     EV100_DARKEST,
     EV100_RANGE,
     ExposureControl,
@@ -43,25 +43,25 @@ from gen_data.generator.sensors.camera.exposure import (
     reachable_ev100,
     saturation_cd_m2,
 )
-from gen_data.generator.sensors.camera.image_sensor import (
+from gen_data.sensors.camera.image_sensor import (
     ImageSensor,
     expose,
     expose_colors,
     mosaic,
     scale_filters,
 )
-from gen_data.generator.sensors.camera.isp import Tone, tone_to_bytes, tone_to_display
-from gen_data.generator.sensors.camera.lens_drops import lens_drops, refract_in_drops
-from gen_data.generator.sensors.camera.local_tone import fuse_exposures
-from gen_data.generator.sensors.camera.optics import add_flare, add_glare
-from gen_data.generator.sensors.device_presets import check_preset, preset_path
+from gen_data.sensors.camera.isp import Tone, tone_to_bytes, tone_to_display
+from gen_data.sensors.camera.lens_drops import lens_drops, refract_in_drops
+from gen_data.sensors.camera.local_tone import fuse_exposures
+from gen_data.sensors.camera.optics import add_flare, add_glare
+from gen_data.sensors.device_presets import check_preset, preset_path
 
 NONE = Constant(0.0)
 CONTRASTS = 16
 """Steps of contrast per unit."""
 _LEAST_SHARPENED_PX = 0.25
 """Radius below which unsharp masking changes nothing: a Gaussian spreads a thousandth then."""
-PRESETS = "gen_data.generator.sensors.camera.presets"
+PRESETS = "gen_data.sensors.camera.presets"
 Row = tuple[float, float, float]
 
 

@@ -13,12 +13,12 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
-from gen_data.generator.config.base_model import Strict
-from gen_data.generator.config.distributions import NonNegative
-from gen_data.generator.config.distributions.discrete import Constant
-from gen_data.generator.core.asset_types import Float32
-from gen_data.generator.core.colorimetry import luminance
-from gen_data.generator.core.streams import Rng, Streams
+from gen_data.config.base_model import Strict
+from gen_data.config.distributions import NonNegative
+from gen_data.config.distributions.discrete import Constant
+from gen_data.core.asset_types import Float32
+from gen_data.core.colorimetry import luminance
+from gen_data.core.streams import Rng, Streams
 
 Pattern = Literal["rggb", "bggr", "grbg", "gbrg", "mono"]
 

@@ -30,17 +30,17 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.core.asset_types import Float32
-from gen_data.generator.core.colorimetry import (
+from gen_data.core.asset_types import Float32
+from gen_data.core.colorimetry import (
     MIDDLE_GREY,
     REC709_FROM_XYZ,
     REC709_LUMINANCE,
     srgb_encode,
     temperature_to_chromaticity,
 )
-from gen_data.generator.core.se3 import Array
-from gen_data.generator.sensors.camera.demosaicing import demosaic_along_edges
-from gen_data.generator.sensors.camera.image_sensor import Pattern
+from gen_data.core.se3 import Array
+from gen_data.sensors.camera.demosaicing import demosaic_along_edges
+from gen_data.sensors.camera.image_sensor import Pattern
 
 Demosaic = Literal["bilinear", "edge_aware"]
 

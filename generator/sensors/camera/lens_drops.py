@@ -7,11 +7,11 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.core.asset_types import Float32
-from gen_data.generator.core.scene import Camera, Weather
-from gen_data.generator.core.se3 import Array
-from gen_data.generator.core.streams import Streams
-from gen_data.generator.sensors.camera.optics import blur, halve
+from gen_data.core.asset_types import Float32
+from gen_data.core.scene import Camera, Weather
+from gen_data.core.se3 import Array
+from gen_data.core.streams import Streams
+from gen_data.sensors.camera.optics import blur, halve
 
 _RADII = (0.004, 0.022)
 """Smallest and largest radius of drops over the image's width."""

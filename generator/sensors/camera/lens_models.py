@@ -8,17 +8,17 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from gen_data.generator.config.base_model import Strict
-from gen_data.generator.config.data_files import load_table
-from gen_data.generator.core.errors import did_you_mean
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.lens import COEFFICIENTS, Lens, LensModel
+from gen_data.config.base_model import Strict
+from gen_data.config.data_files import load_table
+from gen_data.core.errors import did_you_mean
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.lens import COEFFICIENTS, Lens, LensModel
 
 FieldDeg = Annotated[float, Field(gt=0, le=360)]
 
 
 class _LensModel(Strict):
-    """Base of the models of ``gen_data.generator.core.lens``; fields are their coefficients."""
+    """Base of the models of ``gen_data.core.lens``; fields are their coefficients."""
 
     model: LensModel
 

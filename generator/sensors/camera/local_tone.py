@@ -16,9 +16,9 @@ from functools import lru_cache
 import cv2
 import numpy as np
 
-from gen_data.generator.core.asset_types import Float32
-from gen_data.generator.core.colorimetry import luminance
-from gen_data.generator.sensors.camera.isp import Tone, display_values, tone_to_display
+from gen_data.core.asset_types import Float32
+from gen_data.core.colorimetry import luminance
+from gen_data.sensors.camera.isp import Tone, display_values, tone_to_display
 
 _LONG = 1.3
 """Gain of the bright version: rooms are shown brighter than a single exposure may (assumed)."""

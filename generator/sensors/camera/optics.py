@@ -14,9 +14,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.core.asset_types import Float32
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.se3 import Array
+from gen_data.core.asset_types import Float32
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.se3 import Array
 
 _BLUR_LEVELS = (0.0, 1.0, 1.6, 2.5, 4.0, 6.3, 10.0, 16.0)
 """Radii of the layers that a defocused image is composed of [px]."""

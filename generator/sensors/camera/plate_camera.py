@@ -7,12 +7,12 @@ from typing import Literal
 
 from pydantic import model_validator
 
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.plates import EV100, fitted_intrinsics, has_plate
-from gen_data.generator.core.scene import Scene
-from gen_data.generator.sensors.camera.exposure import make_shutter
-from gen_data.generator.sensors.camera.image_pipeline import ImagePipeline
-from gen_data.generator.sensors.camera.rgb_camera import RgbCamera
+from gen_data.core.errors import ConfigError
+from gen_data.core.plates import EV100, fitted_intrinsics, has_plate
+from gen_data.core.scene import Scene
+from gen_data.sensors.camera.exposure import make_shutter
+from gen_data.sensors.camera.image_pipeline import ImagePipeline
+from gen_data.sensors.camera.rgb_camera import RgbCamera
 
 _GIVEN_BY_THE_PHOTOGRAPH = (
     "hfov_deg", "intrinsics", "lens", "rig", "offset_m", "yaw_deg", "pitch_deg", "roll_deg",

@@ -10,27 +10,27 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from gen_data.generator.config.base_model import NAME_PATTERN
-from gen_data.generator.core.capture import Channel, SensorReading
-from gen_data.generator.core.errors import ConfigError, SampleError, did_you_mean
-from gen_data.generator.core.interfaces import Modality, Renderer, SensorInfo
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.scene import Camera, Region, Scene
-from gen_data.generator.core.scene_time import RIG_AXES
-from gen_data.generator.core.se3 import SE3, look_at
-from gen_data.generator.core.shutter import INSTANT, Shutter
-from gen_data.generator.core.stereo import baseline_m, disparity_px, is_seen_by_both
-from gen_data.generator.core.streams import Rng
-from gen_data.generator.sensors.camera.exposure import ExposureTime, RollingShutter, make_shutter
-from gen_data.generator.sensors.camera.image_pipeline import ImagePipeline, capture_photograph
-from gen_data.generator.sensors.camera.lens_models import (
+from gen_data.config.base_model import NAME_PATTERN
+from gen_data.core.capture import Channel, SensorReading
+from gen_data.core.errors import ConfigError, SampleError, did_you_mean
+from gen_data.core.interfaces import Modality, Renderer, SensorInfo
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.scene import Camera, Region, Scene
+from gen_data.core.scene_time import RIG_AXES
+from gen_data.core.se3 import SE3, look_at
+from gen_data.core.shutter import INSTANT, Shutter
+from gen_data.core.stereo import baseline_m, disparity_px, is_seen_by_both
+from gen_data.core.streams import Rng
+from gen_data.sensors.camera.exposure import ExposureTime, RollingShutter, make_shutter
+from gen_data.sensors.camera.image_pipeline import ImagePipeline, capture_photograph
+from gen_data.sensors.camera.lens_models import (
     CalibratedLens,
     LensConfig,
     MeasuredIntrinsics,
     Pinhole,
 )
-from gen_data.generator.sensors.camera.rgb_encoding import RgbEncoding
-from gen_data.generator.sensors.mounting import Mounted, check_rig
+from gen_data.sensors.camera.rgb_encoding import RgbEncoding
+from gen_data.sensors.mounting import Mounted, check_rig
 
 Image = Literal[
     Channel.RGB, Channel.Z_DEPTH, Channel.RANGE, Channel.NORMALS, Channel.INSTANCE, Channel.PART,
@@ -38,7 +38,7 @@ Image = Literal[
     Channel.FLOW_FORWARD, Channel.FLOW_BACKWARD, Channel.FLOW_OCCLUDED_FORWARD,
     Channel.FLOW_OCCLUDED_BACKWARD, Channel.SCENE_FLOW,
 ]  # fmt: skip
-"""Channels that can be written as images; see ``gen_data.generator.core.capture.Channel``."""
+"""Channels that can be written as images; see ``gen_data.core.capture.Channel``."""
 
 PAIRED = frozenset({Channel.DISPARITY, Channel.DISPARITY_VISIBLE})
 """Channels that need a second camera."""

@@ -6,8 +6,8 @@ from typing import Literal
 
 from pydantic import Field, model_validator
 
-from gen_data.generator.config.base_model import Strict
-from gen_data.generator.core.capture import ImageEncoding
+from gen_data.config.base_model import Strict
+from gen_data.core.capture import ImageEncoding
 
 DEFAULT_QUALITY = 92
 

@@ -17,12 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from gen_data.generator.config.base_model import Strict
-from gen_data.generator.core.asset_types import Float32
-from gen_data.generator.core.stereo import disparity_px, is_seen_by_both
-from gen_data.generator.core.streams import Rng
-from gen_data.generator.sensors.depth.structured_light import Dots
-from gen_data.generator.sensors.depth.view import Measured, View
+from gen_data.config.base_model import Strict
+from gen_data.core.asset_types import Float32
+from gen_data.core.stereo import disparity_px, is_seen_by_both
+from gen_data.core.streams import Rng
+from gen_data.sensors.depth.structured_light import Dots
+from gen_data.sensors.depth.view import Measured, View
 
 UInt8 = NDArray[np.uint8]
 

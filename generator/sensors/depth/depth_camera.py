@@ -10,23 +10,23 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, field_validator, model_validator
 
-from gen_data.generator.config.base_model import NAME_PATTERN, Strict
-from gen_data.generator.core.capture import Channel, SensorReading
-from gen_data.generator.core.errors import SampleError
-from gen_data.generator.core.interfaces import Modality, Renderer, SensorInfo
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.lens import PINHOLE
-from gen_data.generator.core.scene import Scene
-from gen_data.generator.core.streams import Rng
-from gen_data.generator.sensors.camera.image_pipeline import ImagePipeline, capture_photograph
-from gen_data.generator.sensors.camera.lens_models import MeasuredIntrinsics
-from gen_data.generator.sensors.camera.rgb_camera import add_camera
-from gen_data.generator.sensors.depth.active_stereo import ActiveStereo
-from gen_data.generator.sensors.depth.structured_light import StructuredLight
-from gen_data.generator.sensors.depth.time_of_flight import TimeOfFlight
-from gen_data.generator.sensors.depth.view import Measured, View
-from gen_data.generator.sensors.device_presets import check_preset, load_preset
-from gen_data.generator.sensors.mounting import Mounted
+from gen_data.config.base_model import NAME_PATTERN, Strict
+from gen_data.core.capture import Channel, SensorReading
+from gen_data.core.errors import SampleError
+from gen_data.core.interfaces import Modality, Renderer, SensorInfo
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.lens import PINHOLE
+from gen_data.core.scene import Scene
+from gen_data.core.streams import Rng
+from gen_data.sensors.camera.image_pipeline import ImagePipeline, capture_photograph
+from gen_data.sensors.camera.lens_models import MeasuredIntrinsics
+from gen_data.sensors.camera.rgb_camera import add_camera
+from gen_data.sensors.depth.active_stereo import ActiveStereo
+from gen_data.sensors.depth.structured_light import StructuredLight
+from gen_data.sensors.depth.time_of_flight import TimeOfFlight
+from gen_data.sensors.depth.view import Measured, View
+from gen_data.sensors.device_presets import check_preset, load_preset
+from gen_data.sensors.mounting import Mounted
 
 SidePx = Annotated[int, Field(ge=8, le=4096)]
 
@@ -71,7 +71,7 @@ class DepthModel(Strict):
         return self
 
 
-MODELS = "gen_data.generator.sensors.depth"
+MODELS = "gen_data.sensors.depth"
 IDEAL = ImagePipeline()
 OWN = frozenset({Channel.MEASURED_DEPTH, Channel.INFRARED})
 

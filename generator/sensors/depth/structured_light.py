@@ -21,12 +21,12 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from gen_data.generator.config.base_model import Strict
-from gen_data.generator.core.asset_types import Float32
-from gen_data.generator.core.stereo import disparity_px, is_seen_by_both
-from gen_data.generator.core.streams import Rng
-from gen_data.generator.sensors.depth.view import Hits, Measured, View, smooth_noise
-from gen_data.generator.sensors.lidar.scan_pattern import Sensitivity
+from gen_data.config.base_model import Strict
+from gen_data.core.asset_types import Float32
+from gen_data.core.stereo import disparity_px, is_seen_by_both
+from gen_data.core.streams import Rng
+from gen_data.sensors.depth.view import Hits, Measured, View, smooth_noise
+from gen_data.sensors.lidar.scan_pattern import Sensitivity
 
 UInt32 = NDArray[np.uint32]
 

@@ -24,10 +24,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from gen_data.generator.config.base_model import Strict
-from gen_data.generator.core.asset_types import Float32
-from gen_data.generator.core.streams import Rng
-from gen_data.generator.sensors.depth.view import Hits, Measured, View
+from gen_data.config.base_model import Strict
+from gen_data.core.asset_types import Float32
+from gen_data.core.streams import Rng
+from gen_data.sensors.depth.view import Hits, Measured, View
 
 LIGHT_M_S = 299_792_458.0
 SUBRAYS = 7

@@ -8,13 +8,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.core.asset_types import Float32
-from gen_data.generator.core.capture import Channel, LidarRays
-from gen_data.generator.core.colorimetry import luminance
-from gen_data.generator.core.interfaces import Renderer
-from gen_data.generator.core.scene import Camera, Lidar, Scene
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.core.streams import Rng
+from gen_data.core.asset_types import Float32
+from gen_data.core.capture import Channel, LidarRays
+from gen_data.core.colorimetry import luminance
+from gen_data.core.interfaces import Renderer
+from gen_data.core.scene import Camera, Lidar, Scene
+from gen_data.core.se3 import SE3
+from gen_data.core.streams import Rng
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -20,23 +20,17 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from gen_data.generator.config.base_model import NAME_PATTERN
-from gen_data.generator.core.capture import Channel, Measurements
-from gen_data.generator.core.colorimetry import luminance
-from gen_data.generator.core.interfaces import Modality, Renderer, SensorInfo
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.measurement_dtypes import table_rows
-from gen_data.generator.core.scene import Camera, Device, Scene
-from gen_data.generator.core.scene_time import RIG_AXES, scene_at
-from gen_data.generator.core.se3 import Array
-from gen_data.generator.core.streams import Rng
-from gen_data.generator.sensors.mounting import (
-    Mounted,
-    check_rate,
-    check_rig,
-    find_camera,
-    window_s,
-)
+from gen_data.config.base_model import NAME_PATTERN
+from gen_data.core.capture import Channel, Measurements
+from gen_data.core.colorimetry import luminance
+from gen_data.core.interfaces import Modality, Renderer, SensorInfo
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.measurement_dtypes import table_rows
+from gen_data.core.scene import Camera, Device, Scene
+from gen_data.core.scene_time import RIG_AXES, scene_at
+from gen_data.core.se3 import Array
+from gen_data.core.streams import Rng
+from gen_data.sensors.mounting import Mounted, check_rate, check_rig, find_camera, window_s
 
 DARK_CD_M2 = 0.005
 """Luminance equivalent of the dark current. White paper under 0.1 lx, the least illuminance for a

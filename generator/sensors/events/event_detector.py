@@ -13,20 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from gen_data.generator.config.base_model import NAME_PATTERN
-from gen_data.generator.core.capture import Channel, Measurements
-from gen_data.generator.core.errors import SampleError
-from gen_data.generator.core.interfaces import Renderer
-from gen_data.generator.core.measurement_dtypes import (
-    LIGHT_STATES,
-    OCCURRENCES,
-    WATCHER,
-    table_rows,
-)
-from gen_data.generator.core.scene import Scene
-from gen_data.generator.core.se3 import Array
-from gen_data.generator.core.streams import Rng
-from gen_data.generator.sensors.events.obb_queries import (
+from gen_data.config.base_model import NAME_PATTERN
+from gen_data.core.capture import Channel, Measurements
+from gen_data.core.errors import SampleError
+from gen_data.core.interfaces import Renderer
+from gen_data.core.measurement_dtypes import LIGHT_STATES, OCCURRENCES, WATCHER, table_rows
+from gen_data.core.scene import Scene
+from gen_data.core.se3 import Array
+from gen_data.core.streams import Rng
+from gen_data.sensors.events.obb_queries import (
     OrientedObstacle,
     distance_m,
     find_obstacles,
@@ -37,7 +32,7 @@ from gen_data.generator.sensors.events.obb_queries import (
     is_touching,
     lane_border_pieces,
 )
-from gen_data.generator.sensors.mounting import Instrument, window_s
+from gen_data.sensors.mounting import Instrument, window_s
 
 Occurrence = Literal["collision", "lane_invasion", "obstacle", "traffic_light", "proximity"]
 EVERYTHING: tuple[Occurrence, ...] = get_args(Occurrence)

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gen_data.generator.core.boxes import boxes_touch
-from gen_data.generator.core.lane_geometry import LaneLine
-from gen_data.generator.core.motion import STILL, Trajectory, Twist
-from gen_data.generator.core.scene import Instance, Lane, Scene
-from gen_data.generator.core.se3 import SE3, Array
+from gen_data.core.boxes import boxes_touch
+from gen_data.core.lane_geometry import LaneLine
+from gen_data.core.motion import STILL, Trajectory, Twist
+from gen_data.core.scene import Instance, Lane, Scene
+from gen_data.core.se3 import SE3, Array
 
 STEMS = ("pole", "street_light", "traffic_light", "traffic_sign", "tree", "utility_pole")
 """Categories with mostly empty boxes: only their stem counts."""

@@ -9,13 +9,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from gen_data.generator.config.paths import find_path
-from gen_data.generator.config.problems import Position, Problem, Problems
-from gen_data.generator.config.validation import validate
-from gen_data.generator.config.yaml_tree import MAX_FILE_BYTES, Node, load_yaml
-from gen_data.generator.core.errors import ConfigError, did_you_mean
-from gen_data.generator.sensors.device_presets import preset_names, preset_path
-from gen_data.generator.sensors.lidar.scan_pattern import PRESETS, LidarModel, lidar_model
+from gen_data.config.paths import find_path
+from gen_data.config.problems import Position, Problem, Problems
+from gen_data.config.validation import validate
+from gen_data.config.yaml_tree import MAX_FILE_BYTES, Node, load_yaml
+from gen_data.core.errors import ConfigError, did_you_mean
+from gen_data.sensors.device_presets import preset_names, preset_path
+from gen_data.sensors.lidar.scan_pattern import PRESETS, LidarModel, lidar_model
 
 COLUMNS = ("elevation_deg", "azimuth_offset_deg")
 LASERS = frozenset({"elevations_deg", "prisms", "azimuth_offsets_deg", "lateral_offsets_m"})

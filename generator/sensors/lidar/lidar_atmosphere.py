@@ -24,16 +24,11 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.core.asset_types import SURFACES
-from gen_data.generator.core.scene import Weather
-from gen_data.generator.core.streams import Rng
-from gen_data.generator.sensors.lidar.lidar_detection import (
-    Float32,
-    Pulses,
-    join_pulses,
-    received_light,
-)
-from gen_data.generator.sensors.lidar.scan_pattern import LidarModel
+from gen_data.core.asset_types import SURFACES
+from gen_data.core.scene import Weather
+from gen_data.core.streams import Rng
+from gen_data.sensors.lidar.lidar_detection import Float32, Pulses, join_pulses, received_light
+from gen_data.sensors.lidar.scan_pattern import LidarModel
 
 PULSE_LENGTH_M = 20e-9 * 299_792_458.0
 OVERLAP_M = (0.9, 1.0)

@@ -20,9 +20,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.core.capture import LidarHits, SecondaryHits
-from gen_data.generator.core.streams import Rng
-from gen_data.generator.sensors.lidar.scan_pattern import LidarModel
+from gen_data.core.capture import LidarHits, SecondaryHits
+from gen_data.core.streams import Rng
+from gen_data.sensors.lidar.scan_pattern import LidarModel
 
 Float32 = NDArray[np.float32]
 UInt16 = NDArray[np.uint16]

@@ -10,28 +10,21 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, WithJsonSchema, field_validator
 
-from gen_data.generator.config.base_model import NAME_PATTERN
-from gen_data.generator.core.asset_types import SURFACES
-from gen_data.generator.core.capture import (
-    POINT,
-    Channel,
-    LidarHits,
-    LidarRays,
-    PointCloud,
-    SecondaryHits,
-)
-from gen_data.generator.core.errors import did_you_mean
-from gen_data.generator.core.interfaces import Modality, Renderer, SensorInfo
-from gen_data.generator.core.scene import Lidar, Scene, Weather
-from gen_data.generator.core.streams import Rng
-from gen_data.generator.sensors.device_presets import preset_names
-from gen_data.generator.sensors.lidar.lidar_atmosphere import (
+from gen_data.config.base_model import NAME_PATTERN
+from gen_data.core.asset_types import SURFACES
+from gen_data.core.capture import POINT, Channel, LidarHits, LidarRays, PointCloud, SecondaryHits
+from gen_data.core.errors import did_you_mean
+from gen_data.core.interfaces import Modality, Renderer, SensorInfo
+from gen_data.core.scene import Lidar, Scene, Weather
+from gen_data.core.streams import Rng
+from gen_data.sensors.device_presets import preset_names
+from gen_data.sensors.lidar.lidar_atmosphere import (
     add_atmosphere,
     attenuate,
     optical_depth,
     rain_noise_m,
 )
-from gen_data.generator.sensors.lidar.lidar_detection import (
+from gen_data.sensors.lidar.lidar_detection import (
     FIELDS,
     LABELS,
     Float32,
@@ -46,7 +39,7 @@ from gen_data.generator.sensors.lidar.lidar_detection import (
     report_intensity,
     select_returns,
 )
-from gen_data.generator.sensors.lidar.scan_pattern import (
+from gen_data.sensors.lidar.scan_pattern import (
     PRESETS,
     Elevation,
     LidarModel,
@@ -56,7 +49,7 @@ from gen_data.generator.sensors.lidar.scan_pattern import (
     lidar_model,
     make_sweep,
 )
-from gen_data.generator.sensors.mounting import Mounted, add_lidar
+from gen_data.sensors.mounting import Mounted, add_lidar
 
 SUBRAYS = 7
 """Rays that sample a beam with divergence."""

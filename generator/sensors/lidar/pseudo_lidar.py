@@ -13,16 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from gen_data.generator.config.base_model import NAME_PATTERN
-from gen_data.generator.core.capture import POINT, Channel, PointCloud
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import Modality, Renderer, SensorInfo
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.scene import Lidar, Scene
-from gen_data.generator.core.se3 import Vec3
-from gen_data.generator.core.shutter import INSTANT
-from gen_data.generator.core.streams import Rng
-from gen_data.generator.sensors.mounting import Mounted, add_lidar, find_camera
+from gen_data.config.base_model import NAME_PATTERN
+from gen_data.core.capture import POINT, Channel, PointCloud
+from gen_data.core.errors import ConfigError
+from gen_data.core.interfaces import Modality, Renderer, SensorInfo
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.scene import Lidar, Scene
+from gen_data.core.se3 import Vec3
+from gen_data.core.shutter import INSTANT
+from gen_data.core.streams import Rng
+from gen_data.sensors.mounting import Mounted, add_lidar, find_camera
 
 MODEL = "pseudo_lidar"
 """Model of these scanners in scenes; their points are pixels of a camera."""

@@ -17,14 +17,14 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from gen_data.generator.config.base_model import Strict
-from gen_data.generator.core.asset_types import Float32
-from gen_data.generator.core.scene import Lidar, Scene
-from gen_data.generator.core.scene_time import RIG_AXES
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.sensors.device_presets import load_preset
+from gen_data.config.base_model import Strict
+from gen_data.core.asset_types import Float32
+from gen_data.core.scene import Lidar, Scene
+from gen_data.core.scene_time import RIG_AXES
+from gen_data.core.se3 import SE3
+from gen_data.sensors.device_presets import load_preset
 
-PRESETS = "gen_data.generator.sensors.lidar.presets"
+PRESETS = "gen_data.sensors.lidar.presets"
 Elevation = Annotated[float, Field(ge=-90, le=90)]
 Hertz = Annotated[float, Field(gt=0, le=10_000)]
 

@@ -29,17 +29,17 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
-from gen_data.generator.config.base_model import NAME_PATTERN, Strict
-from gen_data.generator.core.capture import Channel, LidarRays, Measurements
-from gen_data.generator.core.geodesy import GeodeticOrigin, to_geodetic
-from gen_data.generator.core.interfaces import Renderer
-from gen_data.generator.core.measurement_dtypes import table_rows
-from gen_data.generator.core.scene import Lidar, Scene
-from gen_data.generator.core.scene_time import scene_at
-from gen_data.generator.core.se3 import SE3, Array
-from gen_data.generator.core.streams import Rng
-from gen_data.generator.sensors.device_presets import check_preset, load_preset
-from gen_data.generator.sensors.mounting import (
+from gen_data.config.base_model import NAME_PATTERN, Strict
+from gen_data.core.capture import Channel, LidarRays, Measurements
+from gen_data.core.geodesy import GeodeticOrigin, to_geodetic
+from gen_data.core.interfaces import Renderer
+from gen_data.core.measurement_dtypes import table_rows
+from gen_data.core.scene import Lidar, Scene
+from gen_data.core.scene_time import scene_at
+from gen_data.core.se3 import SE3, Array
+from gen_data.core.streams import Rng
+from gen_data.sensors.device_presets import check_preset, load_preset
+from gen_data.sensors.mounting import (
     Instrument,
     MountMotion,
     mount_motion,
@@ -47,7 +47,7 @@ from gen_data.generator.sensors.mounting import (
     remove_carrier,
 )
 
-PRESETS = "gen_data.generator.sensors.navigation.gnss_presets"
+PRESETS = "gen_data.sensors.navigation.gnss_presets"
 OCCLUSION_RANGE_M = 1000.0
 """Objects farther away occlude no satellite."""
 SATELLITES_MIN = 4

@@ -27,17 +27,17 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import AfterValidator, Field
 
-from gen_data.generator.config.base_model import NAME_PATTERN, Strict
-from gen_data.generator.core.capture import Channel, Measurements
-from gen_data.generator.core.interfaces import Renderer
-from gen_data.generator.core.measurement_dtypes import IMU, table_rows
-from gen_data.generator.core.scene import Scene
-from gen_data.generator.core.se3 import Array
-from gen_data.generator.core.streams import Rng
-from gen_data.generator.sensors.device_presets import check_preset, load_preset
-from gen_data.generator.sensors.mounting import Instrument, mount_motion, reading_times
+from gen_data.config.base_model import NAME_PATTERN, Strict
+from gen_data.core.capture import Channel, Measurements
+from gen_data.core.interfaces import Renderer
+from gen_data.core.measurement_dtypes import IMU, table_rows
+from gen_data.core.scene import Scene
+from gen_data.core.se3 import Array
+from gen_data.core.streams import Rng
+from gen_data.sensors.device_presets import check_preset, load_preset
+from gen_data.sensors.mounting import Instrument, mount_motion, reading_times
 
-PRESETS = "gen_data.generator.sensors.navigation.imu_presets"
+PRESETS = "gen_data.sensors.navigation.imu_presets"
 GRAVITY_M_S2 = 9.80665
 AXES = tuple(column.name for column in IMU[1:])
 

@@ -23,14 +23,14 @@ from typing import ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from gen_data.generator.config.base_model import NAME_PATTERN
-from gen_data.generator.core.capture import Channel, Measurements
-from gen_data.generator.core.interfaces import Renderer
-from gen_data.generator.core.measurement_dtypes import table_rows
-from gen_data.generator.core.scene import Scene
-from gen_data.generator.core.se3 import Array
-from gen_data.generator.core.streams import Rng
-from gen_data.generator.sensors.mounting import Instrument, MountMotion, mount_motion, reading_times
+from gen_data.config.base_model import NAME_PATTERN
+from gen_data.core.capture import Channel, Measurements
+from gen_data.core.interfaces import Renderer
+from gen_data.core.measurement_dtypes import table_rows
+from gen_data.core.scene import Scene
+from gen_data.core.se3 import Array
+from gen_data.core.streams import Rng
+from gen_data.sensors.mounting import Instrument, MountMotion, mount_motion, reading_times
 
 WALKING_M_S = 0.5
 """Below this speed the steering angle is not observable and reported as 0."""

@@ -21,11 +21,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from gen_data.generator.config.base_model import Strict
-from gen_data.generator.config.data_files import load_table
-from gen_data.generator.core.asset_types import SURFACES
-from gen_data.generator.core.scene import Instance
-from gen_data.generator.core.se3 import Array
+from gen_data.config.base_model import Strict
+from gen_data.config.data_files import load_table
+from gen_data.core.asset_types import SURFACES
+from gen_data.core.scene import Instance
+from gen_data.core.se3 import Array
 
 Curve = tuple[tuple[float, float], ...]
 """Pairs of azimuth [deg] and value, linearly interpolated, symmetric about 0."""

@@ -21,21 +21,16 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
-from gen_data.generator.config.base_model import NAME_PATTERN, Strict
-from gen_data.generator.core.capture import Channel, LidarHits, LidarRays, Measurements
-from gen_data.generator.core.interfaces import Renderer
-from gen_data.generator.core.measurement_dtypes import table_rows
-from gen_data.generator.core.scene import Instance, Lidar, Scene
-from gen_data.generator.core.se3 import Array
-from gen_data.generator.core.streams import Rng
-from gen_data.generator.sensors.device_presets import check_preset, load_preset
-from gen_data.generator.sensors.mounting import (
-    Instrument,
-    mount_motion,
-    remove_carrier,
-    velocity_at,
-)
-from gen_data.generator.sensors.radar.radar_detection import (
+from gen_data.config.base_model import NAME_PATTERN, Strict
+from gen_data.core.capture import Channel, LidarHits, LidarRays, Measurements
+from gen_data.core.interfaces import Renderer
+from gen_data.core.measurement_dtypes import table_rows
+from gen_data.core.scene import Instance, Lidar, Scene
+from gen_data.core.se3 import Array
+from gen_data.core.streams import Rng
+from gen_data.sensors.device_presets import check_preset, load_preset
+from gen_data.sensors.mounting import Instrument, mount_motion, remove_carrier, velocity_at
+from gen_data.sensors.radar.radar_detection import (
     TARGETS,
     Echo,
     Look,
@@ -49,7 +44,7 @@ from gen_data.generator.sensors.radar.radar_detection import (
     strongest_members,
 )
 
-PRESETS = "gen_data.generator.sensors.radar.presets"
+PRESETS = "gen_data.sensors.radar.presets"
 FALSE_ALARM = 1e-6
 """Probability that noise alone exceeds the threshold in one cell."""
 THRESHOLD = -math.log(FALSE_ALARM)

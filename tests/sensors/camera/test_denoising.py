@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from gen_data.generator.core.asset_types import Float32
-from gen_data.generator.core.colorimetry import luminance
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.scene import Camera, Weather
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.core.streams import Streams
-from gen_data.generator.sensors.camera.denoising import denoise, is_noisy
-from gen_data.generator.sensors.camera.exposure import dimming_ev
-from gen_data.generator.sensors.camera.image_pipeline import ImagePipeline, develop
+from gen_data.core.asset_types import Float32
+from gen_data.core.colorimetry import luminance
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.scene import Camera, Weather
+from gen_data.core.se3 import SE3
+from gen_data.core.streams import Streams
+from gen_data.sensors.camera.denoising import denoise, is_noisy
+from gen_data.sensors.camera.exposure import dimming_ev
+from gen_data.sensors.camera.image_pipeline import ImagePipeline, develop
 
 WHITE_E, READ_NOISE_E = 200.0, 3.0
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from gen_data.generator.sensors.camera.exposure import (
+from gen_data.sensors.camera.exposure import (
     ExposureControl,
     meter_ev100,
     meter_mean_ev100,

@@ -9,25 +9,25 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gen_data.generator.assemble.config import load_config
-from gen_data.generator.config.distributions import Constant
-from gen_data.generator.core.capture import Channel, SensorReading
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.lens import Lens
-from gen_data.generator.core.scene import Camera, Scene, Weather
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.core.streams import Rng, Streams
-from gen_data.generator.sensors.camera.image_pipeline import (
+from gen_data.assemble.config import load_config
+from gen_data.config.distributions import Constant
+from gen_data.core.capture import Channel, SensorReading
+from gen_data.core.errors import ConfigError
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.lens import Lens
+from gen_data.core.scene import Camera, Scene, Weather
+from gen_data.core.se3 import SE3
+from gen_data.core.streams import Rng, Streams
+from gen_data.sensors.camera.image_pipeline import (
     PRESETS,
     STAGES,
     ImagePipeline,
     capture_photograph,
     develop,
 )
-from gen_data.generator.sensors.camera.isp import display_values, to_bytes
-from gen_data.generator.sensors.camera.rgb_camera import RgbCamera
-from gen_data.generator.sensors.device_presets import preset_names
+from gen_data.sensors.camera.isp import display_values, to_bytes
+from gen_data.sensors.camera.rgb_camera import RgbCamera
+from gen_data.sensors.device_presets import preset_names
 
 LENS = Intrinsics(64, 48, 60.0, 60.0, 32.0, 24.0)
 CAMERA = Camera("eye", SE3(), LENS, ev100=8.0)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gen_data.generator.core.streams import Streams
-from gen_data.generator.sensors.camera.isp import display_values
-from gen_data.generator.sensors.camera.local_tone import fuse_exposures
+from gen_data.core.streams import Streams
+from gen_data.sensors.camera.isp import display_values
+from gen_data.sensors.camera.local_tone import fuse_exposures
 
 WHITE = 16.0
 

@@ -8,20 +8,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gen_data.generator.core.asset_types import Material
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.scene import Body, Camera, Scene, Weather
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.core.streams import Streams
-from gen_data.generator.renderers.warp.renderer import WarpRenderer
-from gen_data.generator.renderers.warp.settings import RenderSettings
-from gen_data.generator.sensors.camera.image_pipeline import (
-    ImagePipeline,
-    capture_photograph,
-    develop,
-)
-from gen_data.generator.sensors.camera.image_sensor import ImageSensor, expose, expose_colors
+from gen_data.core.asset_types import Material
+from gen_data.core.capture import Channel
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.scene import Body, Camera, Scene, Weather
+from gen_data.core.se3 import SE3
+from gen_data.core.streams import Streams
+from gen_data.renderers.warp.renderer import WarpRenderer
+from gen_data.renderers.warp.settings import RenderSettings
+from gen_data.sensors.camera.image_pipeline import ImagePipeline, capture_photograph, develop
+from gen_data.sensors.camera.image_sensor import ImageSensor, expose, expose_colors
 from tests.renderers.fake_library import DARK, FakeLibrary, box_mesh
 
 SIDE = 4

@@ -8,12 +8,12 @@ import cv2
 import numpy as np
 import pytest
 
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.scene import Camera, Weather
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.core.streams import Streams
-from gen_data.generator.sensors.camera.lens_drops import lens_drops, refract_in_drops
-from gen_data.generator.sensors.camera.optics import FACTOR, add_glare, scatter
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.scene import Camera, Weather
+from gen_data.core.se3 import SE3
+from gen_data.core.streams import Streams
+from gen_data.sensors.camera.lens_drops import lens_drops, refract_in_drops
+from gen_data.sensors.camera.optics import FACTOR, add_glare, scatter
 
 CAMERA = Camera("front", SE3(), Intrinsics(960, 640, 800.0, 800.0, 480.0, 320.0))
 

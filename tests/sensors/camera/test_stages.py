@@ -12,18 +12,18 @@ import pytest
 from pydantic import ValidationError
 from scipy import stats
 
-from gen_data.generator.config.distributions import Constant
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.lens import Lens
-from gen_data.generator.core.scene import Camera, Weather
-from gen_data.generator.core.se3 import SE3
-from gen_data.generator.core.streams import Rng, Streams
-from gen_data.generator.sensors.camera import isp, optics
-from gen_data.generator.sensors.camera.exposure import ExposureControl, exposure_settings
-from gen_data.generator.sensors.camera.image_pipeline import PRESETS, ImagePipeline, develop
-from gen_data.generator.sensors.camera.image_sensor import ImageSensor, Pattern, expose, mosaic
-from gen_data.generator.sensors.camera.isp import to_bytes
-from gen_data.generator.sensors.device_presets import preset_names
+from gen_data.config.distributions import Constant
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.lens import Lens
+from gen_data.core.scene import Camera, Weather
+from gen_data.core.se3 import SE3
+from gen_data.core.streams import Rng, Streams
+from gen_data.sensors.camera import isp, optics
+from gen_data.sensors.camera.exposure import ExposureControl, exposure_settings
+from gen_data.sensors.camera.image_pipeline import PRESETS, ImagePipeline, develop
+from gen_data.sensors.camera.image_sensor import ImageSensor, Pattern, expose, mosaic
+from gen_data.sensors.camera.isp import to_bytes
+from gen_data.sensors.device_presets import preset_names
 
 FAR = np.full((48, 64), np.inf)
 EYE = Camera("eye", SE3(), Intrinsics(64, 48, 60.0, 60.0, 32.0, 24.0), ev100=8.0)

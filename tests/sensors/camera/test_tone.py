@@ -8,8 +8,8 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from gen_data.generator.core.streams import Streams
-from gen_data.generator.sensors.camera.isp import (
+from gen_data.core.streams import Streams
+from gen_data.sensors.camera.isp import (
     Tone,
     display_values,
     filmic,

@@ -18,13 +18,13 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from gen_data.generator.core.colorimetry import MIDDLE_GREY, luminance
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.scene import Camera, Weather
-from gen_data.generator.core.se3 import SE3, Array
-from gen_data.generator.core.streams import Rng, Streams
-from gen_data.generator.renderers.warp.atmosphere.kernels import precipitation
-from gen_data.generator.renderers.warp.frame_context import CameraView
+from gen_data.core.colorimetry import MIDDLE_GREY, luminance
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.scene import Camera, Weather
+from gen_data.core.se3 import SE3, Array
+from gen_data.core.streams import Rng, Streams
+from gen_data.renderers.warp.atmosphere.kernels import precipitation
+from gen_data.renderers.warp.frame_context import CameraView
 
 _NEAREST_M = 0.35
 # Aperture of the lens: near particles are defocused by that much.

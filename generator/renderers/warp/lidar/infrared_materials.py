@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.config.data_files import load_table
-from gen_data.generator.core.asset_types import Material
-from gen_data.generator.core.se3 import Array
-from gen_data.generator.renderers.warp.device_cache import DeviceCache
-from gen_data.generator.renderers.warp.lidar.kernels.lidar_rays import Infrared
-from gen_data.generator.renderers.warp.scene.material_packing import BodyMaterials
-from gen_data.generator.renderers.warp.scene.struct_dtypes import stack_records, struct_dtype
+from gen_data.config.data_files import load_table
+from gen_data.core.asset_types import Material
+from gen_data.core.se3 import Array
+from gen_data.renderers.warp.device_cache import DeviceCache
+from gen_data.renderers.warp.lidar.kernels.lidar_rays import Infrared
+from gen_data.renderers.warp.scene.material_packing import BodyMaterials
+from gen_data.renderers.warp.scene.struct_dtypes import stack_records, struct_dtype
 
 _TABLES = load_table(__package__, "infrared", dict[str, float])
 DIFFUSE, RETRO = _TABLES["diffuse"], _TABLES["retro"]

@@ -16,23 +16,23 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from gen_data.generator.core.asset_types import SURFACES
-from gen_data.generator.core.capture import LidarHits, LidarRays, SecondaryHits
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.motion import interpolate_poses
-from gen_data.generator.core.scene import Body, Camera, Lidar, Scene
-from gen_data.generator.core.se3 import Array
-from gen_data.generator.renderers.warp.atmosphere.weather import ground_record
-from gen_data.generator.renderers.warp.device import launch
-from gen_data.generator.renderers.warp.device_cache import DeviceCache
-from gen_data.generator.renderers.warp.lidar.infrared_materials import infrared_surfaces
-from gen_data.generator.renderers.warp.lidar.kernels import lidar_rays as kernels
-from gen_data.generator.renderers.warp.lidar.kernels.ray_packets import LISTED_MAX, Boxes
-from gen_data.generator.renderers.warp.readback import Readback
-from gen_data.generator.renderers.warp.scene.bvh import group_boxes
-from gen_data.generator.renderers.warp.scene.material_packing import BodyMaterials, body_materials
-from gen_data.generator.renderers.warp.scene.scene_packing import PackedWorld, pack_world
-from gen_data.generator.renderers.warp.visibility.label_images import category_ids
+from gen_data.core.asset_types import SURFACES
+from gen_data.core.capture import LidarHits, LidarRays, SecondaryHits
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.motion import interpolate_poses
+from gen_data.core.scene import Body, Camera, Lidar, Scene
+from gen_data.core.se3 import Array
+from gen_data.renderers.warp.atmosphere.weather import ground_record
+from gen_data.renderers.warp.device import launch
+from gen_data.renderers.warp.device_cache import DeviceCache
+from gen_data.renderers.warp.lidar.infrared_materials import infrared_surfaces
+from gen_data.renderers.warp.lidar.kernels import lidar_rays as kernels
+from gen_data.renderers.warp.lidar.kernels.ray_packets import LISTED_MAX, Boxes
+from gen_data.renderers.warp.readback import Readback
+from gen_data.renderers.warp.scene.bvh import group_boxes
+from gen_data.renderers.warp.scene.material_packing import BodyMaterials, body_materials
+from gen_data.renderers.warp.scene.scene_packing import PackedWorld, pack_world
+from gen_data.renderers.warp.visibility.label_images import category_ids
 
 KEYS = 9
 """Poses over a sweep, interpolated linearly: within 0.2 mm at 10 m/s^2 and 0.1 s."""

@@ -12,26 +12,26 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from gen_data.generator.core.asset_types import Float32
-from gen_data.generator.core.bounded_cache import ByteCache
-from gen_data.generator.core.colorimetry import luminance
-from gen_data.generator.core.distribution import install_command
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.scene import Camera, Scene
-from gen_data.generator.core.se3 import Array
-from gen_data.generator.core.streams import Streams
-from gen_data.generator.renderers.warp.atmosphere.weather import fill_fog, ground_record
-from gen_data.generator.renderers.warp.device import launch
-from gen_data.generator.renderers.warp.device_cache import DeviceCache
-from gen_data.generator.renderers.warp.frame_context import CameraView
-from gen_data.generator.renderers.warp.pathtraced.kernels import integrator
-from gen_data.generator.renderers.warp.pathtraced.kernels.emitters import SkyTable
-from gen_data.generator.renderers.warp.realtime.realtime_shading import darken_outside
-from gen_data.generator.renderers.warp.scene.brdf_albedo_lut import smith_albedo
-from gen_data.generator.renderers.warp.scene.environment_maps import irradiance_coefficients
-from gen_data.generator.renderers.warp.scene.kernels import records
-from gen_data.generator.renderers.warp.scene.scene_packing import PackedWorld, lamp_records
-from gen_data.generator.renderers.warp.settings import RenderSettings
+from gen_data.core.asset_types import Float32
+from gen_data.core.bounded_cache import ByteCache
+from gen_data.core.colorimetry import luminance
+from gen_data.core.distribution import install_command
+from gen_data.core.errors import ConfigError
+from gen_data.core.scene import Camera, Scene
+from gen_data.core.se3 import Array
+from gen_data.core.streams import Streams
+from gen_data.renderers.warp.atmosphere.weather import fill_fog, ground_record
+from gen_data.renderers.warp.device import launch
+from gen_data.renderers.warp.device_cache import DeviceCache
+from gen_data.renderers.warp.frame_context import CameraView
+from gen_data.renderers.warp.pathtraced.kernels import integrator
+from gen_data.renderers.warp.pathtraced.kernels.emitters import SkyTable
+from gen_data.renderers.warp.realtime.realtime_shading import darken_outside
+from gen_data.renderers.warp.scene.brdf_albedo_lut import smith_albedo
+from gen_data.renderers.warp.scene.environment_maps import irradiance_coefficients
+from gen_data.renderers.warp.scene.kernels import records
+from gen_data.renderers.warp.scene.scene_packing import PackedWorld, lamp_records
+from gen_data.renderers.warp.settings import RenderSettings
 
 
 def require_denoiser() -> None:
@@ -163,7 +163,7 @@ class PathTracer:
 
     def _denoise(self, frame: CameraView, radiance: wp.array) -> None:
         """Denoise in place."""
-        from gen_data.generator.renderers.warp.pathtraced.kernels.denoise_aovs import trace_guides
+        from gen_data.renderers.warp.pathtraced.kernels.denoise_aovs import trace_guides
 
         n, shape = frame.pixels, (frame.view.height, frame.view.width, 3)
         albedo, normal = (wp.zeros(n, dtype=wp.vec3, device=self._cache.device) for _ in range(2))

@@ -12,19 +12,19 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from gen_data.generator.core.asset_types import Float32
-from gen_data.generator.core.interfaces import Tones
-from gen_data.generator.core.se3 import Array
-from gen_data.generator.renderers.warp.atmosphere.precipitation import draw_precipitation
-from gen_data.generator.renderers.warp.atmosphere.weather import expose_ground, fill_air
-from gen_data.generator.renderers.warp.device import launch
-from gen_data.generator.renderers.warp.frame_context import (
+from gen_data.core.asset_types import Float32
+from gen_data.core.interfaces import Tones
+from gen_data.core.se3 import Array
+from gen_data.renderers.warp.atmosphere.precipitation import draw_precipitation
+from gen_data.renderers.warp.atmosphere.weather import expose_ground, fill_air
+from gen_data.renderers.warp.device import launch
+from gen_data.renderers.warp.frame_context import (
     CameraState,
     CameraView,
     RenderContext,
     render_view,
 )
-from gen_data.generator.renderers.warp.plates import (
+from gen_data.renderers.warp.plates import (
     cover_by_foreground,
     mix_photo,
     restore_photo,
@@ -32,32 +32,25 @@ from gen_data.generator.renderers.warp.plates import (
     things_in,
     without_things,
 )
-from gen_data.generator.renderers.warp.realtime.kernels import (
+from gen_data.renderers.warp.realtime.kernels import (
     lattice_interpolation,
     lattice_lighting,
     shadow_culling,
     soft_shadows,
 )
-from gen_data.generator.renderers.warp.realtime.kernels.lattice import Lattice, sample_lattice
-from gen_data.generator.renderers.warp.scene.kernels import ray_queries, records
-from gen_data.generator.renderers.warp.scene.light_selection import (
-    extract_sky_lights,
-    keep_main_lamps,
-)
-from gen_data.generator.renderers.warp.scene.struct_dtypes import take_rows
-from gen_data.generator.renderers.warp.visibility.gbuffer import GBuffer
-from gen_data.generator.renderers.warp.visibility.kernels import (
-    distortion,
-    edge_antialiasing,
-    rasterizer,
-)
-from gen_data.generator.renderers.warp.visibility.kernels import msaa as mixing
-from gen_data.generator.renderers.warp.visibility.kernels.edge_detection import (
+from gen_data.renderers.warp.realtime.kernels.lattice import Lattice, sample_lattice
+from gen_data.renderers.warp.scene.kernels import ray_queries, records
+from gen_data.renderers.warp.scene.light_selection import extract_sky_lights, keep_main_lamps
+from gen_data.renderers.warp.scene.struct_dtypes import take_rows
+from gen_data.renderers.warp.visibility.gbuffer import GBuffer
+from gen_data.renderers.warp.visibility.kernels import distortion, edge_antialiasing, rasterizer
+from gen_data.renderers.warp.visibility.kernels import msaa as mixing
+from gen_data.renderers.warp.visibility.kernels.edge_detection import (
     GROUP_PX,
     find_edges,
     write_mixed,
 )
-from gen_data.generator.renderers.warp.visibility.multisampling import draw_samples
+from gen_data.renderers.warp.visibility.multisampling import draw_samples
 
 _PARTS = 2
 """Positions of further samples of pixels on edges in reflections or behind glass."""
@@ -347,7 +340,7 @@ def _shade_layers(
 ) -> None:
     """Shade those of ``number`` listed pixels that show layered surfaces, in place."""
     # A module of its own: scenes without such surfaces neither compile nor load it.
-    from gen_data.generator.renderers.warp.realtime.kernels import clearcoat_glass
+    from gen_data.renderers.warp.realtime.kernels import clearcoat_glass
 
     inputs = [*frame.inputs, listed, probe]
     frame.launch(clearcoat_glass.shade_layers, number, inputs, [radiance])
@@ -361,7 +354,7 @@ def _refine_layers(
     radiance: wp.array,
 ) -> None:
     """Take more samples of layered pixels with edges in reflections or behind glass, in place."""
-    from gen_data.generator.renderers.warp.realtime.kernels import clearcoat_glass
+    from gen_data.renderers.warp.realtime.kernels import clearcoat_glass
 
     cache = frame.cache
     count = wp.zeros(1, dtype=wp.int32, device=cache.device)

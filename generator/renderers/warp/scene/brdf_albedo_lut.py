@@ -6,7 +6,7 @@ from functools import cache
 
 import numpy as np
 
-from gen_data.generator.core.asset_types import Float32
+from gen_data.core.asset_types import Float32
 
 _ENTRIES = 32
 _STRATA = 24
@@ -21,7 +21,7 @@ def lobe_albedo() -> Float32:
 
     Source: the split sum of Karis, "Real shading in Unreal Engine 4", 2013, over stratified
     half vectors of GGX, with the masking of
-    ``gen_data.generator.renderers.warp.scene.kernels.brdf``.
+    ``gen_data.renderers.warp.scene.kernels.brdf``.
     """
     # Roughness 0 and grazing view are limits without a value of their own.
     nodes = np.clip(np.arange(_ENTRIES) / (_ENTRIES - 1.0), 1e-3, 1.0)

@@ -17,7 +17,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from gen_data.generator.renderers.warp.scene.kernels import box_groups, bvh_build
+from gen_data.renderers.warp.scene.kernels import box_groups, bvh_build
 
 _WIDTH = 8
 _NODE_GROUPS, _LEAF_GROUPS = 7, 10

@@ -12,17 +12,17 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from gen_data.generator.core import colorimetry
-from gen_data.generator.core.asset_types import Material, MeshData, TextureData, UInt8
-from gen_data.generator.core.code_digests import code_digest
-from gen_data.generator.core.colorimetry import srgb_decode
-from gen_data.generator.core.mapped_files import owned_bytes
-from gen_data.generator.core.se3 import Array
-from gen_data.generator.renderers.warp.scene import bvh
-from gen_data.generator.renderers.warp.scene.bvh import face_boxes, group_boxes, mesh_tree
-from gen_data.generator.renderers.warp.scene.kernels import bvh_build
-from gen_data.generator.renderers.warp.scene.kernels.records import Geometry, TextureRecord
-from gen_data.generator.renderers.warp.scene.struct_dtypes import struct_dtype
+from gen_data.core import colorimetry
+from gen_data.core.asset_types import Material, MeshData, TextureData, UInt8
+from gen_data.core.code_digests import code_digest
+from gen_data.core.colorimetry import srgb_decode
+from gen_data.core.mapped_files import owned_bytes
+from gen_data.core.se3 import Array
+from gen_data.renderers.warp.scene import bvh
+from gen_data.renderers.warp.scene.bvh import face_boxes, group_boxes, mesh_tree
+from gen_data.renderers.warp.scene.kernels import bvh_build
+from gen_data.renderers.warp.scene.kernels.records import Geometry, TextureRecord
+from gen_data.renderers.warp.scene.struct_dtypes import struct_dtype
 
 Arrays = dict[str, NDArray[Any]]
 

@@ -21,14 +21,11 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from gen_data.generator.core.asset_types import Float32
-from gen_data.generator.core.colorimetry import luminance
-from gen_data.generator.core.se3 import Array, Vec3
-from gen_data.generator.renderers.warp.device import launch
-from gen_data.generator.renderers.warp.scene.kernels.environment_lighting import (
-    prefilter,
-    weigh_texels,
-)
+from gen_data.core.asset_types import Float32
+from gen_data.core.colorimetry import luminance
+from gen_data.core.se3 import Array, Vec3
+from gen_data.renderers.warp.device import launch
+from gen_data.renderers.warp.scene.kernels.environment_lighting import prefilter, weigh_texels
 
 
 def texel_directions(height: int) -> tuple[Array, Array]:

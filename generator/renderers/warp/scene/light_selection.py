@@ -12,21 +12,21 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from gen_data.generator.core.colorimetry import luminance
-from gen_data.generator.core.scene import LIGHT_KINDS, PANEL_KINDS, Environment, Light, Scene
-from gen_data.generator.core.se3 import Array
-from gen_data.generator.renderers.warp.frame_context import CameraView
-from gen_data.generator.renderers.warp.realtime.kernels.soft_shadows import count_free_paths
-from gen_data.generator.renderers.warp.scene.environment_maps import SkyLamp
-from gen_data.generator.renderers.warp.scene.kernels import analytic_lights, records
-from gen_data.generator.renderers.warp.scene.scene_packing import (
+from gen_data.core.colorimetry import luminance
+from gen_data.core.scene import LIGHT_KINDS, PANEL_KINDS, Environment, Light, Scene
+from gen_data.core.se3 import Array
+from gen_data.renderers.warp.frame_context import CameraView
+from gen_data.renderers.warp.realtime.kernels.soft_shadows import count_free_paths
+from gen_data.renderers.warp.scene.environment_maps import SkyLamp
+from gen_data.renderers.warp.scene.kernels import analytic_lights, records
+from gen_data.renderers.warp.scene.scene_packing import (
     PackedWorld,
     copy_world,
     lamp_records,
     sky_record,
 )
-from gen_data.generator.renderers.warp.scene.struct_dtypes import take_rows, to_device
-from gen_data.generator.renderers.warp.visibility.gbuffer import GBuffer
+from gen_data.renderers.warp.scene.struct_dtypes import take_rows, to_device
+from gen_data.renderers.warp.visibility.gbuffer import GBuffer
 
 _STRIDE_PX = 11
 # Assumed background illuminance, so that lamps are not ranked by their effect in the dark [lx].

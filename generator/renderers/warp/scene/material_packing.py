@@ -9,12 +9,12 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.core.asset_types import SURFACES, Material
-from gen_data.generator.core.scene import Body
-from gen_data.generator.renderers.warp.device_cache import DeviceCache
-from gen_data.generator.renderers.warp.scene.device_assets import DeviceTexture
-from gen_data.generator.renderers.warp.scene.kernels import records
-from gen_data.generator.renderers.warp.scene.struct_dtypes import stack_records, struct_dtype
+from gen_data.core.asset_types import SURFACES, Material
+from gen_data.core.scene import Body
+from gen_data.renderers.warp.device_cache import DeviceCache
+from gen_data.renderers.warp.scene.device_assets import DeviceTexture
+from gen_data.renderers.warp.scene.kernels import records
+from gen_data.renderers.warp.scene.struct_dtypes import stack_records, struct_dtype
 
 _COLUMNS = (
     "base_color", "roughness", "metallic", "specular", "texture_scale_m", "emission_cd_m2", "coat",
@@ -35,7 +35,7 @@ class BodyMaterials:
         materials: Materials, one per slot of its mesh.
         surfaces: Their MaterialRecord records; ``texture`` is an index into ``textures``, or -1.
         textures: Texture ids, sorted.
-        roles: Role of each, as an index into ``gen_data.generator.core.asset_types.SURFACES``.
+        roles: Role of each, as an index into ``gen_data.core.asset_types.SURFACES``.
     """
 
     materials: tuple[Material, ...]

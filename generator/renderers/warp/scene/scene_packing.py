@@ -10,8 +10,8 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from gen_data.generator.core.lens import LensModel
-from gen_data.generator.core.scene import (
+from gen_data.core.lens import LensModel
+from gen_data.core.scene import (
     LIGHT_KINDS,
     PANEL_KINDS,
     Body,
@@ -22,20 +22,20 @@ from gen_data.generator.core.scene import (
     Scene,
     Weather,
 )
-from gen_data.generator.core.scene_time import moving_bodies
-from gen_data.generator.core.se3 import Array, unit_quaternions_to_rotations
-from gen_data.generator.renderers.warp.device_cache import DeviceCache
-from gen_data.generator.renderers.warp.scene.bvh import body_tree, group_boxes
-from gen_data.generator.renderers.warp.scene.device_assets import DeviceMesh
-from gen_data.generator.renderers.warp.scene.environment_maps import DeviceEnvironment
-from gen_data.generator.renderers.warp.scene.kernels import records
-from gen_data.generator.renderers.warp.scene.material_packing import (
+from gen_data.core.scene_time import moving_bodies
+from gen_data.core.se3 import Array, unit_quaternions_to_rotations
+from gen_data.renderers.warp.device_cache import DeviceCache
+from gen_data.renderers.warp.scene.bvh import body_tree, group_boxes
+from gen_data.renderers.warp.scene.device_assets import DeviceMesh
+from gen_data.renderers.warp.scene.environment_maps import DeviceEnvironment
+from gen_data.renderers.warp.scene.kernels import records
+from gen_data.renderers.warp.scene.material_packing import (
     body_materials,
     cutout_bodies,
     cutout_slots,
     surface_records,
 )
-from gen_data.generator.renderers.warp.scene.struct_dtypes import (
+from gen_data.renderers.warp.scene.struct_dtypes import (
     copy_struct,
     stack_records,
     struct_dtype,

@@ -16,35 +16,28 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from gen_data.generator.core.asset_types import Float32
-from gen_data.generator.core.boxes import BoxPx, tight_box
-from gen_data.generator.core.capture import Silhouette
-from gen_data.generator.core.scene import Scene
-from gen_data.generator.core.se3 import Array
-from gen_data.generator.renderers.warp.device import launch
-from gen_data.generator.renderers.warp.frame_context import (
-    CameraView,
-    RowBand,
-    pack_state,
-)
-from gen_data.generator.renderers.warp.scene.kernels import records
-from gen_data.generator.renderers.warp.scene.kernels.simd import LANES
-from gen_data.generator.renderers.warp.scene.scene_packing import pack_view
-from gen_data.generator.renderers.warp.visibility.distortion_lut import NODE_STRIDE_PX
-from gen_data.generator.renderers.warp.visibility.gbuffer import (
+from gen_data.core.asset_types import Float32
+from gen_data.core.boxes import BoxPx, tight_box
+from gen_data.core.capture import Silhouette
+from gen_data.core.scene import Scene
+from gen_data.core.se3 import Array
+from gen_data.renderers.warp.device import launch
+from gen_data.renderers.warp.frame_context import CameraView, RowBand, pack_state
+from gen_data.renderers.warp.scene.kernels import records
+from gen_data.renderers.warp.scene.kernels.simd import LANES
+from gen_data.renderers.warp.scene.scene_packing import pack_view
+from gen_data.renderers.warp.visibility.distortion_lut import NODE_STRIDE_PX
+from gen_data.renderers.warp.visibility.gbuffer import (
     CORNERS,
     Projected,
     box_corners,
     canvas_box,
     project_vertices,
 )
-from gen_data.generator.renderers.warp.visibility.kernels.amodal import (
-    draw_silhouettes,
-    pack_bits,
-)
-from gen_data.generator.renderers.warp.visibility.kernels.amodal_lens import trace_silhouettes
-from gen_data.generator.renderers.warp.visibility.kernels.rasterizer import Z_NEAR_M, Outline
-from gen_data.generator.renderers.warp.visibility.reprojection import make_bands
+from gen_data.renderers.warp.visibility.kernels.amodal import draw_silhouettes, pack_bits
+from gen_data.renderers.warp.visibility.kernels.amodal_lens import trace_silhouettes
+from gen_data.renderers.warp.visibility.kernels.rasterizer import Z_NEAR_M, Outline
+from gen_data.renderers.warp.visibility.reprojection import make_bands
 
 _NOTHING = np.zeros((0, 0), np.bool_)
 _UNSNAPPED = -(2**31)

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import warp as wp
 
-from gen_data.generator.core.asset_types import Float32
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.se3 import Array
+from gen_data.core.asset_types import Float32
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.se3 import Array
 
 NODE_STRIDE_PX = 8
 """Spacing of the nodes between which directions outside the image are interpolated."""

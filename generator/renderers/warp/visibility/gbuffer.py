@@ -9,14 +9,14 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from gen_data.generator.core.boxes import BoxPx
-from gen_data.generator.core.se3 import Array
-from gen_data.generator.renderers.warp.device import launch
-from gen_data.generator.renderers.warp.device_cache import DeviceCache
-from gen_data.generator.renderers.warp.scene.kernels import ray_queries, records
-from gen_data.generator.renderers.warp.scene.kernels.simd import LANES
-from gen_data.generator.renderers.warp.scene.scene_packing import PackedWorld
-from gen_data.generator.renderers.warp.visibility.kernels import label_resolve, rasterizer
+from gen_data.core.boxes import BoxPx
+from gen_data.core.se3 import Array
+from gen_data.renderers.warp.device import launch
+from gen_data.renderers.warp.device_cache import DeviceCache
+from gen_data.renderers.warp.scene.kernels import ray_queries, records
+from gen_data.renderers.warp.scene.kernels.simd import LANES
+from gen_data.renderers.warp.scene.scene_packing import PackedWorld
+from gen_data.renderers.warp.visibility.kernels import label_resolve, rasterizer
 
 _ROUNDING = 1e-4
 """Relative error of depths in single precision, and a margin."""
@@ -104,7 +104,7 @@ class Projected:
         in_view: DrawnBody records of the bodies that may lie in the image.
         p_camera: Vertices in the camera frame [m].
         xy: Vertices snapped to the image plane; see
-            gen_data.generator.renderers.warp.visibility.kernels.rasterizer.
+            gen_data.renderers.warp.visibility.kernels.rasterizer.
         extents: Extent records of each reached body, [bodies, parts].
     """
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import warp as wp
 
-from gen_data.generator.core.se3 import Array
-from gen_data.generator.renderers.warp.frame_context import CameraView
-from gen_data.generator.renderers.warp.scene.kernels.simd import LANES
-from gen_data.generator.renderers.warp.visibility.gbuffer import Projected
-from gen_data.generator.renderers.warp.visibility.kernels import msaa, rasterizer
+from gen_data.core.se3 import Array
+from gen_data.renderers.warp.frame_context import CameraView
+from gen_data.renderers.warp.scene.kernels.simd import LANES
+from gen_data.renderers.warp.visibility.gbuffer import Projected
+from gen_data.renderers.warp.visibility.kernels import msaa, rasterizer
 
 _QUAD = 4
 

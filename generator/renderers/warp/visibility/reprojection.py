@@ -16,26 +16,22 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from gen_data.generator.core.asset_types import Float32, Int32
-from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.interfaces import AssetLibrary
-from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.scene import Scene
-from gen_data.generator.core.se3 import Array
-from gen_data.generator.core.shutter import INSTANT
-from gen_data.generator.renderers.warp.frame_context import (
+from gen_data.core.asset_types import Float32, Int32
+from gen_data.core.capture import Channel
+from gen_data.core.interfaces import AssetLibrary
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.scene import Scene
+from gen_data.core.se3 import Array
+from gen_data.core.shutter import INSTANT
+from gen_data.renderers.warp.frame_context import (
     CameraState,
     CameraView,
     RowBand,
     is_moving,
     render_view,
 )
-from gen_data.generator.renderers.warp.readback import Readback
-from gen_data.generator.renderers.warp.visibility.label_images import (
-    draw_labels,
-    empty_labels,
-    read_images,
-)
+from gen_data.renderers.warp.readback import Readback
+from gen_data.renderers.warp.visibility.label_images import draw_labels, empty_labels, read_images
 
 RadianceFunction = Callable[[CameraView], wp.array]
 """Radiance of every pixel of a view [cd/m^2], flat, on the device."""

@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import warp as wp
 
-from gen_data.generator.renderers.warp.scene.kernels.analytic_lights import SUN, beam_from
-from gen_data.generator.renderers.warp.scene.kernels.records import (
+from gen_data.renderers.warp.scene.kernels.analytic_lights import SUN, beam_from
+from gen_data.renderers.warp.scene.kernels.records import (
     GBufferRecord,
     LightRecord,
     View,

@@ -8,13 +8,8 @@ from __future__ import annotations
 
 import warp as wp
 
-from gen_data.generator.renderers.warp.scene.kernels.material_eval import SurfaceMaterial
-from gen_data.generator.renderers.warp.scene.kernels.records import (
-    View,
-    World,
-    fast_normalize,
-    floor_int,
-)
+from gen_data.renderers.warp.scene.kernels.material_eval import SurfaceMaterial
+from gen_data.renderers.warp.scene.kernels.records import View, World, fast_normalize, floor_int
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 

@@ -4,15 +4,10 @@ from __future__ import annotations
 
 import warp as wp
 
-from gen_data.generator.renderers.warp.atmosphere.kernels.fog import phase_function
-from gen_data.generator.renderers.warp.scene.kernels.analytic_lights import beam_from
-from gen_data.generator.renderers.warp.scene.kernels.environment_lighting import sky_irradiance
-from gen_data.generator.renderers.warp.scene.kernels.records import (
-    View,
-    World,
-    fast_normalize,
-    floor_int,
-)
+from gen_data.renderers.warp.atmosphere.kernels.fog import phase_function
+from gen_data.renderers.warp.scene.kernels.analytic_lights import beam_from
+from gen_data.renderers.warp.scene.kernels.environment_lighting import sky_irradiance
+from gen_data.renderers.warp.scene.kernels.records import View, World, fast_normalize, floor_int
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 

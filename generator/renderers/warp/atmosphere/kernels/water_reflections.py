@@ -8,30 +8,24 @@ from __future__ import annotations
 
 import warp as wp
 
-from gen_data.generator.renderers.warp.atmosphere.kernels.ground_weathering import (
+from gen_data.renderers.warp.atmosphere.kernels.ground_weathering import (
     estimate_porosity,
     footprint,
     fractal_noise,
     puddle_at,
     snow_at,
 )
-from gen_data.generator.renderers.warp.realtime.kernels.lattice import (
+from gen_data.renderers.warp.realtime.kernels.lattice import (
     Lattice,
     cell_at,
     cell_corner,
     ray_origin,
 )
-from gen_data.generator.renderers.warp.scene.kernels.analytic_lights import SUN, beam_from
-from gen_data.generator.renderers.warp.scene.kernels.brdf import WATER_F0, fresnel_schlick
-from gen_data.generator.renderers.warp.scene.kernels.environment_lighting import (
-    sky_irradiance,
-    sky_rest,
-)
-from gen_data.generator.renderers.warp.scene.kernels.ray_queries import (
-    closest_hit,
-    precipitation_exposure,
-)
-from gen_data.generator.renderers.warp.scene.kernels.records import (
+from gen_data.renderers.warp.scene.kernels.analytic_lights import SUN, beam_from
+from gen_data.renderers.warp.scene.kernels.brdf import WATER_F0, fresnel_schlick
+from gen_data.renderers.warp.scene.kernels.environment_lighting import sky_irradiance, sky_rest
+from gen_data.renderers.warp.scene.kernels.ray_queries import closest_hit, precipitation_exposure
+from gen_data.renderers.warp.scene.kernels.records import (
     HOLES,
     GBufferRecord,
     View,
@@ -41,8 +35,8 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
     pixel_ray,
     surface_index,
 )
-from gen_data.generator.renderers.warp.scene.kernels.texture_sampling import make_sampler, texel_at
-from gen_data.generator.renderers.warp.visibility.kernels.distortion import project_to_pixel
+from gen_data.renderers.warp.scene.kernels.texture_sampling import make_sampler, texel_at
+from gen_data.renderers.warp.visibility.kernels.distortion import project_to_pixel
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import warp as wp
 
-from gen_data.generator.renderers.warp.atmosphere.kernels.ground_weathering import (
+from gen_data.renderers.warp.atmosphere.kernels.ground_weathering import (
     Coat,
     coat_at,
     estimate_porosity,
 )
-from gen_data.generator.renderers.warp.lidar.kernels.ray_packets import (
+from gen_data.renderers.warp.lidar.kernels.ray_packets import (
     FAR_M,
     Boxes,
     Bundle,
@@ -19,14 +19,14 @@ from gen_data.generator.renderers.warp.lidar.kernels.ray_packets import (
     is_box_entered,
     list_bodies,
 )
-from gen_data.generator.renderers.warp.scene.kernels.alpha_test import closest_solid_hit
-from gen_data.generator.renderers.warp.scene.kernels.brdf import WATER_F0, fresnel_schlick
-from gen_data.generator.renderers.warp.scene.kernels.ray_queries import (
+from gen_data.renderers.warp.scene.kernels.alpha_test import closest_solid_hit
+from gen_data.renderers.warp.scene.kernels.brdf import WATER_F0, fresnel_schlick
+from gen_data.renderers.warp.scene.kernels.ray_queries import (
     LASER_OFFSET_M,
     SHELTER_OFFSET_M,
     precipitation_exposure,
 )
-from gen_data.generator.renderers.warp.scene.kernels.records import (
+from gen_data.renderers.warp.scene.kernels.records import (
     HOLES,
     World,
     face_vertices,

@@ -9,14 +9,14 @@ from __future__ import annotations
 
 import warp as wp
 
-from gen_data.generator.renderers.warp.scene.kernels.records import (
+from gen_data.renderers.warp.scene.kernels.records import (
     componentwise_max,
     componentwise_min,
     max_of_two,
     min_of_two,
     slab_interval,
 )
-from gen_data.generator.renderers.warp.scene.kernels.simd import SIMD
+from gen_data.renderers.warp.scene.kernels.simd import SIMD
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 

@@ -17,13 +17,13 @@ from __future__ import annotations
 
 import warp as wp
 
-from gen_data.generator.renderers.warp.scene.kernels.brdf import (
+from gen_data.renderers.warp.scene.kernels.brdf import (
     directional_albedo,
     fresnel_dielectric,
     luminance,
     refract,
 )
-from gen_data.generator.renderers.warp.scene.kernels.records import fast_normalize
+from gen_data.renderers.warp.scene.kernels.records import fast_normalize
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 
@@ -120,11 +120,11 @@ def make_bsdf(
 
     Args:
         table: Directional albedo of GGX lobes, see
-            gen_data.generator.renderers.warp.scene.brdf_albedo_lut.smith_albedo.
+            gen_data.renderers.warp.scene.brdf_albedo_lut.smith_albedo.
         v: Unit direction to the viewer.
         translucency: Ratio of diffuse transmittance to ``albedo``.
         flat: Normal of the face on the side of ``v``.
-        albedo, roughness, metallic, specular: As of gen_data.generator.core.asset_types.Material.
+        albedo, roughness, metallic, specular: As of gen_data.core.asset_types.Material.
         coat, coat_f0, coat_roughness: Weight of the coat above it, its reflectance at normal
             incidence, and its roughness.
     """

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import warp as wp
 
-from gen_data.generator.renderers.warp.pathtraced.kernels.emitters import AT_INFINITY
-from gen_data.generator.renderers.warp.pathtraced.kernels.integrator import make_vertex
-from gen_data.generator.renderers.warp.pathtraced.kernels.sampler import hash_bits, random_pair
-from gen_data.generator.renderers.warp.scene.kernels.ray_queries import closest_hit
-from gen_data.generator.renderers.warp.scene.kernels.records import (
+from gen_data.renderers.warp.pathtraced.kernels.emitters import AT_INFINITY
+from gen_data.renderers.warp.pathtraced.kernels.integrator import make_vertex
+from gen_data.renderers.warp.pathtraced.kernels.sampler import hash_bits, random_pair
+from gen_data.renderers.warp.scene.kernels.ray_queries import closest_hit
+from gen_data.renderers.warp.scene.kernels.records import (
     HOLES,
     View,
     World,
@@ -16,7 +16,7 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
     is_in_view,
     pixel_direction,
 )
-from gen_data.generator.renderers.warp.visibility.kernels.rasterizer import Z_NEAR_M
+from gen_data.renderers.warp.visibility.kernels.rasterizer import Z_NEAR_M
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 

@@ -11,19 +11,11 @@ from __future__ import annotations
 
 import warp as wp
 
-from gen_data.generator.renderers.warp.realtime.kernels.soft_shadows import make_frame
-from gen_data.generator.renderers.warp.scene.kernels.analytic_lights import (
-    DISK,
-    SPOT,
-    SUN,
-    is_panel,
-)
-from gen_data.generator.renderers.warp.scene.kernels.brdf import luminance
-from gen_data.generator.renderers.warp.scene.kernels.environment_lighting import (
-    blend_texels,
-    sky_irradiance,
-)
-from gen_data.generator.renderers.warp.scene.kernels.records import (
+from gen_data.renderers.warp.realtime.kernels.soft_shadows import make_frame
+from gen_data.renderers.warp.scene.kernels.analytic_lights import DISK, SPOT, SUN, is_panel
+from gen_data.renderers.warp.scene.kernels.brdf import luminance
+from gen_data.renderers.warp.scene.kernels.environment_lighting import blend_texels, sky_irradiance
+from gen_data.renderers.warp.scene.kernels.records import (
     EnvironmentRecord,
     LightRecord,
     World,

@@ -13,12 +13,9 @@ from __future__ import annotations
 
 import warp as wp
 
-from gen_data.generator.renderers.warp.atmosphere.kernels.ground_weathering import (
-    apply_coat,
-    coat_at,
-)
-from gen_data.generator.renderers.warp.atmosphere.kernels.water_reflections import water_at
-from gen_data.generator.renderers.warp.pathtraced.kernels.bsdf import (
+from gen_data.renderers.warp.atmosphere.kernels.ground_weathering import apply_coat, coat_at
+from gen_data.renderers.warp.atmosphere.kernels.water_reflections import water_at
+from gen_data.renderers.warp.pathtraced.kernels.bsdf import (
     COAT_F0,
     Bsdf,
     Scattering,
@@ -29,7 +26,7 @@ from gen_data.generator.renderers.warp.pathtraced.kernels.bsdf import (
     scatter,
     scatter_glass,
 )
-from gen_data.generator.renderers.warp.pathtraced.kernels.emitters import (
+from gen_data.renderers.warp.pathtraced.kernels.emitters import (
     AT_INFINITY,
     SKY,
     LightSample,
@@ -47,17 +44,17 @@ from gen_data.generator.renderers.warp.pathtraced.kernels.emitters import (
     sky_place,
     sky_weight_at,
 )
-from gen_data.generator.renderers.warp.pathtraced.kernels.sampler import (
+from gen_data.renderers.warp.pathtraced.kernels.sampler import (
     hash_bits,
     morton_index,
     random_number,
     random_pair,
 )
-from gen_data.generator.renderers.warp.realtime.kernels.clearcoat_glass import maps_at
-from gen_data.generator.renderers.warp.realtime.kernels.soft_shadows import make_frame
-from gen_data.generator.renderers.warp.scene.kernels.alpha_test import OUT_OF_LINE
-from gen_data.generator.renderers.warp.scene.kernels.analytic_lights import is_panel
-from gen_data.generator.renderers.warp.scene.kernels.brdf import (
+from gen_data.renderers.warp.realtime.kernels.clearcoat_glass import maps_at
+from gen_data.renderers.warp.realtime.kernels.soft_shadows import make_frame
+from gen_data.renderers.warp.scene.kernels.alpha_test import OUT_OF_LINE
+from gen_data.renderers.warp.scene.kernels.analytic_lights import is_panel
+from gen_data.renderers.warp.scene.kernels.brdf import (
     WATER_F0,
     directional_albedo,
     fresnel_dielectric,
@@ -65,11 +62,8 @@ from gen_data.generator.renderers.warp.scene.kernels.brdf import (
     pane_reflectance,
     pane_transmittance,
 )
-from gen_data.generator.renderers.warp.scene.kernels.material_eval import (
-    SurfaceMaterial,
-    evaluate_material,
-)
-from gen_data.generator.renderers.warp.scene.kernels.ray_queries import (
+from gen_data.renderers.warp.scene.kernels.material_eval import SurfaceMaterial, evaluate_material
+from gen_data.renderers.warp.scene.kernels.ray_queries import (
     RayHit,
     closest_hit,
     is_intersected,
@@ -77,7 +71,7 @@ from gen_data.generator.renderers.warp.scene.kernels.ray_queries import (
     path_along,
     precipitation_exposure,
 )
-from gen_data.generator.renderers.warp.scene.kernels.records import (
+from gen_data.renderers.warp.scene.kernels.records import (
     HOLES,
     View,
     World,
@@ -90,8 +84,8 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
     surface_index,
     vertex_at,
 )
-from gen_data.generator.renderers.warp.visibility.kernels.label_resolve import face_viewer
-from gen_data.generator.renderers.warp.visibility.kernels.rasterizer import Z_NEAR_M
+from gen_data.renderers.warp.visibility.kernels.label_resolve import face_viewer
+from gen_data.renderers.warp.visibility.kernels.rasterizer import Z_NEAR_M
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 

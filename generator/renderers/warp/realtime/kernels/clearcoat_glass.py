@@ -2,7 +2,7 @@
 
 Only pixels that show such a surface are shaded here, and only scenes with one load this module. A
 pixel's own light is computed as in
-gen_data.generator.renderers.warp.realtime.kernels.lattice_lighting; up to three rays add
+gen_data.renderers.warp.realtime.kernels.lattice_lighting; up to three rays add
 reflections and what lies behind.
 
 * A **clear coat** is a second GGX layer of reflectance 0.04; what it reflects is subtracted from
@@ -20,13 +20,13 @@ from __future__ import annotations
 
 import warp as wp
 
-from gen_data.generator.renderers.warp.atmosphere.kernels.ground_weathering import (
+from gen_data.renderers.warp.atmosphere.kernels.ground_weathering import (
     apply_coat,
     coat_at,
     footprint,
 )
-from gen_data.generator.renderers.warp.realtime.kernels.lattice import ray_origin
-from gen_data.generator.renderers.warp.realtime.kernels.lattice_lighting import (
+from gen_data.renderers.warp.realtime.kernels.lattice import ray_origin
+from gen_data.renderers.warp.realtime.kernels.lattice_lighting import (
     ListedPixels,
     Probe,
     light_at,
@@ -36,37 +36,33 @@ from gen_data.generator.renderers.warp.realtime.kernels.lattice_lighting import 
     visible_lamp_fraction,
     visible_sky_fraction,
 )
-from gen_data.generator.renderers.warp.scene.kernels.alpha_test import OUT_OF_LINE, uv_at
-from gen_data.generator.renderers.warp.scene.kernels.ambient_light import (
+from gen_data.renderers.warp.scene.kernels.alpha_test import OUT_OF_LINE, uv_at
+from gen_data.renderers.warp.scene.kernels.ambient_light import (
     ambient_irradiance,
     ambient_reflection,
     is_indoors,
     received_ambience,
 )
-from gen_data.generator.renderers.warp.scene.kernels.analytic_lights import SUN, beam_from
-from gen_data.generator.renderers.warp.scene.kernels.brdf import (
+from gen_data.renderers.warp.scene.kernels.analytic_lights import SUN, beam_from
+from gen_data.renderers.warp.scene.kernels.brdf import (
     fresnel_dielectric,
     make_brdf,
     pane_reflectance,
     pane_transmittance,
     refract,
 )
-from gen_data.generator.renderers.warp.scene.kernels.environment_lighting import (
+from gen_data.renderers.warp.scene.kernels.environment_lighting import (
     sky_image,
     sky_reflection,
     sky_rest,
 )
-from gen_data.generator.renderers.warp.scene.kernels.material_eval import (
+from gen_data.renderers.warp.scene.kernels.material_eval import (
     SurfaceMaterial,
     evaluate_material,
     sheet_normal,
 )
-from gen_data.generator.renderers.warp.scene.kernels.ray_queries import (
-    FARTHEST,
-    closest_hit,
-    passed_origin,
-)
-from gen_data.generator.renderers.warp.scene.kernels.records import (
+from gen_data.renderers.warp.scene.kernels.ray_queries import FARTHEST, closest_hit, passed_origin
+from gen_data.renderers.warp.scene.kernels.records import (
     HOLES,
     MIRROR_ROUGHNESS,
     GBufferRecord,
@@ -82,17 +78,14 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
     surface_index,
     vertex_at,
 )
-from gen_data.generator.renderers.warp.scene.kernels.texture_sampling import (
+from gen_data.renderers.warp.scene.kernels.texture_sampling import (
     FULL,
     make_sampler,
     mix_texels,
     taps_at,
 )
-from gen_data.generator.renderers.warp.visibility.kernels.edge_detection import from_tone, to_tone
-from gen_data.generator.renderers.warp.visibility.kernels.label_resolve import (
-    face_viewer,
-    point_at,
-)
+from gen_data.renderers.warp.visibility.kernels.edge_detection import from_tone, to_tone
+from gen_data.renderers.warp.visibility.kernels.label_resolve import face_viewer, point_at
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 1})
 

@@ -8,12 +8,9 @@ from __future__ import annotations
 
 import warp as wp
 
-from gen_data.generator.renderers.warp.scene.kernels.material_eval import is_translucent
-from gen_data.generator.renderers.warp.scene.kernels.ray_queries import (
-    OFFSET_M,
-    OFFSET_PER_DISTANCE,
-)
-from gen_data.generator.renderers.warp.scene.kernels.records import (
+from gen_data.renderers.warp.scene.kernels.material_eval import is_translucent
+from gen_data.renderers.warp.scene.kernels.ray_queries import OFFSET_M, OFFSET_PER_DISTANCE
+from gen_data.renderers.warp.scene.kernels.records import (
     GBufferRecord,
     View,
     World,

@@ -9,25 +9,18 @@ from __future__ import annotations
 
 import warp as wp
 
-from gen_data.generator.renderers.warp.atmosphere.kernels.ground_weathering import (
+from gen_data.renderers.warp.atmosphere.kernels.ground_weathering import (
     COAT_QUAD,
     SNOW_BLUE,
     SNOW_GREEN,
     SNOW_RED,
 )
-from gen_data.generator.renderers.warp.realtime.kernels.lattice import (
-    Lattice,
-    points_agree,
-    step_at,
-)
-from gen_data.generator.renderers.warp.realtime.kernels.lattice_lighting import (
-    LatticeLight,
-    is_gatherable,
-)
-from gen_data.generator.renderers.warp.realtime.kernels.soft_shadows import surface_tolerance
-from gen_data.generator.renderers.warp.scene.kernels.environment_lighting import sky_image
-from gen_data.generator.renderers.warp.scene.kernels.material_eval import print_footprint
-from gen_data.generator.renderers.warp.scene.kernels.records import (
+from gen_data.renderers.warp.realtime.kernels.lattice import Lattice, points_agree, step_at
+from gen_data.renderers.warp.realtime.kernels.lattice_lighting import LatticeLight, is_gatherable
+from gen_data.renderers.warp.realtime.kernels.soft_shadows import surface_tolerance
+from gen_data.renderers.warp.scene.kernels.environment_lighting import sky_image
+from gen_data.renderers.warp.scene.kernels.material_eval import print_footprint
+from gen_data.renderers.warp.scene.kernels.records import (
     GBufferRecord,
     TextureRecord,
     View,
@@ -37,7 +30,7 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
     pixel_width,
     surface_index,
 )
-from gen_data.generator.renderers.warp.scene.kernels.texture_sampling import (
+from gen_data.renderers.warp.scene.kernels.texture_sampling import (
     SAMPLE_QUAD,
     Patch,
     Sampler,

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import warp as wp
 
-from gen_data.generator.renderers.warp.atmosphere.kernels.ground_weathering import (
+from gen_data.renderers.warp.atmosphere.kernels.ground_weathering import (
     apply_coat,
     coat_at,
     footprint,
 )
-from gen_data.generator.renderers.warp.realtime.kernels.lattice import (
+from gen_data.renderers.warp.realtime.kernels.lattice import (
     Lattice,
     cell_at,
     ray_origin,
     sheet_side,
 )
-from gen_data.generator.renderers.warp.realtime.kernels.shadow_culling import FAINT_SHARE
-from gen_data.generator.renderers.warp.realtime.kernels.soft_shadows import (
+from gen_data.renderers.warp.realtime.kernels.shadow_culling import FAINT_SHARE
+from gen_data.renderers.warp.realtime.kernels.soft_shadows import (
     CROWN_GLOW,
     CROWN_M,
     SMOOTHED_SHARE,
@@ -25,13 +25,13 @@ from gen_data.generator.renderers.warp.realtime.kernels.soft_shadows import (
     path_to_lamp,
     surface_tolerance,
 )
-from gen_data.generator.renderers.warp.scene.kernels.ambient_light import (
+from gen_data.renderers.warp.scene.kernels.ambient_light import (
     ambient_irradiance,
     ambient_reflection,
     is_indoors,
     received_ambience,
 )
-from gen_data.generator.renderers.warp.scene.kernels.analytic_lights import (
+from gen_data.renderers.warp.scene.kernels.analytic_lights import (
     SUN,
     above_horizon_fraction,
     beam_from,
@@ -39,21 +39,21 @@ from gen_data.generator.renderers.warp.scene.kernels.analytic_lights import (
     relative_illuminance,
     representative_direction,
 )
-from gen_data.generator.renderers.warp.scene.kernels.brdf import Brdf, make_brdf, specular_lobe
-from gen_data.generator.renderers.warp.scene.kernels.material_eval import (
+from gen_data.renderers.warp.scene.kernels.brdf import Brdf, make_brdf, specular_lobe
+from gen_data.renderers.warp.scene.kernels.material_eval import (
     SurfaceMaterial,
     evaluate_material,
     plain_material,
     sheet_normal,
 )
-from gen_data.generator.renderers.warp.scene.kernels.ray_queries import (
+from gen_data.renderers.warp.scene.kernels.ray_queries import (
     free_path,
     free_path_before,
     is_occluded,
     path_along,
     precipitation_exposure,
 )
-from gen_data.generator.renderers.warp.scene.kernels.records import (
+from gen_data.renderers.warp.scene.kernels.records import (
     GBufferRecord,
     LightRecord,
     View,

@@ -1,7 +1,7 @@
 """Soft shadows and ambient occlusion on the lattice, with as few rays as possible.
 
 1. Tiles list the bodies that may shade them
-   (gen_data.generator.renderers.warp.realtime.kernels.shadow_culling): most list none and need no
+   (gen_data.renderers.warp.realtime.kernels.shadow_culling): most list none and need no
    ray.
 2. Points trace one ray per lamp, every other point only where its neighbours differ. The sixteen
    points of a 4 x 4 block aim at sixteen parts of the lamp (interleaved sampling, Keller and
@@ -15,26 +15,23 @@ from __future__ import annotations
 
 import warp as wp
 
-from gen_data.generator.renderers.warp.realtime.kernels.lattice import (
+from gen_data.renderers.warp.realtime.kernels.lattice import (
     Departure,
     Lattice,
     departure_to,
     sheet_side,
 )
-from gen_data.generator.renderers.warp.realtime.kernels.shadow_culling import FAINT_SHARE, TILE
-from gen_data.generator.renderers.warp.scene.kernels.ambient_light import (
-    ambient_irradiance,
-    is_indoors,
-)
-from gen_data.generator.renderers.warp.scene.kernels.analytic_lights import (
+from gen_data.renderers.warp.realtime.kernels.shadow_culling import FAINT_SHARE, TILE
+from gen_data.renderers.warp.scene.kernels.ambient_light import ambient_irradiance, is_indoors
+from gen_data.renderers.warp.scene.kernels.analytic_lights import (
     DISK,
     RECTANGLE,
     SUN,
     SUN_DISTANCE_M,
     beam_from,
 )
-from gen_data.generator.renderers.warp.scene.kernels.material_eval import is_translucent
-from gen_data.generator.renderers.warp.scene.kernels.ray_queries import (
+from gen_data.renderers.warp.scene.kernels.material_eval import is_translucent
+from gen_data.renderers.warp.scene.kernels.ray_queries import (
     NOBODY,
     free_path_before,
     free_path_of_listed,
@@ -42,13 +39,8 @@ from gen_data.generator.renderers.warp.scene.kernels.ray_queries import (
     listed_blocker,
     path_along,
 )
-from gen_data.generator.renderers.warp.scene.kernels.records import (
-    LightRecord,
-    View,
-    World,
-    fast_normalize,
-)
-from gen_data.generator.renderers.warp.scene.kernels.simd import SIMD
+from gen_data.renderers.warp.scene.kernels.records import LightRecord, View, World, fast_normalize
+from gen_data.renderers.warp.scene.kernels.simd import SIMD
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 

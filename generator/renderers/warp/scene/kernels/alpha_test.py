@@ -11,12 +11,8 @@ import inspect
 
 import warp as wp
 
-from gen_data.generator.renderers.warp.scene.kernels.bvh_traverse import (
-    Found,
-    any_in_mesh,
-    first_in_mesh,
-)
-from gen_data.generator.renderers.warp.scene.kernels.records import (
+from gen_data.renderers.warp.scene.kernels.bvh_traverse import Found, any_in_mesh, first_in_mesh
+from gen_data.renderers.warp.scene.kernels.records import (
     CLEAR,
     World,
     face_vertices,

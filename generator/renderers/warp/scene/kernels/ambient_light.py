@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import warp as wp
 
-from gen_data.generator.core.scene import VOLUME_REACH_M
-from gen_data.generator.renderers.warp.scene.kernels.environment_lighting import (
+from gen_data.core.scene import VOLUME_REACH_M
+from gen_data.renderers.warp.scene.kernels.environment_lighting import (
     sky_irradiance,
     sky_reflection,
 )
-from gen_data.generator.renderers.warp.scene.kernels.records import World, floor_int
+from gen_data.renderers.warp.scene.kernels.records import World, floor_int
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 

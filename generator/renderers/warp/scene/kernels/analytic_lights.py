@@ -12,8 +12,8 @@ from __future__ import annotations
 
 import warp as wp
 
-from gen_data.generator.core.scene import LIGHT_KINDS
-from gen_data.generator.renderers.warp.scene.kernels.records import LightRecord, fast_normalize
+from gen_data.core.scene import LIGHT_KINDS
+from gen_data.renderers.warp.scene.kernels.records import LightRecord, fast_normalize
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 
@@ -116,7 +116,7 @@ def beam_from(lamp: LightRecord, p_world: wp.vec3):
     if lamp.kind == SPOT:
         cosine = -wp.dot(beam.direction, lamp.direction)
         span = wp.max(lamp.cos_inner - lamp.cos_outer, 1.0e-4)
-        # Smoothstep in the cosine, which gen_data.generator.core.photometry integrates: being
+        # Smoothstep in the cosine, which gen_data.core.photometry integrates: being
         # symmetric, half of the fading cone counts.
         fade = wp.clamp((cosine - lamp.cos_outer) / span, 0.0, 1.0)
         beam.normal_lux = beam.normal_lux * (fade * fade * (3.0 - 2.0 * fade))

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import warp as wp
 
-from gen_data.generator.renderers.warp.scene.kernels.simd import SIMD
+from gen_data.renderers.warp.scene.kernels.simd import SIMD
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 

@@ -10,15 +10,15 @@ shading in Unreal Engine 4", 2013 (directional albedo from a table); Turquin, "P
 scattering compensation for microfacet models", 2019; Lagarde and de Rousiers, "Moving Frostbite to
 PBR", 2014 (F90); Born and Wolf, "Principles of Optics", 1.5.2 (Fresnel's formulae); Snell's law as
 in Pharr, Jakob and Humphreys, "Physically Based Rendering", 4th ed., 9.3. Weights of luminance are
-those of ``gen_data.generator.core.colorimetry``.
+those of ``gen_data.core.colorimetry``.
 """
 
 from __future__ import annotations
 
 import warp as wp
 
-from gen_data.generator.core.colorimetry import REC709_LUMINANCE
-from gen_data.generator.renderers.warp.scene.kernels.records import fast_normalize
+from gen_data.core.colorimetry import REC709_LUMINANCE
+from gen_data.renderers.warp.scene.kernels.records import fast_normalize
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 

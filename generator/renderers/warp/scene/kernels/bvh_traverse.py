@@ -1,6 +1,6 @@
 """Ray traversal of bounding volume hierarchies, eight boxes or eight triangles at a time.
 
-Trees are those of gen_data.generator.renderers.warp.scene.bvh. On the CPU the traversal takes a
+Trees are those of gen_data.renderers.warp.scene.bvh. On the CPU the traversal takes a
 third of the time of ``wp.mesh_query_ray``, which tests boxes and triangles one by one. On CUDA a
 thread tests the eight one after another, in the same order and with the same arithmetic: hits are
 equal to the last bit.
@@ -14,8 +14,8 @@ from __future__ import annotations
 
 import warp as wp
 
-from gen_data.generator.renderers.warp.scene.kernels.records import BodyRecord, Geometry
-from gen_data.generator.renderers.warp.scene.kernels.simd import SIMD
+from gen_data.renderers.warp.scene.kernels.records import BodyRecord, Geometry
+from gen_data.renderers.warp.scene.kernels.simd import SIMD
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 

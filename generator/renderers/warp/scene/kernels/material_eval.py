@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import warp as wp
 
-from gen_data.generator.renderers.warp.scene.kernels.alpha_test import project_uv
-from gen_data.generator.renderers.warp.scene.kernels.records import (
+from gen_data.renderers.warp.scene.kernels.alpha_test import project_uv
+from gen_data.renderers.warp.scene.kernels.records import (
     World,
     face_vertices,
     fast_normalize,
@@ -14,8 +14,8 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
     is_back_face,
     vertex_at,
 )
-from gen_data.generator.renderers.warp.scene.kernels.texture_sampling import make_sampler, texel_at
-from gen_data.generator.renderers.warp.visibility.kernels.label_resolve import mesh_point
+from gen_data.renderers.warp.scene.kernels.texture_sampling import make_sampler, texel_at
+from gen_data.renderers.warp.visibility.kernels.label_resolve import mesh_point
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 

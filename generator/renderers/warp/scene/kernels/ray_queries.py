@@ -12,17 +12,14 @@ from __future__ import annotations
 
 import warp as wp
 
-from gen_data.generator.renderers.warp.scene.kernels.alpha_test import (
+from gen_data.renderers.warp.scene.kernels.alpha_test import (
     OUT_OF_LINE,
     closest_solid_hit,
     first_opaque_hit,
     is_mesh_intersected,
 )
-from gen_data.generator.renderers.warp.scene.kernels.bvh_traverse import (
-    any_in_scene,
-    first_in_scene,
-)
-from gen_data.generator.renderers.warp.scene.kernels.records import (
+from gen_data.renderers.warp.scene.kernels.bvh_traverse import any_in_scene, first_in_scene
+from gen_data.renderers.warp.scene.kernels.records import (
     CLEAR,
     HOLES,
     MOVES,

@@ -26,7 +26,7 @@ class View:
 
     Attributes:
         inverse_fx, inverse_fy: Reciprocal focal lengths [1/px].
-        lens: PINHOLE, or one of the models of gen_data.generator.core.lens.
+        lens: PINHOLE, or one of the models of gen_data.core.lens.
         coefficients: Distortion coefficients of the lens.
         directions: Unit directions in the camera frame through every pixel centre; the fourth
             component is the pixel's angle [rad], 0 outside the lens's field. Empty for a pinhole.
@@ -56,7 +56,7 @@ class Geometry:
     """One mesh in its own frame.
 
     Attributes:
-        tree: Hierarchy of its faces, see gen_data.generator.renderers.warp.scene.bvh.
+        tree: Hierarchy of its faces, see gen_data.renderers.warp.scene.bvh.
         faces: Three vertex indices per face, flat.
         boxes: Boxes that together bound all faces, see box_groups.
         convex: 1 for a convex solid, which never shadows itself when seen from outside.
@@ -111,7 +111,7 @@ class BodyRecord:
 
 @wp.struct
 class MaterialRecord:
-    """A metallic-roughness material, as gen_data.generator.core.asset_types.Material.
+    """A metallic-roughness material, as gen_data.core.asset_types.Material.
 
     Attributes:
         texture: Index into the textures; -1 where there is none.
@@ -266,7 +266,7 @@ class GroundRecord:
 
     Attributes:
         covered: 0 if everything is dry and bare; the other fields are then unused.
-        wetness, puddles, snow_cover: As in ``gen_data.generator.core.scene.Weather``.
+        wetness, puddles, snow_cover: As in ``gen_data.core.scene.Weather``.
         puddle_level, snow_level: Thresholds of the noise above which there is water or snow.
         seed: Seed of the noise.
         exposed: Exposure of each lattice point to precipitation, [0, 1], flat.
@@ -442,7 +442,7 @@ class World:
 
     Attributes:
         boxes: The bodies' boxes in the world, see box_groups.
-        tree: Hierarchy over the bodies' boxes, see gen_data.generator.renderers.warp.scene.bvh.
+        tree: Hierarchy over the bodies' boxes, see gen_data.renderers.warp.scene.bvh.
         cutouts: Numbers of the bodies with HOLES or CLEAR faces.
         cutout_hierarchy: Warp's hierarchy over their boxes; 0 without any.
         lobes: Directional albedo of specular lobes, see brdf.directional_albedo.

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import warp as wp
 
-from gen_data.generator.renderers.warp.scene.kernels.records import (
+from gen_data.renderers.warp.scene.kernels.records import (
     World,
     face_vertices,
     fast_normalize,

@@ -8,11 +8,8 @@ from __future__ import annotations
 
 import warp as wp
 
-from gen_data.generator.renderers.warp.scene.kernels.alpha_test import (
-    dominant_axis,
-    project_uv,
-)
-from gen_data.generator.renderers.warp.scene.kernels.records import (
+from gen_data.renderers.warp.scene.kernels.alpha_test import dominant_axis, project_uv
+from gen_data.renderers.warp.scene.kernels.records import (
     HOLES,
     View,
     World,

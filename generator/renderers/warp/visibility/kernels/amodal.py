@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import warp as wp
 
-from gen_data.generator.renderers.warp.scene.kernels.records import View, World
-from gen_data.generator.renderers.warp.visibility.kernels.alpha_cutouts import make_cutout
-from gen_data.generator.renderers.warp.visibility.kernels.rasterizer import (
+from gen_data.renderers.warp.scene.kernels.records import View, World
+from gen_data.renderers.warp.visibility.kernels.alpha_cutouts import make_cutout
+from gen_data.renderers.warp.visibility.kernels.rasterizer import (
     UNSNAPPED,
     Z_NEAR_M,
     DepthPlane,

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import warp as wp
 
-from gen_data.generator.renderers.warp.scene.kernels.alpha_test import is_mesh_intersected
-from gen_data.generator.renderers.warp.scene.kernels.ray_queries import FARTHEST
-from gen_data.generator.renderers.warp.scene.kernels.records import (
+from gen_data.renderers.warp.scene.kernels.alpha_test import is_mesh_intersected
+from gen_data.renderers.warp.scene.kernels.ray_queries import FARTHEST
+from gen_data.renderers.warp.scene.kernels.records import (
     HOLES,
     View,
     World,
@@ -14,7 +14,7 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
     to_mesh_point,
     to_mesh_vector,
 )
-from gen_data.generator.renderers.warp.visibility.kernels.rasterizer import Outline
+from gen_data.renderers.warp.visibility.kernels.rasterizer import Outline
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 

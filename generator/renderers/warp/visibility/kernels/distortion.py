@@ -1,13 +1,13 @@
 """Projection of points into the image, for every lens model.
 
-The equations and their sources are those of gen_data.generator.core.lens, in single precision.
+The equations and their sources are those of gen_data.core.lens, in single precision.
 """
 
 from __future__ import annotations
 
 import warp as wp
 
-from gen_data.generator.renderers.warp.scene.kernels.records import (
+from gen_data.renderers.warp.scene.kernels.records import (
     BROWN_CONRADY,
     EQUIRECTANGULAR,
     KANNALA_BRANDT,

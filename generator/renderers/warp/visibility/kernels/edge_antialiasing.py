@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import warp as wp
 
-from gen_data.generator.renderers.warp.scene.kernels.alpha_test import closest_solid_hit, is_hole
-from gen_data.generator.renderers.warp.scene.kernels.ray_queries import FARTHEST
-from gen_data.generator.renderers.warp.scene.kernels.records import (
+from gen_data.renderers.warp.scene.kernels.alpha_test import closest_solid_hit, is_hole
+from gen_data.renderers.warp.scene.kernels.ray_queries import FARTHEST
+from gen_data.renderers.warp.scene.kernels.records import (
     HOLES,
     GBufferRecord,
     View,
@@ -23,11 +23,11 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
     to_mesh_point,
     to_mesh_vector,
 )
-from gen_data.generator.renderers.warp.visibility.kernels.edge_detection import (
+from gen_data.renderers.warp.visibility.kernels.edge_detection import (
     most_similar_normal,
     neighbour_pixel,
 )
-from gen_data.generator.renderers.warp.visibility.kernels.label_resolve import make_facet
+from gen_data.renderers.warp.visibility.kernels.label_resolve import make_facet
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 

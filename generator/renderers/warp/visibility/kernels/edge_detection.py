@@ -7,11 +7,8 @@ from __future__ import annotations
 
 import warp as wp
 
-from gen_data.generator.renderers.warp.scene.kernels.records import (
-    GBufferRecord,
-    View,
-)
-from gen_data.generator.renderers.warp.scene.kernels.simd import SIMD
+from gen_data.renderers.warp.scene.kernels.records import GBufferRecord, View
+from gen_data.renderers.warp.scene.kernels.simd import SIMD
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 
@@ -149,7 +146,7 @@ def to_tone(radiance: wp.vec3, white: float, brightest: float):
     """Value of which a pixel is the mean over its samples; radiance if ``white`` is 0.
 
     A pixel of an image reduced from a larger one is the mean of tones: they saturate, and below
-    that they are nearly logarithms (as the mu-law of gen_data.generator.sensors.camera.isp).
+    that they are nearly logarithms (as the mu-law of gen_data.sensors.camera.isp).
     """
     tone = radiance
     if white > 0.0:

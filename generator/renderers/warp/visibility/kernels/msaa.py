@@ -2,14 +2,14 @@
 
 Triangles are drawn again into samples of the pixels that edges cross; colour is taken from nearby
 pixel centres that show the same surface, as in
-gen_data.generator.renderers.warp.visibility.kernels.edge_antialiasing.
+gen_data.renderers.warp.visibility.kernels.edge_antialiasing.
 """
 
 from __future__ import annotations
 
 import warp as wp
 
-from gen_data.generator.renderers.warp.scene.kernels.records import (
+from gen_data.renderers.warp.scene.kernels.records import (
     GBufferRecord,
     View,
     World,
@@ -21,21 +21,17 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
     surface_index,
     vertex_at,
 )
-from gen_data.generator.renderers.warp.scene.kernels.simd import SIMD
-from gen_data.generator.renderers.warp.visibility.kernels.alpha_cutouts import (
-    SOLID,
-    Cutout,
-    make_cutout,
-)
-from gen_data.generator.renderers.warp.visibility.kernels.edge_detection import (
+from gen_data.renderers.warp.scene.kernels.simd import SIMD
+from gen_data.renderers.warp.visibility.kernels.alpha_cutouts import SOLID, Cutout, make_cutout
+from gen_data.renderers.warp.visibility.kernels.edge_detection import (
     BLOCK,
     CREASE_COSINE,
     from_tone,
     most_similar_normal,
     to_tone,
 )
-from gen_data.generator.renderers.warp.visibility.kernels.label_resolve import point_at
-from gen_data.generator.renderers.warp.visibility.kernels.rasterizer import (
+from gen_data.renderers.warp.visibility.kernels.label_resolve import point_at
+from gen_data.renderers.warp.visibility.kernels.rasterizer import (
     SCAN,
     UNSNAPPED,
     Z_NEAR_M,

@@ -10,13 +10,9 @@ from __future__ import annotations
 
 import warp as wp
 
-from gen_data.generator.renderers.warp.scene.kernels.records import View, World, max_of_two
-from gen_data.generator.renderers.warp.scene.kernels.simd import SIMD
-from gen_data.generator.renderers.warp.visibility.kernels.alpha_cutouts import (
-    SOLID,
-    Cutout,
-    make_cutout,
-)
+from gen_data.renderers.warp.scene.kernels.records import View, World, max_of_two
+from gen_data.renderers.warp.scene.kernels.simd import SIMD
+from gen_data.renderers.warp.visibility.kernels.alpha_cutouts import SOLID, Cutout, make_cutout
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 

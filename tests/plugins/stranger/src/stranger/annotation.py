@@ -7,11 +7,11 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from gen_data.generator.config.base_model import Strict
-from gen_data.generator.core.capture import Channel, SensorReading
-from gen_data.generator.core.interfaces import Annotator
-from gen_data.generator.core.sample import ObjectTruth
-from gen_data.generator.core.scene import Scene
+from gen_data.config.base_model import Strict
+from gen_data.core.capture import Channel, SensorReading
+from gen_data.core.interfaces import Annotator
+from gen_data.core.sample import ObjectTruth
+from gen_data.core.scene import Scene
 
 
 class Distance(Strict):

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Literal
 
-from gen_data.generator.config.base_model import Strict
-from gen_data.generator.core.interfaces import AssetIndex, Element
-from gen_data.generator.core.scene import Body, Instance, Scene
-from gen_data.generator.core.se3 import SE3
+from gen_data.config.base_model import Strict
+from gen_data.core.interfaces import AssetIndex, Element
+from gen_data.core.scene import Body, Instance, Scene
+from gen_data.core.se3 import SE3
 
 
 class Pedestal(Strict):

@@ -6,11 +6,11 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Literal
 
-from gen_data.generator.config.base_model import Strict
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import AssetLibrary, DatasetInfo, Exporter
-from gen_data.generator.core.sample import Sample
-from gen_data.generator.core.serialization import canonical_json
+from gen_data.config.base_model import Strict
+from gen_data.core.errors import ConfigError
+from gen_data.core.interfaces import AssetLibrary, DatasetInfo, Exporter
+from gen_data.core.sample import Sample
+from gen_data.core.serialization import canonical_json
 
 
 class Lines(Strict):

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Literal
 
-from gen_data.generator.config.base_model import Strict
-from gen_data.generator.core.interfaces import AssetIndex, Randomizer, Stage
-from gen_data.generator.core.scene import Scene
-from gen_data.generator.core.streams import Rng
+from gen_data.config.base_model import Strict
+from gen_data.core.interfaces import AssetIndex, Randomizer, Stage
+from gen_data.core.scene import Scene
+from gen_data.core.streams import Rng
 
 
 class Swap(Strict):

@@ -8,12 +8,12 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.config.base_model import Strict
-from gen_data.generator.core.capture import Channel, LidarHits, LidarRays, SensorReading, Silhouette
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import AssetLibrary, FindTones, Renderer, RendererSettings
-from gen_data.generator.core.scene import Camera, Instance, Lidar, Scene
-from gen_data.generator.core.se3 import SE3
+from gen_data.config.base_model import Strict
+from gen_data.core.capture import Channel, LidarHits, LidarRays, SensorReading, Silhouette
+from gen_data.core.errors import ConfigError
+from gen_data.core.interfaces import AssetLibrary, FindTones, Renderer, RendererSettings
+from gen_data.core.scene import Camera, Instance, Lidar, Scene
+from gen_data.core.se3 import SE3
 
 Image = NDArray[Any]
 

@@ -7,12 +7,12 @@ from typing import Literal
 
 import numpy as np
 
-from gen_data.generator.config.base_model import Strict
-from gen_data.generator.core.capture import Channel, Measurements
-from gen_data.generator.core.interfaces import Modality, Renderer, Sensor, SensorInfo
-from gen_data.generator.core.measurement_dtypes import TIME, Column, columns_dtype
-from gen_data.generator.core.scene import Device, Scene
-from gen_data.generator.core.streams import Rng
+from gen_data.config.base_model import Strict
+from gen_data.core.capture import Channel, Measurements
+from gen_data.core.interfaces import Modality, Renderer, Sensor, SensorInfo
+from gen_data.core.measurement_dtypes import TIME, Column, columns_dtype
+from gen_data.core.scene import Device, Scene
+from gen_data.core.streams import Rng
 
 COLUMNS = (TIME, Column("luminance_cd_m2", "<f8", "mean over the image, with noise"))
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from gen_data.generator.assets.family import Provenance, TextureFamily
-from gen_data.generator.core.asset_types import TextureData
+from gen_data.assets.family import Provenance, TextureFamily
+from gen_data.core.asset_types import TextureData
 
 
 def stripes(seed: int) -> TextureData:

@@ -1,0 +1,1 @@
+"""Asset packs: the table, and converters of their files."""

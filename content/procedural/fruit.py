@@ -1,0 +1,432 @@
+"""Fruit: spheres pressed, pulled and bent into shape, whole or cut, with stalks and leaves.
+
+Round fruit are rows of ``fruits.yaml``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from gen_data.assets.family import Facts, Solid
+from gen_data.config.data_files import load_table
+from gen_data.content.procedural import collision_hulls as hulls
+from gen_data.content.procedural import surface_shapes as shapes
+from gen_data.content.procedural.material_presets import (
+    draw_linear,
+    hex_to_linear,
+    printed_material,
+)
+from gen_data.content.procedural.patches import (
+    Array,
+    Patch,
+    join_patches,
+    make_centred_solid,
+    rotate,
+)
+from gen_data.content.procedural.surface_shapes import Point2
+from gen_data.core.asset_types import Material
+from gen_data.core.variant_rng import VariantRng, in_turn, variant_rng
+
+_STALK = Material(hex_to_linear("#5a4329"), 0.8, printed=True)
+_GREENS = ("#4f7a2c", "#3f6a2a", "#6b8a36")
+
+
+@dataclass(frozen=True, slots=True)
+class FruitStyle:
+    """Ranges of the shape of one kind of round fruit; depths are shares of the radius.
+
+    Attributes:
+        slim: Half the height over the radius.
+        dent_top, dent_low: Depths of the hollows of stalk and blossom.
+        dent_width: Their width: 0.02 narrow, 0.14 wide.
+        taper: How much narrower it is below.
+        tip_top, tip_low: How far the ends are drawn out.
+        lobes, lobe_depth: Number and depth of furrows from end to end.
+        cleft: Depth of a single furrow.
+        lumps: Depth of irregular swellings.
+        skin: Texture: a family of its own, or a kind of ``fruit_skin``.
+        skin_first: Seed of the texture of the first variant.
+        stalk: ``twig``, ``button``, ``calyx``, ``stump`` or empty.
+        leaf: Probability of a leaf.
+        cut: Kind of ``fruit_cut`` of a halved fruit; empty = whole.
+        lying: Whether it rests on its side, along X.
+    """
+
+    radius_m: Point2
+    slim: Point2
+    lumps: float
+    skin: str
+    roughness: Point2
+    dent_top: Point2 = (0.0, 0.0)
+    dent_low: Point2 = (0.0, 0.0)
+    dent_width: float = 0.09
+    taper: Point2 = (0.0, 0.0)
+    tip_top: Point2 = (0.0, 0.0)
+    tip_low: Point2 = (0.0, 0.0)
+    lobes: int = 0
+    lobe_depth: float = 0.0
+    cleft: float = 0.0
+    skin_first: int = 0
+    stalk: str = ""
+    leaf: float = 0.0
+    cut: str = ""
+    lying: bool = False
+
+
+STYLES: Mapping[str, FruitStyle] = load_table(__package__, "fruits", FruitStyle)
+_OWN_SKINS = ("apple_skin", "citrus_peel")
+
+
+def apple(seed: int) -> Solid:
+    """An apple, whole or halved. Slots: skin, then flesh, stalk, leaf."""
+    return _round_fruit("apple", seed)
+
+
+def orange(seed: int) -> Solid:
+    """An orange or mandarin, whole or halved. Slots: peel, then flesh, stalk, leaf."""
+    return _round_fruit("orange", seed)
+
+
+def lemon(seed: int) -> Solid:
+    """A lemon lying along X, or half a one. Slots: peel, then flesh, leaf."""
+    return _round_fruit("lemon", seed)
+
+
+def lime(seed: int) -> Solid:
+    """A lime lying along X, or half a one. Slots: peel, flesh."""
+    return _round_fruit("lime", seed)
+
+
+def kiwi(seed: int) -> Solid:
+    """A kiwi fruit lying along X, or half a one. Slots: skin, flesh."""
+    return _round_fruit("kiwi", seed)
+
+
+def tomato(seed: int) -> Solid:
+    """A tomato with its green star. Slots: skin, calyx."""
+    return _round_fruit("tomato", seed)
+
+
+def bell_pepper(seed: int) -> Solid:
+    """A sweet pepper. Slots: skin, stalk."""
+    return _round_fruit("bell_pepper", seed)
+
+
+def peach(seed: int) -> Solid:
+    """A peach or nectarine. Slots: skin, leaf."""
+    return _round_fruit("peach", seed)
+
+
+def plum(seed: int) -> Solid:
+    """A plum. Slots: skin, stalk."""
+    return _round_fruit("plum", seed)
+
+
+def strawberry(seed: int) -> Solid:
+    """A strawberry, most of them on their side. Slots: skin, calyx."""
+    return _round_fruit("strawberry", seed)
+
+
+def carrot(seed: int) -> Solid:
+    """A carrot lying along X. Slots: skin, stump of the leaves."""
+    return _round_fruit("carrot", seed)
+
+
+def fruit_kind(group: str, seed: int) -> str:
+    """Key in ``fruits.yaml`` of a variant of a group."""
+    return in_turn([name for name in STYLES if name.startswith(f"{group}/")], seed)
+
+
+def apple_facts(seed: int) -> Facts:
+    """Whether it is cut."""
+    return Facts(fruit_kind("apple", seed).partition("/")[2])
+
+
+def orange_facts(seed: int) -> Facts:
+    """Mandarin, or whether it is cut."""
+    return Facts(fruit_kind("orange", seed).partition("/")[2])
+
+
+def _round_fruit(group: str, seed: int) -> Solid:
+    rng, style = variant_rng(group, seed), STYLES[fruit_kind(group, seed)]
+    shape, top = _draw_shape(style, rng)
+    skin = f"texture/fruit_skin?kind={style.skin}&seed={seed}"
+    if style.skin in _OWN_SKINS:
+        skin = f"texture/{style.skin}?seed={style.skin_first + seed}"
+    materials = [printed_material(skin, rng.between(*style.roughness))]
+    if style.cut:
+        patches = _half(shape)
+        flesh = f"texture/fruit_cut?kind={style.cut}&seed={seed}"
+        materials.append(printed_material(flesh, 0.3))
+        parts = [hulls.extreme(patches[0].corners_m)]
+    else:
+        patches = [shapes.ball(shape, 26, 36)]
+        parts = [hulls.extreme(patches[0].corners_m)]
+    radius = style.radius_m[0]
+    if style.stalk:
+        stalk, material = _STALKS[style.stalk](top, radius, rng)
+        patches.append(stalk.painted(len(materials)))
+        materials.append(material)
+        parts.append(hulls.extreme(stalk.corners_m, 24))
+    if rng.chance(style.leaf):
+        blade = _leaf(radius * rng.between(1.1, 1.6), rng)
+        blade = blade.rotated("z", rng.between(0.0, 6.28)).moved(z=top)
+        patches.append(blade.painted(len(materials)))
+        materials.append(Material(draw_linear(_GREENS, 0.15, rng), 0.5, printed=True))
+        parts.append(hulls.extreme(blade.corners_m, 24))
+    if style.lying:
+        patches = [patch.rotated("y", 0.5 * math.pi) for patch in patches]
+        parts = [part[:, [2, 1, 0]] * np.array([1.0, 1.0, -1.0]) for part in parts]
+    return make_centred_solid(patches, materials, parts)
+
+
+def _draw_shape(style: FruitStyle, rng: VariantRng) -> tuple[Callable[[Array], Array], float]:
+    """Mapping of directions to points [m], and the height of the stalk's foot [m]."""
+    radius, slim = rng.between(*style.radius_m), rng.between(*style.slim)
+    top, low = rng.between(*style.dent_top), rng.between(*style.dent_low)
+    taper = rng.between(*style.taper)
+    tips = rng.between(*style.tip_top), rng.between(*style.tip_low)
+    lumps = _lumps(5, style.lumps, rng)
+    phase, lean = rng.between(0.0, 6.28), rng.between(-0.05, 0.05)
+    furrow = style.lobe_depth * rng.between(0.6, 1.2)
+
+    def shape(d: Array) -> Array:
+        z = d[..., 2]
+        turn = np.arctan2(d[..., 1], d[..., 0])
+        flank = 1 - z**2
+        dent = top * np.exp(-((1 - z) / style.dent_width))
+        dent = dent + low * np.exp(-((1 + z) / style.dent_width))
+        wave = np.abs(np.cos(0.5 * style.lobes * turn + phase)) if style.lobes else 1.0
+        # Furrows reach furthest into the lower half.
+        ridges = furrow * (1.0 - wave) * np.sqrt(np.maximum(flank, 0.0)) * (1.0 - 0.4 * z)
+        cleft = style.cleft * np.exp(-((turn / 0.22) ** 2)) * np.sqrt(np.maximum(flank, 0.0))
+        r = radius * (1 - dent - ridges - cleft + lumps(d) * flank) * (1.0 + taper * z)
+        drawn = tips[0] * np.exp(-((1 - z) / 0.05)) + tips[1] * np.exp(-((1 + z) / 0.04))
+        up = slim * (r * z + radius * drawn * np.sign(z))
+        return np.stack([r * d[..., 0] + lean * up, r * d[..., 1], up], axis=2)
+
+    peak = shape(np.array([[[0.0, 0.0, 1.0]]]))[0, 0]
+    return shape, float(peak[2])
+
+
+def _half(shape: Callable[[Array], Array]) -> list[Patch]:
+    """The lower half and its cut; on the cut v runs from the rim to the middle."""
+    rings, segments = 14, 40
+    polar = 0.5 * math.pi * (np.arange(rings + 1) / rings - 1.0)
+    turn = 2.0 * math.pi * np.arange(segments) / segments - math.pi
+    turn = np.concatenate([turn, turn[:1]])
+    radius = np.cos(polar)
+    radius[0] = 0.0
+    x, y = radius[:, None] * np.cos(turn), radius[:, None] * np.sin(turn)
+    d = np.stack(np.broadcast_arrays(x, y, np.sin(polar)[:, None]), axis=2)
+    skin = shape(d)
+    rim = skin[-1]
+    share = np.array([1.0, 0.9, 0.7, 0.45, 0.2, 0.0])[:, None, None]
+    middle = np.array([0.0, 0.0, float(rim[:, 2].mean())])
+    cut = middle + share * (rim - middle)[None]
+    v = 1.0 - share[:, 0, 0]
+    return [
+        shapes.grid(skin, v=np.linspace(0.0, 0.5, rings + 1)),
+        shapes.grid(cut, v=v, slot=1),
+    ]
+
+
+Stalk = tuple[Patch, Material]
+
+
+def _twig(top: float, radius: float, rng: VariantRng) -> Stalk:
+    return _stalk((0.0, 0.0, top - 0.002), rng.between(0.3, 0.6) * radius, 0.0013, rng), _STALK
+
+
+def _button(top: float, _: float, rng: VariantRng) -> Stalk:
+    """The scar of a stalk."""
+    button = shapes.ball(lambda d: 0.0035 * d * np.array([1.0, 1.0, 0.4]), 6, 10)
+    green = Material(draw_linear(("#6d7a3a", "#8a7a4a"), 0.1, rng), 0.8, printed=True)
+    return button.moved(z=top), green
+
+
+def _calyx(top: float, radius: float, rng: VariantRng) -> Stalk:
+    """Five to seven narrow sepals and a short stalk."""
+    count, size = rng.choose((5, 6, 7)), radius * rng.between(0.55, 0.8)
+    blades = [_twig(top, 0.6 * radius, rng)[0]]
+    for i in range(count):
+        blade = _blade(size, 0.16, 0.1, -rng.between(0.0, 0.35))
+        turn = 2 * math.pi * i / count + rng.between(-0.2, 0.2)
+        blades.append(blade.rotated("z", turn).moved(z=top + 0.0012))
+    green = Material(draw_linear(_GREENS, 0.1, rng), 0.7, printed=True)
+    return join_patches(blades), green
+
+
+def _stump(top: float, radius: float, rng: VariantRng) -> Stalk:
+    """A thick, bent, ribbed stalk on a green plate."""
+    size = 0.2 * radius
+    bend = [
+        (0.0, 0.0, top - 0.003),
+        (0.0, 0.0, top + size),
+        (rng.between(-1, 1) * size, 0.0, top + 3.2 * size),
+    ]
+    path = shapes.space_evenly(shapes.spline(bend, 24), 7)
+    scale = np.array([1.9, 1.25, 0.9, 0.8, 0.8, 0.85, 1.0])
+    stalk = shapes.sweep(path, shapes.circle(0.62 * size, 9), up=(1.0, 0.0, 0.0), scale=scale)
+    return stalk, Material(draw_linear(_GREENS, 0.1, rng), 0.6, printed=True)
+
+
+_STALKS: Mapping[str, Callable[[float, float, VariantRng], Stalk]] = {
+    "twig": _twig,
+    "button": _button,
+    "calyx": _calyx,
+    "stump": _stump,
+}
+
+
+def _leaf(size: float, rng: VariantRng) -> Patch:
+    return _blade(size, 0.42, 0.02, rng.between(-0.25, 0.25)).rotated("y", -rng.between(0.1, 0.7))
+
+
+def _blade(length: float, width: float, thick: float, droop: float) -> Patch:
+    """A pointed leaf along +X from the origin; width, thickness and droop are shares of it."""
+
+    def shape(d: Array) -> Array:
+        t = 0.5 * (1.0 + d[..., 0])
+        wide = 0.5 * width * np.sign(d[..., 1]) * np.abs(d[..., 1]) ** 1.4
+        lift = droop * t**2 + 0.1 * width * np.abs(d[..., 1]) + 0.5 * thick * d[..., 2]
+        return length * np.stack([t, wide * (1.2 - 0.4 * t), lift], axis=2)
+
+    return shapes.ball(shape, 6, 12)
+
+
+def pear(seed: int) -> Solid:
+    """A pear standing upright. Slots: skin, stalk."""
+    rng = variant_rng("pear", seed)
+    radius, height = rng.between(0.028, 0.037), rng.between(0.078, 0.108)
+    neck, lean = rng.between(0.36, 0.6), rng.between(-0.009, 0.009)
+    lumps = _lumps(4, 0.05, rng)
+
+    def shape(d: Array) -> Array:
+        z = d[..., 2]
+        t = 0.5 + 0.5 * z
+        body = 1.0 - (1.0 - neck) * t**1.5 * (1.0 + 0.35 * np.sin(math.pi * t))
+        flank = np.sqrt(np.maximum(1 - z**2, 0.0)) ** 0.85
+        unit = d[..., :2] / np.maximum(np.sqrt(1 - z**2), 1e-9)[..., None]
+        r = radius * flank * body * (1 + lumps(d)) * 1.12
+        dent = 0.1 * np.exp(-((1 + z) / 0.06))
+        up = 0.5 * height * (z + dent)
+        return np.stack([r * unit[..., 0] + lean * t**2, r * unit[..., 1], up], axis=2)
+
+    skin = printed_material(f"texture/pear_skin?seed={seed}", rng.between(0.35, 0.5))
+    body = shapes.ball(shape, 24, 28)
+    stalk = _stalk((lean, 0.0, 0.5 * height - 0.002), rng.between(0.014, 0.022), 0.0014, rng)
+    points = body.corners_m.reshape(-1, 3)
+    lower, upper = points[points[:, 2] < 0.12 * height], points[points[:, 2] > 0.02 * height]
+    parts = [*map(hulls.extreme, (lower, upper)), hulls.extreme(stalk.corners_m, 16)]
+    return make_centred_solid([body, stalk.painted(1)], (skin, _STALK), parts)
+
+
+def banana(seed: int) -> Solid:
+    """A banana on its side, or a hand of up to seven resting on its tips. Slots: peels, crown."""
+    rng = variant_rng("banana", seed)
+    count = banana_count(seed)
+    length, thick = rng.between(0.15, 0.205), rng.between(0.0165, 0.02)
+    ripe = round(rng.between(0.0, 1.0), 2)
+    peels = [
+        printed_material(f"texture/banana_peel?ripe={ripe}&seed={seed + k}", rng.between(0.4, 0.55))
+        for k in (0, 1000)
+    ]
+    bend = rng.between(0.7, 1.35)
+    if count == 1:
+        skin, parts = _banana(length, thick, bend, 5)
+        return make_centred_solid([skin], (peels[0],), parts)
+    patches, hands = [], []
+    for i in range(count):
+        at = i - 0.5 * (count - 1)
+        turn = at * rng.between(0.19, 0.25) + rng.between(-0.04, 0.04)
+        size, girth = length * rng.between(0.92, 1.06), thick * rng.between(0.92, 1.05)
+        skin, parts = _banana(size, girth, bend * rng.between(0.88, 1.12), 24 // count)
+        # From lying on its side to an arch from the crown to the tip, towards +X; neighbours
+        # rise by turns, since they grow in two rows.
+        shift = np.array([0.0, 0.42 * thick * at, 0.45 * thick * (i % 2)])
+        skin = skin.rotated("x", 0.5 * math.pi).rotated("z", turn).moved(*shift.tolist())
+        patches.append(skin.painted(i % 2))
+        hands += [_turn_up(part, turn) + shift for part in parts]
+    wide = 0.45 * thick * count + 0.012
+    crown = shapes.rounded_box((0.03, wide, 0.02), 0.008, 2).moved(0.008, 0.0, 0.004)
+    patches.append(crown.painted(2))
+    hands[0] = hulls.extreme(np.concatenate([hands[0], crown.corners_m.reshape(-1, 3)]))
+    tan = Material(draw_linear(("#8a8a3a", "#6b5a2c", "#a9a24a"), 0.1, rng), 0.7, printed=True)
+    return make_centred_solid(patches, (*peels, tan), hands)
+
+
+def banana_count(seed: int) -> int:
+    """Number of bananas of a variant: about half of all photographs show several (assumed)."""
+    return in_turn((1, 4, 1, 2, 6, 1, 3, 5), seed)
+
+
+def banana_facts(seed: int) -> Facts:
+    """Single or hand, and the number."""
+    count = banana_count(seed)
+    return Facts("single" if count == 1 else "hand", {"count": str(count)})
+
+
+def _turn_up(points: Array, turn_rad: float) -> Array:
+    """Points turned as the bananas of a hand."""
+    return rotate(rotate(points, "x", 0.5 * math.pi), "z", turn_rad)
+
+
+def _banana(length: float, thick: float, bend: float, count: int) -> tuple[Patch, list[Array]]:
+    """A banana from the stem at the origin along +X, bent towards +Y, and its convex parts."""
+    steps = 25
+    arc = np.linspace(0.0, 1.0, steps)
+    radius = length / bend
+    # The stem leaves at half of the bend upwards, so that both ends are level.
+    angle = bend * (arc - 0.5)
+    rise = radius * (np.cos(angle) - math.cos(0.5 * bend))
+    path = np.stack([radius * (np.sin(angle) + math.sin(0.5 * bend)), rise, 0 * arc], axis=1)
+    # Five blunt edges; the stem end is long and thin, the blossom end short.
+    at = (0, 0.04, 0.1, 0.18, 0.32, 0.5, 0.72, 0.88, 0.95, 0.985, 1.0)
+    widths = (0.36, 0.3, 0.32, 0.62, 0.92, 1.0, 0.97, 0.78, 0.5, 0.3, 0.24)
+    girth = _smooth(np.interp(arc, at, widths))
+    turn = 2 * math.pi * np.arange(20) / 20
+    edge = 1.0 + 0.05 * np.cos(5 * turn) + 0.01 * np.cos(10 * turn)
+    section = thick * edge[:, None] * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    skin = shapes.sweep(path, section, scale=girth)
+    first, second = shapes.frames_along(path, (0.0, 0.0, 1.0))
+    outline = shapes.circle(thick, 8)
+    around = outline[:, :1] * first[:, None] + outline[:, 1:] * second[:, None]
+    rings = path[:, None] + girth[:, None, None] * around
+    edges = np.linspace(0, steps - 1, count + 1).round().astype(int).tolist()
+    parts = [rings[sorted({a, (a + b) // 2, b})].reshape(-1, 3) for a, b in pairwise(edges)]
+    return skin, [hulls.extreme(part, 40) for part in parts]
+
+
+def _smooth(values: Array) -> Array:
+    padded = np.concatenate([values[:1], values, values[-1:]])
+    smooth: Array = 0.25 * padded[:-2] + 0.5 * padded[1:-1] + 0.25 * padded[2:]
+    return smooth
+
+
+def _lumps(count: int, size: float, rng: VariantRng) -> Callable[[Array], Array]:
+    """A low-frequency swelling over directions: a sum of cosines."""
+    axes = rng.random((count, 3)) - 0.5
+    phases = 2 * math.pi * rng.random(count)
+
+    def lumps(d: Array) -> Array:
+        total = np.zeros(d.shape[:2])
+        for axis, phase in zip(axes, phases, strict=True):
+            total += np.cos(6.0 * (d * axis).sum(axis=2) + phase)
+        return size * total / count
+
+    return lumps
+
+
+def _stalk(foot: tuple[float, float, float], length: float, thick: float, rng: VariantRng) -> Patch:
+    """A bent, tapering twig."""
+    x, y, z = foot
+    lean = rng.between(-0.4, 0.4) * length
+    bend = shapes.spline([(x, y, z), (x, y, z + 0.5 * length), (x + lean, y, z + length)], 24)
+    path, scale = shapes.space_evenly(bend, 6), np.array([1.3, 1, 0.9, 0.9, 1.1, 1.5])
+    return shapes.sweep(path, shapes.circle(thick, 8), up=(1.0, 0.0, 0.0), scale=scale)

@@ -1,0 +1,193 @@
+"""The surface of a road, and patches that lie on it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from gen_data.content.procedural.patches import Array, Patch
+from gen_data.content.roads.lane_textures import TILE_M
+from gen_data.content.roads.painted_signs import split_convex
+from gen_data.content.roads.road_materials import SCALES_M
+from gen_data.roads.reference_line import ReferenceLine
+
+PAINT_LIFT_M = 0.003
+SAGITTA_M = 0.008
+"""How far a chord of the mesh may stray from the curve."""
+ROW_M = 12.0
+"""Distance of the rows of straight roads: tiles of ``lane_textures`` end at rows."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Deck:
+    """A reference line with a cross section that is made of straight pieces.
+
+    Attributes:
+        line: The reference line.
+        t_m: Distances to the left of it, rising, shape [k].
+        z_m: Heights at them, shape [k].
+        bend_per_m: Largest curvature of the line.
+        slots: Number of each material slot by name.
+
+    Rows of the mesh lie at the same arc lengths for all strips and patches, so that neighbours
+    share their vertices on bends.
+    """
+
+    line: ReferenceLine
+    t_m: Array
+    z_m: Array
+    bend_per_m: float
+    slots: dict[str, int]
+
+    def at(self, s_m: Array, t_m: Array, lift_m: float = 0.0) -> Array:
+        """Points [..., 3] on the surface, or over it."""
+        flat = self.line.points(s_m.ravel(), t_m.ravel())
+        z = np.interp(t_m.ravel(), self.t_m, self.z_m) + lift_m
+        return np.column_stack([flat, z]).reshape(*s_m.shape, 3)
+
+    def rows(self, start_m: float, end_m: float) -> Array:
+        """Arc lengths from start to end with the common rows between them."""
+        step = ROW_M
+        if self.bend_per_m > 0.0:
+            needed = math.sqrt(8.0 * SAGITTA_M / self.bend_per_m)
+            step = ROW_M / max(1, math.ceil(ROW_M / needed - 1e-9))
+        # Rows next to an end would make slivers.
+        first, last = math.floor((start_m + 0.02) / step) + 1, math.ceil((end_m - 0.02) / step)
+        inside = step * np.arange(first, last)
+        return np.concatenate([[start_m], inside, [end_m]])
+
+    def columns_between(self, low_m: float, high_m: float) -> tuple[float, ...]:
+        """Both distances and the deck's columns between them, so that patches follow its ruts."""
+        # Columns next to an end would make slivers.
+        inside = self.t_m[(self.t_m > low_m + 1e-4) & (self.t_m < high_m - 1e-4)]
+        return (low_m, *(float(t) for t in inside), high_m)
+
+    def ribbon(
+        self, span_m: tuple[float, float], t_m: Sequence[float], slot: str, lift_m: float = 0.0
+    ) -> Patch:
+        """A strip along the road between two arc lengths; ``t_m`` rises across it."""
+        s, t = np.meshgrid(self.rows(*span_m), np.array(t_m), indexing="ij")
+        return self.sheet(s, t, slot, lift_m)
+
+    def lane(
+        self, span_m: tuple[float, float], t_m: Sequence[float], slot: str, lift_m: float = 0.0
+    ) -> Patch:
+        """A strip between two arc lengths whose texture fits its width once and repeats by tiles.
+
+        The texture is mirrored on the left of the reference line, so that neighbours differ.
+        """
+        s, t = np.meshgrid(self.rows(*span_m), np.array(t_m), indexing="ij")
+        u = (t - t[0, 0]) / (t[0, -1] - t[0, 0])
+        u = u if t[0, 0] < -1e-9 else 1.0 - u
+        uv = np.stack([u, s / TILE_M], axis=2)
+        return mapped_surface(self.at(s, t, lift_m), uv, self.slots[slot])
+
+    def edge(
+        self, span_m: tuple[float, float], inner_m: float, outer_m: float, slot: str, lift_m: float
+    ) -> Patch:
+        """A strip along an edge of the carriageway: half its texture from inside to the edge."""
+        low, high = sorted((inner_m, outer_m))
+        s, t = np.meshgrid(
+            self.rows(*span_m), np.array(self.columns_between(low, high)), indexing="ij"
+        )
+        u = 0.5 * (t - inner_m) / (outer_m - inner_m)
+        uv = np.stack([u, s / SCALES_M[slot]], axis=2)
+        return mapped_surface(self.at(s, t, lift_m), uv, self.slots[slot])
+
+    def sheet(self, s_m: Array, t_m: Array, slot: str, lift_m: float = 0.0) -> Patch:
+        """A grid of points given by arc length and distance, both [rows, columns]."""
+        return surface(
+            self.at(s_m, t_m, lift_m), np.stack([s_m, t_m], axis=2), slot, self.slots[slot]
+        )
+
+    def path(self, s_m: Array, t_m: Array, width_m: float, slot: str, lift_m: float) -> Patch:
+        """A line of a width along points in (s, t)."""
+        along = np.stack([np.gradient(s_m), np.gradient(t_m)], axis=1)
+        along /= np.sqrt((along * along).sum(axis=1, keepdims=True))
+        across = 0.5 * width_m * np.stack([along[:, 1], -along[:, 0]], axis=1)
+        s = np.stack([s_m + across[:, 0], s_m - across[:, 0]], axis=1)
+        t = np.stack([t_m + across[:, 1], t_m - across[:, 1]], axis=1)
+        return self.sheet(s, t, slot, lift_m)
+
+    def paint(
+        self,
+        polygons: Iterable[Array],
+        at_m: tuple[float, float],
+        turned: bool = False,
+        slot: str = "marking",
+        lift_m: float = PAINT_LIFT_M,
+    ) -> list[Patch]:
+        """Convex polygons [n, 2] laid on the road, cut where its surface bends.
+
+        Args:
+            polygons: Counter-clockwise, X along the direction of travel, Y to its left.
+            at_m: Arc length and distance of their origin.
+            turned: Whether their X runs against the road.
+            slot: Material.
+            lift_m: Height over the surface.
+        """
+        sign = -1.0 if turned else 1.0
+        columns = tuple(float(t) for t in self.t_m)
+        patches = []
+        for polygon in polygons:
+            placed = np.array(at_m) + sign * polygon
+            rows = self.rows(float(placed[:, 0].min()), float(placed[:, 0].max()))[1:-1]
+            for part in split_convex(placed, 1, columns):
+                for piece in split_convex(part, 0, tuple(float(s) for s in rows)):
+                    patches.append(self._fan(piece, slot, lift_m))
+        return patches
+
+    def _fan(self, st: Array, slot: str, lift_m: float) -> Patch:
+        points = self.at(st[:, 0], st[:, 1], lift_m)
+        uv = st / SCALES_M[slot]
+        count = len(st) - 2
+        index = np.stack(
+            [np.zeros(count, int), np.arange(1, count + 1), np.arange(2, count + 2)], 1
+        )
+        return Patch(points[index], uv[index], np.full(count, self.slots[slot], dtype=np.int64))
+
+    def disc(
+        self, s_m: float, t_m: float, radius_m: float, slot: str, lift_m: float, sides: int = 20
+    ) -> Patch:
+        """A disc on the road, its texture once across it."""
+        turn = 2.0 * math.pi * np.arange(sides + 1) / sides
+        ring = np.stack([np.cos(turn), np.sin(turn)], axis=1)
+        st = np.array([s_m, t_m]) + radius_m * ring
+        rim = self.at(st[:, 0], st[:, 1], lift_m)
+        center = self.at(np.array([s_m]), np.array([t_m]), lift_m)[0]
+        corners = [np.stack([center, a, b]) for a, b in pairwise(rim)]
+        uv = 0.5 + 0.5 * ring
+        uvs = [np.stack([np.array([0.5, 0.5]), a, b]) for a, b in pairwise(uv)]
+        slots = np.full(sides, self.slots[slot], dtype=np.int64)
+        return Patch(np.stack(corners), np.stack(uvs), slots)
+
+
+def surface(points: Array, plan_m: Array, slot: str, number: int) -> Patch:
+    """A grid of points [rows, columns, 3]; its texture follows the plan [rows, columns, 2].
+
+    Slots without a scale show their texture once.
+    """
+    if slot in SCALES_M:
+        uv = plan_m / SCALES_M[slot]
+    else:
+        low, high = plan_m.min(axis=(0, 1)), plan_m.max(axis=(0, 1))
+        uv = (plan_m - low) / np.maximum(high - low, 1e-9)
+    return mapped_surface(points, uv, number)
+
+
+def mapped_surface(points: Array, uv: Array, number: int) -> Patch:
+    """A grid of points [rows, columns, 3] with texture coordinates [rows, columns, 2]."""
+    corners, uvs = (_triangles(grid) for grid in (points, uv))
+    return Patch(corners, uvs, np.full(len(corners), number, dtype=np.int64))
+
+
+def _triangles(grid: Array) -> Array:
+    a, b, c, d = grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]
+    width = grid.shape[2]
+    quads = np.stack([np.stack([a, b, c], axis=2), np.stack([a, c, d], axis=2)], axis=2)
+    triangles: Array = quads.reshape(-1, 3, width)
+    return triangles

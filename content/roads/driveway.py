@@ -1,0 +1,56 @@
+"""Driveways: asphalt that rises over a kerb and crosses a sidewalk.
+
+Frame: metres, Z up, X away from the road, origin at the kerb's foot in the middle of the driveway.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gen_data.assets.family import Solid
+from gen_data.content.procedural.patches import make_solid_in_place
+from gen_data.content.roads.deck import surface
+from gen_data.content.roads.road_materials import ground_material
+from gen_data.core.errors import AssetError
+
+RAMP_M = 0.45
+"""Length of the ramp before the kerb (assumed, 30 %)."""
+_KERB_M, _PROUD_M, _FLANK_M = 0.2, 0.012, 0.25
+"""Width of the kerb under the ramp's end; how far the asphalt lies over what it covers; width of
+the slopes beside it."""
+
+
+def driveway(
+    *,
+    seed: int = 0,
+    width_m: float = 6.0,
+    depth_m: float = 2.5,
+    kerb_m: float = 0.12,
+    rise_m: float = 0.18,
+) -> Solid:
+    """A strip of asphalt across the kerb and what lies behind it, with sloping flanks.
+
+    Args:
+        seed: Of the asphalt.
+        width_m: Along the road, without the flanks.
+        depth_m: From the kerb's foot to the end.
+        kerb_m: Height of the kerb over the gutter.
+        rise_m: Height at the end over the gutter.
+
+    Raises:
+        AssetError: it ends on the kerb.
+    """
+    if depth_m <= _KERB_M:
+        raise AssetError(f"driveway: depth_m={depth_m:g} is not above {_KERB_M:g}")
+    x = np.array([-RAMP_M, 0.0, _KERB_M, depth_m])
+    covered = np.array([0.0, 0.0, kerb_m, rise_m])
+    crown = np.array([0.0, 0.75 * kerb_m, kerb_m, rise_m]) + _PROUD_M
+    crown[0] = 0.002
+    half = 0.5 * width_m
+    y = np.array([-half - _FLANK_M, -half, half, half + _FLANK_M])
+    plan = np.stack(np.meshgrid(x, y, indexing="ij"), axis=2)
+    z = np.stack([covered, crown, crown, covered], axis=1)
+    top = surface(np.concatenate([plan, z[..., None]], axis=2), plan, "pavement", 0)
+    slab = np.array([[a, b, c] for a in (-RAMP_M, depth_m) for b in (-half, half)
+                     for c in (0.0, max(kerb_m, rise_m, _PROUD_M))])  # fmt: skip
+    return make_solid_in_place([top], (ground_material("asphalt", seed),), [slab])

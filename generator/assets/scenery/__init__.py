@@ -1,7 +1,0 @@
-"""Scenery of streets: buildings, plants, street furniture, traffic lights and signs."""
-
-from __future__ import annotations
-
-from gen_data.generator.assets.procedural.family import load_families
-
-FAMILIES, TEXTURES, _ = load_families(__name__)

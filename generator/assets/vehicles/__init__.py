@@ -1,7 +1,0 @@
-"""Cars, vans, trucks, buses, motorcycles and bicycles."""
-
-from __future__ import annotations
-
-from gen_data.generator.assets.procedural.family import load_families
-
-FAMILIES, TEXTURES, _ = load_families(__name__)

@@ -1,0 +1,93 @@
+"""Fit of a configuration to recordings: the function behind ``gen-data match``."""
+
+from __future__ import annotations
+
+import json
+from os import PathLike, fspath
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from gen_data.core.errors import ConfigError, StorageError
+from gen_data.core.whole_files import write_whole
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from gen_data.lab.matching.results import Match
+
+
+def match(  # noqa: PLR0913  (keywords of one front door)
+    folder: str | PathLike[str],
+    config: str | PathLike[str],
+    out: str | PathLike[str] = "matched.yaml",
+    *,
+    images: int = 200,
+    scans: int = 60,
+    scenes: int = 48,
+    camera: str = "",
+    lidar: str = "",
+    on_progress: Callable[[str], None] | None = None,
+) -> Match:
+    """Fit the sensors of a configuration to a folder of unlabelled recordings.
+
+    Exposure, tone, colour, noise, blur and JPEG quality are fitted to photographs; reflectance,
+    dropout and range to laser scans; distance and pitch of the camera to boxes, if the folder has
+    labels of COCO or KITTI. docs/match.md explains the estimates and their limits.
+
+    Args:
+        folder: Holds photographs, scans (``.bin``, ``.pcd``, ``.ply``) and labels at any depth.
+        config: A YAML file or a shipped name.
+        out: The configuration to write, which extends ``config``; a ``.json`` and an ``.html`` file
+            next to it have the report.
+        images: Largest number of photographs to read, chosen evenly.
+        scans: Largest number of scans to read, chosen evenly.
+        scenes: Number of scenes of the configuration to simulate.
+        camera: Camera to fit; empty = the first.
+        lidar: Laser scanner to fit; empty = the first.
+        on_progress: Called with the name of each step when it begins.
+
+    Returns:
+        The fitted values with intervals, statistics before and after, and the files that were read.
+
+    Raises:
+        ConfigError: the configuration is wrong, or an argument.
+        StorageError: the folder holds nothing that can be read, or ``out`` cannot be written.
+    """
+    from threadpoolctl import threadpool_limits
+
+    from gen_data.assemble.config import load_config
+    from gen_data.lab.matching.match import match_recordings
+    from gen_data.lab.matching.match_report import format_match_page, make_figures
+    from gen_data.lab.matching.matched_yaml import format_config
+
+    path, source = Path(out), fspath(config)
+    if path.suffix != ".yaml":
+        raise ConfigError(f"--out: {path}; expected a name that ends in .yaml")
+    if Path(source).is_dir():
+        raise ConfigError(f"{source}: is a folder; expected a configuration to extend")
+    if path.resolve() == Path(source).resolve():
+        raise ConfigError(f"--out: {path} is the configuration itself; choose another name")
+    with threadpool_limits(limits=1):
+        found = match_recordings(
+            Path(folder),
+            source,
+            images=images,
+            scans=scans,
+            scenes=scenes,
+            camera=camera,
+            lidar=lidar,
+            progress=on_progress or (lambda _: None),
+        )
+    figures = json.dumps(make_figures(found), ensure_ascii=False, indent=1, allow_nan=False)
+    files = {
+        path: format_config(found, path),
+        path.with_suffix(".json"): figures + "\n",
+        path.with_suffix(".html"): format_match_page(found, Path(source).stem),
+    }
+    try:
+        write_whole({target: text.encode() for target, text in files.items()})
+    except OSError as error:
+        raise StorageError(f"{error.filename}: {error.strerror}; choose another --out") from error
+    # The written file must be a configuration.
+    load_config(str(path))
+    return found

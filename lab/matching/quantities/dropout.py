@@ -1,0 +1,39 @@
+"""Dropout: returns that are missing, by the transmittance of the scanner's window.
+
+Statistic: the number of points of a sweep. Light passes the window twice: distant and dark surfaces
+are lost first.
+"""
+
+from __future__ import annotations
+
+import math
+
+from gen_data.lab.matching.indirect_inference import Axis
+from gen_data.lab.matching.quantities.base import LidarQuantity, round_digits
+from gen_data.lab.matching.recordings import Scan
+from gen_data.sensors.lidar.lidar_sensor import LidarSensor
+
+
+def measure(scan: Scan) -> float:
+    """Logarithm, base 2, of the number of points."""
+    return math.log2(len(scan.range_m))
+
+
+def _start(sensor: LidarSensor) -> float:
+    return math.log2(sensor.window)
+
+
+def _apply(sensor: LidarSensor, coordinate: float) -> LidarSensor:
+    return sensor.model_copy(update={"window": round_digits(2.0**coordinate)})
+
+
+def to_transmittance(coordinate: float) -> float:
+    """Transmittance of its logarithm, base 2."""
+    return float(2.0**coordinate)
+
+
+DROPOUT = LidarQuantity(
+    "dropout", "transmittance", "log2 of points per sweep", "window", measure, _start, _apply,
+    Axis(-4.0, 0.0, step=0.25, plausible=1.0, enough=0.05, varies=False),
+    to_value=to_transmittance,
+)  # fmt: skip

@@ -1,0 +1,46 @@
+"""Range: the largest that a scanner reports.
+
+Statistic: the range of 99.9 % of the points of a sweep.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from gen_data.lab.matching.indirect_inference import Axis
+from gen_data.lab.matching.quantities.base import LidarQuantity, round_digits, with_model
+from gen_data.lab.matching.recordings import Scan
+from gen_data.sensors.lidar.lidar_sensor import LidarSensor
+
+SHARE = 99.9
+
+
+def measure(scan: Scan) -> float:
+    """Logarithm, base 2, of the range that 99.9 % of the points are within."""
+    return float(np.log2(max(float(np.percentile(scan.range_m, SHARE)), 1e-3)))
+
+
+def _start(sensor: LidarSensor) -> float:
+    return math.log2(sensor.device.range_m[1])
+
+
+def _apply(sensor: LidarSensor, coordinate: float) -> LidarSensor:
+    nearest_m = sensor.device.range_m[0]
+    return with_model(
+        sensor, range_m=(nearest_m, max(round_digits(2.0**coordinate), 1.01 * nearest_m))
+    )
+
+
+def to_range_m(coordinate: float) -> float:
+    """Range of its logarithm, base 2."""
+    return float(2.0**coordinate)
+
+
+RANGE = LidarQuantity(
+    "range", "m", "log2 of the range of 99.9 % of the points", "model.range_m",
+    measure, _start, _apply,
+    Axis(0.0, 10.0, step=0.1, plausible=1.0, enough=0.05, varies=False),
+    to_value=to_range_m,
+)  # fmt: skip
