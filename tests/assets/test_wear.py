@@ -145,7 +145,7 @@ def test_dust_of_new_boxes_lies_on_their_upper_faces() -> None:
 
 def test_some_boxes_are_dusty() -> None:
     """Their upper faces are paler or darker than printed."""
-    dusty = [change("carton", seed)[390:500, 10:250].mean() for seed in range(48)]
+    dusty = [change("carton", seed)[390:500, 10:250].mean() for seed in range(0, 48, 2)]
 
     assert 0.1 < (np.array(dusty) > 12.0).mean() < 0.6
 
@@ -166,7 +166,7 @@ def test_pieces_of_some_labels_are_torn_off(name: str) -> None:
         pale = (worn(name, seed).albedo.min(axis=2) > 190) & (change(name, seed) > 60)
         return bool(pale.mean() > 0.01)
 
-    share = np.mean([torn(seed) for seed in range(75)])
+    share = np.mean([torn(seed) for seed in range(0, 75, 2)])
 
     assert 0.02 < share < 0.3
 
@@ -207,7 +207,7 @@ def test_every_family_of_things_to_handle_has_new_and_marked_variants() -> None:
     for name in ("fork", "remote", "mug", "plate", "hammer", "scissors"):
         textures = [
             {m.texture for m in FAMILIES[name].build(seed=seed).mesh.materials}
-            for seed in range(FAMILIES[name].variants)
+            for seed in range(0, FAMILIES[name].variants, 3)
         ]
         marked = np.mean([any("use_marks" in t for t in each) for each in textures])
         assert 0.5 < marked < 0.98, name

@@ -190,22 +190,6 @@ def test_a_box_that_is_not_its_masks_is_named(damaged: Callable[[], Path]) -> No
     assert "sample 19, color" in findings(certificate)["boxes and masks"].evidence[0]
 
 
-@needs_open3d
-def test_scaled_depth_is_named(damaged: Callable[[], Path]) -> None:
-    """Two per cent are more than any tolerance."""
-    copy = damaged()
-    for path in copy.glob("shards/*/color/depth/*.png"):
-        image = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
-        cv2.imwrite(str(path), np.rint(image * 1.02).astype(np.uint16))
-    reseal(copy)
-
-    certificate = gen_data.certify(copy, **QUICK)
-
-    assert failed(certificate) == {"pixels", "written again", "generated again"}
-    evidence = findings(certificate)["pixels: color"].evidence
-    assert "a ray does not meet what is stated" in evidence[0]
-
-
 def exchange_photographs(copy: Path) -> None:
     """Exchange those of the samples 2 and 9, in exports, too."""
     first, second = (copy / f"shards/000000/color/rgb/{k:09d}.png" for k in (2, 9))
@@ -215,20 +199,6 @@ def exchange_photographs(copy: Path) -> None:
         for path in paths:
             path.write_bytes(data)
     reseal(copy)
-
-
-@pytest.mark.slow
-def test_exchanged_photographs_are_named(damaged: Callable[[], Path]) -> None:
-    """Without the log of the run, only generating them again tells each is the other's picture."""
-    copy = damaged()
-    exchange_photographs(copy)
-
-    certificate = gen_data.certify(copy, samples=64, rays=1, scenes=0)
-
-    assert failed(certificate) == {"generated again"}
-    evidence = findings(certificate)["generated again"].evidence
-    assert [text.split(":")[0] for text in evidence] == ["sample 2", "sample 9"]
-    assert "first difference in stage render" in evidence[0]
 
 
 def test_the_log_of_the_run_tells_exchanged_photographs_without_generating(
@@ -250,10 +220,9 @@ def test_the_log_of_the_run_tells_exchanged_photographs_without_generating(
     assert failed(without_run) == set()
 
 
-@pytest.mark.parametrize("name", ["coco/train/extra.png", "kitti/notes.txt", "notes.txt"])
-def test_a_file_that_no_exporter_writes_is_named(damaged: Callable[[], Path], name: str) -> None:
+def test_a_file_that_no_exporter_writes_is_named(damaged: Callable[[], Path]) -> None:
     """Its checksum is in the manifest, and no reader looks at it."""
-    copy = damaged()
+    copy, name = damaged(), "kitti/notes.txt"
     (copy / name).parent.mkdir(exist_ok=True)
     (copy / name).write_bytes(b"extra")
     reseal(copy)
@@ -263,23 +232,6 @@ def test_a_file_that_no_exporter_writes_is_named(damaged: Callable[[], Path], na
     assert failed(certificate) == {"written again"}
     assert findings(certificate)["written again"].evidence == (
         f"{name}: is extra: the samples give no such file",
-    )
-
-
-def test_a_picture_that_is_another_one_in_an_export_is_named(damaged: Callable[[], Path]) -> None:
-    """The file of COCO is edited, that of the sample is not."""
-    copy = damaged()
-    path = next((copy / "coco").glob("*/000000007_color.png"))
-    mirrored = cv2.imread(str(path))[:, ::-1]
-    path.unlink()
-    cv2.imwrite(str(path), mirrored)
-    reseal(copy)
-
-    certificate = gen_data.certify(copy, **QUICK)
-
-    assert failed(certificate) == {"exports", "written again"}
-    assert findings(certificate)["exports: coco"].evidence == (
-        "sample 7, color: its picture is not that of the data set",
     )
 
 
@@ -349,21 +301,6 @@ def test_a_scene_in_two_splits_is_named(damaged: Callable[[], Path]) -> None:
 
     assert "splits" in failed(certificate)
     assert findings(certificate)["splits"].evidence[0].startswith("scene 2: sample 4 is in ")
-
-
-def test_one_scene_under_two_numbers_in_two_splits_is_named(damaged: Callable[[], Path]) -> None:
-    """Contents are compared, and not only numbers."""
-    copy = damaged()
-    path = copy / "shards/000000/scenes.jsonl"
-    rows = [json.loads(line) for line in path.read_text().splitlines()]
-    other = next(k for k in range(2, 16, 2) if rows[k]["split"] != rows[0]["split"])
-    bodies = rows[0]["scene"]["bodies"]
-    edit_lines(path, lambda k, row: row["scene"].update(bodies=bodies) if k == other else None)
-    reseal(copy)
-
-    finding = findings(gen_data.certify(copy, samples=0, scenes=0))["splits"]
-
-    assert f"scenes 0 ({rows[0]['split']}) and {other // 2} " in finding.evidence[0]
 
 
 def test_files_that_are_not_the_manifests_fail_and_nothing_else_is_said(

@@ -19,7 +19,10 @@ from gen_data.runner.stored import StoredSamples
 
 CONFIG = """\
 extends: tabletop.yaml
-without: {sensors: [pseudo_lidar], exporters: all}
+without:
+  sensors: [pseudo_lidar]
+  exporters: all
+  randomizers: [distractors, tabletop, cover, finish]
 views_per_scene: 1
 randomizers:
   - {name: clutter, count: {uniform_integer: [1, 4]}}
@@ -108,7 +111,7 @@ def test_a_second_round_extends_the_first(made: Round, tmp_path: Path) -> None:
     shutil.copytree(made.config.parent, rounds_folder)
     first = rounds_folder / made.config.name
     judged = tmp_path / "judged"
-    gen_data.generate(str(first), 30, out=judged, workers=0)
+    gen_data.generate(str(first), 20, out=judged, workers=0)
     path = tmp_path / "second.json"
     path.write_text(json.dumps(weak_results(judged)))
 

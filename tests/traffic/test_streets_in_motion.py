@@ -21,6 +21,7 @@ from gen_data.randomizers.free_space import Footprint, Ground
 from gen_data.randomizers.traffic_actors import find_drivers
 from gen_data.randomizers.traffic_flow import TrafficFlow
 from gen_data.traffic.lane_routes import LaneGraph
+from tests.streets import thin_street
 from tests.traffic.roads import lane
 
 SMALL = (
@@ -49,15 +50,15 @@ def spec() -> Config:
 
 @cache
 def factory() -> PipelineFactory:
-    """Of its pipelines; it builds the nominal scenes once."""
-    return PipelineFactory(spec(), n=1)
+    """Of its pipelines, for a street with little scenery; it builds the nominal scenes once."""
+    return PipelineFactory(thin_street("street_sequence", *SMALL), n=1)
 
 
 @cache
 def row() -> dict[int, Sample]:
     """Steps of one sequence, made one after the other."""
     with factory()() as pipeline:
-        return {k: pipeline.sample(k) for k in (0, 3, 5, 8)}
+        return {k: pipeline.sample(k) for k in (0, 5, 8)}
 
 
 def moving_scene(seed: int, of: Config | None = None) -> Scene:
@@ -108,7 +109,7 @@ def overlapping(scene: Scene) -> list[str]:
 
 
 @pytest.mark.parametrize(
-    "seed", [1, 2, 3, *(pytest.param(k, marks=pytest.mark.slow) for k in range(4, 10))]
+    "seed", [1, *(pytest.param(k, marks=pytest.mark.slow) for k in range(2, 7))]
 )
 def test_nothing_collides_in_random_streets(seed: int) -> None:
     """Oriented boxes of everything that moves, every 0.1 s for four seconds."""
@@ -223,7 +224,7 @@ def test_a_sample_alone_equals_the_one_in_its_sequence() -> None:
     for channel, image in one.channels.items():
         assert (image == other.channels[channel]).all()
     ids = [{i.name: i.instance_id for i in sample.scene.instances} for sample in row().values()]
-    assert ids[0] == ids[1] == ids[2] == ids[3]
+    assert ids[0] == ids[1] == ids[2]
 
 
 def test_the_camera_rides_on_the_ego_vehicle() -> None:
