@@ -177,7 +177,7 @@ def test_an_interrupted_study_is_continued(tmp_path: Path) -> None:
     assert not list((tmp_path / "whole").glob("data/*"))
 
 
-SMALL_STUDY = {"n": 8, "seeds": 1, "steps": 80, "size": 64, "workers": 1}
+SMALL_STUDY = {"n": 8, "seeds": 1, "steps": 40, "size": 64, "workers": 1}
 
 
 def small_study(folder: Path) -> Callable[[Path], list[str]]:
