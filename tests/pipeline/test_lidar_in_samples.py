@@ -8,11 +8,11 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
+from gen_data.assemble.config import load_config
 from gen_data.assemble.pipeline_factory import PipelineFactory
 from gen_data.core.sample import Sample
 from gen_data.core.scene import Scene
 from gen_data.core.serialization import from_plain, to_plain
-from tests.streets import thin_street
 
 SMALL = (
     "sensors[0].size_px=[128, 64]",
@@ -26,7 +26,7 @@ SMALL = (
 @pytest.fixture(scope="module")
 def samples() -> Iterator[list[Sample]]:
     """Two instants of a street, and the first made again in another pipeline."""
-    factory = PipelineFactory(thin_street("kitti_rig.yaml", *SMALL), n=1)
+    factory = PipelineFactory(load_config("kitti_rig.yaml", overrides=SMALL), n=1)
     with factory() as pipeline:
         made = [pipeline.sample(0), pipeline.sample(1)]
     with factory() as pipeline:
