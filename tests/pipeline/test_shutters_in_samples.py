@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from gen_data.assemble.config import load_config
 from gen_data.assemble.pipeline_factory import open_pipeline
 from gen_data.core.capture import Channel, SensorReading
 from gen_data.core.sample import Sample
@@ -16,7 +17,6 @@ from gen_data.core.shutter import INSTANT
 from gen_data.core.streams import Streams
 from gen_data.pipeline import Pipeline
 from gen_data.sensors.camera.image_pipeline import ImagePipeline, capture_photograph
-from tests.streets import thin_street
 
 SIZE_PX = (240, 136)
 
@@ -24,7 +24,13 @@ SIZE_PX = (240, 136)
 @pytest.fixture(scope="module")
 def pipeline() -> Iterator[Pipeline]:
     """With small images of a clear day."""
-    with open_pipeline(thin_street("street_motion", "sensors.dash.size_px=[240, 136]")) as opened:
+    overrides = [
+        "sensors.dash.size_px=[240, 136]",
+        "shared.district=arterial",
+        "shared.weather=CloudyNoon",
+        "randomizers.people.count=4",
+    ]
+    with open_pipeline(load_config("street_motion", overrides=overrides)) as opened:
         yield opened
 
 
