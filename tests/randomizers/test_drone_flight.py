@@ -130,6 +130,7 @@ def test_what_is_missing_is_named() -> None:
         flown(from_end_m=201.0)
 
 
+@pytest.mark.slow
 def test_the_shipped_drone_looks_down_at_a_street_from_its_height() -> None:
     """The camera is the gimbal's, 30 to 80 m up, and nothing of the drone is in its image."""
     small = ("sensors[0].size_px=[160, 90]", "exporters=[]", "annotations=[]")

@@ -164,6 +164,7 @@ def settle(scene: Scene, assets: AssetLibrary) -> tuple[int, dict[str, tuple[flo
         return len(world.starts), world.fallen()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["living_room", "workshop"])
 def test_nothing_falls_in_a_room(kind: str) -> None:
     """Two seconds of simulation."""

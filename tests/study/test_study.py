@@ -38,6 +38,7 @@ def write_results(path: Path, found: float) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_results_of_detectors_are_compared(tmp_path: Path) -> None:
     """One finds half of the objects, one all, one the same half: better, and no difference."""
     write_coco(tmp_path / "real", BOXES)
