@@ -24,6 +24,7 @@ from gen_data.core.capture import Channel
 from gen_data.core.colorimetry import srgb_decode
 from gen_data.core.sample import ImageTruth, Utterance
 from gen_data.core.scene import Scene
+from tests.tiers import cases
 
 
 @dataclass(frozen=True)
@@ -89,7 +90,7 @@ def possible_words(rgb: tuple[float, float, float]) -> set[str]:
 
 
 PICTURES = [("tabletop", 0), ("tabletop", 5), ("tabletop", 11), ("bin_picking", 0)]
-each = pytest.mark.parametrize(("config", "index"), PICTURES)
+each = pytest.mark.parametrize(("config", "index"), cases(PICTURES, PICTURES[::3]))
 
 
 def resolve(seen: Picture, text: str) -> set[int]:

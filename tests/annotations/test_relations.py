@@ -142,7 +142,7 @@ def distance_m(one: trimesh.Trimesh, other: trimesh.Trimesh) -> float:
 
 WORLDS = [("tabletop", 0, INSTALLED[0]), ("tabletop", 10, INSTALLED[0])]
 BINS = [("bin_picking", 0, engine) for engine in INSTALLED]
-each = pytest.mark.parametrize(("config", "index", "engine"), cases([*WORLDS, *BINS], WORLDS))
+each = pytest.mark.parametrize(("config", "index", "engine"), cases([*WORLDS, *BINS], WORLDS[:1]))
 
 
 @each
@@ -238,6 +238,7 @@ def test_what_the_hand_holds_is_held_and_on_nothing() -> None:
     assert held not in {subject for subject, _ in world.pairs("on")}
 
 
+@slow
 def test_furniture_stands_on_the_floor_and_things_on_furniture_below_them() -> None:
     """In a furnished room: no wall, ceiling or floor is carried, nothing by what is beside it."""
     world = settled("rooms", 31)

@@ -247,6 +247,7 @@ def test_the_yaml_of_the_readme_is_valid() -> None:
         assert set(pipeline.exporters) == {"coco", "kitti"}
 
 
+@pytest.mark.slow
 def test_the_python_of_the_readme_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """With small images, and few of them."""
     monkeypatch.chdir(tmp_path)

@@ -211,6 +211,7 @@ def test_few_colours_of_whole_faces_become_materials_and_one_colour_a_base_colou
     assert colors == [pytest.approx(c, abs=1e-4) for c in ((0.5029, 0, 0), (0, 0, 0.5029))]
 
 
+@pytest.mark.slow
 def test_colours_of_a_dense_scan_survive_its_decimation(tmp_path: Path) -> None:
     """A sheet of 28,800 triangles, red on the left and blue on the right, is cut to 20,000."""
     n = 121

@@ -103,6 +103,7 @@ def plate_of(folder: Path, entry: str, image: UInt8 | None = None) -> Plate:
     return library_of(folder, entry, image).plate("user/photo")
 
 
+@pytest.mark.slow
 def test_a_given_horizon_is_kept_to_the_pixel(tmp_path: Path) -> None:
     """As two points, and as a height with a slope."""
     given = f"hfov_deg: 65, ground: {GROUND}"

@@ -61,6 +61,7 @@ def test_every_object_family_has_a_stated_real_size() -> None:
     assert set(LONGEST_SIDE_M) == set(OBJECTS)
 
 
+@pytest.mark.slow
 @for_every_variant
 def test_objects_have_the_size_of_real_ones(built: tuple[str, Solid]) -> None:
     """The longest side lies in the range that is measured on real things."""
@@ -213,6 +214,7 @@ def test_vessels_are_hollow_in_physics(name: str, seed: int) -> None:
         assert (_outside_m(part, marble) > 0.001).all()
 
 
+@pytest.mark.slow
 @for_every(OBJECTS)
 def test_equal_seeds_make_equal_bytes_and_others_differ(name: str) -> None:
     """A variant is a pure function of its seed."""

@@ -80,6 +80,7 @@ def stated(library: Library, family: str) -> dict[str, tuple[Symmetry, ...]]:
     return {name: library.get(name).symmetries for name in ids}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("family", STATED)
 def test_a_turn_leaves_the_mesh_in_place(family: str, library: Library) -> None:
     """Every slot, so that colours stay in place too."""
@@ -93,6 +94,7 @@ def test_a_turn_leaves_the_mesh_in_place(family: str, library: Library) -> None:
             assert deviation(mesh, symmetry) < TOLERANCE, (name, symmetry)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("asset", "folds"),
     [
@@ -113,6 +115,7 @@ def test_parametric_objects_turn_about_their_centre(
         assert deviation(library.mesh(asset), symmetry) < TOLERANCE
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("asset", "wrong"),
     [
@@ -129,6 +132,7 @@ def test_other_turns_are_found_out(asset: str, wrong: Any, library: Library) -> 
     assert deviation(library.mesh(asset), wrong) > TOLERANCE
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("family", ["mug", "bottle", "can", "carton", "ball", "bracket", "hammer"])
 def test_printed_and_lopsided_objects_have_none(family: str, library: Library) -> None:
     """A label or a handle shows the turn."""

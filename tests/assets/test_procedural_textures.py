@@ -127,6 +127,7 @@ def test_relief_is_as_fine_as_that_of_the_real_surface(
         assert median_wavelength_mm(normal[..., 1].astype(np.float64), repeat_m) < most_mm
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "repeat_m", "most_mm"), [("wood_grain", 0.5, 20.0), ("terrazzo", 0.6, 40.0)]
 )
@@ -161,6 +162,7 @@ def test_two_in_three_tiles_are_white_grey_or_beige(name: str) -> None:
     assert sum(np.ptp(mean) < 30.0 for mean in means) >= 11
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(PRINTED))
 def test_labels_are_rich_in_edges_and_colours(name: str) -> None:
     """What makes a label for a detector: letters, bars, and at least three colours."""

@@ -91,6 +91,7 @@ def distances_m(points: np.ndarray, edges: np.ndarray) -> np.ndarray:
     return nearest
 
 
+@pytest.mark.slow
 def test_most_things_are_lightly_used_and_a_few_well() -> None:
     """From new to worn."""
     drawn = np.array([draw_wear("anything", seed) for seed in range(2000)])
@@ -100,6 +101,7 @@ def test_most_things_are_lightly_used_and_a_few_well() -> None:
     assert 0.05 < (drawn > 0.8).mean() < 0.18
 
 
+@pytest.mark.slow
 @for_every([(f, s) for f, p in PRINTS.items() for s in range(48) if draw_wear(p, s) > 0.6])
 def test_ink_is_rubbed_off_at_convex_edges_of_the_mesh(variant: tuple[str, int]) -> None:
     """Within 1.5 mm of them more changes than beyond 12 mm, dust on upper faces apart."""
@@ -113,6 +115,7 @@ def test_ink_is_rubbed_off_at_convex_edges_of_the_mesh(variant: tuple[str, int])
     assert changed[below & (away < 0.0015)].mean() > 1.6 * changed[below & (away > 0.012)].mean()
 
 
+@pytest.mark.slow
 def test_new_prints_are_as_they_were_printed() -> None:
     """Those of the least wear, off the face that dust falls on."""
     for name in ("label", "front_label", "can_label"):
@@ -121,6 +124,7 @@ def test_new_prints_are_as_they_were_printed() -> None:
         assert change(name, newest).mean() < 1.5, name
 
 
+@pytest.mark.slow
 def test_dust_follows_the_cosine_of_the_slope() -> None:
     """All of it on level ground, half at 60 degrees, none on walls and from below."""
     upward = np.cos(np.radians([0.0, 60.0, 90.0, 180.0])).astype(np.float32)
@@ -128,6 +132,7 @@ def test_dust_follows_the_cosine_of_the_slope() -> None:
     assert dust_share(upward, 0.4) == pytest.approx([0.4, 0.2, 0.0, 0.0], abs=1e-6)
 
 
+@pytest.mark.slow
 def test_dust_of_new_boxes_lies_on_their_upper_faces() -> None:
     """By the mesh's normals: what is not used yet changes there only."""
     above, beside = [], []
@@ -143,13 +148,15 @@ def test_dust_of_new_boxes_lies_on_their_upper_faces() -> None:
     assert np.mean(above) > 3.0 * np.mean(beside)
 
 
+@pytest.mark.slow
 def test_some_boxes_are_dusty() -> None:
     """Their upper faces are paler or darker than printed."""
-    dusty = [change("carton", seed)[390:500, 10:250].mean() for seed in range(48)]
+    dusty = [change("carton", seed)[390:500, 10:250].mean() for seed in range(0, 48, 2)]
 
     assert 0.1 < (np.array(dusty) > 12.0).mean() < 0.6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LABELS)
 def test_most_labels_stay_legible(name: str) -> None:
     """On nine of ten variants at most a tenth of all pixels changes by more than a quarter."""
@@ -158,6 +165,7 @@ def test_most_labels_stay_legible(name: str) -> None:
     assert np.quantile(hidden, 0.9) < 0.1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["label", "front_label"])
 def test_pieces_of_some_labels_are_torn_off(name: str) -> None:
     """White fibres over at least 1 % of the image; on few of them."""
@@ -166,11 +174,12 @@ def test_pieces_of_some_labels_are_torn_off(name: str) -> None:
         pale = (worn(name, seed).albedo.min(axis=2) > 190) & (change(name, seed) > 60)
         return bool(pale.mean() > 0.01)
 
-    share = np.mean([torn(seed) for seed in range(75)])
+    share = np.mean([torn(seed) for seed in range(0, 75, 2)])
 
     assert 0.02 < share < 0.3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LABELS)
 def test_worn_places_are_duller_and_the_others_as_new(name: str) -> None:
     """The roughness factor is 1 where it is dullest, less elsewhere on used things."""
@@ -181,6 +190,7 @@ def test_worn_places_are_duller_and_the_others_as_new(name: str) -> None:
     assert rough.max() > 250 and rough.min() < 180
 
 
+@pytest.mark.slow
 @for_every(VARIANTS)
 def test_marks_change_the_look_of_plain_slots_alone(variant: tuple[str, int]) -> None:
     """Shape, prints, glass, contents and lamps are as new; nothing gets smoother."""
@@ -202,6 +212,7 @@ def test_marks_change_the_look_of_plain_slots_alone(variant: tuple[str, int]) ->
             assert "kind=metal" in after.texture
 
 
+@pytest.mark.slow
 def test_every_family_of_things_to_handle_has_new_and_marked_variants() -> None:
     """Glass and print apart."""
     for name in ("fork", "remote", "mug", "plate", "hammer", "scissors"):
@@ -213,6 +224,7 @@ def test_every_family_of_things_to_handle_has_new_and_marked_variants() -> None:
         assert 0.5 < marked < 0.98, name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_marks_grow_with_use(kind: str) -> None:
     """Darker on average, and duller in more places."""
@@ -223,6 +235,7 @@ def test_marks_grow_with_use(kind: str) -> None:
     assert np.ptp(heavy.roughness) > np.ptp(light.roughness)
 
 
+@pytest.mark.slow
 def test_tide_lines_run_around_a_cup_at_one_height() -> None:
     """The image varies more from row to row than along rows."""
     rows = TEXTURES["use_marks"].build(11, kind="vessel").albedo[:200, :, 2].astype(np.float64)
@@ -230,6 +243,7 @@ def test_tide_lines_run_around_a_cup_at_one_height() -> None:
     assert rows.mean(axis=1).std() > 2.0 * rows.std(axis=1).mean()
 
 
+@pytest.mark.slow
 def test_films_cover_in_order() -> None:
     """A full film hides all below it; half a film is the mean of both."""
     grey = np.full((2, 2, 3), 100, np.uint8)

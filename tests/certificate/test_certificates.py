@@ -55,6 +55,7 @@ def failed(certificate: Certificate) -> set[str]:
     return {claim.name for claim, _ in certificate.findings(Status.FAILED)}
 
 
+@pytest.mark.slow
 @needs_open3d
 def test_a_good_data_set_passes_every_claim(certified: Path) -> None:
     """Also the one on distributions, whose false-alarm rate is 0.001 for any seed."""
@@ -86,6 +87,7 @@ def test_a_good_data_set_passes_every_claim(certified: Path) -> None:
     )
 
 
+@pytest.mark.slow
 @needs_open3d
 def test_figures_say_how_much_was_checked(certified: Path) -> None:
     """Four images of 200 pixels; the images of all 64 samples in COCO, which score 1."""
@@ -101,6 +103,7 @@ def test_figures_say_how_much_was_checked(certified: Path) -> None:
     assert figures["distributions"]["false-alarm rate of all tests"] == 0.001
 
 
+@pytest.mark.slow
 def test_certificates_have_the_same_bytes_again_and_the_date_they_are_given(
     certified: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -122,11 +125,13 @@ def test_certificates_have_the_same_bytes_again_and_the_date_they_are_given(
         cli.main(command, standalone_mode=False)
 
 
+@pytest.mark.slow
 def test_a_certificate_is_no_part_of_the_data_set(certified: Path, dataset: Path) -> None:
     """Verification accepts it, and the identity is what it was."""
     assert verify(certified, full=True) == verify(dataset, full=True)
 
 
+@pytest.mark.slow
 def test_the_page_needs_no_script_and_no_other_file(certified: Path) -> None:
     """Its content security policy permits its own style sheet only."""
     page = (certified / "CERTIFICATE.html").read_text()
@@ -137,6 +142,7 @@ def test_the_page_needs_no_script_and_no_other_file(certified: Path) -> None:
         assert text in page
 
 
+@pytest.mark.slow
 def test_a_shifted_box_of_coco_is_named(damaged: Callable[[], Path]) -> None:
     """By one pixel, with all checksums done again."""
     copy = damaged()
@@ -157,6 +163,7 @@ def test_a_shifted_box_of_coco_is_named(damaged: Callable[[], Path]) -> None:
     assert not certificate.holds
 
 
+@pytest.mark.slow
 def test_an_object_missing_in_coco_is_named(damaged: Callable[[], Path]) -> None:
     """The export and the labels are compared in both directions, and scored."""
     copy = damaged()
@@ -173,6 +180,7 @@ def test_an_object_missing_in_coco_is_named(damaged: Callable[[], Path]) -> None
     assert name in finding.evidence[0] and "is missing" in finding.evidence[0]
 
 
+@pytest.mark.slow
 def test_a_box_that_is_not_its_masks_is_named(damaged: Callable[[], Path]) -> None:
     """In labels that were wrong when they were sealed; exports agree with them no longer."""
     copy = damaged()
@@ -190,6 +198,7 @@ def test_a_box_that_is_not_its_masks_is_named(damaged: Callable[[], Path]) -> No
     assert "sample 19, color" in findings(certificate)["boxes and masks"].evidence[0]
 
 
+@pytest.mark.slow
 @needs_open3d
 def test_scaled_depth_is_named(damaged: Callable[[], Path]) -> None:
     """Two per cent are more than any tolerance."""
@@ -231,6 +240,7 @@ def test_exchanged_photographs_are_named(damaged: Callable[[], Path]) -> None:
     assert "first difference in stage render" in evidence[0]
 
 
+@pytest.mark.slow
 def test_the_log_of_the_run_tells_exchanged_photographs_without_generating(
     dataset: Path, tmp_path: Path
 ) -> None:
@@ -250,6 +260,7 @@ def test_the_log_of_the_run_tells_exchanged_photographs_without_generating(
     assert failed(without_run) == set()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["coco/train/extra.png", "kitti/notes.txt", "notes.txt"])
 def test_a_file_that_no_exporter_writes_is_named(damaged: Callable[[], Path], name: str) -> None:
     """Its checksum is in the manifest, and no reader looks at it."""
@@ -266,6 +277,7 @@ def test_a_file_that_no_exporter_writes_is_named(damaged: Callable[[], Path], na
     )
 
 
+@pytest.mark.slow
 def test_a_picture_that_is_another_one_in_an_export_is_named(damaged: Callable[[], Path]) -> None:
     """The file of COCO is edited, that of the sample is not."""
     copy = damaged()
@@ -283,6 +295,7 @@ def test_a_picture_that_is_another_one_in_an_export_is_named(damaged: Callable[[
     )
 
 
+@pytest.mark.slow
 @needs_open3d
 def test_exchanged_instances_are_named(damaged: Callable[[], Path]) -> None:
     """Ids are compared, and not only depths."""
@@ -295,6 +308,7 @@ def test_exchanged_instances_are_named(damaged: Callable[[], Path]) -> None:
     assert "pixels" in failed(gen_data.certify(copy, **QUICK))
 
 
+@pytest.mark.slow
 @needs_open3d
 def test_moved_laser_points_are_named(damaged: Callable[[], Path]) -> None:
     """By three centimetres towards the sky of the scanner."""
@@ -312,6 +326,7 @@ def test_moved_laser_points_are_named(damaged: Callable[[], Path]) -> None:
     assert "a ray does not meet instance" in evidence[0]
 
 
+@pytest.mark.slow
 def test_a_parameter_that_was_not_drawn_as_declared_is_named(tmp_path: Path) -> None:
     """The plan declares a distribution; the scenes were made with a constant."""
     folder = tmp_path / "constant"
@@ -333,6 +348,7 @@ def test_a_parameter_that_was_not_drawn_as_declared_is_named(tmp_path: Path) -> 
     assert findings(certificate)["distributions"].status is Status.NOT_CHECKED
 
 
+@pytest.mark.slow
 def test_a_scene_in_two_splits_is_named(damaged: Callable[[], Path]) -> None:
     """Labels and kept scenes agree on it, and so do all checksums."""
     copy = damaged()
@@ -351,6 +367,7 @@ def test_a_scene_in_two_splits_is_named(damaged: Callable[[], Path]) -> None:
     assert findings(certificate)["splits"].evidence[0].startswith("scene 2: sample 4 is in ")
 
 
+@pytest.mark.slow
 def test_one_scene_under_two_numbers_in_two_splits_is_named(damaged: Callable[[], Path]) -> None:
     """Contents are compared, and not only numbers."""
     copy = damaged()
@@ -366,6 +383,7 @@ def test_one_scene_under_two_numbers_in_two_splits_is_named(damaged: Callable[[]
     assert f"scenes 0 ({rows[0]['split']}) and {other // 2} " in finding.evidence[0]
 
 
+@pytest.mark.slow
 def test_files_that_are_not_the_manifests_fail_and_nothing_else_is_said(
     damaged: Callable[[], Path],
 ) -> None:
@@ -383,6 +401,7 @@ def test_files_that_are_not_the_manifests_fail_and_nothing_else_is_said(
     assert certificate.count(Status.PASSED) == 0
 
 
+@pytest.mark.slow
 def test_the_command_exits_with_8_and_names_what_failed(
     damaged: Callable[[], Path], capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -399,6 +418,7 @@ def test_the_command_exits_with_8_and_names_what_failed(
     assert not json.loads((copy / "CERTIFICATE.json").read_bytes())["holds"]
 
 
+@pytest.mark.slow
 def test_what_is_not_installed_is_not_checked(
     damaged: Callable[[], Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -412,6 +432,7 @@ def test_what_is_not_installed_is_not_checked(
     assert install_command("certify") in finding.reason
 
 
+@pytest.mark.slow
 def test_verify_repeats_a_certificate(certified: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Only with --deep."""
     cli.main(["verify", str(certified), "--deep"], standalone_mode=False)
@@ -422,6 +443,7 @@ def test_verify_repeats_a_certificate(certified: Path, capsys: pytest.CaptureFix
     assert "certificate" not in quick
 
 
+@pytest.mark.slow
 def test_verify_refuses_figures_that_come_out_differently(certified: Path, tmp_path: Path) -> None:
     """A certificate that says it saw more than it did."""
     copy = Path(shutil.copytree(certified, tmp_path / "copy"))
@@ -435,6 +457,7 @@ def test_verify_refuses_figures_that_come_out_differently(certified: Path, tmp_p
         cli.main(["verify", str(copy), "--deep"], standalone_mode=False)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("content", ["other", "{}", "no JSON"])
 def test_verify_refuses_a_certificate_of_another_data_set_and_none_at_all(
     certified: Path, damaged: Callable[[], Path], content: str
@@ -453,6 +476,7 @@ def test_verify_refuses_a_certificate_of_another_data_set_and_none_at_all(
     assert ("certifies the data set" in str(error.value)) == (content == "other")
 
 
+@pytest.mark.slow
 def test_a_data_set_that_grows_loses_its_certificate(certified: Path, tmp_path: Path) -> None:
     """What was certified is no more."""
     copy = Path(shutil.copytree(certified, tmp_path / "copy"))
@@ -495,6 +519,7 @@ def test_a_folder_without_a_data_set_is_refused(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_images_on_photographs_are_not_judged(tmp_path: Path) -> None:
     """The foreground of a photograph hides things, and is no geometry that a ray could meet."""
     folder = tmp_path / "plates"
@@ -506,6 +531,7 @@ def test_images_on_photographs_are_not_judged(tmp_path: Path) -> None:
     assert certificate.holds
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [errno.ENOSPC, errno.EIO, errno.EACCES, errno.EROFS])
 @pytest.mark.parametrize("claim", ["files", "samples", "written again"])
 def test_a_refusing_disk_says_nothing_about_the_data(

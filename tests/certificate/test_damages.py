@@ -27,14 +27,14 @@ pytestmark = [
     pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning"),
 ]
 
-N = 18
+N = 12
 SHARD = "shards/000000"
 COCO = "coco/annotations/instances_train.json"
 
 
 @pytest.fixture(scope="module")
 def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Nine scenes of two views, in two shards and three splits."""
+    """Six scenes of two views, in three splits."""
     folder = tmp_path_factory.mktemp("damages") / "table"
     gen_data.generate("tabletop.yaml", N, out=folder, workers=0, seed=1, **SMALL)
     return folder

@@ -137,6 +137,7 @@ def test_a_misspelt_name_in_a_rare_selection_is_one_clear_error() -> None:
         list(probe_values(parse_yaml(text, "test"), 0))
 
 
+@pytest.mark.slow
 def test_probes_of_the_street_show_every_outcome_of_a_thousand_scenes() -> None:
     """A category that few scenes have is one of the data set; only seeds have over 20 values."""
     section = load_config("street.yaml").document.entries["shared"]

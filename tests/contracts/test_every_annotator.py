@@ -19,7 +19,6 @@ from stranger.annotation import Distance
 
 from gen_data.annotations import TABLE
 from gen_data.annotations.annotate import Thresholds, annotate_ego, annotate_reading
-from gen_data.assemble.config import load_config
 from gen_data.assemble.pipeline_factory import open_pipeline
 from gen_data.core.capture import Channel, SensorReading
 from gen_data.core.errors import ConfigError
@@ -27,6 +26,7 @@ from gen_data.core.interfaces import Annotator, AnyAnnotator, AssetLibrary, Imag
 from gen_data.core.sample import EgoTruth, ImageTruth, ObjectTruth
 from gen_data.core.scene import Scene
 from gen_data.core.serialization import canonical_json, to_plain
+from tests.streets import thin_street
 
 ANNOTATORS: dict[str, type[AnyAnnotator]] = {
     **{name: TABLE.load(name) for name in TABLE},
@@ -54,7 +54,7 @@ class World:
 def world() -> World:
     """A street in motion, with vehicles, people, lanes, a rig and a camera on it."""
     channels = frozenset(c for name in ANNOTATORS for c in made(name).channels)
-    with open_pipeline(load_config(CONFIG, overrides=SMALL), channels) as pipeline:
+    with open_pipeline(thin_street(CONFIG, *SMALL), channels) as pipeline:
         sample = pipeline.sample(1)
         (reading,) = sample.capture.readings.values()
         return World(sample.scene, reading, pipeline.assets)

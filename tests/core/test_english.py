@@ -78,6 +78,7 @@ def test_one_and_two_of_irregular_names(name: str) -> None:
     assert (count(name, 1), count(name, 2)) == BY_HAND[name]
 
 
+@pytest.mark.slow
 def test_one_and_two_of_every_other_category() -> None:
     """As inflect has them."""
     inflect = pytest.importorskip("inflect")

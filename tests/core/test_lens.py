@@ -80,6 +80,7 @@ def test_any_brown_conrady_lens_is_that_of_opencv(
     assert_is_opencvs(camera_of(lens, (64, 48), 40.0))
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None, derandomize=True)
 @given(st.floats(-0.1, 0.1), SMALL, SMALL, SMALL, st.floats(60.0, 400.0))
 def test_any_fisheye_is_that_of_opencv(

@@ -13,6 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 from PIL import Image
 
 from tests.end_to_end.running import SMALL, command, digest, environment, gen_data
@@ -77,6 +78,7 @@ def test_killed_run_resumes_to_the_same_bytes(dataset: Path, tmp_path: Path) -> 
     assert digest(tmp_path / "killed") == digest(dataset)
 
 
+@pytest.mark.slow
 def test_sample_made_alone_equals_the_one_in_its_shard(dataset: Path) -> None:
     """Pixels of sample 7, made in another process with no other sample before it."""
     program = (

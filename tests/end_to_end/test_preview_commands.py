@@ -17,6 +17,7 @@ import pytest
 from PIL import Image
 
 from tests.end_to_end.running import SMALL, command, environment, gen_data
+from tests.tiers import cases
 from tests.wheels import needs_rerun
 
 
@@ -130,7 +131,7 @@ def test_a_report_counts_the_annotations_of_a_dataset(dataset: Path, tmp_path: P
 
 
 @needs_rerun
-@pytest.mark.parametrize("signal_number", [signal.SIGINT, signal.SIGKILL])
+@pytest.mark.parametrize("signal_number", cases([signal.SIGINT, signal.SIGKILL], {signal.SIGINT}))
 def test_a_preview_for_browsers_listens_on_this_machine_only(
     tmp_path: Path, signal_number: signal.Signals
 ) -> None:

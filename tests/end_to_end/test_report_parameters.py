@@ -20,6 +20,7 @@ def drawn(dataset: Path) -> DrawnParameters:
         return draw_parameters(StoredSamples(dataset), 3)
 
 
+@pytest.mark.slow
 def test_scenes_that_are_drawn_again_are_the_stored_ones(drawn: DrawnParameters) -> None:
     """To the last bit."""
     assert (drawn.scenes, drawn.different) == (3, 0)

@@ -82,6 +82,7 @@ def test_resets_without_a_seed_continue_from_the_latest_one() -> None:
     assert following[0] != following[1]
 
 
+@pytest.mark.slow
 def test_a_scripted_pick_succeeds(engine: str) -> None:
     """From observations alone: above the object, down, close, up; the reward comes at the end."""
     env = nominal(engine, "ik", "lift")

@@ -138,6 +138,7 @@ def test_without_photographs_nothing_is_fitted() -> None:
     assert {one.note for one in part.quantities} == {"no photographs"}
 
 
+@pytest.mark.slow
 def test_a_camera_without_sensor_gets_none_for_pictures_without_noise() -> None:
     """Nor a demosaicing, which would blur."""
     ideal = ImagePipeline()

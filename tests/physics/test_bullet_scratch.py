@@ -42,6 +42,7 @@ def test_a_world_that_is_never_closed_leaves_no_folder(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_shapes_at_new_scales_take_neither_memory_nor_disk() -> None:
     """Otherwise every file that pybullet has read stays in memory: 18 MB for these shapes."""
     ball = trimesh.creation.icosphere(subdivisions=3, radius=0.05)

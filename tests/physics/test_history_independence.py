@@ -60,6 +60,7 @@ def test_a_scene_settles_the_same_whatever_was_settled_before(
     assert first != other
 
 
+@pytest.mark.slow
 def test_a_scene_settles_the_same_in_another_process(engine_name: EngineName) -> None:
     """Spawned, so that nothing is inherited; after other work in this one."""
     with open_engine(Solids(), PhysicsConfig(engine=engine_name)) as engine:

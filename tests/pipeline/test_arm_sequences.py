@@ -23,6 +23,7 @@ def sequence() -> list[Sample]:
         return [pipeline.sample(index) for index in range(10)]
 
 
+@pytest.mark.slow
 def test_a_sample_alone_equals_the_one_in_its_sequence(sequence: list[Sample]) -> None:
     """Scene, image and labels of the seventh instant."""
     with open_pipeline(load_config("tabletop_sequence.yaml", overrides=SMALL)) as pipeline:

@@ -65,6 +65,7 @@ def test_every_task_is_demonstrated_with_success(task: str) -> None:
     assert arm.episode.phases[-1].end_s <= 15.0, "the sequence of arm_tasks.yaml is shorter"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("failure", ["slip", "miss", "collision"])
 def test_failures_are_drawn_by_their_share(failure: str) -> None:
     """A share of 1 fails always; the label says how."""
@@ -262,6 +263,7 @@ def test_an_arm_of_a_user_without_limits_is_refused_by_its_joint(tmp_path: Path)
         pass
 
 
+@pytest.mark.slow
 def test_a_demonstration_alone_equals_the_one_after_others() -> None:
     """Physics remembers nothing: scene 2 drawn first, and after scenes 0 and 1."""
     config = load_config("arm_tasks.yaml", overrides=(*SMALL, "shared.robot=franka_panda"))

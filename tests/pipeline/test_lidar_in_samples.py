@@ -33,6 +33,7 @@ def samples() -> Iterator[list[Sample]]:
         yield [*made, pipeline.sample(0)]
 
 
+@pytest.mark.slow
 def test_the_scanner_is_where_kitti_has_it_at_every_instant(samples: list[Sample]) -> None:
     """0.27 m behind, 0.08 m above and 0.06 m right of the camera; axes as KITTI's calibration.
 
@@ -50,6 +51,7 @@ def test_the_scanner_is_where_kitti_has_it_at_every_instant(samples: list[Sample
     assert one != two
 
 
+@pytest.mark.slow
 def test_every_labelled_point_lies_in_the_box_of_its_instance(samples: list[Sample]) -> None:
     """To two millimetres, without noise, and as far as it moves during half a sweep."""
     checked = 0
@@ -66,6 +68,7 @@ def test_every_labelled_point_lies_in_the_box_of_its_instance(samples: list[Samp
     assert checked > 1000
 
 
+@pytest.mark.slow
 def test_objects_know_how_many_points_are_on_them(samples: list[Sample]) -> None:
     """By scanner; the same number as in the cloud."""
     counted = 0
@@ -79,6 +82,7 @@ def test_objects_know_how_many_points_are_on_them(samples: list[Sample]) -> None
     assert counted > 0
 
 
+@pytest.mark.slow
 def test_a_sample_made_again_has_the_same_points(samples: list[Sample]) -> None:
     """Byte by byte, in a pipeline of its own."""
     first, again = (samples[k].capture.clouds["velodyne"].points for k in (0, 2))
@@ -86,6 +90,7 @@ def test_a_sample_made_again_has_the_same_points(samples: list[Sample]) -> None:
     assert first.tobytes() == again.tobytes()
 
 
+@pytest.mark.slow
 def test_scenes_with_scanners_survive_serialisation(samples: list[Sample]) -> None:
     """Provenance holds their poses."""
     scene = samples[0].scene

@@ -50,6 +50,7 @@ def reading(sample: Sample) -> SensorReading:
     return sample.capture.readings["dash"]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("following")
 def test_a_step_made_alone_is_the_step_of_the_sequence(pipeline: Pipeline, sample: Sample) -> None:
     """Whatever was rendered before: the same bytes in every channel."""
@@ -59,6 +60,7 @@ def test_a_step_made_alone_is_the_step_of_the_sequence(pipeline: Pipeline, sampl
         assert np.array_equal(image, again.channels[channel], equal_nan=True), channel
 
 
+@pytest.mark.slow
 def test_every_label_of_a_rolling_image_agrees_with_it(sample: Sample) -> None:
     """Boxes and masks are those of the id image, and every share is one."""
     truth, ids = sample.truth["dash"], reading(sample).channels[Channel.INSTANCE]
@@ -70,6 +72,7 @@ def test_every_label_of_a_rolling_image_agrees_with_it(sample: Sample) -> None:
         assert 0.0 < thing.visible_fraction <= 1.0
 
 
+@pytest.mark.slow
 def test_the_camera_of_the_truth_tells_when_its_rows_were_exposed(sample: Sample) -> None:
     """The same shutter in the scene, in the reading and in what annotators saw."""
     shutter = sample.scene.camera("dash").shutter
@@ -78,6 +81,7 @@ def test_the_camera_of_the_truth_tells_when_its_rows_were_exposed(sample: Sample
     assert sample.truth["dash"].camera.shutter == reading(sample).camera.shutter == shutter
 
 
+@pytest.mark.slow
 def test_a_drive_bends_the_image_and_blurs_it(pipeline: Pipeline, sample: Sample) -> None:
     """Against a camera at the same place that sees one instant: other pixels, softer ones."""
     rolled = reading(sample)
@@ -99,6 +103,7 @@ def test_a_drive_bends_the_image_and_blurs_it(pipeline: Pipeline, sample: Sample
     assert detail(rolled.channels[Channel.RGB]) < 0.95 * detail(instant.channels[Channel.RGB])
 
 
+@pytest.mark.slow
 def test_flow_of_the_street_is_that_of_the_next_image(sample: Sample, following: Sample) -> None:
     """Where the point is not hidden, the next image shows the same thing at its end."""
     now, then = reading(sample), reading(following)
@@ -121,6 +126,7 @@ def test_flow_of_the_street_is_that_of_the_next_image(sample: Sample, following:
     assert (ids == found).mean() > 0.98
 
 
+@pytest.mark.slow
 def test_the_first_image_of_a_drive_is_exposed_while_things_move(pipeline: Pipeline) -> None:
     """It is read late enough, and has nothing to look back on yet."""
     first = reading(pipeline.sample(0))

@@ -66,6 +66,7 @@ def opened(scene: Scene, library: Library) -> tuple[dict[str, Body], dict[str, s
     return {b.name: b for b in after.bodies}, dict(after.instances[0].attributes)
 
 
+@pytest.mark.slow
 def test_a_thing_is_one_instance_whose_parts_are_its_links(library: Library) -> None:
     """It stands on the floor: its body's middle is half of 0.8 m above."""
     scene = placed(library)

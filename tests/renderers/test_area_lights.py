@@ -241,6 +241,7 @@ def test_a_matte_plane_under_a_ceiling_panel_is_lit_as_by_quadrature() -> None:
     np.testing.assert_allclose(luminance, expected, rtol=0.02)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "light",
     [

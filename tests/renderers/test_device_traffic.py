@@ -26,6 +26,7 @@ from gen_data.renderers.warp.visibility.gbuffer import CORNERS
 from gen_data.renderers.warp.visibility.kernels.amodal import pack_bits
 from gen_data.renderers.warp.visibility.kernels.rasterizer import Z_NEAR_M
 from tests.renderers.fake_library import FakeLibrary
+from tests.tiers import cases
 
 DOWN = 64_000
 """Bytes of a frame that may leave the device beyond the channels that were asked for."""
@@ -64,12 +65,11 @@ def plates() -> list[Frame]:
     return frames_of("photo_plates.yaml", 2)
 
 
-SLOW = [pytest.param(frames, marks=pytest.mark.slow) for frames in (street, rig)]
-CASES = pytest.mark.parametrize("frames", [tabletop, *SLOW])
+CASES = pytest.mark.parametrize("frames", cases((tabletop, street, rig), {tabletop}))
 Frames = Callable[[], list[Frame]]
 
 
-@pytest.mark.parametrize("frames", [tabletop, plates, *SLOW])
+@pytest.mark.parametrize("frames", cases((tabletop, plates, street, rig), {tabletop}))
 def test_little_but_what_was_asked_for_leaves_the_device(frames: Frames) -> None:
     """In first and further views, of cameras and scanners."""
     for frame in frames():

@@ -109,6 +109,7 @@ def test_no_weather_changes_no_byte(renderer: WarpRenderer) -> None:
     assert plain.tobytes() == seeded.tobytes()
 
 
+@pytest.mark.slow
 def test_labels_do_not_see_the_weather(renderer: WarpRenderer) -> None:
     """Ids, depth, normals and silhouettes equal those of a clear day, bit by bit."""
     channels = frozenset(Channel)

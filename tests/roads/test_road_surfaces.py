@@ -153,6 +153,7 @@ def test_surfaces_are_the_same_every_time_and_face_up(
     assert np.isfinite(a.uvs).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(TEXTURES))
 def test_textures_tile_and_repeat_exactly(name: str) -> None:
     """No seam at the border; equal seeds, equal bytes."""

@@ -164,6 +164,7 @@ def settle(scene: Scene, assets: AssetLibrary) -> tuple[int, dict[str, tuple[flo
         return len(world.starts), world.fallen()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["living_room", "workshop"])
 def test_nothing_falls_in_a_room(kind: str) -> None:
     """Two seconds of simulation."""
@@ -185,10 +186,10 @@ def test_nothing_falls_in_five_rooms_with_furniture_of_packs(kind: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
-def test_nothing_falls_in_four_rooms_of_each_type(kind: str) -> None:
+def test_nothing_falls_in_two_rooms_of_each_type(kind: str) -> None:
     """Tables, shelves and floors carry what is on them."""
-    results = [settle(furnished(kind, seed), library()) for seed in range(4)]
-    assert sum(number for number, _ in results) > 20
+    results = [settle(furnished(kind, seed), library()) for seed in range(2)]
+    assert sum(number for number, _ in results) > 10
     assert [fallen for _, fallen in results if fallen] == []
 
 
@@ -204,13 +205,13 @@ def standing_families() -> list[str]:
 
 @pytest.mark.slow
 def test_what_is_placed_as_it_is_stands_as_it_is() -> None:
-    """Four variants of each family, even if ``settle`` does not let it fall; all plants."""
+    """Two variants of each family, even if ``settle`` does not let it fall; more plants."""
     families = standing_families()
     assert set(families) > HOLLOW
     with bullet() as world:
         world.fix(trimesh.creation.box((900.0, 200.0, 0.2)).apply_translation((0.0, 0.0, -0.1)))
         for k, name in enumerate(families):
-            for seed in range(24 if name == "house_plant" else 4):
+            for seed in range(12 if name == "house_plant" else 2):
                 at_m = (4.0 * k - 2.0 * len(families), 4.0 * seed - 16.0, 0.0)
                 low_m = library().bounds_m(f"{name}?seed={seed}")[0][2]
                 body = Body(name, f"{name}?seed={seed}", SE3((*at_m[:2], -low_m)))

@@ -6,6 +6,7 @@ import colorsys
 from functools import cache
 
 import numpy as np
+import pytest
 
 from gen_data.core.asset_types import Material
 from gen_data.core.colorimetry import srgb_encode
@@ -37,6 +38,7 @@ def is_painted(material: Material) -> bool:
     return material.texture.startswith("texture/paint?")
 
 
+@pytest.mark.slow
 def test_most_walls_are_painted_nearly_white() -> None:
     """Of painted walls at home at least seven in ten have a saturation below 0.1 and are light."""
     found = [
@@ -50,6 +52,7 @@ def test_most_walls_are_painted_nearly_white() -> None:
     assert np.mean([s < 0.1 and v > 0.75 for s, v in found]) > 0.7
 
 
+@pytest.mark.slow
 def test_walls_of_workplaces_are_pale() -> None:
     """Workshops have no coloured paint at all."""
     for scene in rooms("workshop"):
@@ -59,6 +62,7 @@ def test_walls_of_workplaces_are_pale() -> None:
                 assert saturation < 0.1, (saturation, value)
 
 
+@pytest.mark.slow
 def test_at_most_one_wall_stands_out() -> None:
     """Walls of a room are of one material, but for one of them in some rooms."""
     others = []
@@ -71,6 +75,7 @@ def test_at_most_one_wall_stands_out() -> None:
     assert np.mean(others) < 0.4
 
 
+@pytest.mark.slow
 def test_splashbacks_cover_the_wall_behind_every_worktop_and_no_window() -> None:
     """From below the worktops to 1.45 m, or to the sill of a window there; 8 mm thick."""
     covered = 0

@@ -24,6 +24,7 @@ def outside(scene: Scene) -> list[Body]:
     return [b for b in scene.bodies if b.name.startswith("room/outside")]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["apartment", "kitchen", "warehouse"])
 def test_surroundings_stand_on_one_ground_outside_all_rooms(kind: str) -> None:
     """Everything is at the ground's height, a metre away from every floor, and has no label."""
@@ -44,6 +45,7 @@ def test_surroundings_stand_on_one_ground_outside_all_rooms(kind: str) -> None:
                 assert apart > 1.0, (seed, body.asset)
 
 
+@pytest.mark.slow
 def test_assets_of_surroundings_are_announced() -> None:
     """Plans list them, so that their content is part of the data set's identity."""
     possible = set(Furnish(name="f").possible_assets(library()))
@@ -51,6 +53,7 @@ def test_assets_of_surroundings_are_announced() -> None:
     assert set(outlook_assets()) <= possible
 
 
+@pytest.mark.slow
 def test_blinds_hang_within_the_frames_of_their_windows() -> None:
     """Below the upper edge, above the sill, in the reveal."""
     found = 0
@@ -68,6 +71,7 @@ def test_blinds_hang_within_the_frames_of_their_windows() -> None:
     assert found > 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "piece"), [("kitchen", "kitchen_sink"), ("bathroom", "wash_basin")]
 )
@@ -93,6 +97,7 @@ def test_running_taps_are_stated_and_seen(kind: str, piece: str) -> None:
     assert 0.7 < bottom < 0.9
 
 
+@pytest.mark.slow
 def test_vessels_say_whether_they_are_full() -> None:
     """As their assets say what is in them."""
     stated = [
@@ -106,6 +111,7 @@ def test_vessels_say_whether_they_are_full() -> None:
     assert all((full == "1") == contents for full, contents in stated)
 
 
+@pytest.mark.slow
 def test_doors_that_lead_nowhere_stay_closed() -> None:
     """Of an apartment, one door is its entrance; all others may open."""
     scene = ObjectStates(name="s", is_open=ON)(
@@ -118,6 +124,7 @@ def test_doors_that_lead_nowhere_stay_closed() -> None:
     assert max(float(d["open"]) for d in doors) > 0.0
 
 
+@pytest.mark.slow
 def test_light_inside_is_that_of_volumes_and_outside_that_of_the_sky() -> None:
     """One volume per room and window, and by day a sky that is as bright as was drawn."""
     scene = furnished("apartment", 1)

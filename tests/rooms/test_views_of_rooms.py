@@ -53,6 +53,7 @@ def states(scene: Scene, **fields: dist.Numeric[bool]) -> Scene:
     return ObjectStates(name="s", **fields)(scene, library(), Streams(5, 1).rng("s"))
 
 
+@pytest.mark.slow
 def test_closed_parts_are_where_their_pieces_are_and_say_so() -> None:
     """With no opening, parts stay as they were, and every label says 0."""
     closed = states(flat(), is_open=OFF)
@@ -64,6 +65,7 @@ def test_closed_parts_are_where_their_pieces_are_and_say_so() -> None:
     assert {a["open"] for a in attributes} == {"0"}
 
 
+@pytest.mark.slow
 def test_the_joint_of_a_label_is_the_turn_of_the_part() -> None:
     """The angle between a door's leaf and its frame, from their poses."""
     opened = states(flat(), is_open=ON)
@@ -79,6 +81,7 @@ def test_the_joint_of_a_label_is_the_turn_of_the_part() -> None:
     assert list(angles) == pytest.approx(list(angles.values()), abs=2e-3)
 
 
+@pytest.mark.slow
 def test_screens_that_are_on_shine_and_say_so() -> None:
     """Every screen is lit with is_on, none without."""
     for is_on, word in ((ON, "on"), (OFF, "off")):
@@ -96,6 +99,7 @@ def test_screens_that_are_on_shine_and_say_so() -> None:
             assert dict(scene.instance(body.instance_id).attributes)["state"] == word
 
 
+@pytest.mark.slow
 def test_every_lit_lamp_has_a_light_near_it_and_no_other_has() -> None:
     """Labels, emission and lights agree, by day."""
     seen = set()
@@ -116,6 +120,7 @@ def test_every_lit_lamp_has_a_light_near_it_and_no_other_has() -> None:
     assert seen == {"on", "off"}
 
 
+@pytest.mark.slow
 def test_at_night_a_lamp_is_on_and_no_light_comes_through_windows() -> None:
     """Neither sun nor panels, and the view is nearly black."""
     scene = RoomLighting(name="l", night=ON, is_on=OFF)(flat(), library(), Streams(5, 2).rng("l"))
@@ -124,6 +129,7 @@ def test_at_night_a_lamp_is_on_and_no_light_comes_through_windows() -> None:
     assert max(scene.body("room/outside").materials[0].emission_cd_m2) < 1.0
 
 
+@pytest.mark.slow
 def test_the_sun_shines_into_a_window() -> None:
     """It travels inwards through one of them: against its outward normal."""
     fields = {"night": OFF, "sun": ON}
@@ -139,6 +145,7 @@ def test_the_sun_shines_into_a_window() -> None:
     assert max(float(np.dot(n, sun.direction)) for n in inward) > 0.25
 
 
+@pytest.mark.slow
 def test_cameras_stand_on_free_floor_at_the_drawn_height() -> None:
     """Nothing is nearer than the clearance, by OpenCV's distance to outlines."""
     camera = RoomCamera(name="c", height_m=dist.Constant(1.4))
@@ -162,6 +169,7 @@ def walk(**fields: object) -> Scene:
     return RoomPath(name="p", **fields)(flat(), library(), Streams(5, 4).rng("p"))
 
 
+@pytest.mark.slow
 def test_a_walk_has_its_speed_and_touches_nothing() -> None:
     """Every 0.1 s, by OpenCV's distance to outlines; shortened by corners only."""
     scene = walk(speed_m_s=dist.Constant(0.8), radius_m=0.2, duration_s=6.0)
@@ -180,6 +188,7 @@ def test_a_walk_has_its_speed_and_touches_nothing() -> None:
     assert min(distance_m(b, *place) for b in low for place in places) > 0.1
 
 
+@pytest.mark.slow
 def test_a_walk_looks_where_it_goes() -> None:
     """Its X axis is within 60 degrees of its velocity, nearly always."""
     scene = walk(speed_m_s=dist.Constant(0.6), duration_s=6.0)
@@ -204,6 +213,7 @@ def test_a_walk_without_carrier_is_refused() -> None:
         walk(carrier="hand")
 
 
+@pytest.mark.slow
 def test_a_carrier_too_wide_for_a_room_is_rejected_with_a_remedy() -> None:
     """One metre of radius, in a bathroom."""
     walks = RoomPath(name="p", radius_m=1.0)
@@ -213,6 +223,7 @@ def test_a_carrier_too_wide_for_a_room_is_rejected_with_a_remedy() -> None:
     assert "radius_m" in caught.value.rejection.remedy
 
 
+@pytest.mark.slow
 def test_the_map_of_a_room_agrees_with_outlines() -> None:
     """Occupied cells are in a box of what stands; free ones at most in its empty corners."""
     scene = states(flat(), is_open=OFF)
@@ -253,6 +264,7 @@ def _area_m2(scene: Scene) -> float:
     return area
 
 
+@pytest.mark.slow
 def test_ceiling_cameras_are_below_the_ceiling_of_a_room_and_look_down() -> None:
     """Within their distances and tilt, by every draw; the room is around and below them."""
     scene = flat()

@@ -110,6 +110,7 @@ def test_a_poisoned_sample_is_named_and_all_other_shards_are_made(tmp_path: Path
     assert records == ["000000.json", "000002.json"]
 
 
+@pytest.mark.slow
 def test_a_healed_run_completes_what_a_poisoned_one_left(
     tmp_path: Path, reference_digest: str
 ) -> None:

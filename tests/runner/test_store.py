@@ -551,6 +551,7 @@ def survives_power_cut(
         shutil.rmtree(attic)
 
 
+@pytest.mark.slow
 def test_a_power_cut_at_every_operation_is_resumed_to_the_same_bytes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, reference_digest: str
 ) -> None:

@@ -176,6 +176,7 @@ def test_collision_lies_within_the_mesh_bounds(built: tuple[str, Solid]) -> None
     assert (points <= np.array(high) + 0.1).all(), name
 
 
+@pytest.mark.slow
 @for_every(FAMILIES)
 def test_a_variant_has_the_same_bytes_every_time_and_others_than_its_neighbour(name: str) -> None:
     """A pure function of family and seed."""

@@ -89,6 +89,7 @@ def test_readings_follow_each_other_evenly_over_steps() -> None:
     assert np.allclose(rows["time_s"], np.arange(31) / 100.0, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_bias_walks_on_from_step_to_step() -> None:
     """Steps made alone share one walk: its changes grow with time as a walk's do."""
     still = world(straight((0.0, 0.0), (0.0, 0.0)), seconds=20.0)

@@ -128,6 +128,7 @@ def test_half_of_the_reference_targets_are_detected_at_the_reach() -> None:
     assert one_cell_share(250.0, 400) == pytest.approx(0.5, abs=0.09)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("range_m", "expected"), [(125.0, 0.956), (200.0, 0.745)])
 def test_detection_falls_with_the_fourth_power_of_range(range_m: float, expected: float) -> None:
     """SNR at 250 m is 18.9; 16 times as much at half of it, 2.44 times as much at 200 m."""

@@ -19,7 +19,10 @@ from gen_data.runner.stored import StoredSamples
 
 CONFIG = """\
 extends: tabletop.yaml
-without: {sensors: [pseudo_lidar], exporters: all}
+without:
+  sensors: [pseudo_lidar]
+  exporters: all
+  randomizers: [distractors, tabletop, cover, finish]
 views_per_scene: 1
 randomizers:
   - {name: clutter, count: {uniform_integer: [1, 4]}}
@@ -74,6 +77,7 @@ def made(config: Path, data: Path, results: Path) -> Round:
     return adapt(str(config), data, data.parent / "first", results=results)
 
 
+@pytest.mark.slow
 def test_the_next_round_draws_more_of_what_was_missed(made: Round) -> None:
     """Only the distance changes; the file loads, and most of its weight is beyond 1.2 m."""
     assert made.changed == ("orbit.distance_m",)
@@ -87,6 +91,7 @@ def test_the_next_round_draws_more_of_what_was_missed(made: Round) -> None:
     assert distance.distance_m.support() == (0.9, 1.5)
 
 
+@pytest.mark.slow
 def test_the_same_input_writes_the_same_bytes(
     config: Path, data: Path, results: Path, made: Round
 ) -> None:
@@ -102,13 +107,14 @@ def test_the_same_input_writes_the_same_bytes(
     assert list(entry["weights"]) == ["orbit.distance_m"]
 
 
+@pytest.mark.slow
 def test_a_second_round_extends_the_first(made: Round, tmp_path: Path) -> None:
     """Its parts are those of the mixture of the first round."""
     rounds_folder = made.config.parent.with_name("rounds")
     shutil.copytree(made.config.parent, rounds_folder)
     first = rounds_folder / made.config.name
     judged = tmp_path / "judged"
-    gen_data.generate(str(first), 30, out=judged, workers=0)
+    gen_data.generate(str(first), 20, out=judged, workers=0)
     path = tmp_path / "second.json"
     path.write_text(json.dumps(weak_results(judged)))
 
@@ -120,6 +126,7 @@ def test_a_second_round_extends_the_first(made: Round, tmp_path: Path) -> None:
     assert [entry["seed"] for entry in rounds] == [8, 9]
 
 
+@pytest.mark.slow
 def test_results_of_another_data_set_are_refused_by_its_id(
     config: Path, data: Path, tmp_path: Path
 ) -> None:
@@ -137,6 +144,7 @@ def test_results_of_another_data_set_are_refused_by_its_id(
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 def test_results_in_images_that_the_data_set_lacks_are_refused(
     config: Path, data: Path, results: Path, tmp_path: Path
 ) -> None:
@@ -149,6 +157,7 @@ def test_results_in_images_that_the_data_set_lacks_are_refused(
         adapt(str(config), data, tmp_path / "out", results=path)
 
 
+@pytest.mark.slow
 def test_a_round_says_in_how_many_images_something_was_detected(made: Round, results: Path) -> None:
     """So that results of a part of the data set, or of another one, show."""
     images = {row["image_id"] for row in json.loads(results.read_text())}
@@ -156,6 +165,7 @@ def test_a_round_says_in_how_many_images_something_was_detected(made: Round, res
     assert tabulate(made, 1.0)["note"].endswith(f"{len(images)} of 40 images have detections")
 
 
+@pytest.mark.slow
 @pytest.mark.slow
 @pytest.mark.parametrize("content", [b"[]", b"", b"PK"])
 def test_a_file_that_is_no_detector_is_refused(
@@ -175,6 +185,7 @@ def test_a_folder_that_is_no_data_set_is_refused(config: Path, tmp_path: Path) -
         adapt(str(config), tmp_path / "none", tmp_path, results=tmp_path / "none.json")
 
 
+@pytest.mark.slow
 def test_a_data_set_of_another_configuration_is_refused(data: Path, tmp_path: Path) -> None:
     """With the sections that differ."""
     with pytest.raises(
@@ -183,6 +194,7 @@ def test_a_data_set_of_another_configuration_is_refused(data: Path, tmp_path: Pa
         adapt("tabletop.yaml", data, tmp_path, results=tmp_path / "none.json")
 
 
+@pytest.mark.slow
 def test_a_detector_that_misses_nothing_teaches_nothing(
     config: Path, data: Path, tmp_path: Path
 ) -> None:
@@ -210,6 +222,7 @@ def pair(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     return config, out
 
 
+@pytest.mark.slow
 def test_results_of_every_colour_camera_count(pair: tuple[Path, Path], tmp_path: Path) -> None:
     """One camera finds all, the other nothing: the recall is the first one's share of objects."""
     config, data = pair
@@ -226,6 +239,7 @@ def test_results_of_every_colour_camera_count(pair: tuple[Path, Path], tmp_path:
     assert made.recall == pytest.approx(len(found) / len(rows))
 
 
+@pytest.mark.slow
 def test_the_size_of_shards_is_no_part_of_what_was_drawn(
     config: Path, data: Path, results: Path, tmp_path: Path
 ) -> None:

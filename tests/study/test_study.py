@@ -38,6 +38,7 @@ def write_results(path: Path, found: float) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_results_of_detectors_are_compared(tmp_path: Path) -> None:
     """One finds half of the objects, one all, one the same half: better, and no difference."""
     write_coco(tmp_path / "real", BOXES)
@@ -177,7 +178,7 @@ def test_an_interrupted_study_is_continued(tmp_path: Path) -> None:
     assert not list((tmp_path / "whole").glob("data/*"))
 
 
-SMALL_STUDY = {"n": 8, "seeds": 1, "steps": 80, "size": 64, "workers": 1}
+SMALL_STUDY = {"n": 8, "seeds": 1, "steps": 40, "size": 64, "workers": 1}
 
 
 def small_study(folder: Path) -> Callable[[Path], list[str]]:

@@ -21,6 +21,7 @@ from gen_data.randomizers.free_space import Footprint, Ground
 from gen_data.randomizers.traffic_actors import find_drivers
 from gen_data.randomizers.traffic_flow import TrafficFlow
 from gen_data.traffic.lane_routes import LaneGraph
+from tests.streets import thin_street
 from tests.traffic.roads import lane
 
 SMALL = (
@@ -49,15 +50,15 @@ def spec() -> Config:
 
 @cache
 def factory() -> PipelineFactory:
-    """Of its pipelines; it builds the nominal scenes once."""
-    return PipelineFactory(spec(), n=1)
+    """Of its pipelines, for a street with little scenery; it builds the nominal scenes once."""
+    return PipelineFactory(thin_street("street_sequence", *SMALL), n=1)
 
 
 @cache
 def row() -> dict[int, Sample]:
     """Steps of one sequence, made one after the other."""
     with factory()() as pipeline:
-        return {k: pipeline.sample(k) for k in (0, 3, 5, 8)}
+        return {k: pipeline.sample(k) for k in (0, 5, 8)}
 
 
 def moving_scene(seed: int, of: Config | None = None) -> Scene:
@@ -108,7 +109,7 @@ def overlapping(scene: Scene) -> list[str]:
 
 
 @pytest.mark.parametrize(
-    "seed", [1, 2, 3, *(pytest.param(k, marks=pytest.mark.slow) for k in range(4, 10))]
+    "seed", [1, *(pytest.param(k, marks=pytest.mark.slow) for k in range(2, 7))]
 )
 def test_nothing_collides_in_random_streets(seed: int) -> None:
     """Oriented boxes of everything that moves, every 0.1 s for four seconds."""
@@ -119,6 +120,7 @@ def test_nothing_collides_in_random_streets(seed: int) -> None:
         assert not overlapping(scene_at(scene, STEP_S * k)), f"at {STEP_S * k:.1f} s"
 
 
+@pytest.mark.slow
 def test_what_moves_stands_on_the_ground() -> None:
     """Vehicles' lowest points are at the height of the lane under them, within the crossfall."""
     scene = scene_at(scene_of(1), 2.0)
@@ -134,12 +136,14 @@ def test_what_moves_stands_on_the_ground() -> None:
         assert z + body.scale * low[2] == pytest.approx(nearest[2], abs=0.03)
 
 
+@pytest.mark.slow
 def test_same_stream_gives_the_same_traffic_and_another_one_another() -> None:
     """Byte for byte, tracks and changes included."""
     assert canonical_json(moving_scene(2)) == canonical_json(scene_of(2))
     assert canonical_json(scene_of(3)) != canonical_json(scene_of(2))
 
 
+@pytest.mark.slow
 def test_time_goes_both_ways() -> None:
     """The scene at 1 s is the same from the beginning and from later on."""
     scene = scene_of(1)
@@ -152,6 +156,7 @@ def test_time_goes_both_ways() -> None:
     )
 
 
+@pytest.mark.slow
 def test_signals_change_and_say_so() -> None:
     """Over a cycle every light is red and green; materials and the attribute go together."""
     scene = scene_of(1)
@@ -167,6 +172,7 @@ def test_signals_change_and_say_so() -> None:
         assert (state in ("red", "red_yellow")) == ("lens_red" in lit)
 
 
+@pytest.mark.slow
 def test_who_slows_down_shows_brake_lights() -> None:
     """Whenever a vehicle brakes by 1 m/s^2 its lamps glow, and its label says so."""
     seen = 0
@@ -192,6 +198,7 @@ def test_who_slows_down_shows_brake_lights() -> None:
     assert seen
 
 
+@pytest.mark.slow
 def test_people_walk_in_step() -> None:
     """A stride is 0.8 of the body's height: as many sixteenths as the way is long."""
     scene = scene_of(2)
@@ -223,9 +230,10 @@ def test_a_sample_alone_equals_the_one_in_its_sequence() -> None:
     for channel, image in one.channels.items():
         assert (image == other.channels[channel]).all()
     ids = [{i.name: i.instance_id for i in sample.scene.instances} for sample in row().values()]
-    assert ids[0] == ids[1] == ids[2] == ids[3]
+    assert ids[0] == ids[1] == ids[2]
 
 
+@pytest.mark.slow
 def test_the_camera_rides_on_the_ego_vehicle() -> None:
     """1.65 m over the road, 1.5 m before the rear axle, wherever the vehicle is."""
     scenes = [row()[k].scene for k in (0, 8)]
@@ -255,6 +263,7 @@ BAD = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("message", BAD)
 def test_what_cannot_be_is_told_in_one_message(message: str) -> None:
     """Wrong routes, names and durations."""
@@ -279,6 +288,7 @@ def test_a_route_through_a_wall_is_refused() -> None:
         flow(scene, library(), Streams(1, 0).rng("flow"))
 
 
+@pytest.mark.slow
 def test_a_given_route_is_driven() -> None:
     """Through the junction to the left: the ego vehicle ends on the road it was sent to."""
     names = [randomizer.name for randomizer in spec().probes[0].randomizers]
@@ -306,6 +316,7 @@ def test_a_given_route_is_driven() -> None:
     assert away.min() < 1.5
 
 
+@pytest.mark.slow
 def test_what_is_parked_at_the_edge_of_a_lane_does_not_drive() -> None:
     """On one lane: a car is a driver; a parked bicycle, a cone and a tuft of grass are scenery."""
     assets = ("car?seed=0", "parked_bicycle?seed=1", "traffic_cone?seed=0", "grass_tuft?seed=0")

@@ -179,6 +179,7 @@ def test_a_body_that_changes_its_look_shows_one_at_a_time(library: Library, tmp_
     assert shown[1] == shown[2] == ["invisible", "inherited"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["usda", "usdc"])
 def test_other_processes_write_the_same_bytes(kind: str, library: Library, tmp_path: Path) -> None:
     """Text and binary layers, images and all."""

@@ -69,6 +69,7 @@ def textured(stage: Usd.Stage, path: str, image: str) -> UsdShade.Material:
     return material
 
 
+@pytest.mark.slow
 def test_an_exported_world_comes_back(tmp_path: Path) -> None:
     """The same camera sees the same things: label images agree to more than 99 %."""
     library = opened_library(tmp_path)

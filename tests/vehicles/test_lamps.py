@@ -26,6 +26,7 @@ def lens_area_m2(seed: int, role: str) -> float:
     return float(0.5 * np.maximum(ahead, 0.0).sum() / 2.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("role", LIMITS_CD)
 def test_lamps_of_cars_are_as_strong_as_the_regulations_ask(role: str) -> None:
     """On average; the strongest draw on the largest lens is at most one stop too bright."""

@@ -69,6 +69,7 @@ def test_dirt_lies_low_behind_wheels_and_on_the_rear(variant: tuple[str, int]) -
     assert share[behind].mean() > 1.2 * share[further].mean()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SOILED)
 def test_shape_and_print_stay_as_they_are(name: str) -> None:
     """Every face keeps its corners; printed slots keep their coordinates."""
