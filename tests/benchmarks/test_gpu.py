@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from benchmarks.gpu.parts import run_part
-from benchmarks.gpu.references import differences
+from benchmarks.gpu.references import differences, have_same_bytes
 from benchmarks.gpu.report import format_report, reached
 
 ROOT = Path(__file__).parents[2]
@@ -71,6 +71,19 @@ def test_a_point_may_be_a_tenth_of_a_millimetre_off() -> None:
         ("sample 0, top", "another number of points")
     ]
     assert facts({"points/top": here}, {}) == [("sample 0, points/top", "only in one of the two")]
+
+
+def test_a_second_drawing_has_the_same_bytes_also_where_there_is_nothing() -> None:
+    """NaN marks pixels without flow; -0.0 equals 0.0 and has other bytes."""
+    flow = np.array([[np.nan, 0.5], [0.0, np.nan]], np.float32)
+    ids = np.array([1, 2], np.uint16)
+    drawn = {"values/flow": flow, "values/ids": ids}
+
+    assert have_same_bytes(drawn, {"values/flow": flow.copy(), "values/ids": ids.copy()})
+    assert not have_same_bytes(drawn, {"values/flow": flow, "values/ids": ids + 1})
+    assert not have_same_bytes({"values/flow": np.zeros(2)}, {"values/flow": -np.zeros(2)})
+    assert not have_same_bytes(drawn, {"values/flow": flow})
+    assert not have_same_bytes(drawn, {"values/flow": flow, "values/ids": ids.reshape(2, 1)})
 
 
 def test_a_part_that_fails_names_file_line_kernel_and_error() -> None:
