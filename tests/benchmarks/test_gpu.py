@@ -92,12 +92,11 @@ def test_a_second_drawing_has_the_same_bytes_also_where_there_is_nothing() -> No
 
 def test_a_part_that_fails_names_file_line_kernel_and_error() -> None:
     """And leaves the others alone."""
-    result = run_part("broken", "frames:time_kernels", 60.0, config="nowhere", device="cpu",
-                      views=1, small=True)  # fmt: skip
+    result = run_part("broken", "report:format_report", 60.0, figures={"card": 1}, failures={})
 
     assert result.value is None
-    assert result.failure.startswith("benchmarks/gpu/rates.py:")
-    assert "kernel none: KeyError: 'nowhere'" in result.failure
+    assert result.failure.startswith("benchmarks/gpu/report.py:")
+    assert "kernel none: AttributeError: 'int' object has no attribute 'items'" in result.failure
 
 
 def test_a_part_that_takes_too_long_is_left_out() -> None:
@@ -135,7 +134,7 @@ if sys.argv[1] == "2":
     raise SystemExit("out of memory")
 for line in sys.stdin:
     number, place, window_s, pool = json.loads(line)
-    made = {"n": 6, "s": 2.0, "scenes": min(pool, 3), "cpu_s": {"render": 0.3}}
+    made = {"n": 6, "s": 2.0, "scenes": min(pool, 3), "cpu_s": {"render": 0.75}}
     print(json.dumps(made | {"number": number}), flush=True)
 """
 """Makes three samples a second; the third worker ends instead."""
@@ -162,7 +161,7 @@ def test_workers_that_are_not_ready_are_left_out(
     found = rates.measure_rates("street", "cpu", [1, 2, 4], 0.1, 120.0, small=True, scenes=16)
 
     assert found["memory"] == found["disk"] == {"3": 9.0, "2": 6.0, "1": 3.0}
-    assert (found["ready"], found["scenes"], found["stages"]) == (3, 3, {"render": 50.0})
+    assert (found["ready"], found["scenes"], found["stages"]) == (3, 3, {"render": 125.0})
     assert found["left_out"] == ["1 workers not ready: out of memory"]
 
 
