@@ -21,11 +21,15 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from benchmarks.gpu.parts import Result, run_part
-from benchmarks.gpu.references import config_names, write_references
 from benchmarks.gpu.report import format_report
 from gen_data.core.system_calls import usable_cores
 
 PARTS = ("card", "modules", "correct", "kernels", "sweeps", "paths", "rates")
+
+REFERENCES_MAX = 8_000_000
+"""Size of the file of all references [bytes]."""
+RATES_S = 36.0
+"""Bound of the measurements of one workload."""
 
 
 class Measured:
@@ -70,6 +74,8 @@ def measure(arguments: argparse.Namespace) -> Measured:
         one("modules, compiled", "card:compile_modules", "compiled", device=device)
         one("modules, loaded", "card:load_modules", "modules", device=device)
     if "correct" in chosen and arguments.references is not None:
+        from benchmarks.gpu.references import config_names
+
         names = arguments.configs or config_names()
         where = {"references": str(arguments.references.resolve()), "device": device}
         for result in _side_by_side("references:compare", names, limit_s, where):
@@ -80,7 +86,8 @@ def measure(arguments: argparse.Namespace) -> Measured:
             one(f"kernels {name}", "frames:time_kernels", "kernels", name, **values)
     if "sweeps" in chosen:
         rays, repeats = (1, 1) if dry else (4_000_000, 9)
-        one("sweeps", "frames:time_sweeps", "sweeps", device=device, rays=rays, repeats=repeats)
+        values = {"device": device, "rays": rays, "repeats": repeats, "small": dry}
+        one("sweeps", "frames:time_sweeps", "sweeps", **values)
     if "paths" in chosen:
         for where in dict.fromkeys((device, "cpu")):
             size = (64, 48) if dry or where == "cpu" else (640, 480)
@@ -92,9 +99,8 @@ def measure(arguments: argparse.Namespace) -> Measured:
             ("tabletop",) if dry else ("tabletop", "street", "rooms")
         ):
             values = {"config": name, "device": device, "workers": counts[:1] if dry else counts}
-            window_s = 0.1 if dry else 3.0
-            ready_s = limit_s - 2 * len(counts) * (window_s + 0.5) - 5.0
-            values |= {"window_s": window_s, "ready_s": ready_s, "small": dry}
+            values |= {"window_s": 0.1 if dry else 1.0, "small": dry, "scenes": 1 if dry else 16}
+            values["limit_s"] = min(0.9 * limit_s, limit_s if dry else RATES_S)
             one(f"rates {name}", "rates:measure_rates", "rates", name, **values)
     return done
 
@@ -113,17 +119,28 @@ def _side_by_side(
         return list(pool.map(call, names))
 
 
-def make_references(path: Path, names: Sequence[str], limit_s: float) -> int:
-    """Make references on the CPU; returns the number of configurations that failed."""
+def make_references(path: Path, names: Sequence[str], limit_s: float) -> bool:
+    """Make references of configurations, or of all, on the CPU.
+
+    Returns whether all were made and are small enough to be carried to a card.
+    """
+    # Light imports only above: most parts have a process.
+    from benchmarks.gpu.references import config_names, write_references
+
     started_s = time.perf_counter()
     with TemporaryDirectory() as folder:
         where = {"folder": folder}
+        names = names or config_names()
+        # On few cores, all configurations take a quarter of an hour.
+        limit_s *= len(names)
         results = _side_by_side("references:store_references", names, limit_s, where)
         for result in results:
             print(f"{result.seconds:6.1f} s {result.name}: {result.failure or 'done'}")
         size = write_references(path, [Path(r.value) for r in results if not r.failure])
     print(f"{path}: {size / 1e6:.1f} MB in {time.perf_counter() - started_s:.0f} s")
-    return sum(bool(result.failure) for result in results)
+    if size > REFERENCES_MAX:
+        print(f"{path}: more than {REFERENCES_MAX / 1e6:.0f} MB; keep fewer points or pixels")
+    return size <= REFERENCES_MAX and not any(result.failure for result in results)
 
 
 def main(words: Sequence[str] | None = None) -> int:
@@ -140,8 +157,8 @@ def main(words: Sequence[str] | None = None) -> int:
     parser.add_argument("--limit-s", type=float, default=120.0, help="of each part")
     arguments = parser.parse_args(words)
     if arguments.make_references is not None:
-        names = arguments.configs or config_names()
-        return int(make_references(arguments.make_references, names, arguments.limit_s) > 0)
+        path, names = arguments.make_references, arguments.configs or ()
+        return int(not make_references(path, names, arguments.limit_s))
     done = measure(arguments)
     print(format_report(done.figures, done.failures))
     wrong = any(c["findings"] for c in done.figures.get("correct", {}).values())

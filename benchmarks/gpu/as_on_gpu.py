@@ -17,8 +17,6 @@ import warp as wp
 
 from gen_data.renderers.warp import device
 
-NAME = "cpu-as-gpu"
-"""Name of the device in arguments of the measurement."""
 _FLAGS = " -DAS_ON_GPU -D__ffs=__builtin_ffs"
 _LISTING = frozenset({"find_edges", "find_thin", "find_contrasts", "gather_light"})
 """Kernels whose first two outputs are the length of a list and the list, in any order."""

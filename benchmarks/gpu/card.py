@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
 import sys
 import time
 from datetime import date
@@ -11,6 +10,7 @@ from typing import Any
 
 import warp as wp
 
+from benchmarks.gpu.driver import ask_driver
 from benchmarks.runs import machine
 from gen_data.core.system_calls import usable_cores
 from gen_data.renderers.warp.device import (
@@ -42,16 +42,6 @@ def describe_card(device: str) -> dict[str, Any]:
             "cuda": {"driver": wp.get_cuda_driver_version(), "warp": wp.get_cuda_toolkit_version()},
         }
     return facts
-
-
-def ask_driver(query: str) -> str:
-    """One field of ``nvidia-smi``; empty without it."""
-    command = ["nvidia-smi", f"--query-gpu={query}", "--format=csv,noheader,nounits"]
-    try:
-        done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=10)
-    except (OSError, subprocess.SubprocessError):
-        return ""
-    return done.stdout.strip().splitlines()[0]
 
 
 def compile_modules(device: str) -> dict[str, Any]:

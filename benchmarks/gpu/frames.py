@@ -21,8 +21,9 @@ from gen_data.core.capture import LidarRays
 from gen_data.renderers.warp.device import open_device
 from gen_data.sensors.lidar.scan_pattern import Sweep, lidar_model, make_sweep
 
-MODEL = "HDL-64E"
-MANY_RAYS = 4_000_000
+_SWEEP = ("kitti_rig", "velodyne", "HDL-64E")
+_SMALL_SWEEP = ("robot_vacuum", "scan", "VLP-16")
+"""Configuration, its scanner whose place is taken, and the model whose rays are traced."""
 Spent = dict[str, tuple[int, float]]
 """Calls and milliseconds by kernel or kind of copy."""
 
@@ -54,7 +55,9 @@ def time_kernels(config: str, device: str, views: int, small: bool) -> dict[str,
     """
     opened = open_device(device)
     before = 0 if opened.is_cpu else opened.free_memory
-    texts = (*overrides_of(config, device, small), f"views_per_scene={views}")
+    # All views of one scene are the quickest.
+    in_scene = 4 * views if small else views
+    texts = (*overrides_of(config, device, small), f"views_per_scene={in_scene}")
     with open_pipeline(load_config(f"{config}.yaml", seed=1, overrides=texts)) as pipeline:
         for index in range(2 * views):
             pipeline.sample(index)
@@ -79,25 +82,28 @@ def time_kernels(config: str, device: str, views: int, small: bool) -> dict[str,
     }
 
 
-def time_sweeps(device: str, rays: int, repeats: int) -> dict[str, Any]:
+def time_sweeps(device: str, rays: int, repeats: int, small: bool) -> dict[str, Any]:
     """Rays per second of a sweep of an HDL-64E in traffic, and of as many sweeps as make ``rays``.
+
+    Args:
+        device: Of the renderer.
+        rays: At least, of the launch of many.
+        repeats: Measurements of each launch.
+        small: Take a VLP-16 in a room instead.
 
     Returns:
         By kind of launch: ``rays``, ``ms`` from call to hits on the host, and ``kernels``.
     """
-    config = load_config(
-        "kitti_rig.yaml",
-        seed=1,
-        overrides=(f"render.device={device}", "sensors[0].size_px=[64, 32]"),
-    )
-    sweep = make_sweep(lidar_model(MODEL), 0.0)
+    name, scanner, model = _SMALL_SWEEP if small else _SWEEP
+    config = load_config(f"{name}.yaml", seed=1, overrides=(f"render.device={device}",))
+    sweep = make_sweep(lidar_model(model), 0.0)
     count = len(sweep.directions)
     figures = {}
     with open_pipeline(config) as pipeline:
-        scene = pipeline.sample(0).scene
-        renderer, lidar = pipeline.renderer, scene.lidar("velodyne")
-        for name, copies in (("one sweep", 1), ("one launch of many", max(1, rays // count))):
-            beams = _repeated(sweep, copies)
+        scene = pipeline.drawn_view(pipeline.accepted_scene(0), 0).scene
+        renderer, lidar = pipeline.renderer, scene.lidar(scanner)
+        for name, copies in (("one sweep", 1), ("one launch of many", -(-rays // count))):
+            beams = _repeated(sweep, copies, lidar_model(model).range_m[1])
             anew = partial(renderer.scan, replace(scene), lidar, beams)
             packed_ms = _wall_ms(anew)
             kernels, _ = timed_activity(anew, device)
@@ -110,13 +116,13 @@ def time_sweeps(device: str, rays: int, repeats: int) -> dict[str, Any]:
     return figures
 
 
-def _repeated(sweep: Sweep, copies: int) -> LidarRays:
+def _repeated(sweep: Sweep, copies: int, range_m: float) -> LidarRays:
     """The rays of several equal sweeps, one after another."""
     count, order = len(sweep.directions), None
     if sweep.order is not None:
         order = np.concatenate([sweep.order + k * count for k in range(copies)]).astype(np.int32)
     directions = np.tile(sweep.directions, (copies, 1))
-    return LidarRays(directions, 0.0, 1, lidar_model(MODEL).range_m[1], order=order)
+    return LidarRays(directions, 0.0, 1, range_m, order=order)
 
 
 def _wall_ms(work: Callable[[], object]) -> float:
@@ -132,6 +138,7 @@ def time_paths(device: str, size_px: tuple[int, int], samples: int) -> dict[str,
         f"render.samples={samples}",
         "render.denoise=false",
         f"sensors[0].size_px=[{size_px[0]}, {size_px[1]}]",
+        "views_per_scene=3",
     )
     with open_pipeline(
         load_config("tabletop_pathtraced.yaml", seed=1, overrides=texts)

@@ -65,8 +65,10 @@ def _rates(rates: Mapping[str, Any]) -> str:
             mb = rate["device_mb"] / rate["ready"]
             stages = ", ".join(f"{stage} {ms:.1f}" for stage, ms in rate["stages"].items())
             rows.append(
-                f"{name}: {mb:.0f} MB of the device per worker; CPU ms per sample: {stages}"
+                f"{name}: {rate['scenes']} scenes in turn, assets cached; {mb:.0f} MB of the device"
+                f" per worker; CPU ms per sample: {stages}"
             )
+        rows += [f"{name}, left out: {what}" for what in rate["left_out"]]
     return "\n".join(rows)
 
 

@@ -6,6 +6,8 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +15,10 @@ import cv2
 import numpy as np
 import pytest
 
-from benchmarks.gpu.parts import run_part
-from benchmarks.gpu.references import differences
+from benchmarks.gpu import __main__ as command
+from benchmarks.gpu import rates
+from benchmarks.gpu.parts import Result, run_part
+from benchmarks.gpu.references import differences, have_same_bytes
 from benchmarks.gpu.report import format_report, reached
 
 ROOT = Path(__file__).parents[2]
@@ -73,14 +77,26 @@ def test_a_point_may_be_a_tenth_of_a_millimetre_off() -> None:
     assert facts({"points/top": here}, {}) == [("sample 0, points/top", "only in one of the two")]
 
 
+def test_a_second_drawing_has_the_same_bytes_also_where_there_is_nothing() -> None:
+    """NaN marks pixels without flow; -0.0 equals 0.0 and has other bytes."""
+    flow = np.array([[np.nan, 0.5], [0.0, np.nan]], np.float32)
+    ids = np.array([1, 2], np.uint16)
+    drawn = {"values/flow": flow, "values/ids": ids}
+
+    assert have_same_bytes(drawn, {"values/flow": flow.copy(), "values/ids": ids.copy()})
+    assert not have_same_bytes(drawn, {"values/flow": flow, "values/ids": ids + 1})
+    assert not have_same_bytes({"values/flow": np.zeros(2)}, {"values/flow": -np.zeros(2)})
+    assert not have_same_bytes(drawn, {"values/flow": flow})
+    assert not have_same_bytes(drawn, {"values/flow": flow, "values/ids": ids.reshape(2, 1)})
+
+
 def test_a_part_that_fails_names_file_line_kernel_and_error() -> None:
     """And leaves the others alone."""
-    result = run_part("broken", "frames:time_kernels", 60.0, config="nowhere", device="cpu",
-                      views=1, small=True)  # fmt: skip
+    result = run_part("broken", "report:format_report", 60.0, figures={"card": 1}, failures={})
 
     assert result.value is None
-    assert result.failure.startswith("benchmarks/gpu/rates.py:")
-    assert "kernel none: KeyError: 'nowhere'" in result.failure
+    assert result.failure.startswith("benchmarks/gpu/report.py:")
+    assert "kernel none: AttributeError: 'int' object has no attribute 'items'" in result.failure
 
 
 def test_a_part_that_takes_too_long_is_left_out() -> None:
@@ -94,7 +110,8 @@ def test_a_part_that_takes_too_long_is_left_out() -> None:
 def test_the_report_ends_with_the_goals_and_what_is_missing() -> None:
     """Shares of 500 samples/s to disk, 2,000 in memory, and 1 billion rays per second."""
     rate = {"ready": 1, "memory": {"1": 100.0, "2": 150.0}, "disk": {"1": 50.0}, "busy": {},
-            "device_mb": 600.0, "stages": {"render": 3.0}, "errors": []}  # fmt: skip
+            "device_mb": 600.0, "stages": {"render": 3.0}, "scenes": 9,
+            "left_out": []}  # fmt: skip
     sweep = {"rays": 4_000_000, "ms": 8.0, "kernels": [["trace", 7.0]]}
     figures = {"rates": {"tabletop": rate}, "sweeps": {"one": sweep}}
 
@@ -111,11 +128,84 @@ def test_the_report_ends_with_the_goals_and_what_is_missing() -> None:
     ]
 
 
+WORKER = """
+import json, sys
+if sys.argv[1] == "2":
+    raise SystemExit("out of memory")
+for line in sys.stdin:
+    number, place, window_s, pool = json.loads(line)
+    made = {"n": 6, "s": 2.0, "scenes": min(pool, 3), "cpu_s": {"render": 0.75}}
+    print(json.dumps(made | {"number": number}), flush=True)
+"""
+"""Makes three samples a second; the third worker ends instead."""
+
+
+@contextmanager
+def answering(folder: Path, count: int) -> Iterator[list[rates._Worker]]:
+    """Workers that answer without any work."""
+    workers = [
+        rates._Worker([sys.executable, "-c", WORKER, str(k)], folder / f"{k}.log")
+        for k in range(count)
+    ]
+    yield workers
+    for worker in workers:
+        worker.end()
+
+
+def test_workers_that_are_not_ready_are_left_out(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of four workers, the third has ended: the other three are measured, and two, and one."""
+    monkeypatch.setattr(rates, "_started", lambda *a: answering(tmp_path, a[3]))
+
+    found = rates.measure_rates("street", "cpu", [1, 2, 4], 0.1, 120.0, small=True, scenes=16)
+
+    assert found["memory"] == found["disk"] == {"3": 9.0, "2": 6.0, "1": 3.0}
+    assert (found["ready"], found["scenes"], found["stages"]) == (3, 3, {"render": 125.0})
+    assert found["left_out"] == ["1 workers not ready: out of memory"]
+
+
+def test_measurements_that_would_end_too_late_are_left_out_and_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A window longer than the limit."""
+    monkeypatch.setattr(rates, "_started", lambda *a: answering(tmp_path, a[3]))
+
+    found = rates.measure_rates("street", "cpu", [1, 2], 121.0, 120.0, small=True, scenes=16)
+
+    assert found["memory"] == found["disk"] == {}
+    assert found["left_out"] == [
+        "disk, 2 workers: 0 of them in time",
+        "memory, 2 workers: 0 of them in time",
+        "disk, 1 workers: 0 of them in time",
+        "memory, 1 workers: 0 of them in time",
+    ]
+
+
+def test_references_that_are_too_large_to_be_carried_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The file is written all the same, and the exit code is 1."""
+    part = tmp_path / "street.npz"
+    noise = np.random.default_rng(1).integers(256, size=8_100_000, dtype=np.uint8)
+    np.savez(part, **{"street/0/scene": noise})
+    done = [Result("street", 1.0, str(part), "")]
+    monkeypatch.setattr(command, "_side_by_side", lambda *_: done)
+    path = tmp_path / "all.npz"
+
+    assert command.main(["--make-references", str(path), "--configs", "street"]) == 1
+
+    assert capsys.readouterr().out.splitlines()[-1] == (
+        f"{path}: more than 8 MB; keep fewer points or pixels"
+    )
+    assert path.exists()
+
+
 def measure(*words: str | Path) -> None:
     """The command, which fails if a part fails or a sample differs."""
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    command = [sys.executable, "-m", "benchmarks.gpu", *words, "--limit-s", "900"]
-    subprocess.run(command, cwd=ROOT, env=environment, check=True)
+    line = [sys.executable, "-m", "benchmarks.gpu", *words, "--limit-s", "900"]
+    subprocess.run(line, cwd=ROOT, env=environment, check=True)
 
 
 @pytest.mark.slow
@@ -128,11 +218,14 @@ def test_the_measurement_runs_on_the_cpu_with_tiny_sizes(tmp_path: Path) -> None
     found = json.loads((tmp_path / "gpu.json").read_text())
     assert found["failures"] == {}
     assert set(found["figures"]) == set(parts)
+    tabletop = found["figures"]["rates"]["tabletop"]
+    assert tabletop["left_out"] == []
+    assert min(tabletop["disk"]["1"], tabletop["memory"]["1"]) > 0.0
 
 
 @pytest.mark.slow
 def test_the_path_of_a_gpu_draws_what_the_cpu_draws(tmp_path: Path) -> None:
-    """One lane per thread, Warp's hierarchies, lists in another order: same labels, same images.
+    """One lane per thread, lists in another order: same labels, same images.
 
     Left untested are the arithmetic of a GPU, and threads that run at the same time.
     """

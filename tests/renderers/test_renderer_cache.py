@@ -2,21 +2,28 @@
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any, Literal
 
 import numpy as np
+import pytest
+import warp as wp
 
 from gen_data.core.asset_types import Material, TextureData
 from gen_data.core.bounded_cache import ObjectCache
 from gen_data.core.capture import Channel
 from gen_data.core.scene import Body, Light, Scene, Weather
 from gen_data.core.se3 import SE3
+from gen_data.core.shutter import Shutter
 from gen_data.renderers.warp.device import open_device
 from gen_data.renderers.warp.device_cache import DeviceCache
 from gen_data.renderers.warp.renderer import WarpRenderer
 from gen_data.renderers.warp.scene.scene_packing import pack_world
+from gen_data.renderers.warp.settings import RenderSettings
 from tests.renderers.fake_library import FakeLibrary, box_mesh, camera_at, plane_mesh
+from tests.renderers.moving import even_track
 
 CHECKER = TextureData(np.full((4, 4, 3), 128, np.uint8))
 LIBRARY = FakeLibrary(
@@ -124,3 +131,46 @@ def test_stored_hierarchies_and_mip_levels_give_the_same_image() -> None:
         for channel in CHANNELS:
             np.testing.assert_array_equal(seen.channels[channel], expected.channels[channel])
     assert {asset for asset, _ in library.stored} == {"box", "floor", "brick"}
+
+
+def filling(allocate: Callable[..., wp.array], byte: int) -> Callable[..., wp.array]:
+    """What returns memory of the CPU, filled with a byte."""
+
+    def filled(*arguments: Any, **options: Any) -> wp.array:
+        array = allocate(*arguments, **options)
+        if array.size:
+            ctypes.memset(array.ptr, byte, array.size * wp.types.type_size_in_bytes(array.dtype))
+        return array
+
+    return filled
+
+
+@pytest.mark.parametrize("visibility", ["raster", "rays"])
+def test_images_depend_on_no_memory_of_earlier_frames(
+    visibility: Literal["raster", "rays"], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Reused and fresh memory is filled with other bytes before each use.
+
+    A box with a clear coat that moves before a rolling shutter, on wet ground.
+    """
+    coated = (Material((0.8, 0.1, 0.1), coat=1.0),)
+    floor, box = SCENE.bodies
+    scene = replace(
+        SCENE,
+        bodies=(floor, replace(box, materials=coated)),
+        tracks=(even_track("box", box.T_world_body, (1.0, 0.5, 0.2), 1.0),),
+    )
+    camera = replace(EYES[0], shutter=Shutter(0.08, 0.2, 4))
+    channels = CHANNELS | {Channel.NORMALS, Channel.RANGE, Channel.CATEGORY}
+    renderer = WarpRenderer(LIBRARY, "cpu", RenderSettings(visibility=visibility))
+    drawn = []
+
+    for byte in (0x3F, 0x00, 0xC1):
+        with monkeypatch.context() as patched:
+            patched.setattr(DeviceCache, "scratch", filling(DeviceCache.scratch, byte))
+            patched.setattr(wp, "empty", filling(wp.empty, byte))
+            drawn.append(renderer.render(replace(scene), camera, channels).channels)
+
+    for other in drawn[1:]:
+        for channel, image in drawn[0].items():
+            assert image.tobytes() == other[channel].tobytes(), channel

@@ -40,13 +40,15 @@ from gen_data.renderers.warp.scene.kernels.ray_queries import (
     path_along,
 )
 from gen_data.renderers.warp.scene.kernels.records import LightRecord, View, World, fast_normalize
-from gen_data.renderers.warp.scene.kernels.simd import SIMD
+from gen_data.renderers.warp.scene.kernels.simd import LANES, SIMD
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 
 # Edge of the aligned blocks of lattice points. Kernels on blocks have up to a thread per point: the
 # last number of a thread and ``run`` tell its points. On the CPU one thread takes a whole block.
 BLOCK = wp.constant(4)
+# Points in a row that smoothing takes or skips together, on all devices.
+GROUP = wp.constant(LANES)
 # Marks points without a value: off all surfaces, or where a lamp contributes nothing.
 UNSEEN = wp.constant(-1.0)
 # Shadows of lamps with a smaller share of a point's light are too faint for further rays.
@@ -328,6 +330,16 @@ def classes_near(classes: wp.array3d[int], first_x: int, last_x: int, y: int, j:
 
 
 @wp.func
+def classes_near_group(classes: wp.array3d[int], x: int, y: int, j: int):
+    """The same for all points of the group that a point belongs to.
+
+    Skipped sums are missing in the windows around, so all devices must skip the same.
+    """
+    first = x / GROUP * GROUP
+    return classes_near(classes, first, first + GROUP - 1, y, j)
+
+
+@wp.func
 def window_bits(lattice: Lattice, values: wp.array2d[float], j: int, i: int):
     """Values of the points of the same material in the window around a point, as bits."""
     x = i % lattice.width
@@ -588,7 +600,7 @@ def sum_rows(
     """
     y, group, j = wp.tid()
     x = group * lanes
-    if is_uniform(classes_near(classes, x, x + lanes - 1, y, j)):
+    if is_uniform(classes_near_group(classes, x, y, j)):
         for k in range(wp.min(lanes, lattice.width - x)):
             sums[j, 0, y * lattice.width + x + k] = 0.0
             sums[j, 1, y * lattice.width + x + k] = 0.0
@@ -610,7 +622,7 @@ def smooth_lattice(
     """Average differing values over neighbours on one surface; ``enough`` as of smooth_column."""
     y, group, j = wp.tid()
     x = group * lanes
-    if is_uniform(classes_near(classes, x, x + lanes - 1, y, j)):
+    if is_uniform(classes_near_group(classes, x, y, j)):
         # With only zeros or only ones around, the mean is the value itself.
         for k in range(wp.min(lanes, lattice.width - x)):
             i = y * lattice.width + x + k
