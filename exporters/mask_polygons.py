@@ -94,7 +94,8 @@ def join_polygons(polygons: Sequence[Polygon] | Sequence[Outline]) -> Polygon | 
     """Join polygons to a single one by lines that lead to each and back.
 
     Each polygon is joined to the vertex of the longest one that is nearest to its first vertex,
-    from its own vertex nearest to that one. For formats with one polygon per object.
+    from its own vertex nearest to that one; the first of several that are equally near. For formats
+    with one polygon per object.
 
     Raises:
         ValueError: there is no polygon.
@@ -103,20 +104,24 @@ def join_polygons(polygons: Sequence[Polygon] | Sequence[Outline]) -> Polygon | 
         raise ValueError("there is no polygon to join")
     if len(polygons) == 1:
         return polygons[0]
-    from scipy.spatial import cKDTree
-
     longest = max(range(len(polygons)), key=lambda k: len(polygons[k]))
     base = polygons[longest]
     others = [polygon for k, polygon in enumerate(polygons) if k != longest]
-    _, nearest = cKDTree(base).query(np.stack([polygon[0] for polygon in others]))
+    nearest = [_nearest(base, polygon[0]) for polygon in others]
     pieces, begin = [], 0
-    for k in np.argsort(nearest, kind="stable").tolist():
-        end, polygon = int(nearest[k]) + 1, others[k]
-        there = int(np.argmin(((polygon - base[end - 1]) ** 2).sum(axis=1)))
+    for k in sorted(range(len(others)), key=nearest.__getitem__):
+        end, polygon = nearest[k] + 1, others[k]
+        there = _nearest(polygon, base[end - 1])
         detour = [polygon[there:], polygon[: there + 1], base[end - 1 : end]]
         pieces += [base[begin:end], *detour]
         begin = end
     return np.concatenate([*pieces, base[begin:]])
+
+
+def _nearest(vertices: Polygon | Outline, point: Polygon | Outline) -> int:
+    """Index of the vertex [n, 2] nearest to a point [2]."""
+    dx, dy = vertices[:, 0] - point[0], vertices[:, 1] - point[1]
+    return int(np.argmin(dx * dx + dy * dy))
 
 
 @dataclass(frozen=True, eq=False, slots=True)
