@@ -232,7 +232,7 @@ def encode_jpeg(source: Path) -> bytes:
     Raises:
         StorageError: the file is missing or no PNG.
     """
-    image = cv2.cvtColor(read_pixels(source), cv2.COLOR_RGB2BGR)
+    image = read_pixels(source, is_bgr=True)
     _, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
     return data.tobytes()
 

@@ -108,9 +108,10 @@ def _all_records(plan: Plan, store: LocalStore) -> list[ShardRecord]:
 
 def _inodes(store: LocalStore, records: list[ShardRecord]) -> dict[Inode, str]:
     """Digests by inode: files that exporters hard-link are not hashed again."""
+    folders = [(store.shard_dir(record.shard), record) for record in records]
     return {
-        get_inode(store.shard_dir(record.shard) / file.path): file.sha256
-        for record in records
+        get_inode(f"{folder}/{file.path}"): file.sha256
+        for folder, record in folders
         for file in record.files
     }
 
@@ -175,7 +176,7 @@ def _entries(
             yield Entry(f"{folder}/{file.path}", file.bytes, file.sha256)
     for name in exporters:
         for inner, size in tree_sizes(store.root / name).items():
-            path = store.root / name / inner
+            path = f"{store.root}/{name}/{inner}"
             digest = known.get(get_inode(path)) or hash_file(path)
             yield Entry(f"{name}/{inner}", size, digest)
 
