@@ -77,11 +77,13 @@ def drawable_polygons(mask: MaskPx) -> tuple[Outline, ...]:
 
 def _inset(polygon: Polygon) -> Outline:
     # Clockwise with y down: the inside is to the right of each edge.
-    along = np.sign(np.roll(polygon, -1, axis=0) - polygon)
-    inwards = np.stack([-along[:, 1], along[:, 0]], axis=1)
-    before = np.roll(inwards, 1, axis=0)
+    along = np.sign(np.diff(polygon, axis=0, append=polygon[:1]))
+    inwards = np.empty((len(polygon) + 1, 2))
+    inwards[1:, 0], inwards[1:, 1] = -along[:, 1], along[:, 0]
+    inwards[0] = inwards[-1]
+    before, after = inwards[:-1], inwards[1:]
     # A vertex between edges of one direction moves once.
-    move = np.where((inwards == before).all(axis=1, keepdims=True), inwards, inwards + before)
+    move = after + before * (after != before).any(axis=1, keepdims=True)
     outline: Outline = np.round(polygon + INSET_PX * move, 2)
     return outline
 
