@@ -78,7 +78,7 @@ def drawable_polygons(mask: MaskPx) -> tuple[Outline, ...]:
 def _inset(polygon: Polygon) -> Outline:
     # Clockwise with y down: the inside is to the right of each edge.
     along = np.sign(np.diff(polygon, axis=0, append=polygon[:1]))
-    inwards = np.empty((len(polygon) + 1, 2))
+    inwards = np.zeros((len(polygon) + 1, 2))
     inwards[1:, 0], inwards[1:, 1] = -along[:, 1], along[:, 0]
     inwards[0] = inwards[-1]
     before, after = inwards[:-1], inwards[1:]

@@ -13,7 +13,6 @@ from enum import IntEnum
 from itertools import pairwise
 from typing import Any
 
-import cv2
 import deflate
 import numpy as np
 from numpy.typing import NDArray
@@ -142,7 +141,7 @@ def _unfilter(rows: UInt8, step: int, bit_depth: int, is_bgr: bool) -> NDArray[A
     height, width = rows.shape[0], (rows.shape[1] - 1) // step
     depth = bit_depth // 8
     filtered = rows[:, 1:].reshape(height, width, step // depth, depth)
-    values: UInt8 = np.empty(filtered.shape, np.uint8)
+    values: UInt8 = np.zeros(filtered.shape, np.uint8)
     ordered = values[:, :, ::-1] if is_bgr else values
     if kind == RowFilter.UP:
         ordered[:] = filtered

@@ -31,7 +31,7 @@ IRREGULAR = -1
 def hash_file(path: Path | str) -> str:
     """Hexadecimal SHA-256 of a file."""
     digest = hashlib.sha256()
-    with open(path, "rb") as file:
+    with Path(path).open("rb") as file:
         while chunk := file.read(CHUNK_BYTES):
             digest.update(chunk)
     return digest.hexdigest()
