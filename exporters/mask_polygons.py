@@ -21,7 +21,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import overload
+from typing import Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -120,7 +120,7 @@ def join_polygons(polygons: Sequence[Polygon] | Sequence[Outline]) -> Polygon | 
     return np.concatenate([*pieces, base[begin:]])
 
 
-def _nearest(vertices: Polygon | Outline, point: Polygon | Outline) -> int:
+def _nearest(vertices: NDArray[Any], point: NDArray[Any]) -> int:
     """Index of the vertex [n, 2] nearest to a point [2]."""
     dx, dy = vertices[:, 0] - point[0], vertices[:, 1] - point[1]
     return int(np.argmin(dx * dx + dy * dy))
