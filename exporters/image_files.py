@@ -194,8 +194,10 @@ def read_image(
     return _decode_pixels(channel, pixels, depth_scale_m)
 
 
-def read_pixels(path: Path) -> NDArray[Any]:
+def read_pixels(path: Path, is_bgr: bool = False) -> NDArray[Any]:
     """Read the pixels of an image file, uint8 or uint16, [h, w] or RGB [h, w, 3].
+
+    ``is_bgr`` is for encoders of OpenCV, which take BGR.
 
     Raises:
         StorageError: the file is missing or no image.
@@ -204,10 +206,10 @@ def read_pixels(path: Path) -> NDArray[Any]:
         data = path.read_bytes()
     except OSError:
         data = b""
-    pixels = decode_png(data)
+    pixels = decode_png(data, is_bgr)
     if pixels is None and data:
         pixels = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
-        if pixels is not None and pixels.ndim == 3:
+        if pixels is not None and pixels.ndim == 3 and not is_bgr:
             pixels = cv2.cvtColor(pixels, cv2.COLOR_BGR2RGB)
     if pixels is None:
         raise StorageError(f"{path}: missing or no image file; generate the data set again")

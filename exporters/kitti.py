@@ -186,7 +186,7 @@ class Kitti(ExporterBase):
                 index, split = line.split(" ", 1)
                 frames_of.setdefault(split, []).append(_frame_name(int(index)))
                 for source, target in self._links(info, camera, shard_dir, int(index)):
-                    link_or_copy(source, dataset_dir / "training" / target)
+                    link_or_copy(source, dataset_dir / f"training/{target}")
         for split, frames in frames_of.items():
             listing = "".join(f"{frame}\n" for frame in frames)
             write_text(dataset_dir / "ImageSets" / f"{split}.txt", listing)
@@ -213,7 +213,7 @@ class Kitti(ExporterBase):
         names = [f"label_2/{frame}.txt", f"calib/{frame}.txt"]
         if has_scans(shard_dir, self._lidar(info), index):
             names += [f"velodyne/{frame}.bin", f"velodyne_labels/{frame}.label"]
-        links = [(shard_dir / self.type / name, name) for name in names]
+        links = [(shard_dir / f"{self.type}/{name}", name) for name in names]
         rgb = media_path(shard_dir, camera, Channel.RGB, index)
         links.append((rgb, f"image_2/{frame}.png"))
         if Channel.Z_DEPTH in info.media[camera]:

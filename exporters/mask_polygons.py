@@ -21,7 +21,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import overload
+from typing import Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,11 +77,13 @@ def drawable_polygons(mask: MaskPx) -> tuple[Outline, ...]:
 
 def _inset(polygon: Polygon) -> Outline:
     # Clockwise with y down: the inside is to the right of each edge.
-    along = np.sign(np.roll(polygon, -1, axis=0) - polygon)
-    inwards = np.stack([-along[:, 1], along[:, 0]], axis=1)
-    before = np.roll(inwards, 1, axis=0)
+    along = np.sign(np.diff(polygon, axis=0, append=polygon[:1]))
+    inwards = np.zeros((len(polygon) + 1, 2))
+    inwards[1:, 0], inwards[1:, 1] = -along[:, 1], along[:, 0]
+    inwards[0] = inwards[-1]
+    before, after = inwards[:-1], inwards[1:]
     # A vertex between edges of one direction moves once.
-    move = np.where((inwards == before).all(axis=1, keepdims=True), inwards, inwards + before)
+    move = after + before * (after != before).any(axis=1, keepdims=True)
     outline: Outline = np.round(polygon + INSET_PX * move, 2)
     return outline
 
@@ -94,7 +96,8 @@ def join_polygons(polygons: Sequence[Polygon] | Sequence[Outline]) -> Polygon | 
     """Join polygons to a single one by lines that lead to each and back.
 
     Each polygon is joined to the vertex of the longest one that is nearest to its first vertex,
-    from its own vertex nearest to that one. For formats with one polygon per object.
+    from its own vertex nearest to that one; the first of several that are equally near. For formats
+    with one polygon per object.
 
     Raises:
         ValueError: there is no polygon.
@@ -103,20 +106,24 @@ def join_polygons(polygons: Sequence[Polygon] | Sequence[Outline]) -> Polygon | 
         raise ValueError("there is no polygon to join")
     if len(polygons) == 1:
         return polygons[0]
-    from scipy.spatial import cKDTree
-
     longest = max(range(len(polygons)), key=lambda k: len(polygons[k]))
     base = polygons[longest]
     others = [polygon for k, polygon in enumerate(polygons) if k != longest]
-    _, nearest = cKDTree(base).query(np.stack([polygon[0] for polygon in others]))
+    nearest = [_nearest(base, polygon[0]) for polygon in others]
     pieces, begin = [], 0
-    for k in np.argsort(nearest, kind="stable").tolist():
-        end, polygon = int(nearest[k]) + 1, others[k]
-        there = int(np.argmin(((polygon - base[end - 1]) ** 2).sum(axis=1)))
+    for k in sorted(range(len(others)), key=nearest.__getitem__):
+        end, polygon = nearest[k] + 1, others[k]
+        there = _nearest(polygon, base[end - 1])
         detour = [polygon[there:], polygon[: there + 1], base[end - 1 : end]]
         pieces += [base[begin:end], *detour]
         begin = end
     return np.concatenate([*pieces, base[begin:]])
+
+
+def _nearest(vertices: NDArray[Any], point: NDArray[Any]) -> int:
+    """Index of the vertex [n, 2] nearest to a point [2]."""
+    dx, dy = vertices[:, 0] - point[0], vertices[:, 1] - point[1]
+    return int(np.argmin(dx * dx + dy * dy))
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -127,11 +127,10 @@ class Voc(ExporterBase):
             for shard_dir, row in fragment_rows(shard_dirs, self.type, "images"):
                 stem = row["stem"]
                 for suffix, folder in FOLDERS.items():
-                    source = shard_dir / self.type / f"{stem}{suffix}"
-                    link_or_copy(source, root / folder / f"{stem}{source.suffix}")
-                link_or_copy(
-                    self._image(info, shard_dir, row), root / "JPEGImages" / row["file_name"]
-                )
+                    source = shard_dir / f"{self.type}/{stem}{suffix}"
+                    link_or_copy(source, root / f"{folder}/{stem}{source.suffix}")
+                image = self._image(info, shard_dir, row)
+                link_or_copy(image, root / f"JPEGImages/{row['file_name']}")
                 for name, line in _list_lines(info, row):
                     if name not in files:
                         path = root / "ImageSets" / f"{name}.txt"
@@ -177,7 +176,7 @@ class Voc(ExporterBase):
 
     def _image(self, info: DatasetInfo, shard_dir: Path, row: dict[str, Any]) -> Path:
         if self._encodes(info, row["sensor"]):
-            return shard_dir / self.type / str(row["file_name"])
+            return shard_dir / f"{self.type}/{row['file_name']}"
         return info.media_path(shard_dir, row["sensor"], Channel.RGB, row["sample"])
 
 
@@ -232,7 +231,7 @@ def encode_jpeg(source: Path) -> bytes:
     Raises:
         StorageError: the file is missing or no PNG.
     """
-    image = cv2.cvtColor(read_pixels(source), cv2.COLOR_RGB2BGR)
+    image = read_pixels(source, is_bgr=True)
     _, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
     return data.tobytes()
 

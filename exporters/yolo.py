@@ -134,10 +134,10 @@ class Yolo(ExporterBase):
                 source = info.media_path(shard_dir, row["sensor"], Channel.RGB, row["sample"])
                 for task in tasks:
                     rows = pose.rows(row["pose"]) if task == "pose" and pose else row[task]
-                    folder, name = dataset_dir / task, row["file_name"]
-                    label = folder / f"labels/{split}/{Path(name).stem}.txt"
+                    name = str(row["file_name"])
+                    label = dataset_dir / f"{task}/labels/{split}/{name.rpartition('.')[0]}.txt"
                     write_text(label, "".join(f"{line}\n" for line in dict.fromkeys(rows)))
-                    link_or_copy(source, folder / f"images/{split}/{name}")
+                    link_or_copy(source, dataset_dir / f"{task}/images/{split}/{name}")
         for task in tasks:
             text = data_text(info, task, written, pose if task == "pose" else None)
             write_text(dataset_dir / task / "data.yaml", text)

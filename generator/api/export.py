@@ -78,8 +78,8 @@ def export(  # noqa: PLR0913  (keywords of one front door)
         overrides.append(label_map_override(Path(label_map), stored.categories))
     source = os.fspath(folder)
     with _named_formats():
-        config = load_config(source, overrides=overrides)
-        _check_annotations(load_config(source), config)
+        config = load_config(source, overrides=overrides, first_scene_only=True)
+        _check_annotations(load_config(source, first_scene_only=True), config)
         exporters = ready_exporters(config, stored.info, open_assets(config.asset_folders))
         check_scene(config, stored.sample(0).scene)
     summary = write_exports(

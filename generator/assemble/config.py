@@ -6,6 +6,7 @@ import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from itertools import islice
 from pathlib import Path
 from typing import Any, TypedDict, TypeVar, cast
 
@@ -279,11 +280,14 @@ class Changes(TypedDict, total=False):
         seed: Seed of the data set; None = the configuration's.
         overrides: ``KEY=VALUE`` each.
         without: Names of randomizers to leave out.
+        first_scene_only: Check the first scene instead of all outcomes of shared values: for a
+            data set whose scenes exist.
     """
 
     seed: int | None
     overrides: Sequence[str]
     without: Sequence[str]
+    first_scene_only: bool
 
 
 def load_config(source: str, **changes: Unpack[Changes]) -> Config:
@@ -341,7 +345,8 @@ def _make_config(document: Node, name: str, changes: Changes) -> Config:
         problems.add(document.position, "sensors", "at least one sensor is needed")
     for key, names in CONSTANT.items():
         _refuse_varying(sections[key], key, names)
-    probes = _probe(document, head.seed if head else 0, problems)
+    scenes = 1 if changes.get("first_scene_only") else None
+    probes = _probe(document, head.seed if head else 0, problems, scenes)
     problems.raise_if_any()
     assert head is not None
     assert render is not None
@@ -374,10 +379,12 @@ def _refuse_varying(listed: Node, key: str, names: tuple[str, ...]) -> None:
     problems.raise_if_any()
 
 
-def _probe(document: Node, seed: int, problems: Problems) -> tuple[SceneConfig, ...]:
-    """Distinct configurations of scenes for probe values; stops at the first with errors."""
+def _probe(
+    document: Node, seed: int, problems: Problems, scenes: int | None
+) -> tuple[SceneConfig, ...]:
+    """Distinct configurations of the first probe values (None = all); stops at errors."""
     section = document.entries["shared"]
-    every = list(probe_values(section, seed)) if section.content else [{}]
+    every = list(islice(probe_values(section, seed), scenes)) if section.content else [{}]
     configs: list[SceneConfig] = []
     known = _Known()
     for shared in every:

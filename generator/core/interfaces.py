@@ -555,7 +555,7 @@ class DatasetInfo:
     def media_path(self, shard_dir: Path, camera: str, channel: Channel, index: int) -> Path:
         """Path of the image of one channel of one sample, in the camera's encoding."""
         suffix = self.encoding(camera, channel).suffix
-        return media_path(shard_dir, camera, channel, index).with_suffix(suffix)
+        return shard_dir / f"{camera}/{channel.value}/{index:09d}{suffix}"
 
     def sensor(self, name: str) -> SensorInfo:
         """The sensor of that name. Raises KeyError if there is none."""

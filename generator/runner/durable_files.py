@@ -12,7 +12,7 @@ import os
 import shutil
 import stat
 import sys
-from collections.abc import Container, Iterator
+from collections.abc import Container, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
@@ -28,21 +28,21 @@ IRREGULAR = -1
 """The "size" of a directory entry that is neither a file nor a folder."""
 
 
-def hash_file(path: Path) -> str:
+def hash_file(path: Path | str) -> str:
     """Hexadecimal SHA-256 of a file."""
     digest = hashlib.sha256()
-    with path.open("rb") as file:
+    with Path(path).open("rb") as file:
         while chunk := file.read(CHUNK_BYTES):
             digest.update(chunk)
     return digest.hexdigest()
 
 
-def sync_path(path: Path) -> None:
+def sync_path(path: Path | str) -> None:
     """Flush the bytes of a file, or the entries of a folder, to the disk.
 
     Windows opens no folders, and flushes only files that are open for writing.
     """
-    if IS_WINDOWS and path.is_dir():
+    if IS_WINDOWS and Path(path).is_dir():
         return
     descriptor = os.open(path, os.O_RDWR if IS_WINDOWS else os.O_RDONLY)
     try:
@@ -57,21 +57,26 @@ def sync_tree(folder: Path, synced: Container[Inode] = ()) -> None:
     ``synced`` are the inodes of files that are already on the disk. Files are flushed together:
     a file system writes its journal once for several that wait.
     """
+    # Paths are text: for thousands of small files, objects cost as much as the flushes.
     folders, files = [], []
     for inner, _, names in os.walk(folder, topdown=False):
-        folders.append(Path(inner))
-        paths = (Path(inner, name) for name in names)
+        folders.append(inner)
+        paths = (f"{inner}/{name}" for name in names)
         files += [path for path in paths if get_inode(path) not in synced]
     with ThreadPoolExecutor(SYNC_THREADS) as pool:
-        for _ in pool.map(sync_path, files):
+        for _ in pool.map(_sync_paths, (files[k::SYNC_THREADS] for k in range(SYNC_THREADS))):
             pass
-    for path in folders:
+    _sync_paths(folders)
+
+
+def _sync_paths(paths: Iterable[str]) -> None:
+    for path in paths:
         sync_path(path)
 
 
-def get_inode(path: Path) -> Inode:
+def get_inode(path: Path | str) -> Inode:
     """Device and inode number, equal for all hard links to one file."""
-    status = path.lstat()
+    status = os.lstat(path)
     return (status.st_dev, status.st_ino)
 
 

@@ -53,8 +53,8 @@ class StoredPipeline:
         return self.stored.info
 
     def sample(self, index: int) -> Sample:
-        """Read a sample; its images are decoded on access."""
-        sample = self.stored.sample(index)
+        """Read a sample without points; its images are decoded on access."""
+        sample = self.stored.sample(index, has_points=False)
         capture = sample.capture
         times_s = {name: one.time_s for name, one in capture.readings.items()}
         times_s |= {name: one.time_s for name, one in capture.clouds.items()}

@@ -83,12 +83,13 @@ def finalize(
         for name, data in documents.items():
             store.replace_file(name, data, scratch)
         entries = [_entry_of_bytes(name, data) for name, data in documents.items()]
-        entries += _entries(plan, store, records, names, known)
+        record_bytes = [record.to_bytes() for record in records]
+        entries += _entries(plan, store, records, record_bytes, names, known)
         entries.sort(key=_by_path)
         sums = sums_text(entries)
         sealed_before.expect(entries)
         folders = [f"{n}/{inner}" for n in names for inner in empty_folders(store.root / n)]
-        manifest = _manifest(plan, pipeline.info, records, entries, folders)
+        manifest = _manifest(plan, pipeline.info, records, record_bytes, entries, folders)
         sealed = [*entries, _entry_of_bytes(MANIFEST_NAME, manifest)]
         lines = sums_text(sorted(sealed, key=_by_path))
         store.replace_file(SUMS_NAME, lines.encode(), scratch)
@@ -108,9 +109,10 @@ def _all_records(plan: Plan, store: LocalStore) -> list[ShardRecord]:
 
 def _inodes(store: LocalStore, records: list[ShardRecord]) -> dict[Inode, str]:
     """Digests by inode: files that exporters hard-link are not hashed again."""
+    folders = [(store.shard_dir(record.shard), record) for record in records]
     return {
-        get_inode(store.shard_dir(record.shard) / file.path): file.sha256
-        for record in records
+        get_inode(f"{folder}/{file.path}"): file.sha256
+        for folder, record in folders
         for file in record.files
     }
 
@@ -163,19 +165,20 @@ def _entries(
     plan: Plan,
     store: LocalStore,
     records: list[ShardRecord],
+    record_bytes: list[bytes],
     exporters: list[str],
     known: Mapping[Inode, str],
 ) -> Iterator[Entry]:
     """Plan, records, files of shards and of exporters, in no particular order."""
     yield _entry_of_bytes(PLAN_NAME, plan_bytes(plan))
-    for record in records:
+    for record, data in zip(records, record_bytes, strict=True):
         folder = f"{SHARDS_NAME}/{store.shard_dir(record.shard).name}"
-        yield _entry_of_bytes(f"{folder}.json", record.to_bytes())
+        yield _entry_of_bytes(f"{folder}.json", data)
         for file in record.files:
             yield Entry(f"{folder}/{file.path}", file.bytes, file.sha256)
     for name in exporters:
         for inner, size in tree_sizes(store.root / name).items():
-            path = store.root / name / inner
+            path = f"{store.root}/{name}/{inner}"
             digest = known.get(get_inode(path)) or hash_file(path)
             yield Entry(f"{name}/{inner}", size, digest)
 
@@ -184,6 +187,7 @@ def _manifest(
     plan: Plan,
     info: DatasetInfo,
     records: list[ShardRecord],
+    record_bytes: list[bytes],
     entries: list[Entry],
     folders: list[str],
 ) -> bytes:
@@ -204,7 +208,7 @@ def _manifest(
         "scenes": sum(record.scenes for record in records),
         "rejections": sum(record.rejections for record in records),
         "bytes": sum(record.size_bytes for record in records),
-        "shards": [hashlib.sha256(record.to_bytes()).hexdigest() for record in records],
+        "shards": [hashlib.sha256(data).hexdigest() for data in record_bytes],
         # Sizes of the files that equal no file of a shard.
         "files": {e.path: e.bytes for e in entries if e.sha256 not in sized_by_records},
         "empty_folders": folders,

@@ -98,8 +98,9 @@ class ShardRecord:
 
         Its ``sha256`` is that of the same line without it.
         """
-        checksum = hashlib.sha256(canonical_json(self).encode()).hexdigest()
-        return (canonical_json({**to_plain(self), "sha256": checksum}) + "\n").encode()
+        plain = to_plain(self)
+        checksum = hashlib.sha256(canonical_json(plain).encode()).hexdigest()
+        return (canonical_json({**plain, "sha256": checksum}) + "\n").encode()
 
 
 def parse_record(data: bytes) -> ShardRecord | None:
@@ -157,7 +158,8 @@ def describe_shard(
         )
     try:
         files = tuple(
-            FileRecord(path, size, _digest(folder / path, known)) for path, size in sizes.items()
+            FileRecord(path, size, _digest(f"{folder}/{path}", known))
+            for path, size in sizes.items()
         )
     except ValueError as error:
         raise StorageError(f"shard {shard}: {error}; exporters must write such files") from None
@@ -175,7 +177,7 @@ def describe_shard(
     )
 
 
-def _digest(path: Path, known: Mapping[Inode, str]) -> str:
+def _digest(path: str, known: Mapping[Inode, str]) -> str:
     digest = known.get(get_inode(path)) if known else None
     return digest or hash_file(path)
 

@@ -113,8 +113,10 @@ class StoredSamples:
         config: Mapping[str, Any] = self.plan.config
         return config
 
-    def labelled(self, index: int) -> LabelledImages:
+    def labelled(self, index: int, has_points: bool = True) -> LabelledImages:
         """The sample of that number, whose scene, images and points are read on access.
+
+        Without ``has_points``, its scans are empty, as those that exporters receive.
 
         Raises:
             StorageError: a file of the sample's shard is missing or damaged.
@@ -122,15 +124,15 @@ class StoredSamples:
         folder = self._folder_of(index)
         with self._damage(folder / LABELS_NAME):
             labels = parse_labels(self._line(LABELS_NAME, index))
-        return LabelledImages(self, labels, self._capture(folder, labels))
+        return LabelledImages(self, labels, self._capture(folder, labels, has_points))
 
-    def sample(self, index: int) -> Sample:
-        """The whole sample of that number; its images and points are read on access.
+    def sample(self, index: int, has_points: bool = True) -> Sample:
+        """The whole sample of that number, see ``labelled``, with its scene.
 
         Raises:
             StorageError: a file of the sample's shard is missing or damaged.
         """
-        light, kept = self.labelled(index), self.kept_scene(index)
+        light, kept = self.labelled(index, has_points), self.kept_scene(index)
         return Sample(
             index=kept.index,
             scene_index=kept.scene_index,
@@ -195,7 +197,7 @@ class StoredSamples:
                 f"\n    gen-data verify {self.folder} --full"
             ) from error
 
-    def _capture(self, folder: Path, labels: Labels) -> Capture:
+    def _capture(self, folder: Path, labels: Labels, has_points: bool) -> Capture:
         index = labels.index
         readings = {
             name: SensorReading(
@@ -210,6 +212,8 @@ class StoredSamples:
 
         def cloud(name: str) -> PointCloud:
             scan = labels.scans[name]
+            if not has_points:
+                return PointCloud(name, scan.lidar, np.zeros(0, POINT), scan.time_s)
             path = cloud_path(folder, name, index)
             points = _load(path, POINT)
             if not np.isfinite(points["position_m"]).all():

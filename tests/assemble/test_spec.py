@@ -128,6 +128,13 @@ def test_probes_are_the_configurations_that_their_shared_values_give_alone(name:
         assert repr(config.scene_config(probe.shared)) == repr(probe)
 
 
+def test_a_configuration_with_finished_scenes_may_probe_the_first_alone() -> None:
+    """Exports draw nothing: outcomes of shared values were checked before their data set."""
+    (probe,) = load_config("street.yaml", first_scene_only=True).probes
+
+    assert repr(probe) == repr(load_config("street.yaml").probes[0])
+
+
 def test_spec_crosses_process_borders() -> None:
     """A worker process gets the Config itself, not a path that may change meanwhile."""
     spec = load_config("tabletop.yaml")

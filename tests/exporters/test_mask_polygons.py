@@ -133,6 +133,17 @@ def test_a_joined_drawable_polygon_covers_the_pixels() -> None:
     np.testing.assert_array_equal(drawn([joined], 9, 9), pixels)
 
 
+def test_parts_are_joined_at_the_first_of_equally_near_vertices() -> None:
+    """Four vertices are 4 px from the part's first one; a search tree finds another of them."""
+    far = [[x, 20] for x in range(-20, 21, 2)]
+    near = [[0, 4], [-4, 0], [0, -4], [4, 0]]
+    part = np.array([[0, 0], [1, 0], [1, 1]])
+
+    joined = join_polygons([np.array(far + near), part])
+
+    assert joined.tolist() == [*far, [0, 4], [1, 1], [0, 0], [1, 0], [1, 1], [0, 4], *near[1:]]
+
+
 def test_a_rectangle_has_its_four_corners() -> None:
     """From the upper left corner, clockwise; COCO's box is 20 wide and 10 high."""
     (polygon,) = mask_polygons(MaskPx(10, 5, np.ones((10, 20), bool)))

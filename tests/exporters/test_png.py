@@ -76,6 +76,9 @@ def test_the_fast_decoder_agrees_with_opencv(
     assert read is not None
     assert read.dtype == dtype
     np.testing.assert_array_equal(read, expected[..., ::-1] if len(shape) == 3 else expected)
+    in_opencv_order = decode_png(data, is_bgr=True)
+    assert in_opencv_order is not None
+    np.testing.assert_array_equal(in_opencv_order, expected)
 
 
 def test_the_fast_decoder_leaves_other_files_to_opencv() -> None:
