@@ -6,6 +6,8 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from benchmarks.readers import detection, records, rigs, sequences
 from benchmarks.readers.truth import (
     POSES,
@@ -23,7 +25,6 @@ from benchmarks.readers.truth import (
     scanned_instances,
     scans,
     scans_and_lenses,
-    stereo,
 )
 from benchmarks.readers.views import View
 from gen_data.core.scene import Instance
@@ -98,6 +99,10 @@ def nyu40_class(instance: Instance) -> str:
     return ("", *public_classes("nyu40"))[number]
 
 
+STEREO = {
+    "disparity": lambda r: np.nan_to_num(r.channels["disparity"]),
+    "flow": lambda r: np.nan_to_num(r.channels["flow_forward"]),
+}
 D, S = detection, sequences
 READERS: tuple[Reader, ...] = (
     Reader("pycocotools", "coco", D.by_pycocotools, ALL, iou=1, lens=0),
@@ -181,7 +186,7 @@ READERS: tuple[Reader, ...] = (
            tolerance=0.15, because="tenths of pixels; boxes around the corners"),
     Reader("torchvision", "cityscapes", records.by_torchvision_cityscapes,
            Boxes(LEFT, name_of=city_class), "rig", iou=1),
-    Reader("torchvision", "kitti_stereo", S.by_torchvision_stereo, stereo, "rig",
+    Reader("torchvision", "kitti_stereo", S.by_torchvision_stereo, Images(LEFT, STEREO), "rig",
            is_partial=True, because="flow of frames that have a next one"),
     Reader("trackeval", "kitti_tracking", S.by_trackeval,
            Boxes(LEFT, (0, 0, -1, -1), tracked), "rig", is_partial=True,

@@ -253,13 +253,3 @@ def grey_depth(reading: CameraReading) -> NDArray[np.float64]:
     """Inverse depth between 0.3 m, 255, and 3 m, 0."""
     share = (1 / reading.depth_m.astype(float) - 1 / 3) / (1 / 0.3 - 1 / 3)
     return 255.0 * np.clip(share, 0.0, 1.0)
-
-
-def stereo(folder: Path) -> Iterator[View]:
-    """Disparities of the left camera, and its flow where there is any; 0 where they end."""
-    for name, reading, _ in readings(folder, ("image_02",)):
-        flow, disparity = (reading.channels[key] for key in ("flow_forward", "disparity"))
-        things = [thing("disparity", np.nan_to_num(disparity, posinf=0.0))]
-        if np.isfinite(flow).any():
-            things.append(thing("flow", np.nan_to_num(flow)))
-        yield View(name, tuple(things))
