@@ -19,7 +19,7 @@ estimators of relative depth have. Sequences need the fixed range, since depth w
 ``metadata.jsonl`` follows Hugging Face's ``imagefolder``: its columns are ``image``, ``depth``,
 ``segmentation``, ``edges`` and ``text``. diffusers' ``train_controlnet.py`` takes them by name.
 
-A frame that is missing ends a clip; the next one is numbered after those of all views.
+A frame that is missing ends a clip; the next one is numbered behind all views.
 
 Videos are MPEG-4, written by OpenCV: their bytes are the same in every run on a machine, but its
 encoder chooses code by processor. The last row or column of an odd size is cut off.

@@ -203,7 +203,7 @@ def visible_flow(shard_dir: Path, camera: str, index: int) -> bytes:
 _README = """\
 {name}: format of KITTI's stereo benchmark of 2015, sensors '{left}' and '{right}'
 
-training/   All frames, or with flow those that have a next one; ImageSets/*.txt list the frames of
+training/   All frames, or with flow all that have a next one; ImageSets/*.txt list the frames of
             each split.
 image_2     RGB of '{left}'; _11 is the next step, where there is one.
 image_3     RGB of '{right}'.

@@ -9,7 +9,7 @@
     training/evaluate_tracking.seqmap.train      those of one split: also val, test
 
 A frame is an instant at which camera 02 reads, numbered without gaps: after a frame that is
-missing, another sequence starts, numbered after those of all views. Labels have 17 columns,
+missing, another sequence starts, numbered behind all views. Labels have 17 columns,
 separated by blanks: ``frame track_id type truncated occluded alpha left top right bottom h w l x y
 z rotation_y``. They equal the rows of the exporter ``kitti``, but ``track_id`` is the instance id
 (-1 for DontCare), ``truncated`` is 0, 1 or 2, and sitting people are ``Person``, as in KITTI's

@@ -9,8 +9,8 @@
 Rows of ``gt.txt``: ``frame,id,left,top,width,height,flag,class,visibility``. Frames, ids and pixels
 start at 1; ids are instance ids; ``flag`` is 1 for scored objects, which are pedestrians only, as
 in MOT16. ``visibility`` is the visible fraction of the whole silhouette. A frame is an instant at
-which the camera reads; after a frame that is missing, another sequence starts, numbered after those
-of all views, since readers count the images.
+which the camera reads; after a frame that is missing, another sequence starts, numbered behind all
+views, since readers count the images.
 
 Reference: Milan et al., "MOT16: A Benchmark for Multi-Object Tracking", 2016, table 5 (classes);
 its static person (7) sits or lies. Vans, trucks and buses are cars here; categories without a class

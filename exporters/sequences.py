@@ -108,10 +108,10 @@ def read_sequences(shard_dirs: Sequence[Path], exporter: str) -> dict[int, list[
 def even_sequences(
     info: DatasetInfo, shard_dirs: Sequence[Path], exporter: str
 ) -> dict[int, list[Frame]]:
-    """Read sequences of frames at even distances, in order; what follows a gap is another one.
+    """Read sequences of frames at even distances, in order; a gap ends a sequence.
 
-    It has a number after those of all views. The distance is the smallest in the data set: a camera
-    that reads every second step has no gaps.
+    The frames after it are another one, numbered behind all views. The distance is the smallest in
+    the data set: a camera that reads every second step has no gaps.
     """
     sequences = read_sequences(shard_dirs, exporter)
     pairs = chain.from_iterable(map(pairwise, sequences.values()))
