@@ -19,6 +19,8 @@ estimators of relative depth have. Sequences need the fixed range, since depth w
 ``metadata.jsonl`` follows Hugging Face's ``imagefolder``: its columns are ``image``, ``depth``,
 ``segmentation``, ``edges`` and ``text``. diffusers' ``train_controlnet.py`` takes them by name.
 
+A frame that is missing ends a clip; the next one is numbered behind all views.
+
 Videos are MPEG-4, written by OpenCV: their bytes are the same in every run on a machine, but its
 encoder chooses code by processor. The last row or column of an odd size is cut off.
 
@@ -31,7 +33,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator, Sequence
-from itertools import groupby
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
@@ -48,7 +49,6 @@ from gen_data.core.serialization import canonical_json
 from gen_data.exporters.base import ANY_FORMAT, ExporterBase
 from gen_data.exporters.captions import caption
 from gen_data.exporters.conventions import ANY_LENS, Conventions
-from gen_data.exporters.fragments import fragment_rows
 from gen_data.exporters.id_colors import id_colors
 from gen_data.exporters.image_files import (
     DEPTH_UNITS_MAX,
@@ -60,9 +60,9 @@ from gen_data.exporters.label_png import encode_label_png
 from gen_data.exporters.png import RowFilter, encode_png
 from gen_data.exporters.sensor_selection import rgb_camera
 from gen_data.exporters.sequences import (
-    FRAMES,
     Frame,
     check_frame_names,
+    even_sequences,
     frame_facts,
     frame_rate_hz,
     write_bytes,
@@ -187,9 +187,7 @@ class ControlClips(ExporterBase):
         """Link the images of every clip, describe it, and list all frames."""
         camera = rgb_camera(info, self.camera, self.type)
         dataset_dir.mkdir(parents=True, exist_ok=True)
-        rows = fragment_rows(shard_dirs, self.type, FRAMES)
-        for number, members in groupby(rows, lambda item: int(item[1]["sequence"])):
-            frames = [Frame(shard_dir, row) for shard_dir, row in members]
+        for number, frames in even_sequences(info, shard_dirs, self.type).items():
             split = dataset_dir / frames[0].row["split"]
             folder = split / f"{number:06d}"
             for k, frame in enumerate(frames):

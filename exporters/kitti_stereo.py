@@ -15,7 +15,8 @@
   centre; the point is in image_3 at x minus disparity.
 * **Flow** is 16-bit RGB PNG: 64 times the pixels to the right and down, plus 32768; the third
   channel is 1 if the flow is valid. There are folders for the channels that the left camera writes.
-* **Frames** are named by sample; the next step is present if the sequence has one.
+* **Frames** are named by sample; the next step is present if the sequence has one. With flow,
+  frames without a next one are left out: readers pair the k-th ``_10`` with the k-th ``_11``.
 * **Calibration** is as in KITTI's raw data: ``P_rect_03`` has minus focal length times baseline.
 
 Reference: Menze and Geiger, "Object Scene Flow for Autonomous Vehicles", CVPR 2015; its devkit.
@@ -102,9 +103,13 @@ class KittiStereo(ExporterBase):
         """Link all files of the shards into one tree and list the frames of each split."""
         pair = self._pair(info)
         frames_of: dict[str, list[str]] = {split: [] for split in SPLITS}
+        # Without sequences no frame has a next one.
+        is_paired = Channel.FLOW_FORWARD in info.media[pair["02"]] and info.steps_per_scene > 1
         for frames in read_sequences(shard_dirs, self.type).values():
             followers = {frame.index - 1: frame for frame in frames}
             for frame in frames:
+                if is_paired and frame.index not in followers:
+                    continue
                 frames_of.setdefault(frame.row["split"], []).append(f"{frame.index:06d}\n")
                 links = self._links(info, pair, frame, followers.get(frame.index))
                 for source, target in links:
@@ -198,7 +203,8 @@ def visible_flow(shard_dir: Path, camera: str, index: int) -> bytes:
 _README = """\
 {name}: format of KITTI's stereo benchmark of 2015, sensors '{left}' and '{right}'
 
-training/   All frames; ImageSets/*.txt say which split each belongs to.
+training/   All frames, or with flow all that have a next one; ImageSets/*.txt list the frames of
+            each split.
 image_2     RGB of '{left}'; _11 is the next step, where there is one.
 image_3     RGB of '{right}'.
 disp_occ_0  Disparity of image_2, 16-bit: pixels = value / 256; 0 = none, or 256 and more.

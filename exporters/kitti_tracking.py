@@ -8,7 +8,8 @@
     training/evaluate_tracking.seqmap.training   all sequences, with their number of frames
     training/evaluate_tracking.seqmap.train      those of one split: also val, test
 
-A frame is an instant at which camera 02 reads, numbered without gaps. Labels have 17 columns,
+A frame is an instant at which camera 02 reads, numbered without gaps: after a frame that is
+missing, another sequence starts, numbered behind all views. Labels have 17 columns,
 separated by blanks: ``frame track_id type truncated occluded alpha left top right bottom h w l x y
 z rotation_y``. They equal the rows of the exporter ``kitti``, but ``track_id`` is the instance id
 (-1 for DontCare), ``truncated`` is 0, 1 or 2, and sitting people are ``Person``, as in KITTI's
@@ -44,10 +45,10 @@ from gen_data.exporters.sequences import (
     Mount,
     camera_mount,
     check_sequence_count,
+    even_sequences,
     frame_facts,
     lidar_mount,
     matrix_numbers,
-    read_sequences,
     relative_pose,
     write_bytes,
     write_frames,
@@ -129,7 +130,7 @@ class KittiTracking(ExporterBase):
         """Link images and scans, join labels, and list the sequences."""
         folder = dataset_dir / "training"
         seqmaps: dict[str, list[str]] = {"training": [], "train": [], "val": [], "test": []}
-        for number, frames in read_sequences(shard_dirs, self.type).items():
+        for number, frames in even_sequences(info, shard_dirs, self.type).items():
             name = f"{number:04d}"
             self._write_sequence(info, frames, folder, name)
             for split in ("training", frames[0].row["split"]):

@@ -9,7 +9,8 @@
 Rows of ``gt.txt``: ``frame,id,left,top,width,height,flag,class,visibility``. Frames, ids and pixels
 start at 1; ids are instance ids; ``flag`` is 1 for scored objects, which are pedestrians only, as
 in MOT16. ``visibility`` is the visible fraction of the whole silhouette. A frame is an instant at
-which the camera reads.
+which the camera reads; after a frame that is missing, another sequence starts, numbered behind all
+views, since readers count the images.
 
 Reference: Milan et al., "MOT16: A Benchmark for Multi-Object Tracking", 2016, table 5 (classes);
 its static person (7) sits or lies. Vans, trucks and buses are cars here; categories without a class
@@ -34,9 +35,9 @@ from gen_data.exporters.sensor_selection import rgb_camera
 from gen_data.exporters.sequences import (
     Frame,
     check_sequence_count,
+    even_sequences,
     frame_facts,
     frame_rate_hz,
-    read_sequences,
     write_frames,
     write_text,
 )
@@ -118,7 +119,7 @@ class MotChallenge(ExporterBase):
         """Link images, join rows, and list the sequences of each split."""
         benchmark = "_".join(info.name.split())
         names: dict[str, list[str]] = {}
-        for number, frames in read_sequences(shard_dirs, self.type).items():
+        for number, frames in even_sequences(info, shard_dirs, self.type).items():
             name = f"{benchmark}-{number:04d}"
             split = frames[0].row["split"]
             names.setdefault(split, []).append(name)

@@ -3,7 +3,8 @@
 A sequence consists of all instants of one view of one scene; its number is ``index //
 steps_per_scene``. Its frames are the instants at which the format's camera (or scanner) reads,
 numbered without gaps. A shard may end within a sequence: it contains a JSON line per frame, and
-merging the shards numbers the frames.
+merging the shards numbers the frames. In formats that state no times, a frame that is missing ends
+a sequence (``even_sequences``).
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
-from itertools import groupby
+from itertools import chain, count, groupby, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -104,15 +105,35 @@ def read_sequences(shard_dirs: Sequence[Path], exporter: str) -> dict[int, list[
     return sequences
 
 
-def unbroken_episodes(frames: Iterable[Frame]) -> Iterator[list[Frame]]:
+def even_sequences(
+    info: DatasetInfo, shard_dirs: Sequence[Path], exporter: str
+) -> dict[int, list[Frame]]:
+    """Read sequences of frames at even distances, in order; a gap ends a sequence.
+
+    The frames after it are another one, numbered behind all views. The distance is the smallest in
+    the data set: a camera that reads every second step has no gaps.
+    """
+    sequences = read_sequences(shard_dirs, exporter)
+    pairs = chain.from_iterable(map(pairwise, sequences.values()))
+    steps = min((later.index - frame.index for frame, later in pairs), default=1)
+    even: dict[int, list[Frame]] = {}
+    numbers = count(max((sequence_count(info), *(number + 1 for number in sequences))))
+    for number, frames in sequences.items():
+        first, *others = unbroken_episodes(frames, steps)
+        even[number] = first
+        even |= {next(numbers): part for part in others}
+    return dict(sorted(even.items()))
+
+
+def unbroken_episodes(frames: Iterable[Frame], steps: int = 1) -> Iterator[list[Frame]]:
     """Yield the frames of each sequence, in order; a sample that does not exist ends an episode.
 
-    For formats whose frames are one step apart by definition.
+    For formats whose frames are a number of steps apart by definition.
     """
 
     def run_of(item: tuple[int, Frame]) -> tuple[int, int]:
         place, frame = item
-        return frame.row["sequence"], frame.index - place
+        return frame.row["sequence"], frame.index - steps * place
 
     for _, run in groupby(enumerate(frames), key=run_of):
         yield [frame for _, frame in run]

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from benchmarks.readers.views import Comparison
 
 HERE = Path(__file__).parent
-DATA = {"tabletop": ("bent_tabletop.yaml", 4), "rig": ("rig.yaml", 3)}
+DATA = {"tabletop": ("bent_tabletop.yaml", 4), "rig": ("rig.yaml", 3), "arm": ("arm.yaml", 4)}
 """Configuration and number of samples by the name of a data set."""
 RUNS = ({"type": "coco", "segmentation": "rle"}, {"type": "cvat", "shapes": "polygon"})
 """Formats of ``runs``, which is exported from ``tabletop``: other shapes of masks."""
@@ -84,7 +84,8 @@ def make_data(folder: Path) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", gen_data.ConfigWarning)
         for name, (config, n) in DATA.items():
-            gen_data.generate(HERE / config, n, out=folder / name, workers=0)
+            if not (folder / name / "manifest.json").exists():
+                gen_data.generate(HERE / config, n, out=folder / name, workers=0)
         if not (folder / "runs/manifest.json").exists():
             gen_data.export(folder / "tabletop", RUNS, folder / "runs")
 

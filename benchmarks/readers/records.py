@@ -15,13 +15,7 @@ import numpy as np
 
 from benchmarks.readers.detection import SIDES, decode, import_torchvision, matrix_lens
 from benchmarks.readers.truth import image_name
-from benchmarks.readers.views import Thing, View, from_corner, thing
-
-
-def of_pixels(category: str, mask: Any) -> Thing:
-    """A thing with the box of its mask."""
-    y, x = np.nonzero(mask)
-    return thing(category, (x.min(), y.min(), x.max() + 1, y.max() + 1), mask)
+from benchmarks.readers.views import Thing, View, from_corner, of_pixels, thing
 
 
 def by_h5py(root: Path) -> Iterator[View]:
@@ -42,7 +36,7 @@ def by_h5py(root: Path) -> Iterator[View]:
 
 def by_datasets(root: Path) -> Iterator[View]:
     """Hugging Face's own format, by its card."""
-    for split in _load(str(root)).values():
+    for split in load_dataset(str(root)).values():
         names = split.features["objects"]["category"].feature.names
         for row in split:
             found, size = row["objects"], [row["height"], row["width"]]
@@ -55,7 +49,7 @@ def by_datasets(root: Path) -> Iterator[View]:
             yield View(image_name(row["sample"], row["sensor"]), tuple(things), lens)
 
 
-def _load(path: str, **files: Any) -> Any:
+def load_dataset(path: str, **files: Any) -> Any:
     """A data set of the package datasets, with all splits."""
     os.environ |= {"HF_HUB_OFFLINE": "1", "HF_DATASETS_OFFLINE": "1"}
     import datasets
@@ -68,7 +62,9 @@ def by_datasets_webdataset(root: Path) -> Iterator[View]:
     """WebDataset in the package datasets."""
     files = {path.name: str(path / "*.tar") for path in sorted(root.iterdir())}
     rows = (
-        row["json"] for split in _load("webdataset", data_files=files).values() for row in split
+        row["json"]
+        for split in load_dataset("webdataset", data_files=files).values()
+        for row in split
     )
     for labels in rows:
         for camera, row in labels["cameras"].items():
@@ -84,24 +80,30 @@ def _labelled(row: Mapping[str, Any]) -> Thing:
 def by_datasets_language(root: Path) -> Iterator[View]:
     """Objects of referring expressions; furniture has no box."""
     files = {path.name.split("_")[0]: str(path) for path in sorted(root.glob("*_images.jsonl"))}
-    for split in _load("json", data_files=files).values():
+    for split in load_dataset("json", data_files=files).values():
         for row in split:
             things = (_labelled(one) for one in row["objects"] if one.get("bbox"))
             yield View(Path(row["file_name"]).stem, tuple(things))
 
 
-def by_tfrecord(root: Path) -> Iterator[View]:
-    """Records of the Object Detection API; boxes are fractions in 32 bits."""
-    from PIL import Image
+def examples(root: Path, pattern: str) -> Iterator[dict[str, list[Any]]]:
+    """Lists by key of all records of the files, in order."""
     from tfrecord import example_pb2
     from tfrecord.reader import tfrecord_iterator
 
-    for record in (r for p in sorted(root.glob("*.tfrecord")) for r in tfrecord_iterator(str(p))):
+    for record in (r for p in sorted(root.glob(pattern)) for r in tfrecord_iterator(str(p))):
         example = example_pb2.Example.FromString(bytes(record))
-        row = {
+        yield {
             key: list(getattr(value, value.WhichOneof("kind") or "bytes_list").value)
             for key, value in example.features.feature.items()
         }
+
+
+def by_tfrecord(root: Path) -> Iterator[View]:
+    """Records of the Object Detection API; boxes are fractions in 32 bits."""
+    from PIL import Image
+
+    for row in examples(root, "*.tfrecord"):
         size = [row["image/width"][0], row["image/height"][0]] * 2
         names = [name.decode() for name in row["image/object/class/text"]]
         sides = np.transpose([row[f"image/object/bbox/{side}"] for side in SIDES]) * size

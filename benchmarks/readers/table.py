@@ -6,12 +6,33 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from benchmarks.readers import detection, records, rigs
-from benchmarks.readers.truth import Boxes, Cubes, Poses, mot_category, scans, scans_and_lenses
+import numpy as np
+
+from benchmarks.readers import detection, records, rigs, sequences
+from benchmarks.readers.truth import (
+    POSES,
+    Boxes,
+    Cubes,
+    Images,
+    birdseye,
+    grasps,
+    grey_depth,
+    joints,
+    measurements,
+    millimetres,
+    mot_category,
+    pose,
+    scanned_instances,
+    scans,
+    scans_and_lenses,
+)
 from benchmarks.readers.views import View
+from gen_data.core.scene import Instance
 from gen_data.exporters.cityscapes_classes import city_classes
 from gen_data.exporters.kitti import official_type
+from gen_data.exporters.label_map import public_classes
 from gen_data.exporters.nuscenes_classes import category_of
+from gen_data.exporters.scannet import class_numbers
 
 Read = Callable[[Path], Iterable[View]]
 """Views of a folder: of an export by a reader, or of a data set by ``gen_data.open``."""
@@ -27,7 +48,7 @@ class Reader:
         read: Yields what the export holds.
         expected: Yields what the data set states.
         data: Name of the data set (``__main__.DATA``).
-        unit: Of the numbers: ``px`` or ``m``; empty for a reader of lenses only.
+        unit: Of the numbers, such as ``px`` or ``m``; empty for a reader of lenses only.
         tolerance: Largest difference of a number.
         iou: Smallest overlap of masks; None if it reads none.
         lens: Largest difference of lenses [px, coefficients]; None if it reads none.
@@ -61,12 +82,28 @@ def frame(number: str) -> str:
     return f"{int(number):09d}_image_02"
 
 
-def city_class(instance: object) -> str:
+def city_class(instance: Instance) -> str:
     """Class of Cityscapes."""
-    return city_classes().of_instance(instance).name  # type: ignore[arg-type]
+    return city_classes().of_instance(instance).name
 
 
-D = detection
+def tracked(instance: Instance) -> str:
+    """KITTI's type as TrackEval spells it, and the track."""
+    kind = official_type(instance).removesuffix("_sitting").lower()
+    return f"{kind} {instance.instance_id}"
+
+
+def nyu40_class(instance: Instance) -> str:
+    """Class of ScanNet's images; empty = none."""
+    number = class_numbers("nyu40").get(instance.category, 0)
+    return ("", *public_classes("nyu40"))[number]
+
+
+STEREO = {
+    "disparity": lambda r: np.nan_to_num(r.channels["disparity"]),
+    "flow": lambda r: np.nan_to_num(r.channels["flow_forward"]),
+}
+D, S = detection, sequences
 READERS: tuple[Reader, ...] = (
     Reader("pycocotools", "coco", D.by_pycocotools, ALL, iou=1, lens=0),
     Reader("pycocotools", "coco", D.by_pycocotools, ALL, "runs", iou=1, lens=0),
@@ -114,13 +151,13 @@ READERS: tuple[Reader, ...] = (
            because="nine decimals of a fraction"),
     Reader("rerun-sdk", "rerun", records.by_rerun, ALL, lens=FLOATS,
            because="32-bit floats; pinholes only"),
-    Reader("evo", "tum_rgbd", rigs.by_evo, Poses(("color",)), unit="m", tolerance=1e-8,
-           because="nine decimals"),
-    Reader("opencv-python-headless", "calibration", rigs.by_opencv, Poses(posed=False), unit="",
+    Reader("evo", "tum_rgbd", rigs.by_evo, Images(("color",), {"pose": pose}), unit="m",
+           tolerance=1e-8, because="nine decimals"),
+    Reader("opencv-python-headless", "calibration", rigs.by_opencv, Images(), unit="",
            lens=1e-9, because="decimals"),
-    Reader("pycolmap", "calibration", rigs.by_pycolmap, Poses(), unit="m", tolerance=1e-9,
+    Reader("pycolmap", "calibration", rigs.by_pycolmap, POSES, unit="m", tolerance=1e-9,
            lens=1e-9, because="decimals of quaternions"),
-    Reader("usd-core", "usd", rigs.by_usd_core, Poses(), unit="m", tolerance=1e-6, lens=FLOATS,
+    Reader("usd-core", "usd", rigs.by_usd_core, POSES, unit="m", tolerance=1e-6, lens=FLOATS,
            because="apertures of 32 bits"),
     Reader("mcap", "mcap", rigs.by_mcap, ALL, lens=0),
     Reader("mcap", "mcap", rigs.by_mcap_cubes, Cubes(), unit="m", tolerance=1e-8, is_partial=True,
@@ -149,4 +186,26 @@ READERS: tuple[Reader, ...] = (
            tolerance=0.15, because="tenths of pixels; boxes around the corners"),
     Reader("torchvision", "cityscapes", records.by_torchvision_cityscapes,
            Boxes(LEFT, name_of=city_class), "rig", iou=1),
+    Reader("torchvision", "kitti_stereo", S.by_torchvision_stereo, Images(LEFT, STEREO), "rig",
+           is_partial=True, because="flow of frames that have a next one"),
+    Reader("trackeval", "kitti_tracking", S.by_trackeval,
+           Boxes(LEFT, (0, 0, -1, -1), tracked), "rig", is_partial=True,
+           because="KITTI's numbers: first and last pixel; DontCare is left out"),
+    Reader("open3d", "semantickitti", S.by_open3d_ml, scanned_instances, "rig", "m"),
+    Reader("pandas", "tables", S.by_pandas_tables, measurements, "rig", "SI", 1e-5,
+           because="seven digits of 32-bit floats"),
+    Reader("pandas", "birdseye", S.by_pandas_birdseye, birdseye, "rig", "m", 2e-4, iou=1,
+           is_partial=True, because="tenths of a millimetre; objects of the map"),
+    Reader("opencv-python-headless", "scannet", S.by_opencv_scannet,
+           Images(("color",), {"depth": millimetres, "pose": pose}, nyu40_class), unit="px, mm",
+           tolerance=0.501, iou=1, lens=1e-6, because="whole millimetres, NYU40's classes"),
+    Reader("datasets", "control_clips", S.by_datasets_clips,
+           Images(("color",), {"rgb": lambda r: r.rgb, "depth": grey_depth}, lambda _: "instance"),
+           unit="px, grey", tolerance=0.501, iou=1, because="whole grey levels"),
+    Reader("graspnetAPI", "graspnet", S.by_graspnet, grasps, unit="m", tolerance=1e-6,
+           because="32-bit floats"),
+    Reader("lerobot", "lerobot", S.by_lerobot, joints, "arm", "rad, grey", FLOATS,
+           because="32-bit floats"),
+    Reader("tfrecord", "rlds", S.by_tfrecord_episodes, joints, "arm", "rad, grey", FLOATS,
+           because="32-bit floats"),
 )  # fmt: skip

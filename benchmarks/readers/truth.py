@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
 from itertools import chain
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 import gen_data
-from benchmarks.readers.views import Thing, View, cube, thing
+from benchmarks.readers.views import Thing, View, cube, of_pixels, thing
 from gen_data.api.sample import CameraReading
 from gen_data.core.sample import MaskPx
-from gen_data.core.scene import Instance
+from gen_data.core.scene import Instance, Scene
 from gen_data.core.se3 import SE3
 from gen_data.exporters import motchallenge
 
@@ -24,12 +26,14 @@ def image_name(index: int, sensor: str) -> str:
     return f"{index:09d}_{sensor}"
 
 
-def readings(folder: Path, cameras: tuple[str, ...] = ()) -> Iterator[tuple[str, CameraReading]]:
-    """Images of the cameras by name; of all without names."""
+def readings(
+    folder: Path, cameras: tuple[str, ...] = ()
+) -> Iterator[tuple[str, CameraReading, Scene]]:
+    """Images of the cameras by name, and the world; of all without names."""
     for sample in gen_data.open(folder):
         for name, reading in sample.cameras.items():
             if name in cameras or not cameras:
-                yield image_name(sample.index, name), reading
+                yield image_name(sample.index, name), reading, sample.scene
 
 
 def lens(reading: CameraReading) -> tuple[float, ...]:
@@ -70,7 +74,7 @@ class Boxes:
 
     def __call__(self, folder: Path) -> Iterator[View]:
         """All images."""
-        for name, reading in readings(folder, self.cameras):
+        for name, reading, _ in readings(folder, self.cameras):
             shape, listed = reading.channels["rgb"].shape[:2], []
             for item in reading.objects:
                 category = self.name_of(item.instance)
@@ -127,25 +131,125 @@ def scans(folder: Path) -> Iterator[View]:
             yield View(image_name(sample.index, name), (points,))
 
 
+def scanned_instances(folder: Path) -> Iterator[View]:
+    """Points of every instance with a class of SemanticKITTI in the scans."""
+    for sample in gen_data.open(folder):
+        for name, cloud in sample.lidars.items():
+            ids, points = cloud.points["instance_id"], cloud.points["position_m"]
+            known = [(one, scan_class(one)) for one in sample.scene.instances]
+            things = (
+                thing(f"{label} {one.instance_id}", points[ids == one.instance_id])
+                for one, label in known
+                if label and (ids == one.instance_id).any()
+            )
+            yield View(image_name(sample.index, name), tuple(things))
+
+
+def scan_class(instance: Instance) -> str:
+    """Class of SemanticKITTI that its benchmark judges; empty for what is not counted."""
+    rider = instance.category in SCAN_RIDERS and dict(instance.attributes).get("rider") == "yes"
+    return (SCAN_RIDERS if rider else SCAN_CLASSES).get(instance.category, "")
+
+
+SCAN_RIDERS = {"bicycle": "bicyclist", "motorcycle": "motorcyclist"}
+SCAN_CLASSES = {
+    **dict.fromkeys(("car", "van"), "car"),
+    **dict.fromkeys(("bus", "tram"), "other-vehicle"),
+    **dict.fromkeys(("pedestrian", "person"), "person"),
+    **{name: name for name in ("bicycle", "motorcycle", "truck")},
+    "cyclist": "bicyclist",
+    "motorcyclist": "motorcyclist",
+}
+
+
+def measurements(folder: Path) -> Iterator[View]:
+    """Columns of every device; 0 where there is no number."""
+    for sample in gen_data.open(folder):
+        for name, rows in sample.measurements.items():
+            things = (thing(key, np.nan_to_num(rows[key])) for key in rows.dtype.names or ())
+            yield View(image_name(sample.index, name), tuple(things))
+
+
+def birdseye(folder: Path) -> Iterator[View]:
+    """Boxes in the world, and layers of the map around the ego."""
+    for view, sample in zip(Cubes()(folder), gen_data.open(folder), strict=True):
+        frame = sample.core.frame
+        assert frame is not None
+        assert frame.birdseye is not None
+        layers = (thing(name, (), mask) for name, mask in frame.birdseye.layers.items())
+        yield View(view.name, (*view.things, *layers))
+
+
+def grasps(folder: Path) -> Iterator[View]:
+    """Score, width between open fingers, rotation and place of the grasps of each object seen."""
+    for sample in gen_data.open(folder):
+        assert sample.core.frame is not None
+        for name in ("color",):
+            reading, rows = sample.cameras[name], defaultdict(list)
+            seen = {box.instance_id for box in reading.boxes2d}
+            T_camera_world = np.linalg.inv(reading.T_world_camera)
+            for grasp in sample.core.frame.grasps or ():
+                pose = T_camera_world @ grasp.T_world_grasp.matrix()
+                # The exporter's clearance on both sides.
+                size = (grasp.score, grasp.width_m + 2 * 0.003)
+                rows[grasp.instance_id].append((*size, *pose[:3, :3].ravel(), *pose[:3, 3]))
+            things = (thing(str(k), np.array(row)) for k, row in rows.items() if k in seen)
+            yield View(image_name(sample.index, name), tuple(things))
+
+
+def joints(folder: Path) -> Iterator[View]:
+    """Positions of an arm's joints [rad, m], and photographs."""
+    for sample in gen_data.open(folder):
+        (arm,) = sample.scene.articulations
+        yield View(image_name(sample.index, "arm"), (thing("state", arm.joint_positions),))
+    yield from Images((), {"rgb": lambda reading: reading.rgb})(folder)
+
+
 def scans_and_lenses(folder: Path) -> Iterator[View]:
     """Points of every scan, and the lens of every camera."""
-    return chain(scans(folder), Poses(posed=False)(folder))
+    return chain(scans(folder), Images()(folder))
 
 
 @dataclass(frozen=True)
-class Poses:
-    """Lenses of cameras, and their poses in the world as 3 x 4 matrices.
+class Images:
+    """Numbers of images, and their lenses.
 
     Attributes:
         cameras: Names; all without them.
-        posed: Whether the format has poses.
+        numbers: Numbers of a reading by name.
+        name_of: Name of an instance, each of which is a mask; empty = left out. None = no masks.
     """
 
     cameras: tuple[str, ...] = ()
-    posed: bool = True
+    numbers: Mapping[str, Callable[[CameraReading], NDArray[Any]]] = field(default_factory=dict)
+    name_of: Callable[[Instance], str] | None = None
 
     def __call__(self, folder: Path) -> Iterator[View]:
         """All images."""
-        for name, reading in readings(folder, self.cameras):
-            pose = (thing("pose", reading.T_world_camera[:3]),)
-            yield View(name, pose if self.posed else (), lens(reading))
+        for name, reading, scene in readings(folder, self.cameras):
+            things = [thing(key, values(reading)) for key, values in self.numbers.items()]
+            for instance in scene.instances if self.name_of else ():
+                mask = reading.instance_ids == instance.instance_id
+                category = self.name_of(instance) if self.name_of else ""
+                if category and mask.any():
+                    things.append(of_pixels(category, mask))
+            yield View(name, tuple(things), lens(reading))
+
+
+def pose(reading: CameraReading) -> NDArray[np.float64]:
+    """Of the camera in the world, 3 x 4."""
+    return reading.T_world_camera[:3]
+
+
+POSES = Images((), {"pose": pose})
+
+
+def millimetres(reading: CameraReading) -> NDArray[np.float64]:
+    """Depth; 0 where there is none."""
+    return np.where(np.isfinite(reading.depth_m), 1000.0 * reading.depth_m, 0.0)
+
+
+def grey_depth(reading: CameraReading) -> NDArray[np.float64]:
+    """Inverse depth between 0.3 m, 255, and 3 m, 0."""
+    share = (1 / reading.depth_m.astype(float) - 1 / 3) / (1 / 0.3 - 1 / 3)
+    return 255.0 * np.clip(share, 0.0, 1.0)

@@ -58,6 +58,12 @@ def from_corner(category: str, box: Iterable[float], mask: object = None) -> Thi
     return thing(category, (x, y, x + width, y + height), mask)
 
 
+def of_pixels(category: str, mask: NDArray[np.bool_]) -> Thing:
+    """A thing with the box of its mask."""
+    y, x = np.nonzero(mask)
+    return thing(category, (x.min(), y.min(), x.max() + 1, y.max() + 1), mask)
+
+
 def cube(category: str, pose: SE3, size_m: Iterable[float]) -> Thing:
     """A thing in space: centre, and half its length, width and height along its axes [m]."""
     matrix = pose.matrix()
@@ -139,4 +145,5 @@ class Comparison:
 def _iou(one: NDArray[np.bool_], other: NDArray[np.bool_]) -> float:
     if one.shape != other.shape:
         return 0.0
-    return float((one & other).sum() / max(1, (one | other).sum()))
+    union = (one | other).sum()
+    return float((one & other).sum() / union) if union else 1.0

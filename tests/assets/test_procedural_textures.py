@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import ast
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import ImageFont
 
+from gen_data import content
 from gen_data.content.procedural import TEXTURES
 from gen_data.content.procedural.packaging import can_size
 from gen_data.core.asset_types import TextureData
@@ -217,3 +221,23 @@ def test_worley_distances_agree_with_brute_force() -> None:
     away = np.sqrt((row[:, None, None] - all_y) ** 2 + (column[None, :, None] - all_x) ** 2)
 
     assert np.allclose(points.nearest, np.sort(away, axis=2)[..., 0], atol=1e-4)
+
+
+def test_every_printed_character_has_a_glyph() -> None:
+    """Words of tables are in ASCII, for OpenCV 4 has no other letters; others are in Pillow's font.
+
+    That font draws the same box for every character that it lacks.
+    """
+    (folder,) = map(Path, content.__path__)
+    lines = (line for p in folder.rglob("*.yaml") for line in p.read_text("utf-8").splitlines())
+    foreign = {w for line in lines for w in line.partition("# ")[0].split() if not w.isascii()}
+    trees = (ast.parse(p.read_text("utf-8")) for p in folder.rglob("*.py"))
+    literals = {n.value for tree in trees for n in ast.walk(tree) if isinstance(n, ast.Constant)}
+    # Docstrings of several lines have sources with other letters.
+    words = {w for w in literals if isinstance(w, str) and "\n" not in w}
+    font = ImageFont.load_default(size=20)
+    glyphs = {c: bytes(font.getmask(c)) for c in {*"".join(words), "\uffff"}}
+    box = glyphs.pop("\uffff")
+
+    assert foreign == set()
+    assert {c for c, glyph in glyphs.items() if glyph == box} == set()

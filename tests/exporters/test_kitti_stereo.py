@@ -50,7 +50,7 @@ def tree(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_disparities_are_those_of_depth(tree: Path, world: Any) -> None:
     """Focal length times baseline over depth, to half of 1/256 px."""
     _, samples = world.pairs()
-    for sample in samples:
+    for sample in (sample for sample in samples if sample.step_index < 3):
         left = sample.capture.readings["left"]
         exact = left.camera.intrinsics.fx_px * BASELINE_M / left.channels[Channel.Z_DEPTH]
         read = read_disparity(tree / f"training/disp_occ_0/{sample.index:06d}_10.png")
@@ -98,11 +98,14 @@ def test_points_are_in_the_right_image_at_x_minus_disparity(tree: Path, world: A
 
 
 def test_every_frame_has_both_images_and_those_of_the_next_step(tree: Path) -> None:
-    """The last step of a sequence has none; _11 of one frame is _10 of the next."""
+    """RAFT and torchvision pair the k-th of ``*_10.png`` with the k-th of ``*_11.png``.
+
+    The last step of a sequence has no next one; _11 of one frame is _10 of the next.
+    """
+    frames = (0, 1, 2, 4, 5, 6)
     for folder in ("image_2", "image_3"):
         names = {p.name for p in (tree / "training" / folder).iterdir()}
-        following = {f"{k:06d}_11.png" for k in (0, 1, 2, 4, 5, 6)}
-        assert names == {f"{k:06d}_10.png" for k in range(8)} | following
+        assert names == {f"{k:06d}_{step}.png" for k in frames for step in (10, 11)}
         first, second = (
             (tree / "training" / folder / name).read_bytes()
             for name in ("000000_11.png", "000001_10.png")
@@ -115,9 +118,21 @@ def test_splits_list_frames_by_name(tree: Path) -> None:
     listed = {k: (tree / f"ImageSets/{k}.txt").read_text().split() for k in ("train", "val")}
 
     assert listed == {
-        "train": [f"{k:06d}" for k in range(4)],
-        "val": [f"{k:06d}" for k in range(4, 8)],
+        "train": [f"{k:06d}" for k in range(3)],
+        "val": [f"{k:06d}" for k in range(4, 7)],
     }
+
+
+def test_without_flow_the_last_step_is_a_frame_too(world: Any, tmp_path: Path) -> None:
+    """A pair of images and its disparities are complete without a next step."""
+    info, samples = world.pairs()
+    left = info.sensor("left")
+    kept = tuple(c for c in left.channels if not c.value.startswith("flow"))
+    sensors = tuple(replace(s, channels=kept) if s is left else s for s in info.sensors)
+    root = world.export(KittiStereo(), replace(info, sensors=sensors), samples, tmp_path)
+
+    for folder in ("image_2", "disp_occ_0"):
+        assert len(list((root / "training" / folder).glob("*_10.png"))) == 8
 
 
 def test_data_sets_without_a_pair_are_refused(world: Any) -> None:

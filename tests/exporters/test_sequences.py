@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -10,6 +12,7 @@ import pytest
 
 from gen_data.core.errors import ConfigError
 from gen_data.exporters.coco import Coco
+from gen_data.exporters.control_clips import ControlClips
 from gen_data.exporters.kitti import Kitti
 from gen_data.exporters.kitti_raw import KittiRaw
 from gen_data.exporters.kitti_tracking import KittiTracking
@@ -46,6 +49,40 @@ def test_frames_are_numbered_by_the_camera_that_a_format_is_about(
     rows = (tracking / "training/label_02/0001.txt").read_text().splitlines()
     assert {row.split()[0] for row in rows} == {"0", "1"}
     assert stems(tracking / "training/velodyne/0001") == ["000000", "000001"]
+
+
+def test_a_sequence_ends_at_a_gap(world: Any, tmp_path: Path) -> None:
+    """Trackers take frames of one sequence as neighbours; what follows has a number after all."""
+    info, kept = drive_info(world), [s for s in world.drive() if s.index not in {1, 7}]
+    mot = world.export(MotChallenge(), info, kept, tmp_path / "m")
+    tracking = world.export(KittiTracking(), info, kept, tmp_path / "t") / "training"
+    clips = world.export(ControlClips(near_m=5.0, far_m=60.0), info, kept, tmp_path / "c")
+
+    lengths = {p.name: len(stems(p / "img1")) for p in mot.glob("street-*/street-*")}
+    assert lengths == {"street-0000": 1, "street-0001": 3, "street-0002": 2}
+    assert (mot / "seqmaps/street-train.txt").read_text() == "name\nstreet-0000\nstreet-0002\n"
+    assert (mot / "street-train/street-0002/seqinfo.ini").read_text().count("seqLength=2") == 1
+    assert (tracking / "evaluate_tracking.seqmap.training").read_text() == (
+        "0000 empty 000000 000001\n0001 empty 000000 000003\n0002 empty 000000 000002\n"
+    )
+    assert stems(tracking / "image_02/0002") == ["000000", "000001"]
+    assert stems(tracking / "label_02") == ["0000", "0001", "0002"]
+    facts = {p.parent.name: json.loads(p.read_text()) for p in clips.glob("*/*/clip.json")}
+    samples = {name: row["samples"] for name, row in facts.items()}
+    assert samples == {"000000": [0], "000001": [4, 5, 6], "000002": [2, 3]}
+
+
+@pytest.mark.parametrize("exporter", [MotChallenge(), ControlClips(near_m=5.0, far_m=60.0)])
+def test_every_second_frame_is_a_sequence_at_half_the_rate(
+    exporter: Any, world: Any, tmp_path: Path
+) -> None:
+    """A selection at even distances has no gap."""
+    kept = [sample for sample in world.drive() if sample.index % 2]
+    folder = world.export(exporter, drive_info(world), kept, tmp_path)
+
+    texts = [p.read_text() for name in ("seqinfo.ini", "clip.json") for p in folder.rglob(name)]
+    assert len(texts) == 2
+    assert all(re.search(r"frameRate=5\n|\"rate_hz\": ?5\b", text) for text in texts)
 
 
 @pytest.mark.parametrize(
