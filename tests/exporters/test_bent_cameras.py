@@ -14,31 +14,11 @@ import pytest
 from tfrecord import example_pb2
 from tfrecord.reader import tfrecord_iterator
 
-from gen_data.core.errors import ConfigError
 from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.lens import Lens
 from gen_data.exporters import TABLE
 from gen_data.exporters.hdf5 import fields_rad
 from tests.exporters.bent import LENSES, bent_samples, opencv_rays
-
-
-@pytest.mark.parametrize("kind", ["kitti", "kitti_raw", "kitti_tracking", "semantickitti"])
-def test_no_form_of_kitti_takes_a_fisheye(world: Any, kind: str) -> None:
-    """Their calibrations have a matrix and no distortion; a pinhole is taken."""
-    exporter = TABLE.load(kind).model_validate({"type": kind})
-
-    exporter.check(world.info(4, lidars=("top",), lenses={"color": "pinhole"}))
-    with pytest.raises(ConfigError, match=f"'{kind}': camera 'color' has a lens.*pinhole"):
-        exporter.check(world.info(4, lidars=("top",), lenses={"color": "kannala_brandt"}))
-
-
-@pytest.mark.parametrize("kind", ["coco", "motchallenge"])
-def test_formats_of_image_boxes_take_any_lens(world: Any, kind: str) -> None:
-    """Boxes and masks are where the lens puts them."""
-    exporter = TABLE.load(kind).model_validate({"type": kind})
-
-    assert exporter.check(world.info(4, lenses={"color": "kannala_brandt"})) is None
-
 
 POINTS_M = np.array([[0.1, 0.2, 1.0], [-0.6, 0.3, 1.2], [0.7, -0.5, 1.1], [0.0, 0.0, 3.0]])
 

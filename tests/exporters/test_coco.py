@@ -19,12 +19,10 @@ from pycocotools.cocoeval import COCOeval
 
 from gen_data.annotations.annotate import Thresholds
 from gen_data.core.capture import Channel
-from gen_data.core.errors import ConfigError
 from gen_data.core.lens import Lens
 from gen_data.core.scene import Weather
 from gen_data.core.se3 import SE3
 from gen_data.exporters.coco import Coco
-from gen_data.exporters.label_map import LabelMap, MappedExporter
 
 # pycocotools' decoder predates numpy 2's __array__(copy=...).
 pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
@@ -135,14 +133,6 @@ def test_a_split_without_images_has_no_file(dataset: Path) -> None:
 
     stems = ("instances", "car_keypoints", "pedestrian_keypoints")
     assert names == {f"{stem}_{split}.json" for stem in stems for split in ("train", "val")}
-
-
-def test_images_are_links_to_the_shards(dataset: Path) -> None:
-    """No image is stored twice."""
-    shard = dataset.parent / "shards/000001"
-
-    assert (dataset / "val/000000004_color.png").samefile(shard / "color/rgb/000000004.png")
-    assert (dataset / "depth/val/000000004_color.png").samefile(shard / "color/depth/000000004.png")
 
 
 def test_the_pose_and_box_project_onto_the_image_box(train: COCO) -> None:
@@ -296,41 +286,15 @@ def test_boxes_are_floats_in_json(dataset: Path) -> None:
 def test_ignored_objects_are_crowds(world: Any, tmp_path: Path, segmentation: Any) -> None:
     """Which COCOeval does not count; their masks are run lengths."""
     sample = world.samples[0]
-    truth = sample.truth["color"]
-    first, *others = truth.objects
-    marked = replace(truth, objects=(replace(first, ignored=True), *others))
-    changed = replace(sample, truth={"color": marked})
+    first = sample.truth["color"].objects[0]
 
     exporter = Coco(segmentation=segmentation)
-    folder = world.export(exporter, world.info(1), [changed], tmp_path)
+    folder = world.export(exporter, world.info(1), [world.ignoring(sample)], tmp_path)
 
     opened_truth = opened(folder / "annotations/instances_train.json")
     crowds = [row for row in opened_truth.anns.values() if row["iscrowd"]]
     assert [row["instance_id"] for row in crowds] == [first.instance.instance_id]
     assert opened_truth.annToMask(crowds[0]).sum() == first.visible_px
-
-
-def test_an_ignored_region_without_a_class_is_ignored_for_every_class(
-    world: Any, tmp_path: Path
-) -> None:
-    """COCOeval ignores class by class: a detection there is no error for any of them."""
-    exporter = MappedExporter(
-        Coco(), LabelMap(classes={"box": ("crate",), "walker": ("pedestrian",)}, others="ignore")
-    )
-    car = world.instance(1, "car", 9.0, 2.5, 0.0)
-    crate = world.instance(2, "crate", 8.0, -1.0, 0.0)
-    sample = world.sample(0, (car, crate), [world.camera()])
-
-    folder = world.export(exporter, world.info(1), [sample], tmp_path)
-
-    truth = opened(folder / "annotations/instances_train.json")
-    assert set(truth.cats) >= {row["category_id"] for row in truth.anns.values()}
-    crowds = [row for row in truth.anns.values() if row["iscrowd"]]
-    assert [row["category_id"] for row in crowds] == sorted(truth.cats)
-    assert {row["instance_id"] for row in crowds} == {1}
-    assert len(truth.anns) == len(truth.dataset["annotations"]) == 3
-    # A false positive in a region that nobody ignores would halve the precision.
-    assert average_precision(truth, "bbox") == pytest.approx(1.0, abs=1e-9)
 
 
 def test_hidden_objects_are_not_listed(world: Any, tmp_path: Path) -> None:
@@ -361,14 +325,6 @@ def test_two_cameras_give_two_images_per_sample(world: Any, tmp_path: Path) -> N
     truth = opened(folder / "annotations/instances_train.json")
     found = {image["file_name"]: image["id"] for image in truth.imgs.values()}
     assert found == {"000000000_left.png": 2, "000000000_right.png": 3}
-
-
-def test_a_data_set_without_colour_images_is_refused(world: Any) -> None:
-    """Before anything is rendered."""
-    info = world.info(1, media={"color": (Channel.Z_DEPTH,)})
-
-    with pytest.raises(ConfigError, match="no sensor of color writes the rgb channel"):
-        Coco().check(info)
 
 
 def object_keypoint_similarity(truth: COCO, sigmas: list[float] | None) -> float:

@@ -15,8 +15,6 @@ import pytest
 from numpy.typing import NDArray
 from PIL import Image
 
-from gen_data.core.capture import Channel
-from gen_data.core.errors import ConfigError
 from gen_data.exporters.coco import Coco
 from gen_data.exporters.coco_panoptic import CocoPanoptic
 from tests.exporters.coco_masks import drawn_mask
@@ -251,12 +249,9 @@ def test_the_sky_is_above_the_horizon(dataset: Path) -> None:
 def test_ignored_objects_are_void(world: Any, tmp_path: Path) -> None:
     """Evaluation leaves out what is predicted there."""
     sample = world.samples[0]
-    truth = sample.truth["color"]
-    first, *others = truth.objects
-    marked = replace(truth, objects=(replace(first, ignored=True), *others))
+    first, *others = sample.truth["color"].objects
 
-    changed = replace(sample, truth={"color": marked})
-    folder = world.export(CocoPanoptic(), world.info(1), [changed], tmp_path)
+    folder = world.export(CocoPanoptic(), world.info(1), [world.ignoring(sample)], tmp_path)
 
     (annotation,) = read(folder)["annotations"]
     assert len(annotation["segments_info"]) == len(others)
@@ -264,11 +259,3 @@ def test_ignored_objects_are_void(world: Any, tmp_path: Path) -> None:
     mask = first.mask
     crop = ids[mask.y_px : first.box.y_max, mask.x_px : first.box.x_max]
     assert (crop[mask.pixels] == 0).all()
-
-
-def test_a_camera_without_instance_images_is_refused(world: Any) -> None:
-    """Before anything is rendered."""
-    info = world.info(1, media={"color": (Channel.RGB, Channel.CATEGORY)})
-
-    with pytest.raises(ConfigError, match="'color' does not write the channel instance; add it"):
-        CocoPanoptic().check(info)

@@ -6,7 +6,6 @@ import json
 import re
 import shutil
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -234,35 +233,6 @@ def test_the_suggested_range_of_a_sequence_uses_most_greys(
     (dark, light), _ = inverse_depth(np.array([farthest_m, nearest_m], np.float32), (near_m, far_m))
 
     assert int(light) - int(dark) >= 160
-
-
-@pytest.mark.parametrize(
-    ("exporter", "steps", "message"),
-    [
-        (ControlClips(), 4, "depth of a sequence needs a fixed range"),
-        (ControlClips(near_m=5.0), 1, "expected both, with near_m < far_m, or neither"),
-        (ControlClips(near_m=5.0, far_m=5.0), 1, "expected both, with near_m < far_m, or neither"),
-    ],
-)
-def test_ranges_that_make_no_sense_are_refused(
-    world: Any, exporter: ControlClips, steps: int, message: str
-) -> None:
-    """Before anything is rendered."""
-    with pytest.raises(ConfigError, match=message):
-        exporter.check(world.info(8, steps_per_scene=steps))
-
-
-@pytest.mark.parametrize(
-    ("segmentation", "missing"), [("instance", Channel.INSTANCE), ("category", Channel.CATEGORY)]
-)
-def test_missing_channels_are_named(world: Any, segmentation: Any, missing: Channel) -> None:
-    """The camera writes the painted ids, and depth."""
-    known = (Channel.RGB, Channel.Z_DEPTH)
-    info = world.info(1, media={"color": known})
-    with pytest.raises(ConfigError, match=f"does not write the channel {missing}"):
-        ControlClips(segmentation=segmentation).check(info)
-    with pytest.raises(ConfigError, match="does not write the channel depth"):
-        ControlClips().check(replace(world.info(1, media={"color": (Channel.RGB, missing)})))
 
 
 def test_categories_have_a_colour_each(world: Any, tmp_path: Path) -> None:

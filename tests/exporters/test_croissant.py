@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gen_data.core.errors import ConfigError
 from gen_data.core.interfaces import DatasetInfo, Publication
 from gen_data.exporters.croissant import Croissant
 
@@ -67,13 +66,6 @@ def test_tables_list_images_and_objects(dataset: Path, world: Any) -> None:
     assert names == list(world.categories)
 
 
-def test_images_are_links(dataset: Path) -> None:
-    """No image is stored twice."""
-    shard = dataset.parent / "shards/000001"
-
-    assert (dataset / "images/val/000000004_color.png").samefile(shard / "color/rgb/000000004.png")
-
-
 def test_files_are_described_with_their_sums(dataset: Path) -> None:
     """Sizes and digests are those of the files."""
     metadata = json.loads((dataset / "croissant.json").read_text())
@@ -95,12 +87,6 @@ def test_licences_are_those_of_assets_or_of_the_publisher(world: Any, tmp_path: 
         stated.append(json.loads((folder / "croissant.json").read_text())["license"])
 
     assert stated == ["CC0-1.0", "CC-BY-4.0"]
-
-
-def test_a_data_set_without_photographs_is_refused(world: Any) -> None:
-    """Every row of the table has an image."""
-    with pytest.raises(ConfigError, match=r"no sensor of .* writes the rgb channel"):
-        Croissant().check(world.info(7, media={"color": ()}))
 
 
 def faults(folder: Path, world: Any) -> list[str]:

@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 
 from gen_data.core.capture import Channel
-from gen_data.core.errors import ConfigError
 from gen_data.exporters.hdf5 import Hdf5, write_hdf5
 from gen_data.exporters.npz import npz_bytes
 from tests.exporters.conftest import MEDIA, SIZES_M
@@ -202,18 +201,3 @@ def test_each_camera_has_a_container(world: Any, samples: Any, tmp_path: Path) -
     names = sorted(p.name for p in (root / "train").iterdir())
     assert names[:2] == ["000000000_left.hdf5", "000000000_right.hdf5"]
     assert len(names) == 8
-
-
-def test_a_missing_package_is_named(world: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Before anything is rendered; NumPy's archives need none."""
-    monkeypatch.setattr("gen_data.core.optional_packages.find_spec", lambda name: None)
-
-    with pytest.raises(ConfigError, match=r"pip install .*\[formats\]'"):
-        Hdf5().check(world.info(1))
-    Hdf5(container="npz").check(world.info(1))
-
-
-def test_a_data_set_without_images_is_refused(world: Any) -> None:
-    """Such as one of laser scans."""
-    with pytest.raises(ConfigError, match="no camera writes a channel"):
-        Hdf5().check(world.info(1, (), ("top",)))

@@ -8,7 +8,6 @@ import re
 import shutil
 import warnings
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,10 +19,8 @@ import yaml
 from PIL import Image
 from pycocotools import mask as coco_mask
 
-from gen_data.core.errors import ConfigError
 from gen_data.exporters import huggingface
 from gen_data.exporters.huggingface import HuggingFace
-from gen_data.exporters.label_map import LabelMap, MappedExporter
 
 # pycocotools' decoder predates numpy 2's __array__(copy=...).
 pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
@@ -140,46 +137,12 @@ def test_flow_is_binary_and_missing_channels_are_null(world: Any, tmp_path: Path
 
 def test_ignored_objects_are_crowds(world: Any, tmp_path: Path) -> None:
     """As in COCO, which excludes them from scores."""
-    sample = world.samples[0]
-    truth = sample.truth["color"]
-    first, *others = truth.objects
-    objects = (replace(first, ignored=True), *others)
-    ignored = replace(sample, truth={"color": replace(truth, objects=objects)})
+    ignored = world.ignoring(world.samples[0])
     folder = world.export(HuggingFace(), world.info(1), [ignored], tmp_path)
 
     (row,) = read(folder / "data/train-00000-of-00001.parquet").to_pylist()
 
     assert row["objects"]["iscrowd"] == [True] + [False] * (len(row["objects"]["id"]) - 1)
-
-
-def test_an_ignored_object_without_a_class_is_a_crowd_of_every_class(
-    world: Any, tmp_path: Path
-) -> None:
-    """A reader compares it with detections of its class only; ids stay unique."""
-    classes = {"box": ("crate",), "walker": ("pedestrian",)}
-    exporter = MappedExporter(HuggingFace(), LabelMap(classes=classes, others="ignore"))
-    things = (
-        world.instance(1, "car", 9.0, 2.5, 0.0),
-        world.instance(2, "crate", 8.0, -1.0, 0.0),
-    )
-    sample = world.sample(0, things, [world.camera()])
-
-    folder = world.export(exporter, world.info(1), [sample], tmp_path)
-
-    (row,) = read(folder / "data/train-00000-of-00001.parquet").to_pylist()
-    rows = row["objects"]
-    assert sorted(zip(rows["category"], rows["iscrowd"], strict=True)) == [
-        (0, False), (0, True), (1, True),
-    ]  # fmt: skip
-    assert len(set(rows["id"])) == 3
-
-
-def test_a_data_set_without_photographs_is_refused(world: Any) -> None:
-    """Every row has an image."""
-    info = world.info(7, media={"color": ()})
-
-    with pytest.raises(ConfigError, match=r"no sensor of .* writes the rgb channel"):
-        HuggingFace().check(info)
 
 
 def read(path: Path) -> Table:

@@ -17,7 +17,6 @@ from PIL import Image
 from gen_data.annotations.annotate import Thresholds
 from gen_data.core.boxes import BoxPx, OrientedBox
 from gen_data.core.capture import Channel
-from gen_data.core.errors import ConfigError
 from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.sample import ImageTruth, ObjectTruth
 from gen_data.core.scene import Camera, Instance
@@ -344,29 +343,3 @@ def test_without_a_scanner_there_are_no_points(world: Any, tmp_path: Path) -> No
     assert kinds == {"image_2", "label_2", "calib"}
     velo_to_cam = devkit_calib(folder / "training/calib/000000.txt")["Tr_velo_to_cam"]
     np.testing.assert_array_equal(velo_to_cam, [[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0]])
-
-
-@pytest.mark.parametrize(
-    ("exporter", "changes", "message"),
-    [
-        (Kitti(lidar="tpo"), {"lidars": ("top",)}, "no lidar 'tpo'.*did you mean 'top'"),
-        (
-            Kitti(camera="colour"),
-            {},
-            "camera 'colour'.*expected one of: color.*did you mean 'color'",
-        ),
-        (Kitti(), {"media": {"color": (Channel.Z_DEPTH,)}}, "no sensor .* writes the rgb channel"),
-        (Kitti(), {"n": 1_000_001}, "six digits"),
-        (
-            Kitti(),
-            {"lenses": {"color": "kannala_brandt"}},
-            "camera 'color' has a lens of the model 'kannala_brandt'.*rectified",
-        ),
-    ],
-)
-def test_what_kitti_cannot_hold_is_refused_before_rendering(
-    world: Any, exporter: Kitti, changes: dict[str, Any], message: str
-) -> None:
-    """One message, naming the option to change."""
-    with pytest.raises(ConfigError, match=message):
-        exporter.check(world.info(changes.pop("n", 7), **changes))

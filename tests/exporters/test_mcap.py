@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import shutil
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,9 +15,7 @@ from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 from PIL import Image
 
-from gen_data.core import optional_packages
 from gen_data.core.capture import POINT
-from gen_data.core.errors import ConfigError
 from gen_data.core.se3 import SE3
 from gen_data.exporters.mcap import START_NS, Mcap, point_fields
 from tests.exporters.drives import drive_info
@@ -221,20 +218,6 @@ def test_sensors_have_their_own_instants(world: Any, slow: Any, tmp_path: Path) 
     ]
 
 
-def test_ignored_objects_are_left_out(world: Any, samples: Any, tmp_path: Path) -> None:
-    """There is no mark for "do not score"."""
-    left = samples[0].truth["left"]
-    objects = tuple(replace(thing, ignored=True) for thing in left.objects)
-    sample = replace(samples[0], truth={"left": replace(left, objects=objects)})
-    folder = world.export(Mcap(), drive_info(world), [sample], tmp_path)
-
-    found = {topic: m for topic, _, _, m in messages(folder / "train/street-000000.mcap")}
-
-    assert left.objects
-    assert not found["/camera/left/annotations"].points
-    assert not found["/objects"].entities
-
-
 def test_fields_of_points_cover_the_record() -> None:
     """Without gaps, in the record's own types."""
     fields = list(point_fields())
@@ -300,19 +283,3 @@ def test_wrong_values_are_found(
     folder = world.export(Mcap(), drive_info(world), samples, tmp_path)
 
     assert faults(folder / "train/street-000000.mcap", samples[:4])
-
-
-def test_a_missing_package_is_named(world: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Before rendering."""
-    monkeypatch.setattr(
-        optional_packages, "find_spec", lambda name: None if "fox" in name else name
-    )
-
-    with pytest.raises(ConfigError, match="needs the package foxglove-schemas-protobuf: pip"):
-        Mcap().check(world.info(7))
-
-
-def test_a_data_set_without_images_and_scans_is_refused(world: Any) -> None:
-    """Nothing would be in the file."""
-    with pytest.raises(ConfigError, match="neither camera nor lidar"):
-        Mcap().check(world.info(7, ()))

@@ -13,11 +13,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from gen_data.core.capture import Channel
-from gen_data.core.errors import ConfigError
 from gen_data.core.sample import Sample
 from gen_data.exporters.scannet import ScanNet
 from gen_data.exporters.tum_rgbd import TumRgbd
-from tests.exporters.drives import drive_info
 
 NYU40 = {"pedestrian": 31, "crate": 29, "car": 0}
 """Numbers of person and box in NYU's list; it has no cars."""
@@ -188,18 +186,3 @@ def test_scannet_scans_are_listed_by_split(scannet: Path, samples: Sequence[Samp
             assert read is not None
             rgb = sample.capture.readings["left"].channels[Channel.RGB]
             assert np.abs(read[..., ::-1].astype(float) - rgb).mean() < 6.0
-
-
-@pytest.mark.parametrize("exporter", [TumRgbd(), ScanNet()])
-def test_a_camera_without_depth_is_refused(world: Any, exporter: Any) -> None:
-    """The text names the channel."""
-    info = world.info(7, media={"color": (Channel.RGB, Channel.INSTANCE)})
-
-    with pytest.raises(ConfigError, match="camera 'color' does not write the channel depth"):
-        exporter.check(info)
-
-
-def test_an_unknown_imu_is_refused(world: Any) -> None:
-    """The text lists those that exist."""
-    with pytest.raises(ConfigError, match="no IMU 'imo'; expected one of: imu"):
-        TumRgbd(imu="imo").check(drive_info(world))

@@ -14,7 +14,7 @@ import pytest
 
 from gen_data.core.asset_types import SURFACES
 from gen_data.core.capture import POINT
-from gen_data.core.errors import ConfigError, StorageError
+from gen_data.core.errors import StorageError
 from gen_data.core.motion import Twist
 from gen_data.exporters.kitti import (
     Kitti,
@@ -294,39 +294,6 @@ def test_points_lie_in_the_boxes_of_the_lidar_frame(world: Any, tmp_path: Path) 
             assert (np.abs(local) <= 0.5 * np.array(box["size_m"]) + 1e-3).all()
             checked += len(mine)
     assert checked > 100
-
-
-@pytest.mark.parametrize(
-    ("exporter", "message"),
-    [
-        (SemanticKitti(lidar="velo"), "no lidar 'velo'.*top"),
-        (SemanticKitti(camera="colour"), "no camera 'colour'.*color"),
-        (Kitti(lidar="velo"), "no lidar 'velo'.*top"),
-    ],
-)
-def test_sensors_that_are_not_there_are_refused(exporter: Any, message: str, world: Any) -> None:
-    """Before anything is rendered."""
-    with pytest.raises(ConfigError, match=message):
-        exporter.check(world.info(7, lidars=("top",)))
-
-
-def test_a_data_set_without_sensors_is_refused_with_the_remedy(world: Any) -> None:
-    """Each kind by its name, and not by an empty one."""
-    cameras = world.info(1)
-    with pytest.raises(ConfigError, match="there is no lidar; add a sensor"):
-        SemanticKitti().check(cameras)
-    with pytest.raises(ConfigError, match="there is no camera; add a sensor"):
-        SemanticKitti().check(world.info(1, (), ("top",)))
-    with pytest.raises(ConfigError, match="no sensor of none writes the rgb channel; add an rgb"):
-        Kitti().check(world.info(1, (), ("top",)))
-
-
-def test_point_formats_need_a_scanner(world: Any) -> None:
-    """The message says what to add."""
-    with pytest.raises(ConfigError, match="add a sensor of that type"):
-        PointClouds().check(world.info(7))
-    with pytest.raises(ConfigError, match="no lidar"):
-        SemanticKitti().check(world.info(7))
 
 
 def test_air_and_ground_have_surfaces_with_names() -> None:

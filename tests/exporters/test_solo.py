@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import shutil
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -15,7 +14,6 @@ import pytest
 from PIL import Image
 from scipy.spatial.transform import Rotation
 
-from gen_data.core.errors import ConfigError
 from gen_data.exporters.id_colors import id_color, id_colors
 from gen_data.exporters.solo import Solo
 
@@ -279,24 +277,6 @@ def test_centres_behind_the_sensor_have_no_3d_box(world: Any, tmp_path: Path) ->
     assert [row.instanceId for row in solid.values] == [2]
 
 
-def test_ignored_objects_are_left_out(world: Any, tmp_path: Path) -> None:
-    """SOLO has no regions to ignore."""
-    sample = world.samples[0]
-    truth = sample.truth["color"]
-    objects = tuple(replace(t, ignored=t.instance.instance_id == 1) for t in truth.objects)
-    changed = replace(sample, truth={"color": replace(truth, objects=objects)})
-
-    root = world.export(Solo(), world.info(1), [changed], tmp_path)
-
-    (frame,) = read_json(root / "train")
-    flat, solid, instances, _ = frame.captures[0].annotations
-    for rows in (flat.values, solid.values, instances.instances):
-        assert 1 not in [row.instanceId for row in rows]
-        assert len(rows) == len(objects) - 1
-    path = root / "train/sequence.0/step0.color.instance segmentation.png"
-    assert not (np.asarray(Image.open(path)) == id_color(1)).all(-1).any()
-
-
 def test_colors_differ() -> None:
     """Of all ids that an instance may have; only 0 is black."""
     colors = [id_color(number) for number in range(65_536)]
@@ -305,17 +285,3 @@ def test_colors_differ() -> None:
     assert colors[0] == (0, 0, 0)
     ids = np.arange(65_536, dtype=np.uint16).reshape(256, 256)
     np.testing.assert_array_equal(id_colors()[ids].reshape(-1, 3), colors)
-
-
-def test_sequences_of_different_lengths_are_refused(world: Any) -> None:
-    """Readers could not find their frames."""
-    with pytest.raises(ConfigError, match="expected a multiple of 4 samples, not 7"):
-        Solo().check(world.info(7, steps_per_scene=4))
-
-
-def test_lenses_other_than_pinholes_are_refused(world: Any) -> None:
-    """A projection matrix describes the camera."""
-    info = world.info(1, lenses={"color": "kannala_brandt"})
-
-    with pytest.raises(ConfigError, match="has a lens of the model 'kannala_brandt'"):
-        Solo().check(info)

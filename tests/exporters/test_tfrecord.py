@@ -16,11 +16,8 @@ import pytest
 from PIL import Image
 from tfrecord.reader import tfrecord_iterator
 
-from gen_data.core import optional_packages
 from gen_data.core.capture import Channel, ImageEncoding
-from gen_data.core.errors import ConfigError
 from gen_data.exporters import tfrecord
-from gen_data.exporters.label_map import LabelMap, MappedExporter
 from gen_data.exporters.tfrecord import TfRecord, encode_features, frame_record, label_map
 
 
@@ -45,6 +42,11 @@ def features(data: bytes) -> dict[str, tuple[str, list[Any]]]:
     return found
 
 
+def records(path: Path) -> list[dict[str, tuple[str, list[Any]]]]:
+    """Features of all records of a file; the reader has one buffer for all of them."""
+    return [features(bytes(record)) for record in tfrecord_iterator(str(path))]
+
+
 def sums_are_right(path: Path) -> bool:
     """Whether both sums of every record are those of crc32c, masked."""
     data, position = path.read_bytes(), 0
@@ -65,14 +67,14 @@ def faults(folder: Path, world: Any) -> list[str]:
     paths = sorted(folder.glob("train-*.tfrecord"))
     if not all(map(sums_are_right, paths)):
         return ["crc"]
-    records = [features(bytes(r)) for path in paths for r in tfrecord_iterator(str(path))]
+    found = [record for path in paths for record in records(path)]
     expected = [s for s in world.samples if s.split == "train"]
-    ids = [record["image/source_id"][1] for record in records]
+    ids = [record["image/source_id"][1] for record in found]
     if ids != [[str(s.image_id("color")).encode()] for s in expected]:
         return [f"source_id {ids}"]
     return [
         fault
-        for record, sample in zip(records, expected, strict=True)
+        for record, sample in zip(found, expected, strict=True)
         for fault in record_faults(record, sample, world)
     ]
 
@@ -120,9 +122,7 @@ def test_records_hold_images_boxes_and_masks(dataset: Path, world: Any) -> None:
 
 def test_other_channels_are_additional_keys(dataset: Path) -> None:
     """PNG files, as in the shard."""
-    path = dataset / "val-00000-of-00001.tfrecord"
-    # The reader reuses its buffer.
-    record, _ = [features(bytes(data)) for data in tfrecord_iterator(str(path))]
+    record, _ = records(dataset / "val-00000-of-00001.tfrecord")
 
     (depth,) = record["image/depth/encoded"][1]
     shard = dataset.parent / "shards/000000"
@@ -185,48 +185,17 @@ def test_sums_of_the_specification() -> None:
     assert features(data) == {"image/sample": ("int64_list", [size])}
 
 
-def test_a_missing_package_is_named(world: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Before rendering."""
-    monkeypatch.setattr(optional_packages, "find_spec", lambda name: None)
-
-    with pytest.raises(ConfigError, match=r"google-crc32c: pip install .*\[formats\]'"):
-        TfRecord().check(world.info(7))
-
-
-def test_a_data_set_without_photographs_is_refused(world: Any) -> None:
-    """Every record has an image."""
-    with pytest.raises(ConfigError, match=r"no sensor of .* writes the rgb channel"):
-        TfRecord().check(world.info(7, media={"color": ()}))
-
-
 def test_jpeg_files_are_embedded(world: Any, tmp_path: Path) -> None:
     """Under their names, with the format by which the API decodes them."""
     info = world.info(1)
     jpeg = ImageEncoding("jpeg", 92)
     info = replace(info, sensors=tuple(replace(s, rgb_encoding=jpeg) for s in info.sensors))
     folder = world.export(TfRecord(), info, world.samples[:1], tmp_path)
-    (record,) = tfrecord_iterator(str(folder / "train-00000-of-00001.tfrecord"))
-    values = {key: found for key, (_, found) in features(bytes(record)).items()}
+    (record,) = records(folder / "train-00000-of-00001.tfrecord")
+    values = {key: found for key, (_, found) in record.items()}
     assert values["image/format"] == [b"jpeg"]
     assert values["image/filename"] == [b"000000000_color.jpg"]
     image = Image.open(io.BytesIO(values["image/encoded"][0]))
     assert image.format == "JPEG"
     rendered = world.samples[0].capture.readings["color"].channels[Channel.RGB]
     assert np.abs(np.asarray(image, int) - rendered).mean() < 4
-
-
-def test_an_ignored_region_without_a_class_is_a_crowd_of_every_class(
-    world: Any, tmp_path: Path
-) -> None:
-    """Label 0 is the background of TensorFlow's readers."""
-    mapped = LabelMap(classes={"box": ("crate",), "walker": ("pedestrian",)}, others="ignore")
-    car = world.instance(1, "car", 9.0, 2.5, 0.0)
-    sample = world.sample(0, (car,), [world.camera()])
-
-    folder = world.export(MappedExporter(TfRecord(), mapped), world.info(1), [sample], tmp_path)
-
-    (path,) = folder.glob("train*.tfrecord")
-    (record,) = [features(bytes(r)) for r in tfrecord_iterator(str(path))]
-    assert record["image/object/class/label"][1] == [1, 2]
-    assert record["image/object/class/text"][1] == [b"box", b"walker"]
-    assert record["image/object/is_crowd"][1] == [1, 1]

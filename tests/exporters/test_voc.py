@@ -6,7 +6,6 @@ import json
 import shutil
 import xml.etree.ElementTree as ET
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +13,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from gen_data.core.errors import ConfigError
 from gen_data.exporters.coco import Coco
 from gen_data.exporters.label_colors import voc_palette
-from gen_data.exporters.label_map import LabelMap, MappedExporter
 from gen_data.exporters.voc import YEAR, Voc
 
 
@@ -197,12 +194,9 @@ def test_images_are_the_photographs(dataset: Path) -> None:
 def test_ignored_objects_are_difficult_and_void(world: Any, tmp_path: Path) -> None:
     """They come last, so that the others are numbered without gaps."""
     sample = world.samples[0]
-    truth = sample.truth["color"]
-    first, *others = truth.objects
-    marked = replace(truth, objects=(replace(first, ignored=True), *others))
+    first, *others = sample.truth["color"].objects
 
-    changed = replace(sample, truth={"color": marked})
-    folder = world.export(Voc(images="png"), world.info(1), [changed], tmp_path)
+    folder = world.export(Voc(images="png"), world.info(1), [world.ignoring(sample)], tmp_path)
 
     root = folder / YEAR
     rows = objects_of(root / "Annotations/000000000_color.xml")
@@ -217,14 +211,6 @@ def test_ignored_objects_are_difficult_and_void(world: Any, tmp_path: Path) -> N
     )
 
 
-def test_too_many_categories_are_refused(world: Any) -> None:
-    """Label images have eight bits."""
-    info = world.info(1, categories=tuple(f"c{k:03d}" for k in range(255)))
-
-    with pytest.raises(ConfigError, match="room for 254 categories, but there are 255"):
-        Voc().check(info)
-
-
 def test_the_label_map_file_names_classes_by_their_colours(dataset: Path) -> None:
     """Rows ``name:r,g,b:parts:actions``, as CVAT and Datumaro read them; void is "ignored"."""
     root = dataset / "voc/dataset" / YEAR
@@ -235,24 +221,3 @@ def test_the_label_map_file_names_classes_by_their_colours(dataset: Path) -> Non
 
     assert list(color_of) == ["background", "car", "crate", "pedestrian", "ignored"]
     assert [list(c) for c in color_of.values()] == [palette[k] for k in (0, 1, 2, 3, 255)]
-
-
-def test_an_ignored_object_without_a_class_is_difficult_in_every_class(
-    world: Any, tmp_path: Path
-) -> None:
-    """VOC's evaluation leaves out difficult objects class by class."""
-    exporter = MappedExporter(
-        Voc(), LabelMap(classes={"box": ("crate",), "walker": ("pedestrian",)}, others="ignore")
-    )
-    objects = (
-        world.instance(1, "car", 9.0, 2.5, 0.0),
-        world.instance(2, "crate", 8.0, -1.0, 0.0),
-    )
-    sample = world.sample(0, objects, [world.camera()])
-
-    root = world.export(exporter, world.info(1), [sample], tmp_path) / YEAR
-
-    rows = objects_of(root / "Annotations/000000000_color.xml")
-    listed = [(row["name"], row["difficult"]) for row in rows]
-    assert listed == [("box", "0"), ("box", "1"), ("walker", "1")]
-    assert (root / "ImageSets/Main/walker_train.txt").read_text() == "000000000_color  0\n"

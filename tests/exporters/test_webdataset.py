@@ -9,7 +9,6 @@ import shutil
 import tarfile
 import warnings
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,8 +19,6 @@ from numpy.typing import NDArray
 from pycocotools import mask as coco_mask
 
 from gen_data.core.capture import POINT
-from gen_data.core.errors import ConfigError
-from gen_data.exporters.label_map import LabelMap, MappedExporter
 from gen_data.exporters.webdataset import WebDataset
 
 # pycocotools' decoder predates numpy 2's __array__(copy=...).
@@ -198,32 +195,3 @@ def test_damage_is_found(
             tar.addfile(member, io.BytesIO(data))
 
     assert faults(copy, world)
-
-
-def test_names_that_differ_in_case_are_refused(world: Any) -> None:
-    """Fields have lower-case names."""
-    info = world.info(7, ("color", "Color"))
-
-    with pytest.raises(ConfigError, match=r"'color' and 'Color' differ in case"):
-        WebDataset().check(replace(info))
-
-
-def test_an_ignored_object_without_a_class_is_a_crowd_of_every_class(
-    world: Any, tmp_path: Path
-) -> None:
-    """A reader compares it with detections of its class only; ids stay unique."""
-    classes = {"box": ("crate",), "walker": ("pedestrian",)}
-    exporter = MappedExporter(WebDataset(), LabelMap(classes=classes, others="ignore"))
-    things = (
-        world.instance(1, "car", 9.0, 2.5, 0.0),
-        world.instance(2, "crate", 8.0, -1.0, 0.0),
-    )
-    sample = world.sample(0, things, [world.camera()])
-
-    folder = world.export(exporter, world.info(1), [sample], tmp_path)
-
-    (read_sample,) = read(folder / "train")
-    rows = read_sample["json"]["cameras"]["color"]["annotations"]
-    crowds = [(row["category_id"], row["category"]) for row in rows if row["iscrowd"]]
-    assert crowds == [(1, "box"), (2, "walker")]
-    assert len({row["id"] for row in rows}) == len(rows) == 3

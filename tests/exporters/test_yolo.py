@@ -16,7 +16,6 @@ import yaml
 from PIL import Image
 from pycocotools import mask as coco_mask
 
-from gen_data.core.errors import ConfigError
 from gen_data.core.se3 import SE3
 from gen_data.exporters.coco import Coco
 from gen_data.exporters.yolo import Yolo, inner_rectangle
@@ -256,25 +255,6 @@ def test_pose_of_another_category(world: Any, tmp_path: Path) -> None:
     data = yaml.safe_load((tmp_path / "car/dataset/pose/data.yaml").read_text())
     assert data["names"] == {0: "car"}
     assert data["flip_idx"] == [1, 0, 3, 2, 5, 4, 7, 6]
-
-
-def test_an_unknown_category_is_refused(world: Any) -> None:
-    """With the nearest name."""
-    with pytest.raises(ConfigError, match=r"pose_category: there is no category 'cars'.*car"):
-        Yolo(pose_category="cars").check(world.info(1))
-
-
-def test_ignored_objects_are_left_out(world: Any, tmp_path: Path) -> None:
-    """The format cannot exclude a region."""
-    sample = world.samples[0]
-    truth = sample.truth["color"]
-    first, *others = truth.objects
-    marked = replace(truth, objects=(replace(first, ignored=True), *others))
-
-    changed = replace(sample, truth={"color": marked})
-    folder = world.export(Yolo(tasks=("detect",)), world.info(1), [changed], tmp_path)
-
-    assert len(rows_of(folder / "detect", "train", "000000000_color")) == len(others)
 
 
 def test_a_missing_split_is_said_in_the_file(world: Any, tmp_path: Path) -> None:
