@@ -5,8 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import json
-import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -192,81 +191,6 @@ def test_models_in_the_written_poses_give_the_images(dataset: Path) -> None:
     assert problems(dataset) == []
     assert len(read(dataset / "test_targets_bop19.json")) >= 6
     assert sum(len(v) for p in dataset.glob("*/*/scene_gt.json") for v in read(p).values()) >= 15
-
-
-@pytest.fixture(scope="module")
-def small(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The first three frames, the second for tests."""
-    first, second, third = world.with_bodies(world.samples[:3])
-    samples = [first, replace(second, split="test"), replace(third, split="train")]
-    root: Path = world.export(Bop(), world.info(3), samples, tmp_path_factory.mktemp("small"))
-    assert problems(root) == []
-    return root
-
-
-def edit(path: Path, change: Callable[[Any], None]) -> None:
-    value = read(path)
-    change(value)
-    path.write_text(json.dumps(value))
-
-
-def shift_principal_point(root: Path) -> None:
-    edit(root / "train/000000/scene_camera.json", lambda v: v["0"]["cam_K"].__setitem__(2, 79.5))
-
-
-def widen_box(root: Path) -> None:
-    def change(value: Any) -> None:
-        value["0"][0]["bbox_visib"][2] += 1
-
-    edit(root / "train/000000/scene_gt_info.json", change)
-
-
-def swap_objects(root: Path) -> None:
-    edit(root / "train/000002/scene_gt.json", lambda v: v["0"].reverse())
-
-
-def transpose_rotation(root: Path) -> None:
-    def change(value: Any) -> None:
-        gt = value["0"][0]
-        gt["cam_R_m2c"] = np.array(gt["cam_R_m2c"]).reshape(3, 3).T.ravel().tolist()
-
-    edit(root / "train/000000/scene_gt.json", change)
-
-
-def metres(root: Path) -> None:
-    edit(
-        root / "models/models_info.json", lambda v: v["1"].update(diameter=v["1"]["diameter"] / 1e3)
-    )
-
-
-def forget_a_target(root: Path) -> None:
-    edit(root / "test_targets_bop19.json", lambda v: v.pop())
-
-
-def wrong_symmetry(root: Path) -> None:
-    quarter = [0, -1, 0, 0, 1, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]
-    for number in ("1", "2", "3", "4"):
-        edit(root / "models/models_info.json",
-             lambda v, n=number: v[n].update(symmetries_discrete=[quarter]))  # fmt: skip
-
-
-def scale_depth(root: Path) -> None:
-    edit(root / "train/000000/scene_camera.json", lambda v: v["0"].update(depth_scale=1.01))
-
-
-@pytest.mark.damage("bop")
-@pytest.mark.parametrize(
-    "damage",
-    [shift_principal_point, widen_box, swap_objects, transpose_rotation, metres, forget_a_target,
-     wrong_symmetry, scale_depth],
-)  # fmt: skip
-def test_damage_is_noticed(small: Path, tmp_path: Path, damage: Callable[[Path], None]) -> None:
-    """The comparison fails for a data set that is slightly wrong."""
-    shutil.copytree(small, tmp_path / "copy")
-
-    damage(tmp_path / "copy")
-
-    assert problems(tmp_path / "copy")
 
 
 def test_coco_rows_are_the_visible_masks(dataset: Path) -> None:

@@ -6,9 +6,7 @@ import csv
 import hashlib
 import json
 import logging
-import shutil
 import warnings
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -133,33 +131,3 @@ def faults(folder: Path, world: Any) -> list[str]:
 def test_mlcroissant_loads_all_record_sets(dataset: Path, world: Any) -> None:
     """Without an error or a warning; images join their rows."""
     assert faults(dataset, world) == []
-
-
-def edit(path: Path, old: str, new: str) -> None:
-    text = path.read_text()
-    assert old in text
-    path.write_text(text.replace(old, new, 1))
-
-
-@pytest.mark.damage("croissant")
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "damage",
-    [
-        lambda d: edit(d / "croissant.json", '"column": "x"', '"column": "left"'),
-        lambda d: edit(d / "croissant.json", '"column": "x"', '"column": "y"'),
-        lambda d: edit(d / "images.csv", "000000000_color", "000000001_color"),
-        lambda d: edit(d / "croissant.json", '"license"', '"licence"'),
-        lambda d: (d / "images/train/000000001_color.png").unlink(),
-    ],
-    ids=["no such column", "another column", "wrong join", "no licence", "image missing"],
-)
-def test_damage_is_found(
-    damage: Callable[[Path], Any], dataset: Path, world: Any, tmp_path: Path
-) -> None:
-    """The same reader finds faults in damaged copies."""
-    copy = tmp_path / "copy"
-    shutil.copytree(dataset, copy)
-    damage(copy)
-
-    assert faults(copy, world)

@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import json
-import re
-import shutil
 import xml.etree.ElementTree as ET
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -94,38 +91,6 @@ def problems(root: Path, dataset: Path, shapes: str) -> list[str]:
 def test_shapes_and_labels_are_those_of_coco(dataset: Path, shapes: str) -> None:
     """Every pixel, also of objects in several parts; images are numbered from 0."""
     assert problems(dataset / shapes / "dataset", dataset, shapes) == []
-
-
-def _change(pattern: str, new: Any) -> Callable[[Path], None]:
-    def damage(root: Path) -> None:
-        path = root / "train/annotations.xml"
-        path.write_text(re.sub(pattern, new, path.read_text()))
-
-    return damage
-
-
-@pytest.mark.damage("cvat")
-@pytest.mark.parametrize(
-    ("shapes", "damage", "named"),
-    [
-        ("box", _change(r'xbr="(\d+)"', lambda m: f'xbr="{int(m[1]) - 1}"'), "shape"),
-        ("polygon", _change(r'points="[\d.]+,', 'points="0,'), "shape"),
-        ("mask", _change('label="car"', 'label="crate"'), "class"),
-        ("mask", _change('group_id="4"', 'group_id="5"'), "objects"),
-        ("mask", _change('image id="0"', 'image id="1"'), "numbers"),
-        ("mask", lambda root: next((root / "train/images").iterdir()).unlink(), "files"),
-    ],
-)
-def test_damage_is_found(
-    dataset: Path, tmp_path: Path, shapes: str, damage: Callable[[Path], None], named: str
-) -> None:
-    """The check above is able to fail."""
-    root = tmp_path / "copy"
-    shutil.copytree(dataset / shapes / "dataset", root)
-
-    damage(root)
-
-    assert named in problems(root, dataset, shapes)
 
 
 def test_runs_begin_with_zeros() -> None:

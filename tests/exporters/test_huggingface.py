@@ -5,9 +5,7 @@ from __future__ import annotations
 import io
 import os
 import re
-import shutil
 import warnings
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -189,42 +187,3 @@ def loaded_faults(folder: Path, world: Any, cache: Path) -> list[str]:
 def test_datasets_loads_the_folder(dataset: Path, world: Any, tmp_path: Path) -> None:
     """With images, class names and splits."""
     assert loaded_faults(dataset, world, tmp_path) == []
-
-
-def first_column(table: Table, name: str, change: Callable[[Any], Any]) -> Table:
-    """The table with one column changed row by row."""
-    k = table.schema.get_field_index(name)
-    values = [change(value) for value in table.column(name).to_pylist()]
-    column = table.schema.field(k)
-    return table.set_column(k, column, pyarrow.array(values, column.type))
-
-
-@pytest.mark.damage("huggingface")
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "damage",
-    [
-        lambda t: t.replace_schema_metadata(None),
-        lambda t: first_column(
-            t, "objects", lambda o: {**o, "category": [(c + 1) % 3 for c in o["category"]]}
-        ),
-        lambda t: first_column(
-            t,
-            "objects",
-            lambda o: {**o, "bbox": [[x, y, x + w, y + h] for x, y, w, h in o["bbox"]]},
-        ),
-        lambda t: t.slice(1),
-        lambda t: first_column(t, "objects", lambda o: {**o, "rle": o["rle"][::-1]}),
-    ],
-    ids=["no features", "classes from one", "corners", "row missing", "masks reversed"],
-)
-def test_damage_is_found(
-    damage: Callable[[Table], Table], dataset: Path, world: Any, tmp_path: Path
-) -> None:
-    """The same reader finds faults in damaged copies."""
-    copy = tmp_path / "copy"
-    shutil.copytree(dataset, copy)
-    path = copy / "data/train-00000-of-00003.parquet"
-    pyarrow.parquet.write_table(damage(read(path)), path)
-
-    assert loaded_faults(copy, world, tmp_path / "cache")

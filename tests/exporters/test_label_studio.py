@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import json
-import re
-import shutil
 import xml.etree.ElementTree as ET
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
@@ -147,49 +144,6 @@ def _object_problems(
 def test_shapes_and_labels_are_those_of_coco(dataset: Path, shapes: str) -> None:
     """Every pixel, also of objects in several parts."""
     assert problems(dataset / shapes / "dataset", dataset, shapes) == []
-
-
-def _change(pattern: str, new: Any, name: str = "train/tasks.json") -> Callable[[Path], None]:
-    def damage(root: Path) -> None:
-        text = (root / name).read_text()
-        changed = re.sub(pattern, new, text)
-        assert changed != text
-        (root / name).write_text(changed)
-
-    return damage
-
-
-def _empty_masks(path: Path) -> None:
-    tasks = json.loads(path.read_text())
-    for region in (r for task in tasks for r in task["annotations"][0]["result"]):
-        if region["type"] == "brushlabels":
-            size = region["original_height"], region["original_width"]
-            region["value"]["rle"] = brush_rle(MaskPx(0, 0, np.zeros((1, 1), bool)), *size)
-    path.write_text(json.dumps(tasks))
-
-
-@pytest.mark.damage("label_studio")
-@pytest.mark.parametrize(
-    ("shapes", "damage", "named"),
-    [
-        ("box", _change(r'"width":(\d+)\.', lambda m: f'"width":{int(m[1]) + 3}.'), "shape"),
-        ("polygon", _change(r'"points":\[\[[\d.]+', '"points":[[0.0'), "shape"),
-        ("mask", lambda root: _empty_masks(root / "train/tasks.json"), "shape"),
-        ("mask", _change(r'"brushlabels":\["car"\]', '"brushlabels":["crate"]'), "class"),
-        ("mask", _change('"id":"4"', '"id":"5"'), "objects"),
-        ("box", _change('<Label value="car"', '<Label value="cat"', "label_config.xml"), "class"),
-        ("mask", lambda root: next((root / "train/images").iterdir()).unlink(), "files"),
-    ],
-)
-def test_damage_is_found(
-    dataset: Path, tmp_path: Path, shapes: str, damage: Callable[[Path], None], named: str
-) -> None:
-    """The check above is able to fail."""
-    copy = tmp_path / "copy"
-    shutil.copytree(dataset / shapes / "dataset", copy)
-    damage(copy)
-
-    assert named in problems(copy, dataset, shapes)
 
 
 @given(

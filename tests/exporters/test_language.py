@@ -81,21 +81,6 @@ def test_every_utterance_of_the_annotation_is_written_in_order(
     assert_said(world.export(LanguageJsonl(), world.info(7), samples, tmp_path), samples)
 
 
-@pytest.mark.damage("language")
-@pytest.mark.parametrize("damage", [{"answer": "many"}, {"object_ids": [999]}, {"text": "What?"}])
-def test_damage_is_noticed(
-    world: Any, samples: list[Sample], tmp_path: Path, damage: dict[str, Any]
-) -> None:
-    """The comparison fails for a line that is slightly wrong."""
-    folder = world.export(LanguageJsonl(), world.info(7), samples, tmp_path)
-    rows = lines(folder / "train.jsonl")
-    rows[-1].update(damage)
-    (folder / "train.jsonl").write_text("".join(f"{json.dumps(row)}\n" for row in rows), "utf-8")
-
-    with pytest.raises(AssertionError):
-        assert_said(folder, samples)
-
-
 def test_masks_and_ids_are_those_of_coco(world: Any, samples: list[Sample], tmp_path: Path) -> None:
     """Decoded by pycocotools, every mask is the object's visible pixels."""
     folder = world.export(LanguageJsonl(), world.info(7), samples, tmp_path / "language")

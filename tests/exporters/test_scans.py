@@ -250,6 +250,7 @@ def test_a_ply_file_is_what_its_header_says(world: Any, tmp_path: Path) -> None:
     assert list(dtype.names or ()) == POINT_FIELDS
     records = np.frombuffer(body, dtype)
     np.testing.assert_array_equal(records["category"], points["category_id"])
+    np.testing.assert_array_equal(records["instance"], points["instance_id"])
     np.testing.assert_array_equal(records["z"], points["position_m"][:, 2])
 
 

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import io
-import shutil
 import struct
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -135,42 +133,6 @@ def test_the_label_map_counts_from_one() -> None:
     text = label_map(("car", 'a "b"'))
 
     assert text == 'item {\n  id: 1\n  name: "car"\n}\nitem {\n  id: 2\n  name: "a \\"b\\""\n}\n'
-
-
-def flip(data: bytes, position: int) -> bytes:
-    return data[:position] + bytes([data[position] ^ 1]) + data[position + 1 :]
-
-
-def reframed(data: bytes, change: Callable[[bytes], bytes]) -> bytes:
-    """The file with its first record changed and right sums."""
-    (size,) = struct.unpack_from("<Q", data, 0)
-    return frame_record(change(data[12 : 12 + size])) + data[16 + size :]
-
-
-@pytest.mark.damage("tfrecord")
-@pytest.mark.parametrize(
-    "damage",
-    [
-        lambda data: flip(data, len(data) - 40),
-        lambda data: flip(data, 9),
-        lambda data: reframed(data, lambda r: r.replace(b"bbox/xmin", b"bbox/qmin")
-                              .replace(b"bbox/ymin", b"bbox/xmin")
-                              .replace(b"bbox/qmin", b"bbox/ymin")),
-        lambda data: reframed(data, lambda r: r.replace(b"crate", b"Crate")),
-        lambda data: data[16 + struct.unpack_from("<Q", data, 0)[0] :],
-    ],
-    ids=["data", "sum of the length", "x and y swapped", "another name", "record missing"],
-)  # fmt: skip
-def test_damage_is_found(
-    damage: Callable[[bytes], bytes], dataset: Path, world: Any, tmp_path: Path
-) -> None:
-    """The same reader finds faults in damaged copies."""
-    copy = tmp_path / "copy"
-    shutil.copytree(dataset, copy)
-    path = copy / "train-00000-of-00003.tfrecord"
-    path.write_bytes(damage(path.read_bytes()))
-
-    assert faults(copy, world)
 
 
 def test_sums_of_the_specification() -> None:

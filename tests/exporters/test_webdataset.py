@@ -3,12 +3,8 @@
 from __future__ import annotations
 
 import gc
-import io
-import json
-import shutil
 import tarfile
 import warnings
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -23,8 +19,6 @@ from gen_data.exporters.webdataset import WebDataset
 
 # pycocotools' decoder predates numpy 2's __array__(copy=...).
 pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
-
-Members = list[tuple[str, bytes]]
 
 
 @pytest.fixture(scope="module")
@@ -144,54 +138,3 @@ def test_hugging_face_reads_scans_and_rows(dataset: Path, world: Any) -> None:
     for row, sample in zip(loaded, expected, strict=True):
         columns = row["json"]["columns"]["top.points.npy"]
         assert same_columns(np.array(row["top.points.npy"], np.float32), columns, sample)
-
-
-def renamed(members: Members, old: str, new: str) -> Members:
-    return [(name.replace(old, new), data) for name, data in members]
-
-
-def shifted_masks(members: Members) -> Members:
-    """Masks of the neighbouring object."""
-    changed = []
-    for name, data in members:
-        if name.endswith(".json"):
-            labels = json.loads(data)
-            rows = labels["cameras"]["color"]["annotations"]
-            masks = [row["segmentation"] for row in rows]
-            for row, mask in zip(rows, [*masks[1:], *masks[:1]], strict=True):
-                row["segmentation"] = mask
-            changed.append((name, json.dumps(labels).encode()))
-        else:
-            changed.append((name, data))
-    return changed
-
-
-@pytest.mark.damage("webdataset")
-@pytest.mark.parametrize(
-    "damage",
-    [
-        lambda m: [(n, d) for n, d in m if n != "000000000.color.depth.png"],
-        lambda m: renamed(m, "000000000.color", "000000000.x.color"),
-        lambda m: sorted(m, key=lambda item: item[0].split(".", 1)[1]),
-        lambda m: renamed(m, "000000001", "000000002"),
-        shifted_masks,
-    ],
-    ids=["missing field", "dot in key", "fields not adjacent", "wrong key", "wrong masks"],
-)
-def test_damage_is_found(
-    damage: Callable[[Members], Members], dataset: Path, world: Any, tmp_path: Path
-) -> None:
-    """The same reader finds faults in damaged copies."""
-    copy = tmp_path / "train"
-    shutil.copytree(dataset / "train", copy)
-    path = copy / "street-000000.tar"
-    with tarfile.open(path) as tar:
-        files = [(m.name, tar.extractfile(m)) for m in tar.getmembers()]
-        members = [(name, file.read()) for name, file in files if file is not None]
-    with tarfile.open(path, "w") as tar:
-        for name, data in damage(members):
-            member = tarfile.TarInfo(name)
-            member.size = len(data)
-            tar.addfile(member, io.BytesIO(data))
-
-    assert faults(copy, world)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -103,51 +102,6 @@ def test_boxes_and_classes_are_those_of_coco(dataset: Path, task: str) -> None:
 
     assert problems(folder, dataset) == []
     assert rows_of(folder, "train", "000000003_color") == []
-
-
-def _rewrite(change: Callable[[str], str]) -> Callable[[Path], None]:
-    def damage(folder: Path) -> None:
-        for path in (folder / "labels/train").iterdir():
-            text = "".join(change(line) + "\n" for line in path.read_text().splitlines())
-            path.unlink()
-            path.write_text(text)
-
-    return damage
-
-
-def _corner_instead_of_centre(line: str) -> str:
-    number, cx, cy, w, h = line.split()
-    return f"{number} {float(cx) - float(w) / 2} {float(cy) - float(h) / 2} {w} {h}"
-
-
-def _next_class(line: str) -> str:
-    number, rest = line.split(" ", 1)
-    return f"{(int(number) + 1) % 3} {rest}"
-
-
-def _remove_label(folder: Path) -> None:
-    next((folder / "labels/train").iterdir()).unlink()
-
-
-@pytest.mark.damage("yolo")
-@pytest.mark.parametrize(
-    ("damage", "named"),
-    [
-        (_rewrite(_corner_instead_of_centre), "box"),
-        (_rewrite(_next_class), "class"),
-        (_remove_label, "files"),
-    ],
-)
-def test_damage_is_found(
-    dataset: Path, tmp_path: Path, damage: Callable[[Path], None], named: str
-) -> None:
-    """The check above is able to fail."""
-    folder = tmp_path / "copy"
-    shutil.copytree(dataset / "yolo/dataset/detect", folder)
-
-    damage(folder)
-
-    assert named in problems(folder, dataset)
 
 
 def masks_of(dataset: Path, split: str) -> list[tuple[str, Any, Any]]:
