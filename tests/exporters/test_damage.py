@@ -233,7 +233,7 @@ def round_measurements(sample: Sample) -> Sample:
 
 CHANGES: dict[str, Callable[[Any], Any]] = {
     "boxes": objects(box=lambda b: BoxPx(b.x_min + 1, b.y_min, b.x_max + 1, b.y_max)),
-    "masks": objects(mask=lambda m: replace(m, x_px=max(m.x_px - 1, 0))),
+    "masks": objects(mask=lambda m: replace(m, pixels=np.fliplr(m.pixels))),
     "corners": objects(oriented_box=lambda c: (*c[1:], c[0])),
     "shares": objects(visible_fraction=lambda _: 0.0, occlusion=lambda s: 1.0 - s),
     "poses": objects(T_camera_object=lambda pose: pose @ ASIDE),
@@ -415,7 +415,7 @@ ROWS = {
     "cvat": row(
         street,
         lambda m: test_cvat.problems(m.folder, m.root, "mask"),
-        "boxes, categories, shares",
+        "categories, masks, shares",
     ),
     "dota": row(
         street,
