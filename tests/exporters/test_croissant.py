@@ -5,13 +5,10 @@ from __future__ import annotations
 import csv
 import hashlib
 import json
-import logging
-import warnings
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 from gen_data.core.interfaces import DatasetInfo, Publication
@@ -85,49 +82,3 @@ def test_licences_are_those_of_assets_or_of_the_publisher(world: Any, tmp_path: 
         stated.append(json.loads((folder / "croissant.json").read_text())["license"])
 
     assert stated == ["CC0-1.0", "CC-BY-4.0"]
-
-
-def faults(folder: Path, world: Any) -> list[str]:
-    """Differences between what mlcroissant loads and the samples."""
-    logging.disable()
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        import mlcroissant
-
-        try:
-            loaded = mlcroissant.Dataset(jsonld=str(folder / "croissant.json"))
-            issues = loaded.metadata.ctx.issues
-            found = [*issues.errors, *issues.warnings]
-            images = list(loaded.records("images"))
-            objects = list(loaded.records("objects"))
-            categories = list(loaded.records("categories"))
-        except (mlcroissant.ValidationError, mlcroissant.GenerationError, ValueError) as error:
-            return [f"{type(error).__name__}: {error}"]
-        finally:
-            logging.disable(logging.NOTSET)
-    for file in loaded.metadata.distribution:
-        url = getattr(file, "content_url", None)
-        if url and hashlib.sha256((folder / url).read_bytes()).hexdigest() != file.sha256:
-            found.append(f"sum of {url}")
-    if [c["categories/name"].decode() for c in categories] != list(world.categories):
-        found.append("categories")
-    by_id = {row["images/image_id"]: row for row in images}
-    for sample in world.samples:
-        row = by_id.get(sample.image_id("color"))
-        if row is None:
-            found.append(f"image {sample.index}")
-            continue
-        (expected,) = (
-            a for c, a in sample.capture.readings["color"].channels.items() if c.value == "rgb"
-        )
-        if not np.array_equal(np.asarray(row["images/content"]), expected):
-            found.append(f"pixels {sample.index}")
-    boxes = [(o["objects/x"], o["objects/y"], o["objects/width"]) for o in objects]
-    truth = [(t.box.x_min, t.box.y_min, t.box.width_px) for s in world.samples for t in visible(s)]
-    return found if boxes == truth else [*found, "boxes"]
-
-
-@pytest.mark.slow
-def test_mlcroissant_loads_all_record_sets(dataset: Path, world: Any) -> None:
-    """Without an error or a warning; images join their rows."""
-    assert faults(dataset, world) == []

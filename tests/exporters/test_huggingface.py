@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import io
-import os
 import re
-import warnings
 from pathlib import Path
 from typing import Any
 
@@ -154,36 +152,3 @@ def card(folder: Path) -> Any:
     header = re.match(r"---\n(.*?)\n---\n", (folder / "README.md").read_text(), re.DOTALL)
     assert header
     return yaml.safe_load(header.group(1))
-
-
-def loaded_faults(folder: Path, world: Any, cache: Path) -> list[str]:
-    """Differences between what ``datasets`` loads offline and the samples."""
-    os.environ["HF_HUB_OFFLINE"] = os.environ["HF_DATASETS_OFFLINE"] = "1"
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        import datasets
-
-        datasets.disable_progress_bars()
-        try:
-            loaded = datasets.load_dataset(str(folder), cache_dir=str(cache))
-        except (datasets.exceptions.DatasetsError, ValueError) as error:
-            return [f"{type(error).__name__}: {error}"]
-        found = []
-        for split, rows in loaded.items():
-            expected = [s for s in world.samples if s.split == split]
-            if not isinstance(rows.features.get("image"), datasets.Image):
-                found.append("image is no Image")
-                continue
-            names = rows.features["objects"]["category"].feature.names
-            if [row["sample"] for row in rows] != [s.index for s in expected]:
-                found.append("samples")
-                continue
-            for row, truth in zip(rows, expected, strict=True):
-                found += row_faults(row, names, truth)
-        return found
-
-
-@pytest.mark.slow
-def test_datasets_loads_the_folder(dataset: Path, world: Any, tmp_path: Path) -> None:
-    """With images, class names and splits."""
-    assert loaded_faults(dataset, world, tmp_path) == []

@@ -49,19 +49,6 @@ def test_lines_refer_to_objects_of_their_image(
         assert (folder / row["file_name"]).exists()
 
 
-@pytest.mark.slow
-def test_hugging_face_reads_the_lines(world: Any, samples: list[Sample], tmp_path: Path) -> None:
-    """As a table with a row per line, whose columns have one type each."""
-    datasets = pytest.importorskip("datasets")
-    folder = world.export(LanguageJsonl(), world.info(7), samples, tmp_path)
-    path = folder / "train.jsonl"
-    table = datasets.load_dataset(
-        "json", data_files=str(path), split="train", cache_dir=str(tmp_path / "cache")
-    )
-
-    assert list(table) == lines(path)
-
-
 def assert_said(folder: Path, samples: list[Sample]) -> None:
     """The lines are the utterances of the annotation in order, after a caption of each scene."""
     train = [s for s in samples if s.split == "train"]

@@ -120,19 +120,6 @@ def test_tum_accelerometer_has_the_readings_of_the_imu(world: Any, tmp_path: Pat
         assert np.allclose(rows[:, 3], 9.80665, atol=1e-6)
 
 
-@pytest.mark.slow
-def test_evo_reads_the_trajectory(tum: Path, samples: Sequence[Sample]) -> None:
-    """And finds the poses of the camera, in the axes of images."""
-    file_interface = pytest.importorskip("evo.tools.file_interface")
-    for number, split in enumerate(("train", "val")):
-        path = tum / split / f"{number:06d}/groundtruth.txt"
-        trajectory = file_interface.read_tum_trajectory_file(str(path))
-        assert trajectory.check()[0]
-        for pose, sample in zip(trajectory.poses_se3, sequence(samples, number), strict=True):
-            exact = sample.truth["left"].camera.T_world_camera.matrix()
-            assert np.abs(pose - exact).max() < 1e-7
-
-
 def scan_folder(scannet: Path, number: int) -> Path:
     """Folder of a sequence: every scene has one view."""
     return scannet / f"scans/scene{number:04d}_00"

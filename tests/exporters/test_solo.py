@@ -33,13 +33,6 @@ def read_json(root: Path) -> list[Any]:
     ]
 
 
-def read_officially(root: Path) -> list[Any]:
-    """Frames as pysolotools reads them."""
-    from pysolotools.consumers import Solo as Reader
-
-    return list(Reader(data_path=str(root)).frames())
-
-
 def unity(vector: Any) -> Any:
     """World coordinates of Unity: Y and Z exchanged."""
     x, y, z = vector
@@ -149,14 +142,6 @@ def test_frames_show_the_street(dataset: Path, world: Any, split: str) -> None:
     """Poses, boxes, colours and projection in Unity's left-handed frames."""
     root = dataset / split
     assert list(problems(root, read_json(root), of_split(world, split))) == []
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("split", ["train", "val"])
-def test_the_official_reader_reads_the_same(dataset: Path, world: Any, split: str) -> None:
-    """The check of the plain files holds for what pysolotools returns."""
-    root = dataset / split
-    assert list(problems(root, read_officially(root), of_split(world, split))) == []
 
 
 @pytest.mark.slow

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import struct
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +13,6 @@ import pytest
 from PIL import Image
 from tfrecord.reader import tfrecord_iterator
 
-from gen_data.core.capture import Channel, ImageEncoding
 from gen_data.exporters import tfrecord
 from gen_data.exporters.tfrecord import TfRecord, encode_features, frame_record, label_map
 
@@ -145,19 +143,3 @@ def test_sums_of_the_specification() -> None:
     size = 2**63 - 1
     data = tfrecord.encode_example(encode_features({"image/sample": [size]}))
     assert features(data) == {"image/sample": ("int64_list", [size])}
-
-
-def test_jpeg_files_are_embedded(world: Any, tmp_path: Path) -> None:
-    """Under their names, with the format by which the API decodes them."""
-    info = world.info(1)
-    jpeg = ImageEncoding("jpeg", 92)
-    info = replace(info, sensors=tuple(replace(s, rgb_encoding=jpeg) for s in info.sensors))
-    folder = world.export(TfRecord(), info, world.samples[:1], tmp_path)
-    (record,) = records(folder / "train-00000-of-00001.tfrecord")
-    values = {key: found for key, (_, found) in record.items()}
-    assert values["image/format"] == [b"jpeg"]
-    assert values["image/filename"] == [b"000000000_color.jpg"]
-    image = Image.open(io.BytesIO(values["image/encoded"][0]))
-    assert image.format == "JPEG"
-    rendered = world.samples[0].capture.readings["color"].channels[Channel.RGB]
-    assert np.abs(np.asarray(image, int) - rendered).mean() < 4
