@@ -23,15 +23,10 @@ from gen_data.core.lens import Lens
 from gen_data.core.scene import Weather
 from gen_data.core.se3 import SE3
 from gen_data.exporters.coco import Coco
+from tests.exporters.label_readers import opened
 
 # pycocotools' decoder predates numpy 2's __array__(copy=...).
 pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
-
-
-def opened(path: Path) -> COCO:
-    """The file as the official reader sees it."""
-    with contextlib.redirect_stdout(io.StringIO()):
-        return COCO(str(path))
 
 
 def average_precision(truth: COCO, kind: str, path: Path | None = None) -> float:
@@ -92,15 +87,6 @@ def test_box_and_area_are_those_of_the_decoded_mask(train: COCO) -> None:
         assert row["bbox"] == coco_mask.toBbox(rle).tolist()
         assert row["area"] == coco_mask.area(rle)
         assert row["iscrowd"] == 0
-
-
-def test_masks_are_the_pixels_of_the_instance_image(train: COCO, dataset: Path) -> None:
-    """Every mask is found again in the linked 16-bit id image."""
-    for row in train.anns.values():
-        image = train.imgs[row["image_id"]]
-        with Image.open(dataset / image["files"]["instance"]) as ids:
-            expected = np.asarray(ids) == row["instance_id"]
-        np.testing.assert_array_equal(train.annToMask(row).astype(bool), expected)
 
 
 def test_ids_are_positive_and_unique_over_all_splits(dataset: Path) -> None:
@@ -262,16 +248,6 @@ def test_run_lengths_and_polygons_are_the_same_masks(
         assert mask.sum() == row["area"]
         assert coco_mask.toBbox(coco_mask.merge(rles)).tolist() == row["bbox"]
     assert average_precision(runs, "segm") == pytest.approx(1.0, abs=1e-9)
-
-
-def test_contours_through_pixel_centres_are_drawn_smaller(train: COCO) -> None:
-    """Why polygons are traced here: OpenCV's contours lose up to half a pixel on every side."""
-    for row in train.anns.values():
-        mask = train.annToMask(row)
-        contours, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-        flat = [c.ravel().astype(float).tolist() for c in contours if len(c) > 2]
-        rles = coco_mask.frPyObjects(flat, *mask.shape)
-        assert coco_mask.area(coco_mask.merge(rles)) < row["area"]
 
 
 def test_boxes_are_floats_in_json(dataset: Path) -> None:

@@ -11,7 +11,8 @@ import pytest
 from gen_data.exporters import TABLE
 from gen_data.exporters.label_map import LabelMap, MappedExporter
 from gen_data.exporters.voc import YEAR
-from tests.exporters import test_coco, test_huggingface, test_tfrecord, test_voc, test_webdataset
+from tests.exporters.label_readers import opened, parquet, records, tar_samples, voc_objects
+from tests.exporters.test_coco import average_precision
 
 # pycocotools' decoder predates numpy 2's __array__(copy=...).
 pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
@@ -22,9 +23,9 @@ Row = tuple[str, bool]
 
 def in_coco(folder: Path) -> list[Row]:
     """In the file whose ground truth still scores 1: nobody else ignores the region."""
-    truth = test_coco.opened(folder / "annotations/instances_train.json")
+    truth = opened(folder / "annotations/instances_train.json")
     assert len(truth.anns) == len(truth.dataset["annotations"])
-    assert test_coco.average_precision(truth, "bbox") == pytest.approx(1.0, abs=1e-9)
+    assert average_precision(truth, "bbox") == pytest.approx(1.0, abs=1e-9)
     rows = truth.anns.values()
     assert {row["instance_id"] for row in rows if row["iscrowd"]} == {1}
     return [(truth.cats[row["category_id"]]["name"], bool(row["iscrowd"])) for row in rows]
@@ -32,7 +33,7 @@ def in_coco(folder: Path) -> list[Row]:
 
 def in_parquet(folder: Path) -> list[Row]:
     """Classes are counted from 0; ids stay unique."""
-    (row,) = test_huggingface.read(folder / "data/train-00000-of-00001.parquet").to_pylist()
+    (row,) = parquet(folder / "data/train-00000-of-00001.parquet").to_pylist()
     objects = row["objects"]
     assert len(set(objects["id"])) == len(objects["id"])
     names = [("box", "walker")[k] for k in objects["category"]]
@@ -41,7 +42,7 @@ def in_parquet(folder: Path) -> list[Row]:
 
 def in_records(folder: Path) -> list[Row]:
     """Label 0 is the background of TensorFlow's readers."""
-    (record,) = test_tfrecord.records(folder / "train-00000-of-00001.tfrecord")
+    (record,) = records(folder / "train-00000-of-00001.tfrecord")
     labels, texts, crowds = (
         record[f"image/object/{key}"][1] for key in ("class/label", "class/text", "is_crowd")
     )
@@ -51,7 +52,7 @@ def in_records(folder: Path) -> list[Row]:
 
 def in_voc(folder: Path) -> list[Row]:
     """Difficult objects; lists of images have 0 for one that shows no other of the class."""
-    rows = test_voc.objects_of(folder / YEAR / "Annotations/000000000_color.xml")
+    rows = voc_objects(folder / YEAR / "Annotations/000000000_color.xml")
     text = (folder / YEAR / "ImageSets/Main/walker_train.txt").read_text()
     assert text == "000000000_color  0\n"
     return [(row["name"], row["difficult"] == "1") for row in rows]
@@ -59,7 +60,7 @@ def in_voc(folder: Path) -> list[Row]:
 
 def in_tar(folder: Path) -> list[Row]:
     """Ids stay unique."""
-    (sample,) = test_webdataset.read(folder / "train")
+    (sample,) = tar_samples(folder / "train")
     rows = sample["json"]["cameras"]["color"]["annotations"]
     assert len({row["id"] for row in rows}) == len(rows)
     assert [row["category_id"] for row in rows if row["iscrowd"]] == [1, 2]

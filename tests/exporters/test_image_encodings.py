@@ -35,8 +35,8 @@ from gen_data.exporters.nuscenes import NuScenes
 from gen_data.exporters.voc import Voc
 from gen_data.runner.stored import ImageFiles
 from gen_data.sensors.camera.rgb_encoding import RgbEncoding
-from tests.exporters import test_tfrecord
 from tests.exporters.drives import drive_info
+from tests.exporters.label_readers import json_lines, records
 
 JPEG, WEBP, LOSSLESS = (
     ImageEncoding("jpeg", 92),
@@ -149,11 +149,6 @@ Found = tuple[bytes, str]
 """File of the first photograph, and the format that the data set states."""
 
 
-def lines(path: Path) -> list[dict[str, Any]]:
-    """Rows of a JSON lines file."""
-    return [json.loads(line) for line in path.read_text().splitlines()]
-
-
 def file_of(path: Path) -> Found:
     """A file, and the format that its ending states."""
     return path.read_bytes(), path.suffix
@@ -209,7 +204,9 @@ def in_solo(folder: Path) -> Found:
 
 def in_clips(folder: Path) -> Found:
     """By the line of the first frame."""
-    return file_of(folder / "train" / lines(folder / "train/metadata.jsonl")[0]["image_file_name"])
+    return file_of(
+        folder / "train" / json_lines(folder / "train/metadata.jsonl")[0]["image_file_name"]
+    )
 
 
 def in_bop(folder: Path) -> Found:
@@ -243,7 +240,7 @@ def in_tar(folder: Path) -> Found:
 
 def in_records(folder: Path) -> Found:
     """Under the keys by which TensorFlow's API decodes it."""
-    (record,) = test_tfrecord.records(folder / "train-00000-of-00001.tfrecord")
+    (record,) = records(folder / "train-00000-of-00001.tfrecord")
     (data,), (kind,), (name,) = (
         record[f"image/{key}"][1] for key in ("encoded", "format", "filename")
     )

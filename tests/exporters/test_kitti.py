@@ -311,16 +311,14 @@ def test_far_and_low_things_are_dont_care(z_m: float, rows_px: int, labelled: bo
 
 
 def test_official_types_are_used_and_others_are_misc(dataset: Path) -> None:
-    """Cars and pedestrians have types of their own, crates have none."""
-    rows = (dataset / "training/label_2/000000.txt").read_text().splitlines()
+    """Cars and pedestrians have types of their own, crates have none; heights come first."""
+    text = (dataset / "training/label_2/000000.txt").read_text()
+    rows = [line.split(" ") for line in text.splitlines()]
 
-    assert [row.split(" ")[0] for row in rows] == [
-        "Car",
-        "Pedestrian",
-        "Misc",
-        "Misc",
-        "Pedestrian",
-    ]
+    assert [row[0] for row in rows] == ["Car", "Pedestrian", "Misc", "Misc", "Pedestrian"]
+    sizes_m = [tuple(map(float, row[8:11])) for row in rows]
+    car, person, crate = (1.5, 1.8, 4.0), (1.8, 0.6, 0.5), (0.9, 1.4, 1.0)
+    assert sizes_m == [car, person, crate, crate, person]
 
 
 def test_images_in_memory_or_on_disk_give_the_same_bytes(world: Any, tmp_path: Path) -> None:

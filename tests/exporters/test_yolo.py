@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import shutil
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,28 +14,15 @@ import yaml
 from PIL import Image
 from pycocotools import mask as coco_mask
 
-from gen_data.core.se3 import SE3
 from gen_data.exporters.coco import Coco
 from gen_data.exporters.yolo import Yolo, inner_rectangle
 from tests.exporters.coco_masks import drawn_mask
+from tests.exporters.test_labels import divided
 
 # pycocotools' decoder predates numpy 2's __array__(copy=...).
 pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
 
 TASKS = ("detect", "segment", "pose", "obb")
-
-
-def divided(world: Any) -> Any:
-    """A car in two parts behind a pedestrian, seen by a tilted camera."""
-    level = world.camera()
-    tilted = replace(level, T_world_camera=level.T_world_camera @ SE3.about_z(0.4))
-    things = (
-        world.instance(1, "car", 14.0, 0.0, 1.57),
-        world.instance(2, "pedestrian", 8.0, 0.0, 0.0),
-        world.instance(3, "crate", 9.0, 2.0, 0.0),
-        world.instance(4, "crate", 10.0, -3.0, 0.5),
-    )
-    return world.sample(7, things, [tilted])
 
 
 @pytest.fixture(scope="module")
@@ -58,52 +44,6 @@ def rows_of(task_folder: Path, split: str, stem: str) -> list[list[float]]:
     return [[float(value) for value in line.split()] for line in text.splitlines()]
 
 
-def problems(task_folder: Path, dataset: Path) -> list[str]:
-    """Differences of boxes and classes from COCO, and files that Ultralytics would not find."""
-    found = []
-    data = yaml.safe_load((task_folder / "data.yaml").read_text())
-    for split in ("train", "val"):
-        coco = coco_of(dataset, split)
-        names = {c["id"]: c["name"] for c in coco["categories"]}
-        images = {p.stem for p in (task_folder / data[split]).glob("*.png")}
-        labels = {
-            p.stem for p in (task_folder / data[split].replace("images/", "labels/")).iterdir()
-        }
-        if not images == labels == {Path(i["file_name"]).stem for i in coco["images"]}:
-            found.append("files")
-            continue
-        for image in coco["images"]:
-            w, h = image["width"], image["height"]
-            rows = rows_of(task_folder, split, Path(image["file_name"]).stem)
-            expected = [a for a in coco["annotations"] if a["image_id"] == image["id"]]
-            if len(rows) != len(expected):
-                found.append("count")
-                continue
-            for row, annotation in zip(rows, expected, strict=True):
-                if data["names"][int(row[0])] != names[annotation["category_id"]]:
-                    found.append("class")
-                x, y, width, height = annotation["bbox"]
-                if len(row) == 5:
-                    cx, cy, bw, bh = np.array(row[1:]) * [w, h, w, h]
-                    box = [cx - bw / 2, cy - bh / 2, bw, bh]
-                else:
-                    points = np.array(row[1:]).reshape(-1, 2) * [w, h]
-                    # Polygons lie 0.02 px inside the edges of their pixels.
-                    box = [*points.min(axis=0) - 0.02, *np.ptp(points, axis=0) + 0.04]
-                if np.abs(np.array(box) - [x, y, width, height]).max() > 0.01:
-                    found.append("box")
-    return found
-
-
-@pytest.mark.parametrize("task", ["detect", "segment"])
-def test_boxes_and_classes_are_those_of_coco(dataset: Path, task: str) -> None:
-    """Within a hundredth of a pixel; empty images have empty files."""
-    folder = dataset / "yolo/dataset" / task
-
-    assert problems(folder, dataset) == []
-    assert rows_of(folder, "train", "000000003_color") == []
-
-
 def masks_of(dataset: Path, split: str) -> list[tuple[str, Any, Any]]:
     """Name of the image, COCO's row and its mask for every object, in order."""
     coco = coco_of(dataset, split)
@@ -119,7 +59,9 @@ def test_a_segment_is_the_outline_of_the_mask(dataset: Path) -> None:
     for stem, row, mask in masks_of(dataset, "train"):
         place = places[stem] = places.get(stem, -1) + 1
         h, w = mask.shape
-        points = np.array(rows_of(folder, "train", stem)[place][1:]).reshape(-1, 2) * [w, h]
+        number, *outline = rows_of(folder, "train", stem)[place]
+        assert number == row["category_id"] - 1
+        points = np.array(outline).reshape(-1, 2) * [w, h]
         (rle,) = coco_mask.frPyObjects([points.ravel().tolist()], h, w)
         drawn = coco_mask.decode(rle).astype(bool)
         filled = cv2.fillPoly(np.zeros((h, w), np.uint8), [points.astype(np.int32)], 1)
