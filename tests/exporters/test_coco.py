@@ -9,7 +9,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 import pytest
 from PIL import Image
@@ -19,7 +18,6 @@ from pycocotools.cocoeval import COCOeval
 
 from gen_data.annotations.annotate import Thresholds
 from gen_data.core.capture import Channel
-from gen_data.core.lens import Lens
 from gen_data.core.scene import Weather
 from gen_data.core.se3 import SE3
 from gen_data.exporters.coco import Coco
@@ -156,32 +154,6 @@ def test_cameras_are_written_in_full(train: COCO) -> None:
         [[0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 1.6], [0, 0, 0, 1]],
         atol=1e-9,
     )
-
-
-def test_bent_cameras_are_written_as_opencv_takes_them(world: Any, tmp_path: Path) -> None:
-    """K and the distortion project as the camera does; pinholes have no lens."""
-    sample = world.samples[0]
-    truth = sample.truth["color"]
-    lens = Lens("brown_conrady", (-0.2, 0.05, 0.001, -0.002, 0.01, 0.003, 0.0, 0.0))
-    camera = replace(truth.camera, intrinsics=replace(truth.camera.intrinsics, lens=lens))
-    bent = replace(sample, truth={"color": replace(truth, camera=camera)})
-
-    folder = world.export(Coco(), world.info(2), [bent, world.samples[1]], tmp_path)
-
-    images = json.loads((folder / "annotations/instances_train.json").read_text())["images"]
-    first, second = sorted(images, key=lambda image: image["sample"])
-    assert "lens" not in second
-    assert first["lens"]["model"] == "brown_conrady"
-    assert first["lens"]["coefficients"] == ["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"]
-    points = np.array([[0.3, -0.2, 1.0], [-0.5, 0.1, 1.4]])
-    there, _ = cv2.projectPoints(
-        points,
-        np.zeros(3),
-        np.zeros(3),
-        np.array(first["K"]),
-        np.array(first["lens"]["distortion"]),
-    )
-    np.testing.assert_allclose(there[:, 0], camera.intrinsics.project(points), atol=1e-4)
 
 
 def test_visibility_and_amodal_shapes_agree_with_the_masks(train: COCO) -> None:

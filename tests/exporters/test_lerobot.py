@@ -17,8 +17,6 @@ import pyarrow.parquet
 import pytest
 from PIL import Image
 
-from gen_data.assemble.config import load_config
-from gen_data.assemble.pipeline_factory import PipelineFactory
 from gen_data.core.errors import ConfigError
 from gen_data.core.scene import ArmGoal
 from gen_data.exporters import lerobot_files
@@ -285,16 +283,10 @@ def test_tasks_are_sentences(reach: Any) -> None:
     assert task_sentence(scene, replace(arm, task=())) == "Stay in place."
 
 
-def test_a_configuration_without_arm_is_refused_before_rendering() -> None:
-    """The nominal scene decides, so that no shard is lost."""
-    config = load_config("kitti_stereo.yaml", overrides=['exporters=[{"type": "lerobot"}]'])
-
-    with pytest.raises(ConfigError, match="exporter 'lerobot': the scene has no arm; add an elem"):
-        PipelineFactory(config, n=20).check()
-
-
 def test_data_sets_without_arms_are_refused(world: Any, samples: Any, tmp_path: Path) -> None:
-    """With the field to set."""
+    """By the nominal scene, before anything is rendered; with the field to set."""
+    with pytest.raises(ConfigError, match="exporter 'lerobot': the scene has no arm; add an elem"):
+        LeRobot().check_scene(samples[0].scene)
     with pytest.raises(ConfigError, match="the scene has no arm; add an element of type robot"):
         world.export(LeRobot(), drive_info(world), samples, tmp_path / "a")
     with pytest.raises(ConfigError, match="has no arm 'leg'; expected one of: arm"):
