@@ -49,14 +49,10 @@ class Cvat(ImageRowsExporter):
         box="left, top, right, bottom along the edges of pixels",
         lens=ANY_LENS,
     )
+    annotators: ClassVar[frozenset[str]] = frozenset({"instance_masks", "visibility"})
 
     shapes: Literal["mask", "polygon", "box"] = "mask"
     """Shape of every object."""
-
-    @property
-    def needs(self) -> frozenset[str]:
-        """Names of the annotators that it reads."""
-        return frozenset({"instance_masks", "visibility"})
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Number the images of each split, join their shapes, and link the images."""

@@ -49,15 +49,11 @@ class GraspNet(ImageRowsExporter):
 
     type: Literal["graspnet"] = "graspnet"
     conventions: ClassVar[Conventions] = Conventions(lens=ANY_LENS)
+    annotators: ClassVar[frozenset[str]] = frozenset({"grasps"})
 
     height_m: float = Field(0.02, gt=0)
     depth_m: float = Field(0.015, ge=0)
     clearance_m: float = Field(0.003, ge=0)
-
-    @property
-    def needs(self) -> frozenset[str]:
-        """Names of the annotators that it requires."""
-        return frozenset({"grasps"})
 
     def image_row(self, info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
         """The rows of its arrays."""

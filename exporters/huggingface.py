@@ -94,15 +94,11 @@ class HuggingFace(ExporterBase):
     conventions: ClassVar[Conventions] = Conventions(
         pixel_centre="i + 0.5", box=EDGES, lens="any; column `lens`", time=READING
     )
+    annotators: ClassVar[frozenset[str]] = frozenset({"instance_masks"})
 
     image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
     rows_per_file: int = Field(1000, ge=1, le=1_000_000)
     license: str = Field("other", pattern=r"^[a-z0-9.-]+$")
-
-    @property
-    def needs(self) -> frozenset[str]:
-        """Names of the annotators that it reads."""
-        return frozenset({"instance_masks"})
 
     def check(self, info: DatasetInfo) -> None:
         """Reject a data set that this format cannot represent.

@@ -72,6 +72,7 @@ class LabelStudio(ImageRowsExporter):
         box="left, top, width, height along the edges of pixels, in percent of the image",
         lens=ANY_LENS,
     )
+    annotators: ClassVar[frozenset[str]] = frozenset({"instance_masks"})
 
     shapes: Shape = "polygon"
     """Shape of every object."""
@@ -79,11 +80,6 @@ class LabelStudio(ImageRowsExporter):
     """Whether regions are finished annotations, or predictions that an annotator starts from."""
     url_prefix: str = LOCAL_FILES
     """Prefix of the path of an image."""
-
-    @property
-    def needs(self) -> frozenset[str]:
-        """Names of the annotators that it reads."""
-        return frozenset({"instance_masks"})
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Write the tasks of each split, link their images, and describe the interface."""

@@ -48,11 +48,7 @@ class LanguageJsonl(ImageRowsExporter):
 
     type: Literal["language"] = "language"
     conventions: ClassVar[Conventions] = Conventions(box=EDGES, lens=ANY_LENS)
-
-    @property
-    def needs(self) -> frozenset[str]:
-        """Names of the annotators that it requires."""
-        return frozenset({"instance_masks", "language"})
+    annotators: ClassVar[frozenset[str]] = frozenset({"instance_masks", "language"})
 
     def image_row(self, info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
         """Its text and its objects."""
