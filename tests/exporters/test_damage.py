@@ -177,14 +177,12 @@ class Made:
 
     Attributes:
         kind: Format.
-        root: Holds the export, and COCO's of the street as it was, by type.
         folder: The data set.
         world: Its exports are the folder, and its samples those as they were.
         samples: Those as they were.
     """
 
     kind: str
-    root: Path
     folder: Path
     world: Any
     samples: Any
@@ -284,7 +282,7 @@ ROWS = {
     "calibration": row(drive, "cameras",
         test_calibration.test_every_photograph_has_its_pose_in_the_model_of_its_scene),
     "cityscapes": row(street, "categories, ids",
-        lambda m: test_cityscapes.problems(m.folder, m.root)),
+        lambda m: test_cityscapes.problems(m.folder, m.samples)),
     "coco": row(street, "boxes, cameras, categories, centres, masks, poses, shares, solids",
         labels,
         test_coco.test_box_and_area_are_those_of_the_decoded_mask,
@@ -398,11 +396,9 @@ def run_tests(made: Made) -> None:
 
 
 @pytest.fixture(scope="module")
-def make(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Made]:
+def make(world: Any) -> Callable[..., Made]:
     """Exports a format, of changed samples if there are changes."""
     sources = cache(lambda source: source(world))
-    coco = tmp_path_factory.mktemp("coco")
-    world.export(TABLE.load("coco")(), *street(world), coco)
 
     def export(kind: str, root: Path, changes: tuple[Callable[[Any], Any], ...] = ()) -> Made:
         form = ROWS[kind]
@@ -411,10 +407,8 @@ def make(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Callable[..., 
         changed = samples
         for change in changes:
             changed = list(map(change, changed))
-        folder = world.export(exporter, info, changed, root / kind)
-        if kind != "coco":
-            (root / "coco").symlink_to(coco)
-        return Made(kind, root, folder, Copied(world, folder), samples)
+        folder = world.export(exporter, info, changed, root)
+        return Made(kind, folder, Copied(world, folder), samples)
 
     return export
 

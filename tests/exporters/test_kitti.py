@@ -30,6 +30,7 @@ from gen_data.exporters.kitti import (
     upright_box,
 )
 from tests.exporters import kitti_evaluation
+from tests.exporters.drives import calibration
 
 Array = NDArray[np.float64]
 CAMERA = Camera("color", IDENTITY, Intrinsics(200, 100, 150.0, 150.0, 100.0, 50.0))
@@ -48,10 +49,10 @@ def devkit_corners(row: str) -> Array:
 
 def devkit_calib(path: Path) -> dict[str, Array]:
     """Matrices by name; readers take the rows in this order."""
-    rows = [line.split(": ") for line in path.read_text().splitlines()]
+    found = calibration(path)
     names = ["P0", "P1", "P2", "P3", "R0_rect", "Tr_velo_to_cam", "Tr_imu_to_velo"]
-    assert [name for name, _ in rows] == names
-    return {n: np.array(v.split(" "), float).reshape(3, -1) for n, v in rows}
+    assert list(found) == names
+    return {name: values.reshape(3, -1) for name, values in found.items()}
 
 
 STYLE = Kitti(types="category", boxes="tight", low_px=2)

@@ -12,7 +12,7 @@ import pytest
 from gen_data.core.capture import Channel
 from gen_data.core.se3 import SE3
 from gen_data.exporters import TABLE
-from tests.exporters.label_readers import READERS
+from tests.exporters.label_readers import READERS, Found
 
 # pycocotools' decoder predates numpy 2's __array__(copy=...).
 pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
@@ -31,22 +31,35 @@ def divided(world: Any) -> Any:
     return world.sample(7, things, [replace(level, T_world_camera=pose)])
 
 
+def truth_of(sample: Any, camera: str = "color") -> list[Found]:
+    """Visible objects of an image; masks are those of the image of instances."""
+    ids = sample.capture.readings[camera].channels[Channel.INSTANCE]
+    return [
+        Found(
+            thing.instance.category,
+            (thing.box.x_min, thing.box.y_min, thing.box.x_max, thing.box.y_max),
+            ids == thing.instance.instance_id,
+            thing.instance.instance_id,
+        )
+        for thing in sample.truth[camera].objects
+        if thing.box is not None
+    ]
+
+
 def assert_objects(kind: str, folder: Path, samples: list[Any]) -> None:
     """Splits, images, and categories, boxes, masks and numbers of their objects, in order."""
     images = {stem: (split, rows) for split, stem, rows in READERS[kind](folder)}
     assert set(images) == {f"{s.index:09d}_color" for s in samples}
     for sample in samples:
         split, rows = images[f"{sample.index:09d}_color"]
+        truth = truth_of(sample)
         assert split == sample.split
-        ids = sample.capture.readings["color"].channels[Channel.INSTANCE]
-        truth = [t for t in sample.truth["color"].objects if t.box is not None]
-        assert [row.category for row in rows] == [t.instance.category for t in truth]
+        assert [row.category for row in rows] == [thing.category for thing in truth]
         for row, thing in zip(rows, truth, strict=True):
-            box, number = thing.box, thing.instance.instance_id
-            assert row.box in (None, (box.x_min, box.y_min, box.x_max, box.y_max))
-            assert row.number in (None, number)
+            assert row.box in (None, thing.box)
+            assert row.number in (None, thing.number)
             if row.mask is not None:
-                np.testing.assert_array_equal(row.mask, ids == number)
+                np.testing.assert_array_equal(row.mask, thing.mask)
 
 
 @pytest.mark.parametrize(

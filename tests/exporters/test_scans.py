@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 import math
 from dataclasses import replace
@@ -29,6 +28,7 @@ from gen_data.exporters.point_cloud_io import read_points
 from gen_data.exporters.pointclouds import PointClouds
 from gen_data.exporters.semantickitti import SemanticKitti
 from gen_data.exporters.semantickitti import point_labels as semantic_labels
+from tests.exporters.drives import calibration, read_ply
 from tests.wheels import needs_open3d
 
 POINT_FIELDS = [
@@ -83,11 +83,8 @@ def test_kitti_points_are_the_scanner_s(kitti: Path, world: Any) -> None:
 def test_the_calibration_takes_points_onto_the_objects_pixels(kitti: Path, world: Any) -> None:
     """P2 Tr x: points of an instance fall on its mask or within two pixels of it, if visible."""
     sample = world.samples[0]
-    rows = dict(
-        line.split(": ") for line in (kitti / "training/calib/000000.txt").read_text().splitlines()
-    )
-    tr = np.array(rows["Tr_velo_to_cam"].split(), float).reshape(3, 4)
-    p2 = np.array(rows["P2"].split(), float).reshape(3, 4)[:, :3]
+    rows = calibration(kitti / "training/calib/000000.txt")
+    tr, p2 = rows["Tr_velo_to_cam"].reshape(3, 4), rows["P2"].reshape(3, 4)[:, :3]
     points = sample.capture.clouds["top"].points
     seen = {t.instance.instance_id: t for t in sample.truth["color"].objects}
     checked = 0
@@ -240,15 +237,10 @@ def test_a_ply_file_is_what_its_header_says(world: Any, tmp_path: Path) -> None:
     """Parsed by hand: one record per point, in the order of the properties."""
     info = world.info(7, lidars=("top",))
     folder = world.export(PointClouds(), info, world.samples, tmp_path)
-    data = (folder / "top/000000000.ply").read_bytes()
-    header, body = data.split(b"end_header\n", 1)
-    lines = [line.split() for line in io.StringIO(header.decode("ascii"))]
-    types = {"float": "<f4", "uint16": "<u2", "uint8": "u1"}
-    dtype = np.dtype([(line[2], types[line[1]]) for line in lines if line[0] == "property"])
+    records = read_ply(folder / "top/000000000.ply")
     points = world.samples[0].capture.clouds["top"].points
 
-    assert list(dtype.names or ()) == POINT_FIELDS
-    records = np.frombuffer(body, dtype)
+    assert list(records.dtype.names) == POINT_FIELDS
     np.testing.assert_array_equal(records["category"], points["category_id"])
     np.testing.assert_array_equal(records["instance"], points["instance_id"])
     np.testing.assert_array_equal(records["z"], points["position_m"][:, 2])

@@ -1,9 +1,9 @@
-"""YOLO export, held against ``coco``; the slow test reads it with Ultralytics."""
+"""YOLO export, held against the samples; the slow test reads it with Ultralytics."""
 
 from __future__ import annotations
 
-import json
 import shutil
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -12,12 +12,10 @@ import numpy as np
 import pytest
 import yaml
 from PIL import Image
-from pycocotools import mask as coco_mask
 
-from gen_data.exporters.coco import Coco
 from gen_data.exporters.yolo import Yolo, inner_rectangle
-from tests.exporters.coco_masks import drawn_mask
-from tests.exporters.test_labels import divided
+from tests.exporters.label_readers import drawn
+from tests.exporters.test_labels import divided, truth_of
 
 # pycocotools' decoder predates numpy 2's __array__(copy=...).
 pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
@@ -26,17 +24,15 @@ TASKS = ("detect", "segment", "pose", "obb")
 
 
 @pytest.fixture(scope="module")
-def dataset(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The seven frames and one more with all tasks, and their COCO export."""
-    folder = tmp_path_factory.mktemp("yolo")
-    samples = [*world.samples, divided(world)]
-    for exporter in (Yolo(tasks=TASKS), Coco()):
-        world.export(exporter, world.info(8), samples, folder / exporter.type)
-    return folder
+def samples(world: Any) -> list[Any]:
+    """The seven frames, and an object in two parts."""
+    return [*world.samples, divided(world)]
 
 
-def coco_of(dataset: Path, split: str) -> Any:
-    return json.loads((dataset / f"coco/dataset/annotations/instances_{split}.json").read_text())
+@pytest.fixture(scope="module")
+def dataset(world: Any, samples: list[Any], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """All tasks."""
+    return world.export(Yolo(tasks=TASKS), world.info(8), samples, tmp_path_factory.mktemp("yolo"))
 
 
 def rows_of(task_folder: Path, split: str, stem: str) -> list[list[float]]:
@@ -44,57 +40,52 @@ def rows_of(task_folder: Path, split: str, stem: str) -> list[list[float]]:
     return [[float(value) for value in line.split()] for line in text.splitlines()]
 
 
-def masks_of(dataset: Path, split: str) -> list[tuple[str, Any, Any]]:
-    """Name of the image, COCO's row and its mask for every object, in order."""
-    coco = coco_of(dataset, split)
-    names = {i["id"]: Path(i["file_name"]).stem for i in coco["images"]}
-    return [(names[a["image_id"]], a, drawn_mask(a, coco)) for a in coco["annotations"]]
+def objects_of(samples: list[Any], folder: Path) -> Iterator[tuple[list[float], Any]]:
+    """Row and truth of every object of the split train."""
+    for sample in (s for s in samples if s.split == "train"):
+        rows = rows_of(folder, "train", f"{sample.index:09d}_color")
+        yield from zip(rows, truth_of(sample), strict=True)
 
 
-def test_a_segment_is_the_outline_of_the_mask(dataset: Path) -> None:
+def test_a_segment_is_the_outline_of_the_mask(
+    dataset: Path, samples: list[Any], world: Any
+) -> None:
     """Drawn by pycocotools and OpenCV, every polygon gives the mask back, also of two parts."""
-    folder = dataset / "yolo/dataset/segment"
-    places: dict[str, int] = {}
     parts = 0
-    for stem, row, mask in masks_of(dataset, "train"):
-        place = places[stem] = places.get(stem, -1) + 1
+    for (number, *outline), thing in objects_of(samples, dataset / "segment"):
+        assert world.categories[int(number)] == thing.category
+        mask = thing.mask
         h, w = mask.shape
-        number, *outline = rows_of(folder, "train", stem)[place]
-        assert number == row["category_id"] - 1
         points = np.array(outline).reshape(-1, 2) * [w, h]
-        (rle,) = coco_mask.frPyObjects([points.ravel().tolist()], h, w)
-        drawn = coco_mask.decode(rle).astype(bool)
         filled = cv2.fillPoly(np.zeros((h, w), np.uint8), [points.astype(np.int32)], 1)
         count, *_ = cv2.connectedComponents(mask.astype(np.uint8), connectivity=4)
         parts = max(parts, count - 1)
         # A line between parts may round to pixels of its own.
-        assert (drawn != mask).sum() <= (0 if count == 2 else 60), row["id"]
-        assert (filled.astype(bool) != mask).sum() <= (0 if count == 2 else 60), row["id"]
+        for picture in (drawn([points.ravel().tolist()], h, w), filled.astype(bool)):
+            assert (picture != mask).sum() <= (0 if count == 2 else 60)
         np.testing.assert_allclose(np.abs(points - np.rint(points)), 0.02, atol=1e-4)
     assert parts >= 2
 
 
-def test_rotated_boxes_enclose_their_masks(dataset: Path) -> None:
+def test_rotated_boxes_enclose_their_masks(dataset: Path, samples: list[Any]) -> None:
     """Rectangles inside the image, never larger than the upright box, mostly smaller."""
-    folder = dataset / "yolo/dataset/obb"
-    places: dict[str, int] = {}
     smaller = 0
-    for stem, row, mask in masks_of(dataset, "train"):
-        place = places[stem] = places.get(stem, -1) + 1
-        h, w = mask.shape
-        corners = np.array(rows_of(folder, "train", stem)[place][1:]).reshape(4, 2) * [w, h]
+    for row, thing in objects_of(samples, dataset / "obb"):
+        h, w = thing.mask.shape
+        corners = np.array(row[1:]).reshape(4, 2) * [w, h]
         assert (corners >= 0).all()
         assert (corners <= [w, h]).all()
         sides = np.roll(corners, -1, axis=0) - corners
         assert np.abs((sides * np.roll(sides, 1, axis=0)).sum(axis=1)).max() < 0.05
-        y, x = np.nonzero(mask)
+        y, x = np.nonzero(thing.mask)
         ends = np.concatenate([np.stack([x + dx, y + dy], 1) for dx in (0, 1) for dy in (0, 1)])
         for corner, side in zip(corners, sides, strict=True):
             offsets = (ends - corner) @ np.array([-side[1], side[0]]) / np.hypot(*side)
             assert offsets.min() > -0.01
         area = np.hypot(*sides[0]) * np.hypot(*sides[1])
-        assert area <= row["bbox"][2] * row["bbox"][3] + 0.1
-        smaller += area < 0.95 * row["bbox"][2] * row["bbox"][3]
+        left, top, right, bottom = thing.box
+        assert area <= (right - left) * (bottom - top) + 0.1
+        smaller += area < 0.95 * (right - left) * (bottom - top)
     assert smaller > 3
 
 
@@ -118,25 +109,24 @@ def test_a_rectangle_that_leaves_the_image_is_replaced() -> None:
     assert sorted(map(tuple, corners.tolist())) == [(0, 0), (0, 30), (30, 0), (30, 30)]
 
 
-def test_pose_has_the_people_with_their_keypoints(dataset: Path) -> None:
-    """One class; values are those of COCO's keypoints, absent ones are 0."""
-    folder = dataset / "yolo/dataset/pose"
+def test_pose_has_the_people_with_their_keypoints(dataset: Path, samples: list[Any]) -> None:
+    """One class; points that are not in the image are 0."""
+    folder = dataset / "pose"
     data = yaml.safe_load((folder / "data.yaml").read_text())
-    truth = json.loads(
-        (dataset / "coco/dataset/annotations/pedestrian_keypoints_train.json").read_text()
-    )
 
     assert data["names"] == {0: "pedestrian"}
     assert data["kpt_shape"] == [17, 3]
     assert data["flip_idx"] == [0, 2, 1, 4, 3, 6, 5, 8, 7, 10, 9, 12, 11, 14, 13, 16, 15]
     count = 0
-    for image in truth["images"]:
-        rows = rows_of(folder, "train", Path(image["file_name"]).stem)
-        expected = [a for a in truth["annotations"] if a["image_id"] == image["id"]]
-        assert len(rows) == len(expected)
-        for row, annotation in zip(rows, expected, strict=True):
-            points = np.array(row[5:]).reshape(-1, 3) * [image["width"], image["height"], 1]
-            want = np.array(annotation["keypoints"]).reshape(-1, 3)
+    for sample in (s for s in samples if s.split == "train"):
+        rows = rows_of(folder, "train", f"{sample.index:09d}_color")
+        things = sample.truth["color"].objects
+        people = [t for t in things if t.instance.category == "pedestrian" and t.box]
+        for row, thing in zip(rows, people, strict=True):
+            points = np.array(row[5:]).reshape(-1, 3) * [160, 120, 1]
+            want = [
+                (*p.image_px, p.visibility) if p.visibility else [0] * 3 for p in thing.keypoints
+            ]
             np.testing.assert_allclose(points, want, atol=2e-3)
             count += 1
     assert count >= 5
@@ -176,7 +166,7 @@ def test_ultralytics_reads_it_without_repairs(
     monkeypatch.setattr(utils, "check_font", lambda font: None)  # no download
 
     folder = tmp_path / "copy"
-    shutil.copytree(dataset / "yolo/dataset" / task, folder)
+    shutil.copytree(dataset / task, folder)
     data = utils.check_det_dataset(str(folder / "data.yaml"), autodownload=False)
     assert data["nc"] == (1 if task == "pose" else 3)
 
