@@ -42,11 +42,11 @@ from gen_data.exporters.base import ANY_FORMAT, AssetExporter
 from gen_data.exporters.coco import box_xywh, dataset_header, image_name, write_dataset
 from gen_data.exporters.conventions import ANY_LENS, EDGES, Conventions
 from gen_data.exporters.fragments import fragment_lines, fragment_rows, image_splits, write_fragment
-from gen_data.exporters.image_files import link_or_copy
+from gen_data.exporters.image_files import link_or_copy, link_photograph
 from gen_data.exporters.label_colors import voc_palette
 from gen_data.exporters.label_png import encode_label_png
 from gen_data.exporters.label_regions import find_regions
-from gen_data.exporters.sensor_selection import check_channels, rgb_cameras
+from gen_data.exporters.sensor_selection import check_channels, photographs
 from gen_data.exporters.sequences import write_bytes
 
 UInt32 = NDArray[np.uint32]
@@ -93,11 +93,9 @@ class CocoPanoptic(AssetExporter):
         """
         self.check(info)
         rows: dict[str, list[dict[str, Any]]] = {}
-        for sample in samples:
-            for sensor in rgb_cameras(info):
-                if sensor in sample.truth:
-                    row = _write_segments(info, sample, sensor, shard_dir, self.library)
-                    rows.setdefault(f"{sample.split}.images", []).append(row)
+        for sample, sensor in photographs(info, samples):
+            row = _write_segments(info, sample, sensor, shard_dir, self.library)
+            rows.setdefault(f"{sample.split}.images", []).append(row)
         folder = shard_dir / self.type
         folder.mkdir(parents=True, exist_ok=True)
         for stem, lines in rows.items():
@@ -123,10 +121,9 @@ class CocoPanoptic(AssetExporter):
                 _annotation_lines(fragment_lines(folders, stem), ids),
             )
             for shard_dir, row in fragment_rows(shard_dirs, self.type, stem):
-                name, sensor, index = row["file_name"], row["sensor"], row["sample"]
+                name = row["file_name"]
                 link_or_copy(shard_dir / self.type / name, path.with_suffix("") / name)
-                source = info.media_path(shard_dir, sensor, Channel.RGB, index)
-                link_or_copy(source, dataset_dir / split / row["photograph"])
+                link_photograph(info, shard_dir, row, dataset_dir / split / row["photograph"])
 
 
 def _write_segments(

@@ -44,7 +44,7 @@ from gen_data.exporters.croissant_metadata import (
     record_set,
 )
 from gen_data.exporters.fragments import fragment_rows, write_fragment
-from gen_data.exporters.image_files import link_or_copy
+from gen_data.exporters.image_files import link_photograph
 from gen_data.exporters.lens_fields import has_bent_camera
 from gen_data.exporters.sensor_selection import rgb_camera, rgb_cameras
 from gen_data.exporters.sequences import write_text
@@ -138,10 +138,8 @@ class Croissant(AssetExporter):
                 image = row["image"]
                 images.write(image)
                 objects.write_all(row["objects"])
-                sensor, index = image["sensor"], image["sample"]
-                source = info.media_path(shard_dir, sensor, Channel.RGB, index)
                 target = dataset_dir / "images" / image["split"] / image["file_name"]
-                link_or_copy(source, target)
+                link_photograph(info, shard_dir, image, target)
         tables = [table.described() for table in (images, objects, categories)]
         licences, files = self._asset_licences(shard_dirs), [*tables, _image_files(info)]
         document = croissant_document(info, licences, files, _record_sets(info))

@@ -31,7 +31,7 @@ from gen_data.core.sample import MaskPx, ObjectTruth, Sample
 from gen_data.exporters.coco import image_name
 from gen_data.exporters.conventions import ANY_LENS, Conventions
 from gen_data.exporters.fragments import fragment_rows, image_splits
-from gen_data.exporters.image_files import link_or_copy
+from gen_data.exporters.image_files import link_photograph
 from gen_data.exporters.image_rows import ImageRowsExporter
 from gen_data.exporters.label_colors import voc_palette
 from gen_data.exporters.mask_polygons import drawable_polygons
@@ -71,9 +71,7 @@ class Cvat(ImageRowsExporter):
                         f'width="{row["width"]}" height="{row["height"]}">\n'
                         f"{row['shapes']}  </image>\n"
                     )
-                    sensor, index = row["sensor"], row["sample"]
-                    source = info.media_path(shard_dir, sensor, Channel.RGB, index)
-                    link_or_copy(source, path.parent / "images" / name)
+                    link_photograph(info, shard_dir, row, path.parent / "images" / name)
                 file.write("</annotations>\n")
 
     def image_row(self, info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:

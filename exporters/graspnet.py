@@ -32,7 +32,7 @@ from gen_data.core.sample import Sample
 from gen_data.exporters.coco import image_name
 from gen_data.exporters.conventions import ANY_LENS, Conventions
 from gen_data.exporters.fragments import fragment_rows, image_splits
-from gen_data.exporters.image_files import link_or_copy
+from gen_data.exporters.image_files import link_photograph
 from gen_data.exporters.image_rows import ImageRowsExporter
 from gen_data.exporters.sequences import write_bytes
 
@@ -73,8 +73,7 @@ class GraspNet(ImageRowsExporter):
                     file = io.BytesIO()
                     np.save(file, np.array(row[name], np.float32).reshape(-1, columns))
                     write_bytes(image.with_name(f"{image.stem}_{name}.npy"), file.getvalue())
-                source = info.media_path(shard_dir, row["sensor"], Channel.RGB, row["sample"])
-                link_or_copy(source, image)
+                link_photograph(info, shard_dir, row, image)
 
     def _grasps(self, sample: Sample, sensor: str) -> list[list[float]]:
         frame, truth = sample.frame, sample.truth[sensor]

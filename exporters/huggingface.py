@@ -60,7 +60,7 @@ from gen_data.exporters.parquet_tables import (
     value_feature,
 )
 from gen_data.exporters.rle import encode_rle
-from gen_data.exporters.sensor_selection import instant_s, rgb_camera, rgb_cameras
+from gen_data.exporters.sensor_selection import instant_s, photographs, rgb_camera, rgb_cameras
 from gen_data.exporters.sequences import write_text
 
 if TYPE_CHECKING:
@@ -114,9 +114,7 @@ class HuggingFace(ExporterBase):
         self.check(info)
         rows = (
             {"split": sample.split, "row": _row(info, sample, sensor)}
-            for sample in samples
-            for sensor in rgb_cameras(info)
-            if sensor in sample.truth
+            for sample, sensor in photographs(info, samples)
         )
         write_fragment(shard_dir / self.type, IMAGES, rows)
 

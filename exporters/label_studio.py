@@ -39,7 +39,7 @@ from gen_data.core.sample import MaskPx, ObjectTruth, Sample
 from gen_data.exporters.coco import image_name
 from gen_data.exporters.conventions import ANY_LENS, Conventions
 from gen_data.exporters.fragments import fragment_rows, image_splits
-from gen_data.exporters.image_files import link_or_copy
+from gen_data.exporters.image_files import link_photograph
 from gen_data.exporters.image_rows import ImageRowsExporter
 from gen_data.exporters.label_colors import voc_palette
 from gen_data.exporters.mask_polygons import drawable_polygons, join_polygons
@@ -95,9 +95,8 @@ class LabelStudio(ImageRowsExporter):
                     file.write(separator + row["task"])
                     separator = ",\n"
                     keypoints.update(row["keypoints"])
-                    sensor, index = row["sensor"], row["sample"]
-                    source = info.media_path(shard_dir, sensor, Channel.RGB, index)
-                    link_or_copy(source, path.parent / "images" / row["file_name"])
+                    target = path.parent / "images" / row["file_name"]
+                    link_photograph(info, shard_dir, row, target)
                 file.write("\n]\n")
         config = label_config(info.categories, self.shapes, sorted(keypoints))
         write_text(dataset_dir / "label_config.xml", config)
