@@ -366,7 +366,12 @@ ROWS = {
 }  # fmt: skip
 """Facts that tests of each format notice."""
 
-CASES = [(kind, change) for kind, form in ROWS.items() for change in form.changes.split(", ")]
+CASES = [
+    pytest.param(kind, change, marks=[pytest.mark.slow] if number else [])
+    for kind, form in ROWS.items()
+    for number, change in enumerate(form.changes.split(", "))
+]
+"""Every fact of each format; one of each by default."""
 
 
 class Copied:
