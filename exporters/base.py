@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from fnmatch import fnmatchcase
 from typing import ClassVar, TypeVar, get_args
 
-from pydantic import Field, model_validator
+from pydantic import Field, PrivateAttr, model_validator
 
 from gen_data.config.base_model import Strict
 from gen_data.core.capture import Channel, ImageFormat
@@ -21,6 +21,7 @@ PNG_OR_JPEG = frozenset({"png", "jpeg"})
 ANY_FORMAT: frozenset[str] = frozenset(get_args(ImageFormat))
 
 E = TypeVar("E", bound="ExporterBase")
+A = TypeVar("A", bound="AssetExporter")
 
 
 class Rectify(Strict):
@@ -68,15 +69,21 @@ class ExporterBase(Strict):
     image_formats: ClassVar[frozenset[str]] = PNG_ONLY
     """Formats of photographs that it can hold; see ``check_image_formats``."""
 
+    annotators: ClassVar[frozenset[str]] = frozenset()
+    """Names of the annotators that it reads, whatever its fields are."""
+
+    own_classes: ClassVar[bool] = False
+    """Whether the format prescribes its classes, whatever its fields are; see ``Exporter``."""
+
     @property
     def needs(self) -> frozenset[str]:
         """Names of the annotators that it reads."""
-        return frozenset()
+        return self.annotators
 
     @property
     def has_own_classes(self) -> bool:
         """Whether the format prescribes its classes; see ``Exporter``."""
-        return False
+        return self.own_classes
 
     def check(self, info: DatasetInfo) -> None:
         """Reject a data set that the format cannot represent.
@@ -98,6 +105,24 @@ class ExporterBase(Strict):
         """Return the exporter for writing; formats with geometry keep the library."""
         del assets
         return self
+
+
+class AssetExporter(ExporterBase):
+    """An exporter that reads the library of assets while it writes."""
+
+    _assets: AssetLibrary | None = PrivateAttr(None)
+
+    def with_assets(self: A, assets: AssetLibrary) -> A:
+        """Return the exporter with a library."""
+        bound = self.model_copy()
+        bound._assets = assets
+        return bound
+
+    @property
+    def library(self) -> AssetLibrary:
+        """The library of ``with_assets``."""
+        assert self._assets is not None, "call with_assets first"
+        return self._assets
 
 
 def check_image_formats(exporter: Exporter, info: DatasetInfo) -> None:

@@ -64,13 +64,9 @@ class Birdseye(ExporterBase):
     conventions: ClassVar[Conventions] = Conventions(
         pixel_centre="i in `lanes`, i + 0.5 in `borders`", lens=ANY_LENS, time=SAMPLE
     )
+    annotators: ClassVar[frozenset[str]] = frozenset({"bev_map", "boxes3d", "lanes"})
 
     image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
-
-    @property
-    def needs(self) -> frozenset[str]:
-        """Names of the annotators that it reads."""
-        return frozenset({"bev_map", "boxes3d", "lanes"})
 
     def check(self, info: DatasetInfo) -> None:
         """Accept any data set; the annotator ``bev_map`` rejects scenes without a rig."""

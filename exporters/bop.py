@@ -54,7 +54,7 @@ from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.sample import MaskPx, ObjectTruth, Sample
 from gen_data.core.se3 import SE3
 from gen_data.core.serialization import canonical_json
-from gen_data.exporters.base import PNG_OR_JPEG, ExporterBase
+from gen_data.exporters.base import PNG_OR_JPEG, AssetExporter
 from gen_data.exporters.conventions import PINHOLE, Conventions
 from gen_data.exporters.fragments import fragment_lines, fragment_rows, write_fragment
 from gen_data.exporters.image_files import link_or_copy, read_pixels
@@ -86,7 +86,7 @@ IMAGES, MODELS = "images", "models"
 MASKS = ("mask", "mask_visib")
 
 
-class Bop(ExporterBase):
+class Bop(AssetExporter):
     """BOP: poses of rigid objects in the images of one camera, with their models.
 
     Attributes:
@@ -100,18 +100,15 @@ class Bop(ExporterBase):
         box="left, top, last - first column, last - first row (one less than COCO's)",
         lens=PINHOLE,
     )
+    annotators: ClassVar[frozenset[str]] = frozenset(
+        {"instance_masks", "amodal_masks", "boxes2d", "visibility", "poses"}
+    )
 
     image_formats: ClassVar[frozenset[str]] = PNG_OR_JPEG
     camera: str = ""
     folders: Literal["scene", "thousand"] = "scene"
 
-    _assets: AssetLibrary | None = PrivateAttr(None)
     _built: ByteCache[Model] = PrivateAttr(default_factory=lambda: ByteCache(MODEL_CACHE_BYTES))
-
-    @property
-    def needs(self) -> frozenset[str]:
-        """Names of the annotators that it reads."""
-        return frozenset({"instance_masks", "amodal_masks", "boxes2d", "visibility", "poses"})
 
     def check(self, info: DatasetInfo) -> None:
         """Reject a data set that this format cannot represent.
@@ -125,8 +122,7 @@ class Bop(ExporterBase):
 
     def with_assets(self, assets: AssetLibrary) -> Bop:
         """Return the exporter with a library of meshes."""
-        bound = self.model_copy()
-        bound._assets = assets
+        bound = super().with_assets(assets)
         bound._built = ByteCache(MODEL_CACHE_BYTES)
         return bound
 
@@ -137,11 +133,10 @@ class Bop(ExporterBase):
             ConfigError: see ``check``.
             AssetError: an asset's symmetries are not a finite group.
         """
-        assert self._assets is not None, "call with_assets first"
         self.check(info)
         camera = pinhole_camera(info, self.camera, self.type)
         folder = shard_dir / self.type
-        models = _ModelFiles(folder / MODELS, self._assets, self._built)
+        models = _ModelFiles(folder / MODELS, self.library, self._built)
         rows = []
         for sample in samples:
             if camera not in sample.truth:
@@ -220,7 +215,7 @@ class _ModelFiles:
     """Models of a shard; each is built and written at its first use."""
 
     def __init__(self, folder: Path, assets: AssetLibrary, built: ByteCache[Model]) -> None:
-        self._folder, self._assets, self._built = folder, assets, built
+        self._folder, self.library, self._built = folder, assets, built
         self._rows: dict[str, dict[str, Any]] = {}
         self._keys: dict[tuple[Piece, ...], str] = {}
 
@@ -230,7 +225,7 @@ class _ModelFiles:
             self._keys[pieces] = model_key(pieces)
         key = self._keys[pieces]
         if key not in self._rows:
-            model = self._built.get(key, lambda: build_model(pieces, self._assets))
+            model = self._built.get(key, lambda: build_model(pieces, self.library))
             write_bytes(self._folder / f"{key}.ply", ply_bytes(model))
             self._rows[key] = _model_facts(key, pieces, thing, model)
         return key

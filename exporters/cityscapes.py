@@ -44,7 +44,6 @@ from typing import Any, ClassVar, Literal
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import PrivateAttr
 
 from gen_data.core.boxes import BoxPx
 from gen_data.core.capture import Channel
@@ -56,7 +55,7 @@ from gen_data.core.scene_time import RIG_AXES
 from gen_data.core.serialization import canonical_json
 from gen_data.core.stereo import baseline_m
 from gen_data.exporters.background_surfaces import SURFACES, UInt16, read_surfaces
-from gen_data.exporters.base import ExporterBase
+from gen_data.exporters.base import AssetExporter
 from gen_data.exporters.cityscapes_classes import city_classes
 from gen_data.exporters.conventions import PINHOLE, Conventions
 from gen_data.exporters.fragments import fragment_rows, write_fragment
@@ -79,21 +78,16 @@ UNLABELED, EGO_VEHICLE = "unlabeled", "ego vehicle"
 IMAGES = ("labelIds", "instanceIds", "color")
 
 
-class Cityscapes(ExporterBase):
+class Cityscapes(AssetExporter):
     """Cityscapes' fine annotations of one camera."""
 
     type: Literal["cityscapes"] = "cityscapes"
     conventions: ClassVar[Conventions] = Conventions(pixel_centre="i", lens=PINHOLE)
+    own_classes: ClassVar[bool] = True
     camera: str = ""
     """Sensor of the images; empty = the first one, by name, with the rgb channel."""
     right: str = ""
     """Second camera of a rectified pair; empty = none. The first one then needs disparity."""
-    _assets: AssetLibrary | None = PrivateAttr(None)
-
-    @property
-    def has_own_classes(self) -> bool:
-        """Classes are the benchmark's."""
-        return True
 
     def check(self, info: DatasetInfo) -> None:
         """Reject a data set that this format cannot represent.
@@ -118,12 +112,6 @@ class Cityscapes(ExporterBase):
             )
         check_frame_names(info, self.type)
 
-    def with_assets(self, assets: AssetLibrary) -> Cityscapes:
-        """Return the exporter with a library of the ground's meshes."""
-        bound = self.model_copy()
-        bound._assets = assets
-        return bound
-
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
         """Write label images, polygons and calibration of each sample, and a line for it.
 
@@ -131,14 +119,13 @@ class Cityscapes(ExporterBase):
             ConfigError: see ``check``, or the cameras are not a rectified pair.
             StorageError: an image is missing.
         """
-        assert self._assets is not None, "call with_assets first"
         self.check(info)
         camera = pinhole_camera(info, self.camera, self.type)
         rows = []
         for sample in samples:
             if camera not in sample.truth or (self.right and self.right not in sample.truth):
                 continue
-            instances = find_instances(info, sample, camera, shard_dir, self._assets)
+            instances = find_instances(info, sample, camera, shard_dir, self.library)
             stem = shard_dir / self.type / f"{sample.index:09d}"
             for name, values in _values_of_codes().items():
                 write_bytes(_beside(stem, f"{name}.png"), encode_label_png(instances, values))

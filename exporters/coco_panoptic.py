@@ -32,22 +32,21 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import PrivateAttr
 
 from gen_data.core.capture import Channel
 from gen_data.core.interfaces import AssetLibrary, DatasetInfo
 from gen_data.core.sample import Sample
 from gen_data.core.serialization import canonical_json
 from gen_data.exporters.background_surfaces import SURFACES, UInt16, read_surfaces
-from gen_data.exporters.base import ANY_FORMAT, ExporterBase
+from gen_data.exporters.base import ANY_FORMAT, AssetExporter
 from gen_data.exporters.coco import box_xywh, dataset_header, image_name, write_dataset
 from gen_data.exporters.conventions import ANY_LENS, EDGES, Conventions
 from gen_data.exporters.fragments import fragment_lines, fragment_rows, image_splits, write_fragment
-from gen_data.exporters.image_files import link_or_copy
+from gen_data.exporters.image_files import link_or_copy, link_photograph
 from gen_data.exporters.label_colors import voc_palette
 from gen_data.exporters.label_png import encode_label_png
 from gen_data.exporters.label_regions import find_regions
-from gen_data.exporters.sensor_selection import check_channels, rgb_cameras
+from gen_data.exporters.sensor_selection import check_channels, photographs
 from gen_data.exporters.sequences import write_bytes
 
 UInt32 = NDArray[np.uint32]
@@ -67,7 +66,7 @@ _SCATTER = 0x9E3779B1
 """Odd: multiplication modulo 2^24 gives every number one id, and only 0 the id 0."""
 
 
-class CocoPanoptic(ExporterBase):
+class CocoPanoptic(AssetExporter):
     """COCO panoptic segmentation of all cameras with the channels rgb and instance."""
 
     type: Literal["coco_panoptic"] = "coco_panoptic"
@@ -76,7 +75,6 @@ class CocoPanoptic(ExporterBase):
     )
 
     image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
-    _assets: AssetLibrary | None = PrivateAttr(None)
 
     def check(self, info: DatasetInfo) -> None:
         """Reject a data set that this format cannot represent.
@@ -86,12 +84,6 @@ class CocoPanoptic(ExporterBase):
         """
         check_channels(info, (Channel.INSTANCE,), self.type)
 
-    def with_assets(self, assets: AssetLibrary) -> CocoPanoptic:
-        """Return the exporter with a library of the ground's meshes."""
-        bound = self.model_copy()
-        bound._assets = assets
-        return bound
-
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
         """Write an id image and a JSON line per image, and the names of stuff.
 
@@ -99,14 +91,11 @@ class CocoPanoptic(ExporterBase):
             ConfigError: see ``check``.
             StorageError: an image is missing.
         """
-        assert self._assets is not None, "call with_assets first"
         self.check(info)
         rows: dict[str, list[dict[str, Any]]] = {}
-        for sample in samples:
-            for sensor in rgb_cameras(info):
-                if sensor in sample.truth:
-                    row = _write_segments(info, sample, sensor, shard_dir, self._assets)
-                    rows.setdefault(f"{sample.split}.images", []).append(row)
+        for sample, sensor in photographs(info, samples):
+            row = _write_segments(info, sample, sensor, shard_dir, self.library)
+            rows.setdefault(f"{sample.split}.images", []).append(row)
         folder = shard_dir / self.type
         folder.mkdir(parents=True, exist_ok=True)
         for stem, lines in rows.items():
@@ -132,10 +121,9 @@ class CocoPanoptic(ExporterBase):
                 _annotation_lines(fragment_lines(folders, stem), ids),
             )
             for shard_dir, row in fragment_rows(shard_dirs, self.type, stem):
-                name, sensor, index = row["file_name"], row["sensor"], row["sample"]
+                name = row["file_name"]
                 link_or_copy(shard_dir / self.type / name, path.with_suffix("") / name)
-                source = info.media_path(shard_dir, sensor, Channel.RGB, index)
-                link_or_copy(source, dataset_dir / split / row["photograph"])
+                link_photograph(info, shard_dir, row, dataset_dir / split / row["photograph"])
 
 
 def _write_segments(

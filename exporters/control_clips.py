@@ -113,11 +113,6 @@ class ControlClips(ExporterBase):
     segmentation_weight: float = Field(0.5, ge=0, le=1)
     edges_weight: float = Field(0.5, ge=0, le=1)
 
-    @property
-    def needs(self) -> frozenset[str]:
-        """None: boxes of visible objects, which captions list, are always there."""
-        return frozenset()
-
     def check(self, info: DatasetInfo) -> None:
         """Reject a data set that this format cannot represent, or an invalid range.
 

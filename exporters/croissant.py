@@ -28,14 +28,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
-from pydantic import PrivateAttr
-
 from gen_data.core.capture import Channel
 from gen_data.core.errors import ConfigError
-from gen_data.core.interfaces import AssetLibrary, DatasetInfo
+from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.sample import Sample
 from gen_data.core.scene_assets import assets_in
-from gen_data.exporters.base import ANY_FORMAT, ExporterBase
+from gen_data.exporters.base import ANY_FORMAT, AssetExporter
 from gen_data.exporters.coco import image_name
 from gen_data.exporters.conventions import EDGES, Conventions
 from gen_data.exporters.croissant_metadata import (
@@ -46,7 +44,7 @@ from gen_data.exporters.croissant_metadata import (
     record_set,
 )
 from gen_data.exporters.fragments import fragment_rows, write_fragment
-from gen_data.exporters.image_files import link_or_copy
+from gen_data.exporters.image_files import link_photograph
 from gen_data.exporters.lens_fields import has_bent_camera
 from gen_data.exporters.sensor_selection import rgb_camera, rgb_cameras
 from gen_data.exporters.sequences import write_text
@@ -91,7 +89,7 @@ CATEGORY_COLUMNS = {"category_id": "sc:Integer", "name": "sc:Text"}
 """Columns of ``categories.csv`` with their data types."""
 
 
-class Croissant(ExporterBase):
+class Croissant(AssetExporter):
     """Tables of images and objects with Croissant metadata."""
 
     type: Literal["croissant"] = "croissant"
@@ -100,14 +98,6 @@ class Croissant(ExporterBase):
     )
 
     image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
-
-    _assets: AssetLibrary | None = PrivateAttr(None)
-
-    def with_assets(self, assets: AssetLibrary) -> Croissant:
-        """Return the exporter with a library that has the licences of assets."""
-        bound = self.model_copy()
-        bound._assets = assets
-        return bound
 
     def check(self, info: DatasetInfo) -> None:
         """Reject a data set that this format cannot represent.
@@ -148,10 +138,8 @@ class Croissant(ExporterBase):
                 image = row["image"]
                 images.write(image)
                 objects.write_all(row["objects"])
-                sensor, index = image["sensor"], image["sample"]
-                source = info.media_path(shard_dir, sensor, Channel.RGB, index)
                 target = dataset_dir / "images" / image["split"] / image["file_name"]
-                link_or_copy(source, target)
+                link_photograph(info, shard_dir, image, target)
         tables = [table.described() for table in (images, objects, categories)]
         licences, files = self._asset_licences(shard_dirs), [*tables, _image_files(info)]
         document = croissant_document(info, licences, files, _record_sets(info))
@@ -160,9 +148,8 @@ class Croissant(ExporterBase):
 
     def _asset_licences(self, shard_dirs: Sequence[Path]) -> list[str]:
         """Licences of the assets in all scenes, sorted."""
-        assert self._assets is not None, "call with_assets first"
         used = {row["asset"] for _, row in fragment_rows(shard_dirs, self.type, ASSETS)}
-        return sorted({self._assets.get(asset).licence for asset in used})
+        return sorted({self.library.get(asset).licence for asset in used})
 
 
 class _CsvFile:

@@ -31,7 +31,7 @@ from gen_data.core.sample import MaskPx, ObjectTruth, Sample
 from gen_data.exporters.coco import image_name
 from gen_data.exporters.conventions import ANY_LENS, Conventions
 from gen_data.exporters.fragments import fragment_rows, image_splits
-from gen_data.exporters.image_files import link_or_copy
+from gen_data.exporters.image_files import link_photograph
 from gen_data.exporters.image_rows import ImageRowsExporter
 from gen_data.exporters.label_colors import voc_palette
 from gen_data.exporters.mask_polygons import drawable_polygons
@@ -49,14 +49,10 @@ class Cvat(ImageRowsExporter):
         box="left, top, right, bottom along the edges of pixels",
         lens=ANY_LENS,
     )
+    annotators: ClassVar[frozenset[str]] = frozenset({"instance_masks", "visibility"})
 
     shapes: Literal["mask", "polygon", "box"] = "mask"
     """Shape of every object."""
-
-    @property
-    def needs(self) -> frozenset[str]:
-        """Names of the annotators that it reads."""
-        return frozenset({"instance_masks", "visibility"})
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Number the images of each split, join their shapes, and link the images."""
@@ -75,9 +71,7 @@ class Cvat(ImageRowsExporter):
                         f'width="{row["width"]}" height="{row["height"]}">\n'
                         f"{row['shapes']}  </image>\n"
                     )
-                    sensor, index = row["sensor"], row["sample"]
-                    source = info.media_path(shard_dir, sensor, Channel.RGB, index)
-                    link_or_copy(source, path.parent / "images" / name)
+                    link_photograph(info, shard_dir, row, path.parent / "images" / name)
                 file.write("</annotations>\n")
 
     def image_row(self, info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:

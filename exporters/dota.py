@@ -29,7 +29,7 @@ from gen_data.core.sample import ObjectTruth, Sample
 from gen_data.exporters.coco import image_name
 from gen_data.exporters.conventions import ANY_LENS, Conventions
 from gen_data.exporters.fragments import fragment_rows, image_splits
-from gen_data.exporters.image_files import link_or_copy
+from gen_data.exporters.image_files import link_photograph
 from gen_data.exporters.image_rows import ImageRowsExporter
 from gen_data.exporters.sequences import write_text
 
@@ -75,8 +75,7 @@ class Dota(ImageRowsExporter):
                 name = Path(row["file_name"])
                 text = "".join(f"{line}\n" for line in (*HEADER, *row["lines"]))
                 write_text(folder / f"labelTxt/{name.stem}.txt", text)
-                source = info.media_path(shard_dir, row["sensor"], Channel.RGB, row["sample"])
-                link_or_copy(source, folder / "images" / name)
+                link_photograph(info, shard_dir, row, folder / "images" / name)
 
     def _line(self, thing: ObjectTruth) -> str:
         assert thing.oriented_box is not None, "filtered by the caller"

@@ -32,7 +32,7 @@ from gen_data.core.sample import Sample
 from gen_data.exporters.coco import image_name
 from gen_data.exporters.conventions import ANY_LENS, Conventions
 from gen_data.exporters.fragments import fragment_rows, image_splits
-from gen_data.exporters.image_files import link_or_copy
+from gen_data.exporters.image_files import link_photograph
 from gen_data.exporters.image_rows import ImageRowsExporter
 from gen_data.exporters.sequences import write_bytes
 
@@ -49,15 +49,11 @@ class GraspNet(ImageRowsExporter):
 
     type: Literal["graspnet"] = "graspnet"
     conventions: ClassVar[Conventions] = Conventions(lens=ANY_LENS)
+    annotators: ClassVar[frozenset[str]] = frozenset({"grasps"})
 
     height_m: float = Field(0.02, gt=0)
     depth_m: float = Field(0.015, ge=0)
     clearance_m: float = Field(0.003, ge=0)
-
-    @property
-    def needs(self) -> frozenset[str]:
-        """Names of the annotators that it requires."""
-        return frozenset({"grasps"})
 
     def image_row(self, info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
         """The rows of its arrays."""
@@ -77,8 +73,7 @@ class GraspNet(ImageRowsExporter):
                     file = io.BytesIO()
                     np.save(file, np.array(row[name], np.float32).reshape(-1, columns))
                     write_bytes(image.with_name(f"{image.stem}_{name}.npy"), file.getvalue())
-                source = info.media_path(shard_dir, row["sensor"], Channel.RGB, row["sample"])
-                link_or_copy(source, image)
+                link_photograph(info, shard_dir, row, image)
 
     def _grasps(self, sample: Sample, sensor: str) -> list[list[float]]:
         frame, truth = sample.frame, sample.truth[sensor]

@@ -60,7 +60,7 @@ from gen_data.exporters.parquet_tables import (
     value_feature,
 )
 from gen_data.exporters.rle import encode_rle
-from gen_data.exporters.sensor_selection import instant_s, rgb_camera, rgb_cameras
+from gen_data.exporters.sensor_selection import instant_s, photographs, rgb_camera, rgb_cameras
 from gen_data.exporters.sequences import write_text
 
 if TYPE_CHECKING:
@@ -94,15 +94,11 @@ class HuggingFace(ExporterBase):
     conventions: ClassVar[Conventions] = Conventions(
         pixel_centre="i + 0.5", box=EDGES, lens="any; column `lens`", time=READING
     )
+    annotators: ClassVar[frozenset[str]] = frozenset({"instance_masks"})
 
     image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
     rows_per_file: int = Field(1000, ge=1, le=1_000_000)
     license: str = Field("other", pattern=r"^[a-z0-9.-]+$")
-
-    @property
-    def needs(self) -> frozenset[str]:
-        """Names of the annotators that it reads."""
-        return frozenset({"instance_masks"})
 
     def check(self, info: DatasetInfo) -> None:
         """Reject a data set that this format cannot represent.
@@ -118,9 +114,7 @@ class HuggingFace(ExporterBase):
         self.check(info)
         rows = (
             {"split": sample.split, "row": _row(info, sample, sensor)}
-            for sample in samples
-            for sensor in rgb_cameras(info)
-            if sensor in sample.truth
+            for sample, sensor in photographs(info, samples)
         )
         write_fragment(shard_dir / self.type, IMAGES, rows)
 

@@ -30,7 +30,7 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -333,3 +333,11 @@ def _encode_pixels(channel: Channel, image: NDArray[Any], depth_scale_m: float) 
         ),
     }
     return convert.get(channel, lambda: image)()
+
+
+def link_photograph(
+    info: DatasetInfo, shard_dir: Path, image: Mapping[str, Any], target: Path
+) -> None:
+    """Link the photograph of a row with ``sensor`` and ``sample``; see ``link_or_copy``."""
+    source = info.media_path(shard_dir, image["sensor"], Channel.RGB, image["sample"])
+    link_or_copy(source, target)

@@ -11,7 +11,7 @@ from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.sample import Sample
 from gen_data.exporters.base import ANY_FORMAT, ExporterBase
 from gen_data.exporters.fragments import write_fragment
-from gen_data.exporters.sensor_selection import check_channels, rgb_cameras
+from gen_data.exporters.sensor_selection import check_channels, photographs
 
 
 class ImageRowsExporter(ExporterBase):
@@ -36,12 +36,10 @@ class ImageRowsExporter(ExporterBase):
         """
         self.check(info)
         rows: dict[str, list[Mapping[str, Any]]] = {}
-        for sample in samples:
-            for sensor in rgb_cameras(info):
-                if sensor in sample.truth:
-                    facts = self.image_row(info, sample, sensor)
-                    row = {**facts, "sensor": sensor, "sample": sample.index}
-                    rows.setdefault(f"{sample.split}.images", []).append(row)
+        for sample, sensor in photographs(info, samples):
+            facts = self.image_row(info, sample, sensor)
+            row = {**facts, "sensor": sensor, "sample": sample.index}
+            rows.setdefault(f"{sample.split}.images", []).append(row)
         folder = shard_dir / self.type
         folder.mkdir(parents=True, exist_ok=True)
         for name, lines in rows.items():

@@ -112,6 +112,7 @@ class Kitti(ExporterBase):
         lens=PINHOLE,
         intensity="0 to 1",
     )
+    annotators: ClassVar[frozenset[str]] = frozenset({"boxes3d", "visibility"})
     camera: str = ""
     """Sensor that becomes camera 2; empty = the first one, by name, with the rgb channel."""
     types: Literal["official", "category"] = "official"
@@ -124,11 +125,6 @@ class Kitti(ExporterBase):
     """Objects with fewer visible pixel rows than this become DontCare."""
     lidar: str = ""
     """Sensor of the points, lidar or pseudo_lidar; empty = the first one by name, if any."""
-
-    @property
-    def needs(self) -> frozenset[str]:
-        """Names of the annotators that it reads."""
-        return frozenset({"boxes3d", "visibility"})
 
     @property
     def has_own_classes(self) -> bool:

@@ -104,6 +104,8 @@ class KittiRaw(ExporterBase):
         time="UTC from noon; a sweep has its start, middle and end",
         intensity="0 to 1",
     )
+    annotators: ClassVar[frozenset[str]] = frozenset({"visibility"})
+    own_classes: ClassVar[bool] = True
     date: Annotated[str, AfterValidator(_check_date)] = "2011_09_26"
     """Day of the recordings, as year_month_day."""
     image_02: str = ""
@@ -120,16 +122,6 @@ class KittiRaw(ExporterBase):
     """Device whose pose the navigation rows give; empty = the rig itself."""
     origin_deg: tuple[Latitude, Longitude] = (49.01, 8.43)
     """Latitude and longitude of the world's origin."""
-
-    @property
-    def needs(self) -> frozenset[str]:
-        """Names of the annotators that it reads."""
-        return frozenset({"visibility"})
-
-    @property
-    def has_own_classes(self) -> bool:
-        """Tracklets have KITTI's types."""
-        return True
 
     def check(self, info: DatasetInfo) -> None:
         """Reject a data set that this format cannot represent.

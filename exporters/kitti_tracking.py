@@ -72,6 +72,7 @@ class KittiTracking(ExporterBase):
         time="number of the frame",
         intensity="0 to 1",
     )
+    annotators: ClassVar[frozenset[str]] = frozenset({"boxes3d", "visibility"})
     camera: str = ""
     """Sensor that becomes camera 02; empty = the first one, by name, with the rgb channel."""
     right_camera: str = ""
@@ -90,11 +91,6 @@ class KittiTracking(ExporterBase):
     """Objects farther than this along the optical axis become DontCare."""
     low_px: int = Field(10, ge=2)
     """Objects with fewer visible pixel rows than this become DontCare."""
-
-    @property
-    def needs(self) -> frozenset[str]:
-        """Names of the annotators that it reads."""
-        return frozenset({"boxes3d", "visibility"})
 
     @property
     def has_own_classes(self) -> bool:

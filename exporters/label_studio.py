@@ -39,7 +39,7 @@ from gen_data.core.sample import MaskPx, ObjectTruth, Sample
 from gen_data.exporters.coco import image_name
 from gen_data.exporters.conventions import ANY_LENS, Conventions
 from gen_data.exporters.fragments import fragment_rows, image_splits
-from gen_data.exporters.image_files import link_or_copy
+from gen_data.exporters.image_files import link_photograph
 from gen_data.exporters.image_rows import ImageRowsExporter
 from gen_data.exporters.label_colors import voc_palette
 from gen_data.exporters.mask_polygons import drawable_polygons, join_polygons
@@ -72,6 +72,7 @@ class LabelStudio(ImageRowsExporter):
         box="left, top, width, height along the edges of pixels, in percent of the image",
         lens=ANY_LENS,
     )
+    annotators: ClassVar[frozenset[str]] = frozenset({"instance_masks"})
 
     shapes: Shape = "polygon"
     """Shape of every object."""
@@ -79,11 +80,6 @@ class LabelStudio(ImageRowsExporter):
     """Whether regions are finished annotations, or predictions that an annotator starts from."""
     url_prefix: str = LOCAL_FILES
     """Prefix of the path of an image."""
-
-    @property
-    def needs(self) -> frozenset[str]:
-        """Names of the annotators that it reads."""
-        return frozenset({"instance_masks"})
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Write the tasks of each split, link their images, and describe the interface."""
@@ -99,9 +95,8 @@ class LabelStudio(ImageRowsExporter):
                     file.write(separator + row["task"])
                     separator = ",\n"
                     keypoints.update(row["keypoints"])
-                    sensor, index = row["sensor"], row["sample"]
-                    source = info.media_path(shard_dir, sensor, Channel.RGB, index)
-                    link_or_copy(source, path.parent / "images" / row["file_name"])
+                    target = path.parent / "images" / row["file_name"]
+                    link_photograph(info, shard_dir, row, target)
                 file.write("\n]\n")
         config = label_config(info.categories, self.shapes, sorted(keypoints))
         write_text(dataset_dir / "label_config.xml", config)

@@ -35,7 +35,7 @@ from gen_data.exporters.captions import caption
 from gen_data.exporters.coco import box_xywh, image_name, scene_graph
 from gen_data.exporters.conventions import ANY_LENS, EDGES, Conventions
 from gen_data.exporters.fragments import fragment_rows, image_splits
-from gen_data.exporters.image_files import link_or_copy
+from gen_data.exporters.image_files import link_photograph
 from gen_data.exporters.image_rows import ImageRowsExporter
 from gen_data.exporters.rle import encode_rle
 
@@ -48,11 +48,7 @@ class LanguageJsonl(ImageRowsExporter):
 
     type: Literal["language"] = "language"
     conventions: ClassVar[Conventions] = Conventions(box=EDGES, lens=ANY_LENS)
-
-    @property
-    def needs(self) -> frozenset[str]:
-        """Names of the annotators that it requires."""
-        return frozenset({"instance_masks", "language"})
+    annotators: ClassVar[frozenset[str]] = frozenset({"instance_masks", "language"})
 
     def image_row(self, info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
         """Its text and its objects."""
@@ -80,8 +76,7 @@ class LanguageJsonl(ImageRowsExporter):
                     for k, line in enumerate(row["lines"][:UTTERANCE_STRIDE]):
                         identity = {"id": number * UTTERANCE_STRIDE + k}
                         text.write(json.dumps(identity | head | line, ensure_ascii=False) + "\n")
-                    source = info.media_path(shard_dir, row["sensor"], Channel.RGB, row["sample"])
-                    link_or_copy(source, dataset_dir / image["file_name"])
+                    link_photograph(info, shard_dir, row, dataset_dir / image["file_name"])
 
 
 def _utterances(sample: Sample, sensor: str) -> list[tuple[str, Utterance]]:

@@ -36,15 +36,13 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
-from pydantic import PrivateAttr
-
 from gen_data.core.capture import Channel
 from gen_data.core.demonstrations import DemonstrationStep, demonstration_step, joint_positions
 from gen_data.core.errors import ConfigError
-from gen_data.core.interfaces import AssetLibrary, DatasetInfo
+from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.sample import Sample
 from gen_data.core.scene import Articulation, Scene
-from gen_data.exporters.base import ANY_FORMAT, ExporterBase, check_installed, select_names
+from gen_data.exporters.base import ANY_FORMAT, AssetExporter, check_installed, select_names
 from gen_data.exporters.conventions import ANY_LENS, Conventions
 from gen_data.exporters.fragments import fragment_rows
 from gen_data.exporters.lerobot_files import LABELS, LAYOUTS, RobotFiles
@@ -62,7 +60,7 @@ PHRASES = {
 """Phrase for each kind of an arm's goals."""
 
 
-class LeRobot(ExporterBase):
+class LeRobot(AssetExporter):
     """LeRobot: joint positions and images of the episodes of one arm.
 
     Attributes:
@@ -78,14 +76,6 @@ class LeRobot(ExporterBase):
     image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
     arm: str = ""
     version: Literal["v3.0", "v2.1"] = "v3.0"
-
-    _assets: AssetLibrary | None = PrivateAttr(None)
-
-    def with_assets(self, assets: AssetLibrary) -> LeRobot:
-        """Return the exporter with a library that has the joints of robots."""
-        bound = self.model_copy()
-        bound._assets = assets
-        return bound
 
     def check(self, info: DatasetInfo) -> None:
         """Reject a data set that this format cannot represent.
@@ -149,14 +139,13 @@ class LeRobot(ExporterBase):
         return tuple(rgb_camera(info, name, self.type) for name in names)
 
     def _row(self, info: DatasetInfo, sample: Sample, shard_dir: Path) -> dict[str, Any]:
-        assert self._assets is not None, "call with_assets first"
         arm = self._find_arm(sample.scene)
         time_s = sample.scene.time_s
         images = {
             camera: image_sums(info.media_path(shard_dir, camera, Channel.RGB, sample.index))
             for camera in self._cameras(info)
         }
-        robot = self._assets.robot(arm.asset)
+        robot = self.library.robot(arm.asset)
         step = demonstration_step(arm, robot, time_s, info.step_s)
         return frame_facts(info, sample) | {
             "labels": {} if step is None else _labels(step),

@@ -100,15 +100,11 @@ class Mcap(ExporterBase):
         ring="highest laser",
         intensity="0 to 1",
     )
+    annotators: ClassVar[frozenset[str]] = frozenset({"boxes3d"})
 
     image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
     compression: Literal["none", "zstd"] = "none"
     point_time: PointTime = "sweep_middle"
-
-    @property
-    def needs(self) -> frozenset[str]:
-        """Names of the annotators that it reads."""
-        return frozenset({"boxes3d"})
 
     def check(self, info: DatasetInfo) -> None:
         """Reject a data set that this format cannot represent.

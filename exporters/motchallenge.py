@@ -71,6 +71,8 @@ class MotChallenge(ExporterBase):
     conventions: ClassVar[Conventions] = Conventions(
         box="left + 1, top + 1, width, height", lens=ANY_LENS, time="number of the frame, from 1"
     )
+    annotators: ClassVar[frozenset[str]] = frozenset({"boxes2d", "visibility"})
+    own_classes: ClassVar[bool] = True
 
     image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
     camera: str = ""
@@ -78,16 +80,6 @@ class MotChallenge(ExporterBase):
     boxes: Literal["visible", "whole"] = "visible"
     """Boxes around the visible pixels, or around the whole silhouette, including hidden parts and
     parts outside the image, as MOT16's annotators estimated it."""
-
-    @property
-    def needs(self) -> frozenset[str]:
-        """Names of the annotators that it reads."""
-        return frozenset({"boxes2d", "visibility"})
-
-    @property
-    def has_own_classes(self) -> bool:
-        """Classes are the benchmark's."""
-        return True
 
     def check(self, info: DatasetInfo) -> None:
         """Reject a data set that this format cannot represent.

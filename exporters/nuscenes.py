@@ -75,6 +75,8 @@ class NuScenes(ExporterBase):
         ring="lowest laser",
         intensity="0 to 255",
     )
+    annotators: ClassVar[frozenset[str]] = frozenset({"visibility"})
+    own_classes: ClassVar[bool] = True
 
     image_formats: ClassVar[frozenset[str]] = PNG_OR_JPEG
     version: str = Field("v1.0-mini", pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$")
@@ -88,16 +90,6 @@ class NuScenes(ExporterBase):
     """Instant of a moving object's box: when pulses hit it, or the step's."""
     box_margin_m: float = Field(0.002, ge=0, le=0.1)
     """How much larger boxes are on every side: points on the surface are inside."""
-
-    @property
-    def needs(self) -> frozenset[str]:
-        """Names of the annotators that it reads."""
-        return frozenset({"visibility"})
-
-    @property
-    def has_own_classes(self) -> bool:
-        """Categories are nuScenes'."""
-        return True
 
     def check(self, info: DatasetInfo) -> None:
         """Reject a data set that this format cannot represent.

@@ -77,15 +77,11 @@ class PointClouds(ExporterBase):
         ring="highest laser",
         intensity="0 to 1",
     )
+    own_classes: ClassVar[bool] = True
 
     image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
     format: Literal["ply", "pcd"] = "ply"
     point_time: PointTime = "sweep_middle"
-
-    @property
-    def has_own_classes(self) -> bool:
-        """Points keep the category ids of the data set."""
-        return True
 
     def check(self, info: DatasetInfo) -> None:
         """Reject a data set without a laser scanner.

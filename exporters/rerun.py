@@ -67,14 +67,10 @@ class Rerun(ExporterBase):
         lens="any; pinholes have a projection",
         time=READING,
     )
+    annotators: ClassVar[frozenset[str]] = frozenset({"boxes2d", "boxes3d"})
 
     image_formats: ClassVar[frozenset[str]] = PNG_OR_JPEG
     samples_per_file: int = Field(100, ge=1, le=10_000)
-
-    @property
-    def needs(self) -> frozenset[str]:
-        """Names of the annotators that it reads."""
-        return frozenset({"boxes2d", "boxes3d"})
 
     def check(self, info: DatasetInfo) -> None:
         """Refuse a machine without the format's library.

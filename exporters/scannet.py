@@ -70,12 +70,8 @@ class ScanNet(RgbdExporter):
     channels: ClassVar[tuple[Channel, ...]] = (Channel.Z_DEPTH, Channel.INSTANCE)
     type: Literal["scannet"] = "scannet"
     conventions: ClassVar[Conventions] = Conventions(pixel_centre="i", lens=PINHOLE)
+    own_classes: ClassVar[bool] = True
     classes: Literal["nyu40", "ade20k"] = "nyu40"
-
-    @property
-    def has_own_classes(self) -> bool:
-        """Classes are the list's."""
-        return True
 
     def check(self, info: DatasetInfo) -> None:
         """Reject a data set without such a camera, or with more scenes than names.

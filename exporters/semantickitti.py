@@ -120,17 +120,13 @@ class SemanticKitti(ExporterBase):
     conventions: ClassVar[Conventions] = Conventions(
         pixel_centre="i", lens=PINHOLE, time="s; middle of the sweep", intensity="0 to 1"
     )
+    own_classes: ClassVar[bool] = True
 
     image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
     lidar: str = ""
     """Sensor of the scans; empty = the first one by name."""
     camera: str = ""
     """Sensor that becomes camera 0; empty = the first one by name."""
-
-    @property
-    def has_own_classes(self) -> bool:
-        """Classes are the benchmark's."""
-        return True
 
     def check(self, info: DatasetInfo) -> None:
         """Reject a data set without the sensors, or whose camera is not a pinhole.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 from gen_data.core.capture import Channel
@@ -14,6 +14,12 @@ from gen_data.core.sample import Sample
 def rgb_cameras(info: DatasetInfo) -> tuple[str, ...]:
     """Names of the cameras that write the rgb channel, sorted."""
     return tuple(s for s in info.cameras if Channel.RGB in info.media[s])
+
+
+def photographs(info: DatasetInfo, samples: Iterable[Sample]) -> Iterator[tuple[Sample, str]]:
+    """Samples with each camera that took a photograph of them."""
+    for sample in samples:
+        yield from ((sample, sensor) for sensor in rgb_cameras(info) if sensor in sample.truth)
 
 
 def rgb_camera(info: DatasetInfo, wanted: str, exporter: str) -> str:

@@ -90,13 +90,9 @@ class Solo(ExporterBase):
     conventions: ClassVar[Conventions] = Conventions(
         pixel_centre="i + 0.5", box=EDGES, lens=PINHOLE, time=READING
     )
+    annotators: ClassVar[frozenset[str]] = frozenset({"instance_masks", "boxes3d"})
 
     image_formats: ClassVar[frozenset[str]] = PNG_OR_JPEG
-
-    @property
-    def needs(self) -> frozenset[str]:
-        """Names of the annotators that it reads."""
-        return frozenset({"instance_masks", "boxes3d"})
 
     def check(self, info: DatasetInfo) -> None:
         """Reject a data set that this format cannot represent.

@@ -54,7 +54,7 @@ from gen_data.exporters.fragments import fragment_rows, numbered_stem, write_fra
 from gen_data.exporters.ignored_regions import each_class
 from gen_data.exporters.lens_fields import lens_fields
 from gen_data.exporters.png import RowFilter, encode_png
-from gen_data.exporters.sensor_selection import rgb_camera, rgb_cameras
+from gen_data.exporters.sensor_selection import photographs, rgb_camera
 from gen_data.exporters.sequences import write_bytes, write_text
 
 IMAGES = "images"
@@ -127,15 +127,12 @@ class TfRecord(ExporterBase):
         rows: list[dict[str, Any]] = []
         parts: list[bytes] = []
         offset = 0
-        for sample in samples:
-            for sensor in rgb_cameras(info):
-                if sensor not in sample.truth:
-                    continue
-                labels = encode_features(self._labels(info, sample, sensor))
-                where = {"split": sample.split, "sample": sample.index, "sensor": sensor}
-                rows.append(where | {"offset": offset, "size": len(labels)})
-                parts.append(labels)
-                offset += len(labels)
+        for sample, sensor in photographs(info, samples):
+            labels = encode_features(self._labels(info, sample, sensor))
+            where = {"split": sample.split, "sample": sample.index, "sensor": sensor}
+            rows.append(where | {"offset": offset, "size": len(labels)})
+            parts.append(labels)
+            offset += len(labels)
         write_fragment(shard_dir / self.type, IMAGES, rows)
         write_bytes(shard_dir / self.type / LABELS, b"".join(parts))
 

@@ -29,14 +29,13 @@ from typing import Any, ClassVar, Literal
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import PrivateAttr
 
 from gen_data.core.asset_types import TextureData
 from gen_data.core.interfaces import AssetLibrary, DatasetInfo
 from gen_data.core.sample import Sample
 from gen_data.core.scene_time import scene_at
 from gen_data.core.serialization import canonical_json
-from gen_data.exporters.base import ANY_FORMAT, ExporterBase, check_installed
+from gen_data.exporters.base import ANY_FORMAT, AssetExporter, check_installed
 from gen_data.exporters.conventions import Conventions
 from gen_data.exporters.image_files import link_or_copy
 from gen_data.exporters.png import RowFilter, encode_png
@@ -47,7 +46,7 @@ from gen_data.usd.stage_writer import StageFiles, write_stage
 STAGES = "stages.jsonl"
 
 
-class Usd(ExporterBase):
+class Usd(AssetExporter):
     """One OpenUSD stage per view, with meshes, materials, lights, cameras and labels.
 
     Attributes:
@@ -64,14 +63,6 @@ class Usd(ExporterBase):
     image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
     format: Literal["usdc", "usda"] = "usdc"
 
-    _assets: AssetLibrary | None = PrivateAttr(None)
-
-    def with_assets(self, assets: AssetLibrary) -> Usd:
-        """Return the exporter with a library of meshes, textures and skies."""
-        bound = self.model_copy()
-        bound._assets = assets
-        return bound
-
     def check(self, info: DatasetInfo) -> None:
         """Refuse a machine without the format's library.
 
@@ -83,9 +74,8 @@ class Usd(ExporterBase):
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
         """Write a stage for every sequence that starts in the shard, and its shared files."""
-        assert self._assets is not None, "call with_assets first"
         folder = shard_dir / self.type
-        shared = _SharedFiles(folder, self.format, self._assets)
+        shared = _SharedFiles(folder, self.format, self.library)
         rows = []
         for sample in samples:
             if sample.step_index:
@@ -141,7 +131,7 @@ class _SharedFiles:
     """Shared files of a shard's stages; each is written at its first use."""
 
     def __init__(self, folder: Path, suffix: str, assets: AssetLibrary) -> None:
-        self._folder, self._suffix, self._assets = folder, suffix, assets
+        self._folder, self._suffix, self.library = folder, suffix, assets
         self._written: dict[str, TextureFiles] = {}
 
     def files(self) -> StageFiles:
@@ -150,20 +140,20 @@ class _SharedFiles:
             layer=lambda asset: f"./{self._layer(asset)}",
             textures=lambda texture: self._textures(texture, "./"),
             panorama=lambda sky: f"./{self._panorama(sky)}",
-            materials=self._assets.materials,
+            materials=self.library.materials,
         )
 
     def _layer(self, asset: str) -> str:
         name = f"assets/{_file_name(asset)}.{self._suffix}"
         if not (self._folder / name).exists():
-            mesh = self._assets.mesh(asset)
+            mesh = self.library.mesh(asset)
             write_asset_layer(self._folder / name, mesh, lambda t: self._textures(t, "../"))
         return name
 
     def _textures(self, texture: str, up: str) -> TextureFiles:
         if texture not in self._written:
             stem = f"textures/{_file_name(texture)}"
-            images = self._assets.texture(texture)
+            images = self.library.texture(texture)
             self._written[texture] = TextureFiles(
                 self._image(f"{stem}.png", images.albedo),
                 self._image(f"{stem}.roughness.png", images.roughness),
@@ -185,7 +175,7 @@ class _SharedFiles:
     def _panorama(self, sky: str) -> str:
         name = f"environments/{_file_name(sky)}.hdr"
         if not (self._folder / name).exists():
-            bgr = np.ascontiguousarray(self._assets.environment(sky)[..., ::-1])
+            bgr = np.ascontiguousarray(self.library.environment(sky)[..., ::-1])
             _, data = cv2.imencode(".hdr", bgr)
             write_bytes(self._folder / name, data.tobytes())
         return name

@@ -77,16 +77,12 @@ class Voc(ExporterBase):
     conventions: ClassVar[Conventions] = Conventions(
         box="first and last pixel, from 1", lens=ANY_LENS
     )
+    annotators: ClassVar[frozenset[str]] = frozenset({"instance_masks", "visibility"})
 
     image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
     images: Literal["jpeg", "png"] = "jpeg"
     """JPEG files, which all readers take: of quality 95, or links if the camera writes JPEG; or
     links to the files as they are."""
-
-    @property
-    def needs(self) -> frozenset[str]:
-        """Names of the annotators that it reads."""
-        return frozenset({"instance_masks", "visibility"})
 
     def check(self, info: DatasetInfo) -> None:
         """Reject a data set that this format cannot represent.

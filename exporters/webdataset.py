@@ -69,14 +69,10 @@ class WebDataset(ExporterBase):
         ring="highest laser",
         intensity="0 to 1",
     )
+    annotators: ClassVar[frozenset[str]] = frozenset({"instance_masks", "boxes2d"})
 
     image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
     samples_per_tar: int = Field(500, ge=1)
-
-    @property
-    def needs(self) -> frozenset[str]:
-        """Names of the annotators that it reads."""
-        return frozenset({"instance_masks", "boxes2d"})
 
     def check(self, info: DatasetInfo) -> None:
         """Reject names of sensors that are equal in lower case.

@@ -7,7 +7,7 @@ geometry.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -46,7 +46,7 @@ from gen_data.core.lane_geometry import LaneBorder
 from gen_data.core.lens import LensModel
 from gen_data.core.measurement_dtypes import TABLE_COLUMNS, table_rows
 from gen_data.core.motion import JointTrajectory, Trajectory
-from gen_data.core.sample import BirdseyeMap, EgoTruth, ImageTruth, Sample
+from gen_data.core.sample import BirdseyeMap, EgoTruth, ImageTruth, ObjectTruth, Sample
 from gen_data.core.scene import (
     ArmGoal,
     Articulation,
@@ -463,6 +463,21 @@ def with_bodies(samples: Sequence[Sample]) -> list[Sample]:
     return embodied
 
 
+def with_objects(
+    sample: Sample, change: Callable[[tuple[ObjectTruth, ...]], tuple[ObjectTruth, ...]]
+) -> Sample:
+    """The sample with the objects that a function makes of the objects of each image."""
+    truth = {
+        name: replace(image, objects=change(image.objects)) for name, image in sample.truth.items()
+    }
+    return replace(sample, truth=truth)
+
+
+def ignoring(sample: Sample) -> Sample:
+    """The sample whose first object of each image is to be ignored."""
+    return with_objects(sample, lambda ts: (replace(ts[0], ignored=True), *ts[1:]))
+
+
 class Props:
     """A library of light, of one arm and of the meshes of ``with_bodies``."""
 
@@ -551,6 +566,8 @@ class World:
     reach = staticmethod(make_reach)
     pairs = staticmethod(make_pairs)
     with_bodies = staticmethod(with_bodies)
+    with_objects = staticmethod(with_objects)
+    ignoring = staticmethod(ignoring)
 
     def __init__(self) -> None:
         splits = ("train", "train", "val", "train", "val", "train", "train")

@@ -37,3 +37,11 @@ def rigid(values: dict[str, Any]) -> Any:
     matrix = np.eye(4)
     matrix[:3, :3], matrix[:3, 3] = values["R"].reshape(3, 3), values["T"]
     return matrix
+
+
+def read_ply(path: Path) -> Any:
+    """Records of a binary PLY file, by its header."""
+    header, body = path.read_bytes().split(b"end_header\n", 1)
+    words = [line.split() for line in header.decode("ascii").splitlines()]
+    types = {"float": "<f4", "uint16": "<u2", "uint8": "u1"}
+    return np.frombuffer(body, [(w[2], types[w[1]]) for w in words if w[0] == "property"])

@@ -15,6 +15,7 @@ from gen_data.core.motion import Twist
 from gen_data.core.sample import BorderTruth, MaskPx, MotionTruth, Sample
 from gen_data.exporters.birdseye import Birdseye, columns_at
 from gen_data.exporters.coco import Coco
+from tests.exporters.label_readers import json_lines
 
 BORDER = BorderTruth(
     "main/forward0:left", "road", ((80.5, 110.5), (80.5, 90.5), (60.5, 70.5)), (True, True, False)
@@ -33,11 +34,6 @@ def sample(world: Any) -> Sample:
     return replace(first, truth={"color": truth})
 
 
-def lines(path: Path) -> list[dict[str, Any]]:
-    """A file of JSON lines."""
-    return [json.loads(line) for line in path.read_text("utf-8").splitlines()]
-
-
 def test_layers_are_images_of_0_and_255(world: Any, tmp_path: Path) -> None:
     """One per sample and layer: the right half of the map is drivable."""
     folder = world.export(Birdseye(), world.info(7), world.samples, tmp_path)
@@ -52,7 +48,7 @@ def test_layers_are_images_of_0_and_255(world: Any, tmp_path: Path) -> None:
 def test_frames_tell_where_the_map_is_and_what_is_on_it(world: Any, tmp_path: Path) -> None:
     """In order; borders near the map only, boxes by instance."""
     folder = world.export(Birdseye(), world.info(7), world.samples, tmp_path)
-    frames = lines(folder / "frames.jsonl")
+    frames = json_lines(folder / "frames.jsonl")
 
     assert [frame["index"] for frame in frames] == list(range(7))
     first = frames[0]
@@ -72,7 +68,7 @@ def test_lanes_are_columns_at_rows_as_tusimple_has_them(
 ) -> None:
     """Rows every ten pixels; pixel centres at whole numbers, so half a pixel less than ours."""
     folder = world.export(Birdseye(), world.info(1), [sample], tmp_path)
-    (row,) = lines(folder / "lanes/color.jsonl")
+    (row,) = json_lines(folder / "lanes/color.jsonl")
 
     assert row["h_samples"] == list(range(0, 120, 10))
     assert row["lanes"] == [[-2] * 7 + [60.0, 70.0, 80.0, 80.0, 80.0]]

@@ -9,7 +9,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 import pytest
 from PIL import Image
@@ -19,21 +18,13 @@ from pycocotools.cocoeval import COCOeval
 
 from gen_data.annotations.annotate import Thresholds
 from gen_data.core.capture import Channel
-from gen_data.core.errors import ConfigError
-from gen_data.core.lens import Lens
 from gen_data.core.scene import Weather
 from gen_data.core.se3 import SE3
 from gen_data.exporters.coco import Coco
-from gen_data.exporters.label_map import LabelMap, MappedExporter
+from tests.exporters.label_readers import opened
 
 # pycocotools' decoder predates numpy 2's __array__(copy=...).
 pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
-
-
-def opened(path: Path) -> COCO:
-    """The file as the official reader sees it."""
-    with contextlib.redirect_stdout(io.StringIO()):
-        return COCO(str(path))
 
 
 def average_precision(truth: COCO, kind: str, path: Path | None = None) -> float:
@@ -96,15 +87,6 @@ def test_box_and_area_are_those_of_the_decoded_mask(train: COCO) -> None:
         assert row["iscrowd"] == 0
 
 
-def test_masks_are_the_pixels_of_the_instance_image(train: COCO, dataset: Path) -> None:
-    """Every mask is found again in the linked 16-bit id image."""
-    for row in train.anns.values():
-        image = train.imgs[row["image_id"]]
-        with Image.open(dataset / image["files"]["instance"]) as ids:
-            expected = np.asarray(ids) == row["instance_id"]
-        np.testing.assert_array_equal(train.annToMask(row).astype(bool), expected)
-
-
 def test_ids_are_positive_and_unique_over_all_splits(dataset: Path) -> None:
     """Category ids are consecutive from 1 in the order of the data set's categories."""
     paths = sorted((dataset / "annotations").glob("instances_*.json"))
@@ -135,14 +117,6 @@ def test_a_split_without_images_has_no_file(dataset: Path) -> None:
 
     stems = ("instances", "car_keypoints", "pedestrian_keypoints")
     assert names == {f"{stem}_{split}.json" for stem in stems for split in ("train", "val")}
-
-
-def test_images_are_links_to_the_shards(dataset: Path) -> None:
-    """No image is stored twice."""
-    shard = dataset.parent / "shards/000001"
-
-    assert (dataset / "val/000000004_color.png").samefile(shard / "color/rgb/000000004.png")
-    assert (dataset / "depth/val/000000004_color.png").samefile(shard / "color/depth/000000004.png")
 
 
 def test_the_pose_and_box_project_onto_the_image_box(train: COCO) -> None:
@@ -180,32 +154,6 @@ def test_cameras_are_written_in_full(train: COCO) -> None:
         [[0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 1.6], [0, 0, 0, 1]],
         atol=1e-9,
     )
-
-
-def test_bent_cameras_are_written_as_opencv_takes_them(world: Any, tmp_path: Path) -> None:
-    """K and the distortion project as the camera does; pinholes have no lens."""
-    sample = world.samples[0]
-    truth = sample.truth["color"]
-    lens = Lens("brown_conrady", (-0.2, 0.05, 0.001, -0.002, 0.01, 0.003, 0.0, 0.0))
-    camera = replace(truth.camera, intrinsics=replace(truth.camera.intrinsics, lens=lens))
-    bent = replace(sample, truth={"color": replace(truth, camera=camera)})
-
-    folder = world.export(Coco(), world.info(2), [bent, world.samples[1]], tmp_path)
-
-    images = json.loads((folder / "annotations/instances_train.json").read_text())["images"]
-    first, second = sorted(images, key=lambda image: image["sample"])
-    assert "lens" not in second
-    assert first["lens"]["model"] == "brown_conrady"
-    assert first["lens"]["coefficients"] == ["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"]
-    points = np.array([[0.3, -0.2, 1.0], [-0.5, 0.1, 1.4]])
-    there, _ = cv2.projectPoints(
-        points,
-        np.zeros(3),
-        np.zeros(3),
-        np.array(first["K"]),
-        np.array(first["lens"]["distortion"]),
-    )
-    np.testing.assert_allclose(there[:, 0], camera.intrinsics.project(points), atol=1e-4)
 
 
 def test_visibility_and_amodal_shapes_agree_with_the_masks(train: COCO) -> None:
@@ -274,16 +222,6 @@ def test_run_lengths_and_polygons_are_the_same_masks(
     assert average_precision(runs, "segm") == pytest.approx(1.0, abs=1e-9)
 
 
-def test_contours_through_pixel_centres_are_drawn_smaller(train: COCO) -> None:
-    """Why polygons are traced here: OpenCV's contours lose up to half a pixel on every side."""
-    for row in train.anns.values():
-        mask = train.annToMask(row)
-        contours, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-        flat = [c.ravel().astype(float).tolist() for c in contours if len(c) > 2]
-        rles = coco_mask.frPyObjects(flat, *mask.shape)
-        assert coco_mask.area(coco_mask.merge(rles)) < row["area"]
-
-
 def test_boxes_are_floats_in_json(dataset: Path) -> None:
     """Integers make integer tensors in torchvision's wrapper, whose transforms then cut boxes."""
     for path in (dataset / "annotations").glob("*.json"):
@@ -296,41 +234,15 @@ def test_boxes_are_floats_in_json(dataset: Path) -> None:
 def test_ignored_objects_are_crowds(world: Any, tmp_path: Path, segmentation: Any) -> None:
     """Which COCOeval does not count; their masks are run lengths."""
     sample = world.samples[0]
-    truth = sample.truth["color"]
-    first, *others = truth.objects
-    marked = replace(truth, objects=(replace(first, ignored=True), *others))
-    changed = replace(sample, truth={"color": marked})
+    first = sample.truth["color"].objects[0]
 
     exporter = Coco(segmentation=segmentation)
-    folder = world.export(exporter, world.info(1), [changed], tmp_path)
+    folder = world.export(exporter, world.info(1), [world.ignoring(sample)], tmp_path)
 
     opened_truth = opened(folder / "annotations/instances_train.json")
     crowds = [row for row in opened_truth.anns.values() if row["iscrowd"]]
     assert [row["instance_id"] for row in crowds] == [first.instance.instance_id]
     assert opened_truth.annToMask(crowds[0]).sum() == first.visible_px
-
-
-def test_an_ignored_region_without_a_class_is_ignored_for_every_class(
-    world: Any, tmp_path: Path
-) -> None:
-    """COCOeval ignores class by class: a detection there is no error for any of them."""
-    exporter = MappedExporter(
-        Coco(), LabelMap(classes={"box": ("crate",), "walker": ("pedestrian",)}, others="ignore")
-    )
-    car = world.instance(1, "car", 9.0, 2.5, 0.0)
-    crate = world.instance(2, "crate", 8.0, -1.0, 0.0)
-    sample = world.sample(0, (car, crate), [world.camera()])
-
-    folder = world.export(exporter, world.info(1), [sample], tmp_path)
-
-    truth = opened(folder / "annotations/instances_train.json")
-    assert set(truth.cats) >= {row["category_id"] for row in truth.anns.values()}
-    crowds = [row for row in truth.anns.values() if row["iscrowd"]]
-    assert [row["category_id"] for row in crowds] == sorted(truth.cats)
-    assert {row["instance_id"] for row in crowds} == {1}
-    assert len(truth.anns) == len(truth.dataset["annotations"]) == 3
-    # A false positive in a region that nobody ignores would halve the precision.
-    assert average_precision(truth, "bbox") == pytest.approx(1.0, abs=1e-9)
 
 
 def test_hidden_objects_are_not_listed(world: Any, tmp_path: Path) -> None:
@@ -361,14 +273,6 @@ def test_two_cameras_give_two_images_per_sample(world: Any, tmp_path: Path) -> N
     truth = opened(folder / "annotations/instances_train.json")
     found = {image["file_name"]: image["id"] for image in truth.imgs.values()}
     assert found == {"000000000_left.png": 2, "000000000_right.png": 3}
-
-
-def test_a_data_set_without_colour_images_is_refused(world: Any) -> None:
-    """Before anything is rendered."""
-    info = world.info(1, media={"color": (Channel.Z_DEPTH,)})
-
-    with pytest.raises(ConfigError, match="no sensor of color writes the rgb channel"):
-        Coco().check(info)
 
 
 def object_keypoint_similarity(truth: COCO, sigmas: list[float] | None) -> float:

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import json
-import shutil
 from collections.abc import Callable
-from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,11 +13,8 @@ import pytest
 from numpy.typing import NDArray
 from PIL import Image
 
-from gen_data.core.capture import Channel
-from gen_data.core.errors import ConfigError
-from gen_data.exporters.coco import Coco
 from gen_data.exporters.coco_panoptic import CocoPanoptic
-from tests.exporters.coco_masks import drawn_mask
+from tests.exporters.label_readers import segments_of
 
 # pycocotools' decoder predates numpy 2's __array__(copy=...).
 pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
@@ -40,22 +35,10 @@ def scenery(world: Any) -> Any:
 
 @pytest.fixture(scope="module")
 def dataset(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The street and a frame with scenery, with its instances beside."""
+    """The street and a frame with scenery; the depth of 16-bit images reaches the sky."""
     folder = tmp_path_factory.mktemp("panoptic")
-    samples = [*world.samples, scenery(world)]
-    for exporter in (CocoPanoptic(), Coco()):
-        # The depth of 16-bit images reaches the sky.
-        info = world.info(8, depth_scale_m=1 / 256)
-        world.export(exporter, info, samples, folder / exporter.type)
-    return folder
-
-
-def segments_of(path: Path) -> NDArray[np.int64]:
-    """Ids as panopticapi's rgb2id reads them."""
-    with Image.open(path) as image:
-        assert (image.format, image.mode) == ("PNG", "RGB")
-        r, g, b = np.moveaxis(np.asarray(image).astype(np.int64), -1, 0)
-    return r + 256 * g + 65_536 * b
+    info = world.info(8, depth_scale_m=1 / 256)
+    return world.export(CocoPanoptic(), info, [*world.samples, scenery(world)], folder)
 
 
 def read(folder: Path, split: str = "train") -> Any:
@@ -112,115 +95,16 @@ def panoptic_quality(folder: Path, predicted: Callable[[NDArray[Any]], NDArray[A
 
 def test_it_keeps_the_definition_and_scores_one(dataset: Path) -> None:
     """The ground truth as prediction has PQ 1; shifted by some pixels it has not."""
-    folder = dataset / "coco_panoptic/dataset"
+    folder = dataset
 
     assert problems(folder) == []
     assert panoptic_quality(folder, lambda ids: ids) == 1.0
     assert panoptic_quality(folder, lambda ids: np.roll(ids, 4, axis=1)) < 0.9
 
 
-@pytest.mark.slow
-def test_panopticapi_scores_the_ground_truth_as_perfect(dataset: Path, tmp_path: Path) -> None:
-    """PQ 1 for things and stuff by the format's own evaluation; less with shifted segments."""
-    from panopticapi.evaluation import pq_compute_single_core
-
-    folder = dataset / "coco_panoptic/dataset/annotations/panoptic_train"
-    truth = read(folder.parents[1])
-    categories = {c["id"]: c for c in truth["categories"]}
-
-    def quality(images: Path, is_thing: bool) -> float:
-        pairs = [(deepcopy(a), deepcopy(a)) for a in truth["annotations"]]
-        stat = pq_compute_single_core(0, pairs, str(folder), str(images), categories)
-        return float(stat.pq_average(categories, isthing=is_thing)[0]["pq"])
-
-    for path in folder.iterdir():
-        with Image.open(path) as image:
-            pixels = np.asarray(image)
-        moved = np.roll(pixels, 4, axis=1)
-        # Segments at the far edge stay at their own side.
-        moved[:, :4] = pixels[:, :4]
-        Image.fromarray(moved).save(tmp_path / path.name)
-    assert quality(folder, True) == quality(folder, False) == 1.0
-    assert quality(tmp_path, True) < 0.95
-
-
-def _swap_channels(folder: Path) -> None:
-    for path in (folder / "annotations/panoptic_train").iterdir():
-        with Image.open(path) as image:
-            Image.fromarray(np.asarray(image)[..., ::-1].copy()).save(
-                path.with_suffix(".new"), "PNG"
-            )
-        path.with_suffix(".new").replace(path)
-
-
-def _change_json(change: Callable[[Any], None]) -> Callable[[Path], None]:
-    def damage(folder: Path) -> None:
-        truth = read(folder)
-        change(truth)
-        path = folder / "annotations/panoptic_train.json"
-        path.unlink()
-        path.write_text(json.dumps(truth))
-
-    return damage
-
-
-def _remove_image(folder: Path) -> None:
-    next((folder / "annotations/panoptic_train").iterdir()).unlink()
-
-
-@pytest.mark.damage("coco_panoptic")
-@pytest.mark.parametrize(
-    ("damage", "named"),
-    [
-        (_swap_channels, "ids differ"),
-        (_remove_image, "no id image"),
-        (_change_json(lambda t: t["annotations"].pop()), "images and annotations differ"),
-        (_change_json(lambda t: t["annotations"][0]["segments_info"].pop()), "ids differ"),
-        (_change_json(lambda t: _first(t).update(area=_first(t)["area"] + 1)), "area"),
-        (_change_json(lambda t: _first(t)["bbox"].__setitem__(2, 1)), "box"),
-    ],
-)
-def test_damage_is_found(
-    dataset: Path, tmp_path: Path, damage: Callable[[Path], None], named: str
-) -> None:
-    """The check above is able to fail."""
-    folder = tmp_path / "copy"
-    shutil.copytree(dataset / "coco_panoptic/dataset", folder)
-
-    damage(folder)
-
-    assert named in problems(folder)
-
-
-def _first(truth: Any) -> Any:
-    return truth["annotations"][0]["segments_info"][0]
-
-
-def test_things_are_the_instances_of_coco(dataset: Path) -> None:
-    """One segment per annotation, with the same pixels, category and image."""
-    folder = dataset / "coco_panoptic/dataset"
-    truth = read(folder)
-    instances = json.loads((dataset / "coco/dataset/annotations/instances_train.json").read_text())
-    things = {c["id"] for c in truth["categories"] if c["isthing"]}
-    count = 0
-    for annotation in truth["annotations"]:
-        ids = segments_of(folder / "annotations/panoptic_train" / annotation["file_name"])
-        rows = [a for a in instances["annotations"] if a["image_id"] == annotation["image_id"]]
-        listed = [s for s in annotation["segments_info"] if s["category_id"] in things]
-        assert len(listed) == len(rows)
-        for segment, row in zip(listed, rows, strict=True):
-            mask = drawn_mask(row, instances)
-            np.testing.assert_array_equal(ids == segment["id"], mask)
-            assert (segment["category_id"], segment["bbox"]) == (row["category_id"], row["bbox"])
-            named = segment["instance_id"], segment["annotation_id"]
-            assert named == (row["instance_id"], row["id"])
-            count += 1
-    assert count > 10
-
-
 def test_scenery_is_stuff_and_unannotated_cars_are_void(dataset: Path) -> None:
     """Names of stuff that occur follow the things; a hood is neither thing nor background."""
-    folder = dataset / "coco_panoptic/dataset"
+    folder = dataset
     truth = read(folder)
     names = {c["id"]: (c["name"], c["isthing"]) for c in truth["categories"]}
 
@@ -231,7 +115,7 @@ def test_scenery_is_stuff_and_unannotated_cars_are_void(dataset: Path) -> None:
     shown = [names[s["category_id"]][0] for s in annotation["segments_info"]]
     assert shown == ["crate", "pedestrian", "sky", "tree"]
     ids = segments_of(folder / "annotations/panoptic_train/000000007_color.png")
-    with Image.open(dataset / "coco/dataset/instance/train/000000007_color.png") as image:
+    with Image.open(dataset.parent / "shards/000002/color/instance/000000007.png") as image:
         instances = np.asarray(image)
     assert (instances == 6).any()
     assert (ids[instances == 6] == 0).all()
@@ -241,7 +125,7 @@ def test_scenery_is_stuff_and_unannotated_cars_are_void(dataset: Path) -> None:
 
 def test_the_sky_is_above_the_horizon(dataset: Path) -> None:
     """The level camera has it in its upper half, behind everything."""
-    truth = read(dataset / "coco_panoptic/dataset")
+    truth = read(dataset)
     for annotation in truth["annotations"]:
         (sky,) = (s for s in annotation["segments_info"] if s["category_id"] == 4)
         _, top, _, height = sky["bbox"]
@@ -251,12 +135,9 @@ def test_the_sky_is_above_the_horizon(dataset: Path) -> None:
 def test_ignored_objects_are_void(world: Any, tmp_path: Path) -> None:
     """Evaluation leaves out what is predicted there."""
     sample = world.samples[0]
-    truth = sample.truth["color"]
-    first, *others = truth.objects
-    marked = replace(truth, objects=(replace(first, ignored=True), *others))
+    first, *others = sample.truth["color"].objects
 
-    changed = replace(sample, truth={"color": marked})
-    folder = world.export(CocoPanoptic(), world.info(1), [changed], tmp_path)
+    folder = world.export(CocoPanoptic(), world.info(1), [world.ignoring(sample)], tmp_path)
 
     (annotation,) = read(folder)["annotations"]
     assert len(annotation["segments_info"]) == len(others)
@@ -264,11 +145,3 @@ def test_ignored_objects_are_void(world: Any, tmp_path: Path) -> None:
     mask = first.mask
     crop = ids[mask.y_px : first.box.y_max, mask.x_px : first.box.x_max]
     assert (crop[mask.pixels] == 0).all()
-
-
-def test_a_camera_without_instance_images_is_refused(world: Any) -> None:
-    """Before anything is rendered."""
-    info = world.info(1, media={"color": (Channel.RGB, Channel.CATEGORY)})
-
-    with pytest.raises(ConfigError, match="'color' does not write the channel instance; add it"):
-        CocoPanoptic().check(info)

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-import shutil
-from collections.abc import Callable, Iterator
-from dataclasses import replace
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -84,51 +82,6 @@ def dataset(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_signals_follow_from_the_images(dataset: Path, world: Any) -> None:
     """Depth within half a grey value, one colour per instance, edges of the written image."""
     assert list(problems(dataset, world.samples)) == []
-
-
-def repaint(kind: str, change: Callable[[Any], Any]) -> Callable[[Path], None]:
-    def damage(root: Path) -> None:
-        path = root / f"train/000000/{kind}/000000.png"
-        cv2.imwrite(str(path), change(cv2.imread(str(path), cv2.IMREAD_UNCHANGED)))
-
-    return damage
-
-
-def other_frame(root: Path) -> None:
-    one, other = (root / f"train/00000{k}/depth/000000.png" for k in (0, 1))
-    one.unlink()
-    shutil.copyfile(other, one)
-
-
-def other_range(root: Path) -> None:
-    path = root / "train/000000/clip.json"
-    clip = json.loads(path.read_text())
-    clip["depth"]["near_m"][0] *= 1.1
-    path.write_text(json.dumps(clip))
-
-
-@pytest.mark.damage("control_clips")
-@pytest.mark.parametrize(
-    "damage",
-    [
-        repaint("depth", lambda pixels: 255 - pixels),
-        repaint("edges", lambda pixels: np.roll(pixels, 1, axis=1)),
-        repaint("rgb", lambda pixels: pixels[..., ::-1]),
-        repaint("segmentation", lambda pixels: np.where(pixels > 99, 255, 0).astype(np.uint8)),
-        other_frame,
-        other_range,
-    ],
-)
-def test_damage_is_noticed(
-    dataset: Path, world: Any, tmp_path: Path, damage: Callable[[Path], None]
-) -> None:
-    """The comparison fails for a data set that is slightly wrong."""
-    root = tmp_path / "copy"
-    shutil.copytree(dataset, root)
-
-    damage(root)
-
-    assert list(problems(root, world.samples))
 
 
 @pytest.mark.slow
@@ -234,35 +187,6 @@ def test_the_suggested_range_of_a_sequence_uses_most_greys(
     (dark, light), _ = inverse_depth(np.array([farthest_m, nearest_m], np.float32), (near_m, far_m))
 
     assert int(light) - int(dark) >= 160
-
-
-@pytest.mark.parametrize(
-    ("exporter", "steps", "message"),
-    [
-        (ControlClips(), 4, "depth of a sequence needs a fixed range"),
-        (ControlClips(near_m=5.0), 1, "expected both, with near_m < far_m, or neither"),
-        (ControlClips(near_m=5.0, far_m=5.0), 1, "expected both, with near_m < far_m, or neither"),
-    ],
-)
-def test_ranges_that_make_no_sense_are_refused(
-    world: Any, exporter: ControlClips, steps: int, message: str
-) -> None:
-    """Before anything is rendered."""
-    with pytest.raises(ConfigError, match=message):
-        exporter.check(world.info(8, steps_per_scene=steps))
-
-
-@pytest.mark.parametrize(
-    ("segmentation", "missing"), [("instance", Channel.INSTANCE), ("category", Channel.CATEGORY)]
-)
-def test_missing_channels_are_named(world: Any, segmentation: Any, missing: Channel) -> None:
-    """The camera writes the painted ids, and depth."""
-    known = (Channel.RGB, Channel.Z_DEPTH)
-    info = world.info(1, media={"color": known})
-    with pytest.raises(ConfigError, match=f"does not write the channel {missing}"):
-        ControlClips(segmentation=segmentation).check(info)
-    with pytest.raises(ConfigError, match="does not write the channel depth"):
-        ControlClips().check(replace(world.info(1, media={"color": (Channel.RGB, missing)})))
 
 
 def test_categories_have_a_colour_each(world: Any, tmp_path: Path) -> None:

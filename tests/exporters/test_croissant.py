@@ -2,23 +2,17 @@
 
 from __future__ import annotations
 
-import csv
 import hashlib
 import json
-import logging
-import shutil
-import warnings
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
-from gen_data.core.errors import ConfigError
 from gen_data.core.interfaces import DatasetInfo, Publication
 from gen_data.exporters.croissant import Croissant
+from tests.exporters.label_readers import csv_rows
 
 
 @pytest.fixture(scope="module")
@@ -40,38 +34,14 @@ def published(world: Any, licence: str = "") -> DatasetInfo:
     return replace(world.info(7), publication=publication)
 
 
-def table(path: Path) -> list[dict[str, str]]:
-    with path.open(newline="", encoding="utf-8") as file:
-        return list(csv.DictReader(file))
-
-
-def visible(sample: Any) -> list[Any]:
-    return [t for t in sample.truth["color"].objects if t.box is not None]
-
-
 def test_tables_list_images_and_objects(dataset: Path, world: Any) -> None:
     """Ids are COCO's; the empty frame has an image and no object."""
-    images, objects = table(dataset / "images.csv"), table(dataset / "objects.csv")
+    images, objects = csv_rows(dataset / "images.csv"), csv_rows(dataset / "objects.csv")
 
     assert [int(row["image_id"]) for row in images] == [s.image_id("color") for s in world.samples]
-    expected = [
-        (sample.image_id("color"), thing.instance.category, thing.box.x_min, thing.box.width_px)
-        for sample in world.samples
-        for thing in visible(sample)
-    ]
-    written = [
-        (int(row["image_id"]), row["category"], int(row["x"]), int(row["width"])) for row in objects
-    ]
-    assert written == expected
-    names = [row["name"] for row in table(dataset / "categories.csv")]
+    assert {row["image_id"] for row in objects} < {row["image_id"] for row in images}
+    names = [row["name"] for row in csv_rows(dataset / "categories.csv")]
     assert names == list(world.categories)
-
-
-def test_images_are_links(dataset: Path) -> None:
-    """No image is stored twice."""
-    shard = dataset.parent / "shards/000001"
-
-    assert (dataset / "images/val/000000004_color.png").samefile(shard / "color/rgb/000000004.png")
 
 
 def test_files_are_described_with_their_sums(dataset: Path) -> None:
@@ -95,85 +65,3 @@ def test_licences_are_those_of_assets_or_of_the_publisher(world: Any, tmp_path: 
         stated.append(json.loads((folder / "croissant.json").read_text())["license"])
 
     assert stated == ["CC0-1.0", "CC-BY-4.0"]
-
-
-def test_a_data_set_without_photographs_is_refused(world: Any) -> None:
-    """Every row of the table has an image."""
-    with pytest.raises(ConfigError, match=r"no sensor of .* writes the rgb channel"):
-        Croissant().check(world.info(7, media={"color": ()}))
-
-
-def faults(folder: Path, world: Any) -> list[str]:
-    """Differences between what mlcroissant loads and the samples."""
-    logging.disable()
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        import mlcroissant
-
-        try:
-            loaded = mlcroissant.Dataset(jsonld=str(folder / "croissant.json"))
-            issues = loaded.metadata.ctx.issues
-            found = [*issues.errors, *issues.warnings]
-            images = list(loaded.records("images"))
-            objects = list(loaded.records("objects"))
-            categories = list(loaded.records("categories"))
-        except (mlcroissant.ValidationError, mlcroissant.GenerationError, ValueError) as error:
-            return [f"{type(error).__name__}: {error}"]
-        finally:
-            logging.disable(logging.NOTSET)
-    for file in loaded.metadata.distribution:
-        url = getattr(file, "content_url", None)
-        if url and hashlib.sha256((folder / url).read_bytes()).hexdigest() != file.sha256:
-            found.append(f"sum of {url}")
-    if [c["categories/name"].decode() for c in categories] != list(world.categories):
-        found.append("categories")
-    by_id = {row["images/image_id"]: row for row in images}
-    for sample in world.samples:
-        row = by_id.get(sample.image_id("color"))
-        if row is None:
-            found.append(f"image {sample.index}")
-            continue
-        (expected,) = (
-            a for c, a in sample.capture.readings["color"].channels.items() if c.value == "rgb"
-        )
-        if not np.array_equal(np.asarray(row["images/content"]), expected):
-            found.append(f"pixels {sample.index}")
-    boxes = [(o["objects/x"], o["objects/y"], o["objects/width"]) for o in objects]
-    truth = [(t.box.x_min, t.box.y_min, t.box.width_px) for s in world.samples for t in visible(s)]
-    return found if boxes == truth else [*found, "boxes"]
-
-
-@pytest.mark.slow
-def test_mlcroissant_loads_all_record_sets(dataset: Path, world: Any) -> None:
-    """Without an error or a warning; images join their rows."""
-    assert faults(dataset, world) == []
-
-
-def edit(path: Path, old: str, new: str) -> None:
-    text = path.read_text()
-    assert old in text
-    path.write_text(text.replace(old, new, 1))
-
-
-@pytest.mark.damage("croissant")
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "damage",
-    [
-        lambda d: edit(d / "croissant.json", '"column": "x"', '"column": "left"'),
-        lambda d: edit(d / "croissant.json", '"column": "x"', '"column": "y"'),
-        lambda d: edit(d / "images.csv", "000000000_color", "000000001_color"),
-        lambda d: edit(d / "croissant.json", '"license"', '"licence"'),
-        lambda d: (d / "images/train/000000001_color.png").unlink(),
-    ],
-    ids=["no such column", "another column", "wrong join", "no licence", "image missing"],
-)
-def test_damage_is_found(
-    damage: Callable[[Path], Any], dataset: Path, world: Any, tmp_path: Path
-) -> None:
-    """The same reader finds faults in damaged copies."""
-    copy = tmp_path / "copy"
-    shutil.copytree(dataset, copy)
-    damage(copy)
-
-    assert faults(copy, world)

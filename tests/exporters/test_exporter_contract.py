@@ -15,9 +15,13 @@ from tests.exporters.drives import drive_info
 PACKED = {"huggingface", "rlds", "tfrecord", "webdataset", "rerun"}
 """Formats with several samples in a file."""
 EVERY_CLASS = {"coco", "huggingface", "tfrecord", "voc", "webdataset"}
-"""Formats with regions that a score leaves out class by class; each has its own test of them."""
+"""Formats with regions that a score leaves out class by class; see ``test_ignored_objects``."""
 NO_CLASS = {"cityscapes", "hdf5", "kitti", "kitti_tracking", "language", "motchallenge"}
 """Formats with a mark for ignored objects that needs no class, or that only mention them."""
+OWN_IMAGES = {"hdf5", "lerobot", "mcap", "pointclouds", "semantickitti", "tables", "usd"} | PACKED
+"""Formats without image files of the shards."""
+TRACKS = {"kitti_raw", "nuscenes"}
+"""Formats of tracks, from which an ignored object disappears and a missing one does not."""
 
 
 def files(folder: Path) -> dict[str, bytes]:
@@ -74,10 +78,13 @@ def test_shards_can_be_written_in_any_order(
 def test_the_size_of_shards_leaves_no_trace(
     exporter: Any, world: Any, written: Path, tmp_path: Path, size: int
 ) -> None:
-    """Shards of one, three or seven samples: the merged data set has the same bytes."""
+    """Shards of one, three or seven samples: the merged data set has the same bytes.
+
+    Also if the runner keeps arrays of images and points that are written already.
+    """
     info, samples = given(exporter, world)
 
-    other = world.export(exporter, info, samples, tmp_path, shard_size=size)
+    other = world.export(exporter, info, samples, tmp_path, shard_size=size, keep_arrays=size == 7)
 
     assert files(other) == files(written / "dataset")
 
@@ -91,6 +98,35 @@ def test_file_names_of_a_shard_depend_on_indices_only(
     world.export(exporter, info, samples[3:6], tmp_path)
 
     assert files(written / "shards/000001") == files(tmp_path / "shards/000000")
+
+
+def test_only_formats_with_a_mark_for_it_have_ignored_objects(
+    exporter: Any, world: Any, tmp_path: Path
+) -> None:
+    """All others write the same bytes as without the object."""
+    info, samples = given(exporter, world)
+    ignored = world.ignoring(samples[0])
+    missing = world.with_objects(samples[0], lambda objects: objects[1:])
+
+    marked, left_out = (
+        files(world.export(exporter, info, [sample], tmp_path / str(number)))
+        for number, sample in enumerate((ignored, missing))
+    )
+
+    # Texts of the data set are the same in both cases.
+    marks = (EVERY_CLASS | NO_CLASS | TRACKS) - {"language"}
+    assert (marked != left_out) == (exporter.type in marks)
+
+
+def test_no_image_is_stored_twice(exporter: Any, written: Path) -> None:
+    """Files of the data set with the bytes of a file of the shards are links to it."""
+    places: dict[bytes, set[int]] = {}
+    for path in written.glob("shards/**/*.[pj][np]g"):
+        places.setdefault(path.read_bytes(), set()).add(path.stat().st_ino)
+    images = [p for p in (written / "dataset").rglob("*.[pj][np]g") if p.read_bytes() in places]
+
+    assert all(path.stat().st_ino in places[path.read_bytes()] for path in images)
+    assert bool(images) == (exporter.type not in OWN_IMAGES)
 
 
 def test_text_files_are_utf8_with_unix_line_ends(written: Path) -> None:

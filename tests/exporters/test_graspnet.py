@@ -16,8 +16,7 @@ from gen_data.exporters.graspnet import GraspNet
 POSE = SE3.about_z(0.3, (5.0, 1.0, 0.4))
 
 
-@pytest.fixture
-def graspable(world: Any) -> Sample:
+def with_grasps(world: Any) -> Sample:
     """A frame with a grasp and a suction of its first object, and a grasp of a hidden one."""
     first: Sample = world.samples[0]
     seen = first.truth["color"].objects[0].instance.instance_id
@@ -46,28 +45,10 @@ def assert_rows(folder: Path, sample: Sample) -> None:
     assert cup[7] == seen
 
 
-def test_rows_are_in_the_camera_frame_of_visible_objects(
-    world: Any, graspable: Sample, tmp_path: Path
-) -> None:
+def test_rows_are_in_the_camera_frame_of_visible_objects(world: Any, tmp_path: Path) -> None:
     """Hidden things are left out."""
+    graspable = with_grasps(world)
     assert_rows(world.export(GraspNet(), world.info(1), [graspable], tmp_path), graspable)
-
-
-@pytest.mark.damage("graspnet")
-@pytest.mark.parametrize(("column", "change"), [(0, 0.1), (1, 0.02), (5, 0.3), (13, 0.01), (16, 1)])
-def test_damage_is_noticed(
-    world: Any, graspable: Sample, tmp_path: Path, column: int, change: float
-) -> None:
-    """The comparison fails for a row that is slightly wrong: score, width, pose, object."""
-    folder = world.export(GraspNet(), world.info(1), [graspable], tmp_path)
-    path = folder / "train/000000000_color_grasps.npy"
-    rows = np.load(path)
-    rows[0, column] += change
-    path.unlink()
-    np.save(path, rows)
-
-    with pytest.raises(AssertionError):
-        assert_rows(folder, graspable)
 
 
 def test_an_image_without_grasps_has_empty_arrays(world: Any, tmp_path: Path) -> None:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import json
-import shutil
 import zipfile
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -14,9 +13,7 @@ import numpy as np
 import pytest
 
 from gen_data.core.capture import Channel
-from gen_data.core.errors import ConfigError
-from gen_data.exporters.hdf5 import Hdf5, write_hdf5
-from gen_data.exporters.npz import npz_bytes
+from gen_data.exporters.hdf5 import Hdf5
 from tests.exporters.conftest import MEDIA, SIZES_M
 
 CONTAINERS = ("hdf5", "npz")
@@ -115,62 +112,6 @@ def test_files_without_compression_hold_the_same(
     assert sizes["none"] > 3 * sizes["gzip"]
 
 
-def rewrite(path: Path, arrays: dict[str, Any]) -> None:
-    path.unlink()
-    if path.suffix == ".npz":
-        path.write_bytes(npz_bytes(arrays, 1))
-    else:
-        write_hdf5(path, arrays)
-
-
-def half_a_pixel(data: dict[str, Any]) -> None:
-    data["K"] = data["K"] + np.array([[0, 0, 0.5], [0, 0, 0.5], [0, 0, 0]])
-
-
-def blue_first(data: dict[str, Any]) -> None:
-    data["colors"] = np.ascontiguousarray(data["colors"][..., ::-1])
-
-
-def range_as_depth(data: dict[str, Any]) -> None:
-    data["depth"] = (data["depth"] * 1.05).astype(np.float32)
-
-
-def camera_axes(data: dict[str, Any]) -> None:
-    data["campose"] = np.array(
-        json.dumps([{"cam2world_matrix": data["T_world_camera"].tolist()}]).encode()
-    )
-
-
-def opencv_normals(data: dict[str, Any]) -> None:
-    data["normals"] = (1.0 - data["normals"]).astype(np.float32)
-
-
-def lost_instance(data: dict[str, Any]) -> None:
-    rows = json.loads(data["instance_attribute_maps"].item())[:-1]
-    data["instance_attribute_maps"] = np.array(json.dumps(rows).encode())
-
-
-@pytest.mark.damage("hdf5")
-@pytest.mark.parametrize(
-    "damage",
-    [half_a_pixel, blue_first, range_as_depth, camera_axes, opencv_normals, lost_instance],
-)
-def test_damage_is_noticed(
-    dataset: Path, world: Any, tmp_path: Path, damage: Callable[[dict[str, Any]], None]
-) -> None:
-    """The comparison fails for a container that is slightly wrong."""
-    source = next((dataset / "train").glob("000000000_*"))
-    path = tmp_path / source.name
-    shutil.copyfile(source, path)
-    assert list(problems(path, world.samples[0])) == []
-    data = load(path)
-
-    damage(data)
-    rewrite(path, data)
-
-    assert list(problems(path, world.samples[0]))
-
-
 def test_images_are_compressed_by_standard_filters(dataset: Path) -> None:
     """Other programs decode them: the archive passes its checksums, HDF5 knows the filters."""
     path = next((dataset / "train").iterdir())
@@ -202,18 +143,3 @@ def test_each_camera_has_a_container(world: Any, samples: Any, tmp_path: Path) -
     names = sorted(p.name for p in (root / "train").iterdir())
     assert names[:2] == ["000000000_left.hdf5", "000000000_right.hdf5"]
     assert len(names) == 8
-
-
-def test_a_missing_package_is_named(world: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Before anything is rendered; NumPy's archives need none."""
-    monkeypatch.setattr("gen_data.core.optional_packages.find_spec", lambda name: None)
-
-    with pytest.raises(ConfigError, match=r"pip install .*\[formats\]'"):
-        Hdf5().check(world.info(1))
-    Hdf5(container="npz").check(world.info(1))
-
-
-def test_a_data_set_without_images_is_refused(world: Any) -> None:
-    """Such as one of laser scans."""
-    with pytest.raises(ConfigError, match="no camera writes a channel"):
-        Hdf5().check(world.info(1, (), ("top",)))

@@ -2,33 +2,21 @@
 
 from __future__ import annotations
 
-import io
-import os
 import re
-import shutil
-import warnings
-from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pyarrow
 import pyarrow.parquet
 import pytest
 import yaml
-from PIL import Image
-from pycocotools import mask as coco_mask
 
-from gen_data.core.errors import ConfigError
 from gen_data.exporters import huggingface
 from gen_data.exporters.huggingface import HuggingFace
-from gen_data.exporters.label_map import LabelMap, MappedExporter
+from tests.exporters.label_readers import parquet
 
 # pycocotools' decoder predates numpy 2's __array__(copy=...).
 pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
-
-Table = pyarrow.Table
 
 
 @pytest.fixture(scope="module")
@@ -38,50 +26,18 @@ def dataset(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return world.export(HuggingFace(rows_per_file=2), world.info(7), world.samples, folder)
 
 
-def row_faults(row: dict[str, Any], names: list[str], truth: Any) -> list[str]:
-    """Differences between a row with decoded images and a sample."""
-    found = []
-    image, depth = np.asarray(row["image"]), np.asarray(row["depth"])
-    visible = [t for t in truth.truth["color"].objects if t.box is not None]
-    objects = row["objects"]
-    if image.shape != (row["height"], row["width"], 3) or image.dtype != np.uint8:
-        found.append(f"image {image.shape}")
-    # Metres in units of a millimetre, as the data set says.
-    expected = truth.capture.readings["color"].channels
-    (channel,) = (c for c in expected if c.value == "depth")
-    near = expected[channel] < 60.0
-    if not np.allclose(depth[near] * 0.001, expected[channel][near], atol=0.0006):
-        found.append("depth")
-    if len(objects["bbox"]) != len(visible):
-        return [*found, f"{len(objects['bbox'])} objects"]
-    for k, thing in enumerate(visible):
-        x, y, width, height = objects["bbox"][k]
-        box = thing.box
-        if (x, y, x + width, y + height) != (box.x_min, box.y_min, box.x_max, box.y_max):
-            found.append(f"box {k}")
-        if names[objects["category"][k]] != thing.instance.category:
-            found.append(f"category {k}")
-        runs = {"size": [row["height"], row["width"]], "counts": objects["rle"][k]}
-        mask = coco_mask.decode(runs).astype(bool)
-        if not np.array_equal(mask, image[..., 1] == 20 * thing.instance.instance_id):
-            found.append(f"mask {k}")
-        if objects["area"][k] != mask.sum():
-            found.append(f"area {k}")
-    return found
-
-
 def test_parquet_files_embed_images(dataset: Path, world: Any) -> None:
     """Read by pyarrow alone: the bytes are those of the shards' PNG files."""
-    rows = [r for p in sorted((dataset / "data").glob("train-*")) for r in read(p).to_pylist()]
+    rows = [r for p in sorted((dataset / "data").glob("train-*")) for r in parquet(p).to_pylist()]
     train = [s for s in world.samples if s.split == "train"]
 
     assert [row["image_id"] for row in rows] == [s.image_id("color") for s in train]
     for row, truth in zip(rows, train, strict=True):
         assert row["image"]["path"] == f"{truth.index:09d}_color.png"
-        shard = dataset.parent / f"shards/{truth.index // 3:06d}"
-        assert row["image"]["bytes"] == (shard / f"color/rgb/{truth.index:09d}.png").read_bytes()
-        decoded = {c: Image.open(io.BytesIO(row[c]["bytes"])) for c in ("image", "depth")}
-        assert row_faults({**row, **decoded}, list(world.categories), truth) == []
+        shard = dataset.parent / f"shards/{truth.index // 3:06d}/color"
+        for column, channel in (("image", "rgb"), ("depth", "depth")):
+            stored = (shard / channel / f"{truth.index:09d}.png").read_bytes()
+            assert row[column]["bytes"] == stored
 
 
 def test_files_are_numbered_and_counted(dataset: Path) -> None:
@@ -128,7 +84,7 @@ def test_flow_is_binary_and_missing_channels_are_null(world: Any, tmp_path: Path
     """Pillow would decode flow to 8 bits; the right camera writes none."""
     info, samples = world.pairs()
     folder = world.export(HuggingFace(), info, samples, tmp_path)
-    table = read(folder / "data/train-00000-of-00001.parquet")
+    table = parquet(folder / "data/train-00000-of-00001.parquet")
     rows = table.to_pylist()
 
     assert table.schema.field("flow_forward").type == pyarrow.binary()
@@ -140,52 +96,12 @@ def test_flow_is_binary_and_missing_channels_are_null(world: Any, tmp_path: Path
 
 def test_ignored_objects_are_crowds(world: Any, tmp_path: Path) -> None:
     """As in COCO, which excludes them from scores."""
-    sample = world.samples[0]
-    truth = sample.truth["color"]
-    first, *others = truth.objects
-    objects = (replace(first, ignored=True), *others)
-    ignored = replace(sample, truth={"color": replace(truth, objects=objects)})
+    ignored = world.ignoring(world.samples[0])
     folder = world.export(HuggingFace(), world.info(1), [ignored], tmp_path)
 
-    (row,) = read(folder / "data/train-00000-of-00001.parquet").to_pylist()
+    (row,) = parquet(folder / "data/train-00000-of-00001.parquet").to_pylist()
 
     assert row["objects"]["iscrowd"] == [True] + [False] * (len(row["objects"]["id"]) - 1)
-
-
-def test_an_ignored_object_without_a_class_is_a_crowd_of_every_class(
-    world: Any, tmp_path: Path
-) -> None:
-    """A reader compares it with detections of its class only; ids stay unique."""
-    classes = {"box": ("crate",), "walker": ("pedestrian",)}
-    exporter = MappedExporter(HuggingFace(), LabelMap(classes=classes, others="ignore"))
-    things = (
-        world.instance(1, "car", 9.0, 2.5, 0.0),
-        world.instance(2, "crate", 8.0, -1.0, 0.0),
-    )
-    sample = world.sample(0, things, [world.camera()])
-
-    folder = world.export(exporter, world.info(1), [sample], tmp_path)
-
-    (row,) = read(folder / "data/train-00000-of-00001.parquet").to_pylist()
-    rows = row["objects"]
-    assert sorted(zip(rows["category"], rows["iscrowd"], strict=True)) == [
-        (0, False), (0, True), (1, True),
-    ]  # fmt: skip
-    assert len(set(rows["id"])) == 3
-
-
-def test_a_data_set_without_photographs_is_refused(world: Any) -> None:
-    """Every row has an image."""
-    info = world.info(7, media={"color": ()})
-
-    with pytest.raises(ConfigError, match=r"no sensor of .* writes the rgb channel"):
-        HuggingFace().check(info)
-
-
-def read(path: Path) -> Table:
-    """One Parquet file."""
-    with pyarrow.parquet.ParquetFile(path) as file:
-        return file.read()
 
 
 def card(folder: Path) -> Any:
@@ -193,75 +109,3 @@ def card(folder: Path) -> Any:
     header = re.match(r"---\n(.*?)\n---\n", (folder / "README.md").read_text(), re.DOTALL)
     assert header
     return yaml.safe_load(header.group(1))
-
-
-def loaded_faults(folder: Path, world: Any, cache: Path) -> list[str]:
-    """Differences between what ``datasets`` loads offline and the samples."""
-    os.environ["HF_HUB_OFFLINE"] = os.environ["HF_DATASETS_OFFLINE"] = "1"
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        import datasets
-
-        datasets.disable_progress_bars()
-        try:
-            loaded = datasets.load_dataset(str(folder), cache_dir=str(cache))
-        except (datasets.exceptions.DatasetsError, ValueError) as error:
-            return [f"{type(error).__name__}: {error}"]
-        found = []
-        for split, rows in loaded.items():
-            expected = [s for s in world.samples if s.split == split]
-            if not isinstance(rows.features.get("image"), datasets.Image):
-                found.append("image is no Image")
-                continue
-            names = rows.features["objects"]["category"].feature.names
-            if [row["sample"] for row in rows] != [s.index for s in expected]:
-                found.append("samples")
-                continue
-            for row, truth in zip(rows, expected, strict=True):
-                found += row_faults(row, names, truth)
-        return found
-
-
-@pytest.mark.slow
-def test_datasets_loads_the_folder(dataset: Path, world: Any, tmp_path: Path) -> None:
-    """With images, class names and splits."""
-    assert loaded_faults(dataset, world, tmp_path) == []
-
-
-def first_column(table: Table, name: str, change: Callable[[Any], Any]) -> Table:
-    """The table with one column changed row by row."""
-    k = table.schema.get_field_index(name)
-    values = [change(value) for value in table.column(name).to_pylist()]
-    column = table.schema.field(k)
-    return table.set_column(k, column, pyarrow.array(values, column.type))
-
-
-@pytest.mark.damage("huggingface")
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "damage",
-    [
-        lambda t: t.replace_schema_metadata(None),
-        lambda t: first_column(
-            t, "objects", lambda o: {**o, "category": [(c + 1) % 3 for c in o["category"]]}
-        ),
-        lambda t: first_column(
-            t,
-            "objects",
-            lambda o: {**o, "bbox": [[x, y, x + w, y + h] for x, y, w, h in o["bbox"]]},
-        ),
-        lambda t: t.slice(1),
-        lambda t: first_column(t, "objects", lambda o: {**o, "rle": o["rle"][::-1]}),
-    ],
-    ids=["no features", "classes from one", "corners", "row missing", "masks reversed"],
-)
-def test_damage_is_found(
-    damage: Callable[[Table], Table], dataset: Path, world: Any, tmp_path: Path
-) -> None:
-    """The same reader finds faults in damaged copies."""
-    copy = tmp_path / "copy"
-    shutil.copytree(dataset, copy)
-    path = copy / "data/train-00000-of-00003.parquet"
-    pyarrow.parquet.write_table(damage(read(path)), path)
-
-    assert loaded_faults(copy, world, tmp_path / "cache")

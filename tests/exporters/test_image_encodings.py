@@ -2,36 +2,49 @@
 
 from __future__ import annotations
 
+import configparser
+import io
 import json
+import logging
 import tarfile
+import warnings
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from urllib.parse import unquote
+from xml.etree import ElementTree
 
-import cv2
 import h5py
 import numpy as np
+import pyarrow.parquet
 import pytest
+from PIL import Image
 
 from gen_data.core.capture import PNG, Channel, ImageEncoding
 from gen_data.core.errors import ConfigError
 from gen_data.exporters import TABLE
 from gen_data.exporters.base import check_image_formats
 from gen_data.exporters.coco import Coco
+from gen_data.exporters.croissant import Croissant
 from gen_data.exporters.hdf5 import Hdf5
 from gen_data.exporters.image_files import encode_channel, read_image
 from gen_data.exporters.kitti import Kitti
+from gen_data.exporters.motchallenge import MotChallenge
+from gen_data.exporters.nuscenes import NuScenes
 from gen_data.exporters.voc import Voc
-from gen_data.exporters.webdataset import WebDataset
-from gen_data.exporters.yolo import Yolo
 from gen_data.runner.stored import ImageFiles
 from gen_data.sensors.camera.rgb_encoding import RgbEncoding
+from tests.exporters.drives import drive_info
+from tests.exporters.label_readers import json_lines, records
 
 JPEG, WEBP, LOSSLESS = (
     ImageEncoding("jpeg", 92),
     ImageEncoding("webp", 92),
     ImageEncoding("webp_lossless"),
 )
+ERROR_MAX = 4.0
+"""Mean difference to the rendered image, of 255; other images differ by more than 20."""
 MAGIC = {".jpg": b"\xff\xd8\xff", ".webp": b"RIFF"}
 
 
@@ -44,8 +57,13 @@ def encoding(request: Any) -> ImageEncoding:
 @pytest.fixture
 def info(world: Any, encoding: ImageEncoding) -> Any:
     """The street's data set in this encoding."""
-    info = world.info(7)
-    return replace(info, sensors=tuple(replace(s, rgb_encoding=encoding) for s in info.sensors))
+    return encoded(world.info(7), encoding)
+
+
+def encoded(info: Any, encoding: ImageEncoding) -> Any:
+    """The data set with photographs of all cameras in this encoding."""
+    sensors = (replace(s, rgb_encoding=encoding) if s.channels else s for s in info.sensors)
+    return replace(info, sensors=tuple(sensors))
 
 
 def photograph() -> Any:
@@ -106,64 +124,18 @@ def test_stored_images_are_found(
     assert error.mean() <= (0 if encoding is LOSSLESS else 4)
 
 
-def photographs(folder: Path, encoding: ImageEncoding) -> list[Path]:
-    """All files that begin as the encoding does and have its ending."""
-    found = sorted(folder.rglob(f"*{encoding.suffix}"))
-    assert all(p.read_bytes().startswith(MAGIC[encoding.suffix]) for p in found)
-    return found
-
-
-@pytest.mark.parametrize(
-    "exporter", [Coco(), Yolo(tasks=("detect",)), Voc(images="png")], ids=lambda e: e.type
-)
-def test_formats_link_photographs_under_their_ending(
-    tmp_path: Path, exporter: Any, info: Any, world: Any, encoding: ImageEncoding
-) -> None:
-    """One per sample, the same file as in the shard, and named so in the labels."""
-    folder = world.export(exporter, info, world.samples, tmp_path)
-    found = photographs(folder, encoding)
-    assert len(found) == 7
-    shard_files = {p.stat().st_ino for p in photographs(tmp_path / "shards", encoding)}
-    assert {p.stat().st_ino for p in found} <= shard_files
-    if exporter.type == "coco":
-        listed = json.loads((folder / "annotations/instances_train.json").read_bytes())["images"]
-        assert all((folder / "train" / image["file_name"]).exists() for image in listed)
-        depths = [folder / image["files"]["depth"] for image in listed]
-        assert all(
-            cv2.imread(str(path), cv2.IMREAD_UNCHANGED).dtype == np.uint16 for path in depths
-        )
-    if exporter.type == "voc":
-        text = next((folder / "VOCdevkit/VOC2012/Annotations").iterdir()).read_text()
-        assert f"{encoding.suffix}</filename>" in text
-
-
 def test_voc_encodes_jpeg_only_from_other_formats(
     tmp_path: Path, info: Any, world: Any, encoding: ImageEncoding
 ) -> None:
     """A second generation of JPEG would lose more."""
     folder = world.export(Voc(), info, world.samples, tmp_path)
-    found = photographs(folder, JPEG)
+    found = sorted(folder.rglob("*.jpg"))
     assert len(found) == 7
+    assert all(path.read_bytes().startswith(MAGIC[".jpg"]) for path in found)
     linked = {p.stat().st_nlink > 1 for p in found}
     own = list(tmp_path.glob("shards/*/voc/*.jpg"))
     assert linked == {True}
     assert len(own) == (0 if encoding is JPEG else 7)
-
-
-def test_containers_take_every_encoding(
-    tmp_path: Path, info: Any, world: Any, encoding: ImageEncoding
-) -> None:
-    """Tar files keep the encoded bytes, HDF5 files the pixels."""
-    tars = world.export(WebDataset(), info, world.samples, tmp_path / "tar")
-    names: list[str] = []
-    for path in tars.rglob("*.tar"):
-        with tarfile.open(path) as tar:
-            names += tar.getnames()
-    assert sum(name.endswith(f".rgb{encoding.suffix}") for name in names) == 7
-    boxes = world.export(Hdf5(), info, world.samples, tmp_path / "hdf5")
-    with h5py.File(next(boxes.rglob("000000000_*.hdf5"))) as file:
-        made = world.samples[0].capture.readings["color"].channels[Channel.RGB]
-        assert np.abs(np.asarray(file["colors"]).astype(int) - made).mean() <= 4
 
 
 def test_other_formats_refuse_them_with_a_remedy(info: Any, encoding: ImageEncoding) -> None:
@@ -173,7 +145,244 @@ def test_other_formats_refuse_them_with_a_remedy(info: Any, encoding: ImageEncod
     check_image_formats(Coco(), info)
 
 
-def test_every_format_takes_png(world: Any) -> None:
-    """The default; a plug-in without the attribute takes it too."""
-    assert "kitti" in TABLE
-    check_image_formats(Kitti(), world.info(7))
+Found = tuple[bytes, str]
+"""File of the first photograph, and the format that the data set states."""
+
+
+def file_of(path: Path) -> Found:
+    """A file, and the format that its ending states."""
+    return path.read_bytes(), path.suffix
+
+
+def in_parquet(folder: Path) -> Found:
+    """As ``datasets`` embeds images."""
+    table = pyarrow.parquet.read_table(next((folder / "data").glob("train-*")))
+    image = table["image"][0].as_py()
+    return image["bytes"], Path(image["path"]).suffix
+
+
+def in_mcap(folder: Path) -> Found:
+    """The first message of the camera, and Foxglove's name of its format."""
+    from mcap.reader import make_reader
+    from mcap_protobuf.decoder import DecoderFactory
+
+    with sorted(folder.glob("train/*.mcap"))[0].open("rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        _, _, _, message = next(reader.iter_decoded_messages(topics=["/camera/color/rgb"]))
+        return bytes(message.data), message.format
+
+
+def in_cvat(folder: Path) -> Found:
+    """By the name in the XML file."""
+    image = ElementTree.parse(folder / "train/annotations.xml").find("image")
+    assert image is not None
+    return file_of(folder / "train/images" / image.attrib["name"])
+
+
+def in_label_studio(folder: Path) -> Found:
+    """By the address in the first task."""
+    url = json.loads((folder / "train/tasks.json").read_text())[0]["data"]["image"]
+    return file_of(folder / unquote(url).partition("=label_studio/")[2])
+
+
+def in_panoptic(folder: Path) -> Found:
+    """By the entry of the image; segments stay PNG."""
+    data = json.loads((folder / "annotations/panoptic_train.json").read_text())
+    name = data["annotations"][0]["file_name"]
+    assert (folder / "annotations/panoptic_train" / name).read_bytes().startswith(b"\x89PNG")
+    return file_of(folder / "train" / data["images"][0]["file_name"])
+
+
+def in_solo(folder: Path) -> Found:
+    """By the first capture."""
+    frame = json.loads((folder / "train/sequence.0/step0.frame_data.json").read_text())
+    capture = frame["captures"][0]
+    path = folder / "train/sequence.0" / capture["filename"]
+    assert path.suffix == ".jpg"
+    return path.read_bytes(), capture["imageFormat"]
+
+
+def in_clips(folder: Path) -> Found:
+    """By the line of the first frame."""
+    return file_of(
+        folder / "train" / json_lines(folder / "train/metadata.jsonl")[0]["image_file_name"]
+    )
+
+
+def in_bop(folder: Path) -> Found:
+    """By number, as bop_toolkit looks for either ending."""
+    return file_of(next((folder / "train/000000/rgb").glob("000000.*")))
+
+
+def in_recording(folder: Path) -> Found:
+    """The first blob and its media type."""
+    import rerun.chunk
+
+    store = rerun.chunk.RrdReader(str(next(folder.glob("train/*.rrd")))).store()
+    for chunk in store.stream():
+        columns = chunk.to_record_batch()
+        if chunk.entity_path == "/world/cameras/color/image/rgb":
+            values = {
+                name.partition(":")[2]: columns[name][0].as_py() for name in columns.schema.names
+            }
+            return bytes(values["blob"][0]), values["media_type"][0]
+    raise AssertionError("no photograph")
+
+
+def in_tar(folder: Path) -> Found:
+    """The first member with the name of an image of the colour camera."""
+    with tarfile.open(sorted(folder.glob("train/*.tar"))[0]) as tar:
+        (name,) = (n for n in tar.getnames() if ".rgb." in n)
+        member = tar.extractfile(name)
+        assert member is not None
+        return member.read(), Path(name).suffix
+
+
+def in_records(folder: Path) -> Found:
+    """Under the keys by which TensorFlow's API decodes it."""
+    (record,) = records(folder / "train-00000-of-00001.tfrecord")
+    (data,), (kind,), (name,) = (
+        record[f"image/{key}"][1] for key in ("encoded", "format", "filename")
+    )
+    assert name.decode() == "000000000_color." + {"jpeg": "jpg"}.get(kind.decode(), kind.decode())
+    return data, kind.decode()
+
+
+def in_coco(folder: Path) -> Found:
+    """By the entry of the image; depth stays PNG."""
+    (image,) = json.loads((folder / "annotations/instances_train.json").read_bytes())["images"]
+    assert (folder / image["files"]["depth"]).read_bytes().startswith(b"\x89PNG")
+    return file_of(folder / "train" / image["file_name"])
+
+
+def in_yolo(folder: Path) -> Found:
+    """The image of the only label."""
+    (path,) = (folder / "detect/images/train").iterdir()
+    return file_of(path)
+
+
+def in_voc(folder: Path) -> Found:
+    """By the name in the annotation."""
+    root = folder / "VOCdevkit/VOC2012"
+    (path,) = (root / "Annotations").iterdir()
+    return file_of(root / "JPEGImages" / str(ElementTree.parse(path).findtext("filename")))
+
+
+READERS: dict[str, tuple[Callable[[Path], Found], dict[str, Any]]] = {
+    "bop": (in_bop, {}),
+    "coco": (in_coco, {}),
+    "coco_panoptic": (in_panoptic, {}),
+    "control_clips": (in_clips, {}),
+    "cvat": (in_cvat, {}),
+    "huggingface": (in_parquet, {}),
+    "label_studio": (in_label_studio, {}),
+    "mcap": (in_mcap, {}),
+    "rerun": (in_recording, {}),
+    "solo": (in_solo, {}),
+    "tfrecord": (in_records, {}),
+    "voc": (in_voc, {"images": "png"}),
+    "webdataset": (in_tar, {}),
+    "yolo": (in_yolo, {"tasks": ("detect",)}),
+}
+STATED = {
+    "mcap": {"jpeg": "jpeg", "webp": "webp"},
+    "rerun": {"jpeg": "image/jpeg"},
+    "solo": {"jpeg": "Jpg"},
+    "tfrecord": {"jpeg": "jpeg"},
+}
+"""What a data set states, by format; others state the ending of the file."""
+
+
+@pytest.mark.parametrize("encoding", [JPEG, WEBP, LOSSLESS], ids=lambda e: e.format)
+@pytest.mark.parametrize("kind", READERS)
+def test_readers_find_the_photographs(
+    kind: str, encoding: ImageEncoding, world: Any, tmp_path: Path
+) -> None:
+    """The first one, in the stated format; its pixels are those of the first sample."""
+    find, options = READERS[kind]
+    exporter = TABLE.load(kind)(**options)
+    info = encoded(world.info(1, lidars=("top",)), encoding)
+    written = encoding.format.removesuffix("_lossless")
+    if encoding.format not in exporter.image_formats:
+        with pytest.raises(ConfigError, match=f"'color' writes {encoding.format} files"):
+            check_image_formats(exporter, info)
+        return
+    check_image_formats(exporter, info)
+    data, found = find(world.export(exporter, info, world.with_bodies(world.samples[:1]), tmp_path))
+    assert found == STATED.get(kind, {}).get(written, encoding.suffix)
+    image = Image.open(io.BytesIO(data))
+    assert image.format == written.upper()
+    assert is_near(image, world.samples[0].capture.readings["color"].channels[Channel.RGB])
+    shard = tmp_path / f"shards/000000/color/rgb/000000000{encoding.suffix}"
+    assert shard.read_bytes() == data
+
+
+def is_near(image: Any, expected: Any) -> bool:
+    """Whether an image is the rendered one but for the loss of its encoding."""
+    return bool(np.abs(np.asarray(image, int) - expected).mean() < ERROR_MAX)
+
+
+def test_hdf5_has_the_pixels(tmp_path: Path, info: Any, world: Any) -> None:
+    """It decodes photographs."""
+    boxes = world.export(Hdf5(), info, world.samples, tmp_path)
+    with h5py.File(next(boxes.rglob("000000000_*.hdf5"))) as file:
+        made = world.samples[0].capture.readings["color"].channels[Channel.RGB]
+        assert is_near(file["colors"], made)
+
+
+def test_formats_without_photographs_take_every_camera(world: Any) -> None:
+    """They neither link nor embed its files."""
+    info = encoded(world.info(7), WEBP)
+    for kind in ("birdseye", "pointclouds", "semantickitti", "tables", "usd"):
+        check_image_formats(TABLE.load(kind)(), info)
+
+
+def test_croissant_states_the_type(world: Any, tmp_path: Path) -> None:
+    """Rows are joined with JPEG files; cameras with different files are refused."""
+    info = encoded(world.info(7), JPEG)
+    folder = world.export(Croissant(), info, world.samples, tmp_path)
+    document = json.loads((folder / "croissant.json").read_text())
+    (photographs,) = (d for d in document["distribution"] if d["@id"] == "image-files")
+    assert photographs["encodingFormat"] == "image/jpeg"
+    assert len(list(folder.glob(photographs["includes"]))) == 7
+    pair = world.info(7, ("left", "right"))
+    first, *others = pair.sensors
+    mixed = replace(pair, sensors=(replace(first, rgb_encoding=JPEG), *others))
+    with pytest.raises(ConfigError, match=r"write \.jpg and \.png files; expected one format"):
+        Croissant().check(mixed)
+
+
+@pytest.mark.slow
+def test_mlcroissant_reads_jpeg(world: Any, tmp_path: Path) -> None:
+    """The pixels of the first row."""
+    folder = world.export(Croissant(), encoded(world.info(7), JPEG), world.samples, tmp_path)
+    logging.disable()
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            import mlcroissant
+
+            loaded = mlcroissant.Dataset(jsonld=str(folder / "croissant.json"))
+            rows = {row["images/sample"]: row for row in loaded.records("images")}
+    finally:
+        logging.disable(logging.NOTSET)
+    expected = world.samples[0].capture.readings["color"].channels[Channel.RGB]
+    assert len(rows) == 7
+    assert is_near(rows[0]["images/content"], expected)
+
+
+def test_tables_of_sequences_name_jpeg_files(world: Any, samples: Any, tmp_path: Path) -> None:
+    """Rows of images in nuScenes, and the ending in MOTChallenge's description of a sequence."""
+    info = encoded(drive_info(world), JPEG)
+    tables = world.export(NuScenes(), info, samples, tmp_path / "nuscenes")
+    rows = json.loads((tables / "v1.0-mini/sample_data.json").read_text())
+    images = [row for row in rows if row["fileformat"] == "jpg"]
+    assert len(images) == 16
+    assert all((tables / row["filename"]).read_bytes()[:2] == b"\xff\xd8" for row in images)
+    assert {row["fileformat"] for row in rows} == {"jpg", "pcd"}
+    tracks = world.export(MotChallenge(), info, samples, tmp_path / "mot")
+    folder = tracks / "street-val/street-0001"
+    facts = configparser.ConfigParser()
+    facts.read(folder / "seqinfo.ini")
+    images = folder / facts["Sequence"]["imDir"] / f"000001{facts['Sequence']['imExt']}"
+    assert images.read_bytes()[:2] == b"\xff\xd8"

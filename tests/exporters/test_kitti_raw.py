@@ -178,12 +178,6 @@ def test_cameras_that_look_elsewhere_cannot_be_a_rectified_pair(
         )
 
 
-def test_raw_data_needs_a_scanner(world: Any) -> None:
-    """KITTI's readers do."""
-    with pytest.raises(ConfigError, match="no lidar; add a sensor"):
-        KittiRaw().check(world.info(8, ("left",), steps_per_scene=4))
-
-
 @pytest.mark.parametrize("date", ["2011-09-26", "2011_13_01", "2011_9_26", "today"])
 def test_a_date_is_a_day(date: str) -> None:
     """Year, month and day with underscores."""

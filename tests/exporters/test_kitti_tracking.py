@@ -21,6 +21,7 @@ def test_tracking_labels_have_seventeen_columns_and_lasting_ids(exported: Any) -
         ("1", "Car"), ("2", "Pedestrian"), ("4", "Misc")
     }  # fmt: skip
     assert {row[3] for row in rows} <= {"0", "1", "2"}
+    assert {tuple(map(float, row[10:13])) for row in rows if row[1] == "1"} == {(1.5, 1.8, 4.0)}
 
 
 def test_tracking_lists_sequences_by_split(exported: Any) -> None:

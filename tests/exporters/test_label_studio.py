@@ -1,28 +1,20 @@
-"""Label Studio export, held against ``coco`` and Label Studio's own SDK."""
+"""Label Studio export, held against the samples and Label Studio's own SDK."""
 
 from __future__ import annotations
 
 import json
-import re
-import shutil
-import xml.etree.ElementTree as ET
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
-from urllib.parse import unquote
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
-from numpy.typing import NDArray
-from pycocotools import mask as coco_mask
 
 from gen_data.core.sample import MaskPx
-from gen_data.exporters.coco import Coco
-from gen_data.exporters.label_studio import LOCAL_FILES, LabelStudio, brush_rle
-from tests.exporters.coco_masks import drawn_mask
+from gen_data.exporters.label_studio import LabelStudio, brush_rle
+from tests.exporters.label_readers import unpack
 
 # pycocotools' decoder predates numpy 2's __array__(copy=...).
 pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
@@ -32,164 +24,35 @@ SHAPES = ("mask", "polygon", "box")
 
 @pytest.fixture(scope="module")
 def dataset(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The seven frames with each shape, and their COCO export."""
+    """The seven frames with each shape."""
     folder = tmp_path_factory.mktemp("label_studio")
     for shapes in SHAPES:
         world.export(LabelStudio(shapes=shapes), world.info(7), world.samples, folder / shapes)
-    world.export(Coco(), world.info(7), world.samples, folder / "coco")
     return folder
 
 
-def unpack(rle: list[int]) -> NDArray[np.uint8]:
-    """Values of rle-pack: 32 bits of their number, 5 of their size, four sizes of run lengths."""
-    bits = "".join(f"{byte:08b}" for byte in rle)
-    place = 0
-
-    def read(count: int) -> int:
-        nonlocal place
-        place += count
-        return int(bits[place - count : place], 2)
-
-    number, word, sizes = read(32), read(5) + 1, [read(4) + 1 for _ in range(4)]
-    parts: list[NDArray[np.uint8]] = []
-    while sum(map(len, parts)) < number:
-        is_run = read(1)
-        length = read(sizes[read(2)]) + 1
-        values = [read(word)] * length if is_run else [read(word) for _ in range(length)]
-        parts.append(np.array(values, np.uint8))
-    return np.concatenate(parts)
-
-
-def drawn(regions: list[dict[str, Any]]) -> NDArray[np.bool_]:
-    """Mask of the shapes of one object."""
-    width, height = regions[0]["original_width"], regions[0]["original_height"]
-    mask = np.zeros((height, width), bool)
-    for region in regions:
-        value = region["value"]
-        if region["type"] == "brushlabels":
-            mask |= unpack(value["rle"]).reshape(height, width, 4)[..., 3] == 255
-        elif region["type"] == "polygonlabels":
-            points = np.array(value["points"]) * (width / 100, height / 100)
-            encoded = coco_mask.frPyObjects([points.ravel().tolist()], height, width)
-            mask |= coco_mask.decode(encoded[0]).astype(bool)
-        else:
-            x, w = (round(value[name] * width / 100) for name in ("x", "width"))
-            y, h = (round(value[name] * height / 100) for name in ("y", "height"))
-            mask[y : y + h, x : x + w] = True
-    return mask
-
-
-def problems(root: Path, dataset: Path, shapes: str) -> list[str]:
-    """Differences from COCO's train split."""
-    found = []
-    folder = dataset / "coco/dataset/annotations"
-    coco = json.loads((folder / "instances_train.json").read_text())
-    points = {
-        row["id"]: row["keypoints"]
-        for path in folder.glob("*_keypoints_train.json")
-        for row in json.loads(path.read_text())["annotations"]
-    }
-    names = {c["id"]: c["name"] for c in coco["categories"]}
-    controls = list(ET.parse(root / "label_config.xml").getroot())
-    listed = {c.get("name"): [label.get("value") for label in c] for c in controls}
-    if list(listed.values())[1] != list(names.values()):
-        found.append("labels")
-    tasks = json.loads((root / "train/tasks.json").read_text())
-    files = [unquote(t["data"]["image"]).removeprefix(f"{LOCAL_FILES}label_studio/") for t in tasks]
-    if files != sorted(str(p.relative_to(root)) for p in (root / "train/images").iterdir()):
-        found.append("files")
-    if [task["id"] for task in tasks] != [image["id"] for image in coco["images"]]:
-        found.append("ids")
-    for task, image in zip(tasks, coco["images"], strict=True):
-        expected = [a for a in coco["annotations"] if a["image_id"] == image["id"]]
-        objects: dict[str, list[dict[str, Any]]] = {}
-        for region in task["annotations"][0]["result"]:
-            objects.setdefault(region.get("parentID", region["id"]), []).append(region)
-            if not set(region["value"][region["type"]]) <= set(listed[region["from_name"]]):
-                found.append("class")
-        if list(objects) != [str(a["instance_id"]) for a in expected]:
-            found.append("objects")
-            continue
-        for row, regions in zip(expected, objects.values(), strict=True):
-            row["keypoints"] = points.get(row["id"], [])
-            found += _object_problems(row, regions, names[row["category_id"]], shapes, coco)
-    return found
-
-
-def _object_problems(
-    row: dict[str, Any], regions: list[dict[str, Any]], name: str, shapes: str, coco: dict[str, Any]
-) -> list[str]:
-    found = []
-    outlines = [r for r in regions if r["type"] != "keypointlabels"]
-    if {label for r in outlines for label in r["value"][r["type"]]} != {name}:
-        found.append("class")
-    if len(outlines) != 1:
-        found.append("parts")
-    mask = drawn_mask(row, coco)
-    if shapes == "box":
-        x, y, w, h = map(int, row["bbox"])
-        mask[y : y + h, x : x + w] = True
-    if not np.array_equal(drawn(outlines), mask):
-        found.append("shape")
-    points = [r for r in regions if r["type"] == "keypointlabels"]
-    seen = [point for point in zip(*[iter(row["keypoints"])] * 3, strict=True) if point[2]]
-    if len(points) != len(seen):
-        found.append("keypoints")
-    for region, (x_px, y_px, _) in zip(points, seen, strict=False):
-        place = (region["value"]["x"] * region["original_width"] / 100,
-                 region["value"]["y"] * region["original_height"] / 100)  # fmt: skip
-        if not np.allclose(place, (x_px, y_px), atol=0.01):
-            found.append("keypoints")
-    return found
-
-
-@pytest.mark.parametrize("shapes", SHAPES)
-def test_shapes_and_labels_are_those_of_coco(dataset: Path, shapes: str) -> None:
-    """Every pixel, also of objects in several parts."""
-    assert problems(dataset / shapes / "dataset", dataset, shapes) == []
-
-
-def _change(pattern: str, new: Any, name: str = "train/tasks.json") -> Callable[[Path], None]:
-    def damage(root: Path) -> None:
-        text = (root / name).read_text()
-        changed = re.sub(pattern, new, text)
-        assert changed != text
-        (root / name).write_text(changed)
-
-    return damage
-
-
-def _empty_masks(path: Path) -> None:
-    tasks = json.loads(path.read_text())
-    for region in (r for task in tasks for r in task["annotations"][0]["result"]):
-        if region["type"] == "brushlabels":
-            size = region["original_height"], region["original_width"]
-            region["value"]["rle"] = brush_rle(MaskPx(0, 0, np.zeros((1, 1), bool)), *size)
-    path.write_text(json.dumps(tasks))
-
-
-@pytest.mark.damage("label_studio")
-@pytest.mark.parametrize(
-    ("shapes", "damage", "named"),
-    [
-        ("box", _change(r'"width":(\d+)\.', lambda m: f'"width":{int(m[1]) + 3}.'), "shape"),
-        ("polygon", _change(r'"points":\[\[[\d.]+', '"points":[[0.0'), "shape"),
-        ("mask", lambda root: _empty_masks(root / "train/tasks.json"), "shape"),
-        ("mask", _change(r'"brushlabels":\["car"\]', '"brushlabels":["crate"]'), "class"),
-        ("mask", _change('"id":"4"', '"id":"5"'), "objects"),
-        ("box", _change('<Label value="car"', '<Label value="cat"', "label_config.xml"), "class"),
-        ("mask", lambda root: next((root / "train/images").iterdir()).unlink(), "files"),
-    ],
-)
-def test_damage_is_found(
-    dataset: Path, tmp_path: Path, shapes: str, damage: Callable[[Path], None], named: str
-) -> None:
-    """The check above is able to fail."""
-    copy = tmp_path / "copy"
-    shutil.copytree(dataset / shapes / "dataset", copy)
-    damage(copy)
-
-    assert named in problems(copy, dataset, shapes)
+def test_keypoints_are_regions_of_their_object(world: Any, dataset: Path) -> None:
+    """Points that are labelled, as shares of the image; tasks have the ids of images."""
+    tasks = json.loads((dataset / "box/dataset/train/tasks.json").read_text())
+    samples = [sample for sample in world.samples if sample.split == "train"]
+    assert [task["id"] for task in tasks] == [sample.image_id("color") for sample in samples]
+    for task, sample in zip(tasks, samples, strict=True):
+        regions = task["annotations"][0]["result"]
+        found = [
+            (r["parentID"], r["value"]["x"] * 1.6, r["value"]["y"] * 1.2)
+            for r in regions
+            if r["type"] == "keypointlabels"
+        ]
+        expected = [
+            (str(thing.instance.instance_id), *point.image_px)
+            for thing in sample.truth["color"].objects
+            for point in thing.keypoints or ()
+            if point.visibility
+        ]
+        assert [number for number, *_ in found] == [number for number, *_ in expected]
+        np.testing.assert_allclose(
+            [place for _, *place in found], [place for _, *place in expected], atol=0.01
+        )
 
 
 @given(

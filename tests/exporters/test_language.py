@@ -7,15 +7,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
-from pycocotools import mask as coco_mask
 
 from gen_data.core.sample import Relation, Sample
 from gen_data.exporters.coco import Coco
 from gen_data.exporters.label_map import AppliedLabelMap, LabelMap
 from gen_data.exporters.language import LanguageJsonl
-from tests.exporters.test_birdseye import lines
+from tests.exporters.label_readers import json_lines
 
 # pycocotools' decoder predates numpy 2's __array__(copy=...).
 pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
@@ -36,37 +34,27 @@ def test_lines_refer_to_objects_of_their_image(
 ) -> None:
     """Ids are unique, and every file is there."""
     folder = world.export(LanguageJsonl(), world.info(7), samples, tmp_path)
-    rows = lines(folder / "train.jsonl")
-    images = {image["image_id"]: image for image in lines(folder / "train_images.jsonl")}
+    rows = json_lines(folder / "train.jsonl")
+    images = {image["image_id"]: image for image in json_lines(folder / "train_images.jsonl")}
 
     assert len({row["id"] for row in rows}) == len(rows)
     assert {row["kind"] for row in rows} >= {"scene_caption", "caption", "counting", "existence"}
     for row in rows:
         image = images[row["image_id"]]
         known = {thing["object_id"] for thing in image["objects"]}
+        (sample,) = (s for s in samples if s.image_id("color") == image["image_id"])
+        for thing in image["objects"]:
+            assert thing["annotation_id"] == sample.annotation_id("color", thing["object_id"])
         assert set(row["object_ids"]) <= known
         assert row["file_name"] == image["file_name"]
         assert (folder / row["file_name"]).exists()
-
-
-@pytest.mark.slow
-def test_hugging_face_reads_the_lines(world: Any, samples: list[Sample], tmp_path: Path) -> None:
-    """As a table with a row per line, whose columns have one type each."""
-    datasets = pytest.importorskip("datasets")
-    folder = world.export(LanguageJsonl(), world.info(7), samples, tmp_path)
-    path = folder / "train.jsonl"
-    table = datasets.load_dataset(
-        "json", data_files=str(path), split="train", cache_dir=str(tmp_path / "cache")
-    )
-
-    assert list(table) == lines(path)
 
 
 def assert_said(folder: Path, samples: list[Sample]) -> None:
     """The lines are the utterances of the annotation in order, after a caption of each scene."""
     train = [s for s in samples if s.split == "train"]
     said = [u for s in train for u in s.truth["color"].utterances or ()]
-    rows = [row for row in lines(folder / "train.jsonl") if row["kind"] != "scene_caption"]
+    rows = [row for row in json_lines(folder / "train.jsonl") if row["kind"] != "scene_caption"]
 
     assert [(r["kind"], r["text"], r["answer"], tuple(r["object_ids"])) for r in rows] == [
         (u.kind, u.text, u.answer, u.instances) for u in said
@@ -81,41 +69,13 @@ def test_every_utterance_of_the_annotation_is_written_in_order(
     assert_said(world.export(LanguageJsonl(), world.info(7), samples, tmp_path), samples)
 
 
-@pytest.mark.damage("language")
-@pytest.mark.parametrize("damage", [{"answer": "many"}, {"object_ids": [999]}, {"text": "What?"}])
-def test_damage_is_noticed(
-    world: Any, samples: list[Sample], tmp_path: Path, damage: dict[str, Any]
-) -> None:
-    """The comparison fails for a line that is slightly wrong."""
-    folder = world.export(LanguageJsonl(), world.info(7), samples, tmp_path)
-    rows = lines(folder / "train.jsonl")
-    rows[-1].update(damage)
-    (folder / "train.jsonl").write_text("".join(f"{json.dumps(row)}\n" for row in rows), "utf-8")
-
-    with pytest.raises(AssertionError):
-        assert_said(folder, samples)
-
-
-def test_masks_and_ids_are_those_of_coco(world: Any, samples: list[Sample], tmp_path: Path) -> None:
-    """Decoded by pycocotools, every mask is the object's visible pixels."""
-    folder = world.export(LanguageJsonl(), world.info(7), samples, tmp_path / "language")
-    first = lines(folder / "train_images.jsonl")[0]
-    ids = samples[0].capture.readings["color"].channels
-    (instance_image,) = (image for channel, image in ids.items() if channel.value == "instance")
-
-    for thing in first["objects"]:
-        mask = coco_mask.decode(thing["segmentation"]).astype(bool)
-        assert (mask == (np.asarray(instance_image) == thing["object_id"])).all()
-        assert thing["annotation_id"] == samples[0].annotation_id("color", thing["object_id"])
-
-
 def test_relations_have_both_directions_here_and_in_coco(
     world: Any, samples: list[Sample], tmp_path: Path
 ) -> None:
     """Left has right as its inverse, and near itself."""
     folder = world.export(LanguageJsonl(), world.info(7), samples, tmp_path / "language")
     coco = world.export(Coco(), world.info(7), samples, tmp_path / "coco")
-    first = lines(folder / "train_images.jsonl")[0]
+    first = json_lines(folder / "train_images.jsonl")[0]
     image = next(
         i
         for i in json.loads((coco / "annotations/instances_train.json").read_text("utf-8"))[
@@ -130,7 +90,7 @@ def test_relations_have_both_directions_here_and_in_coco(
         expected
     )
     assert {tuple(triple) for triple in image["relationships"]} == expected
-    assert "relationships" not in lines(folder / "train_images.jsonl")[1]
+    assert "relationships" not in json_lines(folder / "train_images.jsonl")[1]
 
 
 def test_label_maps_drop_relations_and_text_about_dropped_objects(

@@ -5,10 +5,8 @@ from __future__ import annotations
 import io
 import json
 import os
-import shutil
 import subprocess
 import sys
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -19,8 +17,6 @@ import pyarrow.parquet
 import pytest
 from PIL import Image
 
-from gen_data.assemble.config import load_config
-from gen_data.assemble.pipeline_factory import PipelineFactory
 from gen_data.core.errors import ConfigError
 from gen_data.core.scene import ArmGoal
 from gen_data.exporters import lerobot_files
@@ -275,73 +271,6 @@ def test_images_of_statistics_are_thinned_as_lerobot_does(tmp_path: Path) -> Non
     assert sums["squares"] == [100 * n, 400 * n, 900 * n]
 
 
-def change_json(path: Path, change: Callable[[Any], Any]) -> None:
-    rows = lines(path)
-    for row in rows:
-        change(row)
-    path.write_text("".join(json.dumps(row) + "\n" for row in rows))
-
-
-def change_rows(path: Path, change: Callable[[list[dict[str, Any]]], Any]) -> None:
-    table = pyarrow.parquet.read_table(path)
-    rows = table.to_pylist()
-    change(rows)
-    pyarrow.parquet.write_table(pyarrow.Table.from_pylist(rows, table.schema), path)
-
-
-def change_frames(folder: Path, change: Callable[[list[dict[str, Any]]], Any]) -> None:
-    (path,) = (folder / "data").rglob("*.parquet")
-    change_rows(path, change)
-
-
-def change_episode(folder: Path, old: str, new: str, change: Callable[[Any], Any]) -> None:
-    """Change the one episode: a line of v2.1, or a row of v3.0."""
-    table = folder / new
-    if table.exists():
-        change_rows(table, lambda rows: change(rows[0]))
-    else:
-        change_json(folder / old, change)
-
-
-def forget_mean(row: dict[str, Any]) -> None:
-    if "stats" in row:
-        row["stats"]["action"]["mean"] = [0.0, 0.0]
-    else:
-        row["stats/action/mean"] = [0.0, 0.0]
-
-
-EPISODES = "meta/episodes/chunk-000/file-000.parquet"
-
-
-@pytest.mark.damage("lerobot")
-@pytest.mark.parametrize(
-    "damage",
-    [
-        lambda d: change_frames(d, lambda rows: rows.pop()),
-        lambda d: change_frames(
-            d, lambda rows: [r.update(action=r["observation.state"]) for r in rows]
-        ),
-        lambda d: change_frames(
-            d, lambda rows: [r.update(timestamp=2 * r["timestamp"]) for r in rows]
-        ),
-        lambda d: change_episode(
-            d, "meta/episodes.jsonl", EPISODES, lambda row: row.update(length=5)
-        ),
-        lambda d: change_episode(d, "meta/episodes_stats.jsonl", EPISODES, forget_mean),
-    ],
-    ids=["row missing", "action is state", "timestamps", "length", "statistics"],
-)
-def test_damage_is_found(
-    damage: Callable[[Path], Any], dataset: Path, reach: Any, tmp_path: Path
-) -> None:
-    """The same reader finds faults in damaged copies."""
-    copy = tmp_path / "copy"
-    shutil.copytree(dataset / "train/toys_arm", copy)
-    damage(copy)
-
-    assert faults(copy, reach[:4])
-
-
 def test_tasks_are_sentences(reach: Any) -> None:
     """Of the arm's goals and the one object that moves."""
     scene = reach[0].scene
@@ -354,20 +283,10 @@ def test_tasks_are_sentences(reach: Any) -> None:
     assert task_sentence(scene, replace(arm, task=())) == "Stay in place."
 
 
-def test_a_configuration_without_arm_is_refused_before_rendering() -> None:
-    """The nominal scene decides, so that no shard is lost."""
-    config = load_config("kitti_stereo.yaml", overrides=['exporters=[{"type": "lerobot"}]'])
-
+def test_data_sets_without_arms_are_refused(world: Any, samples: Any, tmp_path: Path) -> None:
+    """By the nominal scene, before anything is rendered; with the field to set."""
     with pytest.raises(ConfigError, match="exporter 'lerobot': the scene has no arm; add an elem"):
-        PipelineFactory(config, n=20).check()
-
-
-def test_data_sets_without_sequences_or_arms_are_refused(
-    world: Any, samples: Any, tmp_path: Path
-) -> None:
-    """With the field to set."""
-    with pytest.raises(ConfigError, match="steps_per_scene is 1; set steps_per_scene"):
-        LeRobot().check(world.info(7))
+        LeRobot().check_scene(samples[0].scene)
     with pytest.raises(ConfigError, match="the scene has no arm; add an element of type robot"):
         world.export(LeRobot(), drive_info(world), samples, tmp_path / "a")
     with pytest.raises(ConfigError, match="has no arm 'leg'; expected one of: arm"):

@@ -41,7 +41,11 @@ def area(polygon: NDArray[np.int64]) -> float:
 @settings(deadline=None)
 @given(masks)
 def test_polygons_cover_exactly_the_pixels(pixels: NDArray[np.bool_]) -> None:
-    """With any number of parts, holes, islands in holes, and pixels that touch at corners."""
+    """With any number of parts, holes, islands in holes, and pixels that touch at corners.
+
+    Every edge runs along edges of pixels; lines that join polygons have no area; drawable ones lie
+    inside the edges, also at borders of the image.
+    """
     polygons = mask_polygons(MaskPx(3, 5, pixels))
 
     picture = np.zeros((5 + pixels.shape[0] + 2, 3 + pixels.shape[1] + 4), bool)
@@ -49,26 +53,12 @@ def test_polygons_cover_exactly_the_pixels(pixels: NDArray[np.bool_]) -> None:
     np.testing.assert_array_equal(drawn(polygons, *picture.shape), picture)
     assert sum(map(area, polygons)) == pixels.sum()
     assert all(area(polygon) > 0 for polygon in polygons)
-
-
-@settings(deadline=None)
-@given(masks)
-def test_edges_run_along_the_edges_of_pixels(pixels: NDArray[np.bool_]) -> None:
-    """Every edge is horizontal or vertical and has a length."""
-    for polygon in mask_polygons(MaskPx(0, 0, pixels)):
+    for polygon in polygons:
         edges = np.roll(polygon, -1, axis=0) - polygon
         assert ((edges != 0).sum(axis=1) == 1).all()
-
-
-@settings(deadline=None)
-@given(masks.filter(lambda pixels: bool(pixels.any())))
-def test_a_joined_polygon_covers_the_same_pixels(pixels: NDArray[np.bool_]) -> None:
-    """The connecting lines have no area."""
-    polygons = mask_polygons(MaskPx(0, 0, pixels))
-
-    joined = join_polygons(polygons)
-
-    assert area(joined) == pixels.sum()
+    assert not polygons or area(join_polygons(polygons)) == pixels.sum()
+    inside = drawable_polygons(MaskPx(0, 0, pixels))
+    np.testing.assert_array_equal(drawn(inside, *pixels.shape), pixels)
 
 
 def drawn_by_opencv(polygons: list[NDArray[np.float64]], h: int, w: int) -> NDArray[np.bool_]:
@@ -85,15 +75,6 @@ def drawn_by_pillow(polygons: list[NDArray[np.float64]], h: int, w: int) -> NDAr
     for polygon in polygons:
         ImageDraw.Draw(picture).polygon(polygon.astype(int).ravel().tolist(), fill=1)
     return np.array(picture, bool)
-
-
-@settings(deadline=None)
-@given(masks)
-def test_pycocotools_draws_exactly_the_mask_of_drawable_polygons(pixels: NDArray[np.bool_]) -> None:
-    """Also at borders of the image, with holes, and where pixels touch at corners."""
-    polygons = drawable_polygons(MaskPx(0, 0, pixels))
-
-    np.testing.assert_array_equal(drawn(polygons, *pixels.shape), pixels)
 
 
 @pytest.mark.parametrize("draw", [drawn_by_opencv, drawn_by_pillow])

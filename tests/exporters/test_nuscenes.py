@@ -14,7 +14,6 @@ import pytest
 
 from gen_data.core.asset_types import SURFACES
 from gen_data.core.capture import POINT
-from gen_data.core.errors import ConfigError
 from gen_data.core.measurement_dtypes import table_rows
 from gen_data.core.motion import Trajectory, Twist
 from gen_data.core.scene import Body, Lane, ObjectGroup, Scene
@@ -400,23 +399,6 @@ def test_attributes_tell_how_objects_stand(world: Any) -> None:
     assert attribute(ridden, rider="no") == "cycle.without_rider"
     child = replace(person, subcategory="child")
     assert category_of(child) == "human.pedestrian.child"
-
-
-def test_a_data_set_without_things_of_traffic_is_refused(world: Any) -> None:
-    """The devkit's evaluations refuse tables without a box of their classes."""
-    info = replace(world.info(8, ("left",), ("top",)), categories=("bench", "mug"))
-    with pytest.raises(ConfigError, match=r"no category of the data set has a class .* car, van"):
-        NuScenes().check(info)
-
-
-def test_a_data_set_without_a_scanner_is_refused(world: Any) -> None:
-    """The message shows the sensor to add; two sensors cannot share a channel."""
-    with pytest.raises(ConfigError, match=r"there is no lidar; add .*LIDAR_TOP"):
-        NuScenes().check(world.info(8, ("left",)))
-    with pytest.raises(ConfigError, match="'CAM_LEFT' and 'left' both become CAM_LEFT"):
-        NuScenes().check(world.info(8, ("CAM_LEFT", "left"), ("top",)))
-    with pytest.raises(ConfigError, match="lens of the model"):
-        NuScenes().check(world.info(8, ("left",), ("top",), lenses={"left": "kannala_brandt"}))
 
 
 def test_a_scan_without_returns_is_a_key_frame(world: Any, samples: Any, tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ from gen_data.core.se3 import SE3
 from gen_data.exporters.mcap import Mcap
 from gen_data.exporters.pointclouds import PointClouds
 from tests.exporters.conftest import driving_scene, ego_pose, scan
-from tests.exporters.drives import drive_info
+from tests.exporters.drives import drive_info, read_ply
 
 SWEEP_S, STAMP_S = 0.1, 0.2
 MOUNT = SE3((0.0, 0.0, 1.73))
@@ -121,11 +121,3 @@ def test_times_may_count_from_the_start_of_the_sweep(
     assert (row["time_s"], row["point_time"]) == (STAMP_S, "sweep_start")
     assert times.min() == 0.0
     assert times.max() == np.float32(SWEEP_S)
-
-
-def read_ply(path: Path) -> Any:
-    """Records of a binary PLY file, by its header."""
-    header, body = path.read_bytes().split(b"end_header\n", 1)
-    words = [line.split() for line in header.decode("ascii").splitlines()]
-    types = {"float": "<f4", "uint16": "<u2", "uint8": "u1"}
-    return np.frombuffer(body, [(w[2], types[w[1]]) for w in words if w[0] == "property"])

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -220,37 +218,3 @@ def test_an_unknown_container_is_refused(tmp_path: Path, monkeypatch: pytest.Mon
     monkeypatch.setattr(rerun.chunk.ChunkStore, "write_rrd", other)
     with pytest.raises(StorageError, match=r"unknown structure; expected those of rerun-sdk 0\.41"):
         write_recording(tmp_path / "a.rrd", [a_chunk()], "name")
-
-
-def with_shift(sample: Any, shift_m: float) -> Any:
-    truth = sample.truth["color"]
-    x, y, z = truth.camera.T_world_camera.translation_m
-    pose = replace(truth.camera.T_world_camera, translation_m=(x + shift_m, y, z))
-    moved = replace(truth, camera=replace(truth.camera, T_world_camera=pose))
-    return replace(sample, truth={**sample.truth, "color": moved})
-
-
-def without_objects(sample: Any) -> Any:
-    truth = replace(sample.truth["color"], objects=sample.truth["color"].objects[:-1])
-    return replace(sample, truth={**sample.truth, "color": truth})
-
-
-@pytest.mark.damage("rerun")
-@pytest.mark.parametrize(
-    ("change", "named"),
-    [
-        (lambda sample: with_shift(sample, 0.5), "position"),
-        (lambda sample: replace(sample, index=sample.index + 1), "boxes"),
-        (without_objects, "classes"),
-    ],
-    ids=["pose", "index", "objects"],
-)
-def test_differences_are_found(
-    change: Callable[[Any], Any], named: str, dataset: Path, world: Any
-) -> None:
-    """The check above is able to fail: samples that differ from the recordings."""
-    other = type("Other", (), {"samples": [change(sample) for sample in world.samples[:2]]})
-
-    found = problems(dataset, dataset.parent / "shards", other)
-
-    assert any(text.startswith(named) for text in found)

@@ -13,11 +13,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from gen_data.core.capture import Channel
-from gen_data.core.errors import ConfigError
 from gen_data.core.sample import Sample
 from gen_data.exporters.scannet import ScanNet
 from gen_data.exporters.tum_rgbd import TumRgbd
-from tests.exporters.drives import drive_info
 
 NYU40 = {"pedestrian": 31, "crate": 29, "car": 0}
 """Numbers of person and box in NYU's list; it has no cars."""
@@ -122,19 +120,6 @@ def test_tum_accelerometer_has_the_readings_of_the_imu(world: Any, tmp_path: Pat
         assert np.allclose(rows[:, 3], 9.80665, atol=1e-6)
 
 
-@pytest.mark.slow
-def test_evo_reads_the_trajectory(tum: Path, samples: Sequence[Sample]) -> None:
-    """And finds the poses of the camera, in the axes of images."""
-    file_interface = pytest.importorskip("evo.tools.file_interface")
-    for number, split in enumerate(("train", "val")):
-        path = tum / split / f"{number:06d}/groundtruth.txt"
-        trajectory = file_interface.read_tum_trajectory_file(str(path))
-        assert trajectory.check()[0]
-        for pose, sample in zip(trajectory.poses_se3, sequence(samples, number), strict=True):
-            exact = sample.truth["left"].camera.T_world_camera.matrix()
-            assert np.abs(pose - exact).max() < 1e-7
-
-
 def scan_folder(scannet: Path, number: int) -> Path:
     """Folder of a sequence: every scene has one view."""
     return scannet / f"scans/scene{number:04d}_00"
@@ -188,18 +173,3 @@ def test_scannet_scans_are_listed_by_split(scannet: Path, samples: Sequence[Samp
             assert read is not None
             rgb = sample.capture.readings["left"].channels[Channel.RGB]
             assert np.abs(read[..., ::-1].astype(float) - rgb).mean() < 6.0
-
-
-@pytest.mark.parametrize("exporter", [TumRgbd(), ScanNet()])
-def test_a_camera_without_depth_is_refused(world: Any, exporter: Any) -> None:
-    """The text names the channel."""
-    info = world.info(7, media={"color": (Channel.RGB, Channel.INSTANCE)})
-
-    with pytest.raises(ConfigError, match="camera 'color' does not write the channel depth"):
-        exporter.check(info)
-
-
-def test_an_unknown_imu_is_refused(world: Any) -> None:
-    """The text lists those that exist."""
-    with pytest.raises(ConfigError, match="no IMU 'imo'; expected one of: imu"):
-        TumRgbd(imu="imo").check(drive_info(world))

@@ -47,14 +47,9 @@ def test_rle_of_a_crop_is_what_pycocotools_makes_of_the_whole_mask(
 
 
 def test_runs_begin_with_zeros_and_go_down_columns() -> None:
-    """One pixel at row 1, column 2 of a 3 x 4 image comes after two columns and one row."""
-    mask = MaskPx(2, 1, np.ones((1, 1), dtype=bool))
-
-    assert run_lengths(mask, 3, 4) == [7, 1, 4]
-
-
-def test_runs_of_a_full_image_are_no_zeros_and_all_ones() -> None:
-    """The first run is of zeros, even where there are none; a last run of none is left out."""
+    """Also where there are none; a last run of no zeros is left out."""
+    one = MaskPx(2, 1, np.ones((1, 1), dtype=bool))
+    assert run_lengths(one, 3, 4) == [7, 1, 4]  # two columns and a row before it
     assert run_lengths(MaskPx(0, 0, np.ones((3, 4), dtype=bool)), 3, 4) == [0, 12]
 
 

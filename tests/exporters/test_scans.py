@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 import math
 from dataclasses import replace
@@ -14,7 +13,7 @@ import pytest
 
 from gen_data.core.asset_types import SURFACES
 from gen_data.core.capture import POINT
-from gen_data.core.errors import ConfigError, StorageError
+from gen_data.core.errors import StorageError
 from gen_data.core.motion import Twist
 from gen_data.exporters.kitti import (
     Kitti,
@@ -29,6 +28,7 @@ from gen_data.exporters.point_cloud_io import read_points
 from gen_data.exporters.pointclouds import PointClouds
 from gen_data.exporters.semantickitti import SemanticKitti
 from gen_data.exporters.semantickitti import point_labels as semantic_labels
+from tests.exporters.drives import calibration, read_ply
 from tests.wheels import needs_open3d
 
 POINT_FIELDS = [
@@ -83,11 +83,8 @@ def test_kitti_points_are_the_scanner_s(kitti: Path, world: Any) -> None:
 def test_the_calibration_takes_points_onto_the_objects_pixels(kitti: Path, world: Any) -> None:
     """P2 Tr x: points of an instance fall on its mask or within two pixels of it, if visible."""
     sample = world.samples[0]
-    rows = dict(
-        line.split(": ") for line in (kitti / "training/calib/000000.txt").read_text().splitlines()
-    )
-    tr = np.array(rows["Tr_velo_to_cam"].split(), float).reshape(3, 4)
-    p2 = np.array(rows["P2"].split(), float).reshape(3, 4)[:, :3]
+    rows = calibration(kitti / "training/calib/000000.txt")
+    tr, p2 = rows["Tr_velo_to_cam"].reshape(3, 4), rows["P2"].reshape(3, 4)[:, :3]
     points = sample.capture.clouds["top"].points
     seen = {t.instance.instance_id: t for t in sample.truth["color"].objects}
     checked = 0
@@ -240,16 +237,12 @@ def test_a_ply_file_is_what_its_header_says(world: Any, tmp_path: Path) -> None:
     """Parsed by hand: one record per point, in the order of the properties."""
     info = world.info(7, lidars=("top",))
     folder = world.export(PointClouds(), info, world.samples, tmp_path)
-    data = (folder / "top/000000000.ply").read_bytes()
-    header, body = data.split(b"end_header\n", 1)
-    lines = [line.split() for line in io.StringIO(header.decode("ascii"))]
-    types = {"float": "<f4", "uint16": "<u2", "uint8": "u1"}
-    dtype = np.dtype([(line[2], types[line[1]]) for line in lines if line[0] == "property"])
+    records = read_ply(folder / "top/000000000.ply")
     points = world.samples[0].capture.clouds["top"].points
 
-    assert list(dtype.names or ()) == POINT_FIELDS
-    records = np.frombuffer(body, dtype)
+    assert list(records.dtype.names) == POINT_FIELDS
     np.testing.assert_array_equal(records["category"], points["category_id"])
+    np.testing.assert_array_equal(records["instance"], points["instance_id"])
     np.testing.assert_array_equal(records["z"], points["position_m"][:, 2])
 
 
@@ -294,39 +287,6 @@ def test_points_lie_in_the_boxes_of_the_lidar_frame(world: Any, tmp_path: Path) 
             assert (np.abs(local) <= 0.5 * np.array(box["size_m"]) + 1e-3).all()
             checked += len(mine)
     assert checked > 100
-
-
-@pytest.mark.parametrize(
-    ("exporter", "message"),
-    [
-        (SemanticKitti(lidar="velo"), "no lidar 'velo'.*top"),
-        (SemanticKitti(camera="colour"), "no camera 'colour'.*color"),
-        (Kitti(lidar="velo"), "no lidar 'velo'.*top"),
-    ],
-)
-def test_sensors_that_are_not_there_are_refused(exporter: Any, message: str, world: Any) -> None:
-    """Before anything is rendered."""
-    with pytest.raises(ConfigError, match=message):
-        exporter.check(world.info(7, lidars=("top",)))
-
-
-def test_a_data_set_without_sensors_is_refused_with_the_remedy(world: Any) -> None:
-    """Each kind by its name, and not by an empty one."""
-    cameras = world.info(1)
-    with pytest.raises(ConfigError, match="there is no lidar; add a sensor"):
-        SemanticKitti().check(cameras)
-    with pytest.raises(ConfigError, match="there is no camera; add a sensor"):
-        SemanticKitti().check(world.info(1, (), ("top",)))
-    with pytest.raises(ConfigError, match="no sensor of none writes the rgb channel; add an rgb"):
-        Kitti().check(world.info(1, (), ("top",)))
-
-
-def test_point_formats_need_a_scanner(world: Any) -> None:
-    """The message says what to add."""
-    with pytest.raises(ConfigError, match="add a sensor of that type"):
-        PointClouds().check(world.info(7))
-    with pytest.raises(ConfigError, match="no lidar"):
-        SemanticKitti().check(world.info(7))
 
 
 def test_air_and_ground_have_surfaces_with_names() -> None:

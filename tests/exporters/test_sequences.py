@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import json
 import re
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from gen_data.core.errors import ConfigError
 from gen_data.exporters.coco import Coco
 from gen_data.exporters.control_clips import ControlClips
 from gen_data.exporters.kitti import Kitti
@@ -110,41 +108,3 @@ def test_every_format_can_do_without_some_readings(
     else:
         assert len(stems(folder / "training/label_2")) == 8
         assert stems(folder / "training/velodyne") == even
-
-
-@pytest.mark.parametrize(
-    ("exporter", "message"),
-    [
-        (KittiRaw(image_02="lefd"), "camera 'lefd'.*did you mean 'left'"),
-        (KittiRaw(lidar="velo"), "no lidar 'velo'.*top"),
-        (KittiRaw(oxts="gps"), "no device 'gps'.*imu"),
-        (KittiTracking(camera="middle"), "camera 'middle'.*left, right"),
-        (KittiTracking(lidar="velo"), "no lidar 'velo'"),
-        (MotChallenge(camera="middle"), "camera 'middle'.*left, right"),
-    ],
-)
-def test_sensors_that_are_not_there_are_refused(exporter: Any, message: str, world: Any) -> None:
-    """Before anything is rendered, naming what there is."""
-    with pytest.raises(ConfigError, match=message):
-        exporter.check(drive_info(world))
-
-
-@pytest.mark.parametrize("exporter", [KittiRaw(), KittiTracking(), Kitti()])
-def test_rectified_formats_refuse_other_lenses_than_pinholes(exporter: Any, world: Any) -> None:
-    """The message names the sensor and its lens."""
-    info = drive_info(world)
-    sensors = [replace(s, lens="fisheye") if s.name == "left" else s for s in info.sensors]
-    info = replace(info, sensors=tuple(sensors))
-    with pytest.raises(ConfigError, match=r"'left' has a lens of the model 'fisheye'.*coco"):
-        exporter.check(info)
-
-
-@pytest.mark.parametrize("exporter", [KittiRaw(), KittiTracking(), MotChallenge()])
-def test_more_sequences_than_names_are_refused(exporter: Any, world: Any) -> None:
-    """Four digits; the error gives the largest number of samples."""
-    info = world.info(40_001, ("left",), ("top",), steps_per_scene=4)
-    with pytest.raises(
-        ConfigError,
-        match=r"there are 10001; expected at most 40000 samples",
-    ):
-        exporter.check(info)

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import json
-import shutil
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -15,7 +13,6 @@ import pytest
 from PIL import Image
 from scipy.spatial.transform import Rotation
 
-from gen_data.core.errors import ConfigError
 from gen_data.exporters.id_colors import id_color, id_colors
 from gen_data.exporters.solo import Solo
 
@@ -34,13 +31,6 @@ def read_json(root: Path) -> list[Any]:
         json.loads(path.read_text(), object_hook=lambda row: SimpleNamespace(**row))
         for path in paths
     ]
-
-
-def read_officially(root: Path) -> list[Any]:
-    """Frames as pysolotools reads them."""
-    from pysolotools.consumers import Solo as Reader
-
-    return list(Reader(data_path=str(root)).frames())
 
 
 def unity(vector: Any) -> Any:
@@ -155,14 +145,6 @@ def test_frames_show_the_street(dataset: Path, world: Any, split: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("split", ["train", "val"])
-def test_the_official_reader_reads_the_same(dataset: Path, world: Any, split: str) -> None:
-    """The check of the plain files holds for what pysolotools returns."""
-    root = dataset / split
-    assert list(problems(root, read_officially(root), of_split(world, split))) == []
-
-
-@pytest.mark.slow
 def test_the_official_converter_makes_coco_of_it(dataset: Path, world: Any, tmp_path: Path) -> None:
     """Boxes of SOLO2COCOConverter are those of the samples."""
     from pysolotools.consumers import Solo as Reader
@@ -181,68 +163,6 @@ def test_the_official_converter_makes_coco_of_it(dataset: Path, world: Any, tmp_
     ]
     # The converter appends frames as its processes finish them.
     assert sorted(row["bbox"] for row in rows) == sorted(boxes)
-
-
-def edit(root: Path, change: Callable[[Any], None]) -> None:
-    path = root / "sequence.0/step0.frame_data.json"
-    frame = json.loads(path.read_text())
-    change(frame["captures"][0])
-    path.write_text(json.dumps(frame))
-
-
-def right_handed(capture: Any) -> None:
-    for row in capture["annotations"][1]["values"]:
-        row["translation"][1] *= -1
-
-
-def scalar_first(capture: Any) -> None:
-    capture["rotation"] = [capture["rotation"][k] for k in (3, 0, 1, 2)]
-
-
-def length_first(capture: Any) -> None:
-    for row in capture["annotations"][1]["values"]:
-        row["size"].reverse()
-
-
-def inclusive_box(capture: Any) -> None:
-    capture["annotations"][0]["values"][0]["dimension"][0] -= 1
-
-
-def swapped_colors(capture: Any) -> None:
-    one, other, *_ = capture["annotations"][2]["instances"]
-    one["color"], other["color"] = other["color"], one["color"]
-
-
-def wrong_focal_length(capture: Any) -> None:
-    capture["matrix"][0], capture["matrix"][4] = capture["matrix"][4], capture["matrix"][0]
-
-
-@pytest.mark.damage("solo")
-@pytest.mark.parametrize(
-    "damage",
-    [right_handed, scalar_first, length_first, inclusive_box, swapped_colors, wrong_focal_length],
-)
-def test_damage_is_noticed(
-    dataset: Path, world: Any, tmp_path: Path, damage: Callable[[Any], None]
-) -> None:
-    """The comparison fails for a data set that is slightly wrong."""
-    root = tmp_path / "train"
-    shutil.copytree(dataset / "train", root)
-
-    edit(root, damage)
-
-    assert list(problems(root, read_json(root), of_split(world, "train")))
-
-
-def test_a_lost_frame_is_noticed(dataset: Path, world: Any, tmp_path: Path) -> None:
-    """Its number follows from the metadata."""
-    root = tmp_path / "train"
-    shutil.copytree(dataset / "train", root)
-    metadata = json.loads((root / "metadata.json").read_text())
-    metadata.update(totalFrames=4, totalSequences=4)
-    (root / "metadata.json").write_text(json.dumps(metadata))
-
-    assert list(problems(root, read_json(root), of_split(world, "train")[:4]))
 
 
 def test_sequences_have_steps(world: Any, samples: Any, tmp_path: Path) -> None:
@@ -279,24 +199,6 @@ def test_centres_behind_the_sensor_have_no_3d_box(world: Any, tmp_path: Path) ->
     assert [row.instanceId for row in solid.values] == [2]
 
 
-def test_ignored_objects_are_left_out(world: Any, tmp_path: Path) -> None:
-    """SOLO has no regions to ignore."""
-    sample = world.samples[0]
-    truth = sample.truth["color"]
-    objects = tuple(replace(t, ignored=t.instance.instance_id == 1) for t in truth.objects)
-    changed = replace(sample, truth={"color": replace(truth, objects=objects)})
-
-    root = world.export(Solo(), world.info(1), [changed], tmp_path)
-
-    (frame,) = read_json(root / "train")
-    flat, solid, instances, _ = frame.captures[0].annotations
-    for rows in (flat.values, solid.values, instances.instances):
-        assert 1 not in [row.instanceId for row in rows]
-        assert len(rows) == len(objects) - 1
-    path = root / "train/sequence.0/step0.color.instance segmentation.png"
-    assert not (np.asarray(Image.open(path)) == id_color(1)).all(-1).any()
-
-
 def test_colors_differ() -> None:
     """Of all ids that an instance may have; only 0 is black."""
     colors = [id_color(number) for number in range(65_536)]
@@ -305,17 +207,3 @@ def test_colors_differ() -> None:
     assert colors[0] == (0, 0, 0)
     ids = np.arange(65_536, dtype=np.uint16).reshape(256, 256)
     np.testing.assert_array_equal(id_colors()[ids].reshape(-1, 3), colors)
-
-
-def test_sequences_of_different_lengths_are_refused(world: Any) -> None:
-    """Readers could not find their frames."""
-    with pytest.raises(ConfigError, match="expected a multiple of 4 samples, not 7"):
-        Solo().check(world.info(7, steps_per_scene=4))
-
-
-def test_lenses_other_than_pinholes_are_refused(world: Any) -> None:
-    """A projection matrix describes the camera."""
-    info = world.info(1, lenses={"color": "kannala_brandt"})
-
-    with pytest.raises(ConfigError, match="has a lens of the model 'kannala_brandt'"):
-        Solo().check(info)

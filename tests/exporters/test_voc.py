@@ -2,11 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import shutil
-import xml.etree.ElementTree as ET
-from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,135 +9,15 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from gen_data.core.errors import ConfigError
-from gen_data.exporters.coco import Coco
 from gen_data.exporters.label_colors import voc_palette
-from gen_data.exporters.label_map import LabelMap, MappedExporter
 from gen_data.exporters.voc import YEAR, Voc
+from tests.exporters.label_readers import voc_objects
 
 
 @pytest.fixture(scope="module")
 def dataset(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The seven frames, and their COCO export."""
-    folder = tmp_path_factory.mktemp("voc")
-    for exporter in (Voc(), Coco()):
-        world.export(exporter, world.info(7), world.samples, folder / exporter.type)
-    return folder
-
-
-def objects_of(path: Path) -> list[dict[str, Any]]:
-    """Objects of an XML file, boxes as COCO has them."""
-    found = []
-    for node in ET.parse(path).getroot().iter("object"):
-        left, top, right, bottom = (
-            int(node.findtext(f"bndbox/{name}", "")) for name in ("xmin", "ymin", "xmax", "ymax")
-        )
-        found.append(
-            {
-                "name": node.findtext("name"),
-                "bbox": [left - 1, top - 1, right - left + 1, bottom - top + 1],
-                **{k: node.findtext(k) for k in ("difficult", "truncated", "occluded")},
-            }
-        )
-    return found
-
-
-def problems(root: Path, coco: Any, instances: Path) -> list[str]:
-    """Differences from COCO and from the instance images of a split."""
-    found = []
-    names = {c["id"]: c["name"] for c in coco["categories"]}
-    listed = (root / "ImageSets/Main/train.txt").read_text().split()
-    if sorted(listed) != sorted(Path(i["file_name"]).stem for i in coco["images"]):
-        found.append("image set")
-    for image in coco["images"]:
-        stem = Path(image["file_name"]).stem
-        expected = [a for a in coco["annotations"] if a["image_id"] == image["id"]]
-        if not (root / f"JPEGImages/{stem}.jpg").exists():
-            found.append("image")
-        rows = objects_of(root / f"Annotations/{stem}.xml")
-        if [r["bbox"] for r in rows] != [a["bbox"] for a in expected]:
-            found.append("box")
-        if [r["name"] for r in rows] != [names[a["category_id"]] for a in expected]:
-            found.append("class")
-        with Image.open(instances / image["file_name"]) as picture:
-            ids = np.asarray(picture)
-        with Image.open(root / f"SegmentationClass/{stem}.png") as picture:
-            assert picture.mode == "P"
-            classes = np.asarray(picture)
-        with Image.open(root / f"SegmentationObject/{stem}.png") as picture:
-            objects = np.asarray(picture)
-        for number, annotation in enumerate(expected, 1):
-            mask = ids == annotation["instance_id"]
-            if not np.array_equal(objects == number, mask):
-                found.append("object image")
-            if not (classes[mask] == annotation["category_id"]).all():
-                found.append("class image")
-        if (classes > 0).sum() != sum(a["area"] for a in expected):
-            found.append("class image")
-    return found
-
-
-def check(root: Path, dataset: Path) -> list[str]:
-    coco = json.loads((dataset / "coco/dataset/annotations/instances_train.json").read_text())
-    return problems(root, coco, dataset / "coco/dataset/instance/train")
-
-
-def test_boxes_classes_and_masks_are_those_of_coco(dataset: Path) -> None:
-    """Boxes from pixel 1 to the last, objects in the order of their numbers."""
-    root = dataset / "voc/dataset" / YEAR
-
-    assert check(root, dataset) == []
-    stems = {p.stem for p in (root / "Annotations").iterdir()}
-    assert stems == {p.stem for p in (root / "JPEGImages").iterdir()}
-    assert len(stems) == 7
-
-
-def _change_xml(old: str, new: str) -> Callable[[Path], None]:
-    def damage(root: Path) -> None:
-        for path in (root / "Annotations").iterdir():
-            text = path.read_text().replace(old, new)
-            path.unlink()
-            path.write_text(text)
-
-    return damage
-
-
-def _swap_label_images(root: Path) -> None:
-    (root / "SegmentationClass").rename(root / "other")
-    (root / "SegmentationObject").rename(root / "SegmentationClass")
-    (root / "other").rename(root / "SegmentationObject")
-
-
-def _remove_image(root: Path) -> None:
-    (root / "JPEGImages/000000000_color.jpg").unlink()
-
-
-def _shorten_set(root: Path) -> None:
-    path = root / "ImageSets/Main/train.txt"
-    path.write_text("".join(path.read_text().splitlines(keepends=True)[1:]))
-
-
-@pytest.mark.damage("voc")
-@pytest.mark.parametrize(
-    ("damage", "named"),
-    [
-        (_change_xml("<xmin>", "<xmin>1"), "box"),
-        (_change_xml("<name>car", "<name>crate"), "class"),
-        (_swap_label_images, "object image"),
-        (_remove_image, "image"),
-        (_shorten_set, "image set"),
-    ],
-)
-def test_damage_is_found(
-    dataset: Path, tmp_path: Path, damage: Callable[[Path], None], named: str
-) -> None:
-    """The check above is able to fail."""
-    root = tmp_path / "copy"
-    shutil.copytree(dataset / "voc/dataset" / YEAR, root)
-
-    damage(root)
-
-    assert named in check(root, dataset)
+    """The seven frames."""
+    return world.export(Voc(), world.info(7), world.samples, tmp_path_factory.mktemp("voc"))
 
 
 def test_the_palette_is_that_of_the_development_kit(dataset: Path) -> None:
@@ -153,17 +28,17 @@ def test_the_palette_is_that_of_the_development_kit(dataset: Path) -> None:
         [0, 0, 0], [128, 0, 0], [0, 128, 0], [128, 128, 0], [0, 0, 128], [64, 0, 0], [0, 64, 128],
         [224, 224, 192],
     ]  # fmt: skip
-    with Image.open(dataset / f"voc/dataset/{YEAR}/SegmentationClass/000000000_color.png") as image:
+    with Image.open(dataset / f"{YEAR}/SegmentationClass/000000000_color.png") as image:
         assert image.getpalette()[: 3 * 256] == colors.ravel().tolist()
 
 
 def test_lists_of_classes_name_the_images_that_show_them(dataset: Path) -> None:
     """1 for every image with an object, -1 for all others."""
-    root = dataset / "voc/dataset" / YEAR
+    root = dataset / YEAR
     shown = set()
     for line in (root / "ImageSets/Main/pedestrian_trainval.txt").read_text().splitlines():
         stem, value = line.split()
-        names = [thing["name"] for thing in objects_of(root / f"Annotations/{stem}.xml")]
+        names = [thing["name"] for thing in voc_objects(root / f"Annotations/{stem}.xml")]
         assert int(value) == (1 if "pedestrian" in names else -1)
         shown.add(value)
     assert shown == {"1", "-1"}
@@ -171,10 +46,10 @@ def test_lists_of_classes_name_the_images_that_show_them(dataset: Path) -> None:
 
 def test_truncated_and_occluded_follow_the_guidelines(world: Any, dataset: Path) -> None:
     """More than 15 % outside the image; more than 5 % hidden in it."""
-    root = dataset / "voc/dataset" / YEAR
+    root = dataset / YEAR
     states = set()
     for sample in world.samples:
-        rows = objects_of(root / f"Annotations/{sample.index:09d}_color.xml")
+        rows = voc_objects(root / f"Annotations/{sample.index:09d}_color.xml")
         things = [t for t in sample.truth["color"].objects if t.box is not None]
         for row, thing in zip(rows, things, strict=True):
             assert row["truncated"] == str(int(thing.truncation > 0.15))
@@ -185,10 +60,10 @@ def test_truncated_and_occluded_follow_the_guidelines(world: Any, dataset: Path)
 
 def test_images_are_the_photographs(dataset: Path) -> None:
     """JPEG of high quality, in the right order of colours."""
-    with Image.open(dataset / f"voc/dataset/{YEAR}/JPEGImages/000000000_color.jpg") as picture:
+    with Image.open(dataset / f"{YEAR}/JPEGImages/000000000_color.jpg") as picture:
         assert (picture.format, picture.mode) == ("JPEG", "RGB")
         copy = np.asarray(picture).astype(int)
-    with Image.open(dataset / "coco/dataset/train/000000000_color.png") as picture:
+    with Image.open(dataset.parent / "shards/000000/color/rgb/000000000.png") as picture:
         photograph = np.asarray(picture).astype(int)
 
     assert np.abs(copy - photograph).mean() < 6
@@ -197,15 +72,12 @@ def test_images_are_the_photographs(dataset: Path) -> None:
 def test_ignored_objects_are_difficult_and_void(world: Any, tmp_path: Path) -> None:
     """They come last, so that the others are numbered without gaps."""
     sample = world.samples[0]
-    truth = sample.truth["color"]
-    first, *others = truth.objects
-    marked = replace(truth, objects=(replace(first, ignored=True), *others))
+    first, *others = sample.truth["color"].objects
 
-    changed = replace(sample, truth={"color": marked})
-    folder = world.export(Voc(images="png"), world.info(1), [changed], tmp_path)
+    folder = world.export(Voc(images="png"), world.info(1), [world.ignoring(sample)], tmp_path)
 
     root = folder / YEAR
-    rows = objects_of(root / "Annotations/000000000_color.xml")
+    rows = voc_objects(root / "Annotations/000000000_color.xml")
     assert [row["difficult"] for row in rows] == ["0"] * len(others) + ["1"]
     for name in ("SegmentationClass", "SegmentationObject"):
         with Image.open(root / f"{name}/000000000_color.png") as image:
@@ -217,17 +89,9 @@ def test_ignored_objects_are_difficult_and_void(world: Any, tmp_path: Path) -> N
     )
 
 
-def test_too_many_categories_are_refused(world: Any) -> None:
-    """Label images have eight bits."""
-    info = world.info(1, categories=tuple(f"c{k:03d}" for k in range(255)))
-
-    with pytest.raises(ConfigError, match="room for 254 categories, but there are 255"):
-        Voc().check(info)
-
-
 def test_the_label_map_file_names_classes_by_their_colours(dataset: Path) -> None:
     """Rows ``name:r,g,b:parts:actions``, as CVAT and Datumaro read them; void is "ignored"."""
-    root = dataset / "voc/dataset" / YEAR
+    root = dataset / YEAR
     rows = [line.split(":") for line in (root / "labelmap.txt").read_text().splitlines()[1:]]
     color_of = {name: tuple(map(int, color.split(","))) for name, color, *_ in rows}
     with Image.open(next((root / "SegmentationClass").iterdir())) as image:
@@ -235,24 +99,3 @@ def test_the_label_map_file_names_classes_by_their_colours(dataset: Path) -> Non
 
     assert list(color_of) == ["background", "car", "crate", "pedestrian", "ignored"]
     assert [list(c) for c in color_of.values()] == [palette[k] for k in (0, 1, 2, 3, 255)]
-
-
-def test_an_ignored_object_without_a_class_is_difficult_in_every_class(
-    world: Any, tmp_path: Path
-) -> None:
-    """VOC's evaluation leaves out difficult objects class by class."""
-    exporter = MappedExporter(
-        Voc(), LabelMap(classes={"box": ("crate",), "walker": ("pedestrian",)}, others="ignore")
-    )
-    objects = (
-        world.instance(1, "car", 9.0, 2.5, 0.0),
-        world.instance(2, "crate", 8.0, -1.0, 0.0),
-    )
-    sample = world.sample(0, objects, [world.camera()])
-
-    root = world.export(exporter, world.info(1), [sample], tmp_path) / YEAR
-
-    rows = objects_of(root / "Annotations/000000000_color.xml")
-    listed = [(row["name"], row["difficult"]) for row in rows]
-    assert listed == [("box", "0"), ("box", "1"), ("walker", "1")]
-    assert (root / "ImageSets/Main/walker_train.txt").read_text() == "000000000_color  0\n"

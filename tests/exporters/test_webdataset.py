@@ -2,32 +2,20 @@
 
 from __future__ import annotations
 
-import gc
-import io
-import json
-import shutil
 import tarfile
-import warnings
-from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-import webdataset
 from numpy.typing import NDArray
-from pycocotools import mask as coco_mask
 
-from gen_data.core.capture import POINT
-from gen_data.core.errors import ConfigError
-from gen_data.exporters.label_map import LabelMap, MappedExporter
+from gen_data.core.capture import POINT, Channel
 from gen_data.exporters.webdataset import WebDataset
+from tests.exporters.label_readers import tar_samples
 
 # pycocotools' decoder predates numpy 2's __array__(copy=...).
 pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
-
-Members = list[tuple[str, bytes]]
 
 
 @pytest.fixture(scope="module")
@@ -37,19 +25,6 @@ def dataset(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return world.export(
         WebDataset(samples_per_tar=2), info, world.samples, tmp_path_factory.mktemp("tars")
     )
-
-
-def read(folder: Path) -> list[dict[str, Any]]:
-    """Decoded samples of all tar files of a split, as a user reads them."""
-    urls = sorted(str(path) for path in folder.glob("*.tar"))
-    with warnings.catch_warnings():
-        # The reader leaves closing of its files to the garbage collector.
-        warnings.simplefilter("ignore", ResourceWarning)
-        loaded = webdataset.WebDataset(urls, shardshuffle=False, nodesplitter=None)
-        samples = list(loaded.decode("pil"))
-        del loaded
-        gc.collect()
-    return samples
 
 
 def same_columns(matrix: NDArray[Any], columns: list[str], truth: Any) -> bool:
@@ -68,7 +43,7 @@ def faults(folder: Path, world: Any) -> list[str]:
     """Differences between the tar files of a split and the samples."""
     found = []
     expected = [s for s in world.samples if s.split == folder.name]
-    samples = read(folder)
+    samples = tar_samples(folder)
     keys = [sample["__key__"] for sample in samples]
     if keys != [f"{s.index:09d}" for s in expected]:
         return [f"keys {keys}"]
@@ -79,16 +54,9 @@ def faults(folder: Path, world: Any) -> list[str]:
             found.append(f"fields {fields}")
             continue
         labels = sample["json"]
-        rows = labels["cameras"]["color"]["annotations"]
-        seen = {t.instance.instance_id: t for t in truth.truth["color"].objects if t.box}
-        if {row["instance_id"] for row in rows} != set(seen):
-            found.append("objects")
-        image = np.asarray(sample["color.rgb.png"])
-        for row in rows:
-            mask = coco_mask.decode(row["segmentation"]).astype(bool)
-            # The world paints instance k in green 20 k.
-            if not np.array_equal(mask, image[..., 1] == 20 * row["instance_id"]):
-                found.append(f"mask {row['id']}")
+        rgb = truth.capture.readings["color"].channels[Channel.RGB]
+        if not np.array_equal(np.asarray(sample["color.rgb.png"]), rgb):
+            found.append("photograph")
         if not same_columns(sample["top.points.npy"], labels["columns"]["top.points.npy"], truth):
             found.append("points")
     return found
@@ -129,7 +97,9 @@ def test_sensors_that_do_not_read_have_no_field(world: Any, slow: Any, tmp_path:
     info = world.info(8, ("left", "right"), ("top",), devices={}, steps_per_scene=4)
     folder = world.export(WebDataset(), info, slow, tmp_path)
 
-    fields = [{n for n in s if n.endswith((".rgb.png", ".npy"))} for s in read(folder / "train")]
+    fields = [
+        {n for n in s if n.endswith((".rgb.png", ".npy"))} for s in tar_samples(folder / "train")
+    ]
 
     whole, less = {"left.rgb.png", "right.rgb.png", "top.points.npy"}, {"left.rgb.png"}
     assert fields == [whole, less, whole, less]
@@ -147,83 +117,3 @@ def test_hugging_face_reads_scans_and_rows(dataset: Path, world: Any) -> None:
     for row, sample in zip(loaded, expected, strict=True):
         columns = row["json"]["columns"]["top.points.npy"]
         assert same_columns(np.array(row["top.points.npy"], np.float32), columns, sample)
-
-
-def renamed(members: Members, old: str, new: str) -> Members:
-    return [(name.replace(old, new), data) for name, data in members]
-
-
-def shifted_masks(members: Members) -> Members:
-    """Masks of the neighbouring object."""
-    changed = []
-    for name, data in members:
-        if name.endswith(".json"):
-            labels = json.loads(data)
-            rows = labels["cameras"]["color"]["annotations"]
-            masks = [row["segmentation"] for row in rows]
-            for row, mask in zip(rows, [*masks[1:], *masks[:1]], strict=True):
-                row["segmentation"] = mask
-            changed.append((name, json.dumps(labels).encode()))
-        else:
-            changed.append((name, data))
-    return changed
-
-
-@pytest.mark.damage("webdataset")
-@pytest.mark.parametrize(
-    "damage",
-    [
-        lambda m: [(n, d) for n, d in m if n != "000000000.color.depth.png"],
-        lambda m: renamed(m, "000000000.color", "000000000.x.color"),
-        lambda m: sorted(m, key=lambda item: item[0].split(".", 1)[1]),
-        lambda m: renamed(m, "000000001", "000000002"),
-        shifted_masks,
-    ],
-    ids=["missing field", "dot in key", "fields not adjacent", "wrong key", "wrong masks"],
-)
-def test_damage_is_found(
-    damage: Callable[[Members], Members], dataset: Path, world: Any, tmp_path: Path
-) -> None:
-    """The same reader finds faults in damaged copies."""
-    copy = tmp_path / "train"
-    shutil.copytree(dataset / "train", copy)
-    path = copy / "street-000000.tar"
-    with tarfile.open(path) as tar:
-        files = [(m.name, tar.extractfile(m)) for m in tar.getmembers()]
-        members = [(name, file.read()) for name, file in files if file is not None]
-    with tarfile.open(path, "w") as tar:
-        for name, data in damage(members):
-            member = tarfile.TarInfo(name)
-            member.size = len(data)
-            tar.addfile(member, io.BytesIO(data))
-
-    assert faults(copy, world)
-
-
-def test_names_that_differ_in_case_are_refused(world: Any) -> None:
-    """Fields have lower-case names."""
-    info = world.info(7, ("color", "Color"))
-
-    with pytest.raises(ConfigError, match=r"'color' and 'Color' differ in case"):
-        WebDataset().check(replace(info))
-
-
-def test_an_ignored_object_without_a_class_is_a_crowd_of_every_class(
-    world: Any, tmp_path: Path
-) -> None:
-    """A reader compares it with detections of its class only; ids stay unique."""
-    classes = {"box": ("crate",), "walker": ("pedestrian",)}
-    exporter = MappedExporter(WebDataset(), LabelMap(classes=classes, others="ignore"))
-    things = (
-        world.instance(1, "car", 9.0, 2.5, 0.0),
-        world.instance(2, "crate", 8.0, -1.0, 0.0),
-    )
-    sample = world.sample(0, things, [world.camera()])
-
-    folder = world.export(exporter, world.info(1), [sample], tmp_path)
-
-    (read_sample,) = read(folder / "train")
-    rows = read_sample["json"]["cameras"]["color"]["annotations"]
-    crowds = [(row["category_id"], row["category"]) for row in rows if row["iscrowd"]]
-    assert crowds == [(1, "box"), (2, "walker")]
-    assert len({row["id"] for row in rows}) == len(rows) == 3

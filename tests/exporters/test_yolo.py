@@ -1,11 +1,9 @@
-"""YOLO export, held against ``coco``; the slow test reads it with Ultralytics."""
+"""YOLO export, held against the samples; the slow test reads it with Ultralytics."""
 
 from __future__ import annotations
 
-import json
 import shutil
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -14,13 +12,10 @@ import numpy as np
 import pytest
 import yaml
 from PIL import Image
-from pycocotools import mask as coco_mask
 
-from gen_data.core.errors import ConfigError
-from gen_data.core.se3 import SE3
-from gen_data.exporters.coco import Coco
 from gen_data.exporters.yolo import Yolo, inner_rectangle
-from tests.exporters.coco_masks import drawn_mask
+from tests.exporters.label_readers import drawn
+from tests.exporters.test_labels import divided, truth_of
 
 # pycocotools' decoder predates numpy 2's __array__(copy=...).
 pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
@@ -28,31 +23,16 @@ pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:Depreca
 TASKS = ("detect", "segment", "pose", "obb")
 
 
-def divided(world: Any) -> Any:
-    """A car in two parts behind a pedestrian, seen by a tilted camera."""
-    level = world.camera()
-    tilted = replace(level, T_world_camera=level.T_world_camera @ SE3.about_z(0.4))
-    things = (
-        world.instance(1, "car", 14.0, 0.0, 1.57),
-        world.instance(2, "pedestrian", 8.0, 0.0, 0.0),
-        world.instance(3, "crate", 9.0, 2.0, 0.0),
-        world.instance(4, "crate", 10.0, -3.0, 0.5),
-    )
-    return world.sample(7, things, [tilted])
+@pytest.fixture(scope="module")
+def samples(world: Any) -> list[Any]:
+    """The seven frames, and an object in two parts."""
+    return [*world.samples, divided(world)]
 
 
 @pytest.fixture(scope="module")
-def dataset(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The seven frames and one more with all tasks, and their COCO export."""
-    folder = tmp_path_factory.mktemp("yolo")
-    samples = [*world.samples, divided(world)]
-    for exporter in (Yolo(tasks=TASKS), Coco()):
-        world.export(exporter, world.info(8), samples, folder / exporter.type)
-    return folder
-
-
-def coco_of(dataset: Path, split: str) -> Any:
-    return json.loads((dataset / f"coco/dataset/annotations/instances_{split}.json").read_text())
+def dataset(world: Any, samples: list[Any], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """All tasks."""
+    return world.export(Yolo(tasks=TASKS), world.info(8), samples, tmp_path_factory.mktemp("yolo"))
 
 
 def rows_of(task_folder: Path, split: str, stem: str) -> list[list[float]]:
@@ -60,146 +40,52 @@ def rows_of(task_folder: Path, split: str, stem: str) -> list[list[float]]:
     return [[float(value) for value in line.split()] for line in text.splitlines()]
 
 
-def problems(task_folder: Path, dataset: Path) -> list[str]:
-    """Differences of boxes and classes from COCO, and files that Ultralytics would not find."""
-    found = []
-    data = yaml.safe_load((task_folder / "data.yaml").read_text())
-    for split in ("train", "val"):
-        coco = coco_of(dataset, split)
-        names = {c["id"]: c["name"] for c in coco["categories"]}
-        images = {p.stem for p in (task_folder / data[split]).glob("*.png")}
-        labels = {
-            p.stem for p in (task_folder / data[split].replace("images/", "labels/")).iterdir()
-        }
-        if not images == labels == {Path(i["file_name"]).stem for i in coco["images"]}:
-            found.append("files")
-            continue
-        for image in coco["images"]:
-            w, h = image["width"], image["height"]
-            rows = rows_of(task_folder, split, Path(image["file_name"]).stem)
-            expected = [a for a in coco["annotations"] if a["image_id"] == image["id"]]
-            if len(rows) != len(expected):
-                found.append("count")
-                continue
-            for row, annotation in zip(rows, expected, strict=True):
-                if data["names"][int(row[0])] != names[annotation["category_id"]]:
-                    found.append("class")
-                x, y, width, height = annotation["bbox"]
-                if len(row) == 5:
-                    cx, cy, bw, bh = np.array(row[1:]) * [w, h, w, h]
-                    box = [cx - bw / 2, cy - bh / 2, bw, bh]
-                else:
-                    points = np.array(row[1:]).reshape(-1, 2) * [w, h]
-                    # Polygons lie 0.02 px inside the edges of their pixels.
-                    box = [*points.min(axis=0) - 0.02, *np.ptp(points, axis=0) + 0.04]
-                if np.abs(np.array(box) - [x, y, width, height]).max() > 0.01:
-                    found.append("box")
-    return found
+def objects_of(samples: list[Any], folder: Path) -> Iterator[tuple[list[float], Any]]:
+    """Row and truth of every object of the split train."""
+    for sample in (s for s in samples if s.split == "train"):
+        rows = rows_of(folder, "train", f"{sample.index:09d}_color")
+        yield from zip(rows, truth_of(sample), strict=True)
 
 
-@pytest.mark.parametrize("task", ["detect", "segment"])
-def test_boxes_and_classes_are_those_of_coco(dataset: Path, task: str) -> None:
-    """Within a hundredth of a pixel; empty images have empty files."""
-    folder = dataset / "yolo/dataset" / task
-
-    assert problems(folder, dataset) == []
-    assert rows_of(folder, "train", "000000003_color") == []
-
-
-def _rewrite(change: Callable[[str], str]) -> Callable[[Path], None]:
-    def damage(folder: Path) -> None:
-        for path in (folder / "labels/train").iterdir():
-            text = "".join(change(line) + "\n" for line in path.read_text().splitlines())
-            path.unlink()
-            path.write_text(text)
-
-    return damage
-
-
-def _corner_instead_of_centre(line: str) -> str:
-    number, cx, cy, w, h = line.split()
-    return f"{number} {float(cx) - float(w) / 2} {float(cy) - float(h) / 2} {w} {h}"
-
-
-def _next_class(line: str) -> str:
-    number, rest = line.split(" ", 1)
-    return f"{(int(number) + 1) % 3} {rest}"
-
-
-def _remove_label(folder: Path) -> None:
-    next((folder / "labels/train").iterdir()).unlink()
-
-
-@pytest.mark.damage("yolo")
-@pytest.mark.parametrize(
-    ("damage", "named"),
-    [
-        (_rewrite(_corner_instead_of_centre), "box"),
-        (_rewrite(_next_class), "class"),
-        (_remove_label, "files"),
-    ],
-)
-def test_damage_is_found(
-    dataset: Path, tmp_path: Path, damage: Callable[[Path], None], named: str
+def test_a_segment_is_the_outline_of_the_mask(
+    dataset: Path, samples: list[Any], world: Any
 ) -> None:
-    """The check above is able to fail."""
-    folder = tmp_path / "copy"
-    shutil.copytree(dataset / "yolo/dataset/detect", folder)
-
-    damage(folder)
-
-    assert named in problems(folder, dataset)
-
-
-def masks_of(dataset: Path, split: str) -> list[tuple[str, Any, Any]]:
-    """Name of the image, COCO's row and its mask for every object, in order."""
-    coco = coco_of(dataset, split)
-    names = {i["id"]: Path(i["file_name"]).stem for i in coco["images"]}
-    return [(names[a["image_id"]], a, drawn_mask(a, coco)) for a in coco["annotations"]]
-
-
-def test_a_segment_is_the_outline_of_the_mask(dataset: Path) -> None:
     """Drawn by pycocotools and OpenCV, every polygon gives the mask back, also of two parts."""
-    folder = dataset / "yolo/dataset/segment"
-    places: dict[str, int] = {}
     parts = 0
-    for stem, row, mask in masks_of(dataset, "train"):
-        place = places[stem] = places.get(stem, -1) + 1
+    for (number, *outline), thing in objects_of(samples, dataset / "segment"):
+        assert world.categories[int(number)] == thing.category
+        mask = thing.mask
         h, w = mask.shape
-        points = np.array(rows_of(folder, "train", stem)[place][1:]).reshape(-1, 2) * [w, h]
-        (rle,) = coco_mask.frPyObjects([points.ravel().tolist()], h, w)
-        drawn = coco_mask.decode(rle).astype(bool)
+        points = np.array(outline).reshape(-1, 2) * [w, h]
         filled = cv2.fillPoly(np.zeros((h, w), np.uint8), [points.astype(np.int32)], 1)
         count, *_ = cv2.connectedComponents(mask.astype(np.uint8), connectivity=4)
         parts = max(parts, count - 1)
         # A line between parts may round to pixels of its own.
-        assert (drawn != mask).sum() <= (0 if count == 2 else 60), row["id"]
-        assert (filled.astype(bool) != mask).sum() <= (0 if count == 2 else 60), row["id"]
+        for picture in (drawn([points.ravel().tolist()], h, w), filled.astype(bool)):
+            assert (picture != mask).sum() <= (0 if count == 2 else 60)
         np.testing.assert_allclose(np.abs(points - np.rint(points)), 0.02, atol=1e-4)
     assert parts >= 2
 
 
-def test_rotated_boxes_enclose_their_masks(dataset: Path) -> None:
+def test_rotated_boxes_enclose_their_masks(dataset: Path, samples: list[Any]) -> None:
     """Rectangles inside the image, never larger than the upright box, mostly smaller."""
-    folder = dataset / "yolo/dataset/obb"
-    places: dict[str, int] = {}
     smaller = 0
-    for stem, row, mask in masks_of(dataset, "train"):
-        place = places[stem] = places.get(stem, -1) + 1
-        h, w = mask.shape
-        corners = np.array(rows_of(folder, "train", stem)[place][1:]).reshape(4, 2) * [w, h]
+    for row, thing in objects_of(samples, dataset / "obb"):
+        h, w = thing.mask.shape
+        corners = np.array(row[1:]).reshape(4, 2) * [w, h]
         assert (corners >= 0).all()
         assert (corners <= [w, h]).all()
         sides = np.roll(corners, -1, axis=0) - corners
         assert np.abs((sides * np.roll(sides, 1, axis=0)).sum(axis=1)).max() < 0.05
-        y, x = np.nonzero(mask)
+        y, x = np.nonzero(thing.mask)
         ends = np.concatenate([np.stack([x + dx, y + dy], 1) for dx in (0, 1) for dy in (0, 1)])
         for corner, side in zip(corners, sides, strict=True):
             offsets = (ends - corner) @ np.array([-side[1], side[0]]) / np.hypot(*side)
             assert offsets.min() > -0.01
         area = np.hypot(*sides[0]) * np.hypot(*sides[1])
-        assert area <= row["bbox"][2] * row["bbox"][3] + 0.1
-        smaller += area < 0.95 * row["bbox"][2] * row["bbox"][3]
+        left, top, right, bottom = thing.box
+        assert area <= (right - left) * (bottom - top) + 0.1
+        smaller += area < 0.95 * (right - left) * (bottom - top)
     assert smaller > 3
 
 
@@ -223,25 +109,24 @@ def test_a_rectangle_that_leaves_the_image_is_replaced() -> None:
     assert sorted(map(tuple, corners.tolist())) == [(0, 0), (0, 30), (30, 0), (30, 30)]
 
 
-def test_pose_has_the_people_with_their_keypoints(dataset: Path) -> None:
-    """One class; values are those of COCO's keypoints, absent ones are 0."""
-    folder = dataset / "yolo/dataset/pose"
+def test_pose_has_the_people_with_their_keypoints(dataset: Path, samples: list[Any]) -> None:
+    """One class; points that are not in the image are 0."""
+    folder = dataset / "pose"
     data = yaml.safe_load((folder / "data.yaml").read_text())
-    truth = json.loads(
-        (dataset / "coco/dataset/annotations/pedestrian_keypoints_train.json").read_text()
-    )
 
     assert data["names"] == {0: "pedestrian"}
     assert data["kpt_shape"] == [17, 3]
     assert data["flip_idx"] == [0, 2, 1, 4, 3, 6, 5, 8, 7, 10, 9, 12, 11, 14, 13, 16, 15]
     count = 0
-    for image in truth["images"]:
-        rows = rows_of(folder, "train", Path(image["file_name"]).stem)
-        expected = [a for a in truth["annotations"] if a["image_id"] == image["id"]]
-        assert len(rows) == len(expected)
-        for row, annotation in zip(rows, expected, strict=True):
-            points = np.array(row[5:]).reshape(-1, 3) * [image["width"], image["height"], 1]
-            want = np.array(annotation["keypoints"]).reshape(-1, 3)
+    for sample in (s for s in samples if s.split == "train"):
+        rows = rows_of(folder, "train", f"{sample.index:09d}_color")
+        things = sample.truth["color"].objects
+        people = [t for t in things if t.instance.category == "pedestrian" and t.box]
+        for row, thing in zip(rows, people, strict=True):
+            points = np.array(row[5:]).reshape(-1, 3) * [160, 120, 1]
+            want = [
+                (*p.image_px, p.visibility) if p.visibility else [0] * 3 for p in thing.keypoints
+            ]
             np.testing.assert_allclose(points, want, atol=2e-3)
             count += 1
     assert count >= 5
@@ -256,25 +141,6 @@ def test_pose_of_another_category(world: Any, tmp_path: Path) -> None:
     data = yaml.safe_load((tmp_path / "car/dataset/pose/data.yaml").read_text())
     assert data["names"] == {0: "car"}
     assert data["flip_idx"] == [1, 0, 3, 2, 5, 4, 7, 6]
-
-
-def test_an_unknown_category_is_refused(world: Any) -> None:
-    """With the nearest name."""
-    with pytest.raises(ConfigError, match=r"pose_category: there is no category 'cars'.*car"):
-        Yolo(pose_category="cars").check(world.info(1))
-
-
-def test_ignored_objects_are_left_out(world: Any, tmp_path: Path) -> None:
-    """The format cannot exclude a region."""
-    sample = world.samples[0]
-    truth = sample.truth["color"]
-    first, *others = truth.objects
-    marked = replace(truth, objects=(replace(first, ignored=True), *others))
-
-    changed = replace(sample, truth={"color": marked})
-    folder = world.export(Yolo(tasks=("detect",)), world.info(1), [changed], tmp_path)
-
-    assert len(rows_of(folder / "detect", "train", "000000000_color")) == len(others)
 
 
 def test_a_missing_split_is_said_in_the_file(world: Any, tmp_path: Path) -> None:
@@ -300,7 +166,7 @@ def test_ultralytics_reads_it_without_repairs(
     monkeypatch.setattr(utils, "check_font", lambda font: None)  # no download
 
     folder = tmp_path / "copy"
-    shutil.copytree(dataset / "yolo/dataset" / task, folder)
+    shutil.copytree(dataset / task, folder)
     data = utils.check_det_dataset(str(folder / "data.yaml"), autodownload=False)
     assert data["nc"] == (1 if task == "pose" else 3)
 
@@ -325,35 +191,3 @@ def test_ultralytics_reads_it_without_repairs(
     for damaged in (label.read_text().replace("0.", "3."), label.read_text() * 2):
         label.write_text(damaged)
         assert any(result[9] for result in verify())
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("task", ["detect", "segment"])
-def test_ultralytics_scores_the_ground_truth_as_perfect(
-    dataset: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, task: str
-) -> None:
-    """mAP50-95 is 0.995, its value of a perfect result; boxes moved by a tenth have less."""
-    monkeypatch.setenv("YOLO_CONFIG_DIR", str(tmp_path))
-    monkeypatch.setenv("YOLO_OFFLINE", "true")
-    import torch
-    from ultralytics.data.utils import img2label_paths, verify_image_label
-    from ultralytics.utils.metrics import ap_per_class, box_iou
-    from ultralytics.utils.ops import xywh2xyxy
-
-    def score(shift: float) -> float:
-        correct, confidence, classes = [], [], []
-        images = sorted(str(p) for p in (dataset / f"yolo/dataset/{task}/images/train").iterdir())
-        for image, label in zip(images, img2label_paths(images), strict=True):
-            rows = verify_image_label((image, label, "", False, 3, 0, 0, False))[1]
-            boxes = torch.tensor(xywh2xyxy(rows[:, 1:]))
-            moved = boxes + shift * (boxes[:, 2:] - boxes[:, :2]).repeat(1, 2)
-            overlap = box_iou(boxes, moved).diagonal()[:, None]
-            correct.append((overlap >= torch.linspace(0.5, 0.95, 10) - 1e-6).numpy())
-            confidence.append(np.full(len(rows), 0.9))
-            classes.append(rows[:, 0])
-        found = np.concatenate(classes)
-        result = ap_per_class(np.concatenate(correct), np.concatenate(confidence), found, found)
-        return float(result[5].mean())
-
-    assert score(0.0) == pytest.approx(0.995, abs=1e-4)
-    assert score(0.1) < 0.8

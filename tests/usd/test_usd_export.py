@@ -116,7 +116,6 @@ def _slower(stage: Any) -> None:
     stage.SetTimeCodesPerSecond(24.0)
 
 
-@pytest.mark.damage("usd")
 @pytest.mark.parametrize("damage", [_other_up_axis, _centimetres, _asset_missing, _slower])
 def test_damage_is_found(sequence: Any, tmp_path: Path, damage: Callable[[Any], None]) -> None:
     """The check above is able to fail."""
