@@ -18,6 +18,7 @@ from gen_data.core.scene import Device
 from gen_data.core.scene_time import place_sensors
 from gen_data.core.se3 import SE3
 from gen_data.exporters.nuscenes import NuScenes
+from gen_data.sensors.radar.radar_sensor import Radar
 from tests.exporters import nuscenes_devkit as checks
 from tests.exporters.nuscenes_devkit import find_faults, open_devkit
 
@@ -34,7 +35,7 @@ def with_radar(sample: Any) -> Any:
     car = scene.instance(1)
     x, y, _ = T_radar_world.apply(np.array(car.T_world_instance.translation_m))
     rows = table_rows(
-        "radar",
+        Radar.columns,
         sample.index % 4 and 1,
         time_s=scene.time_s,
         range_m=np.hypot(x, y),
