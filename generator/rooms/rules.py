@@ -74,6 +74,12 @@ class RoomType:
         pieces: Rules in the order of placing.
         pale: Whether its walls are always near white.
         blinds: Whether its windows may have blinds.
+        skirting: Whether skirting boards differ from its walls.
+        door_m: Width and height of the openings of its doors; empty = the usual ones.
+        sill_m: Height of the lower edges of its windows.
+        window_width_m: Width of its windows.
+        clerestory: Whether its windows are below the ceiling.
+        french_windows: Share of windows that begin at the floor.
     """
 
     size_m: tuple[Range, Range, Range]
@@ -85,6 +91,12 @@ class RoomType:
     splashback: tuple[str, ...] = ()
     pale: bool = False
     blinds: bool = True
+    skirting: bool = True
+    door_m: tuple[float, ...] = ()
+    sill_m: Range = (0.8, 0.95)
+    window_width_m: Range = (1.0, 2.1)
+    clerestory: bool = False
+    french_windows: float = 0.0
 
     @property
     def usual_area_m2(self) -> float:
