@@ -133,7 +133,7 @@ EVERY_FRAME = (
     "visibility.kernels.label_resolve",
     "realtime.kernels.shadow_culling",
     "scene.kernels.bvh_build",
-    "realtime.kernels.lattice",
+    "scene.kernels.lattice",
     "visibility.kernels.edge_detection",
     "scene.kernels.environment_lighting",
 )

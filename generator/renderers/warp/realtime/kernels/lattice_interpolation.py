@@ -15,10 +15,10 @@ from gen_data.renderers.warp.atmosphere.kernels.ground_weathering import (
     SNOW_GREEN,
     SNOW_RED,
 )
-from gen_data.renderers.warp.realtime.kernels.lattice import Lattice, points_agree, step_at
 from gen_data.renderers.warp.realtime.kernels.lattice_lighting import LatticeLight, is_gatherable
 from gen_data.renderers.warp.realtime.kernels.soft_shadows import surface_tolerance
 from gen_data.renderers.warp.scene.kernels.environment_lighting import sky_image
+from gen_data.renderers.warp.scene.kernels.lattice import Lattice, points_agree, step_at
 from gen_data.renderers.warp.scene.kernels.material_eval import print_footprint
 from gen_data.renderers.warp.scene.kernels.records import (
     GBufferRecord,

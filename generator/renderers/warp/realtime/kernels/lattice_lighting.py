@@ -9,12 +9,6 @@ from gen_data.renderers.warp.atmosphere.kernels.ground_weathering import (
     coat_at,
     footprint,
 )
-from gen_data.renderers.warp.realtime.kernels.lattice import (
-    Lattice,
-    cell_at,
-    ray_origin,
-    sheet_side,
-)
 from gen_data.renderers.warp.realtime.kernels.shadow_culling import FAINT_SHARE
 from gen_data.renderers.warp.realtime.kernels.soft_shadows import (
     CROWN_GLOW,
@@ -40,6 +34,12 @@ from gen_data.renderers.warp.scene.kernels.analytic_lights import (
     representative_direction,
 )
 from gen_data.renderers.warp.scene.kernels.brdf import Brdf, make_brdf, specular_lobe
+from gen_data.renderers.warp.scene.kernels.lattice import (
+    Lattice,
+    cell_at,
+    ray_origin,
+    sheet_side,
+)
 from gen_data.renderers.warp.scene.kernels.material_eval import (
     SurfaceMaterial,
     evaluate_material,

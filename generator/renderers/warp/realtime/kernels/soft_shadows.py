@@ -15,12 +15,6 @@ from __future__ import annotations
 
 import warp as wp
 
-from gen_data.renderers.warp.realtime.kernels.lattice import (
-    Departure,
-    Lattice,
-    departure_to,
-    sheet_side,
-)
 from gen_data.renderers.warp.realtime.kernels.shadow_culling import FAINT_SHARE, TILE
 from gen_data.renderers.warp.scene.kernels.ambient_light import ambient_irradiance, is_indoors
 from gen_data.renderers.warp.scene.kernels.analytic_lights import (
@@ -29,6 +23,12 @@ from gen_data.renderers.warp.scene.kernels.analytic_lights import (
     SUN,
     SUN_DISTANCE_M,
     beam_from,
+)
+from gen_data.renderers.warp.scene.kernels.lattice import (
+    Departure,
+    Lattice,
+    departure_to,
+    sheet_side,
 )
 from gen_data.renderers.warp.scene.kernels.material_eval import is_translucent
 from gen_data.renderers.warp.scene.kernels.ray_queries import (
