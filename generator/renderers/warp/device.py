@@ -268,8 +268,9 @@ def _compile_queued(device: str, folder: str) -> None:
 def _digest() -> str:
     """Digest of the kernels' sources and of the compiler's settings."""
     digest = hashlib.sha256(f"{wp.config.version} {wp.config.cpu_compiler_flags}".encode())
-    for source in sorted(Path(__file__).parent.glob("*/kernels/*.py")):
-        digest.update(source.read_bytes())
+    for source in sorted(Path(__file__).parent.glob("*/kernels/*.*")):
+        if source.suffix in (".h", ".py"):
+            digest.update(source.read_bytes())
     return digest.hexdigest()[:16]
 
 
