@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import permutations, takewhile
 
 import numpy as np
 
@@ -277,34 +278,37 @@ def _shared_lanes(
     n = len(routes)
     offset, low = np.zeros((n, n)), np.full((n, n), np.inf)
     high = np.full((n, n), -np.inf)
-    for i, own in enumerate(routes):
-        ends = (*own.starts_m[1:], own.end_m)
-        for j, other in enumerate(routes):
-            if i == j or not set(own.lanes) & set(other.lanes):
-                continue
-            k = next(
-                (k for k, name in enumerate(own.lanes)
-                 if name in other.lanes and ends[k] > first_m[i]),
-                None,
-            )  # fmt: skip
-            if k is None:
-                continue
-            o = other.lanes.index(own.lanes[k])
-            offset[i, j] = own.starts_m[k] - other.starts_m[o]
-            low[i, j] = own.starts_m[k]
-            if k > 0 and o > 0:
-                meet = crossed.get((other.lanes[o - 1], own.lanes[k - 1]))
-                if meet is not None and meet.kind == "meet":
-                    low[i, j] -= other.starts_m[o] - other.starts_m[o - 1] - meet.own_m[0]
-            while (
-                k + 1 < len(own.lanes)
-                and o + 1 < len(other.lanes)
-                and own.lanes[k + 1] == other.lanes[o + 1]
-            ):
-                k, o = k + 1, o + 1
-            high[i, j] = ends[k]
-            if k + 1 < len(own.lanes) and o + 1 < len(other.lanes):
-                part = crossed.get((other.lanes[o + 1], own.lanes[k + 1]))
-                if part is not None and part.kind == "part":
-                    high[i, j] += part.own_m[1]
+    for (i, own), (j, other) in permutations(enumerate(routes), 2):
+        shared = _shared_lane(own, other, float(first_m[i]), crossed)
+        if shared is not None:
+            offset[i, j], low[i, j], high[i, j] = shared
     return offset, low, high
+
+
+def _shared_lane(
+    own: Route, other: Route, first_m: float, crossed: Mapping[tuple[str, str], Overlap]
+) -> tuple[float, float, float] | None:
+    """Offset, start and end of the first lanes that a route shares with another; None = none.
+
+    Merging before them and parting behind them count.
+    """
+    ends = (*own.starts_m[1:], own.end_m)
+    ahead = (k for k, name in enumerate(own.lanes) if name in other.lanes and ends[k] > first_m)
+    k = next(ahead, None)
+    if k is None:
+        return None
+    o = other.lanes.index(own.lanes[k])
+    offset_m, low_m = own.starts_m[k] - other.starts_m[o], own.starts_m[k]
+    if k > 0 and o > 0:
+        meet = crossed.get((other.lanes[o - 1], own.lanes[k - 1]))
+        if meet is not None and meet.kind == "meet":
+            low_m -= other.starts_m[o] - other.starts_m[o - 1] - meet.own_m[0]
+    pairs = zip(own.lanes[k:], other.lanes[o:], strict=False)
+    common = sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], pairs))
+    k, o = k + common, o + common
+    high_m = ends[k - 1]
+    if k < len(own.lanes) and o < len(other.lanes):
+        part = crossed.get((other.lanes[o], own.lanes[k]))
+        if part is not None and part.kind == "part":
+            high_m += part.own_m[1]
+    return offset_m, low_m, high_m
