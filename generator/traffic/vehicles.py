@@ -151,10 +151,7 @@ def make_vehicles(
     bends = np.maximum(np.abs(courses.curvature_per_m), 1e-6)
     allowed = np.minimum(limits, np.sqrt(LATERAL_M_S2 / bends))
     limit_braking(allowed)
-    widths: dict[str, float] = {}
-    for v in vehicles:
-        for name in v.route.lanes:
-            widths[name] = max(widths.get(name, 0.0), v.width_m)
+    widths = _widest_by_lane(vehicles)
     crossed = find_overlaps(graph, widths)
     walked = crosswalk_zones(graph, widths, crosswalks)
     offset, low, high = _shared_lanes([v.route for v in vehicles], first, crossed)
@@ -170,15 +167,21 @@ def make_vehicles(
         offset_m=offset,
         from_m=low,
         to_m=high,
-        end_m=np.minimum(
-            np.array([v.route.end_m if v.route.dead_end else np.inf for v in vehicles]),
-            [_free_station_m(v, courses, k, obstacles) for k, v in enumerate(vehicles)],
-        ),
+        end_m=np.array([_end_m(v, courses, k, obstacles) for k, v in enumerate(vehicles)]),
         entries=tuple(_entries(graph, v.route) for v in vehicles),
         zones=tuple(_zones(v.route, walked) for v in vehicles),
         overlaps=crossed,
         headings={name: heading(graph.lines[name].lane.center_m, -1) for name in widths},
     )
+
+
+def _widest_by_lane(vehicles: Sequence[Vehicle]) -> dict[str, float]:
+    """Width of the widest vehicle on each lane [m]."""
+    widths: dict[str, float] = {}
+    for v in vehicles:
+        for name in v.route.lanes:
+            widths[name] = max(widths.get(name, 0.0), v.width_m)
+    return widths
 
 
 def _followed_line(graph: LaneGraph, vehicle: Vehicle, grid: Array) -> Array:
@@ -196,6 +199,12 @@ def limit_braking(limits: Array) -> None:
         after = limits[:, k + 1]
         reachable = np.sqrt(after * after + 2.0 * EASY_M_S2 * STATION_M)
         limits[:, k] = np.minimum(limits[:, k], reachable)
+
+
+def _end_m(vehicle: Vehicle, courses: Courses, k: int, obstacles: Array) -> float:
+    """Station at which a vehicle's front has to stop; ``inf`` = nowhere."""
+    route_m = vehicle.route.end_m if vehicle.route.dead_end else math.inf
+    return min(route_m, _free_station_m(vehicle, courses, k, obstacles))
 
 
 def _free_station_m(vehicle: Vehicle, courses: Courses, k: int, obstacles: Array) -> float:
