@@ -26,7 +26,7 @@ from gen_data.assemble.config import load_config
 from gen_data.assemble.pipeline_factory import PipelineFactory
 from gen_data.assets.library import open_library
 from gen_data.renderers.warp.device import open_device
-from gen_data.renderers.warp.device_cache import DeviceCache
+from gen_data.renderers.warp.scene.device_cache import DeviceCache
 from gen_data.runner.identity import format_licences, make_plan
 from gen_data.runner.resident_memory import release_memory
 from gen_data.runner.run import RunProgress, run

@@ -35,8 +35,8 @@ from gen_data.core.se3 import SE3, look_at
 from gen_data.core.streams import Streams
 from gen_data.core.system_calls import usable_cores
 from gen_data.renderers.warp.device import open_device
-from gen_data.renderers.warp.device_cache import DeviceCache
 from gen_data.renderers.warp.renderer import WarpRenderer
+from gen_data.renderers.warp.scene.device_cache import DeviceCache
 from gen_data.runner.resident_memory import release_memory
 
 Points = list[tuple[float, float]]

@@ -274,7 +274,7 @@ def _tiles_of(config: Any, strip: Strip) -> list[Any]:
     with open_pipeline(config) as pipeline:
         sample = pipeline.sample(strip.index)
         shown = pipeline.info.media
-        tiles = list(make_tiles([sample], shown, labels=strip.labels, devices=True))
+        tiles = list(make_tiles([sample], shown, labels=strip.labels, views=pipeline.info.views))
     known = {tile.caption for tile in tiles}
     for name, cloud in sample.capture.clouds.items():
         # Contact sheets leave pseudo lidars out.
@@ -361,7 +361,8 @@ def _draw_sheet(name: str, sheet: Sheet) -> Image.Image:
         samples = [pipeline.sample(index) for index in sheet.samples]
         info = pipeline.info
         shown = info.media if own else dict.fromkeys(info.cameras, wanted)
-        tiles = list(make_tiles(samples, shown, labels=sheet.labels, devices=own))
+        views = info.views if own else {}
+        tiles = list(make_tiles(samples, shown, labels=sheet.labels, views=views))
     images = render_tiles(tiles, sheet.tile_px, captions=len(info.cameras) > 1 or own)
     return Image.fromarray(arrange_tiles(images, sheet.columns))
 

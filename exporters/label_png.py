@@ -233,12 +233,11 @@ def _code_lengths(counts: Sequence[int]) -> Int64:
     """
     symbols = [symbol for symbol, count in enumerate(counts) if count]
     lengths = np.zeros(len(counts), np.int64)
-    while True:
-        lengths[symbols] = depths = _leaf_depths([counts[symbol] for symbol in symbols])
-        if max(depths) <= _CODE_BITS_MAX:
-            return lengths
+    while max(depths := _leaf_depths([counts[symbol] for symbol in symbols])) > _CODE_BITS_MAX:
         # Counts that differ less have shorter codes.
         counts = [-(-count // 2) for count in counts]
+    lengths[symbols] = depths
+    return lengths
 
 
 def _leaf_depths(counts: Sequence[int]) -> list[int]:

@@ -188,13 +188,11 @@ def _trace_borders(corners: _Corners) -> list[list[int]]:
         if seen[left]:
             continue
         first = left if corners.holds_below[left] else left + 1
-        border, corner = [], first
-        while True:
+        border = [first]
+        while (corner := across[border[-1] ^ 1]) != first:
             border.append(corner)
+        for corner in border:
             seen[corner & ~1] = 1
-            corner = across[corner ^ 1]
-            if corner == first:
-                break
         borders.append(border)
     return borders
 

@@ -8,9 +8,8 @@
     <sensor>/poses.jsonl         a line per reading: index of the sample, sequence, time, the
                                  device's model, its pose on the rig and in the world
 
-Every row starts with the index of its sample; ``columns.json`` and
-``gen_data.core.measurement_dtypes`` describe the other columns. Units are the ends of the
-names. ``nan`` is "nothing".
+Every row starts with the index of its sample; ``columns.json`` describes the other columns. Units
+are the ends of the names. ``nan`` is "nothing".
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ from numpy.typing import NDArray
 from gen_data.core.capture import Measurements
 from gen_data.core.errors import ConfigError, StorageError
 from gen_data.core.interfaces import DatasetInfo, SensorInfo, table_path
-from gen_data.core.measurement_dtypes import TABLE_COLUMNS, columns_dtype
+from gen_data.core.measurement_dtypes import columns_dtype
 from gen_data.core.sample import Sample
 from gen_data.core.serialization import canonical_json
 from gen_data.exporters.base import ANY_FORMAT, ExporterBase
@@ -57,8 +56,7 @@ class Tables(ExporterBase):
         """
         if not info.devices:
             raise ConfigError(
-                "exporter 'tables': no device writes rows; add a sensor such as"
-                f" {', '.join(sorted(TABLE_COLUMNS))}"
+                "exporter 'tables': no device writes rows; add a sensor such as imu or radar"
             )
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:

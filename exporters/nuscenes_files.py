@@ -104,7 +104,7 @@ def lidar_bytes(points: NDArray[np.void], turns: int) -> bytes:
 
 
 def radar_bytes(rows: NDArray[np.void]) -> bytes:
-    """Encode the detections of a radar; ``rows`` are of ``measurement_dtypes.RADAR``.
+    """Encode the detections of a radar; ``rows`` have the columns of ``Radar``.
 
     Velocities are the radial one, along x and y; no radar measures the other component. Without
     detections there is one point of NaN, as readers expect.

@@ -203,27 +203,35 @@ def _chunks(
     (classes,) = rr.AnnotationContext(_describe_classes(info, skeletons)).as_component_batches()
     context = rr.ComponentColumn(classes.component_descriptor(), classes, lengths=[1])
     yield Chunk.from_columns("/", indexes=[], columns=[context])
-    counts = [len(row["boxes"]) for row in rows]
-    if any(counts):
-        boxes = [box for row in rows for box in row["boxes"]]
-        columns = rr.Boxes3D.columns(
-            half_sizes=[box["half"] for box in boxes],
-            centers=[box["pose"][:3] for box in boxes],
-            quaternions=[box["pose"][3:] for box in boxes],
-            class_ids=[box["class"] for box in boxes],
-        )
-        yield _chunk(info, "world/boxes", rows, columns.partition(counts))
+    if any(row["boxes"] for row in rows):
+        yield _box_chunk(info, rows)
     for rig in sorted({name for row in rows for name in row["rigs"]}):
         mine = [{**row, "pose": row["rigs"][rig]} for row in rows if rig in row["rigs"]]
         yield _poses(info, f"world/rigs/{rig}", mine)
     for name in info.cameras:
-        images = [{**row, **row["cameras"][name]} for row in rows if name in row["cameras"]]
-        if images:
+        if images := _readings(rows, "cameras", name):
             yield from _camera_chunks(info, name, images, skeletons)
     for name in info.lidars:
-        scans = [{**row, **row["lidars"][name]} for row in rows if name in row["lidars"]]
-        if scans:
+        if scans := _readings(rows, "lidars", name):
             yield from _lidar_chunks(info, name, scans)
+
+
+def _readings(rows: Sequence[Row], kind: str, sensor: str) -> list[Row]:
+    """Rows of the samples that a sensor reads, with the fields of its reading."""
+    return [{**row, **row[kind][sensor]} for row in rows if sensor in row[kind]]
+
+
+def _box_chunk(info: DatasetInfo, rows: Sequence[Row]) -> Any:
+    import rerun as rr
+
+    boxes = [box for row in rows for box in row["boxes"]]
+    columns = rr.Boxes3D.columns(
+        half_sizes=[box["half"] for box in boxes],
+        centers=[box["pose"][:3] for box in boxes],
+        quaternions=[box["pose"][3:] for box in boxes],
+        class_ids=[box["class"] for box in boxes],
+    )
+    return _chunk(info, "world/boxes", rows, columns.partition([len(r["boxes"]) for r in rows]))
 
 
 def _describe_classes(info: DatasetInfo, skeletons: Mapping[int, Skeleton]) -> list[Any]:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping
 from dataclasses import replace
 from typing import Annotated, Literal
 
+from gen_data.assets.families import declared
 from gen_data.config import distributions as dist
 from gen_data.core.asset_types import Material
 from gen_data.core.errors import ConfigError
@@ -19,7 +19,8 @@ from gen_data.randomizers.base import RandomizerBase, choose, find_texture_files
 from gen_data.randomizers.color_space import hsv_to_linear
 from gen_data.rooms.bodies import JOINTS, Builder, Looks, remove_room
 from gen_data.rooms.floor_plan import Room, between, draw_plan
-from gen_data.rooms.layout import Conflict, Piece, furnish
+from gen_data.rooms.furnishing import furnish
+from gen_data.rooms.layout import Conflict, Piece
 from gen_data.rooms.options import families_of, find_options
 from gen_data.rooms.outlook import draw_outlook, outlook_assets
 from gen_data.rooms.rules import APARTMENT, Range, find_room_type
@@ -29,27 +30,6 @@ TRIES, TRIES_PER_ROOM = 12, 3
 _DOOR_STYLES = 4
 _PALE_WALLS, _ACCENTS = 0.87, 0.15
 """Shares of rooms whose walls are near white, and of those where one wall stands out."""
-_WORKPLACES = frozenset({"office", "warehouse", "workshop"})
-"""Rooms that are always pale."""
-_FLOORS: Mapping[str, tuple[Range, Range]] = {
-    "carpet": ((0.45, 0.55), (1.0, 1.0)),
-    "floor_tiles": ((1.1, 1.3), (0.9, 1.0)),
-    "marble": ((0.8, 1.4), (0.15, 0.35)),
-    "screed": ((2.2, 3.0), (0.55, 0.9)),
-    "terrazzo": ((0.5, 0.7), (0.25, 0.5)),
-    "wood_planks": ((1.4, 1.8), (0.35, 0.65)),
-}
-"""Length of a repeat [m] and roughness of floors, by family."""
-_WALLS: Mapping[str, tuple[float, float]] = {
-    "brick": (1.0, 1.0),
-    "concrete": (2.0, 0.9),
-    "granite": (0.4, 0.3),
-    "marble": (1.2, 0.25),
-    "paint": (1.2, 0.85),
-    "plaster": (1.5, 1.0),
-    "tiles": (1.2, 1.0),
-}
-"""Length of a repeat [m] and roughness of walls, by family."""
 _BLINDS = 0.45
 """Share of rooms with blinds."""
 
@@ -164,14 +144,15 @@ class Furnish(RandomizerBase):
         rules = find_room_type(room.kind, "")
         field = f"randomizers.{self.name}"
         ground = choose(rules.floor, rng)
-        scales, roughness = _FLOORS.get(ground, ((1.0, 1.6), (0.8, 1.0)))
         floor = Material(
             (1.0, 1.0, 1.0),
-            between(rng, roughness),
+            between(rng, declared(f"texture/{ground}", "floor_roughness", (0.8, 1.0))),
             texture=choose(find_textures(assets, (ground,), field), rng),
-            texture_scale_m=between(rng, scales),
+            texture_scale_m=between(
+                rng, declared(f"texture/{ground}", "floor_repeat_m", (1.0, 1.6))
+            ),
         )
-        pale = room.kind in _WORKPLACES or rng.random() < _PALE_WALLS
+        pale = rules.pale or rng.random() < _PALE_WALLS
         tint = _draw_pale(rng) if pale else _draw_muted(rng, 0.02, 0.07, (0.82, 0.94))
         wall = choose(rules.walls, rng)
         walls = self._draw_wall(wall, tint, assets, rng)
@@ -197,9 +178,10 @@ class Furnish(RandomizerBase):
     def _draw_wall(self, family: str, tint: Vec3, assets: AssetIndex, rng: Rng) -> Material:
         """A wall covered by a drawn texture of a family; paint takes the tint."""
         options = find_textures(assets, (family,), f"randomizers.{self.name}")
-        scale_m, roughness = _WALLS.get(family, (1.4, 1.0))
+        repeat_m = declared(f"texture/{family}", "wall_repeat_m", 1.4)
+        roughness = declared(f"texture/{family}", "wall_roughness", 1.0)
         color = tint if family == "paint" else (1.0, 1.0, 1.0)
-        return Material(color, roughness, texture=choose(options, rng), texture_scale_m=scale_m)
+        return Material(color, roughness, texture=choose(options, rng), texture_scale_m=repeat_m)
 
 
 def _draw_pale(rng: Rng) -> Vec3:
@@ -219,7 +201,7 @@ def _draw_muted(rng: Rng, low: float, high: float, values: Range) -> Vec3:
 
 def _draw_blinds(room: Room, rng: Rng) -> tuple[float, ...]:
     """Share of each opening that a blind covers; rooms have blinds at all windows or at none."""
-    has_blinds = room.kind not in ("warehouse", "workshop") and rng.random() < _BLINDS
+    has_blinds = find_room_type(room.kind, "").blinds and rng.random() < _BLINDS
     shares = [round(0.08 + 0.55 * float(rng.random()) ** 2, 3) for _ in room.openings]
     return tuple(
         share if has_blinds and opening.kind == "window" else 0.0

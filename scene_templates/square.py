@@ -96,16 +96,17 @@ class Square(Element):
             (-0.5 * math.pi, (2.0, half), (1.0, 0.0), self.depth_m - 2.0),
         )
         for turn, (x, y), (dx, dy), reach in rows:
-            at = 0.0
-            while True:
-                asset = parametric_id(f"building/{self.houses}", seed=int(rng.between(0, 96)))
-                (_, y0, _), (x1, y1, _) = assets.bounds_m(asset)
-                if at + (y1 - y0) > reach + 4.0:
-                    break
+            at, house = 0.0, self._draw_house(rng)
+            (_, y0, _), (x1, y1, _) = assets.bounds_m(house)
+            while at + (y1 - y0) <= reach + 4.0:
                 middle = at + 0.5 * (y1 - y0)
                 stand = SE3.about_z(turn, (x + dx * middle, y + dy * middle, 0.0))
-                yield asset, stand @ SE3((-x1, -0.5 * (y0 + y1), 0.0))
-                at += y1 - y0
+                yield house, stand @ SE3((-x1, -0.5 * (y0 + y1), 0.0))
+                at, house = at + (y1 - y0), self._draw_house(rng)
+                (_, y0, _), (x1, y1, _) = assets.bounds_m(house)
+
+    def _draw_house(self, rng: VariantRng) -> str:
+        return parametric_id(f"building/{self.houses}", seed=int(rng.between(0, 96)))
 
     def _furniture(self, rng: VariantRng) -> Iterator[tuple[str, SE3]]:
         """A fountain in the middle, rows of trees with benches below, lamps at the corners."""

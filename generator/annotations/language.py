@@ -28,6 +28,8 @@ from gen_data.core.interfaces import AssetLibrary
 from gen_data.core.sample import ImageTruth, ObjectTruth, Utterance, both_ways
 from gen_data.core.scene import ObjectGroup, Scene
 
+Words = Mapping[str, str]
+"""Words by their places in a form."""
 CONTACTS = ("inside", "on", "held_by")
 """Predicates that say where a thing is, the most telling one first."""
 SIDES = ("left_of", "right_of")
@@ -205,28 +207,32 @@ class View:
         if thing.instance_id in self.names:
             yield self.names[thing.instance_id]
         others = [t for t in self._candidates(thing.category) if t != thing]
-        number, words = thing.instance_id, {"thing": thing.category}
-        for side, word in (("left_of", "leftmost"), ("right_of", "rightmost")):
-            # "The leftmost mug" is said of mugs, not of a mug and a cup.
-            alike = {t.category for t in others} == {thing.category}
-            if alike and all(_is_beside(thing, side, t) for t in others):
-                yield forms[word].format(**words)
-        yield from (forms[word].format(**words) for word in _sizes(thing, others))
-        if others and thing.color and all(t.color not in ("", thing.color) for t in others):
-            yield forms["color"].format(color=thing.color, **words)
-        for predicate in CONTACTS:
-            for landmark in self._objects(number, predicate):
-                if others and not any(
-                    not t.clear or self._has(t, predicate, landmark) for t in others
-                ):
-                    yield forms[predicate].format(b=self.names[landmark], **words)
+        yield from (
+            forms[form].format(thing=thing.category, **words)
+            for form, words in (
+                *((word, {}) for word in (*_ends(thing, others), *_sizes(thing, others))),
+                *_colors(thing, others),
+                *self._contacts(thing, others),
+                *self._landmarks(thing, others),
+            )
+        )
+
+    def _contacts(self, thing: Thing, others: Sequence[Thing]) -> Iterator[tuple[str, Words]]:
+        """Contacts with named things that no other thing of the name has."""
+        for predicate in CONTACTS if others else ():
+            for landmark in self._objects(thing.instance_id, predicate):
+                if all(t.clear and not self._has(t, predicate, landmark) for t in others):
+                    yield predicate, {"b": self.names[landmark]}
+
+    def _landmarks(self, thing: Thing, others: Sequence[Thing]) -> Iterator[tuple[str, Words]]:
+        """Sides of named things on which no other thing of the name is: the nearest of each."""
         by_id = {t.instance_id: t for t in self.things}
-        for side in SIDES:
-            beside = [by_id[n] for n in self._objects(number, side)]
+        for side in SIDES if others else ():
+            beside = [by_id[n] for n in self._objects(thing.instance_id, side)]
             beside = [t for t in beside if all(_is_across(o, side, t) for o in others)]
-            if others and beside:
+            if beside:
                 nearest = min(beside, key=lambda t: abs(t.middle - thing.middle))
-                yield forms[side].format(b=self.names[nearest.instance_id], **words)
+                yield side, {"b": self.names[nearest.instance_id]}
 
     def _relations(self) -> Iterator[Utterance]:
         forms = grammar()["sentences"]
@@ -258,27 +264,37 @@ class View:
     def _places(self) -> Iterator[Utterance]:
         forms = grammar()["questions"]
         named = [t for t in self.spoken if t.instance_id in self.names]
+        yield from self._whereabouts(forms["where"], named)
+        yield from self._contents(forms["what"])
+        yield from self._views(forms["views"], named)
+
+    def _whereabouts(self, form: str, named: Sequence[Thing]) -> Iterator[Utterance]:
         for thing in named:
             number = thing.instance_id
             for predicate, place in grammar()["places"].items():
                 objects = self._objects(number, predicate)
                 if len(objects) == 1:
-                    text = forms["where"].format(a=self.names[number])
+                    text = form.format(a=self.names[number])
                     answer = place.format(b=self.names[objects[0]])
                     yield Utterance("spatial", text, answer, (number, objects[0]))
+
+    def _contents(self, forms: Mapping[str, str]) -> Iterator[Utterance]:
         for landmark, name in self.names.items():
-            for predicate, form in forms["what"].items():
+            for predicate, form in forms.items():
                 held = [t for t in self.things if self._has(t, predicate, landmark)]
                 if held and all(t in self.spoken for t in held):
                     counts = sorted(Counter(t.category for t in held).items())
                     answer = join([count(category, n) for category, n in counts])
                     ids = tuple(t.instance_id for t in held)
                     yield Utterance("spatial", form.format(b=name), answer, ids)
+
+    def _views(self, forms: Mapping[str, str], named: Sequence[Thing]) -> Iterator[Utterance]:
+        ids = {t.instance_id for t in named}
         for thing in named:
-            for predicate, form in forms["views"].items():
+            for predicate, form in forms.items():
                 for other in self._objects(thing.instance_id, predicate):
                     # Of each pair one question is asked; half of them have the answer no.
-                    if thing.instance_id > other or other not in {t.instance_id for t in named}:
+                    if thing.instance_id > other or other not in ids:
                         continue
                     pair = (thing.instance_id, other)
                     turned = sum(pair) % 2 == 1
@@ -306,6 +322,21 @@ def _is_beside(one: Thing, side: str, other: Thing) -> bool:
     """Whether the boxes of two things are separate, the first one on that side."""
     left, right = (one, other) if side == "left_of" else (other, one)
     return left.box.x_max <= right.box.x_min
+
+
+def _ends(thing: Thing, others: Sequence[Thing]) -> Iterator[str]:
+    """Ends of a row that a thing is at, of things of one category."""
+    # "The leftmost mug" is said of mugs, not of a mug and a cup.
+    if {t.category for t in others} == {thing.category}:
+        for side, word in (("left_of", "leftmost"), ("right_of", "rightmost")):
+            if all(_is_beside(thing, side, t) for t in others):
+                yield word
+
+
+def _colors(thing: Thing, others: Sequence[Thing]) -> Iterator[tuple[str, Words]]:
+    """The colour of a thing, if all others certainly have another one."""
+    if others and thing.color and all(t.color not in ("", thing.color) for t in others):
+        yield "color", {"color": thing.color}
 
 
 def _sizes(thing: Thing, others: Sequence[Thing]) -> Iterator[str]:

@@ -23,8 +23,8 @@ TABLES: Mapping[str, PluginTable[Any]] = {
 }
 """All tables by kind, for ``gen-data describe`` and the JSON Schema."""
 
-ASSET_FAMILY = "asset_family"
-"""Kind of the plug-ins that only the asset library loads."""
+CONTENT_KINDS = ("asset_family", "room_place", "room_type")
+"""Kinds of plug-ins that elements and randomizers find by name or tag."""
 
 P = TypeVar("P")
 
@@ -41,12 +41,11 @@ def default_plugin(table: PluginTable[P], name: str) -> P:
 def third_party_packages(plugins: Iterable[object]) -> dict[str, str]:
     """``{name: version}`` of the third-party packages of plug-ins.
 
-    Packages with asset families are always included, because their families take part in every
-    selection by tags.
+    Packages with content are always included: asset families take part in every selection by tags.
     """
     classes = {f"{type(p).__module__}:{type(p).__qualname__}" for p in plugins}
     found = [e for kind in TABLES for e in third_party(kind).values() if e.value in classes]
-    entries = (*found, *third_party(ASSET_FAMILY).values())
+    entries = (*found, *(e for kind in CONTENT_KINDS for e in third_party(kind).values()))
     packages = sorted({package_of(entry) for entry in entries})
     return {name: version for name, _, version in (p.partition(" ") for p in packages)}
 

@@ -141,7 +141,8 @@ def contact_sheet(
             samples = _samples(pipeline.sample, first, n, step)
             info = pipeline.info
             shown = info.media if own else dict.fromkeys(info.cameras, wanted)
-            drawn = make_tiles(samples, shown, labels=labels, devices=own, width_px=tile_px)
+            views = info.views if own else {}
+            drawn = make_tiles(samples, shown, labels=labels, views=views, width_px=tile_px)
             images += render_tiles(drawn, tile_px, captions=captions)
     write_sheet(arrange_tiles(images, columns), out)
     click.echo(f"{out}: {len(images)} tiles")

@@ -191,8 +191,7 @@ class Measurements:
     """Measurements of a device: radar, IMU, GNSS receiver, odometer, event detector.
 
     Attributes:
-        rows: Records [n] of
-            ``gen_data.core.measurement_dtypes.table_dtype(device.kind)``; may be empty.
+        rows: Records [n] of ``columns_dtype(SensorInfo.columns)``; may be empty.
         time_s: The instant that ``device`` refers to.
     """
 

@@ -363,6 +363,8 @@ class SensorInfo:
         lens: Cameras: model of the lens.
         columns: Devices: columns of its rows; the first is
             ``gen_data.core.measurement_dtypes.TIME``.
+        view: Devices: ``module:function`` that draws a reading for contact sheets, from
+            Measurements, Scene and width over height, as uint8 [h, w, 3]; empty = none.
         rate_hz: Readings per second; None = one per step. Cameras and laser scanners read at most
             once per step.
         time_offset_s: Delay of readings after the step's instant [s].
@@ -376,6 +378,7 @@ class SensorInfo:
     channels: tuple[Channel, ...] = ()
     lens: LensModel = "pinhole"
     columns: tuple[Column, ...] = ()
+    view: str = ""
     rate_hz: float | None = None
     time_offset_s: float = 0.0
     needs_clear_view: bool = False
@@ -542,6 +545,11 @@ class DatasetInfo:
     def devices(self) -> Mapping[str, str]:
         """``{sensor: kind}`` of all other sensors, sorted by name."""
         return {s.name: s.kind for s in self._with_modality(Modality.DEVICE)}
+
+    @property
+    def views(self) -> Mapping[str, str]:
+        """``{device: module:function}`` of the devices that draw their readings."""
+        return {s.name: s.view for s in self._with_modality(Modality.DEVICE) if s.view}
 
     @property
     def media(self) -> Mapping[str, tuple[Channel, ...]]:

@@ -582,8 +582,7 @@ class Device:
 
     Attributes:
         name: The sensor's name in the YAML.
-        kind: ``radar``, ``imu``, ``gnss``, ``odometer``, ``watcher`` (event detector) or
-            ``event_camera``.
+        kind: Kind of device, such as ``radar``.
         rig: Name of its rig; empty = it is mounted at ``camera``.
         T_rig_device: Pose on the rig. X forward, Y left, Z up.
         T_world_device: Pose, derived from the rig's.

@@ -68,27 +68,20 @@ class Engine:
         Raises:
             AssetError: an asset has no collision geometry, or is no robot.
         """
-        held = {
-            a.goal.grasped_object for a in scene.articulations if a.goal and a.goal.kind == "hold"
-        }
-        falling = [b for b in _solids(scene) if b.motion == "dynamic" and b.name not in held]
-        fixed = [b.name for b in _solids(scene) if b.motion != "dynamic" and b.name not in held]
+        free = [body for body in _solids(scene) if body.name not in _held(scene)]
+        falling = [body for body in free if body.motion == "dynamic"]
+        fixed = [body.name for body in free if body.motion != "dynamic"]
         if not falling and not scene.articulations:
             return Settled(scene)
-        self._fill(scene, falling, fixed)
-        arms = self._solve_goals(scene, fixed, _resting_bodies(scene, falling))
+        arms = self._place(scene, falling, fixed)
         if isinstance(arms, Rejection):
             return Settled(scene, arms)
-        surfaces = {body.name: candidate_surfaces(scene, body) for body in falling}
-        links = [name for name in self._world.names if name not in fixed and name not in surfaces]
-        rejection = Settling(self._world, falling, surfaces, self._config).settle(fixed, links)
+        rejection = self._let_fall(scene, falling, fixed)
         if rejection is not None:
             return Settled(scene, rejection)
         settled = self._update_poses(scene, falling, [state for _, state in arms])
-        planned = self._add_arm_tracks(settled, fixed, [body.name for body in falling], arms)
-        if isinstance(planned, Rejection):
-            return Settled(scene, planned)
-        return Settled(planned)
+        shown = self._demonstrate(settled, fixed, [body.name for body in falling], arms)
+        return Settled(scene, shown) if isinstance(shown, Rejection) else Settled(shown)
 
     def weigh(self, scene: Scene) -> Scene:
         """The scene with a mass for every body that collides, guessed where none is known."""
@@ -169,10 +162,12 @@ class Engine:
         name = f"collision shape {shape_version()}"
         return unpack_shape(self._assets.derived(asset_id, name, lambda: pack_shape(compute())))
 
-    def _solve_goals(
-        self, scene: Scene, fixed: list[str], placed: list[str]
+    def _place(
+        self, scene: Scene, falling: list[Body], fixed: list[str]
     ) -> list[tuple[Arm, ArmState]] | Rejection:
-        """Each arm with its solved state; arms avoid those before them."""
+        """Fill the world, and pose each arm; arms avoid those before them."""
+        self._fill(scene, falling, fixed)
+        placed = _resting_bodies(scene, falling)
         arms: list[tuple[Arm, ArmState]] = []
         obstacles = list(fixed)
         for articulation in scene.articulations:
@@ -182,35 +177,34 @@ class Engine:
                 return state
             arms.append((arm, state))
             obstacles += arm.bodies
-            if articulation.goal and state.T_world_held is not None:
-                obstacles.append(articulation.goal.grasped_object)
+            obstacles += filter(None, [_held_by(arm, state)])
         return arms
+
+    def _let_fall(self, scene: Scene, falling: list[Body], fixed: list[str]) -> Rejection | None:
+        surfaces = {body.name: candidate_surfaces(scene, body) for body in falling}
+        links = [name for name in self._world.names if name not in fixed and name not in surfaces]
+        return Settling(self._world, falling, surfaces, self._config).settle(fixed, links)
 
     def _arm(self, articulation: Articulation) -> Arm:
         robot = self._assets.robot(articulation.asset)
         shapes = {link: self._shape(asset) for link, asset in robot.collisions.items()}
         return Arm(articulation, robot, shapes, self._world)
 
-    def _add_arm_tracks(
+    def _demonstrate(
         self, scene: Scene, fixed: list[str], fallen: list[str], arms: list[tuple[Arm, ArmState]]
     ) -> Scene | Rejection:
         """The scene with trajectories of arms with tasks, and of the bodies they carry.
 
         Arms move one after the other, each when those before it have come to rest.
         """
-        if not any(arm.articulation.task for arm, _ in arms):
+        at_work = [(arm, state) for arm, state in arms if arm.articulation.task]
+        if not at_work:
             return scene
-        held = [
-            arm.articulation.goal.grasped_object
-            for arm, state in arms
-            if arm.articulation.goal and state.T_world_held is not None
-        ]
+        held = [name for name in (_held_by(arm, state) for arm, state in arms) if name]
         resting = {name: scene.body(name).T_world_body for name in (*fallen, *held)}
         recording = TrajectoryRecording(dict(resting))
         episodes: dict[str, Episode] = {}
-        for arm, state in arms:
-            if not arm.articulation.task:
-                continue
+        for arm, state in at_work:
             others = [name for other, _ in arms if other is not arm for name in other.bodies]
             obstacles = [*fixed, *others]
             planner = TaskPlanner(arm, state, self._world, obstacles, resting, scene.surfaces)
@@ -273,6 +267,18 @@ def _solids(scene: Scene) -> list[Body]:
     """Bodies that collide, without links of robots, whose geometry comes from their robot."""
     prefixes = tuple(f"{articulation.name}/" for articulation in scene.articulations)
     return [b for b in scene.bodies if b.collides and not b.name.startswith(prefixes)]
+
+
+def _held(scene: Scene) -> set[str]:
+    """Names of bodies that arms hold from the beginning."""
+    goals = (articulation.goal for articulation in scene.articulations)
+    return {goal.grasped_object for goal in goals if goal and goal.kind == "hold"}
+
+
+def _held_by(arm: Arm, state: ArmState) -> str:
+    """Name of the body that an arm holds in a state; empty = none."""
+    goal = arm.articulation.goal
+    return goal.grasped_object if goal and state.T_world_held is not None else ""
 
 
 def _resting_bodies(scene: Scene, falling: list[Body]) -> list[str]:

@@ -6,16 +6,18 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 
 import cv2
 import numpy as np
 
 from gen_data.core.capture import Channel
 from gen_data.core.errors import ConfigError, StorageError
+from gen_data.core.plugins import loaded
 from gen_data.core.sample import Sample
 from gen_data.core.whole_files import write_whole
 from gen_data.preview.overlay import Image, channel_image, draw_labels
-from gen_data.preview.sensor_views import event_view, radar_view, range_view, top_view
+from gen_data.preview.sensor_views import range_view, top_view
 from gen_data.sensors.lidar import pseudo_lidar
 
 GAP_PX = 4
@@ -38,7 +40,7 @@ def make_tiles(
     channels: Mapping[str, Sequence[Channel]],
     *,
     labels: bool,
-    devices: bool = False,
+    views: Mapping[str, str] = MappingProxyType({}),
     width_px: int = 0,
 ) -> Iterator[Tile]:
     """Yield one tile per sample, camera and channel, and two per scan.
@@ -47,7 +49,7 @@ def make_tiles(
         samples: Samples to show.
         channels: Channels of every camera.
         labels: Whether to draw labels on colour images.
-        devices: Whether to add tiles of radars and event cameras.
+        views: ``module:function`` that draws the readings of a device, by the device's name.
         width_px: Width of a tile, for lines and names of a legible size; 0 = that of the image.
     """
     for sample in samples:
@@ -68,11 +70,10 @@ def make_tiles(
                 continue
             yield Tile(name, top_view(cloud, sample.scene, aspect))
             yield Tile(f"{name} range, intensity, class", range_view(cloud))
-        for name, table in sorted(sample.capture.tables.items()) if devices else ():
-            if table.device.kind == "radar":
-                yield Tile(name, radar_view(table, sample.scene, aspect))
-            elif table.device.kind == "event_camera":
-                yield Tile(name, event_view(table))
+        for name, table in sorted(sample.capture.tables.items()):
+            if name in views:
+                draw = loaded(views[name], f"view of '{name}'")
+                yield Tile(name, draw(table, sample.scene, aspect))
 
 
 def render_tiles(shown: Iterable[Tile], width_px: int, *, captions: bool) -> list[Image]:

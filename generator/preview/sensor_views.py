@@ -172,11 +172,12 @@ def radar_view(table: Measurements, scene: Scene, aspect: float) -> Image:
     return image
 
 
-def event_view(table: Measurements) -> Image:
+def event_view(table: Measurements, scene: Scene, aspect: float) -> Image:
     """Draw all events of a reading, uint8 [h, w, 3], cropped to their extent.
 
     Blue is brighter, red is darker; the last event of a pixel counts.
     """
+    del scene, aspect
     rows = table.rows
     shape = (int(rows["y_px"].max(initial=7)) + 1, int(rows["x_px"].max(initial=7)) + 1)
     image: Image = np.full((*shape, 3), GREY, np.uint8)

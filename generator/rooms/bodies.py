@@ -17,6 +17,7 @@ from gen_data.core.se3 import SE3, Vec3
 from gen_data.rooms.floor_plan import WALL_M, Opening, Room, direction, walls_of
 from gen_data.rooms.layout import Piece
 from gen_data.rooms.outlook import Outlook
+from gen_data.rooms.rules import find_room_type
 
 OUTSIDE = "outside"
 LEADS_OUT = "leads_out"
@@ -287,7 +288,7 @@ class Builder:
         pose = SE3.about_z(0.5 * math.pi * (wall - 1), (*room.at_wall(wall, 0.0, 0.0), 0.0))
         asset = _id("wall", **parameters)
         surface, skirting = looks.of_wall(wall), self._assets.materials(asset)[1]
-        if room.kind in ("bathroom", "warehouse", "workshop"):
+        if not find_room_type(room.kind, "").skirting:
             skirting = surface
         self.add(
             f"{room.name}/wall_{wall}",

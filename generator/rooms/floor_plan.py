@@ -8,7 +8,7 @@ what faces into the room.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
@@ -19,9 +19,6 @@ WALL_M = 0.1
 """Thickness of the walls of one room; rooms that touch share a wall of twice as much."""
 DOOR_M = (0.88, 2.04)
 """Width and height of the openings of doors; DIN 18101 has leaves of 0.86 m by 1.985 m."""
-GATE_M = (3.0, 3.2)
-_SILLS_M: Mapping[str, Range] = {"bathroom": (1.2, 1.35), "kitchen": (0.96, 1.1)}
-"""Heights of windows, where they are higher than elsewhere: over worktops, against views."""
 _ASIDE_M = 0.12
 """Smallest distance of an opening from a corner or another opening."""
 _TRIES = 40
@@ -164,19 +161,19 @@ def _open(
     room: Room, rules: RoomType, walls: range | tuple[int, ...] | list[int], doors: int, rng: Rng
 ) -> Room:
     """The room with doors, then windows, in some of its walls, where they fit."""
-    size = GATE_M if room.kind == "warehouse" else DOOR_M
+    size = rules.door_m or DOOR_M
     for _ in range(doors):
         room = _add(
             room, "door", (size[0], 0.0, min(size[1], room.size_m[2] - 0.2)), list(walls), rng
         )
     for _ in range(draw_count(rng, rules.windows)):
-        low = between(rng, _SILLS_M.get(room.kind, (0.8, 0.95)))
-        if room.kind in ("warehouse", "workshop"):
+        low = between(rng, rules.sill_m)
+        if rules.clerestory:
             low = room.size_m[2] - 1.5
         high = min(room.size_m[2] - 0.25, low + between(rng, (1.2, 1.45)))
-        if room.kind == "living_room" and rng.random() < 0.3:
+        if rules.french_windows and rng.random() < rules.french_windows:
             low = 0.1
-        width = between(rng, (0.6, 0.9) if room.kind == "bathroom" else (1.0, 2.1))
+        width = between(rng, rules.window_width_m)
         room = _add(room, "window", (width, low, high), list(walls), rng)
     return room
 

@@ -4,26 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
+from gen_data.assets.families import declared
 from gen_data.core.asset_types import Asset
 from gen_data.core.bounded_cache import ObjectCache
 from gen_data.core.interfaces import AssetIndex
 from gen_data.rooms.rules import APARTMENT, find_room_type
 
 IN_APARTMENTS = ("bathroom", "bedroom", "kitchen", "living_room")
-_ALSO_FROM_PACKS = frozenset(
-    {
-        "armchair",
-        "bed",
-        "chair",
-        "coffee_table",
-        "desk",
-        "house_plant",
-        "office_chair",
-        "sofa",
-        "stool",
-    }
-)
-"""Families whose rules fit any model of their category: no boards, doors or drawers."""
 _by_family: ObjectCache[Mapping[str, tuple[str, ...]]] = ObjectCache(2)
 
 
@@ -58,7 +45,14 @@ def _group(everything: tuple[Asset, ...]) -> Mapping[str, tuple[str, ...]]:
     return {
         family: tuple(
             sorted(
-                (*ids, *(packed.get(category[family], ()) if family in _ALSO_FROM_PACKS else ()))
+                (
+                    *ids,
+                    *(
+                        packed.get(category[family], ())
+                        if declared(family, "also_from_packs", False)
+                        else ()
+                    ),
+                )
             )
         )
         for family, ids in own.items()

@@ -4,31 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
-from typing import Literal
 
-from gen_data.config.data_files import load_data
+from gen_data.config.data_files import load_table
 from gen_data.core.errors import ConfigError, did_you_mean
-from gen_data.core.serialization import from_plain
+from gen_data.core.plugins import loaded, third_party
 
 Range = tuple[float, float]
-Place = Literal[
-    "wall",
-    "corner",
-    "free",
-    "front",
-    "beside",
-    "around",
-    "on",
-    "above",
-    "under",
-    "across",
-    "hang",
-    "window",
-    "below",
-    "ceiling",
-    "door",
-    "over",
-]
+KIND = "room_type"
+"""Kind of the plug-ins that are types of rooms."""
 APARTMENT = "apartment"
 """Type of several joined rooms."""
 
@@ -41,7 +24,7 @@ class Rule:
         piece: Name by which other rules refer to it.
         assets: Families to draw from, each as likely as it is listed.
         count: Smallest and largest number; per piece of ``of`` for ``on``.
-        place: Where it goes.
+        place: Row of ``gen_data.rooms.TABLE``.
         of: Pieces that it refers to.
         gap_m: Distance from that piece [m].
         clearance_m: Depth of free floor before its front [m].
@@ -50,6 +33,8 @@ class Rule:
         at: Place on the top that carries it, from -1 to 1 along depth and width.
         matching: Whether all matching pieces of a room have one look.
         optional: Whether a room may do without it, whatever ``count`` says.
+        movable: Whether a person moves it out of the way.
+        clutter: Whether ``clutter`` of the randomizer scales its number.
         things: Families of small things on it.
         how_many: Smallest and largest number of them per surface.
         filled: Share of its boards that things cover, side by side; 0 = ``how_many`` lie about.
@@ -59,7 +44,7 @@ class Rule:
     piece: str
     assets: tuple[str, ...]
     count: tuple[int, int]
-    place: Place
+    place: str
     of: tuple[str, ...] = ()
     gap_m: Range = (0.0, 0.0)
     clearance_m: float = 0.0
@@ -68,6 +53,8 @@ class Rule:
     at: tuple[float, float] = (0.0, 0.0)
     matching: bool = False
     optional: bool = False
+    movable: bool = False
+    clutter: bool = False
     things: tuple[str, ...] = ()
     how_many: tuple[int, int] = (0, 0)
     filled: Range = (0.0, 0.0)
@@ -85,6 +72,14 @@ class RoomType:
         accent: Those of a single wall that stands out; in a share of the rooms.
         splashback: Those behind worktops.
         pieces: Rules in the order of placing.
+        pale: Whether its walls are always near white.
+        blinds: Whether its windows may have blinds.
+        skirting: Whether skirting boards differ from its walls.
+        door_m: Width and height of the openings of its doors; empty = the usual ones.
+        sill_m: Height of the lower edges of its windows.
+        window_width_m: Width of its windows.
+        clerestory: Whether its windows are below the ceiling.
+        french_windows: Share of windows that begin at the floor.
     """
 
     size_m: tuple[Range, Range, Range]
@@ -94,6 +89,14 @@ class RoomType:
     pieces: tuple[Rule, ...]
     accent: tuple[str, ...] = ()
     splashback: tuple[str, ...] = ()
+    pale: bool = False
+    blinds: bool = True
+    skirting: bool = True
+    door_m: tuple[float, ...] = ()
+    sill_m: Range = (0.8, 0.95)
+    window_width_m: Range = (1.0, 2.1)
+    clerestory: bool = False
+    french_windows: float = 0.0
 
     @property
     def usual_area_m2(self) -> float:
@@ -111,9 +114,18 @@ class RoomType:
 
 @cache
 def room_types() -> dict[str, RoomType]:
-    """The shipped types by name."""
-    rows = load_data(__package__, "room_types")
-    return {name: from_plain(RoomType, row) for name, row in rows.items()}
+    """Types by name: shipped ones, and those of the entry points ``gen_data.room_type``.
+
+    Raises:
+        ConfigError: an entry point is not a RoomType.
+    """
+    found: dict[str, RoomType] = {}
+    for name, entry in third_party(KIND).items():
+        room_type: object = loaded(entry.value, f"{KIND} '{name}'")
+        if not isinstance(room_type, RoomType):
+            raise ConfigError(f"{KIND} '{name}': {entry.value} is not a {__name__}.RoomType")
+        found[name] = room_type
+    return {**found, **load_table(__name__.rpartition(".")[0], "room_types", RoomType)}
 
 
 def find_room_type(name: str, field: str) -> RoomType:

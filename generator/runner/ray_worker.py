@@ -80,8 +80,7 @@ class ShardWorker:
         ended.wait()
 
     def _serve(self) -> None:
-        while True:
-            work = self._work.get()
+        for work in iter(self._work.get, None):
             work()
 
     def _stream(self, work: Callable[[], None]) -> Iterator[list[Event]]:

@@ -15,7 +15,7 @@ from typing_extensions import Self
 from gen_data.config.base_model import NAME_PATTERN, Strict
 from gen_data.core.errors import ConfigError, ConfigWarning, did_you_mean
 from gen_data.core.interfaces import AssetIndex, Modality, Sensor, SensorInfo
-from gen_data.core.measurement_dtypes import TABLE_COLUMNS, TIME_DECIMALS
+from gen_data.core.measurement_dtypes import TIME_DECIMALS, Column
 from gen_data.core.motion import STILL, Trajectory, Twist
 from gen_data.core.scene import Camera, Device, Lidar, Scene
 from gen_data.core.scene_time import RIG_AXES
@@ -91,11 +91,10 @@ class Mounted(Strict):
     def _info(self, name: str, modality: Modality, kind: str = "", **more: Any) -> SensorInfo:
         """Description with the rate of its readings; ``more`` are further fields.
 
-        Its carrier may occlude it, unless it may be inside; devices have the columns of their kind.
+        Its carrier may occlude it, unless it may be inside.
         """
-        given = {"columns": TABLE_COLUMNS[kind]} if kind else {}
         times = {"rate_hz": self.rate_hz, "time_offset_s": self.time_offset_s}
-        fields = {"needs_clear_view": not self.inside, **times, **given, **more}
+        fields = {"needs_clear_view": not self.inside, **times, **more}
         return SensorInfo(name, modality, kind, **fields)
 
 
@@ -110,6 +109,8 @@ class Instrument(Mounted):
     """
 
     kind: ClassVar[str]
+    columns: ClassVar[tuple[Column, ...]]
+    view: ClassVar[str] = ""
     name: str = Field("instrument", pattern=NAME_PATTERN)
     rig: str = "ego"
 
@@ -119,8 +120,9 @@ class Instrument(Mounted):
         return str(getattr(self, "model", ""))
 
     def describe(self) -> SensorInfo:
-        """Describe a device with the columns of its kind."""
-        return self._info(self.name, Modality.DEVICE, self.kind, needs_clear_view=False)
+        """Describe a device with its columns and its drawing."""
+        own = {"columns": self.columns, "view": self.view, "needs_clear_view": False}
+        return self._info(self.name, Modality.DEVICE, self.kind, **own)
 
     def mount(self, scene: Scene) -> Scene:
         """Add this device to its rig.

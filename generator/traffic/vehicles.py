@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import permutations, takewhile
 
 import numpy as np
 
@@ -150,10 +151,7 @@ def make_vehicles(
     bends = np.maximum(np.abs(courses.curvature_per_m), 1e-6)
     allowed = np.minimum(limits, np.sqrt(LATERAL_M_S2 / bends))
     limit_braking(allowed)
-    widths: dict[str, float] = {}
-    for v in vehicles:
-        for name in v.route.lanes:
-            widths[name] = max(widths.get(name, 0.0), v.width_m)
+    widths = _widest_by_lane(vehicles)
     crossed = find_overlaps(graph, widths)
     walked = crosswalk_zones(graph, widths, crosswalks)
     offset, low, high = _shared_lanes([v.route for v in vehicles], first, crossed)
@@ -169,15 +167,21 @@ def make_vehicles(
         offset_m=offset,
         from_m=low,
         to_m=high,
-        end_m=np.minimum(
-            np.array([v.route.end_m if v.route.dead_end else np.inf for v in vehicles]),
-            [_free_station_m(v, courses, k, obstacles) for k, v in enumerate(vehicles)],
-        ),
+        end_m=np.array([_end_m(v, courses, k, obstacles) for k, v in enumerate(vehicles)]),
         entries=tuple(_entries(graph, v.route) for v in vehicles),
         zones=tuple(_zones(v.route, walked) for v in vehicles),
         overlaps=crossed,
         headings={name: heading(graph.lines[name].lane.center_m, -1) for name in widths},
     )
+
+
+def _widest_by_lane(vehicles: Sequence[Vehicle]) -> dict[str, float]:
+    """Width of the widest vehicle on each lane [m]."""
+    widths: dict[str, float] = {}
+    for v in vehicles:
+        for name in v.route.lanes:
+            widths[name] = max(widths.get(name, 0.0), v.width_m)
+    return widths
 
 
 def _followed_line(graph: LaneGraph, vehicle: Vehicle, grid: Array) -> Array:
@@ -195,6 +199,12 @@ def limit_braking(limits: Array) -> None:
         after = limits[:, k + 1]
         reachable = np.sqrt(after * after + 2.0 * EASY_M_S2 * STATION_M)
         limits[:, k] = np.minimum(limits[:, k], reachable)
+
+
+def _end_m(vehicle: Vehicle, courses: Courses, k: int, obstacles: Array) -> float:
+    """Station at which a vehicle's front has to stop; ``inf`` = nowhere."""
+    route_m = vehicle.route.end_m if vehicle.route.dead_end else math.inf
+    return min(route_m, _free_station_m(vehicle, courses, k, obstacles))
 
 
 def _free_station_m(vehicle: Vehicle, courses: Courses, k: int, obstacles: Array) -> float:
@@ -277,34 +287,37 @@ def _shared_lanes(
     n = len(routes)
     offset, low = np.zeros((n, n)), np.full((n, n), np.inf)
     high = np.full((n, n), -np.inf)
-    for i, own in enumerate(routes):
-        ends = (*own.starts_m[1:], own.end_m)
-        for j, other in enumerate(routes):
-            if i == j or not set(own.lanes) & set(other.lanes):
-                continue
-            k = next(
-                (k for k, name in enumerate(own.lanes)
-                 if name in other.lanes and ends[k] > first_m[i]),
-                None,
-            )  # fmt: skip
-            if k is None:
-                continue
-            o = other.lanes.index(own.lanes[k])
-            offset[i, j] = own.starts_m[k] - other.starts_m[o]
-            low[i, j] = own.starts_m[k]
-            if k > 0 and o > 0:
-                meet = crossed.get((other.lanes[o - 1], own.lanes[k - 1]))
-                if meet is not None and meet.kind == "meet":
-                    low[i, j] -= other.starts_m[o] - other.starts_m[o - 1] - meet.own_m[0]
-            while (
-                k + 1 < len(own.lanes)
-                and o + 1 < len(other.lanes)
-                and own.lanes[k + 1] == other.lanes[o + 1]
-            ):
-                k, o = k + 1, o + 1
-            high[i, j] = ends[k]
-            if k + 1 < len(own.lanes) and o + 1 < len(other.lanes):
-                part = crossed.get((other.lanes[o + 1], own.lanes[k + 1]))
-                if part is not None and part.kind == "part":
-                    high[i, j] += part.own_m[1]
+    for (i, own), (j, other) in permutations(enumerate(routes), 2):
+        shared = _shared_lane(own, other, float(first_m[i]), crossed)
+        if shared is not None:
+            offset[i, j], low[i, j], high[i, j] = shared
     return offset, low, high
+
+
+def _shared_lane(
+    own: Route, other: Route, first_m: float, crossed: Mapping[tuple[str, str], Overlap]
+) -> tuple[float, float, float] | None:
+    """Offset, start and end of the first lanes that a route shares with another; None = none.
+
+    Merging before them and parting behind them count.
+    """
+    ends = (*own.starts_m[1:], own.end_m)
+    ahead = (k for k, name in enumerate(own.lanes) if name in other.lanes and ends[k] > first_m)
+    k = next(ahead, None)
+    if k is None:
+        return None
+    o = other.lanes.index(own.lanes[k])
+    offset_m, low_m = own.starts_m[k] - other.starts_m[o], own.starts_m[k]
+    if k > 0 and o > 0:
+        meet = crossed.get((other.lanes[o - 1], own.lanes[k - 1]))
+        if meet is not None and meet.kind == "meet":
+            low_m -= other.starts_m[o] - other.starts_m[o - 1] - meet.own_m[0]
+    pairs = zip(own.lanes[k:], other.lanes[o:], strict=False)
+    common = sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], pairs))
+    k, o = k + common, o + common
+    high_m = ends[k - 1]
+    if k < len(own.lanes) and o < len(other.lanes):
+        part = crossed.get((other.lanes[o], own.lanes[k]))
+        if part is not None and part.kind == "part":
+            high_m += part.own_m[1]
+    return offset_m, low_m, high_m

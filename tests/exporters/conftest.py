@@ -44,7 +44,7 @@ from gen_data.core.interfaces import DatasetInfo, Exporter, Modality, SensorInfo
 from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.lane_geometry import LaneBorder
 from gen_data.core.lens import LensModel
-from gen_data.core.measurement_dtypes import TABLE_COLUMNS, table_rows
+from gen_data.core.measurement_dtypes import table_rows
 from gen_data.core.motion import JointTrajectory, Trajectory
 from gen_data.core.sample import BirdseyeMap, EgoTruth, ImageTruth, ObjectTruth, Sample
 from gen_data.core.scene import (
@@ -62,6 +62,8 @@ from gen_data.core.scene_time import RIG_AXES, add_twists, place_sensors, scene_
 from gen_data.core.se3 import SE3, Array, look_at
 from gen_data.exporters.image_files import write_media
 from gen_data.runner.shard import drop_pixels
+from gen_data.sensors import TABLE as SENSORS
+from gen_data.sensors.navigation.imu import Imu
 from tests.exporters.drives import drive_info
 from tests.wheels import NO_RERUN
 
@@ -232,7 +234,7 @@ def imu_rows(index: int) -> NDArray[Any]:
     """Three readings; the second has a figure of many digits."""
     times_s = 0.1 * index + 0.01 * np.arange(3)
     force = np.array([0.0, 1.0 / 3.0, -2.5e-7])
-    return table_rows("imu", 3, time_s=times_s, force_x_m_s2=force, force_z_m_s2=9.80665)
+    return table_rows(Imu.columns, 3, time_s=times_s, force_x_m_s2=force, force_z_m_s2=9.80665)
 
 
 def annotated(
@@ -436,7 +438,7 @@ def make_info(
     ]
     sensors += [SensorInfo(name, Modality.LIDAR) for name in lidars]
     sensors += [
-        SensorInfo(name, Modality.DEVICE, kind, columns=TABLE_COLUMNS[kind])
+        SensorInfo(name, Modality.DEVICE, kind, columns=SENSORS.load(kind).columns)
         for name, kind in kinds.items()
     ]
     info = DatasetInfo(

@@ -29,6 +29,7 @@ from gen_data.exporters.nuscenes_files import (
     radar_bytes,
 )
 from gen_data.exporters.nuscenes_frames import annotated_things, views_by_instance, visibility_level
+from gen_data.sensors.radar.radar_sensor import Radar
 from tests.exporters.drives import drive_info
 
 ORIGIN_M = (50.0, 50.0, 0.0)
@@ -317,7 +318,7 @@ def test_visibility_adds_up_over_the_cameras(samples: Any) -> None:
 def test_radar_files_have_the_fields_of_the_device() -> None:
     """Position and radial velocity of a detection 30 degrees to the left that approaches."""
     rows = table_rows(
-        "radar",
+        Radar.columns,
         2,
         range_m=[10.0, 20.0],
         azimuth_rad=[np.pi / 6, 0.0],

@@ -17,6 +17,7 @@ from gen_data.core.scene import Device
 from gen_data.core.scene_time import place_sensors
 from gen_data.core.se3 import SE3
 from gen_data.exporters.nuscenes import NuScenes
+from gen_data.sensors.radar.radar_sensor import Radar
 
 # The devkit and its dependencies are older than the NumPy and Matplotlib that they run with.
 pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore")]
@@ -31,7 +32,7 @@ def with_radar(sample: Any) -> Any:
     car = scene.instance(1)
     x, y, _ = T_radar_world.apply(np.array(car.T_world_instance.translation_m))
     rows = table_rows(
-        "radar",
+        Radar.columns,
         sample.index % 4 and 1,
         time_s=scene.time_s,
         range_m=np.hypot(x, y),

@@ -12,11 +12,11 @@ import pytest
 
 from gen_data.core.errors import StorageError
 from gen_data.core.interfaces import Modality, SensorInfo, table_path
-from gen_data.core.measurement_dtypes import TABLE_COLUMNS
 from gen_data.exporters.image_files import write_media
 from gen_data.exporters.measurement_tables import Tables, read_rows
+from gen_data.sensors.navigation.imu import Imu
 
-IMU = SensorInfo("imu", Modality.DEVICE, "imu", columns=TABLE_COLUMNS["imu"])
+IMU = SensorInfo("imu", Modality.DEVICE, "imu", columns=Imu.columns)
 
 
 def test_csv_holds_every_digit_that_matters(world: Any, tmp_path: Path) -> None:
@@ -28,7 +28,7 @@ def test_csv_holds_every_digit_that_matters(world: Any, tmp_path: Path) -> None:
     assert [int(row["sample"]) for row in rows] == [2, 2, 2, 3, 3, 3]
     assert [float(row["force_x_m_s2"]) for row in rows[:3]] == [0.0, 1.0 / 3.0, -2.5e-7]
     assert rows[0]["time_s"] == "0.2"
-    assert list(rows[0]) == ["sample", *(column.name for column in TABLE_COLUMNS["imu"])]
+    assert list(rows[0]) == ["sample", *(column.name for column in Imu.columns)]
 
 
 def test_sequences_have_a_file_each_also_across_shards(world: Any, tmp_path: Path) -> None:

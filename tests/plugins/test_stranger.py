@@ -12,12 +12,15 @@ import re
 import shutil
 import subprocess
 import sys
+from importlib.metadata import distributions
 from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
 
+from gen_data.assemble.plugin_tables import CONTENT_KINDS, TABLES
+from gen_data.preview.contact_sheet import GAP_PX
 from tests.end_to_end.running import ROOT, command
 
 PACKAGE = Path(__file__).parent / "stranger"
@@ -25,8 +28,10 @@ CONFIG = """
 seed: 3
 elements:
   - {type: surface, name: table}
+  - {type: room_layout, name: room, kind: stranger_gallery, annotate: false}
   - {type: stranger_pedestal, name: cup, at_m: [0.0, 0.0, 1.0]}
 randomizers:
+  - {type: furnish, name: furniture}
   - {type: stranger_swap, name: swap, target: cup, tags: [mug]}
   - {type: textures, name: cover, targets: [table], textures: [stranger_pattern], probability: true}
   - {type: camera_pose, name: orbit, stage: view}
@@ -96,6 +101,47 @@ def lines(dataset: Path) -> list[dict[str, object]]:
     return [json.loads(line) for line in text.splitlines()]
 
 
+def test_each_kind_of_plug_in_takes_one_file_and_one_line(installed: str) -> None:
+    """Files and entry points of the package correspond one to one; no file imports another."""
+    (package,) = distributions(path=[installed])
+    files = {path.stem: path.read_text() for path in PACKAGE.glob("src/stranger/[!_]*.py")}
+
+    assert sorted(entry.module for entry in package.entry_points) == sorted(
+        f"stranger.{name}" for name in files
+    )
+    assert {entry.group for entry in package.entry_points} == {
+        f"gen_data.{kind}" for kind in (*TABLES, *CONTENT_KINDS)
+    }
+    assert not [name for name, text in files.items() if "import stranger" in text]
+    assert not [name for name, text in files.items() if "from stranger" in text]
+
+
+def test_the_room_has_the_pieces_of_its_type_at_the_places_of_its_rule(dataset: Path) -> None:
+    """Two blocks in a room 6 m long, a quarter of it from its middle, on a striped floor."""
+    for scene in scenes(dataset):
+        bodies = {body["name"]: body for body in scene["bodies"]}  # type: ignore[attr-defined]
+        blocks = [bodies[f"room/0/stranger_block_{k}"] for k in range(2)]
+        assert all(block["asset"].startswith("stranger_block?seed=") for block in blocks)
+        places = [block["T_world_body"]["translation_m"] for block in blocks]
+        assert places == [[-1.5, 0.0, 0.0], [1.5, 0.0, 0.0]]
+        (material,) = bodies["room/0/floor"]["materials"]
+        assert material["texture"].startswith("texture/stranger_stripes?seed=")
+
+
+def test_the_contact_sheet_shows_the_drawing_of_the_device(dataset: Path, installed: str) -> None:
+    """The last tile is white up to the share of 50 cd/m^2 that the device measured."""
+    arguments = ("contact-sheet", "strange.yaml", "-n", "1", "--channels", "written")
+    done = run(*arguments, "--tile-px", "96", "--columns", "1", path=installed, cwd=dataset.parent)
+
+    assert done.returncode == 0, done.stderr
+    row = (dataset / "tables/meter/000000.csv").read_text().splitlines()[1]
+    sheet = np.array(Image.open(dataset.parent / "contact-sheet.png"))
+    bar = sheet[-GAP_PX - 72 : -GAP_PX, GAP_PX:-GAP_PX]
+    white = round(96 * float(row.split(",")[2]) / 50.0)
+    assert 0 < white < 96
+    assert (bar == np.where(np.arange(96) < white, 255, 0)[:, None]).all()
+
+
 def test_the_data_set_verifies(dataset: Path, installed: str) -> None:
     """Every byte of it."""
     done = run("verify", str(dataset), "--full", path=installed, cwd=dataset)
@@ -122,7 +168,8 @@ def test_the_texture_covers_the_table_and_keeps_its_licence(dataset: Path) -> No
         textures = {material["texture"] for material in table["materials"]}
         assert all(name.startswith("texture/stranger_stripes?seed=") for name in textures)
     licences = (dataset / "LICENSES-ASSETS.md").read_text()
-    assert "| stranger | CC0-1.0 | A stranger | texture/stranger_stripes |" in licences
+    names = "stranger_block, texture/stranger_stripes"
+    assert f"| stranger | CC0-1.0 | A stranger | {names} |" in licences
 
 
 def test_the_sensor_measures_the_images_of_the_renderer(dataset: Path) -> None:
@@ -178,7 +225,7 @@ def test_an_unknown_field_is_refused_at_its_place(installed: str, tmp_path: Path
     done = run("--config", "strange.yaml", "--n", "1", path=installed, cwd=tmp_path)
 
     assert done.returncode != 0
-    assert "strange.yaml:18:36: render.luminance: unknown key" in done.stderr
+    assert "strange.yaml:20:36: render.luminance: unknown key" in done.stderr
     assert "luminance_cd_m2" in done.stderr
 
 
@@ -187,6 +234,6 @@ def test_the_examples_of_the_contributors_guide_are_those_of_the_package() -> No
     guide = (ROOT / "CONTRIBUTING.md").read_text()
     blocks = re.findall(r"^```\w+\n# (tests/\S+)\n(.*?)^```$", guide, re.MULTILINE | re.DOTALL)
 
-    assert len(blocks) == 8
+    assert len(blocks) == 10
     for path, text in blocks:
         assert text.rstrip() in (ROOT / path).read_text(), path

@@ -18,7 +18,10 @@ from gen_data.core.scene import Camera, Device, Instance, Scene
 from gen_data.core.se3 import SE3
 from gen_data.preview.contact_sheet import CAPTION_PX, Tile, make_tiles, render_tiles
 from gen_data.preview.sensor_views import BRIGHTER, DARKER, GREY, event_view, radar_view
+from gen_data.sensors.event_camera.event_camera import COLUMNS, VIEW
+from gen_data.sensors.radar.radar_sensor import Radar
 
+VIEWS = {"radar": Radar.view, "events": VIEW}
 DOCS = Path(__file__).parents[2] / "docs"
 SHEETS = sorted((DOCS / "sheets").glob("*.yaml"))
 CAR = Instance(1, "car", "car", 1, "car", box_min_m=(-2, -1, 0), box_max_m=(2, 1, 1.5))
@@ -27,12 +30,12 @@ CAR = Instance(1, "car", "car", 1, "car", box_min_m=(-2, -1, 0), box_max_m=(2, 1
 def radar_table(**columns: object) -> Measurements:
     """Detections of a radar at the world's origin."""
     device = Device("radar", "radar", "ego", T_world_device=SE3())
-    return Measurements("radar", device, table_rows("radar", 1, **columns))  # type: ignore[arg-type]
+    return Measurements("radar", device, table_rows(Radar.columns, 1, **columns))  # type: ignore[arg-type]
 
 
 def event_table() -> Measurements:
     """Three events: one pixel twice, first brighter, then darker."""
-    rows = table_rows("event_camera", 3, time_s=[0.1, 0.2, 0.3], x_px=[9, 3, 9], y_px=[7, 2, 7])
+    rows = table_rows(COLUMNS, 3, time_s=[0.1, 0.2, 0.3], x_px=[9, 3, 9], y_px=[7, 2, 7])
     rows["polarity"] = [1, 1, -1]
     return Measurements("events", Device("events", "event_camera", "ego"), rows)
 
@@ -56,7 +59,7 @@ def test_every_sensor_shows_what_it_writes() -> None:
     """Captions name the sensor, and the channel where it has several."""
     channels = {"color": (Channel.RGB,), "depth": (Channel.RGB, Channel.Z_DEPTH)}
 
-    shown = list(make_tiles([sample()], channels, labels=False, devices=True))
+    shown = list(make_tiles([sample()], channels, labels=False, views=VIEWS))
 
     assert [t.caption for t in shown] == ["color", "depth rgb", "depth depth", "events", "radar"]
     without = make_tiles([sample()], channels, labels=True)
@@ -78,7 +81,7 @@ def test_captions_stand_below_their_tiles() -> None:
 
 def test_the_last_event_of_a_pixel_decides_its_colour() -> None:
     """Red where it became darker at last, blue where brighter, grey where nothing came."""
-    view = event_view(event_table())
+    view = event_view(event_table(), Scene("t"), 1.0)
 
     assert view.shape == (8, 10, 3)
     assert tuple(view[7, 9]) == DARKER

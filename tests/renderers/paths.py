@@ -7,9 +7,9 @@ import numpy as np
 from gen_data.core.capture import Channel
 from gen_data.core.scene import Camera, Scene
 from gen_data.renderers.warp.device import open_device
-from gen_data.renderers.warp.device_cache import DeviceCache
 from gen_data.renderers.warp.pathtraced.path_tracer import PathTracer
 from gen_data.renderers.warp.renderer import WarpRenderer
+from gen_data.renderers.warp.scene.device_cache import DeviceCache
 from gen_data.renderers.warp.scene.scene_packing import pack_view, pack_world
 from gen_data.renderers.warp.settings import RenderSettings
 from tests.renderers.fake_library import FakeLibrary

@@ -15,11 +15,11 @@ from gen_data.core.photometry import add_fixture, fixture_asset, luminance_cd_m2
 from gen_data.core.scene import Body, Camera, Light, Scene
 from gen_data.core.se3 import SE3, Vec3
 from gen_data.renderers.warp.device import open_device
+from gen_data.renderers.warp.realtime.light_selection import main_lamps
 from gen_data.renderers.warp.renderer import WarpRenderer
 from gen_data.renderers.warp.scene.brdf_albedo_lut import lobe_albedo
 from gen_data.renderers.warp.scene.kernels import analytic_lights, records
 from gen_data.renderers.warp.scene.kernels.brdf import make_brdf, specular_lobe
-from gen_data.renderers.warp.scene.light_selection import main_lamps
 from gen_data.renderers.warp.scene.scene_packing import lamp_records
 from gen_data.renderers.warp.settings import RenderSettings
 from tests.embree import RayCaster, placed

@@ -10,8 +10,8 @@ import warp as wp
 from gen_data.core.scene import Body, Scene
 from gen_data.core.se3 import SE3
 from gen_data.renderers.warp.device import open_device
-from gen_data.renderers.warp.device_cache import DeviceCache
 from gen_data.renderers.warp.scene.bvh import body_tree, face_boxes, mesh_tree
+from gen_data.renderers.warp.scene.device_cache import DeviceCache
 from gen_data.renderers.warp.scene.kernels.bvh_traverse import any_in_mesh, first_in_mesh
 from gen_data.renderers.warp.scene.kernels.ray_queries import (
     closest_hit,

@@ -10,10 +10,10 @@ from gen_data.core.capture import Channel
 from gen_data.core.scene import Body, Environment, Instance, Scene
 from gen_data.core.se3 import SE3
 from gen_data.renderers.warp.device import open_device
-from gen_data.renderers.warp.device_cache import DeviceCache
 from gen_data.renderers.warp.renderer import WarpRenderer
 from gen_data.renderers.warp.scene.bvh import face_boxes
 from gen_data.renderers.warp.scene.device_assets import boxes_around
+from gen_data.renderers.warp.scene.device_cache import DeviceCache
 from gen_data.renderers.warp.scene.scene_packing import pack_view, pack_world
 from gen_data.renderers.warp.settings import RenderSettings
 from gen_data.renderers.warp.visibility.gbuffer import bodies_within, project_vertices

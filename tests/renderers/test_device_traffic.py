@@ -16,8 +16,8 @@ from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.scene import Camera
 from gen_data.core.se3 import SE3
 from gen_data.renderers.warp.device import open_device
-from gen_data.renderers.warp.device_cache import DeviceCache
 from gen_data.renderers.warp.readback import Readback
+from gen_data.renderers.warp.scene.device_cache import DeviceCache
 from gen_data.renderers.warp.scene.kernels import records
 from gen_data.renderers.warp.scene.scene_packing import pack_view
 from gen_data.renderers.warp.scene.struct_dtypes import take_rows

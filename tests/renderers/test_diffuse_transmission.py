@@ -14,8 +14,8 @@ from gen_data.core.capture import Channel
 from gen_data.core.scene import Body, Camera, Environment, Instance, Light, Scene, Weather
 from gen_data.core.se3 import SE3, Vec3
 from gen_data.renderers.warp.device import open_device
-from gen_data.renderers.warp.device_cache import DeviceCache
 from gen_data.renderers.warp.renderer import WarpRenderer
+from gen_data.renderers.warp.scene.device_cache import DeviceCache
 from gen_data.renderers.warp.scene.material_packing import body_materials
 from gen_data.renderers.warp.settings import RenderSettings
 from tests.renderers.fake_library import DARK, FakeLibrary, box_mesh, camera_at, plane_mesh

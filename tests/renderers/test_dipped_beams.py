@@ -11,9 +11,9 @@ from gen_data.core.capture import Channel
 from gen_data.core.scene import Body, Light, Scene
 from gen_data.core.se3 import SE3
 from gen_data.randomizers.vehicle_lights import dipped_beam
+from gen_data.renderers.warp.realtime.light_selection import dipped_share, main_lamps
 from gen_data.renderers.warp.renderer import WarpRenderer
 from gen_data.renderers.warp.scene.kernels import records
-from gen_data.renderers.warp.scene.light_selection import dipped_share, main_lamps
 from gen_data.renderers.warp.settings import RenderSettings
 from tests.renderers.fake_library import DARK, MATTE, FakeLibrary, box_mesh, camera_at
 

@@ -17,12 +17,12 @@ from gen_data.core.scene import Body, Camera, Instance, Light, Scene, Weather
 from gen_data.core.se3 import SE3, look_at
 from gen_data.renderers.warp.atmosphere.precipitation import make_streaks, rain
 from gen_data.renderers.warp.device import open_device
-from gen_data.renderers.warp.device_cache import DeviceCache
 from gen_data.renderers.warp.renderer import WarpRenderer
+from gen_data.renderers.warp.scene.device_cache import DeviceCache
+from gen_data.renderers.warp.scene.kernels.distortion import project_to_pixel
 from gen_data.renderers.warp.scene.kernels.records import View
 from gen_data.renderers.warp.scene.scene_packing import pack_view
 from gen_data.renderers.warp.visibility.amodal import bounding_cone
-from gen_data.renderers.warp.visibility.kernels.distortion import project_to_pixel
 from tests.embree import RayCaster, placed
 from tests.renderers.embree import near_edges
 from tests.renderers.fake_library import DARK, FakeLibrary, box_mesh, room_mesh, sphere_mesh

@@ -18,8 +18,8 @@ from gen_data.core.scene import Body, Light, Scene, Weather
 from gen_data.core.se3 import SE3
 from gen_data.core.shutter import Shutter
 from gen_data.renderers.warp.device import open_device
-from gen_data.renderers.warp.device_cache import DeviceCache
 from gen_data.renderers.warp.renderer import WarpRenderer
+from gen_data.renderers.warp.scene.device_cache import DeviceCache
 from gen_data.renderers.warp.scene.scene_packing import pack_world
 from gen_data.renderers.warp.settings import RenderSettings
 from tests.renderers.fake_library import FakeLibrary, box_mesh, camera_at, plane_mesh

@@ -16,9 +16,9 @@ from gen_data.core.rolling_shutter_projection import project_rolling_shutter, wo
 from gen_data.core.scene import Body, Scene
 from gen_data.core.se3 import SE3
 from gen_data.core.shutter import INSTANT, Shutter
-from gen_data.renderers.warp.frame_context import CameraState, render_view
 from gen_data.renderers.warp.renderer import WarpRenderer
 from gen_data.renderers.warp.shutter_integration import integrate_light, split_slices
+from gen_data.renderers.warp.visibility.frame_context import CameraState, render_view
 from gen_data.renderers.warp.visibility.reprojection import make_bands, render_bands
 from tests.renderers.moving import FACING, LENS, MESHES, even_track, world
 

@@ -6,9 +6,9 @@ import numpy as np
 import warp as wp
 
 from gen_data.renderers.warp.device import open_device
+from gen_data.renderers.warp.native_code import native
 from gen_data.renderers.warp.scene.kernels.records import TextureRecord, World
 from gen_data.renderers.warp.scene.kernels.texture_sampling import (
-    SAMPLE_QUAD,
     Sampler,
     make_sampler,
     texel_at,
@@ -22,7 +22,7 @@ _POINTS = 4096
 
 
 @wp.func_native(
-    SAMPLE_QUAD
+    native("scene/kernels/sample_quad.h")
     + """
     for (int k = 0; k < 4; k += QUAD) {
         Floats u, v;

@@ -35,9 +35,9 @@ from gen_data.renderers.warp.atmosphere.precipitation import (
     usual_exposure_s,
 )
 from gen_data.renderers.warp.device import open_device
-from gen_data.renderers.warp.device_cache import DeviceCache
+from gen_data.renderers.warp.realtime.light_selection import main_lamps
 from gen_data.renderers.warp.renderer import WarpRenderer
-from gen_data.renderers.warp.scene.light_selection import main_lamps
+from gen_data.renderers.warp.scene.device_cache import DeviceCache
 from gen_data.renderers.warp.scene.scene_packing import pack_world
 from gen_data.renderers.warp.settings import RenderSettings
 from tests.randomizers.doubles import rng_of

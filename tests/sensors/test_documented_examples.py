@@ -10,7 +10,6 @@ import textwrap
 import pytest
 import yaml
 
-from gen_data.core.measurement_dtypes import TABLE_COLUMNS
 from gen_data.sensors import TABLE
 
 
@@ -23,7 +22,7 @@ def test_the_example_of_a_navigation_sensor_is_valid_and_names_its_columns(kind:
     (entry,) = yaml.safe_load(textwrap.dedent(block.group(1)))["sensors"]
     sensor = TABLE.load(entry["type"]).model_validate(entry)  # type: ignore[attr-defined]
     assert f'sample.measurements["{sensor.name}"]' in text
-    columns = {column.name for column in TABLE_COLUMNS[kind]}
+    columns = {column.name for column in TABLE.load(kind).columns}
     fields = re.findall(r"``(\w+_(?:s|m|deg|s2|rad))``", text)
     assert fields
     assert set(fields) <= columns

@@ -9,10 +9,9 @@ import pytest
 from pydantic import ValidationError
 
 from gen_data.core.errors import SampleError
-from gen_data.core.measurement_dtypes import LIGHT_STATES, OCCURRENCES
 from gen_data.core.scene import Body, Lane, Rig
 from gen_data.core.se3 import SE3
-from gen_data.sensors.events.event_detector import EventDetector
+from gen_data.sensors.events.event_detector import LIGHT_STATES, OCCURRENCES, EventDetector
 from gen_data.sensors.events.obb_queries import find_obstacles, gap_ahead_m, is_touching
 from tests.sensors.streetcar import (
     PERSON_M,

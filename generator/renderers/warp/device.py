@@ -133,7 +133,7 @@ EVERY_FRAME = (
     "visibility.kernels.label_resolve",
     "realtime.kernels.shadow_culling",
     "scene.kernels.bvh_build",
-    "realtime.kernels.lattice",
+    "scene.kernels.lattice",
     "visibility.kernels.edge_detection",
     "scene.kernels.environment_lighting",
 )
@@ -268,8 +268,9 @@ def _compile_queued(device: str, folder: str) -> None:
 def _digest() -> str:
     """Digest of the kernels' sources and of the compiler's settings."""
     digest = hashlib.sha256(f"{wp.config.version} {wp.config.cpu_compiler_flags}".encode())
-    for source in sorted(Path(__file__).parent.glob("*/kernels/*.py")):
-        digest.update(source.read_bytes())
+    for source in sorted(Path(__file__).parent.glob("*/kernels/*.*")):
+        if source.suffix in (".h", ".py"):
+            digest.update(source.read_bytes())
     return digest.hexdigest()[:16]
 
 

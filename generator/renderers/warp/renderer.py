@@ -13,10 +13,7 @@ from gen_data.core.errors import ConfigError
 from gen_data.core.interfaces import AssetLibrary, FindTones
 from gen_data.core.scene import Camera, Lidar, Scene
 from gen_data.renderers.warp.device import compile_kernels, open_device
-from gen_data.renderers.warp.device_cache import DeviceCache
-from gen_data.renderers.warp.frame_context import CameraState, CameraView, RenderContext
 from gen_data.renderers.warp.lidar.lidar_tracing import trace_scan
-from gen_data.renderers.warp.plates import open_backdrop
 from gen_data.renderers.warp.realtime.realtime_shading import (
     add_precipitation,
     radiance_image,
@@ -24,13 +21,16 @@ from gen_data.renderers.warp.realtime.realtime_shading import (
     shade_pixels,
     smooth_edges,
 )
+from gen_data.renderers.warp.scene.device_cache import DeviceCache
 from gen_data.renderers.warp.scene.scene_packing import pack_view, pack_world
 from gen_data.renderers.warp.settings import RenderSettings
 from gen_data.renderers.warp.shutter_integration import expose_shutter
 from gen_data.renderers.warp.visibility.amodal import render_silhouettes
+from gen_data.renderers.warp.visibility.frame_context import CameraState, CameraView, RenderContext
 from gen_data.renderers.warp.visibility.gbuffer import find_visible
 from gen_data.renderers.warp.visibility.label_images import label_images
 from gen_data.renderers.warp.visibility.optical_flow import FLOW, flow_images
+from gen_data.renderers.warp.visibility.plates import open_backdrop
 from gen_data.renderers.warp.visibility.reprojection import copy_gbuffer
 
 Images = Mapping[Channel, NDArray[Any]]

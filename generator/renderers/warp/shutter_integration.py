@@ -20,7 +20,16 @@ from numpy.typing import NDArray
 from gen_data.core.asset_types import Float32
 from gen_data.core.capture import Channel, SensorReading, Silhouette
 from gen_data.core.scene import Camera, Scene
-from gen_data.renderers.warp.frame_context import (
+from gen_data.renderers.warp.realtime.light_selection import main_lamp_numbers
+from gen_data.renderers.warp.realtime.realtime_shading import (
+    add_precipitation,
+    radiance_image,
+    shade_pixels,
+    smooth_edges,
+)
+from gen_data.renderers.warp.scene.scene_packing import copy_world, repack_moved
+from gen_data.renderers.warp.visibility.amodal import rolling_silhouettes
+from gen_data.renderers.warp.visibility.frame_context import (
     CameraState,
     CameraView,
     RenderContext,
@@ -28,15 +37,6 @@ from gen_data.renderers.warp.frame_context import (
     is_moving,
     render_view,
 )
-from gen_data.renderers.warp.realtime.realtime_shading import (
-    add_precipitation,
-    radiance_image,
-    shade_pixels,
-    smooth_edges,
-)
-from gen_data.renderers.warp.scene.light_selection import main_lamp_numbers
-from gen_data.renderers.warp.scene.scene_packing import copy_world, repack_moved
-from gen_data.renderers.warp.visibility.amodal import rolling_silhouettes
 from gen_data.renderers.warp.visibility.kernels.exposure import add_rows
 from gen_data.renderers.warp.visibility.optical_flow import FLOW, flow_images
 from gen_data.renderers.warp.visibility.reprojection import (

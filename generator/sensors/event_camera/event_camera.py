@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +25,7 @@ from gen_data.core.capture import Channel, Measurements
 from gen_data.core.colorimetry import luminance
 from gen_data.core.interfaces import Modality, Renderer, SensorInfo
 from gen_data.core.intrinsics import Intrinsics
-from gen_data.core.measurement_dtypes import table_rows
+from gen_data.core.measurement_dtypes import TIME, Column, table_rows
 from gen_data.core.scene import Camera, Device, Scene
 from gen_data.core.scene_time import RIG_AXES, scene_at
 from gen_data.core.se3 import Array
@@ -35,6 +35,13 @@ from gen_data.sensors.mounting import Mounted, check_rate, check_rig, find_camer
 DARK_CD_M2 = 0.005
 """Luminance equivalent of the dark current. White paper under 0.1 lx, the least illuminance for a
 DVS128 (Lichtsteiner et al. 2008), is six times as bright."""
+COLUMNS = (
+    TIME,
+    Column("x_px", "<u2", "column of the pixel"),
+    Column("y_px", "<u2", "row of the pixel"),
+    Column("polarity", "|i1", "1 brighter, -1 darker"),
+    Column("instance_id", "<u2", "what the pixel shows at the nearest frame; 0"),
+)
 THRESHOLD_MIN = 0.01
 BRIGHT_SHARE = 0.25
 """Shot noise of the brightest pixels over that in the dark (v2e)."""
@@ -184,6 +191,7 @@ def apply_refractory_period(events: Events, refractory_s: float) -> Events:
 
 SidePx = Annotated[int, Field(ge=8, le=2048)]
 KIND = "event_camera"
+VIEW = "gen_data.preview.sensor_views:event_view"
 CHANNELS = frozenset({Channel.RADIANCE, Channel.INSTANCE})
 
 
@@ -208,6 +216,7 @@ class EventCamera(Mounted):
         shot_noise_hz: Rate of noise events in the dark, per pixel.
     """
 
+    columns: ClassVar[tuple[Column, ...]] = COLUMNS
     type: Literal["event_camera"] = "event_camera"
     name: str = Field("events", pattern=NAME_PATTERN)
     camera: str = "color"
@@ -222,7 +231,7 @@ class EventCamera(Mounted):
 
     def describe(self) -> SensorInfo:
         """Describe a device whose view its carrier may occlude."""
-        return self._info(self.name, Modality.DEVICE, KIND)
+        return self._info(self.name, Modality.DEVICE, KIND, columns=self.columns, view=VIEW)
 
     def mount(self, scene: Scene) -> Scene:
         """Add this device to its rig, or to its camera.
@@ -245,7 +254,7 @@ class EventCamera(Mounted):
         start_s, end_s = window_s(scene, self.rate_hz)
         device = scene.device(self.name)
         if end_s <= start_s:
-            return Measurements(self.name, device, table_rows("event_camera", 0), scene.time_s)
+            return Measurements(self.name, device, table_rows(COLUMNS, 0), scene.time_s)
         times_s = start_s + (end_s - start_s) * np.linspace(0.0, 1.0, self.frames_per_step + 1)
         luminances, ids = self._render_frames(scene, times_s, renderer)
         width_px, height_px = self.size_px
@@ -257,7 +266,7 @@ class EventCamera(Mounted):
         events = apply_refractory_period(Events.merge([signal, noise]), self.refractory_s)
         frame = np.rint((events.time_s - start_s) / (times_s[1] - start_s)).astype(np.int64)
         rows = table_rows(
-            "event_camera",
+            COLUMNS,
             len(events.pixel),
             time_s=events.time_s,
             x_px=events.pixel % width_px,

@@ -17,7 +17,7 @@ from gen_data.config.base_model import NAME_PATTERN
 from gen_data.core.capture import Channel, Measurements
 from gen_data.core.errors import SampleError
 from gen_data.core.interfaces import Renderer
-from gen_data.core.measurement_dtypes import LIGHT_STATES, OCCURRENCES, WATCHER, table_rows
+from gen_data.core.measurement_dtypes import TIME, Column, table_rows
 from gen_data.core.scene import Scene
 from gen_data.core.se3 import Array
 from gen_data.core.streams import Rng
@@ -39,6 +39,28 @@ EVERYTHING: tuple[Occurrence, ...] = get_args(Occurrence)
 Row = tuple[float, int, int, float]
 """Time [s], number of the event, id of the other instance, value."""
 
+OCCURRENCES = ("collision", "lane_invasion", "obstacle", "traffic_light", "proximity")
+"""Events that a watcher (event detector) reports, by index."""
+
+LIGHT_STATES = ("dark", "red", "red_yellow", "yellow", "green")
+"""``value`` of the occurrence ``traffic_light``, by number."""
+
+COLUMNS = (
+    TIME,
+    Column(
+        "occurrence",
+        "|u1",
+        "0 collision, 1 lane_invasion, 2 obstacle, 3 traffic_light, 4 proximity",
+    ),
+    Column("instance_id", "<u2", "the other thing; 0 = none"),
+    Column(
+        "value",
+        "<f4",
+        "collision: speed against each other [m/s]; lane_invasion: 1 = the line to the left, -1 ="
+        " to the right; obstacle, proximity: distance [m]; traffic_light: 0 dark, 1 red, 2 red and"
+        " yellow, 3 yellow, 4 green",
+    ),
+)
 CLOSING_SPEED_MAX_M_S = 150.0
 """Bound for culling: no object approaches faster."""
 LOW_M = 0.2
@@ -60,6 +82,7 @@ class EventDetector(Instrument):
     """
 
     kind: ClassVar[str] = "watcher"
+    columns: ClassVar[tuple[Column, ...]] = COLUMNS
     type: Literal["watcher"] = "watcher"
     name: str = Field("watcher", pattern=NAME_PATTERN)
     events: tuple[Occurrence, ...] = Field(EVERYTHING, min_length=1)
@@ -193,5 +216,5 @@ def _report_nearest(
 def _table(rows: list[Row]) -> NDArray[np.void]:
     """Rows sorted by time, event and instance."""
     columns = np.array(sorted(rows), dtype=np.float64).reshape(-1, 4).T
-    names = tuple(column.name for column in WATCHER)
-    return table_rows("watcher", len(rows), **dict(zip(names, columns, strict=True)))
+    names = tuple(column.name for column in COLUMNS)
+    return table_rows(COLUMNS, len(rows), **dict(zip(names, columns, strict=True)))

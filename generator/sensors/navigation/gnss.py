@@ -33,7 +33,7 @@ from gen_data.config.base_model import NAME_PATTERN, Strict
 from gen_data.core.capture import Channel, LidarRays, Measurements
 from gen_data.core.geodesy import GeodeticOrigin, to_geodetic
 from gen_data.core.interfaces import Renderer
-from gen_data.core.measurement_dtypes import table_rows
+from gen_data.core.measurement_dtypes import TIME, Column, table_rows
 from gen_data.core.scene import Lidar, Scene
 from gen_data.core.scene_time import scene_at
 from gen_data.core.se3 import SE3, Array
@@ -47,6 +47,19 @@ from gen_data.sensors.mounting import (
     remove_carrier,
 )
 
+COLUMNS = (
+    TIME,
+    Column("latitude_deg", "<f8", "WGS 84; NaN without a fix"),
+    Column("longitude_deg", "<f8", "WGS 84; NaN"),
+    Column("altitude_m", "<f8", "above the ellipsoid; NaN"),
+    Column("velocity_east_m_s", "<f4", "NaN without a fix"),
+    Column("velocity_north_m_s", "<f4", "NaN"),
+    Column("velocity_up_m_s", "<f4", "NaN"),
+    Column("horizontal_sigma_m", "<f4", "standard deviation of the position, per axis; NaN"),
+    Column("vertical_sigma_m", "<f4", "standard deviation of the altitude; NaN"),
+    Column("satellites", "|u1", "in sight"),
+    Column("quality", "|u1", "as in NMEA GGA: 0 no fix, 1 alone, 2 differential, 4 RTK, 5 float"),
+)
 PRESETS = "gen_data.sensors.navigation.gnss_presets"
 OCCLUSION_RANGE_M = 1000.0
 """Objects farther away occlude no satellite."""
@@ -101,6 +114,7 @@ class Gnss(Instrument):
     """
 
     kind: ClassVar[str] = "gnss"
+    columns: ClassVar[tuple[Column, ...]] = COLUMNS
     type: Literal["gnss"] = "gnss"
     name: str = Field("gnss", pattern=NAME_PATTERN)
     model: Annotated[str, AfterValidator(lambda name: check_preset(PRESETS, name))] = "standalone"
@@ -127,7 +141,7 @@ class Gnss(Instrument):
         rate_hz = self.rate_hz or 1.0 / scene.step_s
         slow = _draw_slow_errors(times_s, rate_hz, model.correlation_s, shared)
         columns = self._columns(model, motion, times_s, fixes, slow, rng)
-        rows = table_rows("gnss", len(times_s), time_s=times_s, **columns)
+        rows = table_rows(COLUMNS, len(times_s), time_s=times_s, **columns)
         return Measurements(self.name, scene.device(self.name), rows, scene.time_s)
 
     def _columns(

@@ -30,16 +30,25 @@ from pydantic import AfterValidator, Field
 from gen_data.config.base_model import NAME_PATTERN, Strict
 from gen_data.core.capture import Channel, Measurements
 from gen_data.core.interfaces import Renderer
-from gen_data.core.measurement_dtypes import IMU, table_rows
+from gen_data.core.measurement_dtypes import TIME, Column, table_rows
 from gen_data.core.scene import Scene
 from gen_data.core.se3 import Array
 from gen_data.core.streams import Rng
 from gen_data.sensors.device_presets import check_preset, load_preset
 from gen_data.sensors.mounting import Instrument, mount_motion, reading_times
 
+COLUMNS = (
+    TIME,
+    Column("force_x_m_s2", "<f8", "specific force forward: acceleration minus gravity"),
+    Column("force_y_m_s2", "<f8", "to the left"),
+    Column("force_z_m_s2", "<f8", "upward; 9.8 at rest"),
+    Column("rate_x_rad_s", "<f8", "angular rate about the forward axis"),
+    Column("rate_y_rad_s", "<f8", "about the left axis"),
+    Column("rate_z_rad_s", "<f8", "about the upward axis"),
+)
 PRESETS = "gen_data.sensors.navigation.imu_presets"
 GRAVITY_M_S2 = 9.80665
-AXES = tuple(column.name for column in IMU[1:])
+AXES = tuple(column.name for column in COLUMNS[1:])
 
 
 class Errors(Strict):
@@ -75,6 +84,7 @@ class Imu(Instrument):
     """
 
     kind: ClassVar[str] = "imu"
+    columns: ClassVar[tuple[Column, ...]] = COLUMNS
     type: Literal["imu"] = "imu"
     name: str = Field("imu", pattern=NAME_PATTERN)
     model: Annotated[str, AfterValidator(lambda name: check_preset(PRESETS, name))] = "RT3003"
@@ -95,7 +105,7 @@ class Imu(Instrument):
             limits = _per_axis(model, "full_scale")
             readings = np.clip(readings, -limits, limits)
         columns = dict(zip(AXES, np.round(readings, 9).T, strict=True))
-        rows = table_rows("imu", len(times_s), time_s=times_s, **columns)
+        rows = table_rows(COLUMNS, len(times_s), time_s=times_s, **columns)
         return Measurements(self.name, scene.device(self.name), rows, scene.time_s)
 
 

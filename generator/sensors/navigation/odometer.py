@@ -26,12 +26,23 @@ from pydantic import Field
 from gen_data.config.base_model import NAME_PATTERN
 from gen_data.core.capture import Channel, Measurements
 from gen_data.core.interfaces import Renderer
-from gen_data.core.measurement_dtypes import table_rows
+from gen_data.core.measurement_dtypes import TIME, Column, table_rows
 from gen_data.core.scene import Scene
 from gen_data.core.se3 import Array
 from gen_data.core.streams import Rng
 from gen_data.sensors.mounting import Instrument, MountMotion, mount_motion, reading_times
 
+COLUMNS = (
+    TIME,
+    Column("distance_m", "<f8", "travelled since the beginning; backwards counts down"),
+    Column("speed_m_s", "<f4", "forward"),
+    Column("yaw_rate_rad_s", "<f4", "to the left"),
+    Column("steering_rad", "<f4", "of the front wheels, to the left; 0 below walking pace"),
+    Column("wheel_rear_left_m_s", "<f4", "speed of the wheel's rim"),
+    Column("wheel_rear_right_m_s", "<f4", "speed of the wheel's rim"),
+    Column("wheel_front_left_m_s", "<f4", "speed of the wheel's rim"),
+    Column("wheel_front_right_m_s", "<f4", "speed of the wheel's rim"),
+)
 WALKING_M_S = 0.5
 """Below this speed the steering angle is not observable and reported as 0."""
 CHORDS = 4
@@ -53,6 +64,7 @@ class Odometer(Instrument):
     """
 
     kind: ClassVar[str] = "odometer"
+    columns: ClassVar[tuple[Column, ...]] = COLUMNS
     type: Literal["odometer"] = "odometer"
     name: str = Field("odometer", pattern=NAME_PATTERN)
     wheelbase_m: float = Field(2.7, gt=0, le=20)
@@ -91,7 +103,7 @@ class Odometer(Instrument):
             "wheel_front_left_m_s": wheels[2],
             "wheel_front_right_m_s": wheels[3],
         }
-        rows = table_rows("odometer", len(times_s), time_s=times_s, **columns)
+        rows = table_rows(COLUMNS, len(times_s), time_s=times_s, **columns)
         return Measurements(self.name, scene.device(self.name), rows, scene.time_s)
 
     def _steering(self, speeds: Array, rates: Array) -> Array:

@@ -24,7 +24,7 @@ from pydantic import AfterValidator, Field
 from gen_data.config.base_model import NAME_PATTERN, Strict
 from gen_data.core.capture import Channel, LidarHits, LidarRays, Measurements
 from gen_data.core.interfaces import Renderer
-from gen_data.core.measurement_dtypes import table_rows
+from gen_data.core.measurement_dtypes import TIME, Column, table_rows
 from gen_data.core.scene import Instance, Lidar, Scene
 from gen_data.core.se3 import Array
 from gen_data.core.streams import Rng
@@ -44,6 +44,19 @@ from gen_data.sensors.radar.radar_detection import (
     strongest_members,
 )
 
+COLUMNS = (
+    TIME,
+    Column("range_m", "<f4", "distance from the radar"),
+    Column("azimuth_rad", "<f4", "to the left of its axis"),
+    Column("elevation_rad", "<f4", "above its axis; 0 where the device cannot tell"),
+    Column("velocity_m_s", "<f4", "radial, relative to the radar; positive = receding"),
+    Column("velocity_compensated_m_s", "<f4", "the same without the radar's own motion"),
+    Column("rcs_dbsm", "<f4", "radar cross section as measured, fluctuation included"),
+    Column("snr_db", "<f4", "signal over noise"),
+    Column("instance_id", "<u2", "what sent most of it back; 0 = unlabelled or noise"),
+    Column("category_id", "<u2", "of that instance; 0"),
+    Column("origin", "|u1", "0 false alarm, 1 a thing with an instance id, 2 ground and the like"),
+)
 PRESETS = "gen_data.sensors.radar.presets"
 FALSE_ALARM = 1e-6
 """Probability that noise alone exceeds the threshold in one cell."""
@@ -83,6 +96,8 @@ class Radar(Instrument):
     """
 
     kind: ClassVar[str] = "radar"
+    columns: ClassVar[tuple[Column, ...]] = COLUMNS
+    view: ClassVar[str] = "gen_data.preview.sensor_views:radar_view"
     type: Literal["radar"] = "radar"
     name: str = Field("radar", pattern=NAME_PATTERN)
     model: Annotated[str, AfterValidator(lambda name: check_preset(PRESETS, name))] = "ARS408-21"
@@ -139,7 +154,7 @@ class Radar(Instrument):
         towards = _directions(found.azimuth_rad, found.elevation_rad)
         categories = {i.instance_id: i.category_id for i in scene.instances}
         rows = table_rows(
-            "radar",
+            COLUMNS,
             len(found.range_m),
             time_s=scene.time_s,
             range_m=found.range_m,

@@ -24,7 +24,7 @@ from gen_data.core.scene import Camera, Weather
 from gen_data.core.se3 import SE3, Array
 from gen_data.core.streams import Rng, Streams
 from gen_data.renderers.warp.atmosphere.kernels import precipitation
-from gen_data.renderers.warp.frame_context import CameraView
+from gen_data.renderers.warp.visibility.frame_context import CameraView
 
 _NEAREST_M = 0.35
 # Aperture of the lens: near particles are defocused by that much.

@@ -14,9 +14,9 @@ import warp as wp
 from gen_data.core.scene import LIGHT_KINDS, Weather
 from gen_data.renderers.warp.atmosphere.kernels import fog as kernels
 from gen_data.renderers.warp.atmosphere.kernels import ground_weathering, water_reflections
-from gen_data.renderers.warp.frame_context import CameraView
-from gen_data.renderers.warp.realtime.kernels.lattice import Lattice
 from gen_data.renderers.warp.scene.kernels import records
+from gen_data.renderers.warp.scene.kernels.lattice import Lattice
+from gen_data.renderers.warp.visibility.frame_context import CameraView
 
 # Standard deviation of ground_weathering.fractal_noise, which is nearly normal.
 _PATCH_DEVIATION = 0.513

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from gen_data.config.data_files import load_table
 from gen_data.core.asset_types import Material
 from gen_data.core.se3 import Array
-from gen_data.renderers.warp.device_cache import DeviceCache
 from gen_data.renderers.warp.lidar.kernels.lidar_rays import Infrared
+from gen_data.renderers.warp.scene.device_cache import DeviceCache
 from gen_data.renderers.warp.scene.material_packing import BodyMaterials
 from gen_data.renderers.warp.scene.struct_dtypes import stack_records, struct_dtype
 

@@ -24,12 +24,12 @@ from gen_data.core.scene import Body, Camera, Lidar, Scene
 from gen_data.core.se3 import Array
 from gen_data.renderers.warp.atmosphere.weather import ground_record
 from gen_data.renderers.warp.device import launch
-from gen_data.renderers.warp.device_cache import DeviceCache
 from gen_data.renderers.warp.lidar.infrared_materials import infrared_surfaces
 from gen_data.renderers.warp.lidar.kernels import lidar_rays as kernels
 from gen_data.renderers.warp.lidar.kernels.ray_packets import LISTED_MAX, Boxes
 from gen_data.renderers.warp.readback import Readback
 from gen_data.renderers.warp.scene.bvh import group_boxes
+from gen_data.renderers.warp.scene.device_cache import DeviceCache
 from gen_data.renderers.warp.scene.material_packing import BodyMaterials, body_materials
 from gen_data.renderers.warp.scene.scene_packing import PackedWorld, pack_world
 from gen_data.renderers.warp.visibility.label_images import category_ids

@@ -22,16 +22,16 @@ from gen_data.core.se3 import Array
 from gen_data.core.streams import Streams
 from gen_data.renderers.warp.atmosphere.weather import fill_fog, ground_record
 from gen_data.renderers.warp.device import launch
-from gen_data.renderers.warp.device_cache import DeviceCache
-from gen_data.renderers.warp.frame_context import CameraView
 from gen_data.renderers.warp.pathtraced.kernels import integrator
 from gen_data.renderers.warp.pathtraced.kernels.emitters import SkyTable
 from gen_data.renderers.warp.realtime.realtime_shading import darken_outside
 from gen_data.renderers.warp.scene.brdf_albedo_lut import smith_albedo
+from gen_data.renderers.warp.scene.device_cache import DeviceCache
 from gen_data.renderers.warp.scene.environment_maps import irradiance_coefficients
 from gen_data.renderers.warp.scene.kernels import records
 from gen_data.renderers.warp.scene.scene_packing import PackedWorld, lamp_records
 from gen_data.renderers.warp.settings import RenderSettings
+from gen_data.renderers.warp.visibility.frame_context import CameraView
 
 
 def require_denoiser() -> None:

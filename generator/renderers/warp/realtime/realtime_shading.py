@@ -18,32 +18,24 @@ from gen_data.core.se3 import Array
 from gen_data.renderers.warp.atmosphere.precipitation import draw_precipitation
 from gen_data.renderers.warp.atmosphere.weather import expose_ground, fill_air
 from gen_data.renderers.warp.device import launch
-from gen_data.renderers.warp.frame_context import (
-    CameraState,
-    CameraView,
-    RenderContext,
-    render_view,
-)
-from gen_data.renderers.warp.plates import (
-    cover_by_foreground,
-    mix_photo,
-    restore_photo,
-    show_photo,
-    things_in,
-    without_things,
-)
 from gen_data.renderers.warp.realtime.kernels import (
     lattice_interpolation,
     lattice_lighting,
     shadow_culling,
     soft_shadows,
 )
-from gen_data.renderers.warp.realtime.kernels.lattice import Lattice, sample_lattice
-from gen_data.renderers.warp.scene.kernels import ray_queries, records
-from gen_data.renderers.warp.scene.light_selection import extract_sky_lights, keep_main_lamps
+from gen_data.renderers.warp.realtime.light_selection import extract_sky_lights, keep_main_lamps
+from gen_data.renderers.warp.scene.kernels import distortion, ray_queries, records
+from gen_data.renderers.warp.scene.kernels.lattice import Lattice, sample_lattice
 from gen_data.renderers.warp.scene.struct_dtypes import take_rows
+from gen_data.renderers.warp.visibility.frame_context import (
+    CameraState,
+    CameraView,
+    RenderContext,
+    render_view,
+)
 from gen_data.renderers.warp.visibility.gbuffer import GBuffer
-from gen_data.renderers.warp.visibility.kernels import distortion, edge_antialiasing, rasterizer
+from gen_data.renderers.warp.visibility.kernels import edge_antialiasing, rasterizer
 from gen_data.renderers.warp.visibility.kernels import msaa as mixing
 from gen_data.renderers.warp.visibility.kernels.edge_detection import (
     GROUP_PX,
@@ -51,6 +43,14 @@ from gen_data.renderers.warp.visibility.kernels.edge_detection import (
     write_mixed,
 )
 from gen_data.renderers.warp.visibility.multisampling import draw_samples
+from gen_data.renderers.warp.visibility.plates import (
+    cover_by_foreground,
+    mix_photo,
+    restore_photo,
+    show_photo,
+    things_in,
+    without_things,
+)
 
 _PARTS = 2
 """Positions of further samples of pixels on edges in reflections or behind glass."""

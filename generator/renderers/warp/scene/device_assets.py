@@ -18,6 +18,7 @@ from gen_data.core.code_digests import code_digest
 from gen_data.core.colorimetry import srgb_decode
 from gen_data.core.mapped_files import owned_bytes
 from gen_data.core.se3 import Array
+from gen_data.renderers.warp.native_code import native
 from gen_data.renderers.warp.scene import bvh
 from gen_data.renderers.warp.scene.bvh import face_boxes, group_boxes, mesh_tree
 from gen_data.renderers.warp.scene.kernels import bvh_build
@@ -47,7 +48,9 @@ _CONVEXITY_FACES_MAX = 2000
 def arrays_version() -> str:
     """Everything but the asset that prepared arrays depend on: code and libraries."""
     modules = (__file__, bvh.__file__, bvh_build.__file__, colorimetry.__file__)
-    return code_digest(modules, cv2.__version__, np.__version__, wp.__version__)
+    return code_digest(
+        modules, native("scene/kernels/grow.h"), cv2.__version__, np.__version__, wp.__version__
+    )
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from gen_data.core.asset_types import SURFACES, Material
 from gen_data.core.scene import Body
-from gen_data.renderers.warp.device_cache import DeviceCache
 from gen_data.renderers.warp.scene.device_assets import DeviceTexture
+from gen_data.renderers.warp.scene.device_cache import DeviceCache
 from gen_data.renderers.warp.scene.kernels import records
 from gen_data.renderers.warp.scene.struct_dtypes import stack_records, struct_dtype
 

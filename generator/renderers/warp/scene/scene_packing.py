@@ -24,9 +24,9 @@ from gen_data.core.scene import (
 )
 from gen_data.core.scene_time import moving_bodies
 from gen_data.core.se3 import Array, unit_quaternions_to_rotations
-from gen_data.renderers.warp.device_cache import DeviceCache
 from gen_data.renderers.warp.scene.bvh import body_tree, group_boxes
 from gen_data.renderers.warp.scene.device_assets import DeviceMesh
+from gen_data.renderers.warp.scene.device_cache import DeviceCache
 from gen_data.renderers.warp.scene.environment_maps import DeviceEnvironment
 from gen_data.renderers.warp.scene.kernels import records
 from gen_data.renderers.warp.scene.material_packing import (

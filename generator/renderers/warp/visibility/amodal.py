@@ -22,11 +22,11 @@ from gen_data.core.capture import Silhouette
 from gen_data.core.scene import Scene
 from gen_data.core.se3 import Array
 from gen_data.renderers.warp.device import launch
-from gen_data.renderers.warp.frame_context import CameraView, RowBand, pack_state
+from gen_data.renderers.warp.native_code import LANES
+from gen_data.renderers.warp.scene.distortion_lut import NODE_STRIDE_PX
 from gen_data.renderers.warp.scene.kernels import records
-from gen_data.renderers.warp.scene.kernels.simd import LANES
 from gen_data.renderers.warp.scene.scene_packing import pack_view
-from gen_data.renderers.warp.visibility.distortion_lut import NODE_STRIDE_PX
+from gen_data.renderers.warp.visibility.frame_context import CameraView, RowBand, pack_state
 from gen_data.renderers.warp.visibility.gbuffer import (
     CORNERS,
     Projected,

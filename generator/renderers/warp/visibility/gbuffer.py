@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from gen_data.core.boxes import BoxPx
 from gen_data.core.se3 import Array
 from gen_data.renderers.warp.device import launch
-from gen_data.renderers.warp.device_cache import DeviceCache
+from gen_data.renderers.warp.native_code import LANES
+from gen_data.renderers.warp.scene.device_cache import DeviceCache
 from gen_data.renderers.warp.scene.kernels import ray_queries, records
-from gen_data.renderers.warp.scene.kernels.simd import LANES
 from gen_data.renderers.warp.scene.scene_packing import PackedWorld
 from gen_data.renderers.warp.visibility.kernels import label_resolve, rasterizer
 

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from gen_data.core.capture import Channel
 from gen_data.core.scene import Scene
-from gen_data.renderers.warp.frame_context import CameraView
-from gen_data.renderers.warp.plates import hide_labels
 from gen_data.renderers.warp.readback import Readback
 from gen_data.renderers.warp.scene.kernels import records
+from gen_data.renderers.warp.visibility.frame_context import CameraView
 from gen_data.renderers.warp.visibility.kernels import label_resolve
+from gen_data.renderers.warp.visibility.plates import hide_labels
 
 
 def label_images(frame: CameraView, channels: frozenset[Channel]) -> dict[Channel, NDArray[Any]]:

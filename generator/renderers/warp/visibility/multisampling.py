@@ -6,8 +6,8 @@ import numpy as np
 import warp as wp
 
 from gen_data.core.se3 import Array
-from gen_data.renderers.warp.frame_context import CameraView
-from gen_data.renderers.warp.scene.kernels.simd import LANES
+from gen_data.renderers.warp.native_code import LANES
+from gen_data.renderers.warp.visibility.frame_context import CameraView
 from gen_data.renderers.warp.visibility.gbuffer import Projected
 from gen_data.renderers.warp.visibility.kernels import msaa, rasterizer
 

@@ -14,8 +14,13 @@ from numpy.typing import NDArray
 from gen_data.core.asset_types import Float32
 from gen_data.core.capture import Channel
 from gen_data.core.intrinsics import Intrinsics
-from gen_data.renderers.warp.frame_context import CameraState, CameraView, RowBand, render_view
-from gen_data.renderers.warp.plates import hide_flow
+from gen_data.renderers.warp.visibility.frame_context import (
+    CameraState,
+    CameraView,
+    RowBand,
+    render_view,
+)
+from gen_data.renderers.warp.visibility.plates import hide_flow
 from gen_data.renderers.warp.visibility.reprojection import (
     BandedGBuffer,
     ReprojectedPoints,

@@ -23,14 +23,14 @@ from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.scene import Scene
 from gen_data.core.se3 import Array
 from gen_data.core.shutter import INSTANT
-from gen_data.renderers.warp.frame_context import (
+from gen_data.renderers.warp.readback import Readback
+from gen_data.renderers.warp.visibility.frame_context import (
     CameraState,
     CameraView,
     RowBand,
     is_moving,
     render_view,
 )
-from gen_data.renderers.warp.readback import Readback
 from gen_data.renderers.warp.visibility.label_images import draw_labels, empty_labels, read_images
 
 RadianceFunction = Callable[[CameraView], wp.array]

@@ -206,21 +206,6 @@ def bump_visibility(mixable: wp.vec4):
     return mixable[1] * (1.0 - 0.8 * wp.min(mixed_snow(mixable), 1.0))
 
 
-# Native code for four interpolated coats at once, in the types of texture_sampling.SAMPLE_QUAD: the
-# factor and the snow of albedo_below_coat, and bump_visibility.
-COAT_QUAD = """
-    struct Coat { Floats wet, snow, bumps; };
-    auto coat_of = [&](const Floats* mixable) {
-        const Floats ramp = smaller(larger(mixable[2], 0.0f), 1.0f);
-        Coat coat;
-        coat.snow = ramp * ramp * (3.0f - 2.0f * ramp) * mixable[3];
-        coat.wet = mixable[0] * larger(1.0f - coat.snow, 0.0f);
-        coat.bumps = mixable[1] * (1.0f - 0.8f * smaller(coat.snow, 1.0f));
-        return coat;
-    };
-"""
-
-
 @wp.func
 def apply_coat(world: World, surface: int, material: SurfaceMaterial, coat: Coat, n: wp.vec3):
     """The material under water and snow; ``n`` is its normal without bumps."""

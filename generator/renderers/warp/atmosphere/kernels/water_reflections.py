@@ -15,15 +15,16 @@ from gen_data.renderers.warp.atmosphere.kernels.ground_weathering import (
     puddle_at,
     snow_at,
 )
-from gen_data.renderers.warp.realtime.kernels.lattice import (
+from gen_data.renderers.warp.scene.kernels.analytic_lights import SUN, beam_from
+from gen_data.renderers.warp.scene.kernels.brdf import WATER_F0, fresnel_schlick
+from gen_data.renderers.warp.scene.kernels.distortion import project_to_pixel
+from gen_data.renderers.warp.scene.kernels.environment_lighting import sky_irradiance, sky_rest
+from gen_data.renderers.warp.scene.kernels.lattice import (
     Lattice,
     cell_at,
     cell_corner,
     ray_origin,
 )
-from gen_data.renderers.warp.scene.kernels.analytic_lights import SUN, beam_from
-from gen_data.renderers.warp.scene.kernels.brdf import WATER_F0, fresnel_schlick
-from gen_data.renderers.warp.scene.kernels.environment_lighting import sky_irradiance, sky_rest
 from gen_data.renderers.warp.scene.kernels.ray_queries import closest_hit, precipitation_exposure
 from gen_data.renderers.warp.scene.kernels.records import (
     HOLES,
@@ -36,7 +37,6 @@ from gen_data.renderers.warp.scene.kernels.records import (
     surface_index,
 )
 from gen_data.renderers.warp.scene.kernels.texture_sampling import make_sampler, texel_at
-from gen_data.renderers.warp.visibility.kernels.distortion import project_to_pixel
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 

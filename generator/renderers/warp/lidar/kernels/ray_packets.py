@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import warp as wp
 
+from gen_data.renderers.warp.native_code import native
 from gen_data.renderers.warp.scene.kernels.records import (
     componentwise_max,
     componentwise_min,
@@ -16,7 +17,6 @@ from gen_data.renderers.warp.scene.kernels.records import (
     min_of_two,
     slab_interval,
 )
-from gen_data.renderers.warp.scene.kernels.simd import SIMD
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 
@@ -130,41 +130,7 @@ def entry_distance(bundle: Bundle, low_m: wp.vec3, high_m: wp.vec3):
     return wp.where(enter > leave * (1.0 + SLACK), FAR_M, enter)
 
 
-_NEXT_ENTERED = (
-    SIMD
-    + f"""
-    constexpr float FAR = {float(FAR_M)}f, SLACK_M = {float(SLACK_M)}f, SLACK = {float(SLACK)}f;
-"""
-    + """
-    const int count = groups.shape[0] / 6;
-    for (int b = after + 1; b < count; b += LANES - b % LANES) {
-        const float* group = groups.data + 48 * (b / 8) + (LANES == 8 ? 0 : b % 8);
-        const Floats none = 0.0f, never = FAR;
-        Floats enter = none, leave = never;
-        // As entry_distance.
-        for (int k = 0; k < 3; ++k) {
-            const Floats near = load(group + 16 * k, Floats()) - SLACK_M - origin_high_m[k];
-            const Floats far = load(group + 16 * k + 8, Floats()) + SLACK_M - origin_low_m[k];
-            const Floats forth = way_high[k] > 0.0f ? near / way_high[k] : never;
-            const Floats back = way_low[k] < 0.0f ? far / way_low[k] : never;
-            enter = larger(enter, near > none ? forth : far < none ? back : none);
-            leave = smaller(leave, way_low[k] > 0.0f    ? far / way_low[k]
-                                   : way_high[k] < 0.0f ? near / way_high[k]
-                                                        : never);
-        }
-        enter = enter * (1.0f - SLACK);
-        const Floats reach = reach_m;
-        const unsigned hits = bits(enter <= leave * (1.0f + SLACK)) & bits(enter < reach)
-                              & ~0u << b % LANES;
-        if (hits)
-            return b - b % LANES + first_bit(hits);
-    }
-    return -1;
-"""
-)
-
-
-@wp.func_native(_NEXT_ENTERED)
+@wp.func_native(native("lidar/kernels/next_entered.h", FAR=FAR_M, SLACK_M=SLACK_M, SLACK=SLACK))
 def next_entered(
     groups: wp.array[wp.float32],
     origin_low_m: wp.vec3,

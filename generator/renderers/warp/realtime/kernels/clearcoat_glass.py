@@ -25,7 +25,6 @@ from gen_data.renderers.warp.atmosphere.kernels.ground_weathering import (
     coat_at,
     footprint,
 )
-from gen_data.renderers.warp.realtime.kernels.lattice import ray_origin
 from gen_data.renderers.warp.realtime.kernels.lattice_lighting import (
     ListedPixels,
     Probe,
@@ -56,6 +55,7 @@ from gen_data.renderers.warp.scene.kernels.environment_lighting import (
     sky_reflection,
     sky_rest,
 )
+from gen_data.renderers.warp.scene.kernels.lattice import ray_origin
 from gen_data.renderers.warp.scene.kernels.material_eval import (
     SurfaceMaterial,
     evaluate_material,

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import warp as wp
 
-from gen_data.renderers.warp.realtime.kernels.lattice import Lattice
 from gen_data.renderers.warp.scene.kernels.analytic_lights import SUN, SUN_DISTANCE_M
 from gen_data.renderers.warp.scene.kernels.box_groups import high_corner, low_corner, next_in_shaft
+from gen_data.renderers.warp.scene.kernels.lattice import Lattice
 from gen_data.renderers.warp.scene.kernels.material_eval import is_translucent
 from gen_data.renderers.warp.scene.kernels.records import (
     World,

@@ -15,12 +15,7 @@ from __future__ import annotations
 
 import warp as wp
 
-from gen_data.renderers.warp.realtime.kernels.lattice import (
-    Departure,
-    Lattice,
-    departure_to,
-    sheet_side,
-)
+from gen_data.renderers.warp.native_code import LANES, native
 from gen_data.renderers.warp.realtime.kernels.shadow_culling import FAINT_SHARE, TILE
 from gen_data.renderers.warp.scene.kernels.ambient_light import ambient_irradiance, is_indoors
 from gen_data.renderers.warp.scene.kernels.analytic_lights import (
@@ -29,6 +24,12 @@ from gen_data.renderers.warp.scene.kernels.analytic_lights import (
     SUN,
     SUN_DISTANCE_M,
     beam_from,
+)
+from gen_data.renderers.warp.scene.kernels.lattice import (
+    Departure,
+    Lattice,
+    departure_to,
+    sheet_side,
 )
 from gen_data.renderers.warp.scene.kernels.material_eval import is_translucent
 from gen_data.renderers.warp.scene.kernels.ray_queries import (
@@ -40,7 +41,6 @@ from gen_data.renderers.warp.scene.kernels.ray_queries import (
     path_along,
 )
 from gen_data.renderers.warp.scene.kernels.records import LightRecord, View, World, fast_normalize
-from gen_data.renderers.warp.scene.kernels.simd import LANES, SIMD
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 
@@ -419,98 +419,7 @@ def is_uniform(classes: int):
     return classes == 1 or classes == 2  # noqa: PLR1714
 
 
-_WINDOW = (
-    SIMD
-    + f"""
-    constexpr float UNSEEN = {float(UNSEEN)}f;
-"""
-    + """
-    const int points = values.shape[1];
-    auto is_inside = [&](int x, int y) {
-        return x >= 0 && x < lattice.width && y >= 0 && y < lattice.height;
-    };
-    auto are_inside = [&](int x, int y) {
-        return is_inside(x, y) && x + LANES <= lattice.width;
-    };
-    // Neighbours in a row; those off the lattice lie on no surface.
-    struct Points { Ints surface; Floats p[3], n[3]; };
-    auto points_at = [&](int x, int y) {
-        const int first = y * lattice.width + x;
-        Points points;
-        if (are_inside(x, y)) {
-            points.surface = load(lattice.surface.data + first, Ints());
-            load_triples((const float*)(lattice.p_m.data + first), points.p);
-            load_triples((const float*)(lattice.normal.data + first), points.n);
-        } else {
-            int surface[LANES];
-            wp::vec3 p[LANES], n[LANES];
-            for (int lane = 0; lane < LANES; ++lane) {
-                const bool inside = is_inside(x + lane, y);
-                surface[lane] = inside ? lattice.surface.data[first + lane] : -1;
-                p[lane] = lattice.p_m.data[inside ? first + lane : 0];
-                n[lane] = lattice.normal.data[inside ? first + lane : 0];
-            }
-            points.surface = load(surface, Ints());
-            load_triples((const float*)p, points.p);
-            load_triples((const float*)n, points.n);
-        }
-        return points;
-    };
-    auto values_at = [&](const float* from, int x, int y) {
-        const int first = y * lattice.width + x;
-        if (are_inside(x, y))
-            return load(from + first, Floats());
-        float values[LANES];
-        for (int lane = 0; lane < LANES; ++lane)
-            values[lane] = is_inside(x + lane, y) ? from[first + lane] : UNSEEN;
-        return load(values, Floats());
-    };
-    auto write = [&](float* to, Floats lanes) {
-        for (int lane = 0; lane < LANES && x + lane < lattice.width; ++lane)
-            to[y * lattice.width + x + lane] = at(lanes, lane);
-    };
-    auto dot = [](const Floats* a, const Floats* b) {
-        return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-    };
-    const Floats zero = 0.0f;
-    const Points here = points_at(x, y);
-    const Floats away[3] = {here.p[0] - eye_m[0], here.p[1] - eye_m[1], here.p[2] - eye_m[2]};
-    const Floats squared_tolerance = dot(away, away) * (tolerance * tolerance);
-    // A term where points lie on one smooth stretch of surface, as lattice.points_agree; else 0.
-    auto where_one = [&](const Points& there, Floats term) -> Floats {
-        const Floats way[3] = {there.p[0] - here.p[0], there.p[1] - here.p[1],
-                              there.p[2] - here.p[2]};
-        const Floats height = dot(here.n, way), least = 0.9f;
-        const auto one = (here.surface == there.surface) & (dot(here.n, there.n) >= least)
-                         & (height * height <= squared_tolerance);
-        return one ? term : zero;
-    };
-    // Points at the rims of windows count half: windows are thus centred and contain every part of
-    // a 4 x 4 pattern equally often.
-    auto rim_weight = [](int offset, int half) -> Floats {
-        return offset == half || offset == -half ? 0.5f : 1.0f;
-    };
-"""
-)
-
-_SUM_ROW = (
-    _WINDOW
-    + """
-    const float* given = values.data + j * points;
-    Floats total = 0.0f, count = 0.0f;
-    for (int k = -2; k <= 2; ++k) {
-        const Points there = points_at(x + k, y);
-        const Floats value = values_at(given, x + k, y), weight = rim_weight(k, 2);
-        total += where_one(there, value != UNSEEN ? value * weight : zero);
-        count += where_one(there, value != UNSEEN ? weight : zero);
-    }
-    write(sums.data + 2 * j * points, total);
-    write(sums.data + (2 * j + 1) * points, count);
-"""
-)
-
-
-@wp.func_native(_SUM_ROW)
+@wp.func_native(native("realtime/kernels/sum_row.h", UNSEEN=UNSEEN))
 def sum_row(
     lattice: Lattice,
     eye_m: wp.vec3,
@@ -531,37 +440,7 @@ def sum_row(
     ...
 
 
-_SMOOTH_COLUMN = (
-    _WINDOW
-    + """
-    auto sum_column = [&](int half, Floats& total, Floats& count) {
-        total = 0.0f;
-        count = 0.0f;
-        for (int k = -half; k <= half; ++k) {
-            const Points there = points_at(x, y + k);
-            const Floats weight = rim_weight(k, half);
-            const float* given = sums.data + 2 * j * points;
-            total += where_one(there, values_at(given, x, y + k) * weight);
-            count += where_one(there, values_at(given + points, x, y + k) * weight);
-        }
-    };
-    Floats total, count, wide_total, wide_count;
-    sum_column(2, total, count);
-    const Floats value = values_at(values.data + j * points, x, y), limit = enough;
-    const auto lacks = (value != UNSEEN) & (count < limit);
-    if (bits(lacks)) {
-        // At the end of a surface a window holds part of the pattern only: take a larger one.
-        sum_column(4, wide_total, wide_count);
-        total = lacks ? wide_total : total;
-        count = lacks ? wide_count : count;
-    }
-    const auto known = (value != UNSEEN) & (count > zero);
-    write(smoothed.data + j * points, known ? total / count : value);
-"""
-)
-
-
-@wp.func_native(_SMOOTH_COLUMN)
+@wp.func_native(native("realtime/kernels/smooth_column.h", UNSEEN=UNSEEN))
 def smooth_column(
     lattice: Lattice,
     eye_m: wp.vec3,

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import warp as wp
 
+from gen_data.renderers.warp.native_code import native
 from gen_data.renderers.warp.scene.kernels.records import (
     EnvironmentRecord,
     fast_normalize,
     floor_int,
 )
-from gen_data.renderers.warp.scene.kernels.simd import SIMD
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 
@@ -183,26 +183,7 @@ def weigh_texels(
         shares[texel / 8, i, texel % 8] = shares[texel / 8, i, texel % 8] / weight
 
 
-_WEIGHTED_MEANS = (
-    SIMD
-    + """
-    const int count = radiance.shape[0];
-    const float* share = shares.data + 8 * count * (first / 8) + first % 8;
-    const float* rgb = (const float*)radiance.data;
-    Floats red = 0.0f, green = 0.0f, blue = 0.0f;
-    for (int i = 0; i < count; ++i, share += 8, rgb += 3) {
-        const Floats weight = load(share, Floats());
-        red += weight * rgb[0];
-        green += weight * rgb[1];
-        blue += weight * rgb[2];
-    }
-    for (int lane = 0; lane < LANES; ++lane)
-        means.data[first + lane] = wp::vec3(at(red, lane), at(green, lane), at(blue, lane));
-"""
-)
-
-
-@wp.func_native(_WEIGHTED_MEANS)
+@wp.func_native(native("scene/kernels/weighted_means.h"))
 def weighted_means(
     shares: wp.array3d[wp.float32],
     radiance: wp.array[wp.vec3],

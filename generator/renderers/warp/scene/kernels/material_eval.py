@@ -12,10 +12,10 @@ from gen_data.renderers.warp.scene.kernels.records import (
     first_weight,
     flat_normal,
     is_back_face,
+    mesh_point,
     vertex_at,
 )
 from gen_data.renderers.warp.scene.kernels.texture_sampling import make_sampler, texel_at
-from gen_data.renderers.warp.visibility.kernels.label_resolve import mesh_point
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 

@@ -471,6 +471,17 @@ class World:
 
 
 @wp.func
+def mesh_point(world: World, hit: wp.vec2i, weight: wp.vec2):
+    """Point of a (body, face) in the mesh frame, from stored barycentric weights."""
+    u = first_weight(weight)
+    v = weight[1]
+    g = world.bodies[hit[0]].geometry
+    corner = face_vertices(world, g, hit[1])
+    p = vertex_at(world, g, corner[0]) * (1.0 - u - v)
+    return p + vertex_at(world, g, corner[1]) * u + vertex_at(world, g, corner[2]) * v
+
+
+@wp.func
 def to_mesh_point(world: World, b: int, p_world: wp.vec3):
     """Transform a world point to the mesh frame of body b."""
     return world.bodies[b].B_mesh_world @ p_world + world.bodies[b].t_mesh_world

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import warp as wp
 
+from gen_data.renderers.warp.native_code import native
 from gen_data.renderers.warp.scene.kernels.records import GBufferRecord, View
-from gen_data.renderers.warp.scene.kernels.simd import SIMD
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 
@@ -29,37 +29,7 @@ def clamped_pixel(view: View, x: int, y: int):
     return wp.clamp(y, 0, view.height - 1) * view.width + wp.clamp(x, 0, view.width - 1)
 
 
-@wp.func_native(
-    SIMD
-    + """
-    const auto* hits = images.hits.data;
-    auto is_edge = [&](int i, int j) {
-        if (hits[i][0] != hits[j][0])
-            return true;
-        const auto &m = images.normals.data[i], &n = images.normals.data[j];
-        const float a = images.z_m.data[i], b = images.z_m.data[j], near = least(a, b);
-        const float apart = a > b ? a - b : b - a;
-        // Self-occlusion: depths that a continuous surface would not have. Floors seen at more than
-        // two degrees change less between rows (640 x 480, 60 degrees).
-        return m[0] * n[0] + m[1] * n[1] + m[2] * n[2] < crease_cosine || apart > 0.05f * near;
-    };
-    int edges = 0;
-    for (int k = 0; k < n; k += LANES) {
-        unsigned faces = 0;
-        if (n - k >= LANES)
-            faces = bits(load(hits + i + k, Longs()) != load(hits + i + k + step, Longs()));
-        else
-            for (int m = k; m < n; ++m)
-                faces |= (unsigned)!(hits[i + m] == hits[i + m + step]) << (m - k);
-        // Most neighbours show the same face.
-        for (; faces; faces &= faces - 1) {
-            const int m = k + first_bit(faces);
-            edges |= (int)is_edge(i + m, i + m + step) << m;
-        }
-    }
-    return edges;
-"""
-)
+@wp.func_native(native("visibility/kernels/edges_along.h"))
 def edges_along(images: GBufferRecord, i: int, step: int, n: int, crease_cosine: float) -> int:
     """Whether an edge runs between each of ``n`` pixels from i and the pixel ``step`` further.
 
@@ -110,16 +80,6 @@ def neighbour_pixel(view: View, x: int, y: int, k: int):
     # Four bits per position: a shift replaces a table.
     m = int((ORDER >> wp.int64(4 * k)) & wp.int64(15))
     return clamped_pixel(view, x + m % 3 - 1, y + m / 3 - 1)
-
-
-# The nine pixels of ``neighbour_pixel``, in its order, as ``block``. Needs ``view``, ``x``, ``y``.
-BLOCK = """
-    const int left = x > 0 ? x - 1 : 0, right = x + 1 < view.width ? x + 1 : x;
-    const int row = y * view.width, up = y > 0 ? row - view.width : row;
-    const int down = y + 1 < view.height ? row + view.width : row;
-    const int block[9] = {row + x, up + x, row + left, row + right, down + x,
-                          up + left, up + right, down + left, down + right};
-"""
 
 
 @wp.func

@@ -11,7 +11,7 @@ from gen_data.renderers.warp.scene.kernels.records import (
     World,
     face_vertices,
     fast_normalize,
-    first_weight,
+    mesh_point,
     normal_at,
     pixel_direction,
     vertex_at,
@@ -243,14 +243,3 @@ def distance_to(world: World, hit: wp.vec2i, weight: wp.vec2):
     b = hit[0]
     m = mesh_point(world, hit, weight)
     return wp.length(world.bodies[b].A_camera_mesh @ m + world.bodies[b].t_camera_mesh)
-
-
-@wp.func
-def mesh_point(world: World, hit: wp.vec2i, weight: wp.vec2):
-    """Point of a (body, face) in the mesh frame, from stored barycentric weights."""
-    u = first_weight(weight)
-    v = weight[1]
-    g = world.bodies[hit[0]].geometry
-    corner = face_vertices(world, g, hit[1])
-    p = vertex_at(world, g, corner[0]) * (1.0 - u - v)
-    return p + vertex_at(world, g, corner[1]) * u + vertex_at(world, g, corner[2]) * v

@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import warp as wp
 
+from gen_data.renderers.warp.native_code import native
 from gen_data.renderers.warp.scene.kernels.records import View, World, max_of_two
-from gen_data.renderers.warp.scene.kernels.simd import SIMD
-from gen_data.renderers.warp.visibility.kernels.alpha_cutouts import SOLID, Cutout, make_cutout
+from gen_data.renderers.warp.visibility.kernels.alpha_cutouts import Cutout, make_cutout
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 
@@ -280,88 +280,7 @@ def depth_plane(view: View, p0: wp.vec3, p1: wp.vec3, p2: wp.vec3, window: Windo
     return plane
 
 
-# Visit the groups of LANES pixels of a triangle's box. ``matter(x, y)`` gets a group's first pixel
-# and tells which of its pixels matter, before edges are evaluated. ``visit(x, y, inside, at)`` gets
-# those of them that are inside all edges, moved outwards by ``reach``; ``at(k)`` has the edge
-# functions at the group's k-th pixel: integers below 2^51, which double precision holds and adds
-# exactly. Needs ``edges``, and SIMD before it.
-SCAN = """
-    struct Values { double a, b, c; };
-    // Steps of a row of ``width`` at which an edge function may be positive, rounded outwards by
-    // less than ROUNDED pixels.
-    constexpr int ROUNDED = 3;
-    auto narrow = [](double value, double dx, double inverse, int width, int& first, int& end) {
-        const double root = -value * inverse;
-        if (dx > 0.0 && root > first)
-            first = root < width ? (int)root : width;
-        else if (dx < 0.0 && root < end - 2)
-            end = root > 0.0 ? (int)root + 2 : 2;
-        else if (dx == 0.0 && value < 0.0)
-            end = 0;
-    };
-    auto scan = [&](Values reach, auto matter, auto visit) {
-        const Values dx = {(double)edges.a.dx, (double)edges.b.dx, (double)edges.c.dx};
-        const Values dy = {(double)edges.a.dy, (double)edges.b.dy, (double)edges.c.dy};
-        Values row = {edges.a.value + reach.a, edges.b.value + reach.b, edges.c.value + reach.c};
-        const Doubles lanes_a = doubles(lane) * dx.a, lanes_b = doubles(lane) * dx.b;
-        const Doubles lanes_c = doubles(lane) * dx.c;
-        const int x_first = edges.box.x_first, width = edges.box.x_last - x_first + 1;
-        const bool is_wide = width > LANES;
-        Values inverse = {};
-        if (is_wide)
-            inverse = {1.0 / dx.a, 1.0 / dx.b, 1.0 / dx.c};
-        for (int y = edges.box.y_first; y <= edges.box.y_last; ++y) {
-            int first = 0, end = width;
-            if (is_wide) {
-                narrow(row.a, dx.a, inverse.a, width, first, end);
-                narrow(row.b, dx.b, inverse.b, width, first, end);
-                narrow(row.c, dx.c, inverse.c, width, first, end);
-            }
-            for (int x = first; x < end; x += LANES) {
-                unsigned inside = matter(x_first + x, y) & first_bits(width - x);
-                if (!inside)
-                    continue;
-                auto at = [&](int k) {
-                    const double step = x + k;
-                    return Values{row.a + step * dx.a, row.b + step * dx.b, row.c + step * dx.c};
-                };
-                if (!is_wide || x < first + ROUNDED || x + LANES > end - ROUNDED) {
-                    const Values e = at(0);
-                    const Doubles a = lanes_a + e.a, b = lanes_b + e.b, c = lanes_c + e.c;
-                    inside &= bits(least(a, least(b, c)) >= Doubles(0.0));
-                    if (!inside)
-                        continue;
-                }
-                visit(x_first + x, y, inside, at);
-            }
-            row = {row.a + dy.a, row.b + dy.b, row.c + dy.c};
-        }
-    };
-"""
-
-
-@wp.func_native(
-    SIMD
-    + SOLID
-    + SCAN
-    + """
-    const Floats low = plane.low, high = plane.high;
-    const long long hit = (unsigned)body | (long long)face << 32;
-    auto nearest = [&](int x, int y) { return load(nearness.data + y * stride + x, Floats()); };
-    auto matter = [&](int x, int y) { return bits(nearest(x, y) < high); };
-    scan({}, matter, [&](int x, int y, unsigned inside, auto) {
-        const Floats xs = lane + (float)x;
-        const Floats w = clamped(plane.c + (float)y * plane.dy + xs * plane.dx, low, high);
-        unsigned drawn = inside & bits(w > nearest(x, y));
-        if (drawn)
-            drawn = solid(drawn, xs + 0.5f, Floats((float)y + 0.5f), w);
-        if (drawn) {
-            put(nearness.data + y * stride + x, drawn, w);
-            put(hits.data + y * stride + x, drawn, Longs(hit));
-        }
-    });
-"""
-)
+@wp.func_native(native("visibility/kernels/draw_nearest.h"))
 def draw_nearest(
     world: World,
     edges: Edges,
@@ -380,29 +299,7 @@ def draw_nearest(
     ...
 
 
-@wp.func_native(
-    SIMD
-    + SOLID
-    + SCAN
-    + """
-    const auto& window = outline.window;
-    const Floats low = plane.low, high = plane.high;
-    auto pixels = [&](int x, int y) {
-        return mask.data + outline.first_pixel + y * outline.stride + x;
-    };
-    auto matter = [&](int x, int y) { return bits(load(pixels(x, y), Bytes()) == Bytes(0)); };
-    scan({}, matter, [&](int x, int y, unsigned inside, auto) {
-        if (cutout.texture >= 0) {
-            const Floats xs = lane + (float)x;
-            const Floats w = clamped(plane.c + (float)y * plane.dy + xs * plane.dx, low, high);
-            const Floats x_px = lane + ((float)(x + window.x0) + 0.5f);
-            inside = solid(inside, x_px, Floats((float)(y + window.y0) + 0.5f), w);
-        }
-        if (inside)
-            put(pixels(x, y), inside, Bytes(1));
-    });
-"""
-)
+@wp.func_native(native("visibility/kernels/draw_coverage.h"))
 def draw_coverage(
     world: World,
     edges: Edges,
@@ -420,35 +317,13 @@ def draw_coverage(
     ...
 
 
-@wp.func_native(
-    SIMD
-    + """
-    for (int y = box.y_first; y <= box.y_last; ++y)
-        for (int x = box.x_first; x <= box.x_last; x += LANES) {
-            const auto* pixels = mask.data + outline.first_pixel + y * outline.stride + x;
-            if (bits(load(pixels, Bytes()) == Bytes(0)) & first_bits(box.x_last - x + 1))
-                return false;
-        }
-    return true;
-"""
-)
+@wp.func_native(native("visibility/kernels/is_filled.h"))
 def is_filled(box: Box, outline: Outline, mask: wp.array[wp.uint8]) -> bool:
     """Whether all pixels of a box of an outline's window are drawn."""
     ...
 
 
-@wp.func_native(
-    SIMD
-    + """
-    for (int y = box.y_first; y <= box.y_last; ++y)
-        for (int x = box.x_first; x <= box.x_last; x += LANES) {
-            const Floats nearest = load(nearness.data + y * stride + x, Floats());
-            if (bits(nearest < Floats(nearness_max)) & first_bits(box.x_last - x + 1))
-                return false;
-        }
-    return true;
-"""
-)
+@wp.func_native(native("visibility/kernels/is_hidden.h"))
 def is_hidden(box: Box, nearness_max: float, stride: int, nearness: wp.array[float]) -> bool:
     """Whether all pixels of a box of an image are at least as near as ``nearness_max`` [1/m]."""
     ...

@@ -1,4 +1,4 @@
-"""A renderer in numpy that shows every instance as its bounding box, in one colour."""
+"""A renderer in numpy that shows every annotated instance as its bounding box, in one colour."""
 
 from __future__ import annotations
 
@@ -121,6 +121,8 @@ def _nearest(instances: Iterable[Instance], T_world_eye: SE3, rays: Image) -> di
         "coordinates": np.zeros((*shape, 3)),
     }
     for instance in instances:
+        if not instance.annotated:
+            continue
         z, normal, coordinates = _hit(instance, T_world_eye, rays)
         nearer = z < found["z"]
         found["z"][nearer] = z[nearer]

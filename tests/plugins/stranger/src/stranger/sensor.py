@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gen_data.config.base_model import Strict
 from gen_data.core.capture import Channel, Measurements
@@ -15,6 +16,7 @@ from gen_data.core.scene import Device, Scene
 from gen_data.core.streams import Rng
 
 COLUMNS = (TIME, Column("luminance_cd_m2", "<f8", "mean over the image, with noise"))
+VIEW = "stranger.sensor:draw_bar"
 
 
 class LightMeter(Strict):
@@ -33,7 +35,7 @@ class LightMeter(Strict):
 
     def describe(self) -> SensorInfo:
         """Describe a device with its own columns."""
-        return SensorInfo(self.name, Modality.DEVICE, "light_meter", columns=COLUMNS)
+        return SensorInfo(self.name, Modality.DEVICE, "light_meter", columns=COLUMNS, view=VIEW)
 
     def mount(self, scene: Scene) -> Scene:
         """Return the scene with the device at its camera."""
@@ -51,6 +53,15 @@ class LightMeter(Strict):
         rows["time_s"] = scene.time_s
         rows["luminance_cd_m2"] = mean * (1.0 + self.noise * rng.standard_normal())
         return Measurements(self.name, scene.device(self.name), rows, scene.time_s)
+
+
+def draw_bar(table: Measurements, scene: Scene, aspect: float) -> NDArray[np.uint8]:
+    """Draw a bar as wide as the share of 50 cd/m^2, uint8 [h, w, 3]."""
+    del scene
+    width_px = 96
+    image = np.zeros((round(width_px / aspect), width_px, 3), np.uint8)
+    image[:, : round(width_px * float(table.rows["luminance_cd_m2"][0]) / 50.0)] = 255
+    return image
 
 
 PLUGIN: type[Sensor] = LightMeter

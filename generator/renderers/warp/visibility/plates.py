@@ -34,7 +34,7 @@ from gen_data.core.plates import (
 )
 from gen_data.core.scene import Camera, Scene, Weather
 from gen_data.core.se3 import Array
-from gen_data.renderers.warp.frame_context import Backdrop, CameraView
+from gen_data.renderers.warp.visibility.frame_context import Backdrop, CameraView
 from gen_data.renderers.warp.visibility.kernels import photographs as kernels
 
 _RATIO_MAX = 16.0

@@ -1,18 +1,9 @@
-"""Vocabulary of native code that handles several pixels or samples at once.
+// Vocabulary of native code that handles several pixels or samples at once.
+// On the CPU, a vector has eight lanes (LANES), a quad four (QUAD); both are extension types of the
+// compiler that Warp ships: plain IEEE arithmetic, the same on every processor. On CUDA the same text
+// compiles to one lane per thread. Unused names cost nothing. Compiled with AS_ON_GPU, the CPU takes
+// the text of CUDA too: tests do so without a GPU.
 
-On the CPU, a vector has eight lanes (LANES), a quad four (QUAD); both are extension types of the
-compiler that Warp ships: plain IEEE arithmetic, the same on every processor. On CUDA the same text
-compiles to one lane per thread. A native function begins with ``SIMD``; unused names cost nothing.
-Compiled with AS_ON_GPU, the CPU takes the text of CUDA too: tests do so without a GPU.
-"""
-
-from __future__ import annotations
-
-LANES = 8
-"""Lanes of a vector on the CPU: arrays that vectors are read from or written to are that much
-longer than their contents."""
-
-SIMD = """
 #if defined(__CUDA_ARCH__) || defined(AS_ON_GPU)
     constexpr int LANES = 1, QUAD = 1;
     typedef float Floats, FloatQuad;
@@ -132,4 +123,3 @@ SIMD = """
         const auto raised = v > low ? v : low;
         return raised < high ? raised : high;
     };
-"""

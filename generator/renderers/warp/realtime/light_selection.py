@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from gen_data.core.colorimetry import luminance
 from gen_data.core.scene import LIGHT_KINDS, PANEL_KINDS, Environment, Light, Scene
 from gen_data.core.se3 import Array
-from gen_data.renderers.warp.frame_context import CameraView
 from gen_data.renderers.warp.realtime.kernels.soft_shadows import count_free_paths
 from gen_data.renderers.warp.scene.environment_maps import SkyLamp
 from gen_data.renderers.warp.scene.kernels import analytic_lights, records
@@ -26,6 +25,7 @@ from gen_data.renderers.warp.scene.scene_packing import (
     sky_record,
 )
 from gen_data.renderers.warp.scene.struct_dtypes import take_rows, to_device
+from gen_data.renderers.warp.visibility.frame_context import CameraView
 from gen_data.renderers.warp.visibility.gbuffer import GBuffer
 
 _STRIDE_PX = 11

@@ -26,13 +26,13 @@ from gen_data.renderers.warp.scene.device_assets import (
     upload_mesh,
     upload_texture,
 )
+from gen_data.renderers.warp.scene.distortion_lut import DeviceOptics, upload_optics
 from gen_data.renderers.warp.scene.environment_maps import (
     DeviceEnvironment,
     upload_environment,
     upload_split,
 )
 from gen_data.renderers.warp.scene.struct_dtypes import to_device
-from gen_data.renderers.warp.visibility.distortion_lut import DeviceOptics, upload_optics
 
 _MESH_BYTES, _TEXTURE_BYTES = 176 << 20, 384 << 20
 """Of a GPU."""

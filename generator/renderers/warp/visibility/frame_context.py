@@ -15,7 +15,7 @@ from gen_data.core.interfaces import FindTones
 from gen_data.core.scene import Camera, Scene
 from gen_data.core.scene_time import scene_at
 from gen_data.renderers.warp.device import launch
-from gen_data.renderers.warp.device_cache import DeviceCache
+from gen_data.renderers.warp.scene.device_cache import DeviceCache
 from gen_data.renderers.warp.scene.kernels import records
 from gen_data.renderers.warp.scene.scene_packing import (
     PackedWorld,

@@ -1,0 +1,8 @@
+// Out of line: most modules traverse trees in several places.
+auto walked = [&]() __attribute__((noinline)) {
+constexpr bool ANY = true;
+#include "scene/kernels/ray_traversal.h"
+#include "scene/kernels/in_mesh.h"
+return body >= 0;
+};
+return walked();
