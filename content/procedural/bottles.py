@@ -167,11 +167,11 @@ def _bottle_materials(
 def jar(seed: int) -> Solid:
     """A preserving jar with a twist-off lid. Slots: body, label, lid, then contents."""
     rng = variant_rng("jar", seed)
-    radius, height = rng.between(0.027, 0.045), rng.between(0.07, 0.15)
+    radius, height = rng.between(0.027, 0.045, "radius_m"), rng.between(0.07, 0.15, "height_m")
     top, lid_radius, mouth = height - 0.014, 0.93 * radius, 0.88 * radius
     neck = rng.choose((0.74, 0.8, 0.84))
     upper = [(radius, neck * height), (mouth, top - 0.003), (mouth, top + 0.004)]
-    style = rng.choose(("wrap", "front"))
+    style = rng.choose(("wrap", "front"), "style")
     wall = _Wall(radius, (0.2 * height, (neck - 0.14) * height), upper, [0.02, 0.006])
     patches = [
         *_make_wall(wall, style, 0),

@@ -108,7 +108,7 @@ def stepped_shaft(seed: int) -> Solid:
 def pipe_elbow(seed: int) -> Solid:
     """A 90 degree pipe elbow with collars, flat on the ground. Slot: body."""
     rng = variant_rng("pipe_elbow", seed)
-    outer = rng.between(0.01, 0.018)
+    outer = rng.between(0.01, 0.018, "outer_m")
     inner, bend = 0.78 * outer, outer * rng.between(1.5, 2.4)
     straight, collar = 0.8 * outer, outer * 1.22
     turn = np.linspace(0.0, 0.5 * math.pi, 13)
@@ -143,7 +143,7 @@ def bracket(seed: int) -> Solid:
     """An angle bracket with screw holes. Slot: body."""
     rng = variant_rng("bracket", seed)
     a, b = rng.between(0.04, 0.07), rng.between(0.03, 0.06)
-    width, thick = rng.between(0.02, 0.035), rng.between(0.002, 0.004)
+    width, thick = rng.between(0.02, 0.035, "width_m"), rng.between(0.002, 0.004, "thickness_m")
     hole = min(0.16 * width, 0.004)
     foot = _holed_plate(a, width, thick, hole)
     upright = _holed_plate(b, width, thick, hole).rotated("y", -0.5 * math.pi).moved(thick)
@@ -192,8 +192,11 @@ class _Gear:
 
 
 def _draw_gear(rng: VariantRng) -> _Gear:
-    teeth, module = rng.choose((14, 16, 18, 20, 24)), rng.choose((0.0015, 0.002, 0.0025))
-    thick, pitch = rng.between(0.006, 0.014), 0.5 * teeth * module
+    teeth, module = (
+        rng.choose((14, 16, 18, 20, 24), "teeth"),
+        rng.choose((0.0015, 0.002, 0.0025), "module_m"),
+    )
+    thick, pitch = rng.between(0.006, 0.014, "thickness_m"), 0.5 * teeth * module
     bore = rng.between(0.25, 0.35) * pitch
     hub = thick + rng.between(0.004, 0.01) if rng.chance(0.6) else 0.0
     return _Gear(teeth, module, thick, bore, hub)
@@ -228,7 +231,7 @@ def flange_symmetries(seed: int) -> tuple[Symmetry, ...]:
 
 def _draw_flange(rng: VariantRng) -> tuple[float, float, int]:
     """Radius and thickness [m] of the disc, and the number of its bolt holes."""
-    radius, thick = rng.between(0.03, 0.045), rng.between(0.005, 0.009)
+    radius, thick = rng.between(0.03, 0.045, "radius_m"), rng.between(0.005, 0.009, "thickness_m")
     return radius, thick, rng.choose((4, 4, 6, 8))
 
 

@@ -104,7 +104,7 @@ def choose(group: str, seed: int) -> Choice:
     kind = in_turn(kinds, seed)
     style = STYLES[kind]
     finish, decor = rng.choose(style.finishes), rng.choose(style.decors)
-    lid = rng.chance(style.lid)
+    lid = rng.chance(style.lid, "lid")
     return Choice(
         kind,
         handle=rng.choose(style.handles),
@@ -113,9 +113,9 @@ def choose(group: str, seed: int) -> Choice:
         content=rng.choose(style.contents),
         facets=rng.choose(style.facets),
         lid=lid,
-        sleeve=rng.chance(style.sleeve),
-        straw=rng.chance(style.straw),
-        saucer=rng.chance(style.saucer),
+        sleeve=rng.chance(style.sleeve, "sleeve"),
+        straw=rng.chance(style.straw, "straw"),
+        saucer=rng.chance(style.saucer, "saucer"),
     )
 
 

@@ -44,7 +44,7 @@ def pram(seed: int) -> Solid:
     """
     kind, rng = in_turn(PRAMS, seed), variant_rng("pram", seed)
     r, wide = (0.14, 0.27) if kind == "carrycot" else (0.1, 0.23)
-    front, rear, grip = 0.36, -0.34, rng.between(0.98, 1.06)
+    front, rear, grip = 0.36, -0.34, rng.between(0.98, 1.06, "grip_scale")
     parts: list[Patch] = []
     for y in (-wide, wide):
         for x, size in ((front, 0.8 * r), (rear, r)):
@@ -178,7 +178,7 @@ def _trolley(hard: bool, rng: VariantRng) -> tuple[list[Patch], float]:
 
 def _holdall(rng: VariantRng) -> tuple[list[Patch], float]:
     """A soft round bag along Y with two handles and bands."""
-    half, r = rng.between(0.25, 0.33), rng.between(0.14, 0.17)
+    half, r = 0.5 * rng.between(0.5, 0.66, "width_m"), rng.between(0.14, 0.17, "radius_m")
     profile = [(0.0, -half), (0.8 * r, -half), (r, -0.85 * half), (r, 0.85 * half), (0.8 * r, half),
                (0.0, half)]  # fmt: skip
     body = lathe(profile, 16).rotated("x", 0.5 * math.pi).scaled(1.0, 1.0, 0.9).moved(z=0.9 * r)
@@ -195,7 +195,7 @@ def _holdall(rng: VariantRng) -> tuple[list[Patch], float]:
 
 def _backpack(rng: VariantRng) -> tuple[list[Patch], float]:
     """A backpack with a lid, pockets and shoulder straps behind."""
-    high, wide, deep = rng.between(0.48, 0.6), 0.32, 0.2
+    high, wide, deep = rng.between(0.48, 0.6, "height_m"), 0.32, 0.2
     foot, neck = (
         Rectangle.about(0, 0, deep, wide),
         Rectangle.about(-0.02, 0, 0.75 * deep, 0.86 * wide),

@@ -49,8 +49,11 @@ def cafe_set(seed: int) -> Solid:
     """
     rng = variant_rng("cafe_set", seed)
     kind, count = in_turn(CHAIRS, seed), (2, 4, 3, 2, 4, 2)[seed % 6]
-    half, high = (0.3 if count == 2 else rng.between(0.34, 0.42)), rng.between(0.71, 0.75)
-    round_top = rng.chance(0.55)
+    half, high = (
+        (0.3 if count == 2 else 0.5 * rng.between(0.68, 0.84, "width_m")),
+        rng.between(0.71, 0.75, "height_m"),
+    )
+    round_top = rng.chance(0.55, "round_top")
     parts = _table(half, high, round_top)
     first = rng.choose((0.0, 0.5)) * math.pi
     for k in range(count):
@@ -62,7 +65,11 @@ def cafe_set(seed: int) -> Solid:
         parts.append(placed.rotated("z", turn))
     parts += _crockery(high, half, count, rng)
     if seed % 3 == 2:
-        parts += _canopy(rng.between(1.15, 1.5), 4 if rng.chance(0.5) else 8, rng.chance(0.3))
+        parts += _canopy(
+            0.5 * rng.between(2.3, 3.0, "width_m"),
+            4 if rng.chance(0.5) else 8,
+            rng.chance(0.3, "striped"),
+        )
         parts.append(post(0.02, (high, 2.5)))
     low, top = join_patches(parts).bounds_m()
     # The middle of the group, not the table, is the origin.
@@ -123,7 +130,7 @@ def parasol(seed: int) -> Solid:
     Slots: steel, pole, base, -, canvas, stripes.
     """
     rng = variant_rng("parasol", seed)
-    furled, half = seed % 4 == 3, rng.between(1.25, 2.0)
+    furled, half = seed % 4 == 3, 0.5 * rng.between(2.5, 4.0, "width_m")
     parts = [block((-0.35, -0.35, 0.0), (0.35, 0.35, 0.08), 0.015, 2)]
     parts.append(post(0.028, (0.08, 2.75)).painted(1))
     if furled:
@@ -136,7 +143,7 @@ def parasol(seed: int) -> Solid:
             rows.append(ring)
         parts.append(grid(np.stack(rows), slot=_SLOT_CANVAS))
     else:
-        parts += _canopy(half, 4 if seed % 2 else 8, rng.chance(0.4))
+        parts += _canopy(half, 4 if seed % 2 else 8, rng.chance(0.4, "striped"))
     wood = patterned_material("texture/wood_grain?seed=2", 1.0, 0.6, (0.6, 0.45, 0.32))
     materials = (
         worn_steel(rng),
@@ -196,14 +203,14 @@ def market_stall(seed: int) -> Solid:
     Slots: steel, wood, cloth of the table, crates, canvas, stripes, three kinds of produce.
     """
     rng = variant_rng("market_stall", seed)
-    half, deep, table = 0.5 * rng.between(2.4, 3.4), 1.0, 0.82
+    half, deep, table = 0.5 * rng.between(2.4, 3.4, "width_m"), 1.0, 0.82
     parts = []
     for x in (-deep, deep - 0.1):
         high = 2.5 if x < 0 else 2.15
         for y in (-half + 0.05, half - 0.05):
             parts.append(bar((x, y, 0.0), (x, y, high), 0.02, 5))
         parts.append(bar((x, -half, high), (x, half, high), 0.02, 5))
-    parts += _awning(half, deep, rng.chance(0.7))
+    parts += _awning(half, deep, rng.chance(0.7, "striped"))
     front = deep - 0.35
     parts.append(block((-0.35, -half + 0.1, table - 0.04), (front, half - 0.1, table), 0.0, 1))
     for y in np.linspace(-half + 0.3, half - 0.3, 3).tolist():

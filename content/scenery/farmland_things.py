@@ -53,7 +53,7 @@ def straw_bale(seed: int) -> Solid:
     """
     kind, rng = in_turn(BALES, seed), variant_rng("straw_bale", seed)
     if kind in ("round", "wrapped"):
-        radius, half = 0.5 * rng.between(1.2, 1.5), 0.5 * rng.between(1.15, 1.25)
+        radius, half = 0.5 * rng.between(1.2, 1.5), 0.5 * rng.between(1.15, 1.25, "width_m")
         edge = 0.12 if kind == "wrapped" else 0.04
         profile = [(0.0, -half), (radius - edge, -half), (radius, edge - half),
                    (radius, half - edge), (radius - edge, half), (0.0, half)]  # fmt: skip
@@ -106,7 +106,7 @@ def power_pylon(seed: int, span_m: float) -> Solid:
     if not 0.0 <= span_m <= SPAN_MAX_M:
         raise AssetError(f"power_pylon: span_m={span_m} is not between 0 and {SPAN_MAX_M:g}")
     kind, rng = in_turn(PYLONS, seed), variant_rng("power_pylon", seed)
-    high, foot = rng.between(26.0, 34.0), rng.between(2.2, 3.0)
+    high, foot = rng.between(26.0, 34.0, "height_m"), rng.between(2.2, 3.0, "foot_m")
     widths = _widths(high, foot)
     parts = list(_mast(widths))
     for x in (-foot, foot):

@@ -35,7 +35,11 @@ def bus_shelter(seed: int) -> Solid:
     Slots: frame, glass, roof, seat, two prints, sign.
     """
     kind, rng = in_turn(ROOFS, seed), variant_rng("bus_shelter", seed)
-    half, x, high = 0.5 * rng.between(3.0, 5.0), 0.5 * rng.between(1.3, 1.7), rng.between(2.3, 2.5)
+    half, x, high = (
+        0.5 * rng.between(3.0, 5.0, "width_m"),
+        0.5 * rng.between(1.3, 1.7, "depth_m"),
+        rng.between(2.3, 2.5, "height_m"),
+    )
     bays = 3 if half < 2.1 else 4
     edges = np.linspace(-half, half, bays + 1).tolist()
     parts = [block((-x - 0.03, y - 0.03, 0.0), (-x + 0.03, y + 0.03, high)) for y in edges]
@@ -138,7 +142,7 @@ def phone_box(seed: int) -> Solid:
     Slots: frame, glass, roof, telephone, notices.
     """
     kind, rng = in_turn(PHONES, seed), variant_rng("phone_box", seed)
-    half, high = rng.between(0.43, 0.48), rng.between(2.2, 2.45)
+    half, high = 0.5 * rng.between(0.86, 0.96, "width_m"), rng.between(2.2, 2.45, "height_m")
     if kind == "pillar":
         parts = [
             block((-0.18, -0.3, 0.0), (-0.06, 0.3, 2.05), 0.02),
@@ -204,7 +208,7 @@ def level_crossing_barrier(seed: int) -> Solid:
     grey, lens, black.
     """
     rng = variant_rng("level_crossing_barrier", seed)
-    raised, reach = seed % 3 == 2, rng.between(3.5, 5.5)
+    raised, reach = seed % 3 == 2, rng.between(3.5, 5.5, "reach_m")
     parts = [
         block((-0.22, -0.25, 0.0), (0.22, 0.25, 0.1), 0.01, 2),
         block((-0.18, -0.2, 0.1), (0.18, 0.2, 1.05), 0.02, 2),

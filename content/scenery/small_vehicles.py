@@ -167,7 +167,11 @@ def trailer(seed: int) -> Solid:
     taillights, tarpaulin, steel, and those of the wheels.
     """
     kind, rng = in_turn(TRAILERS, seed), variant_rng("trailer", seed)
-    half, wide, floor = 0.5 * rng.between(2.0, 2.6), 0.5 * rng.between(1.1, 1.3), 0.52
+    half, wide, floor = (
+        0.5 * rng.between(2.0, 2.6, "width_m"),
+        0.5 * rng.between(1.1, 1.3, "width_m"),
+        0.52,
+    )
     reach = half + 1.15
     parts: list[Patch] = []
     for side in (-1.0, 1.0):

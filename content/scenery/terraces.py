@@ -33,10 +33,15 @@ def terrace(seed: int) -> Solid:
     """
     rng, kind = variant_rng("terrace", seed), in_turn(_KINDS, seed)
     if kind == "path":
-        wide, long, high, pieces = rng.between(0.6, 1.1), rng.between(5.0, 10.0), 0.03, 12
+        wide, long, high, pieces = (
+            rng.between(0.6, 1.1, "width_m"),
+            rng.between(5.0, 10.0, "length_m"),
+            0.03,
+            12,
+        )
     else:
-        wide, long, pieces = rng.between(2.8, 4.0), rng.between(3.2, 5.0), 1
-        high = rng.between(0.12, 0.2) if kind == "deck" else 0.05
+        wide, long, pieces = rng.between(2.8, 4.0, "width_m"), rng.between(3.2, 5.0, "length_m"), 1
+        high = rng.between(0.12, 0.2, "height_m") if kind == "deck" else 0.05
     x, edges = 0.5 * wide, np.linspace(-0.5 * long, 0.5 * long, pieces + 1)
     joint = _JOINT_M if pieces > 1 else 0.0
     slabs = [
@@ -64,7 +69,7 @@ def garden_path(seed: int, length_m: float) -> Solid:
     if not _PATH_M[0] <= length_m <= _PATH_M[1]:
         raise ValueError(f"length_m is {length_m:g}; expected a number from 0.5 to 60")
     rng = variant_rng("garden_path", seed)
-    half, is_slabs = 0.5 * rng.between(1.0, 1.6), _is_slabs(seed)
+    half, is_slabs = 0.5 * rng.between(1.0, 1.6, "width_m"), _is_slabs(seed)
     pieces = max(1, round(length_m / 0.7)) if is_slabs else 1
     joint = _JOINT_M if is_slabs else 0.0
     edges = np.linspace(-0.5 * length_m, 0.5 * length_m, pieces + 1)

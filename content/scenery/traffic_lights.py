@@ -45,13 +45,13 @@ def traffic_light(seed: int, mount: str) -> Solid:
     """
     rng = variant_rng("traffic_light", seed)
     arm = _choose_mount(seed, mount) == "mast_arm"
-    lens_m = 0.15 if arm else rng.choose((0.1, 0.1, 0.15))
+    lens_m = 0.15 if arm else rng.choose((0.1, 0.1, 0.15), "lens_m")
     low = head(VEHICLE_LENSES, 0.1 if arm else lens_m).moved(0.11, 0.0, rng.between(2.15, 2.5))
     radius = 0.09 if arm else 0.055
-    top = rng.between(5.6, 6.2) if arm else float(low.bounds_m()[1][2]) + 0.1
+    top = rng.between(5.6, 6.2, "top_m") if arm else float(low.bounds_m()[1][2]) + 0.1
     parts = [low, post(radius, (0.0, top), sides=12).painted(POLE)]
     if arm:
-        reach = rng.between(3.5, 5.5)
+        reach = rng.between(3.5, 5.5, "reach_m")
         path = [(0.0, 0.0, top - 0.1), (0.0, -0.6 * reach, top + 0.05), (0.0, -reach, top + 0.1)]
         high = head(VEHICLE_LENSES, lens_m)
         plate = _backboard(high)

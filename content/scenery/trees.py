@@ -279,7 +279,7 @@ def _flare_roots(patch: Patch) -> Patch:
 
 def _conifer(rng: VariantRng) -> Solid:
     """A spruce: whorls of drooping branches along a straight trunk, evergreen."""
-    height, base_m = rng.between(6.0, 12.0), rng.between(0.1, 0.17)
+    height, base_m = rng.between(6.0, 12.0, "height_m"), rng.between(0.1, 0.17, "base_m")
     clear, spread = rng.between(0.2, 0.9), rng.between(0.17, 0.24) * height
     line = np.array([(0.0, 0.0, 0.0), (0.0, 0.0, 0.6 * height), (0.0, 0.0, height)])
     trunk = sweep(line, circle(base_m, 8), up=(1.0, 0.0, 0.0), scale=np.array([1.0, 0.5, 0.08]))

@@ -59,8 +59,8 @@ def utility_pole(seed: int, span_m: float) -> Solid:
     if not 0.0 <= span_m <= SPAN_MAX_M:
         raise AssetError(f"utility_pole: span_m={span_m} is not between 0 and {SPAN_MAX_M:g}")
     kind, rng = in_turn(POLES, seed), variant_rng("utility_pole", seed)
-    high = rng.between(8.9, 9.8)
-    foot = 0.15 if kind.startswith("concrete") else rng.between(0.12, 0.15)
+    high = rng.between(8.9, 9.8, "height_m")
+    foot = 0.15 if kind.startswith("concrete") else rng.between(0.12, 0.15, "foot_m")
     radii = (foot, 0.62 * foot)
     if kind.startswith("concrete"):
         pole = lathe([(0.0, 0.0), (radii[0], 0.0), (radii[1], high), (0.0, high)], 8)
@@ -125,7 +125,7 @@ def _fittings(kind: str, radius: float, rng: VariantRng) -> list[Patch]:
         parts.append(rounded_box((0.5, 0.24, 0.1), 0.03, 1).moved(0.69, 0.0, 7.05).painted(2))
         parts.append(block((0.48, -0.09, 6.985), (0.9, 0.09, 7.0), 0.0, 4))
     if rng.chance(0.6):
-        z = rng.between(2.2, 3.2)
+        z = rng.between(2.2, 3.2, "height_m")
         parts.append(block((radius, -0.14, z), (radius + 0.16, 0.14, z + 0.4), 0.01, 2))
         duct = ((0.13, 0.05, 0.0), (0.13, 0.05, z))
         parts.append(bar(*duct, 0.02, 5, 2))
@@ -166,7 +166,7 @@ def power_box(seed: int) -> Solid:
         "substation": (2.2, 1.6, 1.75),
     }[kind]  # fmt: skip
     w, h = w * rng.between(0.92, 1.08), h * rng.between(0.95, 1.05)
-    x, y, foot = 0.5 * d, 0.5 * w, rng.between(0.06, 0.16)
+    x, y, foot = 0.5 * d, 0.5 * w, rng.between(0.06, 0.16, "foot_m")
     parts = [
         block((-x, -y, foot), (x, y, h - 0.04), 0.012),
         block((-x + 0.02, -y + 0.02, 0.0), (x - 0.02, y - 0.02, foot + 0.01), 0.0, 2),
@@ -175,7 +175,7 @@ def power_box(seed: int) -> Solid:
     doors = {"kiosk": 2, "substation": 3, "parcel": 3, "meter": 1}.get(kind, rng.choose((1, 2)))
     parts += _doors(doors, (x, y, foot, h), rows=6 if kind == "parcel" else 1)
     if kind not in {"parcel", "meter"} and rng.chance(0.7):
-        width = rng.between(0.14, 0.24)
+        width = rng.between(0.14, 0.24, "width_m")
         at, z = rng.between(-0.5, 0.5) * (w - width - 0.1), rng.between(0.45, 0.7) * h
         face = facing_rectangle(x + 0.003, (at - width / 2, at + width / 2), (z, z + 1.41 * width))
         parts.append(face.painted(3))

@@ -165,8 +165,12 @@ def rubbish_bags(seed: int) -> Solid:
         parts += _boxes(r + 0.42, rng)
     color, other = rng.choose(_BAGS), rng.choose(_BAGS)
     materials = (
-        Material(painted_material(color, 0.35).base_color, roughness=rng.between(0.25, 0.4)),
-        Material(painted_material(other, 0.35).base_color, roughness=rng.between(0.25, 0.4)),
+        Material(
+            painted_material(color, 0.35).base_color, roughness=rng.between(0.25, 0.4, "roughness")
+        ),
+        Material(
+            painted_material(other, 0.35).base_color, roughness=rng.between(0.25, 0.4, "roughness")
+        ),
         patterned_material("texture/cardboard?seed=1", 0.6, 0.9),
         printed_material(f"texture/poster?seed={seed % 12}", 0.6),
     )

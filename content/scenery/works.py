@@ -52,7 +52,7 @@ def traffic_cone(seed: int) -> Solid:
     """
     kind, rng = in_turn(CONES, seed), variant_rng("traffic_cone", seed)
     color = rng.choose(("#e2561b", "#e2561b", "#d8401f", "#c9c41f"))
-    dirt = rng.between(0.55, 1.0)
+    dirt = rng.between(0.55, 1.0, "dirt")
     red, green, blue = (dirt * c for c in hex_to_linear(_WHITE))
     materials = (
         worn_paint((_RED if kind == "beacon" else color,), 0.6, rng),
@@ -64,7 +64,7 @@ def traffic_cone(seed: int) -> Solid:
     elif kind == "post":
         parts, high, half = _flexible_post()
     else:
-        high = rng.choose((0.5, 0.75, 0.75, 1.0))
+        high = rng.choose((0.5, 0.75, 0.75, 1.0), "height_m")
         parts, half = _cone(high)
     if kind == "fallen":
         # It rests on the rim of its foot and on its tip.
@@ -158,7 +158,7 @@ def road_barrier_facts(seed: int) -> Facts:
 def _safety_shape(plastic: bool, seed: int, rng: VariantRng) -> tuple[list[Patch], np.ndarray]:
     """A New Jersey profile: foot 0.6 m wide (0.41 m plastic), 0.8 m high (EN 1317 systems)."""
     half, wide = (0.6, 0.68) if plastic else (1.0, 1.0)
-    high = rng.between(0.8, 0.85)
+    high = rng.between(0.8, 0.85, "height_m")
     flank = [(0.0, 0.3), (0.075, 0.3), (0.33, 0.17), (high, 0.09)]
     outline = np.array([(wide * x, z) for z, x in flank] + [(-wide * x, z) for z, x in flank[::-1]])
     # The outline's second axis becomes Z, the extrusion runs along -Y.

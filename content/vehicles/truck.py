@@ -53,9 +53,9 @@ def truck(seed: int) -> Solid:
     rng, kind = variant_rng("truck", seed), in_turn(KINDS, seed)
     longest = 7.6 if kind in ("tipper", "refuse_truck") else 9.8
     x, cab, roof = (
-        0.5 * rng.between(6.6, longest),
-        rng.between(1.75, 2.05),
-        rng.between(2.45, 2.75),
+        0.5 * rng.between(6.6, longest, "depth_m"),
+        rng.between(1.75, 2.05, "cab_m"),
+        rng.between(2.45, 2.75, "roof_m"),
     )
     top = max(roof + 0.25, rng.between(3.0, 3.75))
     loads = {"tipper": _tipper, "tanker": _tank, "flatbed": _flatbed, "car_transporter": _decks,
@@ -67,7 +67,9 @@ def truck(seed: int) -> Solid:
     paints = materials(rng, cab_paint, box_paint)
     keep = replace(paints[Slot.SECOND_PAINT], printed=True)
     finish = (*paints[: Slot.SECOND_PAINT], keep, *paints[Slot.SECOND_PAINT + 1 :])
-    return assemble_truck((x, cab, roof, top), rng.between(0.42, 0.49), load, finish, spoiler)
+    return assemble_truck(
+        (x, cab, roof, top), rng.between(0.42, 0.49, "radius_m"), load, finish, spoiler
+    )
 
 
 def truck_facts(seed: int) -> Facts:
@@ -78,7 +80,11 @@ def truck_facts(seed: int) -> Facts:
 def fire_engine(seed: int) -> Solid:
     """A fire engine with lockers, roller shutters, a ladder and beacons."""
     rng = variant_rng("fire_engine", seed)
-    x, cab, roof = 0.5 * rng.between(7.2, 8.4), rng.between(2.4, 2.7), rng.between(2.6, 2.8)
+    x, cab, roof = (
+        0.5 * rng.between(7.2, 8.4, "depth_m"),
+        rng.between(2.4, 2.7, "cab_m"),
+        rng.between(2.6, 2.8, "roof_m"),
+    )
     top = roof + rng.between(0.15, 0.4)
     red, stripe = hex_to_linear("#b5121b"), hex_to_linear(rng.choose(("#f2e600", "#e9e9e6")))
     finish = materials(rng, red, stripe, printed=Print(fixed=True))

@@ -214,8 +214,7 @@ def _call(
     function: Callable[..., T], asset_id: AssetId, family: AnyFamily
 ) -> tuple[T, dict[str, Draw]]:
     arguments, asked = _merge_arguments(asset_id, family)
-    name = asset_id.name.removeprefix(f"{kind_of(family)}/")
-    with drawing(name, asked) as drawn:
+    with drawing(asked) as drawn:
         return function(**arguments), drawn
 
 

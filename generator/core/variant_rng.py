@@ -40,38 +40,35 @@ class Draw:
     value: DrawnValue
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Drawing:
     """Named draws of one asset.
 
     Attributes:
-        family: Name of its family, without the prefix of its kind.
         asked: Values that its id asks for.
         drawn: Named draws so far.
+        root: First word of the name of the first stream. Streams of other first words belong to
+            other assets, which the asset contains or resembles.
     """
 
-    family: str
-    asked: Mapping[str, DrawnValue] = field(default_factory=dict)
+    asked: Mapping[str, DrawnValue]
     drawn: dict[str, Draw] = field(default_factory=dict)
-
-    def owns(self, stream: str) -> bool:
-        """Whether a stream belongs to the family, to a part of it, or to what it is a part of."""
-        return f"{stream}/".startswith(f"{self.family}/") or self.family.startswith(f"{stream}/")
+    root: str = ""
 
 
 _DRAWING: ContextVar[Drawing | None] = ContextVar("_DRAWING", default=None)
 
 
 @contextmanager
-def drawing(family: str, asked: Mapping[str, DrawnValue]) -> Iterator[dict[str, Draw]]:
-    """Record the named draws of a family; give them the values asked for.
+def drawing(asked: Mapping[str, DrawnValue]) -> Iterator[dict[str, Draw]]:
+    """Record the named draws of one asset; give them the values asked for.
 
     Draws raise ValueError where such a value is impossible.
 
     Yields:
         The draws, in their order, by name; complete when the context ends.
     """
-    current = Drawing(family, asked)
+    current = Drawing(asked)
     token = _DRAWING.set(current)
     try:
         yield current.drawn
@@ -150,9 +147,11 @@ def _find_option(name: str, asked: DrawnValue, options: Sequence[T]) -> T:
 def variant_rng(name: str, seed: int) -> VariantRng:
     """The generator of everything that variant ``seed`` of family ``name`` draws."""
     rng = VariantRng(Streams(seed=seed, scene=0).rng(name).bit_generator)
-    current = _DRAWING.get()
     rng.seed, rng.name = seed, name
-    rng.drawing = current if current is not None and current.owns(name) else None
+    current, root = _DRAWING.get(), name.partition("/")[0]
+    if current is not None:
+        current.root = current.root or root
+        rng.drawing = current if current.root == root else None
     return rng
 
 
