@@ -254,7 +254,7 @@ def router(seed: int = 0) -> Solid:
 def game_console(seed: int = 0) -> Solid:
     """A game console. Slots: case, dark."""
     rng = variant_rng("game_console", seed)
-    body: Box = ((-0.13, -0.15, 0.0), (0.13, 0.15, rng.between(0.05, 0.08)))
+    body: Box = ((-0.13, -0.15, 0.0), (0.13, 0.15, rng.between(0.05, 0.08, "height_m")))
     patches = [
         shapes.block(*body, 0.012),
         shapes.block((0.128, -0.13, 0.02), (0.132, 0.1, 0.024), 0.0, 1),
@@ -423,7 +423,7 @@ def toilet_paper(seed: int = 0) -> Solid:
 def tissue_box(seed: int = 0) -> Solid:
     """A box of tissues. Slots: card, paper."""
     rng = variant_rng("tissue_box", seed)
-    body: Box = ((-0.06, -0.11, 0.0), (0.06, 0.11, rng.between(0.06, 0.1)))
+    body: Box = ((-0.06, -0.11, 0.0), (0.06, 0.11, rng.between(0.06, 0.1, "height_m")))
     h = body[1][2]
     sheet = cushion((-0.015, -0.05, h - 0.01), (0.015, 0.05, h + 0.06), 1, 0.014)
     return solid(

@@ -54,7 +54,7 @@ def book_stack(seed: int = 0) -> Solid:
     rng = variant_rng("book_stack", seed)
     patches: list[Patch] = []
     z, reach = 0.0, [0.0, 0.0]
-    for k in range(int(rng.between(2, 7))):
+    for k in range(rng.whole(2, 7, "count")):
         x, y, t = rng.between(0.075, 0.1), rng.between(0.1, 0.13), rng.between(0.012, 0.04)
         parts = [
             shapes.block((-x, -y, 0.0), (x, y, 0.002), 0.0, k % 4),
@@ -93,7 +93,7 @@ def paper_stack(seed: int = 0) -> Solid:
     rng = variant_rng("paper_stack", seed)
     patches: list[Patch] = []
     z = 0.0
-    for _ in range(int(rng.between(2, 7))):
+    for _ in range(rng.whole(2, 7, "count")):
         t = rng.between(0.0008, 0.006)
         sheet = shapes.block((-0.1485, -0.105, 0.0), (0.1485, 0.105, t))
         turned = sheet.rotated("z", rng.between(-0.12, 0.12))
@@ -217,7 +217,7 @@ def dish_rack(seed: int = 0) -> Solid:
 def plate_stack(seed: int = 0) -> Solid:
     """Plates or bowls on each other. Slot: glaze."""
     rng = variant_rng("plate_stack", seed)
-    r, deep = rng.between(0.1, 0.135, "radius_m"), seed % 2 == 1
+    r, deep = rng.between(0.1, 0.135, "radius_m"), rng.turn((False, True), "deep")
     rise, step = (0.06, 0.018) if deep else (0.02, 0.0085)
     radius = 0.7 * r if deep else r
     profile = [(0.0, 0.0), (0.55 * radius, 0.0), (radius, rise), (radius - 0.003, rise + 0.002),
@@ -346,7 +346,7 @@ def toothbrush_cup(seed: int = 0) -> Solid:
         [(0.0, 0.0), (r, 0.0), (1.05 * r, h), (r, h), (0.92 * r, 0.005), (0.0, 0.005)], 28
     )
     patches = [cup]
-    for k in range(1 + seed % 3):
+    for k in range(rng.turn((1, 2, 3), "count")):
         a = 2.1 * k + rng.between(0.0, 1.0)
         c, s = math.cos(a), math.sin(a)
         tip = (0.95 * r * c, 0.95 * r * s, h + 0.08)
@@ -412,7 +412,7 @@ def bathroom_scale(seed: int = 0) -> Solid:
 def power_strip(seed: int = 0) -> Solid:
     """A strip of sockets with a curled cable. Slots: body, sockets, cable."""
     rng = variant_rng("power_strip", seed)
-    count = 3 + seed % 4
+    count = rng.turn((3, 4, 5, 6), "sockets")
     half = 0.5 * (0.045 * count + 0.05)
     body: Box = ((-0.026, -half, 0.0), (0.026, half, 0.038))
     patches = [shapes.block(*body, 0.006)]
@@ -432,7 +432,9 @@ def game_box(seed: int = 0) -> Solid:
     rng = variant_rng("game_box", seed)
     patches: list[Patch] = []
     z, x, y = 0.0, 0.0, 0.0
-    sizes = sorted((rng.between(0.13, 0.19) for _ in range(1 + seed % 3)), reverse=True)
+    sizes = sorted(
+        (rng.between(0.13, 0.19) for _ in range(rng.turn((1, 2, 3), "count"))), reverse=True
+    )
     for k, b in enumerate(sizes):
         a, t = min(b, rng.between(0.13, 0.15)), rng.between(0.04, 0.07)
         part = [
@@ -454,8 +456,8 @@ def game_box(seed: int = 0) -> Solid:
 def plush_toy(seed: int = 0) -> Solid:
     """A sitting bear or rabbit of plush. Slots: plush, belly, eyes."""
     rng = variant_rng("plush_toy", seed)
-    s = rng.between(0.8, 1.3)
-    rabbit = seed % 3 == 2
+    s = rng.between(0.8, 1.3, "scale")
+    rabbit = rng.turn((False, False, True), "rabbit")
 
     def lump(x: float, y: float, z: float, a: float, b: float, c: float, slot: int = 0) -> Patch:
         ball = shapes.ball(lambda d: d * (a, b, c), 12, 18).painted(slot).moved(x, y, z)

@@ -433,7 +433,7 @@ def _housing(rng: VariantRng) -> Material:
 def house_plant(seed: int = 0) -> Solid:
     """A plant in a pot. Slots: pot, soil, leaves."""
     rng = variant_rng("house_plant", seed)
-    big = seed % 2 == 0
+    big = rng.turn((True, False), "big")
     r, h = (
         (rng.between(0.14, 0.2), rng.between(0.24, 0.36))
         if big
@@ -473,7 +473,7 @@ def house_plant(seed: int = 0) -> Solid:
 def _leaf(rng: VariantRng, length: float) -> Patch:
     """A pointed, bent leaf on a stalk in the plane y = 0, from the origin outwards."""
     steps = 7
-    lean, bend = rng.between(0.15, 0.7, "lean_rad"), rng.between(0.5, 1.5, "bend_rad")
+    lean, bend = rng.between(0.15, 0.7), rng.between(0.5, 1.5)
     s = np.linspace(0.0, 1.0, steps)
     angle = lean + bend * s * s
     x = np.concatenate([[0.0], np.cumsum(np.sin(angle[:-1]))]) * length / (steps - 1)
@@ -562,7 +562,7 @@ def book_row(seed: int = 0) -> Solid:
     ]
     band = Material(draw_linear(("#a08a55", "#a39e92", "#77757a"), 0.1, rng), 0.5)
     patches: list[Patch] = []
-    y, tallest, end = 0.0, 0.0, rng.between(0.16, 0.4)
+    y, tallest, end = 0.0, 0.0, rng.between(0.16, 0.4, "width_m")
     while y < end:
         # Series are alike; single books are not.
         thick, h, d = rng.between(0.01, 0.045), rng.between(0.165, 0.285), rng.between(0.12, 0.19)

@@ -136,7 +136,7 @@ def cooker(seed: int = 0) -> Solid:
         patches.append(shapes.lathe(ring, 36, 5).moved(x, y))
     # Panel with knobs, door with a window and a bar, drawer below; gaps between them are dark.
     x = _X + 0.02
-    glassy = seed % 2 == 0
+    glassy = rng.turn((True, False), "glass_hob")
     patches += [
         shapes.block((_X - 0.01, -0.296, 0.1), (_X + 0.004, 0.296, 0.858), 0.0, 4),
         shapes.block((_X, -0.297, 0.742), (x, 0.297, 0.856), 0.004, 2),
@@ -226,7 +226,7 @@ def toilet(seed: int = 0) -> Solid:
     """A toilet with cistern or built into the wall. Slots: ceramic, seat."""
     rng = variant_rng("toilet", seed)
     z = rng.between(0.4, 0.44, "seat_m")
-    cistern = seed % 2 == 0
+    cistern = rng.turn((True, False), "cistern")
     outline = [
         (0.10, 0.0),
         (0.13, 0.05),
@@ -264,7 +264,7 @@ def toilet(seed: int = 0) -> Solid:
 def wash_basin(seed: int = 0) -> Solid:
     """A basin on a cupboard. Slots: ceramic, front, steel."""
     rng = variant_rng("wash_basin", seed)
-    d, w = rng.between(0.42, 0.5, "depth_m"), (0.5, 0.6, 0.8)[seed % 3]
+    d, w = rng.between(0.42, 0.5, "depth_m"), rng.turn((0.5, 0.6, 0.8), "width_m")
     x, y, z = 0.5 * d, 0.5 * w, 0.86
     height = rng.between(0.1, 0.18, "tap_m")
     rim: list[Box] = [
@@ -297,8 +297,8 @@ def bathtub(seed: int = 0) -> Solid:
     """A bathtub. Slots: ceramic, panel, steel."""
     rng = variant_rng("bathtub", seed)
     d, w, z = (
-        (0.7, 0.75, 0.8)[seed % 3],
-        (1.6, 1.7, 1.8)[seed % 3],
+        rng.turn((0.7, 0.75, 0.8), "depth_m"),
+        rng.turn((1.6, 1.7, 1.8), "width_m"),
         rng.between(0.52, 0.58, "height_m"),
     )
     x, y = 0.5 * d, 0.5 * w
@@ -332,7 +332,7 @@ def bathtub(seed: int = 0) -> Solid:
 def shower(seed: int = 0) -> Solid:
     """A shower: tray, pole with head, and panes of glass. Slots: ceramic, steel, glass."""
     rng = variant_rng("shower", seed)
-    d = (0.8, 0.9, 1.0)[seed % 3]
+    d = rng.turn((0.8, 0.9, 1.0), "width_m")
     x = 0.5 * d
     tray: Box = ((-x, -x, 0.0), (x, x, 0.06))
     patches: list[Patch] = [shapes.block(*tray, 0.012)]

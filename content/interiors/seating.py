@@ -43,8 +43,8 @@ PIPING_HEIGHT = 0.9
 def sofa(seed: int = 0) -> Solid:
     """A sofa for two to four. Slots: cover, legs, pillows."""
     rng = variant_rng("sofa", seed)
-    places = 2 + seed % 3
-    return _upholstered(rng, places, places * rng.between(0.58, 0.68))
+    places = rng.turn((2, 3, 4), "places")
+    return _upholstered(rng, places, places * rng.between(0.58, 0.68, "seat_width_m"))
 
 
 def armchair(seed: int = 0) -> Solid:
@@ -171,17 +171,18 @@ def chair(seed: int = 0) -> Solid:
         rng.between(0.44, 0.47, "seat_m"),
     )
     back_z = rng.between(0.8, 0.98, "back_m")
-    soft = seed % 3 == 1
+    kind = rng.turn(("wood", "upholstered", "shell"), "kind")
+    soft, back = kind == "upholstered", kind != "wood"
     seat: Box = ((-0.5 * d, -0.5 * w, z - (0.06 if soft else 0.025)), (0.5 * d, 0.5 * w, z))
     patches = [padding(*seat, rng, 0, 6.0, 0.003) if soft else board(*seat, 0, 0.008)]
     x = -0.5 * d + 0.02
-    legs = 1 if seed % 3 else 0
+    legs = 1 if back else 0
     for sy in (-1, 1):
         y = sy * (0.5 * w - 0.03)
         patches.append(rod((0.5 * d - 0.03, y, z - 0.02), (0.5 * d, 1.03 * y, 0.0), 0.014, legs))
         patches.append(rod((x, y, z - 0.02), (x - 0.04, 1.03 * y, 0.0), 0.014, legs))
         patches.append(rod((x, y, z - 0.03), (x - 0.07, y, back_z), 0.012, legs))
-    if soft or seed % 3 == 2:
+    if back:
         rest: Box = (
             (-0.02, -0.5 * w, -0.5 * (back_z - z) + 0.1),
             (0.02, 0.5 * w, 0.5 * (back_z - z)),
@@ -193,7 +194,7 @@ def chair(seed: int = 0) -> Solid:
             .moved(x - 0.045, 0.0, 0.5 * (z + back_z) + 0.02)
         )
     else:
-        for k in range(2 + seed % 2):
+        for k in range(rng.turn((2, 3), "slats")):
             h = back_z - 0.05 - 0.13 * k
             lean = x - 0.07 * (h - z) / (back_z - z)
             patches.append(
@@ -209,7 +210,7 @@ def chair(seed: int = 0) -> Solid:
     boxes: list[Box] = [seat, ((x - 0.08, -0.5 * w, z), (x + 0.01, 0.5 * w, back_z))]
     boxes += _legs_under(d, w, z)
     made = solid(patches, [body, wood(rng) if legs and soft else steel if legs else body], boxes)
-    edge = (x - 0.075, 0.0, back_z + (0.015 if soft or seed % 3 == 2 else 0.0))
+    edge = (x - 0.075, 0.0, back_z + (0.015 if back else 0.0))
     # Before the back, and clear of the round edges of cushions.
     corners = (-0.5 * d + 0.08, -0.5 * w + 0.03, z), (0.5 * d - 0.03, 0.5 * w - 0.03, z)
     supports = tuple(Keypoint(SUPPORT, corner) for corner in corners)
@@ -219,7 +220,10 @@ def chair(seed: int = 0) -> Solid:
 def stool(seed: int = 0) -> Solid:
     """A stool, low or at bar height. Slots: seat, legs."""
     rng = variant_rng("stool", seed)
-    z, r = (0.45, 0.65)[seed % 2] + rng.between(-0.02, 0.02), rng.between(0.15, 0.19, "radius_m")
+    z, r = (
+        rng.turn((0.45, 0.65), "seat_m") + rng.between(-0.02, 0.02),
+        rng.between(0.15, 0.19, "radius_m"),
+    )
     patches = [disc(0, 0, z - 0.035, z, r, 0, 32)]
     for k in range(4):
         a = 0.25 * math.pi * (2 * k + 1)
@@ -291,7 +295,7 @@ def office_chair(seed: int = 0) -> Solid:
 def dining_table(seed: int = 0) -> Solid:
     """A table for meals, rectangular or round. Slots: top, legs."""
     rng = variant_rng("dining_table", seed)
-    if seed % 4 == 3:
+    if rng.turn((False, False, False, True), "round_top"):
         return _round_table(
             rng, rng.between(0.45, 0.6, "radius_m"), rng.between(0.73, 0.76, "height_m")
         )
@@ -306,7 +310,7 @@ def dining_table(seed: int = 0) -> Solid:
 def coffee_table(seed: int = 0) -> Solid:
     """A low table. Slots: top, legs."""
     rng = variant_rng("coffee_table", seed)
-    if seed % 3 == 2:
+    if rng.turn((False, False, True), "round_top"):
         return _round_table(
             rng, rng.between(0.34, 0.45, "radius_m"), rng.between(0.38, 0.46, "height_m")
         )
@@ -332,7 +336,7 @@ def desk(seed: int = 0) -> Solid:
         rng.between(0.6, 0.8, "depth_m"),
         rng.between(1.2, 1.8, "width_m"),
         rng.between(0.72, 0.76, "height_m"),
-        drawers=seed % 2 == 1,
+        drawers=rng.turn((False, True), "drawers"),
         cables=True,
     )
 
@@ -378,7 +382,7 @@ def _rectangular_table(
     cables: bool = False,
 ) -> Solid:
     d, w, z = depth_m, width_m, height_m
-    thick = rng.between(0.02, 0.04, "thickness_m")
+    thick = rng.between(0.02, 0.04, "top_thickness_m")
     top: Box = ((-0.5 * d, -0.5 * w, z - thick), (0.5 * d, 0.5 * w, z))
     patches = [board(*top, 0, 0.004), *four_legs(d, w, z - thick, rng.between(0.04, 0.07), 1, 0.05)]
     apron = 0.02

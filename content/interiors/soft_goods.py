@@ -214,7 +214,7 @@ def drape(
 def bed(seed: int = 0) -> Solid:
     """A bed of 0.9 to 1.8 m, made; its head at -X. Slots: frame, mattress, duvet, pillows."""
     rng = variant_rng("bed", seed)
-    w = (0.9, 1.4, 1.6, 1.8)[seed % 4]
+    w = rng.turn((0.9, 1.4, 1.6, 1.8), "width_m")
     length, top = 2.0, rng.between(0.42, 0.52, "top_m")
     x0, x1, y0, y1 = -0.5 * length - 0.06, 0.5 * length + 0.04, -0.5 * w - 0.04, 0.5 * w + 0.04
     rail = rng.between(0.24, 0.32, "rail_m")
@@ -265,8 +265,8 @@ def blanket(seed: int = 0) -> Solid:
     """A folded blanket. Slot: cloth."""
     rng = variant_rng("blanket", seed)
     x, y, layers = (
-        rng.between(0.16, 0.22, "depth_m"),
-        rng.between(0.2, 0.3, "width_m"),
+        0.5 * rng.between(0.32, 0.44, "depth_m"),
+        0.5 * rng.between(0.4, 0.6, "width_m"),
         rng.whole(2, 5, "layers"),
     )
     return _folded(rng, [(x, y, rng.between(0.022, 0.035))] * layers, [fabric(rng)])
@@ -276,8 +276,8 @@ def towel_stack(seed: int = 0) -> Solid:
     """Folded towels on each other. Slots: cloths."""
     rng = variant_rng("towel_stack", seed)
     x, y, count = (
-        rng.between(0.11, 0.15, "depth_m"),
-        rng.between(0.15, 0.2, "width_m"),
+        0.5 * rng.between(0.22, 0.3, "depth_m"),
+        0.5 * rng.between(0.3, 0.4, "width_m"),
         rng.whole(2, 7, "count"),
     )
     sizes = [(x * rng.between(0.93, 1.0), y * rng.between(0.93, 1.0), 0.045)] * count
@@ -289,7 +289,7 @@ def folded_clothes(seed: int = 0) -> Solid:
     rng = variant_rng("folded_clothes", seed)
     sizes = [
         (rng.between(0.13, 0.16), rng.between(0.12, 0.16), rng.between(0.025, 0.05))
-        for _ in range(int(rng.between(1, 6)))
+        for _ in range(rng.whole(1, 6, "count"))
     ]
     return _folded(rng, sizes, [fabric(rng) for _ in range(3)])
 
@@ -314,7 +314,7 @@ def clothes_pile(seed: int = 0) -> Solid:
     rng = variant_rng("clothes_pile", seed)
     patches: list[Patch] = []
     reach, top = 0.0, 0.0
-    for k in range(2 + seed % 2):
+    for k in range(rng.turn((2, 3), "count")):
         r = rng.between(0.16, 0.26)
         ring = np.linspace(0.0, 1.0, 12)[:, None]
         turn = np.linspace(0.0, 2.0 * math.pi, 41)[None, :]
@@ -364,7 +364,7 @@ def coat_hooks(seed: int = 0) -> Solid:
     Slots: board, hooks, coats.
     """
     rng = variant_rng("coat_hooks", seed)
-    count = 3 + seed % 3
+    count = rng.turn((3, 4, 5), "hooks")
     w, drop = 0.17 * count, 1.05
     patches: list[Patch] = [board((0.0, -0.5 * w, drop), (0.02, 0.5 * w, drop + 0.09))]
     lowest = drop
@@ -399,9 +399,7 @@ def hang_garment(rng: VariantRng, length_m: float, slot: int, *, thin: bool = Fa
     """
     s = np.linspace(0.0, 1.0, 12 if thin else 26)[:, None]
     turn = np.linspace(0.0, 2.0 * math.pi, 41 if thin else 65)[None, :]
-    shoulder = (
-        rng.between(0.17, 0.2, "shoulder_m") if thin else rng.between(0.14, 0.17, "shoulder_m")
-    )
+    shoulder = rng.between(0.17, 0.2) if thin else rng.between(0.14, 0.17)
     slope = np.clip(s / 0.14, 0.0, 1.0)
     wide = 0.045 + (shoulder - 0.045) * np.sin(0.5 * math.pi * slope) + 0.035 * s
     deep = (0.015 if thin else 0.035) + (0.006 if thin else 0.03) * slope
@@ -570,7 +568,7 @@ def _over_rail(
     wave = np.sin(waves * y + rng.between(0.0, 6.3)) + 0.5 * np.sin(
         0.47 * waves * y + rng.between(0.0, 6.3)
     )
-    depth = rng.between(0.003, 0.009, "depth_m")
+    depth = rng.between(0.003, 0.009, "fold_depth_m")
     # One corner hangs lower than the other.
     tilt = rng.between(-0.06, 0.06) * y
 

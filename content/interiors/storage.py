@@ -111,16 +111,23 @@ def _measures(family: str, seed: int) -> tuple[VariantRng, float, float, float, 
     if family == "wardrobe":
         return (
             rng,
-            rng.between(0.55, 0.62),
-            (0.8, 1.0, 1.2)[seed % 3],
+            rng.between(0.55, 0.62, "depth_m"),
+            rng.turn((0.8, 1.0, 1.2), "width_m"),
             0.08,
-            rng.between(1.9, 2.2),
+            rng.between(1.9, 2.2, "height_m"),
             2,
         )
     if family == "refrigerator":
-        return rng, rng.between(0.6, 0.66), rng.between(0.56, 0.68), 0.62, rng.between(1.55, 1.9), 1
+        return (
+            rng,
+            rng.between(0.6, 0.66, "depth_m"),
+            rng.between(0.56, 0.68, "width_m"),
+            0.62,
+            rng.between(1.55, 1.9, "height_m"),
+            1,
+        )
     if family == "wall_unit":
-        return rng, rng.between(0.32, 0.36), (0.6, 0.8)[seed % 2], 0.0, 0.7, 2
+        return rng, rng.between(0.32, 0.36, "depth_m"), rng.turn((0.6, 0.8), "width_m"), 0.0, 0.7, 2
     return rng, 0.58, 0.6, 0.1, 0.86, 1
 
 
@@ -312,29 +319,30 @@ def _chest_measures(family: str, seed: int) -> tuple[VariantRng, float, float, f
         case "dresser":
             return (
                 rng,
-                rng.between(0.42, 0.5),
-                rng.between(0.8, 1.3),
-                rng.between(0.74, 1.05),
+                rng.between(0.42, 0.5, "depth_m"),
+                rng.between(0.8, 1.3, "width_m"),
+                rng.between(0.74, 1.05, "height_m"),
                 0.09,
-                3 + seed % 2,
+                rng.turn((3, 4), "drawers"),
             )
         case "bedside_table":
             return (
                 rng,
-                rng.between(0.35, 0.42),
-                rng.between(0.4, 0.5),
-                rng.between(0.42, 0.58),
+                rng.between(0.35, 0.42, "depth_m"),
+                rng.between(0.4, 0.5, "width_m"),
+                rng.between(0.42, 0.58, "height_m"),
                 0.1,
-                1 + seed % 2,
+                rng.turn((1, 2), "drawers"),
             )
         case "filing_cabinet":
-            return rng, 0.58, 0.42, (0.7, 1.02, 1.32)[seed % 3], 0.02, (2, 3, 4)[seed % 3]
+            drawers = rng.turn((2, 3, 4), "drawers")
+            return rng, 0.58, 0.42, (0.7, 1.02, 1.32)[drawers - 2], 0.02, drawers
         case _:
             return (
                 rng,
-                rng.between(0.42, 0.5),
-                rng.between(0.6, 0.8),
-                rng.between(0.8, 0.95),
+                rng.between(0.42, 0.5, "depth_m"),
+                rng.between(0.6, 0.8, "width_m"),
+                rng.between(0.8, 0.95, "height_m"),
                 0.12,
                 5,
             )
@@ -401,7 +409,7 @@ def bookcase(seed: int = 0) -> Solid:
     rng = variant_rng("bookcase", seed)
     d, w, z = (
         rng.between(0.26, 0.36, "depth_m"),
-        (0.4, 0.8, 1.0)[seed % 3],
+        rng.turn((0.4, 0.8, 1.0), "width_m"),
         rng.between(0.9, 2.05, "height_m"),
     )
     return _shelves(d, w, z, [front(rng)])
@@ -531,7 +539,7 @@ def _cartons(
     patches: list[Patch] = []
     rows = rng.whole(1, 5, "rows")
     nx, ny = rng.choose(((3, 2), (2, 2), (4, 2), (4, 3), (2, 1)))
-    h = rng.between(0.2, 0.3, "height_m") if rows > 2 else rng.between(0.22, 0.36, "height_m")
+    h = rng.between(0.2, 0.3, "layer_m") if rows > 2 else rng.between(0.22, 0.36, "layer_m")
     a, b = 1.16 / nx, 0.76 / ny
     for row in range(rows):
         for i in range(nx):

@@ -225,7 +225,7 @@ def carton_stack(seed: int = 0) -> Solid:
     rng = variant_rng("carton_stack", seed)
     patches: list[Patch] = []
     x, y, z = 0.5 * rng.between(0.26, 0.38, "depth_m"), 0.5 * rng.between(0.3, 0.52, "width_m"), 0.0
-    for k in range(1 + seed % 3):
+    for k in range(rng.turn((1, 2, 3), "count")):
         h = rng.between(0.1, 0.24) if seed % 3 else rng.between(0.14, 0.28)
         part: list[Patch] = []
         tape_carton(part, (-x, -y, 0.0), (x, y, h), rng, (0, 1, 2, 3))
@@ -241,7 +241,7 @@ def screw_jars(seed: int = 0) -> Solid:
     rng = variant_rng("screw_jars", seed)
     patches: list[Patch] = []
     r, h = rng.between(0.032, 0.042, "radius_m"), rng.between(0.08, 0.12, "height_m")
-    for i in range(1 + seed % 2):
+    for i in range(rng.turn((1, 2), "rows")):
         for j in range(2 + seed % 4):
             x, y = 2.15 * r * i, 2.15 * r * j
             fill = rng.between(0.25, 0.8) * h
@@ -322,8 +322,10 @@ def timber(seed: int = 0) -> Solid:
 def pedal_bin(seed: int = 0) -> Solid:
     """A bin with a lid and a pedal. Slots: body, dark parts."""
     rng = variant_rng("pedal_bin", seed)
-    r, h = ((0.13, 0.6), (0.145, 0.42), (0.1, 0.27))[seed % 3]
-    r, h = r * rng.between(0.95, 1.05), h * rng.between(0.95, 1.05)
+    r, h = {"tall": (0.13, 0.6), "wide": (0.145, 0.42), "small": (0.1, 0.27)}[
+        rng.turn(("tall", "wide", "small"), "size")
+    ]
+    r, h = r * rng.between(0.95, 1.05, "width_scale"), h * rng.between(0.95, 1.05, "height_scale")
     body = shapes.lathe([(0.0, 0.012), (r, 0.012), (r, 0.9 * h), (0.0, 0.9 * h)], 40)
     dome = [
         (1.02 * r, 0.9 * h + 0.012),

@@ -59,7 +59,7 @@ def wall_shelf(seed: int = 0) -> Solid:
 def socket(seed: int = 0) -> Solid:
     """One to three sockets in a frame. Slots: plate, holes."""
     rng = variant_rng("socket", seed)
-    count = 1 + seed % 3
+    count = rng.turn((1, 2, 3), "count")
     w = 0.081 * count
     plate: Box = ((0.0, -0.5 * w, 0.0), (0.009, 0.5 * w, 0.081))
     patches = [shapes.block(*plate, 0.003)]
@@ -80,7 +80,7 @@ def socket(seed: int = 0) -> Solid:
 
 def light_switch(seed: int = 0) -> Solid:
     """One or two rockers in a frame. Slots: plate, rockers."""
-    count = 1 + seed % 2
+    count = variant_rng("light_switch", seed).turn((1, 2), "count")
     w = 0.081 * count
     plate: Box = ((0.0, -0.5 * w, 0.0), (0.008, 0.5 * w, 0.081))
     patches = [shapes.block(*plate, 0.003)]
@@ -240,7 +240,7 @@ def bathroom_cabinet(seed: int = 0) -> Solid:
         rng.between(0.55, 0.9, "width_m"),
         rng.between(0.6, 0.75, "height_m"),
         0.14,
-        1 + seed % 3,
+        rng.turn((1, 2, 3), "doors"),
     )
     body: Box = ((0.0, -0.5 * w, 0.0), (d, 0.5 * w, h))
     patches = [board(*body)]
@@ -255,7 +255,7 @@ def bathroom_cabinet(seed: int = 0) -> Solid:
 def parts_bins(seed: int = 0) -> Solid:
     """Rows of open plastic bins for small parts. Slots: rail, bins, parts."""
     rng = variant_rng("parts_bins", seed)
-    rows, columns = 2 + seed % 3, rng.whole(4, 8, "columns")
+    rows, columns = rng.turn((2, 3, 4), "rows"), rng.whole(4, 8, "columns")
     a, h, d = 0.105, 0.085, 0.15
     w, pitch = columns * (a + 0.006), h + 0.045
     back: Box = ((0.0, -0.5 * w, 0.0), (0.01, 0.5 * w, rows * pitch))

@@ -203,7 +203,7 @@ def _stacked(
 
 def sliced_sandwich(seed: int, rng: VariantRng, *, half: bool = False) -> Dish:
     """Two slices of tin loaf with fillings; ``half`` is cut from corner to corner."""
-    size, thick = rng.between(0.095, 0.12, "size_m"), rng.between(0.011, 0.015, "thickness_m")
+    size, thick = rng.between(0.095, 0.12, "size_m"), rng.between(0.011, 0.015, "bread_m")
     outline = _slice_outline(size, rng)
     if half:
         outline = size * np.array(
@@ -290,8 +290,8 @@ SANDWICHES: Mapping[str, Callable[[int, VariantRng], Dish]] = {
 
 def make_pizza(seed: int, rng: VariantRng, radius: float, turn_rad: float) -> Dish:
     """A pizza around Z, from angle 0 to ``turn_rad``; 2 pi is a whole one."""
-    thick, rim = rng.between(0.005, 0.009, "thickness_m"), rng.between(0.013, 0.02, "rim_m")
-    width, outline = rng.between(0.014, 0.022, "width_m"), wobble(6, 0.012, rng)
+    thick, rim = rng.between(0.005, 0.009, "base_m"), rng.between(0.013, 0.02, "rim_m")
+    width, outline = rng.between(0.014, 0.022, "crust_m"), wobble(6, 0.012, rng)
     edge = [
         (radius - width, thick),
         (radius - 0.75 * width, rim),
@@ -692,7 +692,7 @@ def _sprinkles(radius: float, across: float, up: float, rng: VariantRng) -> list
 def _hot_dog(seed: int, rng: VariantRng) -> Dish:
     length, radius = rng.between(0.14, 0.18, "length_m"), rng.between(0.022, 0.027, "radius_m")
     loaf = _loaf(length, radius)
-    thick = rng.between(0.0105, 0.0125, "thickness_m")
+    thick = rng.between(0.0105, 0.0125, "sausage_radius_m")
     reach = 0.5 * length * rng.between(1.0, 1.08)
     body = np.linspace(-1.0, 1.0, 25)
     path = np.stack([reach * body, 0.0 * body, 0.004 * body**2], axis=1)

@@ -139,7 +139,8 @@ def carrot(seed: int) -> Solid:
 
 def fruit_kind(group: str, seed: int) -> str:
     """Key in ``fruits.yaml`` of a variant of a group."""
-    return in_turn([name for name in STYLES if name.startswith(f"{group}/")], seed)
+    kinds = [name.partition("/")[2] for name in STYLES if name.startswith(f"{group}/")]
+    return f"{group}/{variant_rng(group, seed).turn(kinds, 'kind')}"
 
 
 def apple_facts(seed: int) -> Facts:
@@ -187,7 +188,8 @@ def _round_fruit(group: str, seed: int) -> Solid:
 
 def _draw_shape(style: FruitStyle, rng: VariantRng) -> tuple[Callable[[Array], Array], float]:
     """Mapping of directions to points [m], and the height of the stalk's foot [m]."""
-    radius, slim = rng.between(*style.radius_m), rng.between(*style.slim)
+    radius = rng.between(*style.radius_m, "radius_m")
+    slim = rng.between(*style.slim, "slim")
     top, low = rng.between(*style.dent_top), rng.between(*style.dent_low)
     taper = rng.between(*style.taper)
     tips = rng.between(*style.tip_top), rng.between(*style.tip_low)
@@ -333,7 +335,7 @@ def banana(seed: int) -> Solid:
     """A banana on its side, or a hand of up to seven resting on its tips. Slots: peels, crown."""
     rng = variant_rng("banana", seed)
     count = banana_count(seed)
-    length, thick = rng.between(0.15, 0.205, "length_m"), rng.between(0.0165, 0.02, "thickness_m")
+    length, thick = rng.between(0.15, 0.205, "length_m"), rng.between(0.0165, 0.02, "radius_m")
     ripe = round(rng.between(0.0, 1.0), 2)
     peels = [
         printed_material(f"texture/banana_peel?ripe={ripe}&seed={seed + k}", rng.between(0.4, 0.55))

@@ -43,7 +43,7 @@ def hex_bolt(seed: int) -> Solid:
     """A hexagon bolt standing on its head. Slot: body."""
     rng = variant_rng("hex_bolt", seed)
     d, flats, head, _, pitch = (0.001 * v for v in in_turn(_SIZES["hexagons"], seed))
-    length = d * rng.choose((2.0, 3.0, 4.0, 5.0))
+    length = d * rng.choose((2.0, 3.0, 4.0, 5.0), "length_by_diameter")
     threaded = min(length - d, max(2 * d, 0.55 * length))
     corner = flats / math.sqrt(3)
     end = head + length
@@ -89,7 +89,9 @@ def washer(seed: int) -> Solid:
 def stepped_shaft(seed: int) -> Solid:
     """A turned shaft of several diameters, lying along X. Slot: body."""
     rng = variant_rng("stepped_shaft", seed)
-    radii = [rng.between(*bounds) for bounds in _SIZES["shaft_radii"]][: rng.choose((3, 4, 5))]
+    radii = [rng.between(*bounds) for bounds in _SIZES["shaft_radii"]][
+        : rng.choose((3, 4, 5), "steps")
+    ]
     chamfer, z = 0.0008, 0.0
     profile: list[Point2] = [(0.0, 0.0)]
     parts = []
@@ -268,9 +270,9 @@ def connector_symmetries(seed: int) -> tuple[Symmetry, ...]:
 
 def _draw_connector(rng: VariantRng) -> tuple[float, float, int]:
     """Side of the block and reach of the ports [m], and their number."""
-    side = rng.between(0.022, 0.034)
+    side = rng.between(0.022, 0.034, "side_m")
     reach = rng.between(0.2, 0.45) * side
-    return side, reach, rng.choose((3, 4, 5, 6))
+    return side, reach, rng.choose((3, 4, 5, 6), "ports")
 
 
 def _worn_metal(kind: str, rng: VariantRng) -> Material:

@@ -27,7 +27,7 @@ def grapes(seed: int) -> Solid:
     rng = variant_rng("grapes", seed)
     count = grape_count(seed)
     thick, slim = (
-        rng.between(0.0075, 0.0115, "thickness_m"),
+        rng.between(0.0075, 0.0115, "berry_radius_m"),
         rng.choose((1.0, 1.05, 1.15, 1.35), "slim"),
     )
     places = _packed(count, thick, rng)

@@ -369,7 +369,7 @@ def _straw(choice: Choice, walls: Walls, rng: VariantRng) -> Part:
     slope = (lean - foot[0]) / (z - foot[2])
     tip = (foot[0] + slope * (top - foot[2]), 0.0, top)
     path = np.linspace(foot, tip, 5)
-    radius = rng.between(0.003, 0.004, "radius_m")
+    radius = rng.between(0.003, 0.004)
     straw = shapes.sweep(path, shapes.circle(radius, 10), up=(1.0, 0.0, 0.0))
     codes = ("#f2f2ee", "#1f1f22", "#c3121f", "#2e8a4e", "#b98e5f")
     return [straw], plastic_material(rng, codes), hulls.tube(path[[0, 4]], 0.9 * radius)[0]

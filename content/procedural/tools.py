@@ -100,7 +100,7 @@ def hammer(seed: int) -> Solid:
 def wrench(seed: int) -> Solid:
     """A combination wrench: open jaw at +X, ring at -X. Slot: steel."""
     rng = variant_rng("wrench", seed)
-    across = rng.choose((0.010, 0.012, 0.013, 0.015, 0.017, 0.019))
+    across = rng.choose((0.010, 0.012, 0.013, 0.015, 0.017, 0.019), "across_flats_m")
     length = across * rng.between(10.5, 12.5)
     thick, bar = 0.33 * across + 0.0012, 0.36 * across + 0.0015
     head, ring = 1.12 * across, 0.8 * across

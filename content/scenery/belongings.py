@@ -30,7 +30,7 @@ from gen_data.content.scenery.clutter_shapes import (
     worn_steel,
 )
 from gen_data.core.asset_types import Material
-from gen_data.core.variant_rng import VariantRng, in_turn, variant_rng
+from gen_data.core.variant_rng import VariantRng, variant_rng
 
 PRAMS = ("carrycot", "buggy", "carrycot", "buggy")
 SUITCASES = ("hard", "soft", "duffel", "hard", "backpack")
@@ -42,7 +42,8 @@ def pram(seed: int) -> Solid:
 
     Slots: frame, fabric, tyre, trim.
     """
-    kind, rng = in_turn(PRAMS, seed), variant_rng("pram", seed)
+    rng = variant_rng("pram", seed)
+    kind = rng.turn(PRAMS, "kind")
     r, wide = (0.14, 0.27) if kind == "carrycot" else (0.1, 0.23)
     front, rear, grip = 0.36, -0.34, rng.between(0.98, 1.06, "grip_scale")
     parts: list[Patch] = []
@@ -85,7 +86,7 @@ def pram(seed: int) -> Solid:
 
 def pram_facts(seed: int) -> Facts:
     """Its kind."""
-    return Facts("pram", {"kind": in_turn(PRAMS, seed)})
+    return Facts("pram", {"kind": variant_rng("pram", seed).turn(PRAMS, "kind")})
 
 
 def _wheel(radius: float) -> list[Patch]:
@@ -115,7 +116,8 @@ def suitcase(seed: int) -> Solid:
 
     Slots: shell, trim, wheels, second fabric.
     """
-    kind, rng = in_turn(SUITCASES, seed), variant_rng("suitcase", seed)
+    rng = variant_rng("suitcase", seed)
+    kind = rng.turn(SUITCASES, "kind")
     if kind in {"hard", "soft"}:
         parts, high = _trolley(kind == "hard", rng)
     elif kind == "duffel":
@@ -136,7 +138,7 @@ def suitcase(seed: int) -> Solid:
 
 def suitcase_facts(seed: int) -> Facts:
     """Its kind."""
-    return Facts("suitcase", {"kind": in_turn(SUITCASES, seed)})
+    return Facts("suitcase", {"kind": variant_rng("suitcase", seed).turn(SUITCASES, "kind")})
 
 
 def _trolley(hard: bool, rng: VariantRng) -> tuple[list[Patch], float]:
@@ -221,7 +223,7 @@ def shopping_bags(seed: int) -> Solid:
     Slots: first and second paper, print, cords, goods.
     """
     rng = variant_rng("shopping_bags", seed)
-    count = (1, 2, 3, 4)[seed % 4]
+    count = rng.turn((1, 2, 3, 4), "count")
     parts, at = [], 0.0
     for k in range(count):
         d, w, h = rng.between(0.1, 0.17), rng.between(0.2, 0.36), rng.between(0.26, 0.44)

@@ -57,7 +57,7 @@ def garden_wall(seed: int, style: str) -> Solid:
     skin = _skin(kind, rng)
     railed = kind.endswith("railing")
     high = rng.between(0.45, 0.7, "height_m") if railed else rng.between(0.7, 1.5, "height_m")
-    half, reach = 0.5 * rng.between(0.2, 0.3, "width_m"), 0.035
+    half, reach = 0.5 * rng.between(0.2, 0.3, "thickness_m"), 0.035
     if kind == "gabion":
         half = 0.25
     parts = [block((-half, -HALF_M, 0.0), (half, HALF_M, high - 0.06))]
@@ -134,7 +134,7 @@ def _wood(rng: VariantRng, scale_m: float = 1.2) -> Material:
 
 def _pickets(rng: VariantRng) -> Made:
     """Upright pickets with pointed, round or flat tops on two rails."""
-    high, wide = rng.between(0.8, 1.2, "height_m"), rng.between(0.07, 0.1, "width_m")
+    high, wide = rng.between(0.8, 1.2, "height_m"), rng.between(0.07, 0.1, "board_m")
     count = round(2.0 * HALF_M / (wide + rng.between(0.03, 0.07)))
     pitch, half = 2.0 * HALF_M / count, 0.5 * wide
     kind = rng.choose(("point", "point", "round", "flat"), "kind")
@@ -184,7 +184,7 @@ def _planks(rng: VariantRng) -> Made:
     """Boards across with gaps, on an inner post."""
     rows, wide, gap = (
         rng.choose((3, 4, 5), "rows"),
-        rng.between(0.1, 0.15, "width_m"),
+        rng.between(0.1, 0.15, "board_m"),
         rng.between(0.05, 0.12, "gap_m"),
     )
     foot = rng.between(0.06, 0.15, "foot_m")

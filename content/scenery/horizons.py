@@ -280,7 +280,7 @@ def _woods_on(points: Array, rng: VariantRng) -> list[Patch]:
 def _lump(foot_m: Array, radius_m: float, rng: VariantRng) -> Patch:
     """A crown of few faces that stands on a slope; no two are alike."""
     x, y, z = foot_m.tolist()
-    high = rng.between(0.9, 1.5, "height_m")
+    high = rng.between(0.9, 1.5)
     made = ball(lambda d: d * radius_m * np.array([1.0, 1.0, high]), 3, 5)
     placed = made.rotated("z", rng.between(0.0, 6.2)).moved(x, y, z + 0.6 * radius_m)
     return replace(placed, corners_m=np.maximum(placed.corners_m, np.array([-1e3, -1e3, 0.0])))

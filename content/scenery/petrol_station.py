@@ -131,7 +131,8 @@ def fountain(seed: int) -> Solid:
 
     Slots: stone, water, steel.
     """
-    kind, rng = in_turn(FOUNTAINS, seed), variant_rng("fountain", seed)
+    rng = variant_rng("fountain", seed)
+    kind = rng.turn(FOUNTAINS, "kind")
     radius, rim = rng.between(1.6, 2.8, "radius_m"), rng.between(0.45, 0.6, "rim_m")
     sides = rng.choose((8, 24, 24), "sides")
     profile = [(radius + 0.25, 0.0), (radius + 0.25, 0.12), (radius, 0.14), (radius, rim - 0.08),
@@ -171,4 +172,4 @@ def _spout(number: int) -> Patch:
 
 def fountain_facts(seed: int) -> Facts:
     """Its kind."""
-    return Facts("fountain", {"kind": in_turn(FOUNTAINS, seed)})
+    return Facts("fountain", {"kind": variant_rng("fountain", seed).turn(FOUNTAINS, "kind")})

@@ -17,7 +17,7 @@ from gen_data.content.procedural.surface_shapes import block, grid, lathe, round
 from gen_data.content.scenery.basic_shapes import facing_rectangle, make_solid, post
 from gen_data.content.scenery.clutter_shapes import on_ground, worn_paint, worn_steel
 from gen_data.core.asset_types import Material
-from gen_data.core.variant_rng import in_turn, variant_rng
+from gen_data.core.variant_rng import variant_rng
 
 BILLBOARDS = ("hoarding", "light_box", "a_board", "tall", "light_box", "hoarding", "a_board")
 POSTERS, WIDE_POSTERS, STREET_NAMES = 12, 8, 12
@@ -29,7 +29,8 @@ def billboard(seed: int) -> Solid:
 
     Slots: frame, print in front, print behind.
     """
-    kind, rng = in_turn(BILLBOARDS, seed), variant_rng("billboard", seed)
+    rng = variant_rng("billboard", seed)
+    kind = rng.turn(BILLBOARDS, "kind")
     prints = _posters(seed, "wide_poster" if kind in {"hoarding", "tall"} else "poster")
     if kind == "a_board":
         parts, hull = _a_board()
@@ -45,7 +46,7 @@ def billboard(seed: int) -> Solid:
 
 def billboard_facts(seed: int) -> Facts:
     """Its kind."""
-    return Facts("billboard", {"kind": in_turn(BILLBOARDS, seed)})
+    return Facts("billboard", {"kind": variant_rng("billboard", seed).turn(BILLBOARDS, "kind")})
 
 
 def _posters(seed: int, family: str) -> tuple[Material, Material]:

@@ -176,7 +176,7 @@ def post_box(seed: int) -> Solid:
         rng.between(0.3, 0.4, "depth_m"),
         rng.between(0.6, 0.75, "height_m"),
     )
-    z = rng.between(0.65, 0.8, "height_m")
+    z = rng.between(0.65, 0.8, "legs_m")
     body = rounded_box((d, w, h), 0.03, 2).moved(z=z + 0.5 * h)
     x = 0.5 * d
     flap = block((x, -0.4 * w, z + 0.68 * h), (x + 0.03, 0.4 * w, z + 0.82 * h), 0.008).painted(1)

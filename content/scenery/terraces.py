@@ -18,7 +18,7 @@ from gen_data.content.procedural.surface_shapes import block
 from gen_data.content.scenery.cafe import cafe_set
 from gen_data.content.scenery.foliage import merge_meshes
 from gen_data.core.asset_types import ConvexParts, Material
-from gen_data.core.variant_rng import VariantRng, in_turn, variant_rng
+from gen_data.core.variant_rng import VariantRng, variant_rng
 
 _KINDS = ("terrace", "path", "deck", "path")
 _PATH_M, _SLAB_M = (0.5, 60.0), 0.06
@@ -31,7 +31,8 @@ def terrace(seed: int) -> Solid:
 
     Slots: pavement, then those of the chairs.
     """
-    rng, kind = variant_rng("terrace", seed), in_turn(_KINDS, seed)
+    rng = variant_rng("terrace", seed)
+    kind = rng.turn(_KINDS, "kind")
     if kind == "path":
         wide, long, high, pieces = (
             rng.between(0.6, 1.1, "width_m"),
@@ -99,7 +100,7 @@ def _is_slabs(seed: int) -> bool:
 
 def terrace_facts(seed: int) -> Facts:
     """Whether it is a terrace, a deck or a path."""
-    return Facts(in_turn(_KINDS, seed))
+    return Facts(variant_rng("terrace", seed).turn(_KINDS, "kind"))
 
 
 def _pavement(kind: str, rng: VariantRng) -> Material:

@@ -159,7 +159,7 @@ def _city_block(plan: _Block, rng: VariantRng) -> Iterator[Patch]:
         return
     yield _flat_roof(plan)
     if plan.storeys > 8 and rng.chance(0.5):
-        inset = rng.between(1.5, 3.5, "inset_m")
+        inset = rng.between(1.5, 3.5)
         plan = _Block(plan.x0 + inset, plan.y0 + inset, plan.x1 - inset, plan.y1 - inset,
                       plan.top_m, round(rng.between(1.0, 4.0)), plan.storey_m,
                       plan.slot)  # fmt: skip
@@ -167,7 +167,7 @@ def _city_block(plan: _Block, rng: VariantRng) -> Iterator[Patch]:
         yield _flat_roof(plan)
     top = plan.top_m
     x, y = 0.5 * (plan.x0 + plan.x1), plan.y0 + rng.between(0.25, 0.75) * (plan.y1 - plan.y0)
-    reach, high = rng.between(1.2, 2.6, "reach_m"), rng.between(1.8, 3.2, "height_m")
+    reach, high = rng.between(1.2, 2.6), rng.between(1.8, 3.2)
     yield block((x - 2.0, y - reach, top), (x + 2.0, y + reach, top + high), 0.0, _ROOF)
     if plan.storeys > 6 and rng.chance(0.4):
         yield cone((0.18, top + high), (0.05, top + high + rng.between(4.0, 9.0)), 5, _ROOF).moved(
@@ -248,7 +248,7 @@ def _church(rng: VariantRng) -> Iterator[Patch]:
 
 def _crown(at_m: tuple[float, float], rng: VariantRng) -> Patch:
     """A treetop between the houses."""
-    radius, high = rng.between(2.5, 4.0, "radius_m"), rng.between(0.9, 1.3, "height_m")
+    radius, high = rng.between(2.5, 4.0), rng.between(0.9, 1.3)
 
     def shape(d: Array) -> Array:
         lobe = 1.0 + 0.2 * np.sin(3.0 * np.arctan2(d[..., 1:2], d[..., :1]) + 5.0 * d[..., 2:])

@@ -71,7 +71,7 @@ def traffic_light_facts(seed: int, mount: str) -> Facts:
 def pedestrian_signal(seed: int) -> Solid:
     """A red and green signal for people, with a push button. Slots as above."""
     rng = variant_rng("pedestrian_signal", seed)
-    signal = head(PEDESTRIAN_LENSES, 0.1).moved(0.11, 0.0, rng.between(2.1, 2.3))
+    signal = head(PEDESTRIAN_LENSES, 0.1).moved(0.11, 0.0, rng.between(2.1, 2.3, "height_m"))
     top = float(signal.bounds_m()[1][2]) + 0.1
     button = shapes.rounded_box((0.09, 0.11, 0.2), 0.02, 1).moved(0.06, 0.0, 1.05).painted(BOARD)
     parts = [signal, button, post(0.052, (0.0, top), sides=12).painted(POLE)]

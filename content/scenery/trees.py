@@ -354,9 +354,14 @@ def leaf_greens(codes: tuple[str, ...], rng: VariantRng) -> tuple[Material, ...]
 
 
 def _draw_shape(species: Species, rng: VariantRng) -> Shape:
-    height, clear = rng.between(*species.height_m), rng.between(*species.clear_m)
+    height = rng.between(*species.height_m, "height_m")
+    clear = rng.between(*species.clear_m, "clear_m")
     crown = height - clear + species.overlap_m
-    wide = rng.between(*species.width) if species.width[0] < species.width[1] else species.width[0]
+    wide = (
+        rng.between(*species.width, "width")
+        if species.width[0] < species.width[1]
+        else species.width[0]
+    )
     if species.boughs:
         centre_z = height - species.middle * crown
         lobes = _draw_boughs(crown * wide, crown, centre_z, species.boughs, rng)
@@ -370,7 +375,7 @@ def _draw_shape(species: Species, rng: VariantRng) -> Shape:
         r = 0.5 * crown
         lobes = (Lobe((0.0, 0.0, height - r), (wide * r, wide * r, r)),)
     green = rng.choose(species.greens) if len(species.greens) > 1 else species.greens[0]
-    trunk = rng.between(*species.trunk_m)
+    trunk = rng.between(*species.trunk_m, "trunk_m")
     return Shape(height, clear, trunk, lobes, green, species.bark, species.droop)
 
 

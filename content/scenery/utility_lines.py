@@ -26,7 +26,7 @@ from gen_data.content.scenery.street_furniture import GALVANISED
 from gen_data.core.asset_types import Material
 from gen_data.core.errors import AssetError
 from gen_data.core.se3 import Vec3
-from gen_data.core.variant_rng import VariantRng, in_turn, variant_rng
+from gen_data.core.variant_rng import VariantRng, variant_rng
 
 POLES = ("wood", "concrete", "wood_transformer", "wood_lamp", "concrete_double", "wood_double")
 BOXES = ("telecom", "power", "kiosk", "meter", "parcel", "telecom_tall", "substation", "power")
@@ -58,7 +58,8 @@ def utility_pole(seed: int, span_m: float) -> Solid:
     """
     if not 0.0 <= span_m <= SPAN_MAX_M:
         raise AssetError(f"utility_pole: span_m={span_m} is not between 0 and {SPAN_MAX_M:g}")
-    kind, rng = in_turn(POLES, seed), variant_rng("utility_pole", seed)
+    rng = variant_rng("utility_pole", seed)
+    kind = rng.turn(POLES, "kind")
     high = rng.between(8.9, 9.8, "height_m")
     foot = 0.15 if kind.startswith("concrete") else rng.between(0.12, 0.15, "foot_m")
     radii = (foot, 0.62 * foot)
@@ -88,7 +89,7 @@ def utility_pole(seed: int, span_m: float) -> Solid:
 def utility_pole_facts(seed: int, span_m: float) -> Facts:
     """Its kind, whatever the span."""
     del span_m
-    return Facts("utility_pole", {"kind": in_turn(POLES, seed)})
+    return Facts("utility_pole", {"kind": variant_rng("utility_pole", seed).turn(POLES, "kind")})
 
 
 def _cross_arms(double: bool, radius: float) -> list[Patch]:
@@ -125,7 +126,7 @@ def _fittings(kind: str, radius: float, rng: VariantRng) -> list[Patch]:
         parts.append(rounded_box((0.5, 0.24, 0.1), 0.03, 1).moved(0.69, 0.0, 7.05).painted(2))
         parts.append(block((0.48, -0.09, 6.985), (0.9, 0.09, 7.0), 0.0, 4))
     if rng.chance(0.6):
-        z = rng.between(2.2, 3.2, "height_m")
+        z = rng.between(2.2, 3.2)
         parts.append(block((radius, -0.14, z), (radius + 0.16, 0.14, z + 0.4), 0.01, 2))
         duct = ((0.13, 0.05, 0.0), (0.13, 0.05, z))
         parts.append(bar(*duct, 0.02, 5, 2))
@@ -159,7 +160,8 @@ def power_box(seed: int) -> Solid:
 
     Faces +X. Slots: body, seams, plinth, sticker, roof. Sizes: assumed from makers' catalogues.
     """
-    kind, rng = in_turn(BOXES, seed), variant_rng("power_box", seed)
+    rng = variant_rng("power_box", seed)
+    kind = rng.turn(BOXES, "kind")
     w, d, h = {
         "telecom": (0.75, 0.31, 1.05), "power": (0.79, 0.32, 1.1), "kiosk": (1.25, 0.45, 1.4),
         "meter": (0.45, 0.2, 0.95), "parcel": (1.5, 0.6, 1.95), "telecom_tall": (0.8, 0.5, 1.65),
@@ -175,7 +177,7 @@ def power_box(seed: int) -> Solid:
     doors = {"kiosk": 2, "substation": 3, "parcel": 3, "meter": 1}.get(kind, rng.choose((1, 2)))
     parts += _doors(doors, (x, y, foot, h), rows=6 if kind == "parcel" else 1)
     if kind not in {"parcel", "meter"} and rng.chance(0.7):
-        width = rng.between(0.14, 0.24, "width_m")
+        width = rng.between(0.14, 0.24)
         at, z = rng.between(-0.5, 0.5) * (w - width - 0.1), rng.between(0.45, 0.7) * h
         face = facing_rectangle(x + 0.003, (at - width / 2, at + width / 2), (z, z + 1.41 * width))
         parts.append(face.painted(3))
@@ -195,7 +197,7 @@ def power_box(seed: int) -> Solid:
 
 def power_box_facts(seed: int) -> Facts:
     """Its kind."""
-    return Facts("power_box", {"kind": in_turn(BOXES, seed)})
+    return Facts("power_box", {"kind": variant_rng("power_box", seed).turn(BOXES, "kind")})
 
 
 def _roof(kind: str, x: float, y: float, h: float) -> Patch:

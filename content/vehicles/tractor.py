@@ -81,7 +81,7 @@ def _wheels(rear_x: float, rear: float, front_x: float, front: float) -> list[Pa
 
 def _bonnet(rear_x: float, x: float, rng: VariantRng) -> list[Patch]:
     """Engine, bonnet that falls to the front, grille, weights, exhaust."""
-    low, high, nose = 1.0, rng.between(1.6, 1.75, "height_m"), x - 0.3
+    low, high, nose = 1.0, rng.between(1.6, 1.75, "bonnet_m"), x - 0.3
     side = np.array([(low, 0.0), (high, 0.0), (high - 0.08, nose - rear_x - 0.25),
                      (high - 0.3, nose - rear_x), (low, nose - rear_x)])  # fmt: skip
     path = np.array([(rear_x, -0.42, 0.0), (rear_x, 0.42, 0.0)])

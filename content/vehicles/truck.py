@@ -31,7 +31,7 @@ from gen_data.content.vehicles.vehicle_materials import COLORS, SIDES, Print, ma
 from gen_data.content.vehicles.vehicle_materials import VehicleSlot as Slot
 from gen_data.content.vehicles.wheels import Axles
 from gen_data.core.asset_types import Material
-from gen_data.core.variant_rng import in_turn, variant_rng
+from gen_data.core.variant_rng import variant_rng
 
 _FLOOR_M = 0.42
 _HALF_M = 1.16
@@ -50,7 +50,8 @@ def truck(seed: int) -> Solid:
 
     Randomizers paint the cab; boxes, tanks and beds keep the colour of their kind.
     """
-    rng, kind = variant_rng("truck", seed), in_turn(KINDS, seed)
+    rng = variant_rng("truck", seed)
+    kind = rng.turn(KINDS, "kind")
     longest = 7.6 if kind in ("tipper", "refuse_truck") else 9.8
     x, cab, roof = (
         0.5 * rng.between(6.6, longest, "depth_m"),
@@ -68,13 +69,13 @@ def truck(seed: int) -> Solid:
     keep = replace(paints[Slot.SECOND_PAINT], printed=True)
     finish = (*paints[: Slot.SECOND_PAINT], keep, *paints[Slot.SECOND_PAINT + 1 :])
     return assemble_truck(
-        (x, cab, roof, top), rng.between(0.42, 0.49, "radius_m"), load, finish, spoiler
+        (x, cab, roof, top), rng.between(0.42, 0.49, "wheel_radius_m"), load, finish, spoiler
     )
 
 
 def truck_facts(seed: int) -> Facts:
     """Its kind."""
-    return Facts(in_turn(KINDS, seed))
+    return Facts(variant_rng("truck", seed).turn(KINDS, "kind"))
 
 
 def fire_engine(seed: int) -> Solid:

@@ -22,7 +22,6 @@ from gen_data.core.streams import Rng, Streams
 T = TypeVar("T")
 DrawnValue = float | int | str | tuple[float, ...]
 """Values of draws as in asset ids; ``true`` and ``false`` for truth values."""
-_TRUTH = {"false": False, "true": True}
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,14 +97,16 @@ class VariantRng(Rng):
         value = options[min(int(self.random() * len(options)), len(options) - 1)]
         return self._settle(name, options, value)
 
-    def turn(self, options: Sequence[T], name: str = "") -> T:
-        """The option of the seed: consecutive seeds take the options in turn; draws nothing."""
-        return self._settle(name, options, in_turn(options, self.seed))
+    def turn(self, options: Sequence[T], name: str, number: int | None = None) -> T:
+        """The option of the seed, or of another number, in turn; the stream stays as it is."""
+        return self._settle(
+            name, options, in_turn(options, self.seed if number is None else number)
+        )
 
     def chance(self, probability: float, name: str = "") -> bool:
         """Draw True with the given probability."""
         value = float(self.random()) < probability
-        return _TRUTH[self._settle(name, tuple(_TRUTH), str(value).lower())] if name else value
+        return self._settle(name, (False, True), value)
 
     def shuffled(self, items: Sequence[T]) -> list[T]:
         """Return the items in random order."""
@@ -123,8 +124,14 @@ class VariantRng(Rng):
         find = _find_in_range if is_range else _find_option
         asked = self.drawing.asked
         value: Any = find(name, asked[name], options) if name in asked else drawn
-        self.drawing.drawn[name] = Draw(tuple(dict.fromkeys(options)), is_range, value)
+        known = tuple(dict.fromkeys(map(_in_ids, options)))
+        self.drawing.drawn[name] = Draw(known, is_range, _in_ids(value))
         return value  # type: ignore[no-any-return]
+
+
+def _in_ids(value: Any) -> Any:
+    """A value as in asset ids."""
+    return str(value).lower() if isinstance(value, bool) else value
 
 
 def _find_in_range(name: str, asked: DrawnValue, ends: Sequence[float]) -> float:
@@ -138,9 +145,9 @@ def _find_in_range(name: str, asked: DrawnValue, ends: Sequence[float]) -> float
 
 def _find_option(name: str, asked: DrawnValue, options: Sequence[T]) -> T:
     for option in options:
-        if option == asked:
+        if _in_ids(option) == asked:
             return option
-    words = list(dict.fromkeys(map(str, options)))
+    words = list(dict.fromkeys(str(_in_ids(option)) for option in options))
     raise ValueError(f"{name} is none of {', '.join(words)}{did_you_mean(str(asked), words)}")
 
 
