@@ -16,6 +16,7 @@ from gen_data.assets.asset_cache import Arrays, Store, content_key
 from gen_data.assets.asset_ids import AssetId, ParameterValue, format_parameter
 from gen_data.assets.families import AnyFamily, kind_of, own_families, third_party_families
 from gen_data.assets.family import EnvironmentFamily, Facts, Family, TextureFamily
+from gen_data.assets.family_parameters import FamilyParameter, merge_draws
 from gen_data.assets.importer import ImportedMesh
 from gen_data.core.asset_types import Asset, Float32, Symmetry, TextureData
 from gen_data.core.bounded_cache import CountCache, Sized
@@ -27,6 +28,7 @@ VERSION = 4
 _KEYS = 8192
 """Content keys kept in memory, some hundred bytes each."""
 _MAX_SEED = 2**31 - 1
+_VARIANTS_DESCRIBED = 24
 _offered: CountCache[tuple[AnyFamily, Asset]] = CountCache(16384)
 """Descriptions of assets offered for selection, about 1 kB each: every library of a process has the
 same, each search by tags finds many of them, and their facts take a millisecond."""
@@ -78,9 +80,10 @@ class ProceduralLibrary:
         except ValueError as error:
             raise AssetError(f"asset '{asset_id}': {error}") from error
 
-    def variants(self, name: str) -> tuple[AssetId, ...]:
-        """Ids of a family that are offered for selection; of a known name."""
-        return tuple(AssetId(name, {"seed": k}) for k in range(self._families[name].variants))
+    def parameters(self, name: str) -> tuple[FamilyParameter, ...]:
+        """Named draws of a family with a known name; makes its first 24 variants."""
+        seeds = range(min(self._families[name].variants, _VARIANTS_DESCRIBED))
+        return merge_draws(self.draws(AssetId(name, {"seed": k})) for k in seeds)
 
     def _describe(self, asset_id: AssetId, family: AnyFamily) -> Asset:
         if _merge_arguments(asset_id, family)[1]:
