@@ -21,7 +21,7 @@ from gen_data.core.streams import Rng, Streams
 
 T = TypeVar("T")
 DrawnValue = float | int | str | tuple[float, ...]
-"""Values of draws as in asset ids; ``true`` and ``false`` for truth values."""
+"""Values of draws as in asset ids: ``true``, ``false``, and ``none`` for an empty word."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,7 +130,9 @@ class VariantRng(Rng):
 
 
 def _in_ids(value: Any) -> Any:
-    """A value as in asset ids."""
+    """A value as in asset ids: words for truth values and for nothing."""
+    if value is None or value == "":
+        return "none"
     return str(value).lower() if isinstance(value, bool) else value
 
 
