@@ -130,11 +130,15 @@ class Library:
         """Keep a description, so that asking for it by its id reads nothing again."""
         return self._entries.get(asset.asset_id, lambda: asset)
 
-    def parameters(self, family: str) -> tuple[FamilyParameter, ...]:
-        """Named draws of a procedural family, over its variants. Raises UnknownAsset."""
+    def parameters(self, family: str, variants: int = 24) -> tuple[FamilyParameter, ...]:
+        """Named draws of a procedural family in its first variants, which it makes.
+
+        Raises:
+            UnknownAsset: if there is no such family.
+        """
         if not self._is_generated(family):
             raise UnknownAsset(f"asset '{family}': is a file, which has no parameters")
-        return self._generated.parameters(family)
+        return self._generated.parameters(family, variants)
 
     def materials(self, asset_id: str) -> tuple[Material, ...]:
         """The asset's own materials, one per mesh slot."""

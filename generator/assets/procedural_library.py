@@ -28,7 +28,6 @@ VERSION = 4
 _KEYS = 8192
 """Content keys kept in memory, some hundred bytes each."""
 _MAX_SEED = 2**31 - 1
-_VARIANTS_DESCRIBED = 24
 _offered: CountCache[tuple[AnyFamily, Asset]] = CountCache(16384)
 """Descriptions of assets offered for selection, about 1 kB each: every library of a process has the
 same, each search by tags finds many of them, and their facts take a millisecond."""
@@ -80,9 +79,9 @@ class ProceduralLibrary:
         except ValueError as error:
             raise AssetError(f"asset '{asset_id}': {error}") from error
 
-    def parameters(self, name: str) -> tuple[FamilyParameter, ...]:
-        """Named draws of a family with a known name; makes its first 24 variants."""
-        seeds = range(min(self._families[name].variants, _VARIANTS_DESCRIBED))
+    def parameters(self, name: str, variants: int) -> tuple[FamilyParameter, ...]:
+        """Named draws of the first variants of a family with a known name, which are made."""
+        seeds = range(min(self._families[name].variants, variants))
         return merge_draws(self.draws(AssetId(name, {"seed": k})) for k in seeds)
 
     def _describe(self, asset_id: AssetId, family: AnyFamily) -> Asset:

@@ -124,6 +124,6 @@ def test_describe_finds_a_family_that_has_the_name_of_a_plugin() -> None:
     """The kind before the name tells them apart."""
     for name, start in (
         ("overpass", "element overpass"),
-        ("asset_family/overpass", "asset_family"),
+        ("asset_family/overpass", "asset_family overpass"),
     ):
         assert CliRunner().invoke(cli, ["describe", name]).output.startswith(start)
