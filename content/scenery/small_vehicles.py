@@ -176,11 +176,8 @@ def trailer(seed: int) -> Solid:
     """
     rng = variant_rng("trailer", seed)
     kind = rng.turn(TRAILERS, "kind")
-    half, wide, floor = (
-        0.5 * rng.between(2.0, 2.6, "length_m"),
-        0.5 * rng.between(1.1, 1.3, "width_m"),
-        0.52,
-    )
+    half, floor = 0.5 * rng.between(2.0, 2.6, "length_m"), 0.52
+    wide = 0.5 * rng.between(1.1, 1.3, "width_m")
     reach = half + 1.15
     parts: list[Patch] = []
     for side in (-1.0, 1.0):

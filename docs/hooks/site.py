@@ -20,7 +20,7 @@ ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT))
 
 from docs.hooks.command_reference import command_page  # noqa: E402
-from docs.hooks.family_reference import family_page
+from docs.hooks.family_reference import family_page  # noqa: E402
 from docs.hooks.plugin_reference import first_comment, plugin_pages, yaml_block  # noqa: E402
 from docs.hooks.python_reference import python_page  # noqa: E402
 
