@@ -53,7 +53,11 @@ def _case(rng: VariantRng) -> Material:
 def microwave(seed: int = 0) -> Solid:
     """A microwave oven. Slots: case, glass, steel."""
     rng = variant_rng("microwave", seed)
-    d, w, h = rng.between(0.32, 0.38), rng.between(0.44, 0.5), rng.between(0.25, 0.29)
+    d, w, h = (
+        rng.between(0.32, 0.38, "depth_m"),
+        rng.between(0.44, 0.5, "width_m"),
+        rng.between(0.25, 0.29, "height_m"),
+    )
     x, y = 0.5 * d, 0.5 * w
     body: Box = ((-x, -y, 0.008), (x, y, h))
     patches = [
@@ -70,7 +74,11 @@ def microwave(seed: int = 0) -> Solid:
 def toaster(seed: int = 0) -> Solid:
     """A toaster with two slots. Slots: case, dark."""
     rng = variant_rng("toaster", seed)
-    d, w, h = rng.between(0.16, 0.19), rng.between(0.26, 0.3), rng.between(0.17, 0.2)
+    d, w, h = (
+        rng.between(0.16, 0.19, "depth_m"),
+        rng.between(0.26, 0.3, "width_m"),
+        rng.between(0.17, 0.2, "height_m"),
+    )
     body: Box = ((-0.5 * d, -0.5 * w, 0.0), (0.5 * d, 0.5 * w, h))
     patches = [cushion(*body, 0, 0.03)]
     for x in (-0.03, 0.03):
@@ -85,7 +93,7 @@ def toaster(seed: int = 0) -> Solid:
 def kettle(seed: int = 0) -> Solid:
     """An electric kettle on its base. Slots: case, dark."""
     rng = variant_rng("kettle", seed)
-    r, h = rng.between(0.07, 0.085), rng.between(0.18, 0.23)
+    r, h = rng.between(0.07, 0.085, "radius_m"), rng.between(0.18, 0.23, "height_m")
     body = shapes.lathe(
         [
             (0.0, 0.02),
@@ -111,7 +119,7 @@ def kettle(seed: int = 0) -> Solid:
 def coffee_maker(seed: int = 0) -> Solid:
     """A coffee maker with a jug. Slots: case, jug."""
     rng = variant_rng("coffee_maker", seed)
-    w, h = rng.between(0.17, 0.2), rng.between(0.3, 0.36)
+    w, h = rng.between(0.17, 0.2, "width_m"), rng.between(0.3, 0.36, "height_m")
     boxes: list[Box] = [
         ((-0.12, -0.5 * w, 0.0), (0.12, 0.5 * w, 0.04)),
         ((-0.12, -0.5 * w, 0.04), (-0.02, 0.5 * w, h)),
@@ -128,7 +136,7 @@ def coffee_maker(seed: int = 0) -> Solid:
 def cooking_pot(seed: int = 0) -> Solid:
     """A pot, some with a lid. Slots: body, handles."""
     rng = variant_rng("cooking_pot", seed)
-    r, h = rng.between(0.08, 0.13), rng.between(0.09, 0.16)
+    r, h = rng.between(0.08, 0.13, "radius_m"), rng.between(0.09, 0.16, "height_m")
     patches = [
         shapes.lathe(
             [(0.0, 0.0), (r, 0.0), (r, h), (r - 0.003, h), (r - 0.003, 0.004), (0.0, 0.004)], 40
@@ -153,7 +161,7 @@ def cooking_pot(seed: int = 0) -> Solid:
 def frying_pan(seed: int = 0) -> Solid:
     """A frying pan. Slots: body, handle."""
     rng = variant_rng("frying_pan", seed)
-    r, h = rng.between(0.1, 0.14), rng.between(0.04, 0.055)
+    r, h = rng.between(0.1, 0.14, "radius_m"), rng.between(0.04, 0.055, "height_m")
     profile = [(0.0, 0.0), (0.8 * r, 0.0), (r, h), (r - 0.004, h), (0.8 * r, 0.005), (0.0, 0.005)]
     patches = [
         shapes.lathe(profile, 40),
@@ -169,7 +177,7 @@ def frying_pan(seed: int = 0) -> Solid:
 def cutting_board(seed: int = 0) -> Solid:
     """A cutting board. Slot: wood."""
     rng = variant_rng("cutting_board", seed)
-    x, y = rng.between(0.1, 0.14), rng.between(0.15, 0.21)
+    x, y = 0.5 * rng.between(0.2, 0.28, "depth_m"), 0.5 * rng.between(0.3, 0.42, "width_m")
     flat: Box = ((-x, -y, 0.0), (x, y, 0.018))
     return solid([board(*flat, 0, 0.005)], [wood(rng, 0.6)], [flat])
 
@@ -177,7 +185,7 @@ def cutting_board(seed: int = 0) -> Solid:
 def printer(seed: int = 0) -> Solid:
     """A printer with a sheet in its tray. Slots: case, dark, paper."""
     rng = variant_rng("printer", seed)
-    h = rng.between(0.17, 0.28)
+    h = rng.between(0.17, 0.28, "height_m")
     body: Box = ((-0.18, -0.22, 0.0), (0.16, 0.22, h))
     patches = [
         cushion(*body, 0, 0.02),
@@ -194,7 +202,11 @@ def printer(seed: int = 0) -> Solid:
 def speaker(seed: int = 0) -> Solid:
     """A loudspeaker. Slots: case, cones."""
     rng = variant_rng("speaker", seed)
-    d, w, h = rng.between(0.15, 0.25), rng.between(0.14, 0.22), rng.between(0.24, 0.4)
+    d, w, h = (
+        rng.between(0.15, 0.25, "depth_m"),
+        rng.between(0.14, 0.22, "width_m"),
+        rng.between(0.24, 0.4, "height_m"),
+    )
     x = 0.5 * d
     body: Box = ((-x, -0.5 * w, 0.0), (x, 0.5 * w, h))
     patches: list[Patch] = [board(*body, 0, 0.004)]
@@ -207,7 +219,7 @@ def speaker(seed: int = 0) -> Solid:
 def desk_fan(seed: int = 0) -> Solid:
     """A fan. Slots: case, cage."""
     rng = variant_rng("desk_fan", seed)
-    r = rng.between(0.12, 0.17)
+    r = rng.between(0.12, 0.17, "radius_m")
     z = r + 0.1
     patches = [
         disc(0, 0, 0.0, 0.02, 0.6 * r, 0, 32),
@@ -242,7 +254,7 @@ def router(seed: int = 0) -> Solid:
 def game_console(seed: int = 0) -> Solid:
     """A game console. Slots: case, dark."""
     rng = variant_rng("game_console", seed)
-    body: Box = ((-0.13, -0.15, 0.0), (0.13, 0.15, rng.between(0.05, 0.08)))
+    body: Box = ((-0.13, -0.15, 0.0), (0.13, 0.15, rng.between(0.05, 0.08, "height_m")))
     patches = [
         shapes.block(*body, 0.012),
         shapes.block((0.128, -0.13, 0.02), (0.132, 0.1, 0.024), 0.0, 1),
@@ -255,7 +267,7 @@ def game_console(seed: int = 0) -> Solid:
 def basket(seed: int = 0) -> Solid:
     """A woven basket, some with a blanket in it. Slots: body, cloth."""
     rng = variant_rng("basket", seed)
-    r, h = rng.between(0.14, 0.21), rng.between(0.2, 0.38)
+    r, h = rng.between(0.14, 0.21, "radius_m"), rng.between(0.2, 0.38, "height_m")
     rows, columns = 40, 81
     s = np.linspace(0.0, 1.0, rows)[:, None]
     turn = np.linspace(0.0, 2.0 * math.pi, columns)[None, :]
@@ -287,7 +299,11 @@ def basket(seed: int = 0) -> Solid:
 def ottoman(seed: int = 0) -> Solid:
     """A padded footstool. Slots: cover, legs."""
     rng = variant_rng("ottoman", seed)
-    x, y, z = rng.between(0.2, 0.32), rng.between(0.22, 0.4), rng.between(0.36, 0.44)
+    x, y, z = (
+        0.5 * rng.between(0.4, 0.64, "depth_m"),
+        0.5 * rng.between(0.44, 0.8, "width_m"),
+        rng.between(0.36, 0.44, "height_m"),
+    )
     body: Box = ((-x, -y, 0.06), (x, y, z))
     patches = [cushion(*body, 0, 0.05)]
     patches += [
@@ -301,7 +317,7 @@ def ottoman(seed: int = 0) -> Solid:
 def coat_rack(seed: int = 0) -> Solid:
     """A stand for coats, some with coats on it. Slots: wood, cloth."""
     rng = variant_rng("coat_rack", seed)
-    h = rng.between(1.65, 1.85)
+    h = rng.between(1.65, 1.85, "height_m")
     patches = [rod((0.0, 0.0, 0.02), (0.0, 0.0, h), 0.018, 0)]
     for k in range(4):
         a = 0.5 * math.pi * k + 0.4
@@ -317,7 +333,7 @@ def coat_rack(seed: int = 0) -> Solid:
 def ladder(seed: int = 0) -> Solid:
     """A step ladder, open. Slots: metal, feet."""
     rng = variant_rng("ladder", seed)
-    h, w = rng.between(1.1, 1.7), 0.22
+    h, w = rng.between(1.1, 1.7, "height_m"), 0.22
     patches: list[Patch] = []
     for sy in (-1, 1):
         patches.append(rod((0.3, sy * w, 0.02), (0.04, 0.8 * sy * w, h), 0.016, 0))
@@ -340,7 +356,7 @@ def ladder(seed: int = 0) -> Solid:
 def bucket(seed: int = 0) -> Solid:
     """A bucket. Slots: body, handle."""
     rng = variant_rng("bucket", seed)
-    r, h = rng.between(0.12, 0.15), rng.between(0.24, 0.3)
+    r, h = rng.between(0.12, 0.15, "radius_m"), rng.between(0.24, 0.3, "height_m")
     profile = [
         (0.0, 0.0),
         (0.75 * r, 0.0),
@@ -366,7 +382,7 @@ def bucket(seed: int = 0) -> Solid:
 def fire_extinguisher(seed: int = 0) -> Solid:
     """A fire extinguisher. Slots: red, dark."""
     rng = variant_rng("fire_extinguisher", seed)
-    r, h = rng.between(0.07, 0.09), rng.between(0.4, 0.52)
+    r, h = rng.between(0.07, 0.09, "radius_m"), rng.between(0.4, 0.52, "height_m")
     body = shapes.lathe(
         [(0.0, 0.0), (r, 0.0), (r, h - 0.06), (0.6 * r, h - 0.02), (0.02, h), (0.0, h)], 32
     )
@@ -381,7 +397,7 @@ def fire_extinguisher(seed: int = 0) -> Solid:
 def soap_dispenser(seed: int = 0) -> Solid:
     """A soap dispenser. Slots: body, pump."""
     rng = variant_rng("soap_dispenser", seed)
-    r, h = rng.between(0.028, 0.038), rng.between(0.11, 0.15)
+    r, h = rng.between(0.028, 0.038, "radius_m"), rng.between(0.11, 0.15, "height_m")
     patches = [
         disc(0, 0, 0.0, h, r, 0, 30),
         disc(0, 0, h, h + 0.012, 0.014, 1),
@@ -395,7 +411,7 @@ def soap_dispenser(seed: int = 0) -> Solid:
 def toilet_paper(seed: int = 0) -> Solid:
     """A roll of toilet paper. Slots: paper, core."""
     rng = variant_rng("toilet_paper", seed)
-    r = rng.between(0.04, 0.058)
+    r = rng.between(0.04, 0.058, "radius_m")
     ring = [(0.02, 0.0), (r, 0.0), (r, 0.1), (0.02, 0.1), (0.02, 0.0)]
     return solid(
         [shapes.lathe(ring, 36)],
@@ -407,7 +423,7 @@ def toilet_paper(seed: int = 0) -> Solid:
 def tissue_box(seed: int = 0) -> Solid:
     """A box of tissues. Slots: card, paper."""
     rng = variant_rng("tissue_box", seed)
-    body: Box = ((-0.06, -0.11, 0.0), (0.06, 0.11, rng.between(0.06, 0.1)))
+    body: Box = ((-0.06, -0.11, 0.0), (0.06, 0.11, rng.between(0.06, 0.1, "height_m")))
     h = body[1][2]
     sheet = cushion((-0.015, -0.05, h - 0.01), (0.015, 0.05, h + 0.06), 1, 0.014)
     return solid(
@@ -420,7 +436,7 @@ def tissue_box(seed: int = 0) -> Solid:
 def alarm_clock(seed: int = 0) -> Solid:
     """An alarm clock. Slots: case, face."""
     rng = variant_rng("alarm_clock", seed)
-    w, h = rng.between(0.05, 0.08), rng.between(0.06, 0.1)
+    w, h = 0.5 * rng.between(0.1, 0.16, "width_m"), rng.between(0.06, 0.1, "height_m")
     body: Box = ((-0.03, -w, 0.0), (0.03, w, h))
     face = shapes.block((0.03, -0.85 * w, 0.12 * h), (0.031, 0.85 * w, 0.88 * h), 0.0, 1)
     lit = Material((0.01, 0.01, 0.01), 0.1) if rng.chance(0.6) else painted_material("#f2f0ea", 0.5)

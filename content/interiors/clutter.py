@@ -54,7 +54,7 @@ def book_stack(seed: int = 0) -> Solid:
     rng = variant_rng("book_stack", seed)
     patches: list[Patch] = []
     z, reach = 0.0, [0.0, 0.0]
-    for k in range(int(rng.between(2, 7))):
+    for k in range(rng.whole(2, 7, "count")):
         x, y, t = rng.between(0.075, 0.1), rng.between(0.1, 0.13), rng.between(0.012, 0.04)
         parts = [
             shapes.block((-x, -y, 0.0), (x, y, 0.002), 0.0, k % 4),
@@ -78,7 +78,7 @@ def book_stack(seed: int = 0) -> Solid:
 def magazine(seed: int = 0) -> Solid:
     """A magazine. Slots: pages, cover."""
     rng = variant_rng("magazine", seed)
-    x, y, t = 0.14, 0.105, rng.between(0.003, 0.007)
+    x, y, t = 0.14, 0.105, rng.between(0.003, 0.007, "thickness_m")
     body: Box = ((-x, -y, 0.0), (x, y, t))
     # The front of a cover's sheet.
     u0, v0, u1, v1 = COVER_ATLAS["front"]
@@ -93,7 +93,7 @@ def paper_stack(seed: int = 0) -> Solid:
     rng = variant_rng("paper_stack", seed)
     patches: list[Patch] = []
     z = 0.0
-    for _ in range(int(rng.between(2, 7))):
+    for _ in range(rng.whole(2, 7, "count")):
         t = rng.between(0.0008, 0.006)
         sheet = shapes.block((-0.1485, -0.105, 0.0), (0.1485, 0.105, t))
         turned = sheet.rotated("z", rng.between(-0.12, 0.12))
@@ -106,7 +106,7 @@ def binder_row(seed: int = 0) -> Solid:
     """Binders side by side, spines towards +X. Slots: covers, labels."""
     rng = variant_rng("binder_row", seed)
     patches: list[Patch] = []
-    y, count = 0.0, int(rng.between(2, 8))
+    y, count = 0.0, rng.whole(2, 8, "count")
     for _ in range(count):
         t = rng.choose((0.05, 0.08))
         slot = 0 if rng.chance(0.5) else 1
@@ -128,7 +128,7 @@ def binder_row(seed: int = 0) -> Solid:
 def pen_cup(seed: int = 0) -> Solid:
     """A cup with pens. Slots: cup, pens."""
     rng = variant_rng("pen_cup", seed)
-    r, h = rng.between(0.034, 0.042), rng.between(0.09, 0.11)
+    r, h = rng.between(0.034, 0.042, "radius_m"), rng.between(0.09, 0.11, "height_m")
     cup = shapes.lathe(
         [(0.0, 0.0), (r, 0.0), (r, h), (r - 0.003, h), (r - 0.003, 0.004), (0.0, 0.004)], 28
     )
@@ -149,7 +149,7 @@ def desk_lamp(seed: int = 0) -> Solid:
     """A lamp with a jointed arm. Slots: metal, shade, bulb."""
     rng = variant_rng("desk_lamp", seed)
     a, b = rng.between(0.3, 0.4), rng.between(0.26, 0.34)
-    lean, reach = rng.between(-0.5, -0.25), rng.between(0.9, 1.3)
+    lean, reach = rng.between(-0.5, -0.25), rng.between(0.9, 1.3, "reach_m")
     elbow = (math.sin(lean) * a, 0.0, 0.02 + math.cos(lean) * a)
     head = (elbow[0] + math.sin(reach) * b, 0.0, elbow[2] + math.cos(reach) * b)
     shade = shapes.lathe(
@@ -180,7 +180,7 @@ def desk_lamp(seed: int = 0) -> Solid:
 def dish_rack(seed: int = 0) -> Solid:
     """Plates, cups and bowls that drain. Slots: wire, dishes, tray."""
     rng = variant_rng("dish_rack", seed)
-    x, y = 0.16, rng.between(0.18, 0.23)
+    x, y = 0.16, 0.5 * rng.between(0.36, 0.46, "width_m")
     patches: list[Patch] = [shapes.block((-x, -y, 0.0), (x, y, 0.012), 0.004, 3)]
     for z in (0.025, 0.11):
         loop = [(-x, -y), (x, -y), (x, y), (-x, y), (-x, -y)]
@@ -217,12 +217,12 @@ def dish_rack(seed: int = 0) -> Solid:
 def plate_stack(seed: int = 0) -> Solid:
     """Plates or bowls on each other. Slot: glaze."""
     rng = variant_rng("plate_stack", seed)
-    r, deep = rng.between(0.1, 0.135), seed % 2 == 1
+    r, deep = rng.between(0.1, 0.135, "radius_m"), rng.turn((False, True), "deep")
     rise, step = (0.06, 0.018) if deep else (0.02, 0.0085)
     radius = 0.7 * r if deep else r
     profile = [(0.0, 0.0), (0.55 * radius, 0.0), (radius, rise), (radius - 0.003, rise + 0.002),
                (0.52 * radius, 0.005), (0.0, 0.005)]  # fmt: skip
-    count = int(rng.between(2, 8))
+    count = rng.whole(2, 8, "count")
     one = shapes.lathe(profile, 36)
     patches = [
         one.moved(rng.between(-1, 1) * 0.002, rng.between(-1, 1) * 0.002, k * step)
@@ -238,7 +238,7 @@ def plate_stack(seed: int = 0) -> Solid:
 def fruit_bowl(seed: int = 0) -> Solid:
     """A bowl with apples and oranges. Slots: bowl, fruit."""
     rng = variant_rng("fruit_bowl", seed)
-    r, h = rng.between(0.12, 0.15), rng.between(0.06, 0.085)
+    r, h = rng.between(0.12, 0.15, "radius_m"), rng.between(0.06, 0.085, "height_m")
     profile = [(0.0, 0.0), (0.45 * r, 0.0), (0.8 * r, 0.4 * h), (r, h), (r - 0.005, h),
                (0.77 * r, 0.42 * h), (0.43 * r, 0.006), (0.0, 0.006)]  # fmt: skip
     patches = [shapes.lathe(profile, 40)]
@@ -273,7 +273,7 @@ def knife_block(seed: int = 0) -> Solid:
 def utensil_pot(seed: int = 0) -> Solid:
     """A pot with wooden spoons and ladles. Slots: pot, wood, steel."""
     rng = variant_rng("utensil_pot", seed)
-    r, h = rng.between(0.05, 0.065), rng.between(0.13, 0.17)
+    r, h = rng.between(0.05, 0.065, "radius_m"), rng.between(0.13, 0.17, "height_m")
     pot = shapes.lathe(
         [(0.0, 0.0), (0.9 * r, 0.0), (r, h), (r - 0.005, h), (0.86 * r, 0.006), (0.0, 0.006)], 30
     )
@@ -297,7 +297,7 @@ def utensil_pot(seed: int = 0) -> Solid:
 def spice_rack(seed: int = 0) -> Solid:
     """Small jars in two rows of a rack. Slots: rack, glass, caps, spices."""
     rng = variant_rng("spice_rack", seed)
-    w = rng.between(0.28, 0.4)
+    w = rng.between(0.28, 0.4, "width_m")
     patches: list[Patch] = [
         board((-0.06, -0.5 * w, 0.0), (0.06, -0.5 * w + 0.012, 0.26)),
         board((-0.06, 0.5 * w - 0.012, 0.0), (0.06, 0.5 * w, 0.26)),
@@ -327,7 +327,7 @@ def spice_rack(seed: int = 0) -> Solid:
 def paper_towel(seed: int = 0) -> Solid:
     """Kitchen paper on a stand. Slots: stand, paper."""
     rng = variant_rng("paper_towel", seed)
-    r = rng.between(0.045, 0.065)
+    r = rng.between(0.045, 0.065, "radius_m")
     roll = shapes.lathe([(0.02, 0.015), (r, 0.015), (r, 0.24), (0.02, 0.24), (0.02, 0.015)], 32, 1)
     patches = [disc(0, 0, 0.0, 0.014, 0.075, 0, 32), rod((0, 0, 0.01), (0, 0, 0.3), 0.008, 0), roll]
     stand = wood(rng) if rng.chance(0.5) else metal_material(STAINLESS, 0.25)
@@ -341,12 +341,12 @@ def paper_towel(seed: int = 0) -> Solid:
 def toothbrush_cup(seed: int = 0) -> Solid:
     """A cup with toothbrushes. Slots: cup, brushes."""
     rng = variant_rng("toothbrush_cup", seed)
-    r, h = 0.036, rng.between(0.09, 0.11)
+    r, h = 0.036, rng.between(0.09, 0.11, "height_m")
     cup = shapes.lathe(
         [(0.0, 0.0), (r, 0.0), (1.05 * r, h), (r, h), (0.92 * r, 0.005), (0.0, 0.005)], 28
     )
     patches = [cup]
-    for k in range(1 + seed % 3):
+    for k in range(rng.turn((1, 2, 3), "count")):
         a = 2.1 * k + rng.between(0.0, 1.0)
         c, s = math.cos(a), math.sin(a)
         tip = (0.95 * r * c, 0.95 * r * s, h + 0.08)
@@ -366,7 +366,11 @@ def toothbrush_cup(seed: int = 0) -> Solid:
 def shampoo(seed: int = 0) -> Solid:
     """A bottle of shampoo or shower gel. Slots: bottle, cap, label."""
     rng = variant_rng("shampoo", seed)
-    x, y, h = rng.between(0.018, 0.026), rng.between(0.028, 0.04), rng.between(0.15, 0.22)
+    x, y, h = (
+        0.5 * rng.between(0.036, 0.052, "depth_m"),
+        0.5 * rng.between(0.056, 0.08, "width_m"),
+        rng.between(0.15, 0.22, "height_m"),
+    )
     body = shapes.rounded_box((2 * x, 2 * y, h), 0.95 * x, 4).moved(0.0, 0.0, 0.5 * h)
     flat = disc(0.0, 0.0, 0.0, 0.012, 0.9 * x, 0, 20)
     cap = disc(0.0, 0.0, h - 0.006, h + 0.025, 0.6 * x, 1, 20)
@@ -408,7 +412,7 @@ def bathroom_scale(seed: int = 0) -> Solid:
 def power_strip(seed: int = 0) -> Solid:
     """A strip of sockets with a curled cable. Slots: body, sockets, cable."""
     rng = variant_rng("power_strip", seed)
-    count = 3 + seed % 4
+    count = rng.turn((3, 4, 5, 6), "sockets")
     half = 0.5 * (0.045 * count + 0.05)
     body: Box = ((-0.026, -half, 0.0), (0.026, half, 0.038))
     patches = [shapes.block(*body, 0.006)]
@@ -428,7 +432,9 @@ def game_box(seed: int = 0) -> Solid:
     rng = variant_rng("game_box", seed)
     patches: list[Patch] = []
     z, x, y = 0.0, 0.0, 0.0
-    sizes = sorted((rng.between(0.13, 0.19) for _ in range(1 + seed % 3)), reverse=True)
+    sizes = sorted(
+        (rng.between(0.13, 0.19) for _ in range(rng.turn((1, 2, 3), "count"))), reverse=True
+    )
     for k, b in enumerate(sizes):
         a, t = min(b, rng.between(0.13, 0.15)), rng.between(0.04, 0.07)
         part = [
@@ -450,8 +456,8 @@ def game_box(seed: int = 0) -> Solid:
 def plush_toy(seed: int = 0) -> Solid:
     """A sitting bear or rabbit of plush. Slots: plush, belly, eyes."""
     rng = variant_rng("plush_toy", seed)
-    s = rng.between(0.8, 1.3)
-    rabbit = seed % 3 == 2
+    s = rng.between(0.8, 1.3, "scale")
+    rabbit = rng.turn((False, False, True), "rabbit")
 
     def lump(x: float, y: float, z: float, a: float, b: float, c: float, slot: int = 0) -> Patch:
         ball = shapes.ball(lambda d: d * (a, b, c), 12, 18).painted(slot).moved(x, y, z)
@@ -490,7 +496,11 @@ def plush_toy(seed: int = 0) -> Solid:
 def backpack(seed: int = 0) -> Solid:
     """A rucksack that stands. Slots: cloth, straps."""
     rng = variant_rng("backpack", seed)
-    x, y, h = rng.between(0.09, 0.12), rng.between(0.14, 0.17), rng.between(0.4, 0.5)
+    x, y, h = (
+        0.5 * rng.between(0.18, 0.24, "depth_m"),
+        0.5 * rng.between(0.28, 0.34, "width_m"),
+        rng.between(0.4, 0.5, "height_m"),
+    )
     patches = [
         cushion((-x, -y, 0.0), (x, y, h), 0, 0.06),
         cushion((0.7 * x, -0.75 * y, 0.03), (x + 0.05, 0.75 * y, 0.5 * h), 0, 0.03),
@@ -543,7 +553,7 @@ def guitar(seed: int = 0) -> Solid:
 def dumbbells(seed: int = 0) -> Solid:
     """A pair of dumbbells. Slots: heads, bars."""
     rng = variant_rng("dumbbells", seed)
-    r = rng.between(0.035, 0.05)
+    r = rng.between(0.035, 0.05, "radius_m")
     patches: list[Patch] = []
     for x in (-1.2 * r, 1.2 * r):
         patches.append(rod((x, -0.075, r), (x, 0.075, r), 0.014, 1, 12))
@@ -562,7 +572,7 @@ def dumbbells(seed: int = 0) -> Solid:
 def step_stool(seed: int = 0) -> Solid:
     """Two steps to stand on. Slots: steps, legs."""
     rng = variant_rng("step_stool", seed)
-    w = rng.between(0.36, 0.42)
+    w = rng.between(0.36, 0.42, "width_m")
     y = 0.5 * w
     steps: list[Box] = [((-0.22, -y, 0.4), (0.02, y, 0.425)), ((-0.02, -y, 0.2), (0.22, y, 0.225))]
     sides: list[Box] = [
@@ -595,7 +605,7 @@ def drill(seed: int = 0) -> Solid:
 def tape_roll(seed: int = 0) -> Solid:
     """A roll of adhesive tape. Slot: tape."""
     rng = variant_rng("tape_roll", seed)
-    r, h = rng.between(0.045, 0.06), rng.between(0.02, 0.05)
+    r, h = rng.between(0.045, 0.06, "radius_m"), rng.between(0.02, 0.05, "height_m")
     ring = shapes.lathe([(0.038, 0.0), (r, 0.0), (r, h), (0.038, h), (0.038, 0.0)], 36)
     colors = ("#b08a54", "#1d1e20", "#d9d8d4", "#b3261e", "#2f5d9c")
     return solid([ring], [painted_material(rng.choose(colors), 0.3)], [((-r, -r, 0.0), (r, r, h))])
@@ -604,7 +614,12 @@ def tape_roll(seed: int = 0) -> Solid:
 def open_carton(seed: int = 0) -> Solid:
     """An open box with packing paper in it. Slots: cardboard, paper."""
     rng = variant_rng("open_carton", seed)
-    x, y, h, t = rng.between(0.15, 0.24), rng.between(0.18, 0.3), rng.between(0.2, 0.36), 0.005
+    x, y, h, t = (
+        0.5 * rng.between(0.3, 0.48, "depth_m"),
+        0.5 * rng.between(0.36, 0.6, "width_m"),
+        rng.between(0.2, 0.36, "height_m"),
+        0.005,
+    )
     walls: list[Box] = [
         ((-x, -y, 0.0), (x, y, t)),
         ((-x, -y, t), (-x + t, y, h)),
@@ -629,7 +644,7 @@ def open_carton(seed: int = 0) -> Solid:
 def trolley(seed: int = 0) -> Solid:
     """A rolling table with three trays. Slots: trays, posts."""
     rng = variant_rng("trolley", seed)
-    x, y = 0.2, rng.between(0.26, 0.36)
+    x, y = 0.2, 0.5 * rng.between(0.52, 0.72, "width_m")
     levels = (0.14, 0.46, 0.8)
     trays: list[Box] = [((-x, -y, z), (x, y, z + 0.012)) for z in levels]
     patches = [shapes.block(*b, 0.002) for b in trays]
@@ -667,7 +682,7 @@ def trolley(seed: int = 0) -> Solid:
 def radio(seed: int = 0) -> Solid:
     """A radio with a cloth front. Slots: case, cloth, knobs."""
     rng = variant_rng("radio", seed)
-    w, h, d = rng.between(0.2, 0.3), rng.between(0.12, 0.16), 0.09
+    w, h, d = rng.between(0.2, 0.3, "width_m"), rng.between(0.12, 0.16, "height_m"), 0.09
     case: Box = ((-0.5 * d, -0.5 * w, 0.0), (0.5 * d, 0.5 * w, h))
     mesh: Box = ((0.5 * d, -0.46 * w, 0.1 * h), (0.5 * d + 0.003, 0.15 * w, 0.9 * h))
     patches = [shapes.block(*case, 0.012), shapes.block(*mesh, 0.001, 1)]

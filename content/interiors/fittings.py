@@ -74,7 +74,7 @@ def ceiling_lamp(seed: int = 0) -> Solid:
         )
     )
     if seed % 3 == 0:
-        r, h = rng.between(0.16, 0.26), rng.between(0.07, 0.12)
+        r, h = rng.between(0.16, 0.26, "radius_m"), rng.between(0.07, 0.12, "height_m")
         glow = shapes.lathe(
             [(r, -0.02), (r, -0.5 * h), (0.86 * r, -0.85 * h), (0.5 * r, -h), (0.0, -1.04 * h)][
                 ::-1
@@ -86,7 +86,7 @@ def ceiling_lamp(seed: int = 0) -> Solid:
         made = solid(patches, [paint, _shade(rng)], [((-r, -r, -h), (r, r, 0.0))])
         return _with_lamp(made, (0.0, 0.0, -h - 0.06))
     drop = rng.between(0.35, 0.7)
-    r, h = rng.between(0.16, 0.26), rng.between(0.14, 0.24)
+    r, h = rng.between(0.16, 0.26, "radius_m"), rng.between(0.14, 0.24, "height_m")
     patches = [
         disc(0, 0, -0.025, 0.0, 0.05, 0),
         rod((0.0, 0.0, -drop + h), (0.0, 0.0, -0.02), 0.004, 0, 6),
@@ -101,7 +101,7 @@ def ceiling_lamp(seed: int = 0) -> Solid:
 def tube_lamp(seed: int = 0) -> Solid:
     """A long lamp under the ceiling, which is at z = 0. Slots: housing, tube."""
     rng = variant_rng("tube_lamp", seed)
-    w, d = rng.between(1.15, 1.5), rng.between(0.1, 0.2)
+    w, d = rng.between(1.15, 1.5, "width_m"), rng.between(0.1, 0.2, "depth_m")
     box: Box = ((-0.5 * d, -0.5 * w, -0.06), (0.5 * d, 0.5 * w, 0.0))
     tube: Box = ((-0.4 * d, -0.48 * w, -0.075), (0.4 * d, 0.48 * w, -0.06))
     looks = [painted_material("#ecebe7", 0.4), Material((0.9, 0.9, 0.9), 0.6, role=LAMP)]
@@ -112,13 +112,17 @@ def tube_lamp(seed: int = 0) -> Solid:
 def floor_lamp(seed: int = 0) -> Solid:
     """A lamp on a pole. Slots: metal, shade."""
     rng = variant_rng("floor_lamp", seed)
-    return _standing_lamp(rng, rng.between(1.35, 1.65), rng.between(0.17, 0.24), 0.14)
+    return _standing_lamp(
+        rng, rng.between(1.35, 1.65, "top_m"), rng.between(0.17, 0.24, "shade_m"), 0.14
+    )
 
 
 def table_lamp(seed: int = 0) -> Solid:
     """A lamp for tables. Slots: metal, shade."""
     rng = variant_rng("table_lamp", seed)
-    return _standing_lamp(rng, rng.between(0.34, 0.52), rng.between(0.1, 0.15), 0.075)
+    return _standing_lamp(
+        rng, rng.between(0.34, 0.52, "top_m"), rng.between(0.1, 0.15, "shade_m"), 0.075
+    )
 
 
 def _standing_lamp(rng: VariantRng, top_m: float, shade_m: float, foot_m: float) -> Solid:
@@ -148,7 +152,7 @@ def _standing_lamp(rng: VariantRng, top_m: float, shade_m: float, foot_m: float)
 def curtain(seed: int = 0) -> Solid:
     """A curtain on a piece of rail; origin at the middle below. Slots: cloth, rail."""
     rng = variant_rng("curtain", seed)
-    w, h = rng.between(0.4, 0.7), rng.between(2.1, 2.35)
+    w, h = rng.between(0.4, 0.7, "width_m"), rng.between(2.1, 2.35, "height_m")
     count = round(w / 0.095)
     y = np.linspace(-0.5 * w, 0.5 * w, count * 10 + 1)[None, :]
     z = np.linspace(0.0, h, 24)[:, None]
@@ -202,13 +206,17 @@ def rug(seed: int = 0) -> Solid:
     edge = replace(pile, texture=f"texture/carpet?seed={int(rng.between(0, 16))}")
     t = 0.012
     if seed % 4 == 3:
-        r = rng.between(0.6, 1.0)
+        r = rng.between(0.6, 1.0, "radius_m")
         return solid(
             [disc(0, 0, 0, t, r, 0, 56)],
             [pile, edge],
             [((-0.7 * r, -0.7 * r, 0.0), (0.7 * r, 0.7 * r, t))],
         )
-    x, y, b = rng.between(0.6, 1.0), rng.between(0.9, 1.5), rng.between(0.04, 0.14)
+    x, y, b = (
+        0.5 * rng.between(1.2, 2.0, "depth_m"),
+        0.5 * rng.between(1.8, 3.0, "width_m"),
+        rng.between(0.04, 0.14),
+    )
     whole: Box = ((-x, -y, 0.0), (x, y, t))
     inner: Box = ((-x + b, -y + b, t - 0.001), (x - b, y - b, t + 0.001))
     return solid([shapes.block(*whole, 0.004, 1), shapes.block(*inner)], [pile, edge], [whole])
@@ -233,7 +241,7 @@ def picture(seed: int = 0) -> Solid:
     f = rng.between(0.01, 0.018 + 0.012 * long)
     mount = rng.choose((0.0, rng.between(0.1, 0.2) * long, rng.between(0.15, 0.3) * short))
     w, h = wide + 2.0 * (f + mount), high + 2.0 * (f + mount)
-    deep = rng.between(0.014, 0.03)
+    deep = rng.between(0.014, 0.03, "depth_m")
     patches = _frame(w, h, f, deep, 0.002)
     y, a = 0.5 * wide, f + mount
     patches.append(rectangle((0.0112, -y, a), (0.0, wide, 0.0), (0.0, 0.0, high)).painted(2))
@@ -263,7 +271,7 @@ def picture(seed: int = 0) -> Solid:
 def mirror(seed: int = 0) -> Solid:
     """A mirror for walls; origin at the middle of its lower edge. Slots: frame, glass."""
     rng = variant_rng("mirror", seed)
-    w, h = rng.between(0.45, 0.9), rng.between(0.6, 1.1)
+    w, h = rng.between(0.45, 0.9, "width_m"), rng.between(0.6, 1.1, "height_m")
     f = rng.between(0.008, 0.04)
     glass = rectangle(
         (0.011, -0.5 * w + f, f), (0.0, w - 2 * f, 0.0), (0.0, 0.0, h - 2 * f)
@@ -297,7 +305,7 @@ def _frame(
 def radiator(seed: int = 0) -> Solid:
     """A heater for walls; origin at the middle of its lower edge. Slots: panel, valve."""
     rng = variant_rng("radiator", seed)
-    w, h = rng.between(0.6, 1.4), rng.between(0.4, 0.6)
+    w, h = rng.between(0.6, 1.4, "width_m"), rng.between(0.4, 0.6, "height_m")
     count = round(w / 0.05)
     patches = [shapes.block((0.03, -0.5 * w, 0.0), (0.09, 0.5 * w, h), 0.008)]
     # A pressed sheet: waves, which shade softly at any distance, rather than ribs.
@@ -323,13 +331,13 @@ def radiator(seed: int = 0) -> Solid:
 def television(seed: int = 0) -> Solid:
     """A television on feet, on or off by its lit screen. Slots: housing, screen."""
     rng = variant_rng("television", seed)
-    return _screen(rng.between(0.9, 1.35), 0.05, "television")
+    return _screen(rng.between(0.9, 1.35, "width_m"), 0.05, "television")
 
 
 def monitor(seed: int = 0) -> Solid:
     """A monitor on a stand. Slots: housing, screen."""
     rng = variant_rng("monitor", seed)
-    return _screen(rng.between(0.5, 0.65), 0.13, "monitor")
+    return _screen(rng.between(0.5, 0.65, "width_m"), 0.13, "monitor")
 
 
 def _screen(w: float, lift_m: float, name: str) -> Solid:
@@ -414,7 +422,7 @@ def laptop_lid(seed: int = 0) -> Solid:
 
 def _laptop(seed: int) -> tuple[VariantRng, float, float]:
     rng = variant_rng("laptop", seed)
-    w = rng.between(0.3, 0.36)
+    w = rng.between(0.3, 0.36, "width_m")
     return rng, 0.66 * w, w
 
 
@@ -425,7 +433,7 @@ def _housing(rng: VariantRng) -> Material:
 def house_plant(seed: int = 0) -> Solid:
     """A plant in a pot. Slots: pot, soil, leaves."""
     rng = variant_rng("house_plant", seed)
-    big = seed % 2 == 0
+    big = rng.turn((True, False), "big")
     r, h = (
         (rng.between(0.14, 0.2), rng.between(0.24, 0.36))
         if big
@@ -437,8 +445,8 @@ def house_plant(seed: int = 0) -> Solid:
     )
     soil = disc(0, 0, 0.84 * h, 0.88 * h, 0.9 * r, 1)
     patches = [pot, soil]
-    count = int(rng.between(16, 30)) if big else int(rng.between(9, 16))
-    length = rng.between(0.45, 0.8) if big else rng.between(0.12, 0.24)
+    count = rng.whole(16, 30, "count") if big else rng.whole(9, 16, "count")
+    length = rng.between(0.45, 0.8, "length_m") if big else rng.between(0.12, 0.24, "length_m")
     for k in range(count):
         # Leaves grow the golden angle apart (Vogel, Mathematical Biosciences 44, 1979): to all
         # sides, so that the plant stands.
@@ -485,7 +493,7 @@ def _leaf(rng: VariantRng, length: float) -> Patch:
 def waste_basket(seed: int = 0) -> Solid:
     """A waste basket. Slot: body."""
     rng = variant_rng("waste_basket", seed)
-    r, h = rng.between(0.12, 0.17), rng.between(0.26, 0.36)
+    r, h = rng.between(0.12, 0.17, "radius_m"), rng.between(0.26, 0.36, "height_m")
     body = shapes.lathe(
         [
             (0.0, 0.0),
@@ -510,7 +518,7 @@ def waste_basket(seed: int = 0) -> Solid:
 def wall_clock(seed: int = 0) -> Solid:
     """A round clock for walls; origin at its lowest point. Slots: case, face, hands."""
     rng = variant_rng("wall_clock", seed)
-    r = rng.between(0.12, 0.18)
+    r = rng.between(0.12, 0.18, "radius_m")
     case = shapes.lathe(
         [(0.0, 0.0), (r, 0.0), (r, 0.035), (r - 0.012, 0.04), (r - 0.012, 0.025), (0.0, 0.025)], 48
     )
@@ -530,7 +538,7 @@ def wall_clock(seed: int = 0) -> Solid:
 def whiteboard(seed: int = 0) -> Solid:
     """A board to write on; origin at the middle below, on the wall. Slots: frame, board."""
     rng = variant_rng("whiteboard", seed)
-    w, h = rng.between(1.2, 1.8), rng.between(0.9, 1.2)
+    w, h = rng.between(1.2, 1.8, "width_m"), rng.between(0.9, 1.2, "height_m")
     back: Box = ((0.0, -0.5 * w + 0.004, 0.004), (0.012, 0.5 * w - 0.004, h - 0.004))
     tray: Box = ((0.0, -0.3 * w, -0.01), (0.06, 0.3 * w, 0.0))
     patches = [*_frame(w, h, 0.02, 0.022), shapes.block(*back, 0.0, 1), shapes.block(*tray, 0.003)]
@@ -554,7 +562,7 @@ def book_row(seed: int = 0) -> Solid:
     ]
     band = Material(draw_linear(("#a08a55", "#a39e92", "#77757a"), 0.1, rng), 0.5)
     patches: list[Patch] = []
-    y, tallest, end = 0.0, 0.0, rng.between(0.16, 0.4)
+    y, tallest, end = 0.0, 0.0, rng.between(0.16, 0.4, "width_m")
     while y < end:
         # Series are alike; single books are not.
         thick, h, d = rng.between(0.01, 0.045), rng.between(0.165, 0.285), rng.between(0.12, 0.19)
@@ -621,7 +629,11 @@ def _standing_book(
 def picture_frame(seed: int = 0) -> Solid:
     """A framed photograph that stands, leaning back. Slots: frame, mount, print."""
     rng = variant_rng("picture_frame", seed)
-    w, h, f = rng.between(0.1, 0.2), rng.between(0.13, 0.24), rng.between(0.008, 0.02)
+    w, h, f = (
+        rng.between(0.1, 0.2, "width_m"),
+        rng.between(0.13, 0.24, "height_m"),
+        rng.between(0.008, 0.02),
+    )
     image = rectangle(
         (0.006, -0.5 * w + f, f), (0.0, w - 2 * f, 0.0), (0.0, 0.0, h - 2 * f)
     ).painted(2)

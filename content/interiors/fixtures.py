@@ -55,7 +55,7 @@ def kitchen_sink(seed: int = 0) -> Solid:
         shapes.block((x - 0.008, -0.213, 0.9), (x + 0.008, 0.213, 0.9035), 0.0015, 2)
         for x in (-0.172, 0.194)
     ]
-    height = rng.between(0.2, 0.32)
+    height = rng.between(0.2, 0.32, "tap_m")
     patches += tap(-0.22, 0.0, 0.9, height, 2)
     patches += [
         board((_X, -0.297, 0.103), (_X + 0.018, 0.297, 0.857), 1),
@@ -136,7 +136,7 @@ def cooker(seed: int = 0) -> Solid:
         patches.append(shapes.lathe(ring, 36, 5).moved(x, y))
     # Panel with knobs, door with a window and a bar, drawer below; gaps between them are dark.
     x = _X + 0.02
-    glassy = seed % 2 == 0
+    glassy = rng.turn((True, False), "glass_hob")
     patches += [
         shapes.block((_X - 0.01, -0.296, 0.1), (_X + 0.004, 0.296, 0.858), 0.0, 4),
         shapes.block((_X, -0.297, 0.742), (x, 0.297, 0.856), 0.004, 2),
@@ -215,7 +215,7 @@ def _worktop(*, hole: bool) -> list[Box]:
 def range_hood(seed: int = 0) -> Solid:
     """A hood over a cooker; origin at the middle below. Slot: body."""
     rng = variant_rng("range_hood", seed)
-    d, h = rng.between(0.44, 0.5), rng.between(0.5, 0.7)
+    d, h = rng.between(0.44, 0.5, "depth_m"), rng.between(0.5, 0.7, "height_m")
     low: Box = ((-0.5 * d, -0.3, 0.0), (0.5 * d, 0.3, 0.06))
     duct: Box = ((-0.5 * d, -0.14, 0.06), (-0.5 * d + 0.26, 0.14, h))
     paint = brushed_steel(seed) if rng.chance(0.7) else painted_material("#1f2022", 0.25)
@@ -225,8 +225,8 @@ def range_hood(seed: int = 0) -> Solid:
 def toilet(seed: int = 0) -> Solid:
     """A toilet with cistern or built into the wall. Slots: ceramic, seat."""
     rng = variant_rng("toilet", seed)
-    z = rng.between(0.4, 0.44)
-    cistern = seed % 2 == 0
+    z = rng.between(0.4, 0.44, "seat_m")
+    cistern = rng.turn((True, False), "cistern")
     outline = [
         (0.10, 0.0),
         (0.13, 0.05),
@@ -245,7 +245,7 @@ def toilet(seed: int = 0) -> Solid:
     patches: list[Patch] = [bowl, seat.scaled(1.35, 1.0, 1.0).moved(0.1)]
     x = -0.35
     patches.append(shapes.block((x, -0.1, 0.08), (0.0, 0.1, z - 0.06), 0.03))
-    closed = rng.chance(0.5)
+    closed = rng.chance(0.5, "closed")
     lid = shapes.lathe([(0.0, 0.0), (0.19, 0.0), (0.19, 0.014), (0.0, 0.02)], 36, 1).scaled(
         1.35, 1.0, 1.0
     )
@@ -264,9 +264,9 @@ def toilet(seed: int = 0) -> Solid:
 def wash_basin(seed: int = 0) -> Solid:
     """A basin on a cupboard. Slots: ceramic, front, steel."""
     rng = variant_rng("wash_basin", seed)
-    d, w = rng.between(0.42, 0.5), (0.5, 0.6, 0.8)[seed % 3]
+    d, w = rng.between(0.42, 0.5, "depth_m"), rng.turn((0.5, 0.6, 0.8), "width_m")
     x, y, z = 0.5 * d, 0.5 * w, 0.86
-    height = rng.between(0.1, 0.18)
+    height = rng.between(0.1, 0.18, "tap_m")
     rim: list[Box] = [
         ((-x, -y, z - 0.095), (-x + 0.13, y, z)),
         ((x - 0.04, -y, z - 0.095), (x, y, z)),
@@ -296,7 +296,11 @@ def wash_basin(seed: int = 0) -> Solid:
 def bathtub(seed: int = 0) -> Solid:
     """A bathtub. Slots: ceramic, panel, steel."""
     rng = variant_rng("bathtub", seed)
-    d, w, z = (0.7, 0.75, 0.8)[seed % 3], (1.6, 1.7, 1.8)[seed % 3], rng.between(0.52, 0.58)
+    d, w, z = (
+        rng.turn((0.7, 0.75, 0.8), "depth_m"),
+        rng.turn((1.6, 1.7, 1.8), "width_m"),
+        rng.between(0.52, 0.58, "height_m"),
+    )
     x, y = 0.5 * d, 0.5 * w
     outer = shapes.rounded_box((d, w, z), 0.03, 2).moved(0.0, 0.0, 0.5 * z)
     # The upper side is open: a rim around an inner shell.
@@ -328,7 +332,7 @@ def bathtub(seed: int = 0) -> Solid:
 def shower(seed: int = 0) -> Solid:
     """A shower: tray, pole with head, and panes of glass. Slots: ceramic, steel, glass."""
     rng = variant_rng("shower", seed)
-    d = (0.8, 0.9, 1.0)[seed % 3]
+    d = rng.turn((0.8, 0.9, 1.0), "width_m")
     x = 0.5 * d
     tray: Box = ((-x, -x, 0.0), (x, x, 0.06))
     patches: list[Patch] = [shapes.block(*tray, 0.012)]

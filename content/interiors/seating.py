@@ -43,20 +43,24 @@ PIPING_HEIGHT = 0.9
 def sofa(seed: int = 0) -> Solid:
     """A sofa for two to four. Slots: cover, legs, pillows."""
     rng = variant_rng("sofa", seed)
-    places = 2 + seed % 3
-    return _upholstered(rng, places, places * rng.between(0.58, 0.68))
+    places = rng.turn((2, 3, 4), "places")
+    return _upholstered(rng, places, places * rng.between(0.58, 0.68, "seat_width_m"))
 
 
 def armchair(seed: int = 0) -> Solid:
     """An armchair. Slots: cover, legs, pillows."""
     rng = variant_rng("armchair", seed)
-    return _upholstered(rng, 1, rng.between(0.52, 0.62))
+    return _upholstered(rng, 1, rng.between(0.52, 0.62, "seat_width_m"))
 
 
 def _upholstered(rng: VariantRng, places: int, seat_m: float) -> Solid:
-    arm, depth = rng.between(0.12, 0.22), rng.between(0.82, 0.98)
-    seat_z, back_z, leg = rng.between(0.4, 0.46), rng.between(0.72, 0.9), rng.between(0.05, 0.15)
-    arm_z, soft = rng.between(0.54, 0.64), rng.between(0.03, 0.07)
+    arm, depth = rng.between(0.12, 0.22, "arm_width_m"), rng.between(0.82, 0.98, "depth_m")
+    seat_z, back_z, leg = (
+        rng.between(0.4, 0.46, "seat_m"),
+        rng.between(0.72, 0.9, "back_m"),
+        rng.between(0.05, 0.15, "leg_m"),
+    )
+    arm_z, soft = rng.between(0.54, 0.64, "armrest_m"), rng.between(0.03, 0.07, "softness_m")
     w, x0, x1 = seat_m + 2 * arm, -0.5 * depth, 0.5 * depth
     y0, y1 = -0.5 * w, 0.5 * w
     base: Box = ((x0 + 0.02, y0 + 0.02, leg), (x1 - 0.03, y1 - 0.02, seat_z - 0.14))
@@ -67,7 +71,7 @@ def _upholstered(rng: VariantRng, places: int, seat_m: float) -> Solid:
     ]
     patches = [cushion(*b, 0, soft) for b in (base, back)]
     patches += [padding(*b, rng, 0, 9.0, 0.002) for b in arms]
-    each, piped = seat_m / places, rng.chance(0.45)
+    each, piped = seat_m / places, rng.chance(0.45, "piped")
     loose, bulge = rng.chance(0.5), rng.between(4.5, 8.0)
     for k in range(places):
         a = y0 + arm + k * each
@@ -161,19 +165,24 @@ def _bent(patch: Patch, wrap_per_m: float, lumbar_m: float) -> Patch:
 def chair(seed: int = 0) -> Solid:
     """A chair for tables, wooden, upholstered or a shell on steel. Slots: seat, legs."""
     rng = variant_rng("chair", seed)
-    w, d, z = rng.between(0.4, 0.48), rng.between(0.42, 0.48), rng.between(0.44, 0.47)
-    back_z = rng.between(0.8, 0.98)
-    soft = seed % 3 == 1
+    w, d, z = (
+        rng.between(0.4, 0.48, "width_m"),
+        rng.between(0.42, 0.48, "depth_m"),
+        rng.between(0.44, 0.47, "seat_m"),
+    )
+    back_z = rng.between(0.8, 0.98, "back_m")
+    kind = rng.turn(("wood", "upholstered", "shell"), "kind")
+    soft, back = kind == "upholstered", kind != "wood"
     seat: Box = ((-0.5 * d, -0.5 * w, z - (0.06 if soft else 0.025)), (0.5 * d, 0.5 * w, z))
     patches = [padding(*seat, rng, 0, 6.0, 0.003) if soft else board(*seat, 0, 0.008)]
     x = -0.5 * d + 0.02
-    legs = 1 if seed % 3 else 0
+    legs = 1 if back else 0
     for sy in (-1, 1):
         y = sy * (0.5 * w - 0.03)
         patches.append(rod((0.5 * d - 0.03, y, z - 0.02), (0.5 * d, 1.03 * y, 0.0), 0.014, legs))
         patches.append(rod((x, y, z - 0.02), (x - 0.04, 1.03 * y, 0.0), 0.014, legs))
         patches.append(rod((x, y, z - 0.03), (x - 0.07, y, back_z), 0.012, legs))
-    if soft or seed % 3 == 2:
+    if back:
         rest: Box = (
             (-0.02, -0.5 * w, -0.5 * (back_z - z) + 0.1),
             (0.02, 0.5 * w, 0.5 * (back_z - z)),
@@ -185,7 +194,7 @@ def chair(seed: int = 0) -> Solid:
             .moved(x - 0.045, 0.0, 0.5 * (z + back_z) + 0.02)
         )
     else:
-        for k in range(2 + seed % 2):
+        for k in range(rng.turn((2, 3), "slats")):
             h = back_z - 0.05 - 0.13 * k
             lean = x - 0.07 * (h - z) / (back_z - z)
             patches.append(
@@ -201,7 +210,7 @@ def chair(seed: int = 0) -> Solid:
     boxes: list[Box] = [seat, ((x - 0.08, -0.5 * w, z), (x + 0.01, 0.5 * w, back_z))]
     boxes += _legs_under(d, w, z)
     made = solid(patches, [body, wood(rng) if legs and soft else steel if legs else body], boxes)
-    edge = (x - 0.075, 0.0, back_z + (0.015 if soft or seed % 3 == 2 else 0.0))
+    edge = (x - 0.075, 0.0, back_z + (0.015 if back else 0.0))
     # Before the back, and clear of the round edges of cushions.
     corners = (-0.5 * d + 0.08, -0.5 * w + 0.03, z), (0.5 * d - 0.03, 0.5 * w - 0.03, z)
     supports = tuple(Keypoint(SUPPORT, corner) for corner in corners)
@@ -211,7 +220,10 @@ def chair(seed: int = 0) -> Solid:
 def stool(seed: int = 0) -> Solid:
     """A stool, low or at bar height. Slots: seat, legs."""
     rng = variant_rng("stool", seed)
-    z, r = (0.45, 0.65)[seed % 2] + rng.between(-0.02, 0.02), rng.between(0.15, 0.19)
+    z, r = (
+        rng.turn((0.45, 0.65), "seat_m") + rng.between(-0.02, 0.02),
+        rng.between(0.15, 0.19, "radius_m"),
+    )
     patches = [disc(0, 0, z - 0.035, z, r, 0, 32)]
     for k in range(4):
         a = 0.25 * math.pi * (2 * k + 1)
@@ -227,11 +239,11 @@ def stool(seed: int = 0) -> Solid:
 def office_chair(seed: int = 0) -> Solid:
     """A swivel chair on five castors. Slots: cover, base."""
     rng = variant_rng("office_chair", seed)
-    w, z = rng.between(0.46, 0.52), rng.between(0.44, 0.52)
+    w, z = rng.between(0.46, 0.52, "width_m"), rng.between(0.44, 0.52, "seat_m")
     top = z + rng.between(0.48, 0.7)
     high, half = top - z - 0.08, 0.46 * w
     seat = padding((-0.24, -0.5 * w, z - 0.075), (0.27, 0.5 * w, z), rng, 0, 5.0, 0.003)
-    mesh = rng.chance(0.4)
+    mesh = rng.chance(0.4, "mesh")
     thin = 0.014 if mesh else 0.034
     rest = padding((-thin, -half, 0.0), (thin, half, high), rng, 0, 5.0, 0.003)
     bend = rng.between(0.7, 1.3), rng.between(0.025, 0.045)
@@ -283,27 +295,37 @@ def office_chair(seed: int = 0) -> Solid:
 def dining_table(seed: int = 0) -> Solid:
     """A table for meals, rectangular or round. Slots: top, legs."""
     rng = variant_rng("dining_table", seed)
-    if seed % 4 == 3:
-        return _round_table(rng, rng.between(0.45, 0.6), rng.between(0.73, 0.76))
+    if rng.turn((False, False, False, True), "round_top"):
+        return _round_table(
+            rng, rng.between(0.45, 0.6, "radius_m"), rng.between(0.73, 0.76, "height_m")
+        )
     return _rectangular_table(
-        rng, rng.between(0.75, 0.95), rng.between(1.2, 1.9), rng.between(0.73, 0.76)
+        rng,
+        rng.between(0.75, 0.95, "depth_m"),
+        rng.between(1.2, 1.9, "width_m"),
+        rng.between(0.73, 0.76, "height_m"),
     )
 
 
 def coffee_table(seed: int = 0) -> Solid:
     """A low table. Slots: top, legs."""
     rng = variant_rng("coffee_table", seed)
-    if seed % 3 == 2:
-        return _round_table(rng, rng.between(0.34, 0.45), rng.between(0.38, 0.46))
+    if rng.turn((False, False, True), "round_top"):
+        return _round_table(
+            rng, rng.between(0.34, 0.45, "radius_m"), rng.between(0.38, 0.46, "height_m")
+        )
     return _rectangular_table(
-        rng, rng.between(0.5, 0.65), rng.between(0.8, 1.2), rng.between(0.36, 0.46)
+        rng,
+        rng.between(0.5, 0.65, "depth_m"),
+        rng.between(0.8, 1.2, "width_m"),
+        rng.between(0.36, 0.46, "height_m"),
     )
 
 
 def side_table(seed: int = 0) -> Solid:
     """A small table beside a seat. Slots: top, legs."""
     rng = variant_rng("side_table", seed)
-    return _round_table(rng, rng.between(0.2, 0.26), rng.between(0.45, 0.6))
+    return _round_table(rng, rng.between(0.2, 0.26, "radius_m"), rng.between(0.45, 0.6, "height_m"))
 
 
 def desk(seed: int = 0) -> Solid:
@@ -311,10 +333,10 @@ def desk(seed: int = 0) -> Solid:
     rng = variant_rng("desk", seed)
     return _rectangular_table(
         rng,
-        rng.between(0.6, 0.8),
-        rng.between(1.2, 1.8),
-        rng.between(0.72, 0.76),
-        drawers=seed % 2 == 1,
+        rng.between(0.6, 0.8, "depth_m"),
+        rng.between(1.2, 1.8, "width_m"),
+        rng.between(0.72, 0.76, "height_m"),
+        drawers=rng.turn((False, True), "drawers"),
         cables=True,
     )
 
@@ -322,13 +344,19 @@ def desk(seed: int = 0) -> Solid:
 def meeting_table(seed: int = 0) -> Solid:
     """A long table for meetings. Slots: top, legs."""
     rng = variant_rng("meeting_table", seed)
-    return _rectangular_table(rng, rng.between(0.9, 1.2), rng.between(1.8, 2.6), 0.74)
+    return _rectangular_table(
+        rng, rng.between(0.9, 1.2, "depth_m"), rng.between(1.8, 2.6, "width_m"), 0.74
+    )
 
 
 def workbench(seed: int = 0) -> Solid:
     """A workbench with a thick top and a lower board. Slots: top, legs."""
     rng = variant_rng("workbench", seed)
-    d, w, z = rng.between(0.6, 0.75), rng.between(1.4, 2.0), rng.between(0.82, 0.92)
+    d, w, z = (
+        rng.between(0.6, 0.75, "depth_m"),
+        rng.between(1.4, 2.0, "width_m"),
+        rng.between(0.82, 0.92, "height_m"),
+    )
     top: Box = ((-0.5 * d, -0.5 * w, z - 0.05), (0.5 * d, 0.5 * w, z))
     low: Box = ((-0.5 * d + 0.06, -0.5 * w + 0.06, 0.18), (0.5 * d - 0.08, 0.5 * w - 0.06, 0.21))
     patches = [board(*top, 0, 0.005), board(*low, 0), *four_legs(d, w, z - 0.05, 0.07, 1, 0.06)]
@@ -354,7 +382,7 @@ def _rectangular_table(
     cables: bool = False,
 ) -> Solid:
     d, w, z = depth_m, width_m, height_m
-    thick = rng.between(0.02, 0.04)
+    thick = rng.between(0.02, 0.04, "top_thickness_m")
     top: Box = ((-0.5 * d, -0.5 * w, z - thick), (0.5 * d, 0.5 * w, z))
     patches = [board(*top, 0, 0.004), *four_legs(d, w, z - thick, rng.between(0.04, 0.07), 1, 0.05)]
     apron = 0.02

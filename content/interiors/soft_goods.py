@@ -214,23 +214,23 @@ def drape(
 def bed(seed: int = 0) -> Solid:
     """A bed of 0.9 to 1.8 m, made; its head at -X. Slots: frame, mattress, duvet, pillows."""
     rng = variant_rng("bed", seed)
-    w = (0.9, 1.4, 1.6, 1.8)[seed % 4]
-    length, top = 2.0, rng.between(0.42, 0.52)
+    w = rng.turn((0.9, 1.4, 1.6, 1.8), "width_m")
+    length, top = 2.0, rng.between(0.42, 0.52, "top_m")
     x0, x1, y0, y1 = -0.5 * length - 0.06, 0.5 * length + 0.04, -0.5 * w - 0.04, 0.5 * w + 0.04
-    rail = rng.between(0.24, 0.32)
+    rail = rng.between(0.24, 0.32, "rail_m")
     head: Box = ((x0, y0, 0.0), (x0 + 0.05, y1, rng.between(0.8, 1.15)))
     sides: list[Box] = [
         ((x0 + 0.05, y0, 0.12), (x1, y0 + 0.03, rail)),
         ((x0 + 0.05, y1 - 0.03, 0.12), (x1, y1, rail)),
         ((x1 - 0.03, y0 + 0.03, 0.12), (x1, y1 - 0.03, rail)),
     ]
-    soft_head = rng.chance(0.4)
+    soft_head = rng.chance(0.4, "soft_head")
     patches: list[Patch] = [cushion(*head, 4, 0.03) if soft_head else board(*head, 0, 0.006)]
     patches += [board(*b) for b in sides]
     patches += four_legs(x1 - x0, y1 - y0, 0.2, 0.06, 0)
     mattress: Box = ((-0.5 * length, -0.5 * w, 0.14), (0.5 * length, 0.5 * w, top))
     patches.append(cushion(*mattress, 1, 0.05))
-    fold, hang = rng.between(0.5, 0.75), rng.between(0.16, 0.26)
+    fold, hang = rng.between(0.5, 0.75, "fold_m"), rng.between(0.16, 0.26, "hang_m")
     start = -0.5 * length + fold
     patches.append(drape((start, 0.5 * length), 0.5 * w, top + 0.02, hang, rng, 2))
     back = drape(
@@ -256,7 +256,7 @@ def bed(seed: int = 0) -> Solid:
 def cushion_pillow(seed: int = 0) -> Solid:
     """A cushion that lies flat. Slot: cloth."""
     rng = variant_rng("cushion_pillow", seed)
-    s, h = rng.between(0.19, 0.25), rng.between(0.12, 0.16)
+    s, h = rng.between(0.19, 0.25), rng.between(0.12, 0.16, "height_m")
     body: Box = ((-0.8 * s, -0.8 * s, 0.0), (0.8 * s, 0.8 * s, h))
     return solid([pillow(s, s, h, rng)], [fabric(rng)], [body])
 
@@ -264,14 +264,22 @@ def cushion_pillow(seed: int = 0) -> Solid:
 def blanket(seed: int = 0) -> Solid:
     """A folded blanket. Slot: cloth."""
     rng = variant_rng("blanket", seed)
-    x, y, layers = rng.between(0.16, 0.22), rng.between(0.2, 0.3), int(rng.between(2, 5))
+    x, y, layers = (
+        0.5 * rng.between(0.32, 0.44, "depth_m"),
+        0.5 * rng.between(0.4, 0.6, "width_m"),
+        rng.whole(2, 5, "layers"),
+    )
     return _folded(rng, [(x, y, rng.between(0.022, 0.035))] * layers, [fabric(rng)])
 
 
 def towel_stack(seed: int = 0) -> Solid:
     """Folded towels on each other. Slots: cloths."""
     rng = variant_rng("towel_stack", seed)
-    x, y, count = rng.between(0.11, 0.15), rng.between(0.15, 0.2), int(rng.between(2, 7))
+    x, y, count = (
+        0.5 * rng.between(0.22, 0.3, "depth_m"),
+        0.5 * rng.between(0.3, 0.4, "width_m"),
+        rng.whole(2, 7, "count"),
+    )
     sizes = [(x * rng.between(0.93, 1.0), y * rng.between(0.93, 1.0), 0.045)] * count
     return _folded(rng, sizes, [cloth(rng), cloth(rng)])
 
@@ -281,7 +289,7 @@ def folded_clothes(seed: int = 0) -> Solid:
     rng = variant_rng("folded_clothes", seed)
     sizes = [
         (rng.between(0.13, 0.16), rng.between(0.12, 0.16), rng.between(0.025, 0.05))
-        for _ in range(int(rng.between(1, 6)))
+        for _ in range(rng.whole(1, 6, "count"))
     ]
     return _folded(rng, sizes, [fabric(rng) for _ in range(3)])
 
@@ -306,7 +314,7 @@ def clothes_pile(seed: int = 0) -> Solid:
     rng = variant_rng("clothes_pile", seed)
     patches: list[Patch] = []
     reach, top = 0.0, 0.0
-    for k in range(2 + seed % 2):
+    for k in range(rng.turn((2, 3), "count")):
         r = rng.between(0.16, 0.26)
         ring = np.linspace(0.0, 1.0, 12)[:, None]
         turn = np.linspace(0.0, 2.0 * math.pi, 41)[None, :]
@@ -330,7 +338,7 @@ def clothes_pile(seed: int = 0) -> Solid:
 def laundry_basket(seed: int = 0) -> Solid:
     """A basket with clothes in it. Slots: basket, clothes."""
     rng = variant_rng("laundry_basket", seed)
-    r, h = rng.between(0.19, 0.24), rng.between(0.38, 0.55)
+    r, h = rng.between(0.19, 0.24, "radius_m"), rng.between(0.38, 0.55, "height_m")
     wall = shapes.lathe(
         [(0.0, 0.0), (0.85 * r, 0.0), (r, h), (r - 0.012, h), (0.84 * r, 0.02), (0.0, 0.02)], 28
     )
@@ -356,7 +364,7 @@ def coat_hooks(seed: int = 0) -> Solid:
     Slots: board, hooks, coats.
     """
     rng = variant_rng("coat_hooks", seed)
-    count = 3 + seed % 3
+    count = rng.turn((3, 4, 5), "hooks")
     w, drop = 0.17 * count, 1.05
     patches: list[Patch] = [board((0.0, -0.5 * w, drop), (0.02, 0.5 * w, drop + 0.09))]
     lowest = drop
@@ -461,8 +469,10 @@ def draped_clothes(seed: int = 0) -> Solid:
     """
     rng = variant_rng("draped_clothes", seed)
     if seed % 4 == 3:
-        wide = rng.between(0.34, 0.44)
-        loop = _over_rail(rng, wide, rng.between(0.25, 0.36), rng.between(0.3, 0.5), 0.047)
+        wide = rng.between(0.34, 0.44, "width_m")
+        loop = _over_rail(
+            rng, wide, rng.between(0.25, 0.36, "front_m"), rng.between(0.3, 0.5, "back_m"), 0.047
+        )
         patches = [loop.moved(0.0, rng.between(-0.03, 0.03), 0.002)]
     else:
         patches = _jacket(rng)
@@ -480,7 +490,7 @@ LEAN_RAD = 0.14
 
 def _jacket(rng: VariantRng) -> list[Patch]:
     """A jacket around an upright back along Y, open below, its front shorter than its back."""
-    back, short = rng.between(0.42, 0.6), rng.between(0.28, 0.36)
+    back, short = rng.between(0.42, 0.6, "back_m"), rng.between(0.28, 0.36, "short_m")
     s = np.linspace(0.0, 1.0, 24)[:, None]
     turn = np.linspace(0.0, 2.0 * math.pi, 65)[None, :]
     c, sn = np.cos(turn), np.sin(turn)
@@ -533,7 +543,7 @@ def _jacket(rng: VariantRng) -> list[Patch]:
 def towel(seed: int = 0) -> Solid:
     """A towel over a rail; origin at the middle below, on the wall. Slots: cloth, rail."""
     rng = variant_rng("towel", seed)
-    w, h = rng.between(0.35, 0.5), rng.between(0.4, 0.65)
+    w, h = rng.between(0.35, 0.5, "width_m"), rng.between(0.4, 0.65, "height_m")
     rail_x, rail_z, radius = 0.062, h - 0.016, 0.009
     patches = [
         _over_rail(rng, w, rail_z, rail_z * rng.between(0.55, 0.95)).moved(rail_x, 0, rail_z)
@@ -558,7 +568,7 @@ def _over_rail(
     wave = np.sin(waves * y + rng.between(0.0, 6.3)) + 0.5 * np.sin(
         0.47 * waves * y + rng.between(0.0, 6.3)
     )
-    depth = rng.between(0.003, 0.009)
+    depth = rng.between(0.003, 0.009, "fold_depth_m")
     # One corner hangs lower than the other.
     tilt = rng.between(-0.06, 0.06) * y
 
@@ -583,7 +593,11 @@ def _over_rail(
 def bath_mat(seed: int = 0) -> Solid:
     """A mat of tufted cloth. Slot: pile."""
     rng = variant_rng("bath_mat", seed)
-    x, y, t = rng.between(0.22, 0.28), rng.between(0.32, 0.42), 0.016
+    x, y, t = (
+        0.5 * rng.between(0.44, 0.56, "depth_m"),
+        0.5 * rng.between(0.64, 0.84, "width_m"),
+        0.016,
+    )
     pile = Material(draw_linear(PALETTES["cloth"], 0.1, rng), 1.0)
     look = patterned_material(f"texture/carpet?seed={int(rng.between(0, 16))}", 0.5, 1.0)
     body: Box = ((-x, -y, 0.0), (x, y, t))
@@ -593,7 +607,7 @@ def bath_mat(seed: int = 0) -> Solid:
 def drying_rack(seed: int = 0) -> Solid:
     """A rack with laundry that dries. Slots: rods, cloths."""
     rng = variant_rng("drying_rack", seed)
-    w, d, h = rng.between(0.95, 1.2), 0.5, rng.between(0.85, 0.95)
+    w, d, h = rng.between(0.95, 1.2, "width_m"), 0.5, rng.between(0.85, 0.95, "height_m")
     patches: list[Patch] = []
     for sy in (-1, 1):
         y = sy * 0.5 * w

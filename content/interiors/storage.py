@@ -111,16 +111,23 @@ def _measures(family: str, seed: int) -> tuple[VariantRng, float, float, float, 
     if family == "wardrobe":
         return (
             rng,
-            rng.between(0.55, 0.62),
-            (0.8, 1.0, 1.2)[seed % 3],
+            rng.between(0.55, 0.62, "depth_m"),
+            rng.turn((0.8, 1.0, 1.2), "width_m"),
             0.08,
-            rng.between(1.9, 2.2),
+            rng.between(1.9, 2.2, "height_m"),
             2,
         )
     if family == "refrigerator":
-        return rng, rng.between(0.6, 0.66), rng.between(0.56, 0.68), 0.62, rng.between(1.55, 1.9), 1
+        return (
+            rng,
+            rng.between(0.6, 0.66, "depth_m"),
+            rng.between(0.56, 0.68, "width_m"),
+            0.62,
+            rng.between(1.55, 1.9, "height_m"),
+            1,
+        )
     if family == "wall_unit":
-        return rng, rng.between(0.32, 0.36), (0.6, 0.8)[seed % 2], 0.0, 0.7, 2
+        return rng, rng.between(0.32, 0.36, "depth_m"), rng.turn((0.6, 0.8), "width_m"), 0.0, 0.7, 2
     return rng, 0.58, 0.6, 0.1, 0.86, 1
 
 
@@ -312,29 +319,30 @@ def _chest_measures(family: str, seed: int) -> tuple[VariantRng, float, float, f
         case "dresser":
             return (
                 rng,
-                rng.between(0.42, 0.5),
-                rng.between(0.8, 1.3),
-                rng.between(0.74, 1.05),
+                rng.between(0.42, 0.5, "depth_m"),
+                rng.between(0.8, 1.3, "width_m"),
+                rng.between(0.74, 1.05, "height_m"),
                 0.09,
-                3 + seed % 2,
+                rng.turn((3, 4), "drawers"),
             )
         case "bedside_table":
             return (
                 rng,
-                rng.between(0.35, 0.42),
-                rng.between(0.4, 0.5),
-                rng.between(0.42, 0.58),
+                rng.between(0.35, 0.42, "depth_m"),
+                rng.between(0.4, 0.5, "width_m"),
+                rng.between(0.42, 0.58, "height_m"),
                 0.1,
-                1 + seed % 2,
+                rng.turn((1, 2), "drawers"),
             )
         case "filing_cabinet":
-            return rng, 0.58, 0.42, (0.7, 1.02, 1.32)[seed % 3], 0.02, (2, 3, 4)[seed % 3]
+            drawers = rng.turn((2, 3, 4), "drawers")
+            return rng, 0.58, 0.42, (0.7, 1.02, 1.32)[drawers - 2], 0.02, drawers
         case _:
             return (
                 rng,
-                rng.between(0.42, 0.5),
-                rng.between(0.6, 0.8),
-                rng.between(0.8, 0.95),
+                rng.between(0.42, 0.5, "depth_m"),
+                rng.between(0.6, 0.8, "width_m"),
+                rng.between(0.8, 0.95, "height_m"),
                 0.12,
                 5,
             )
@@ -399,14 +407,22 @@ def _drawer(family: str, seed: int) -> Solid:
 def bookcase(seed: int = 0) -> Solid:
     """A bookcase. Slot: boards."""
     rng = variant_rng("bookcase", seed)
-    d, w, z = rng.between(0.26, 0.36), (0.4, 0.8, 1.0)[seed % 3], rng.between(0.9, 2.05)
+    d, w, z = (
+        rng.between(0.26, 0.36, "depth_m"),
+        rng.turn((0.4, 0.8, 1.0), "width_m"),
+        rng.between(0.9, 2.05, "height_m"),
+    )
     return _shelves(d, w, z, [front(rng)])
 
 
 def steel_rack(seed: int = 0) -> Solid:
     """A rack of steel for storage. Slots: boards, posts."""
     rng = variant_rng("steel_rack", seed)
-    d, w, z = rng.between(0.4, 0.55), rng.between(0.9, 1.3), rng.between(1.7, 2.0)
+    d, w, z = (
+        rng.between(0.4, 0.55, "depth_m"),
+        rng.between(0.9, 1.3, "width_m"),
+        rng.between(1.7, 2.0, "height_m"),
+    )
     paint = painted_material(rng.choose(("#a9adb0", "#3b4046", "#2f5d7c")), 0.4)
     return _shelves(d, w, z, [metal_material(ZINC, 0.45), paint], posts=True)
 
@@ -443,7 +459,7 @@ def board_levels_m(height_m: float) -> tuple[float, ...]:
 def pallet_rack(seed: int = 0) -> Solid:
     """A rack for pallets with three levels above the floor. Slots: uprights, beams, decks."""
     rng = variant_rng("pallet_rack", seed)
-    d, w = 1.3, rng.between(2.4, 2.8)
+    d, w = 1.3, rng.between(2.4, 2.8, "width_m")
     z = 3 * PALLET_PITCH_M + rng.between(0.1, 0.3)
     uprights: list[Box] = []
     for sy in (-1, 1):
@@ -521,9 +537,9 @@ def _cartons(
 ) -> tuple[list[Patch], list[Material], float]:
     """Layers of equal cartons, some wrapped in film."""
     patches: list[Patch] = []
-    rows = int(rng.between(1, 5))
+    rows = rng.whole(1, 5, "rows")
     nx, ny = rng.choose(((3, 2), (2, 2), (4, 2), (4, 3), (2, 1)))
-    h = rng.between(0.2, 0.3) if rows > 2 else rng.between(0.22, 0.36)
+    h = rng.between(0.2, 0.3, "layer_m") if rows > 2 else rng.between(0.22, 0.36, "layer_m")
     a, b = 1.16 / nx, 0.76 / ny
     for row in range(rows):
         for i in range(nx):
@@ -550,7 +566,7 @@ _FILM_ROUGHNESS = 0.3
 def _sacks(rng: VariantRng) -> tuple[list[Patch], list[Material], float]:
     """Paper or plastic sacks in layers, lying across each other."""
     patches: list[Patch] = []
-    rows, t = int(rng.between(2, 6)), 0.12
+    rows, t = rng.whole(2, 6, "rows"), 0.12
     for row in range(rows):
         for k in range(3):
             x, y = -0.39 + 0.39 * k, 0.0
@@ -565,7 +581,7 @@ def _sacks(rng: VariantRng) -> tuple[list[Patch], list[Material], float]:
 
 def _drums(rng: VariantRng) -> tuple[list[Patch], list[Material], float]:
     """Six drums or canisters."""
-    r, h = 0.185, rng.between(0.45, 0.62)
+    r, h = 0.185, rng.between(0.45, 0.62, "height_m")
     patches: list[Patch] = []
     profile = [(0.0, 0.0), (r, 0.0), (r, 0.3 * h), (r + 0.006, 0.33 * h), (r, 0.36 * h),
                (r, 0.64 * h), (r + 0.006, 0.67 * h), (r, 0.7 * h), (r, h), (r - 0.012, h),
@@ -660,7 +676,11 @@ def _mixed(seed: int, rng: VariantRng) -> tuple[list[Patch], list[Material], flo
 def storage_box(seed: int = 0) -> Solid:
     """A closed box of cardboard or plastic. Slots: body, lid."""
     rng = variant_rng("storage_box", seed)
-    x, y, z = rng.between(0.14, 0.22), rng.between(0.15, 0.28), rng.between(0.18, 0.4)
+    x, y, z = (
+        0.5 * rng.between(0.28, 0.44, "depth_m"),
+        0.5 * rng.between(0.3, 0.56, "width_m"),
+        rng.between(0.18, 0.4, "height_m"),
+    )
     low: Box = ((-x, -y, 0.0), (x, y, z - 0.03))
     lid: Box = ((-x - 0.006, -y - 0.006, z - 0.06), (x + 0.006, y + 0.006, z))
     if rng.chance(0.5):
@@ -678,7 +698,11 @@ def storage_box(seed: int = 0) -> Solid:
 def tv_stand(seed: int = 0) -> Solid:
     """A low board for a television. Slots: carcass, front, handle."""
     rng = variant_rng("tv_stand", seed)
-    d, w, z = rng.between(0.38, 0.45), rng.between(1.2, 1.9), rng.between(0.4, 0.55)
+    d, w, z = (
+        rng.between(0.38, 0.45, "depth_m"),
+        rng.between(1.2, 1.9, "width_m"),
+        rng.between(0.4, 0.55, "height_m"),
+    )
     boards = carcass(d, w, 0.1, z, 1)
     patches = [board(*b) for b in boards]
     x = 0.5 * d
@@ -702,7 +726,7 @@ def tv_stand(seed: int = 0) -> Solid:
 def washing_machine(seed: int = 0) -> Solid:
     """A washing machine. Slots: body, ring, glass, panel."""
     rng = variant_rng("washing_machine", seed)
-    d, x = rng.between(0.52, 0.6), 0.0
+    d, x = rng.between(0.52, 0.6, "depth_m"), 0.0
     x = 0.5 * d
     body: Box = ((-x, -0.3, 0.0), (x, 0.3, 0.85))
     ring = shapes.lathe(

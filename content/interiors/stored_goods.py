@@ -224,8 +224,8 @@ def carton_stack(seed: int = 0) -> Solid:
     """One to three closed cartons on one another. Slots: card, tape, label, print."""
     rng = variant_rng("carton_stack", seed)
     patches: list[Patch] = []
-    x, y, z = rng.between(0.13, 0.19), rng.between(0.15, 0.26), 0.0
-    for k in range(1 + seed % 3):
+    x, y, z = 0.5 * rng.between(0.26, 0.38, "depth_m"), 0.5 * rng.between(0.3, 0.52, "width_m"), 0.0
+    for k in range(rng.turn((1, 2, 3), "count")):
         h = rng.between(0.1, 0.24) if seed % 3 else rng.between(0.14, 0.28)
         part: list[Patch] = []
         tape_carton(part, (-x, -y, 0.0), (x, y, h), rng, (0, 1, 2, 3))
@@ -240,8 +240,8 @@ def screw_jars(seed: int = 0) -> Solid:
     """Jars with screws and nails, in a row or two. Slots: glass, lids, steel, brass."""
     rng = variant_rng("screw_jars", seed)
     patches: list[Patch] = []
-    r, h = rng.between(0.032, 0.042), rng.between(0.08, 0.12)
-    for i in range(1 + seed % 2):
+    r, h = rng.between(0.032, 0.042, "radius_m"), rng.between(0.08, 0.12, "height_m")
+    for i in range(rng.turn((1, 2), "rows")):
         for j in range(2 + seed % 4):
             x, y = 2.15 * r * i, 2.15 * r * j
             fill = rng.between(0.25, 0.8) * h
@@ -262,8 +262,8 @@ def screw_jars(seed: int = 0) -> Solid:
 def cable_coil(seed: int = 0) -> Solid:
     """Cable, wire or hose, wound up and lying. Slots: cable, ties."""
     rng = variant_rng("cable_coil", seed)
-    r, wire = rng.between(0.08, 0.15), rng.between(0.004, 0.008)
-    turns = int(rng.between(5, 11))
+    r, wire = rng.between(0.08, 0.15, "radius_m"), rng.between(0.004, 0.008, "wire_m")
+    turns = rng.whole(5, 11, "turns")
     t = np.linspace(0.0, 2.0 * math.pi * turns, 22 * turns)
     layer = np.floor(t / (2.0 * math.pi))
     reach = r + wire * 1.6 * (layer % 3) + 0.004 * np.sin(2.3 * t)
@@ -287,9 +287,9 @@ def timber(seed: int = 0) -> Solid:
     """Boards, battens, pipes and a sheet that lean against a wall. Slots: woods, steel, sheet."""
     rng = variant_rng("timber", seed)
     patches: list[Patch] = []
-    y, wide = 0.0, rng.between(0.45, 1.0)
+    y, wide = 0.0, rng.between(0.45, 1.0, "width_m")
     if seed % 3 == 0:
-        h = rng.between(1.0, 1.5)
+        h = rng.between(1.0, 1.5, "height_m")
         sheet = shapes.block((0.0, 0.0, 0.0), (0.014, wide, h), 0.0015, 3)
         patches.append(sheet.rotated("y", -0.13).moved(0.0, 0.0, 0.0))
     while y < wide:
@@ -322,8 +322,10 @@ def timber(seed: int = 0) -> Solid:
 def pedal_bin(seed: int = 0) -> Solid:
     """A bin with a lid and a pedal. Slots: body, dark parts."""
     rng = variant_rng("pedal_bin", seed)
-    r, h = ((0.13, 0.6), (0.145, 0.42), (0.1, 0.27))[seed % 3]
-    r, h = r * rng.between(0.95, 1.05), h * rng.between(0.95, 1.05)
+    r, h = {"tall": (0.13, 0.6), "wide": (0.145, 0.42), "small": (0.1, 0.27)}[
+        rng.turn(("tall", "wide", "small"), "size")
+    ]
+    r, h = r * rng.between(0.95, 1.05, "width_scale"), h * rng.between(0.95, 1.05, "height_scale")
     body = shapes.lathe([(0.0, 0.012), (r, 0.012), (r, 0.9 * h), (0.0, 0.9 * h)], 40)
     dome = [
         (1.02 * r, 0.9 * h + 0.012),

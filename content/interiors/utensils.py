@@ -42,7 +42,11 @@ def _plastic(rng: VariantRng) -> Material:
 def toolbox(seed: int = 0) -> Solid:
     """A toolbox with a handle. Slots: body, dark."""
     rng = variant_rng("toolbox", seed)
-    x, y, h = rng.between(0.09, 0.12), rng.between(0.2, 0.27), rng.between(0.17, 0.23)
+    x, y, h = (
+        0.5 * rng.between(0.18, 0.24, "depth_m"),
+        0.5 * rng.between(0.4, 0.54, "width_m"),
+        rng.between(0.17, 0.23, "height_m"),
+    )
     body: Box = ((-x, -y, 0.0), (x, y, h))
     patches = [
         shapes.block((-x, -y, 0.0), (x, y, 0.68 * h), 0.008),
@@ -60,7 +64,7 @@ def toolbox(seed: int = 0) -> Solid:
 def jerry_can(seed: int = 0) -> Solid:
     """A canister with a grip. Slots: body, cap."""
     rng = variant_rng("jerry_can", seed)
-    x, y, h = 0.08, rng.between(0.12, 0.17), rng.between(0.3, 0.42)
+    x, y, h = 0.08, 0.5 * rng.between(0.24, 0.34, "width_m"), rng.between(0.3, 0.42, "height_m")
     patches = [cushion((-x, -y, 0.0), (x, y, 0.82 * h), 0, 0.03)]
     patches.append(rod((0.0, -0.1 * y, h - 0.02), (0.0, 0.75 * y, h - 0.02), 0.016, 0))
     for share in (-0.1, 0.75):
@@ -72,7 +76,7 @@ def jerry_can(seed: int = 0) -> Solid:
 def paint_can(seed: int = 0) -> Solid:
     """A tin of paint, some open. Slots: tin, paint."""
     rng = variant_rng("paint_can", seed)
-    r, h = rng.between(0.055, 0.1), rng.between(0.11, 0.2)
+    r, h = rng.between(0.055, 0.1, "radius_m"), rng.between(0.11, 0.2, "height_m")
     inner = h - 0.02 if rng.chance(0.4) else h - 0.004
     wall = [(0.0, 0.0), (r, 0.0), (r, h), (r - 0.008, h), (r - 0.008, inner), (0.0, inner)]
     label = shapes.lathe([(r + 0.0005, 0.2 * h), (r + 0.0005, 0.8 * h)], 40, 1)
@@ -83,7 +87,11 @@ def paint_can(seed: int = 0) -> Solid:
 def crate(seed: int = 0) -> Solid:
     """An open crate of slats. Slot: wood."""
     rng = variant_rng("crate", seed)
-    x, y, h = rng.between(0.14, 0.2), rng.between(0.2, 0.3), rng.between(0.18, 0.3)
+    x, y, h = (
+        0.5 * rng.between(0.28, 0.4, "depth_m"),
+        0.5 * rng.between(0.4, 0.6, "width_m"),
+        rng.between(0.18, 0.3, "height_m"),
+    )
     boxes: list[Box] = [((-x, -y, 0.0), (x, y, 0.014))]
     rows = max(2, round(h / 0.1))
     for k in range(rows):
@@ -100,7 +108,7 @@ def crate(seed: int = 0) -> Solid:
 def barrel(seed: int = 0) -> Solid:
     """A drum of 30 to 200 litres with beads. Slot: body."""
     rng = variant_rng("barrel", seed)
-    r, h = rng.between(0.17, 0.29), rng.between(0.5, 0.88)
+    r, h = rng.between(0.17, 0.29, "radius_m"), rng.between(0.5, 0.88, "height_m")
     profile = [(0.0, 0.0), (r, 0.0)]
     for share in (0.33, 0.66):
         z = share * h
@@ -149,7 +157,7 @@ def iron(seed: int = 0) -> Solid:
 def globe(seed: int = 0) -> Solid:
     """A globe on a stand. Slots: sea, stand."""
     rng = variant_rng("globe", seed)
-    r = rng.between(0.09, 0.15)
+    r = rng.between(0.09, 0.15, "radius_m")
     z = r + 0.07
     ball = shapes.ball(lambda d: r * d, 20, 32).moved(0.0, 0.0, z)
     patches = [
@@ -169,7 +177,7 @@ def globe(seed: int = 0) -> Solid:
 def umbrella_stand(seed: int = 0) -> Solid:
     """A stand with closed umbrellas. Slots: stand, cloth, grip."""
     rng = variant_rng("umbrella_stand", seed)
-    r, h = rng.between(0.1, 0.13), rng.between(0.42, 0.55)
+    r, h = rng.between(0.1, 0.13, "radius_m"), rng.between(0.42, 0.55, "height_m")
     wall = [(0.0, 0.0), (r, 0.0), (r, h), (r - 0.005, h), (r - 0.005, 0.01), (0.0, 0.01)]
     patches = [shapes.lathe(wall, 36)]
     for k in range(int(rng.between(1, 4))):
@@ -183,7 +191,7 @@ def umbrella_stand(seed: int = 0) -> Solid:
 def hand_truck(seed: int = 0) -> Solid:
     """A hand truck that stands upright. Slots: frame, dark."""
     rng = variant_rng("hand_truck", seed)
-    h, w = rng.between(1.05, 1.25), 0.2
+    h, w = rng.between(1.05, 1.25, "height_m"), 0.2
     patches: list[Patch] = [shapes.block((0.0, -w, 0.0), (0.26, w, 0.012), 0.002)]
     for sy in (-1, 1):
         patches.append(rod((0.0, sy * w, 0.0), (-0.04, sy * w, h), 0.016))
@@ -216,7 +224,7 @@ def vise(seed: int = 0) -> Solid:
 def first_aid_box(seed: int = 0) -> Solid:
     """A first-aid box. Slots: body, cross."""
     rng = variant_rng("first_aid_box", seed)
-    x, y, h = 0.05, rng.between(0.11, 0.14), rng.between(0.17, 0.22)
+    x, y, h = 0.05, 0.5 * rng.between(0.22, 0.28, "width_m"), rng.between(0.17, 0.22, "height_m")
     z = 0.5 * h
     patches = [
         shapes.block((-x, -y, 0.0), (x, y, h), 0.012),

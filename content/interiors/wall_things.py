@@ -33,7 +33,11 @@ SHELF_BRACKET_M = 0.12
 def wall_shelf(seed: int = 0) -> Solid:
     """A board on brackets. Slots: board, brackets."""
     rng = variant_rng("wall_shelf", seed)
-    d, w, t = rng.between(0.18, 0.26), rng.between(0.6, 1.2), rng.between(0.02, 0.035)
+    d, w, t = (
+        rng.between(0.18, 0.26, "depth_m"),
+        rng.between(0.6, 1.2, "width_m"),
+        rng.between(0.02, 0.035, "thickness_m"),
+    )
     top = SHELF_BRACKET_M + t
     shelf: Box = ((0.0, -0.5 * w, SHELF_BRACKET_M), (d, 0.5 * w, top))
     patches = [board(*shelf, 0, 0.003)]
@@ -55,7 +59,7 @@ def wall_shelf(seed: int = 0) -> Solid:
 def socket(seed: int = 0) -> Solid:
     """One to three sockets in a frame. Slots: plate, holes."""
     rng = variant_rng("socket", seed)
-    count = 1 + seed % 3
+    count = rng.turn((1, 2, 3), "count")
     w = 0.081 * count
     plate: Box = ((0.0, -0.5 * w, 0.0), (0.009, 0.5 * w, 0.081))
     patches = [shapes.block(*plate, 0.003)]
@@ -76,7 +80,7 @@ def socket(seed: int = 0) -> Solid:
 
 def light_switch(seed: int = 0) -> Solid:
     """One or two rockers in a frame. Slots: plate, rockers."""
-    count = 1 + seed % 2
+    count = variant_rng("light_switch", seed).turn((1, 2), "count")
     w = 0.081 * count
     plate: Box = ((0.0, -0.5 * w, 0.0), (0.008, 0.5 * w, 0.081))
     patches = [shapes.block(*plate, 0.003)]
@@ -91,7 +95,7 @@ def light_switch(seed: int = 0) -> Solid:
 def utensil_rail(seed: int = 0) -> Solid:
     """A rail with ladles, spoons and a cloth. Slots: steel, wood, cloth."""
     rng = variant_rng("utensil_rail", seed)
-    w, top = rng.between(0.45, 0.7), 0.36
+    w, top = rng.between(0.45, 0.7, "width_m"), 0.36
     patches: list[Patch] = [rod((0.045, -0.5 * w, top), (0.045, 0.5 * w, top), 0.007, 0, 12)]
     for sy in (-1, 1):
         patches.append(rod((0.0, sy * 0.45 * w, top), (0.045, sy * 0.45 * w, top), 0.008, 0))
@@ -114,7 +118,7 @@ def utensil_rail(seed: int = 0) -> Solid:
 def pegboard(seed: int = 0) -> Solid:
     """A board with hand tools on hooks. Slots: board, steel, handles."""
     rng = variant_rng("pegboard", seed)
-    w, h = rng.between(0.9, 1.4), rng.between(0.6, 0.8)
+    w, h = rng.between(0.9, 1.4, "width_m"), rng.between(0.6, 0.8, "height_m")
     back: Box = ((0.0, -0.5 * w, 0.0), (0.012, 0.5 * w, h))
     patches: list[Patch] = [shapes.block(*back, 0.002)]
     columns = int(w / 0.11)
@@ -161,7 +165,7 @@ def _hand_tool(y: float, top: float, length: float, kind: int) -> list[Patch]:
 def notice_board(seed: int = 0) -> Solid:
     """A cork board with sheets of paper. Slots: frame, cork, papers."""
     rng = variant_rng("notice_board", seed)
-    w, h = rng.between(0.6, 1.0), rng.between(0.45, 0.7)
+    w, h = rng.between(0.6, 1.0, "width_m"), rng.between(0.45, 0.7, "height_m")
     back: Box = ((0.0, -0.5 * w, 0.0), (0.012, 0.5 * w, h))
     patches: list[Patch] = [shapes.block(*back, 0.0, 1)]
     for low, high in (
@@ -193,7 +197,7 @@ def notice_board(seed: int = 0) -> Solid:
 def roll_holder(seed: int = 0) -> Solid:
     """A holder with a roll of toilet paper. Slots: steel, paper."""
     rng = variant_rng("roll_holder", seed)
-    r = rng.between(0.04, 0.058)
+    r = rng.between(0.04, 0.058, "radius_m")
     roll = shapes.lathe([(0.02, -0.05), (r, -0.05), (r, 0.05), (0.02, 0.05), (0.02, -0.05)], 32, 1)
     tail: Box = ((0.075 + r - 0.002, -0.05, 0.0), (0.075 + r - 0.001, 0.05, 0.1))
     patches = [
@@ -212,7 +216,7 @@ def roll_holder(seed: int = 0) -> Solid:
 def wall_calendar(seed: int = 0) -> Solid:
     """A calendar: a picture above a table of days. Slots: paper, picture, ink."""
     rng = variant_rng("wall_calendar", seed)
-    w, h = 0.3, rng.between(0.4, 0.5)
+    w, h = 0.3, rng.between(0.4, 0.5, "height_m")
     sheet: Box = ((0.0, -0.5 * w, 0.0), (0.004, 0.5 * w, h))
     photo = rectangle((0.0045, -0.46 * w, 0.48 * h), (0.0, 0.92 * w, 0.0), (0.0, 0.0, 0.48 * h))
     patches = [shapes.block(*sheet), photo.painted(1)]
@@ -232,7 +236,12 @@ def wall_calendar(seed: int = 0) -> Solid:
 def bathroom_cabinet(seed: int = 0) -> Solid:
     """A cabinet with mirrors for doors. Slots: body, mirror."""
     rng = variant_rng("bathroom_cabinet", seed)
-    w, h, d, doors = rng.between(0.55, 0.9), rng.between(0.6, 0.75), 0.14, 1 + seed % 3
+    w, h, d, doors = (
+        rng.between(0.55, 0.9, "width_m"),
+        rng.between(0.6, 0.75, "height_m"),
+        0.14,
+        rng.turn((1, 2, 3), "doors"),
+    )
     body: Box = ((0.0, -0.5 * w, 0.0), (d, 0.5 * w, h))
     patches = [board(*body)]
     for k in range(doors):
@@ -246,7 +255,7 @@ def bathroom_cabinet(seed: int = 0) -> Solid:
 def parts_bins(seed: int = 0) -> Solid:
     """Rows of open plastic bins for small parts. Slots: rail, bins, parts."""
     rng = variant_rng("parts_bins", seed)
-    rows, columns = 2 + seed % 3, int(rng.between(4, 8))
+    rows, columns = rng.turn((2, 3, 4), "rows"), rng.whole(4, 8, "columns")
     a, h, d = 0.105, 0.085, 0.15
     w, pitch = columns * (a + 0.006), h + 0.045
     back: Box = ((0.0, -0.5 * w, 0.0), (0.01, 0.5 * w, rows * pitch))

@@ -32,7 +32,7 @@ def book_size_m(seed: int) -> tuple[float, float, float]:
     """Length along the spine, width and thickness."""
     rng = variant_rng("book/size", seed)
     length, width = in_turn(_FORMATS, seed)
-    scale = rng.between(0.97, 1.03)
+    scale = rng.between(0.97, 1.03, "scale")
     return (length * scale, width * scale, rng.between(0.012, 0.042))
 
 
@@ -40,7 +40,7 @@ def book(seed: int) -> Solid:
     """A paperback or hardcover. Slots: cover, pages."""
     rng = variant_rng("book", seed)
     length, width, thickness = book_size_m(seed)
-    hard = rng.chance(0.5)
+    hard = rng.chance(0.5, "hard")
     board = 0.0028 if hard else 0.0006
     margin = 0.003 if hard else 0.0
     bow = min(0.004, 0.3 * thickness) if hard else 0.0006

@@ -30,7 +30,7 @@ from gen_data.content.procedural.vessel_contents import CONTENTS, DRINKS, liquid
 from gen_data.content.procedural.vessels import radius_at, subdivide
 from gen_data.content.procedural.wear import draw_wear, dulled
 from gen_data.core.asset_types import Material
-from gen_data.core.variant_rng import VariantRng, in_turn, variant_rng
+from gen_data.core.variant_rng import VariantRng, variant_rng
 
 # Width by height of the unrolled label; its texture is drawn at this aspect.
 LABEL_ASPECT = 2.6
@@ -98,10 +98,12 @@ BOTTLES = load_table(__package__, "bottles", BottleStyle)
 def choose_bottle(seed: int) -> BottleChoice:
     """Draw the kind, contents, closure and label of a bottle."""
     rng = variant_rng("bottle/choice", seed)
-    kind = in_turn(tuple(BOTTLES), seed)
+    kind = rng.turn(tuple(BOTTLES), "kind")
     style = BOTTLES[kind]
-    drink = rng.choose(style.drinks) if style.clear else ""
-    return BottleChoice(kind, drink, rng.choose(style.closures), rng.choose(style.labels))
+    drink = rng.choose(style.drinks, "drink") if style.clear else ""
+    return BottleChoice(
+        kind, drink, rng.choose(style.closures, "closure"), rng.choose(style.labels, "label")
+    )
 
 
 def bottle_facts(seed: int) -> Facts:
@@ -114,7 +116,10 @@ def bottle(seed: int) -> Solid:
     """A bottle of one of the styles in ``BOTTLES``. Slots: body, label, cap, then contents."""
     rng, choice = variant_rng("bottle", seed), choose_bottle(seed)
     style = BOTTLES[choice.kind]
-    height, radius = rng.between(*style.height_m), rng.between(*style.radius_m)
+    height, radius = (
+        rng.between(*style.height_m, "height_m"),
+        rng.between(*style.radius_m, "radius_m"),
+    )
     neck_z = height * rng.between(*style.neck_share)
     z0, z1 = height * style.label_share[0], min(height * style.label_share[1], neck_z - 0.01)
     shoulder = [
@@ -167,11 +172,11 @@ def _bottle_materials(
 def jar(seed: int) -> Solid:
     """A preserving jar with a twist-off lid. Slots: body, label, lid, then contents."""
     rng = variant_rng("jar", seed)
-    radius, height = rng.between(0.027, 0.045), rng.between(0.07, 0.15)
+    radius, height = rng.between(0.027, 0.045, "radius_m"), rng.between(0.07, 0.15, "height_m")
     top, lid_radius, mouth = height - 0.014, 0.93 * radius, 0.88 * radius
     neck = rng.choose((0.74, 0.8, 0.84))
     upper = [(radius, neck * height), (mouth, top - 0.003), (mouth, top + 0.004)]
-    style = rng.choose(("wrap", "front"))
+    style = rng.choose(("wrap", "front"), "style")
     wall = _Wall(radius, (0.2 * height, (neck - 0.14) * height), upper, [0.02, 0.006])
     patches = [
         *_make_wall(wall, style, 0),

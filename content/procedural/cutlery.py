@@ -31,7 +31,7 @@ def spoon(seed: int) -> Solid:
     """A table, dessert, coffee or serving spoon. Slots: head, handle."""
     rng = variant_rng("spoon", seed)
     size = in_turn((1.0, 0.86, 0.66, 1.0, 1.18), seed) * rng.between(0.96, 1.04)
-    wide, tail = rng.between(0.88, 1.1), rng.between(0.7, 1.35)
+    wide, tail = rng.between(0.88, 1.1, "wide_scale"), rng.between(0.7, 1.35, "tail_m")
     bowl = [(-32, 3.0, 12.0, 0.5), (-22, 12.0, 9.5, 4.0), (-8, 19.5, 7.0, 7.5),
             (8, 21.0, 6.5, 8.0), (20, 17.5, 7.5, 6.5), (28, 10.5, 9.0, 3.0),
             (31.5, 4.0, 10.0, 0.5)]  # fmt: skip
@@ -44,7 +44,7 @@ def fork(seed: int) -> Solid:
     """A table or dessert fork with three or four tines. Slots: head, handle."""
     rng = variant_rng("fork", seed)
     size = (1.0, 0.86)[seed % 2] * rng.between(0.97, 1.03)
-    tail, half = rng.between(0.7, 1.35), rng.between(11.0, 13.5)
+    tail, half = rng.between(0.7, 1.35, "tail_m"), 0.5 * rng.between(22.0, 27.0, "head_scale")
     count = 3 if rng.chance(0.25) else 4
     head = [(40, 4.0, 4.0, 14.5, 2.2, 0.0), (48, 10.5, 10.5, 12.0, 2.0, 1.0),
             (56, half, half, 9.0, 1.9, 2.0), (63, half, half, 6.0, 1.9, 2.0)]  # fmt: skip
@@ -87,7 +87,11 @@ def knife(seed: int) -> Solid:
     """A table or kitchen knife lying on its side, edge towards -Y. Slots: blade, handle."""
     rng = variant_rng("knife", seed)
     style = KNIVES[knife_kind(seed)]
-    size, grip, deep = rng.between(*style.size), rng.between(0.9, 1.15), rng.between(0.88, 1.1)
+    size, grip, deep = (
+        rng.between(*style.size),
+        rng.between(0.9, 1.15, "grip_scale"),
+        rng.between(0.88, 1.1, "deep_scale"),
+    )
     handle = _even(*((x, grip * wide, z, thick) for x, wide, z, thick in style.handle))
     blade = [(x, deep * low, high, style.z, thick, 0.0) for x, low, high, thick in style.blade]
     finish = _GRIPS[rng.choose(style.grips)](rng) if style.grips else None

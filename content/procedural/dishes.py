@@ -203,7 +203,7 @@ def _stacked(
 
 def sliced_sandwich(seed: int, rng: VariantRng, *, half: bool = False) -> Dish:
     """Two slices of tin loaf with fillings; ``half`` is cut from corner to corner."""
-    size, thick = rng.between(0.095, 0.12), rng.between(0.011, 0.015)
+    size, thick = rng.between(0.095, 0.12, "size_m"), rng.between(0.011, 0.015, "bread_m")
     outline = _slice_outline(size, rng)
     if half:
         outline = size * np.array(
@@ -224,7 +224,7 @@ def sliced_sandwich(seed: int, rng: VariantRng, *, half: bool = False) -> Dish:
 
 def _round_roll(seed: int, rng: VariantRng) -> Dish:
     """A burger or a filled bun, with sesame."""
-    radius = rng.between(0.045, 0.058)
+    radius = rng.between(0.045, 0.058, "radius_m")
     foot = puck(radius, rng.between(0.013, 0.018), rng, soft=0.12)
     thick = float(foot.bounds_m()[1][2])
     crown = mound(radius * 1.02, rng.between(0.03, 0.04), rng, rough=0.012, flat=0.72).painted(0)
@@ -256,7 +256,7 @@ def _round_roll(seed: int, rng: VariantRng) -> Dish:
 
 def _baguette(seed: int, rng: VariantRng) -> Dish:
     """A filled length of baguette along X."""
-    length, radius = rng.between(0.14, 0.2), rng.between(0.026, 0.033)
+    length, radius = rng.between(0.14, 0.2, "length_m"), rng.between(0.026, 0.033, "radius_m")
     return _long_roll(seed, rng, length, radius)
 
 
@@ -290,8 +290,8 @@ SANDWICHES: Mapping[str, Callable[[int, VariantRng], Dish]] = {
 
 def make_pizza(seed: int, rng: VariantRng, radius: float, turn_rad: float) -> Dish:
     """A pizza around Z, from angle 0 to ``turn_rad``; 2 pi is a whole one."""
-    thick, rim = rng.between(0.005, 0.009), rng.between(0.013, 0.02)
-    width, outline = rng.between(0.014, 0.022), wobble(6, 0.012, rng)
+    thick, rim = rng.between(0.005, 0.009, "base_m"), rng.between(0.013, 0.02, "rim_m")
+    width, outline = rng.between(0.014, 0.022, "crust_m"), wobble(6, 0.012, rng)
     edge = [
         (radius - width, thick),
         (radius - 0.75 * width, rim),
@@ -416,17 +416,19 @@ Point = tuple[float, float]
 
 
 def _whole_pizza(seed: int, rng: VariantRng) -> Dish:
-    return make_pizza(seed, rng, rng.between(0.125, 0.16), 2.0 * math.pi)
+    return make_pizza(seed, rng, rng.between(0.125, 0.16, "radius_m"), 2.0 * math.pi)
 
 
 def _started_pizza(seed: int, rng: VariantRng) -> Dish:
     missing = rng.choose((1, 1, 2, 3)) / 8.0
-    return make_pizza(seed, rng, rng.between(0.125, 0.16), 2.0 * math.pi * (1.0 - missing))
+    return make_pizza(
+        seed, rng, rng.between(0.125, 0.16, "radius_m"), 2.0 * math.pi * (1.0 - missing)
+    )
 
 
 def pizza_slice(seed: int, rng: VariantRng) -> Dish:
     """An eighth or a sixth, with its middle at the origin and its tip towards -X."""
-    radius, turn = rng.between(0.14, 0.19), 2.0 * math.pi / rng.choose((6, 8, 8))
+    radius, turn = rng.between(0.14, 0.19, "radius_m"), 2.0 * math.pi / rng.choose((6, 8, 8))
     dish = make_pizza(seed, rng, radius, turn)
 
     def place(points: Array) -> Array:
@@ -464,7 +466,7 @@ def _tiers(radius: float, height: float, layers: int) -> list[tuple[Point, Point
 
 def _cake_piece(seed: int, rng: VariantRng, radius: float, turn_rad: float) -> Dish:
     """A layer cake from angle 0 to ``turn_rad``; its coat is icing, its cut faces show layers."""
-    height, layers = rng.between(0.055, 0.085), rng.choose((2, 3, 3))
+    height, layers = rng.between(0.055, 0.085, "height_m"), rng.choose((2, 3, 3), "layers")
     is_whole, steps = turn_rad > 6.28, max(5, round(10 * turn_rad))
     patches: list[Patch] = []
     for low, high, slot in _tiers(radius - 0.006, height, layers):
@@ -521,7 +523,7 @@ def _decoration(radius: float, turn_rad: float, z: float, rng: VariantRng) -> li
     if rng.chance(0.25):
         return []
     count = max(1, round(rng.choose((8, 10, 12)) * turn_rad / (2.0 * math.pi)))
-    size = rng.between(0.009, 0.014)
+    size = rng.between(0.009, 0.014, "size_m")
     made = []
     for i in range(count):
         angle = turn_rad * (i + 0.5) / count
@@ -533,7 +535,7 @@ def _decoration(radius: float, turn_rad: float, z: float, rng: VariantRng) -> li
 
 def cake_slice(seed: int, rng: VariantRng) -> Dish:
     """A slice with its middle at the origin, its tip towards -X."""
-    radius, turn = rng.between(0.1, 0.13), rng.between(0.5, 0.8)
+    radius, turn = rng.between(0.1, 0.13, "radius_m"), rng.between(0.5, 0.8)
     dish = _cake_piece(seed, rng, radius, turn)
     c, s = math.cos(0.5 * turn), math.sin(0.5 * turn)
     spin = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
@@ -546,15 +548,15 @@ def cake_slice(seed: int, rng: VariantRng) -> Dish:
 
 
 def _whole_cake(seed: int, rng: VariantRng) -> Dish:
-    return _cake_piece(seed, rng, rng.between(0.085, 0.12), 2.0 * math.pi)
+    return _cake_piece(seed, rng, rng.between(0.085, 0.12, "radius_m"), 2.0 * math.pi)
 
 
 def _cupcake(seed: int, rng: VariantRng) -> Dish:
     """A cup of paper with a swirl of icing."""
     foot, rim, high = (
-        rng.between(0.022, 0.026),
-        rng.between(0.032, 0.037),
-        rng.between(0.036, 0.044),
+        rng.between(0.022, 0.026, "foot_m"),
+        rng.between(0.032, 0.037, "rim_m"),
+        rng.between(0.036, 0.044, "height_m"),
     )
     pleats = 28
     profile = shapes.fillet(
@@ -589,8 +591,8 @@ def _cupcake(seed: int, rng: VariantRng) -> Dish:
 
 def _square(seed: int, rng: VariantRng) -> Dish:
     """A brownie or a piece of tray bake: crust below, icing above."""
-    x, y = rng.between(0.055, 0.08), rng.between(0.05, 0.07)
-    z, top = rng.between(0.025, 0.038), rng.between(0.003, 0.008)
+    x, y = 0.5 * rng.between(0.11, 0.16, "depth_m"), 0.5 * rng.between(0.1, 0.14, "width_m")
+    z, top = rng.between(0.025, 0.038, "height_m"), rng.between(0.003, 0.008, "top_m")
     body = shapes.block((-x / 2, -y / 2, 0.0), (x / 2, y / 2, z), 0.003).painted(1)
     coat = shapes.block(
         (-x / 2 - 0.0005, -y / 2 - 0.0005, z - 0.001),
@@ -623,7 +625,7 @@ CAKES: Mapping[str, Callable[[int, VariantRng], Dish]] = {
 def make_donut(seed: int, rng: VariantRng) -> Dish:
     """A ring on z = 0, half of them with glaze and of these half with sprinkles."""
     across, up = rng.between(0.0165, 0.02), rng.between(0.014, 0.018)
-    radius = rng.between(0.026, 0.031)
+    radius = rng.between(0.026, 0.031, "radius_m")
     ring = torus(radius, (across, up), 40, 20).moved(z=up)
     outline = wobble(4, 0.02, rng)
     patches = [_warped(ring, outline).painted(0)]
@@ -688,9 +690,9 @@ def _sprinkles(radius: float, across: float, up: float, rng: VariantRng) -> list
 
 
 def _hot_dog(seed: int, rng: VariantRng) -> Dish:
-    length, radius = rng.between(0.14, 0.18), rng.between(0.022, 0.027)
+    length, radius = rng.between(0.14, 0.18, "length_m"), rng.between(0.022, 0.027, "radius_m")
     loaf = _loaf(length, radius)
-    thick = rng.between(0.0105, 0.0125)
+    thick = rng.between(0.0105, 0.0125, "sausage_radius_m")
     reach = 0.5 * length * rng.between(1.0, 1.08)
     body = np.linspace(-1.0, 1.0, 25)
     path = np.stack([reach * body, 0.0 * body, 0.004 * body**2], axis=1)

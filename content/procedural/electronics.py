@@ -36,13 +36,13 @@ KEY_CELLS = 8
 def cell_phone(seed: int) -> Solid:
     """A telephone with its screen up. Slots: body, screen, back, lenses, buttons."""
     rng = variant_rng("cell_phone", seed)
-    length, width = rng.between(0.138, 0.166), rng.between(0.067, 0.078)
-    thick, corner = rng.between(0.0072, 0.0092), rng.between(0.005, 0.0125)
-    has_case = rng.chance(0.4)
+    length, width = rng.between(0.138, 0.166, "length_m"), rng.between(0.067, 0.078, "width_m")
+    thick, corner = rng.between(0.0072, 0.0092, "thickness_m"), rng.between(0.005, 0.0125)
+    has_case = rng.chance(0.4, "has_case")
     grow = 0.0016 if has_case else 0.0
     outline = rounded_rectangle(length + 2 * grow, width + 2 * grow, corner + grow)
     body = shapes.extrude(outline, thick + grow, 0.0016 + 0.4 * grow)
-    bezel = rng.choose((0.0012, 0.0016, 0.003))
+    bezel = rng.choose((0.0012, 0.0016, 0.003), "bezel_m")
     glass = rounded_rectangle(length - 2 * bezel, width - 2 * bezel, corner - bezel)
     top = thick + grow
     screen = shapes.extrude(glass, 0.0003, 0.0001, slot=1).moved(z=top - 0.0001)
@@ -93,7 +93,7 @@ def _screen_material(seed: int, rng: VariantRng) -> Material:
 
 def _camera_island(length: float, width: float, rng: VariantRng) -> tuple[Patch, list[Patch]]:
     """A raised plate with lenses below a corner of the back."""
-    count = rng.choose((1, 2, 2, 3))
+    count = rng.choose((1, 2, 2, 3), "count")
     wide, long = rng.choose(((0.022, 0.042), (0.032, 0.032), (0.02, 0.02)))
     centre = (-0.5 * length + 0.5 * long + 0.008, 0.5 * width - 0.5 * wide - 0.007)
     outline = rounded_rectangle(long, wide, 0.005) + np.array(centre)
@@ -120,10 +120,10 @@ def rounded_rectangle(length: float, width: float, radius: float, steps: int = 5
 def remote(seed: int) -> Solid:
     """A remote control, keys up, its transmitter at +X. Slots: body, keys, others, window."""
     rng = variant_rng("remote", seed)
-    slim = rng.chance(0.35)
-    length = rng.between(0.13, 0.165) if slim else rng.between(0.165, 0.225)
-    width = rng.between(0.034, 0.04) if slim else rng.between(0.042, 0.055)
-    thick = rng.between(0.012, 0.022)
+    slim = rng.chance(0.35, "slim")
+    length = rng.between(0.13, 0.165, "length_m") if slim else rng.between(0.165, 0.225, "length_m")
+    width = rng.between(0.034, 0.04, "width_m") if slim else rng.between(0.042, 0.055, "width_m")
+    thick = rng.between(0.012, 0.022, "thickness_m")
     corner = min(rng.choose((0.005, 0.01, 0.017)), 0.45 * width)
     bevel = min(rng.choose((0.002, 0.004, 0.0055)), 0.6 * corner)
     body = shapes.extrude(rounded_rectangle(length, width, corner), thick, bevel)
@@ -132,7 +132,7 @@ def remote(seed: int) -> Solid:
     sink = 1.0 - rng.between(0.0, 0.25) * (0.5 - corners[..., 0] / length)
     corners[..., 2] = thick - (thick - corners[..., 2]) * sink
     keys = _remote_keys(length, width, slim, rng)
-    rise = rng.between(0.0008, 0.0022)
+    rise = rng.between(0.0008, 0.0022, "rise_m")
     patches = [Patch(corners, body.uvs, body.slots)]
     for x, y, rx, ry, slot in keys:
         outline = shapes.circle(1.0, 10) * np.array([rx, ry])
@@ -159,7 +159,7 @@ def _remote_keys(
     """Centre, half axes [m] and slot of every key."""
     columns = 3 if slim or rng.chance(0.6) else 4
     pitch_y = 0.84 * width / columns
-    rows = int(rng.between(6, 8)) if slim else int(rng.between(10, 14))
+    rows = rng.whole(6, 8, "rows") if slim else rng.whole(10, 14, "rows")
     pitch_x = 0.86 * length / rows
     ring_row = int(rng.between(2, rows - 2))
     size = min(0.38 * pitch_x, 0.4 * pitch_y) * rng.between(0.85, 1.0)
@@ -185,9 +185,9 @@ def _remote_keys(
 def mouse(seed: int) -> Solid:
     """A computer mouse, its keys towards +X. Slots: shell, seams, wheel."""
     rng = variant_rng("mouse", seed)
-    length, width = rng.between(0.096, 0.124), rng.between(0.056, 0.068)
-    height, flat = rng.between(0.03, 0.041), rng.choose((0.55, 0.7, 0.85))
-    peak, waist = rng.between(-0.25, 0.1), rng.between(0.0, 0.12)
+    length, width = rng.between(0.096, 0.124, "length_m"), rng.between(0.056, 0.068, "width_m")
+    height, flat = rng.between(0.03, 0.041, "height_m"), rng.choose((0.55, 0.7, 0.85), "flat")
+    peak, waist = rng.between(-0.25, 0.1), rng.between(0.0, 0.12, "waist_m")
 
     def shape(d: Array) -> Array:
         x = np.sign(d[..., 0]) * np.abs(d[..., 0]) ** flat
@@ -239,17 +239,23 @@ def keyboard(seed: int) -> Solid:
     """A computer keyboard; its user sits at +X. Slots: case, keys, others."""
     rng = variant_rng("keyboard", seed)
     layout = _Layout(15, rng.choose((5, 6, 6)), rng.chance(0.5))
-    pitch = rng.between(0.0182, 0.0192)
+    pitch = rng.between(0.0182, 0.0192, "pitch_m")
     columns = layout.columns + (4.4 if layout.digits else 0.0)
-    margin, flat = rng.between(0.004, 0.012), rng.chance(0.45)
+    margin, flat = rng.between(0.004, 0.012), rng.chance(0.45, "flat")
     width, depth = columns * pitch + 2 * margin, layout.rows * pitch + 2 * margin
-    thick = rng.between(0.005, 0.008) if flat else rng.between(0.014, 0.022)
-    case = shapes.extrude(
-        rounded_rectangle(depth, width, rng.choose((0.003, 0.007, 0.012))), thick, 0.0015
+    thick = (
+        rng.between(0.005, 0.008, "thickness_m")
+        if flat
+        else rng.between(0.014, 0.022, "thickness_m")
     )
-    caps = _key_caps(layout, pitch, 0.0022 if flat else rng.between(0.006, 0.009), rng)
+    case = shapes.extrude(
+        rounded_rectangle(depth, width, rng.choose((0.003, 0.007, 0.012), "radius_m")),
+        thick,
+        0.0015,
+    )
+    caps = _key_caps(layout, pitch, 0.0022 if flat else rng.between(0.006, 0.009, "height_m"), rng)
     keys = caps.moved(-0.5 * depth + margin, -0.5 * width + margin, thick - 0.0008)
-    slope = rng.between(0.0, 0.09)
+    slope = rng.between(0.0, 0.09, "slope")
     patches = [patch.rotated("y", slope) for patch in (case, keys)]
     dark = rng.chance(0.65)
     codes = _GREYS if dark else ("#e6e6e4", "#d9dadb", "#c9ccd0")
@@ -267,7 +273,7 @@ def keyboard(seed: int) -> Solid:
 
 def _key_caps(layout: _Layout, pitch: float, height: float, rng: VariantRng) -> Patch:
     """Tapered caps from the far left corner, rows along +X, columns along +Y."""
-    taper, gap = rng.between(0.82, 0.94), rng.between(0.0012, 0.0022)
+    taper, gap = rng.between(0.82, 0.94, "taper"), rng.between(0.0012, 0.0022, "gap_m")
     made, letter = [], 0
     for row in range(layout.rows):
         y = 0.0

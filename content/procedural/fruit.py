@@ -139,7 +139,8 @@ def carrot(seed: int) -> Solid:
 
 def fruit_kind(group: str, seed: int) -> str:
     """Key in ``fruits.yaml`` of a variant of a group."""
-    return in_turn([name for name in STYLES if name.startswith(f"{group}/")], seed)
+    kinds = [name.partition("/")[2] for name in STYLES if name.startswith(f"{group}/")]
+    return f"{group}/{variant_rng(group, seed).turn(kinds, 'kind')}"
 
 
 def apple_facts(seed: int) -> Facts:
@@ -187,7 +188,8 @@ def _round_fruit(group: str, seed: int) -> Solid:
 
 def _draw_shape(style: FruitStyle, rng: VariantRng) -> tuple[Callable[[Array], Array], float]:
     """Mapping of directions to points [m], and the height of the stalk's foot [m]."""
-    radius, slim = rng.between(*style.radius_m), rng.between(*style.slim)
+    radius = rng.between(*style.radius_m, "radius_m")
+    slim = rng.between(*style.slim, "slim")
     top, low = rng.between(*style.dent_top), rng.between(*style.dent_low)
     taper = rng.between(*style.taper)
     tips = rng.between(*style.tip_top), rng.between(*style.tip_low)
@@ -252,7 +254,7 @@ def _button(top: float, _: float, rng: VariantRng) -> Stalk:
 
 def _calyx(top: float, radius: float, rng: VariantRng) -> Stalk:
     """Five to seven narrow sepals and a short stalk."""
-    count, size = rng.choose((5, 6, 7)), radius * rng.between(0.55, 0.8)
+    count, size = rng.choose((5, 6, 7), "count"), radius * rng.between(0.55, 0.8)
     blades = [_twig(top, 0.6 * radius, rng)[0]]
     for i in range(count):
         blade = _blade(size, 0.16, 0.1, -rng.between(0.0, 0.35))
@@ -303,7 +305,7 @@ def _blade(length: float, width: float, thick: float, droop: float) -> Patch:
 def pear(seed: int) -> Solid:
     """A pear standing upright. Slots: skin, stalk."""
     rng = variant_rng("pear", seed)
-    radius, height = rng.between(0.028, 0.037), rng.between(0.078, 0.108)
+    radius, height = rng.between(0.028, 0.037, "radius_m"), rng.between(0.078, 0.108, "height_m")
     neck, lean = rng.between(0.36, 0.6), rng.between(-0.009, 0.009)
     lumps = _lumps(4, 0.05, rng)
 
@@ -320,7 +322,9 @@ def pear(seed: int) -> Solid:
 
     skin = printed_material(f"texture/pear_skin?seed={seed}", rng.between(0.35, 0.5))
     body = shapes.ball(shape, 24, 28)
-    stalk = _stalk((lean, 0.0, 0.5 * height - 0.002), rng.between(0.014, 0.022), 0.0014, rng)
+    stalk = _stalk(
+        (lean, 0.0, 0.5 * height - 0.002), rng.between(0.014, 0.022, "length_m"), 0.0014, rng
+    )
     points = body.corners_m.reshape(-1, 3)
     lower, upper = points[points[:, 2] < 0.12 * height], points[points[:, 2] > 0.02 * height]
     parts = [*map(hulls.extreme, (lower, upper)), hulls.extreme(stalk.corners_m, 16)]
@@ -331,13 +335,13 @@ def banana(seed: int) -> Solid:
     """A banana on its side, or a hand of up to seven resting on its tips. Slots: peels, crown."""
     rng = variant_rng("banana", seed)
     count = banana_count(seed)
-    length, thick = rng.between(0.15, 0.205), rng.between(0.0165, 0.02)
+    length, thick = rng.between(0.15, 0.205, "length_m"), rng.between(0.0165, 0.02, "radius_m")
     ripe = round(rng.between(0.0, 1.0), 2)
     peels = [
         printed_material(f"texture/banana_peel?ripe={ripe}&seed={seed + k}", rng.between(0.4, 0.55))
         for k in (0, 1000)
     ]
-    bend = rng.between(0.7, 1.35)
+    bend = rng.between(0.7, 1.35, "bend_rad")
     if count == 1:
         skin, parts = _banana(length, thick, bend, 5)
         return make_centred_solid([skin], (peels[0],), parts)

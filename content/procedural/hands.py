@@ -63,8 +63,8 @@ def hand(seed: int, pose: str = "any", radii_mm: Sequence[float] = (0.0,) * 4) -
     """
     pose, rng = hand_pose(seed, pose), variant_rng("hand", seed)
     # Beside what is held the hand has the size of the table, so that it fits.
-    stout = rng.between(0.9, 1.04)
-    size = 1.0 if pose == GRASP else rng.between(0.9, 1.06)
+    stout = rng.between(0.9, 1.04, "stout")
+    size = 1.0 if pose == GRASP else rng.between(0.9, 1.06, "size_scale")
     held = draw_radii(seed, radii_mm) if pose == GRASP else ()
     shown = "flat" if pose == OPEN else pose
     bones = hand_shape.grasp_bones(held, _lift_deg(seed)) if held else hand_shape.pose_bones(shown)

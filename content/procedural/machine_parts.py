@@ -43,7 +43,7 @@ def hex_bolt(seed: int) -> Solid:
     """A hexagon bolt standing on its head. Slot: body."""
     rng = variant_rng("hex_bolt", seed)
     d, flats, head, _, pitch = (0.001 * v for v in in_turn(_SIZES["hexagons"], seed))
-    length = d * rng.choose((2.0, 3.0, 4.0, 5.0))
+    length = d * rng.choose((2.0, 3.0, 4.0, 5.0), "length_by_diameter")
     threaded = min(length - d, max(2 * d, 0.55 * length))
     corner = flats / math.sqrt(3)
     end = head + length
@@ -89,7 +89,9 @@ def washer(seed: int) -> Solid:
 def stepped_shaft(seed: int) -> Solid:
     """A turned shaft of several diameters, lying along X. Slot: body."""
     rng = variant_rng("stepped_shaft", seed)
-    radii = [rng.between(*bounds) for bounds in _SIZES["shaft_radii"]][: rng.choose((3, 4, 5))]
+    radii = [rng.between(*bounds) for bounds in _SIZES["shaft_radii"]][
+        : rng.choose((3, 4, 5), "steps")
+    ]
     chamfer, z = 0.0008, 0.0
     profile: list[Point2] = [(0.0, 0.0)]
     parts = []
@@ -108,7 +110,7 @@ def stepped_shaft(seed: int) -> Solid:
 def pipe_elbow(seed: int) -> Solid:
     """A 90 degree pipe elbow with collars, flat on the ground. Slot: body."""
     rng = variant_rng("pipe_elbow", seed)
-    outer = rng.between(0.01, 0.018)
+    outer = rng.between(0.01, 0.018, "outer_m")
     inner, bend = 0.78 * outer, outer * rng.between(1.5, 2.4)
     straight, collar = 0.8 * outer, outer * 1.22
     turn = np.linspace(0.0, 0.5 * math.pi, 13)
@@ -143,7 +145,7 @@ def bracket(seed: int) -> Solid:
     """An angle bracket with screw holes. Slot: body."""
     rng = variant_rng("bracket", seed)
     a, b = rng.between(0.04, 0.07), rng.between(0.03, 0.06)
-    width, thick = rng.between(0.02, 0.035), rng.between(0.002, 0.004)
+    width, thick = rng.between(0.02, 0.035, "width_m"), rng.between(0.002, 0.004, "thickness_m")
     hole = min(0.16 * width, 0.004)
     foot = _holed_plate(a, width, thick, hole)
     upright = _holed_plate(b, width, thick, hole).rotated("y", -0.5 * math.pi).moved(thick)
@@ -192,8 +194,11 @@ class _Gear:
 
 
 def _draw_gear(rng: VariantRng) -> _Gear:
-    teeth, module = rng.choose((14, 16, 18, 20, 24)), rng.choose((0.0015, 0.002, 0.0025))
-    thick, pitch = rng.between(0.006, 0.014), 0.5 * teeth * module
+    teeth, module = (
+        rng.choose((14, 16, 18, 20, 24), "teeth"),
+        rng.choose((0.0015, 0.002, 0.0025), "module_m"),
+    )
+    thick, pitch = rng.between(0.006, 0.014, "thickness_m"), 0.5 * teeth * module
     bore = rng.between(0.25, 0.35) * pitch
     hub = thick + rng.between(0.004, 0.01) if rng.chance(0.6) else 0.0
     return _Gear(teeth, module, thick, bore, hub)
@@ -228,7 +233,7 @@ def flange_symmetries(seed: int) -> tuple[Symmetry, ...]:
 
 def _draw_flange(rng: VariantRng) -> tuple[float, float, int]:
     """Radius and thickness [m] of the disc, and the number of its bolt holes."""
-    radius, thick = rng.between(0.03, 0.045), rng.between(0.005, 0.009)
+    radius, thick = rng.between(0.03, 0.045, "radius_m"), rng.between(0.005, 0.009, "thickness_m")
     return radius, thick, rng.choose((4, 4, 6, 8))
 
 
@@ -265,9 +270,9 @@ def connector_symmetries(seed: int) -> tuple[Symmetry, ...]:
 
 def _draw_connector(rng: VariantRng) -> tuple[float, float, int]:
     """Side of the block and reach of the ports [m], and their number."""
-    side = rng.between(0.022, 0.034)
+    side = rng.between(0.022, 0.034, "side_m")
     reach = rng.between(0.2, 0.45) * side
-    return side, reach, rng.choose((3, 4, 5, 6))
+    return side, reach, rng.choose((3, 4, 5, 6), "ports")
 
 
 def _worn_metal(kind: str, rng: VariantRng) -> Material:

@@ -106,7 +106,7 @@ def _strand(length: float, height: float, rng: VariantRng) -> Patch:
 
 
 def _spaghetti(seed: int, radius: float, rng: VariantRng) -> list[Helping]:
-    wide, high = 0.82 * radius, rng.between(0.024, 0.034)
+    wide, high = 0.82 * radius, rng.between(0.024, 0.034, "height_m")
     pasta = plain_food(("#e6c878", "#dfbd68", "#ead08a"), 0.4, rng)
     strands = join_patches([_strand(wide, 0.94 * high, rng) for _ in range(52)])
     heap = mound(0.9 * wide, 0.86 * high, rng, rough=0.05)
@@ -139,7 +139,7 @@ def _grains(count: int, radius: float, high: float, rng: VariantRng) -> Patch:
 
 
 def _rice_and_curry(seed: int, radius: float, rng: VariantRng) -> list[Helping]:
-    wide, high = 0.52 * radius, rng.between(0.024, 0.032)
+    wide, high = 0.52 * radius, rng.between(0.024, 0.032, "height_m")
     white = plain_food(("#f2eee2", "#efe6cf", "#f0d990"), 0.55, rng)
     rice = join_patches([mound(wide, high, rng, rough=0.03), _grains(190, wide, high, rng)])
     stew = mound(0.62 * radius, 0.4 * high, rng, rough=0.12, flat=0.5).moved(0.34 * radius)
@@ -161,7 +161,7 @@ def _rice_and_curry(seed: int, radius: float, rng: VariantRng) -> list[Helping]:
 
 
 def _salad(_: int, radius: float, rng: VariantRng) -> list[Helping]:
-    wide, high = 0.8 * radius, rng.between(0.03, 0.042)
+    wide, high = 0.8 * radius, rng.between(0.03, 0.042, "height_m")
     made: list[Helping] = [
         (
             mound(0.85 * wide, 0.6 * high, rng, rough=0.14),
@@ -286,7 +286,7 @@ def _roast(seed: int, radius: float, rng: VariantRng) -> list[Helping]:
         golden = food_material("toast", seed, 0.45, 0.06)
     made.append((join_patches(chips), golden))
     ball = shapes.ball(lambda d: 0.0045 * d, 5, 7)
-    coins = rng.chance(0.4)
+    coins = rng.chance(0.4, "coins")
     side = [
         (puck(0.0095, 0.005, rng) if coins else ball.moved(z=0.0045)).moved(
             -0.1 * radius + float(x), -0.48 * radius + float(y), 0.003 * (k % 3)
@@ -325,7 +325,7 @@ def _pancakes(seed: int, radius: float, rng: VariantRng) -> list[Helping]:
 
 def _toast(seed: int, radius: float, rng: VariantRng) -> list[Helping]:
     """Toast with jam, egg or avocado."""
-    size, thick = rng.between(0.09, 0.105), rng.between(0.011, 0.014)
+    size, thick = rng.between(0.09, 0.105, "size_m"), rng.between(0.011, 0.014, "thickness_m")
     body = shapes.rounded_box((size, 0.96 * size, thick), 0.0035, 2).moved(z=0.5 * thick)
     made = [(body, food_material("toast", seed, 0.8, 0.13))]
     layer = mound(0.44 * size, 0.0035, rng, rough=0.07, flat=0.3).moved(z=thick - 0.0004)

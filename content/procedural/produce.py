@@ -26,7 +26,10 @@ def grapes(seed: int) -> Solid:
     """
     rng = variant_rng("grapes", seed)
     count = grape_count(seed)
-    thick, slim = rng.between(0.0075, 0.0115), rng.choose((1.0, 1.05, 1.15, 1.35))
+    thick, slim = (
+        rng.between(0.0075, 0.0115, "berry_radius_m"),
+        rng.choose((1.0, 1.05, 1.15, 1.35), "slim"),
+    )
     places = _packed(count, thick, rng)
     berry = shapes.ball(lambda d: thick * d * np.array([1.0, 1.0, slim]), 7, 10)
     groups: tuple[list[Patch], ...] = ([], [], [])
@@ -125,8 +128,10 @@ def broccoli(seed: int) -> Solid:
     """
     rng = variant_rng("broccoli", seed)
     is_head = broccoli_kind(seed) == "head"
-    radius = rng.between(0.045, 0.07) if is_head else rng.between(0.02, 0.034)
-    count = rng.choose((22, 26, 30)) if is_head else rng.choose((7, 9, 11))
+    radius = (
+        rng.between(0.045, 0.07, "radius_m") if is_head else rng.between(0.02, 0.034, "radius_m")
+    )
+    count = rng.choose((22, 26, 30), "count") if is_head else rng.choose((7, 9, 11), "count")
     high = radius * rng.between(0.75, 0.95)
     rise = radius * rng.between(0.9, 1.2)
     florets, arms = [], []
@@ -215,7 +220,7 @@ def mushroom(seed: int) -> Solid:
     Caps are 30 mm to 65 mm wide (UNECE FFV-24: from 15 mm; above, assumed).
     """
     rng = variant_rng("mushroom", seed)
-    radius = rng.between(0.015, 0.032)
+    radius = rng.between(0.015, 0.032, "radius_m")
     high, stem = radius * rng.between(0.8, 1.15), radius * rng.between(0.5, 0.9)
     foot = radius * rng.between(0.34, 0.46)
     veil = radius * rng.between(0.2, 0.45)
@@ -254,7 +259,7 @@ def mushroom(seed: int) -> Solid:
         warped.append(Patch(corners, patch.uvs, patch.slots))
     tone = food_material("mushroom", seed, 0.6, 0.06)
     pale = plain_food(("#efe6d6", "#e6dac4"), 0.7, rng)
-    lean = rng.between(0.0, 0.06)
+    lean = rng.between(0.0, 0.06, "lean_rad")
     parts = [wrap(warped[0].corners_m), wrap(patches[2].corners_m, 24)]
     if seed % 2:
         # Picked ones lie on their side as often as they stand.

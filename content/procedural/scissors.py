@@ -23,8 +23,8 @@ def scissors(seed: int) -> Solid:
     # Nail to tailor's scissors: 110 to 240 mm (assumed, within 10 %).
     size = rng.choose((0.55, 0.75, 0.9, 1.0, 1.0, 1.15)) * rng.between(0.95, 1.05)
     spread = rng.choose((0.0, 0.0, 0.05, 0.25, 0.45)) * rng.between(0.7, 1.2)
-    blade = _blade(size * rng.between(0.92, 1.1), rng.between(0.85, 1.2), rng)
-    all_metal = rng.chance(0.2)
+    blade = _blade(size * rng.between(0.92, 1.1), rng.between(0.85, 1.2, "width_scale"), rng)
+    all_metal = rng.chance(0.2, "all_metal")
     patches, parts = [], []
     for side in (1.0, -1.0):
         # Loops of thumb and fingers differ.
@@ -43,7 +43,7 @@ def scissors(seed: int) -> Solid:
 
 def _blade(size: float, width: float, rng: VariantRng) -> Patch:
     """The upper half's blade and shank, from the loop at -X to the tip at +X."""
-    tip = rng.choose((0.0, 0.001, 0.003))
+    tip = rng.choose((0.0, 0.001, 0.003), "tip_m")
     w = 0.0075 * width
     edge = [(-0.045, -0.0075), (-0.02, -0.006), (0.0, -0.8 * w), (0.05, -0.0025), (0.098, -0.0005)]
     spine = [(0.1, tip), (0.075, 0.65 * w), (0.03, 1.1 * w), (0.0, w), (-0.02, 0.0015),

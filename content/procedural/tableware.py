@@ -378,7 +378,7 @@ def _straw(choice: Choice, walls: Walls, rng: VariantRng) -> Part:
 def _saucer(_: Choice, walls: Walls, rng: VariantRng) -> Part:
     """A saucer whose well holds the foot; the cup keeps its place, the saucer is below."""
     foot, wide = walls.outer[0][0], walls.outer[-1][0]
-    radius, rise = wide * rng.between(1.55, 1.8), rng.between(0.0105, 0.013)
+    radius, rise = wide * rng.between(1.55, 1.8), rng.between(0.0105, 0.013, "rise_m")
     low = -0.003
     profile = [(0.0, low - 0.002), (0.8 * foot, low - 0.002), (0.82 * foot, low - 0.004),
                (foot, low - 0.004), (1.3 * foot, low - 0.001), (radius, low + rise - 0.002),
@@ -407,7 +407,7 @@ def plate(seed: int) -> Solid:
     if meal:
         sizes = (0.105, 0.11) if meal in SMALL else (0.13, 0.14, 0.135, 0.155)
     radius = in_turn(sizes, seed) * rng.between(0.96, 1.04)
-    rise, wall = rng.between(0.016, 0.026), rng.between(0.0035, 0.005)
+    rise, wall = rng.between(0.016, 0.026, "rise_m"), rng.between(0.0035, 0.005, "wall_m")
     well, foot = radius * rng.between(0.58, 0.86), radius * rng.between(0.48, 0.56)
     step = rise * rng.between(0.35, 0.7)
     bend, floor = well + 0.35 * (radius - well), 0.002 + wall

@@ -68,17 +68,22 @@ class _Screwdriver:
 
 
 def _draw_screwdriver(rng: VariantRng) -> _Screwdriver:
-    radius, grip = rng.between(0.011, 0.016), rng.between(0.085, 0.115)
-    blade, shaft = rng.between(0.06, 0.15), rng.between(0.0025, 0.0038)
+    radius, grip = rng.between(0.011, 0.016, "radius_m"), rng.between(0.085, 0.115, "grip_m")
+    blade, shaft = rng.between(0.06, 0.15, "blade_m"), rng.between(0.0025, 0.0038, "shaft_m")
     return _Screwdriver(
-        radius, grip, blade, shaft, flutes=rng.choose((0, 6, 6, 8)), flat=rng.chance(0.5)
+        radius,
+        grip,
+        blade,
+        shaft,
+        flutes=rng.choose((0, 6, 6, 8), "flutes"),
+        flat=rng.chance(0.5, "flat"),
     )
 
 
 def hammer(seed: int) -> Solid:
     """A joiner's hammer with wooden or plastic handle. Slots: handle, head."""
     rng = variant_rng("hammer", seed)
-    length, size = rng.between(0.26, 0.33), rng.between(0.9, 1.1)
+    length, size = rng.between(0.26, 0.33, "length_m"), rng.between(0.9, 1.1, "size_scale")
     handle = _hammer_handle(length)
     head, head_hulls = _hammer_head()
     wood = Material(presets.draw_linear(presets.WOODS[:4], 0.1, rng), 0.55)
@@ -95,7 +100,7 @@ def hammer(seed: int) -> Solid:
 def wrench(seed: int) -> Solid:
     """A combination wrench: open jaw at +X, ring at -X. Slot: steel."""
     rng = variant_rng("wrench", seed)
-    across = rng.choose((0.010, 0.012, 0.013, 0.015, 0.017, 0.019))
+    across = rng.choose((0.010, 0.012, 0.013, 0.015, 0.017, 0.019), "across_flats_m")
     length = across * rng.between(10.5, 12.5)
     thick, bar = 0.33 * across + 0.0012, 0.36 * across + 0.0015
     head, ring = 1.12 * across, 0.8 * across

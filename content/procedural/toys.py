@@ -70,7 +70,7 @@ def ball_kind(seed: int) -> str:
 def candle(seed: int) -> Solid:
     """A pillar candle with a wick. Slots: wax, wick."""
     rng = variant_rng("candle", seed)
-    radius, height = rng.between(0.022, 0.04), rng.between(0.05, 0.15)
+    radius, height = rng.between(0.022, 0.04, "radius_m"), rng.between(0.05, 0.15, "height_m")
     rim = [(radius, height), (0.75 * radius, height - 0.003), (0.0, height - 0.006)]
     wax = fillet([(0.0, 0.0), (radius, 0.0), *rim], [0.0, 0.002, 0.003, 0.004, 0.0], 3)
     thread = ((0.0, -0.008), (0.001, -0.008), (0.001, 0.007), (0.0, 0.0075))

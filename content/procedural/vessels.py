@@ -17,7 +17,7 @@ from gen_data.config.data_files import load_table
 from gen_data.content.procedural import collision_hulls as hulls
 from gen_data.content.procedural import surface_shapes as shapes
 from gen_data.content.procedural.patches import Array, Patch, unit
-from gen_data.core.variant_rng import VariantRng, in_turn, variant_rng
+from gen_data.core.variant_rng import VariantRng, variant_rng
 
 Point2 = shapes.Point2
 SEGMENTS = 48
@@ -100,29 +100,32 @@ STYLES = load_table(__package__, "vessels", VesselStyle)
 def choose(group: str, seed: int) -> Choice:
     """Draw the kind and the parts of a variant of a group: ``mug``, ``cup``, ``bowl`` ..."""
     rng = variant_rng(f"{group}/choice", seed)
-    kinds = [name for name in STYLES if name.startswith(f"{group}/")]
-    kind = in_turn(kinds, seed)
+    kinds = [name.partition("/")[2] for name in STYLES if name.startswith(f"{group}/")]
+    kind = f"{group}/{rng.turn(kinds, 'kind')}"
     style = STYLES[kind]
-    finish, decor = rng.choose(style.finishes), rng.choose(style.decors)
-    lid = rng.chance(style.lid)
+    finish, decor = rng.choose(style.finishes, "finish"), rng.choose(style.decors)
+    lid = rng.chance(style.lid, "lid")
     return Choice(
         kind,
-        handle=rng.choose(style.handles),
+        handle=rng.choose(style.handles, "handle"),
         finish=finish,
         decor="plain" if finish in (*_PLAIN_FINISHES, "wood") else decor,
-        content=rng.choose(style.contents),
-        facets=rng.choose(style.facets),
+        content=rng.choose(style.contents, "content"),
+        facets=rng.choose(style.facets, "facets"),
         lid=lid,
-        sleeve=rng.chance(style.sleeve),
-        straw=rng.chance(style.straw),
-        saucer=rng.chance(style.saucer),
+        sleeve=rng.chance(style.sleeve, "sleeve"),
+        straw=rng.chance(style.straw, "straw"),
+        saucer=rng.chance(style.saucer, "saucer"),
     )
 
 
 def draw_walls(style: VesselStyle, rng: VariantRng) -> Walls:
     """Draw the measures of a vessel that stands on z = 0."""
-    height, radius = rng.between(*style.height_m), rng.between(*style.radius_m)
-    wall, floor = rng.between(*style.wall_m), rng.between(*style.floor_m)
+    height, radius = (
+        rng.between(*style.height_m, "height_m"),
+        rng.between(*style.radius_m, "radius_m"),
+    )
+    wall, floor = rng.between(*style.wall_m, "wall_m"), rng.between(*style.floor_m)
     knots = [(r * radius, z * height) for r, z in style.outline]
     foot, arc = knots[0][0], style.corner * radius
     lift = 0.0015 if style.floor_share == 0.0 else 0.0006

@@ -50,7 +50,7 @@ def _guard_rail(seed: int) -> Solid:
 def _jersey(seed: int) -> Solid:
     """A concrete safety shape, 2 m long: foot 0.6 m, 0.8-0.9 m high."""
     rng = variant_rng("barrier/jersey", seed)
-    half, h = 1.0, rng.between(0.8, 0.9)
+    half, h = 1.0, rng.between(0.8, 0.9, "height_m")
     flank = [(0.0, 0.3), (0.08, 0.3), (0.33, 0.17), (h, 0.09)]
     section = np.array([*((z, -y) for z, y in flank), *flank[::-1]])
     prism = extrude(section, 2 * half, 0.008).rotated("y", -0.5 * np.pi)
@@ -66,7 +66,7 @@ def _jersey(seed: int) -> Solid:
 def _construction(seed: int) -> Solid:
     """A work-site barrier: a red and white board on two feet, lamps on some."""
     rng = variant_rng("barrier/construction", seed)
-    half, z, fields = 0.5 * rng.between(1.2, 2.0), 0.85, 8
+    half, z, fields = 0.5 * rng.between(1.2, 2.0, "width_m"), 0.85, 8
     boards = []
     for low in ((z, z + 0.2), (0.25, 0.35))[: rng.choose((1, 2, 2))]:
         boards += _striped_board(half, low, fields)

@@ -30,7 +30,7 @@ from gen_data.content.scenery.clutter_shapes import (
     worn_steel,
 )
 from gen_data.core.asset_types import Material
-from gen_data.core.variant_rng import VariantRng, in_turn, variant_rng
+from gen_data.core.variant_rng import VariantRng, variant_rng
 
 PRAMS = ("carrycot", "buggy", "carrycot", "buggy")
 SUITCASES = ("hard", "soft", "duffel", "hard", "backpack")
@@ -42,9 +42,10 @@ def pram(seed: int) -> Solid:
 
     Slots: frame, fabric, tyre, trim.
     """
-    kind, rng = in_turn(PRAMS, seed), variant_rng("pram", seed)
+    rng = variant_rng("pram", seed)
+    kind = rng.turn(PRAMS, "kind")
     r, wide = (0.14, 0.27) if kind == "carrycot" else (0.1, 0.23)
-    front, rear, grip = 0.36, -0.34, rng.between(0.98, 1.06)
+    front, rear, grip = 0.36, -0.34, rng.between(0.98, 1.06, "grip_scale")
     parts: list[Patch] = []
     for y in (-wide, wide):
         for x, size in ((front, 0.8 * r), (rear, r)):
@@ -85,7 +86,7 @@ def pram(seed: int) -> Solid:
 
 def pram_facts(seed: int) -> Facts:
     """Its kind."""
-    return Facts("pram", {"kind": in_turn(PRAMS, seed)})
+    return Facts("pram", {"kind": variant_rng("pram", seed).turn(PRAMS, "kind")})
 
 
 def _wheel(radius: float) -> list[Patch]:
@@ -115,7 +116,8 @@ def suitcase(seed: int) -> Solid:
 
     Slots: shell, trim, wheels, second fabric.
     """
-    kind, rng = in_turn(SUITCASES, seed), variant_rng("suitcase", seed)
+    rng = variant_rng("suitcase", seed)
+    kind = rng.turn(SUITCASES, "kind")
     if kind in {"hard", "soft"}:
         parts, high = _trolley(kind == "hard", rng)
     elif kind == "duffel":
@@ -136,7 +138,7 @@ def suitcase(seed: int) -> Solid:
 
 def suitcase_facts(seed: int) -> Facts:
     """Its kind."""
-    return Facts("suitcase", {"kind": in_turn(SUITCASES, seed)})
+    return Facts("suitcase", {"kind": variant_rng("suitcase", seed).turn(SUITCASES, "kind")})
 
 
 def _trolley(hard: bool, rng: VariantRng) -> tuple[list[Patch], float]:
@@ -178,7 +180,7 @@ def _trolley(hard: bool, rng: VariantRng) -> tuple[list[Patch], float]:
 
 def _holdall(rng: VariantRng) -> tuple[list[Patch], float]:
     """A soft round bag along Y with two handles and bands."""
-    half, r = rng.between(0.25, 0.33), rng.between(0.14, 0.17)
+    half, r = 0.5 * rng.between(0.5, 0.66, "width_m"), rng.between(0.14, 0.17, "radius_m")
     profile = [(0.0, -half), (0.8 * r, -half), (r, -0.85 * half), (r, 0.85 * half), (0.8 * r, half),
                (0.0, half)]  # fmt: skip
     body = lathe(profile, 16).rotated("x", 0.5 * math.pi).scaled(1.0, 1.0, 0.9).moved(z=0.9 * r)
@@ -195,7 +197,7 @@ def _holdall(rng: VariantRng) -> tuple[list[Patch], float]:
 
 def _backpack(rng: VariantRng) -> tuple[list[Patch], float]:
     """A backpack with a lid, pockets and shoulder straps behind."""
-    high, wide, deep = rng.between(0.48, 0.6), 0.32, 0.2
+    high, wide, deep = rng.between(0.48, 0.6, "height_m"), 0.32, 0.2
     foot, neck = (
         Rectangle.about(0, 0, deep, wide),
         Rectangle.about(-0.02, 0, 0.75 * deep, 0.86 * wide),
@@ -221,7 +223,7 @@ def shopping_bags(seed: int) -> Solid:
     Slots: first and second paper, print, cords, goods.
     """
     rng = variant_rng("shopping_bags", seed)
-    count = (1, 2, 3, 4)[seed % 4]
+    count = rng.turn((1, 2, 3, 4), "count")
     parts, at = [], 0.0
     for k in range(count):
         d, w, h = rng.between(0.1, 0.17), rng.between(0.2, 0.36), rng.between(0.26, 0.44)

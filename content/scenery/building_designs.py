@@ -141,20 +141,20 @@ def _draw_fields(recipe: Mapping[str, Any], rng: VariantRng) -> dict[str, Any]:
         if name == "variants":
             values |= _draw_fields(item["yes" if rng.chance(item["chance"]) else "no"], rng)
         else:
-            values[name] = _draw_value(item, rng)
+            values[name] = _draw_value(item, rng, name)
     return values
 
 
-def _draw_value(item: Any, rng: VariantRng) -> Any:
+def _draw_value(item: Any, rng: VariantRng, name: str = "") -> Any:
     if isinstance(item, list):
         return tuple(_draw_value(part, rng) for part in item)
     if not isinstance(item, dict):
         return item
     if "choose" in item:
-        return rng.choose(item["choose"])
+        return rng.choose(item["choose"], name)
     if "chance" in item:
-        return rng.chance(item["chance"])
-    value = rng.between(*item["uniform"])
+        return rng.chance(item["chance"], name)
+    value = rng.between(*item["uniform"], name)
     return round(value, item["digits"]) if "digits" in item else value
 
 

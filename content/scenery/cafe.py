@@ -32,7 +32,7 @@ from gen_data.content.scenery.clutter_shapes import (
     worn_steel,
 )
 from gen_data.core.asset_types import Material
-from gen_data.core.variant_rng import VariantRng, in_turn, variant_rng
+from gen_data.core.variant_rng import VariantRng, variant_rng
 
 CHAIRS = ("slats", "woven", "shell", "slats", "woven")
 _CLOTHS = ("#e9e2d0", "#b3261e", "#22406f", "#2f5f3a", "#d9a520", "#5a5d60", "#f2f0ea", "#7a2f3f",
@@ -48,9 +48,12 @@ def cafe_set(seed: int) -> Solid:
     Slots: frame, seats, table top, crockery, canvas, stripes.
     """
     rng = variant_rng("cafe_set", seed)
-    kind, count = in_turn(CHAIRS, seed), (2, 4, 3, 2, 4, 2)[seed % 6]
-    half, high = (0.3 if count == 2 else rng.between(0.34, 0.42)), rng.between(0.71, 0.75)
-    round_top = rng.chance(0.55)
+    kind, count = rng.turn(CHAIRS, "chairs"), rng.turn((2, 4, 3, 2, 4, 2), "count")
+    half, high = (
+        (0.3 if count == 2 else 0.5 * rng.between(0.68, 0.84, "width_m")),
+        rng.between(0.71, 0.75, "table_m"),
+    )
+    round_top = rng.chance(0.55, "round_top")
     parts = _table(half, high, round_top)
     first = rng.choose((0.0, 0.5)) * math.pi
     for k in range(count):
@@ -61,8 +64,12 @@ def cafe_set(seed: int) -> Solid:
         placed = one.rotated("z", math.pi + rng.between(-0.3, 0.3)).moved(away + 0.2)
         parts.append(placed.rotated("z", turn))
     parts += _crockery(high, half, count, rng)
-    if seed % 3 == 2:
-        parts += _canopy(rng.between(1.15, 1.5), 4 if rng.chance(0.5) else 8, rng.chance(0.3))
+    if _has_parasol(seed):
+        parts += _canopy(
+            0.5 * rng.between(2.3, 3.0, "parasol_m"),
+            4 if rng.chance(0.5) else 8,
+            rng.chance(0.3, "striped"),
+        )
         parts.append(post(0.02, (high, 2.5)))
     low, top = join_patches(parts).bounds_m()
     # The middle of the group, not the table, is the origin.
@@ -87,8 +94,15 @@ def cafe_set_facts(seed: int) -> Facts:
     """Kind of its chairs, and whether it has a parasol."""
     return Facts(
         "cafe_set",
-        {"chairs": in_turn(CHAIRS, seed), "parasol": "yes" if seed % 3 == 2 else "no"},
+        {
+            "chairs": variant_rng("cafe_set", seed).turn(CHAIRS, "chairs"),
+            "parasol": "yes" if _has_parasol(seed) else "no",
+        },
     )
+
+
+def _has_parasol(seed: int) -> bool:
+    return variant_rng("cafe_set", seed).turn((False, False, True), "parasol")
 
 
 def _table(half: float, high: float, round_top: bool) -> list[Patch]:
@@ -123,7 +137,7 @@ def parasol(seed: int) -> Solid:
     Slots: steel, pole, base, -, canvas, stripes.
     """
     rng = variant_rng("parasol", seed)
-    furled, half = seed % 4 == 3, rng.between(1.25, 2.0)
+    furled, half = _is_furled(seed), 0.5 * rng.between(2.5, 4.0, "width_m")
     parts = [block((-0.35, -0.35, 0.0), (0.35, 0.35, 0.08), 0.015, 2)]
     parts.append(post(0.028, (0.08, 2.75)).painted(1))
     if furled:
@@ -136,7 +150,7 @@ def parasol(seed: int) -> Solid:
             rows.append(ring)
         parts.append(grid(np.stack(rows), slot=_SLOT_CANVAS))
     else:
-        parts += _canopy(half, 4 if seed % 2 else 8, rng.chance(0.4))
+        parts += _canopy(half, 4 if seed % 2 else 8, rng.chance(0.4, "striped"))
     wood = patterned_material("texture/wood_grain?seed=2", 1.0, 0.6, (0.6, 0.45, 0.32))
     materials = (
         worn_steel(rng),
@@ -150,7 +164,11 @@ def parasol(seed: int) -> Solid:
 
 def parasol_facts(seed: int) -> Facts:
     """Whether it is open."""
-    return Facts("parasol", {"state": "furled" if seed % 4 == 3 else "open"})
+    return Facts("parasol", {"state": "furled" if _is_furled(seed) else "open"})
+
+
+def _is_furled(seed: int) -> bool:
+    return variant_rng("parasol", seed).turn((False, False, False, True), "furled")
 
 
 def _canopy(half: float, sides: int, striped: bool) -> list[Patch]:
@@ -196,14 +214,14 @@ def market_stall(seed: int) -> Solid:
     Slots: steel, wood, cloth of the table, crates, canvas, stripes, three kinds of produce.
     """
     rng = variant_rng("market_stall", seed)
-    half, deep, table = 0.5 * rng.between(2.4, 3.4), 1.0, 0.82
+    half, deep, table = 0.5 * rng.between(2.4, 3.4, "width_m"), 1.0, 0.82
     parts = []
     for x in (-deep, deep - 0.1):
         high = 2.5 if x < 0 else 2.15
         for y in (-half + 0.05, half - 0.05):
             parts.append(bar((x, y, 0.0), (x, y, high), 0.02, 5))
         parts.append(bar((x, -half, high), (x, half, high), 0.02, 5))
-    parts += _awning(half, deep, rng.chance(0.7))
+    parts += _awning(half, deep, rng.chance(0.7, "striped"))
     front = deep - 0.35
     parts.append(block((-0.35, -half + 0.1, table - 0.04), (front, half - 0.1, table), 0.0, 1))
     for y in np.linspace(-half + 0.3, half - 0.3, 3).tolist():

@@ -21,7 +21,7 @@ from gen_data.content.procedural.surface_shapes import ball, circle, spline, swe
 from gen_data.content.scenery.basic_shapes import make_solid
 from gen_data.core.asset_types import Material
 from gen_data.core.se3 import Vec3
-from gen_data.core.variant_rng import VariantRng, in_turn, variant_rng
+from gen_data.core.variant_rng import VariantRng, variant_rng
 
 POSES = ("standing", "walking", "sitting")
 _COAT, _MARKS, _NOSE, _COLLAR = range(4)
@@ -62,7 +62,7 @@ def dog(seed: int) -> Solid:
     """A dog; breeds and poses in turn. Slots: coat, markings, nose and eyes, collar."""
     name, pose = _kind(seed)
     breed, rng = _BREEDS[name], variant_rng("dog", seed)
-    size = rng.between(*breed.withers_m)
+    size = rng.between(*breed.withers_m, "withers_m")
     parts = _sit(breed) if pose == "sitting" else _stand(breed, pose == "walking", rng)
     body = join_patches(parts).scaled(size, size, size)
     low, high = body.bounds_m()
@@ -84,7 +84,8 @@ def dog_facts(seed: int) -> Facts:
 
 
 def _kind(seed: int) -> tuple[str, str]:
-    return in_turn(BREEDS, seed), in_turn(POSES, seed + seed // len(BREEDS))
+    rng = variant_rng("dog", seed)
+    return rng.turn(BREEDS, "breed"), rng.turn(POSES, "pose", seed + seed // len(BREEDS))
 
 
 def _limb(path: list[Vec3], radii: list[float], slot: int = _COAT, sides: int = 10) -> Patch:

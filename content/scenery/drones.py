@@ -20,7 +20,7 @@ PAINTS = ("#c9cbcd", "#2b2d30", "#e4e2dc", "#5a5f66")
 def airframe(seed: int) -> Solid:
     """A folding quadrotor of 0.3 to 0.45 m between opposite rotors (assumed)."""
     rng = variant_rng("drone", seed)
-    reach = 0.5 * rng.between(0.3, 0.45)
+    reach = 0.5 * rng.between(0.3, 0.45, "rotors_m")
     trunk = block((-0.11, -0.045, -0.03), (0.11, 0.045, 0.04), 0.012)
     parts = [trunk]
     for k in range(4):

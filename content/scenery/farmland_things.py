@@ -28,7 +28,7 @@ from gen_data.content.scenery.clutter_shapes import wire
 from gen_data.content.scenery.street_furniture import GALVANISED
 from gen_data.core.errors import AssetError
 from gen_data.core.se3 import Vec3
-from gen_data.core.variant_rng import in_turn, variant_rng
+from gen_data.core.variant_rng import variant_rng
 
 BALES = ("round", "round", "wrapped", "square", "stack", "wrapped")
 PYLONS = ("danube", "single", "barrel", "danube")
@@ -51,9 +51,10 @@ def straw_bale(seed: int) -> Solid:
 
     Slots: straw or film, ends or cords.
     """
-    kind, rng = in_turn(BALES, seed), variant_rng("straw_bale", seed)
+    rng = variant_rng("straw_bale", seed)
+    kind = rng.turn(BALES, "kind")
     if kind in ("round", "wrapped"):
-        radius, half = 0.5 * rng.between(1.2, 1.5), 0.5 * rng.between(1.15, 1.25)
+        radius, half = 0.5 * rng.between(1.2, 1.5), 0.5 * rng.between(1.15, 1.25, "width_m")
         edge = 0.12 if kind == "wrapped" else 0.04
         profile = [(0.0, -half), (radius - edge, -half), (radius, edge - half),
                    (radius, half - edge), (radius - edge, half), (0.0, half)]  # fmt: skip
@@ -87,7 +88,7 @@ def straw_bale(seed: int) -> Solid:
 
 def straw_bale_facts(seed: int) -> Facts:
     """Its kind."""
-    return Facts("straw_bale", {"kind": in_turn(BALES, seed)})
+    return Facts("straw_bale", {"kind": variant_rng("straw_bale", seed).turn(BALES, "kind")})
 
 
 def power_pylon(seed: int, span_m: float) -> Solid:
@@ -105,8 +106,9 @@ def power_pylon(seed: int, span_m: float) -> Solid:
     """
     if not 0.0 <= span_m <= SPAN_MAX_M:
         raise AssetError(f"power_pylon: span_m={span_m} is not between 0 and {SPAN_MAX_M:g}")
-    kind, rng = in_turn(PYLONS, seed), variant_rng("power_pylon", seed)
-    high, foot = rng.between(26.0, 34.0), rng.between(2.2, 3.0)
+    rng = variant_rng("power_pylon", seed)
+    kind = rng.turn(PYLONS, "kind")
+    high, foot = rng.between(26.0, 34.0, "height_m"), rng.between(2.2, 3.0, "foot_m")
     widths = _widths(high, foot)
     parts = list(_mast(widths))
     for x in (-foot, foot):
@@ -140,7 +142,7 @@ def power_pylon(seed: int, span_m: float) -> Solid:
 def power_pylon_facts(seed: int, span_m: float) -> Facts:
     """Its kind, whatever the span."""
     del span_m
-    return Facts("power_pylon", {"kind": in_turn(PYLONS, seed)})
+    return Facts("power_pylon", {"kind": variant_rng("power_pylon", seed).turn(PYLONS, "kind")})
 
 
 def _widths(high_m: float, foot_m: float) -> Array:

@@ -56,8 +56,8 @@ def garden_wall(seed: int, style: str) -> Solid:
     rng = variant_rng("garden_wall", seed)
     skin = _skin(kind, rng)
     railed = kind.endswith("railing")
-    high = rng.between(0.45, 0.7) if railed else rng.between(0.7, 1.5)
-    half, reach = rng.between(0.1, 0.15), 0.035
+    high = rng.between(0.45, 0.7, "height_m") if railed else rng.between(0.7, 1.5, "height_m")
+    half, reach = 0.5 * rng.between(0.2, 0.3, "thickness_m"), 0.035
     if kind == "gabion":
         half = 0.25
     parts = [block((-half, -HALF_M, 0.0), (half, HALF_M, high - 0.06))]
@@ -119,7 +119,7 @@ def _railing(foot: float, high: float, rng: VariantRng) -> list[Patch]:
         block((-0.015, -HALF_M, z), (0.015, HALF_M, z + 0.012), 0.0, 2)
         for z in (foot + 0.08, foot + high - 0.06)
     ]
-    pointed = rng.chance(0.6)
+    pointed = rng.chance(0.6, "pointed")
     for y in np.arange(-HALF_M + 0.06, HALF_M, 0.125):
         parts.append(bar((0.0, float(y), foot), (0.0, float(y), foot + high), 0.009, 4, 2))
         if pointed:
@@ -134,10 +134,10 @@ def _wood(rng: VariantRng, scale_m: float = 1.2) -> Material:
 
 def _pickets(rng: VariantRng) -> Made:
     """Upright pickets with pointed, round or flat tops on two rails."""
-    high, wide = rng.between(0.8, 1.2), rng.between(0.07, 0.1)
+    high, wide = rng.between(0.8, 1.2, "height_m"), rng.between(0.07, 0.1, "board_m")
     count = round(2.0 * HALF_M / (wide + rng.between(0.03, 0.07)))
     pitch, half = 2.0 * HALF_M / count, 0.5 * wide
-    kind = rng.choose(("point", "point", "round", "flat"))
+    kind = rng.choose(("point", "point", "round", "flat"), "kind")
     top = {"point": [(high, 0.0)], "flat": []}.get(
         kind, [(high - half * (1 - math.sin(t)), half * math.cos(t)) for t in (0.7, 1.57, 2.44)]
     )
@@ -154,7 +154,7 @@ def _pickets(rng: VariantRng) -> Made:
 
 def _panel(rng: VariantRng) -> Made:
     """A closed privacy screen between posts; boards upright or across, trellis on some."""
-    high, trellis = rng.between(1.5, 1.8), rng.chance(0.4)
+    high, trellis = rng.between(1.5, 1.8, "height_m"), rng.chance(0.4, "trellis")
     top = high - (0.32 if trellis else 0.0)
     boards = round((top - 0.06) / 0.14)
     pitch = (top - 0.06) / boards
@@ -182,8 +182,12 @@ def _panel(rng: VariantRng) -> Made:
 
 def _planks(rng: VariantRng) -> Made:
     """Boards across with gaps, on an inner post."""
-    rows, wide, gap = rng.choose((3, 4, 5)), rng.between(0.1, 0.15), rng.between(0.05, 0.12)
-    foot = rng.between(0.06, 0.15)
+    rows, wide, gap = (
+        rng.choose((3, 4, 5), "rows"),
+        rng.between(0.1, 0.15, "board_m"),
+        rng.between(0.05, 0.12, "gap_m"),
+    )
+    foot = rng.between(0.06, 0.15, "foot_m")
     parts = []
     for k in range(rows):
         z = foot + k * (wide + gap)
@@ -197,9 +201,9 @@ def _planks(rng: VariantRng) -> Made:
 
 def _rail(rng: VariantRng) -> Made:
     """Posts with two or three rails: round or split wood, or steel tubes."""
-    high, steel = rng.between(0.9, 1.2), rng.chance(0.4)
-    count = rng.choose((2, 3))
-    r = 0.024 if steel else rng.between(0.045, 0.06)
+    high, steel = rng.between(0.9, 1.2, "height_m"), rng.chance(0.4, "steel")
+    count = rng.choose((2, 3), "count")
+    r = 0.024 if steel else rng.between(0.045, 0.06, "radius_m")
     y = -HALF_M + r + 0.02
     post = cone((1.15 * r, 0.0), (1.1 * r, high), 8).moved(y=y)
     levels = [high - 0.06 - k * (high - 0.2) / count for k in range(count)]
@@ -216,7 +220,7 @@ def _rail(rng: VariantRng) -> Made:
 
 def _iron(rng: VariantRng) -> Made:
     """Wrought or cast iron: bars with tips, rings between the rails, on a kerb in some."""
-    high, foot = rng.between(1.0, 1.6), rng.choose((0.0, 0.0, 0.18, 0.3))
+    high, foot = rng.between(1.0, 1.6, "height_m"), rng.choose((0.0, 0.0, 0.18, 0.3), "foot_m")
     parts = []
     if foot:
         parts.append(block((-0.1, -HALF_M, 0.0), (0.1, HALF_M, foot), 0.012, 1))
@@ -243,7 +247,7 @@ def _iron(rng: VariantRng) -> Made:
 
 def _mesh(rng: VariantRng) -> Made:
     """Double-rod panels: uprights of 6 mm every 50 mm, pairs of 8 mm rods every 200 mm."""
-    high = rng.choose((0.83, 1.03, 1.23, 1.63))
+    high = rng.choose((0.83, 1.03, 1.23, 1.63), "height_m")
     parts = [
         wire((0.0, float(y), 0.03), (0.0, float(y), high), 0.0035)
         for y in np.arange(-HALF_M + 0.075, HALF_M, 0.05)
@@ -260,7 +264,7 @@ def _mesh(rng: VariantRng) -> Made:
 
 def _chain_link(rng: VariantRng) -> Made:
     """Woven diamonds of 70 mm between tubular posts, and tension wires."""
-    high, pitch = rng.choose((1.0, 1.25, 1.5)), 0.085
+    high, pitch = rng.choose((1.0, 1.25, 1.5), "height_m"), 0.085
     parts = []
     for lean in (1.0, -1.0):
         x = 0.0015 * lean

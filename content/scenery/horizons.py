@@ -64,7 +64,7 @@ def tree_line(seed: int, season: str) -> Solid:
     check_option("horizon/trees", "season", season, SEASONS)
     rng = variant_rng("horizon/trees", seed)
     crowns, y = [], -0.5 * TREE_LINE_M
-    tall = rng.between(9.0, 14.0)
+    tall = rng.between(9.0, 14.0, "height_m")
     while y < 0.5 * TREE_LINE_M:
         height = tall * rng.between(0.7, 1.25)
         radius = height * rng.between(0.24, 0.36)
@@ -87,7 +87,7 @@ def forest(seed: int, season: str) -> Solid:
     """
     check_option("horizon/forest", "season", season, SEASONS)
     rng = variant_rng("horizon/forest", seed)
-    firs = rng.choose((0.08, 0.3, 0.75))
+    firs = rng.choose((0.08, 0.3, 0.75), "firs_m")
     crowns = []
     for row in range(3):
         y = -0.5 * FOREST_M
@@ -129,7 +129,7 @@ def hill(seed: int, season: str) -> Solid:
     check_option("horizon/hills", "season", season, SEASONS)
     rng = variant_rng("horizon/hills", seed)
     across, along = 27, 33
-    peak = rng.between(25.0, 85.0)
+    peak = rng.between(25.0, 85.0, "peak_m")
     x = -260.0 * np.linspace(0.0, 1.0, across)[:, None]
     y = np.linspace(-0.75, 0.75, along)[None, :] * HILL_M
     lumps = [

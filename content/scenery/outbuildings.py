@@ -19,17 +19,17 @@ from gen_data.core.variant_rng import VariantRng, variant_rng
 def garage(seed: int) -> Solid:
     """A garage for one or two cars."""
     rng = variant_rng("garage", seed)
-    return _garage(seed, rng.choose((1, 1, 2)), rng)
+    return _garage(seed, rng.choose((1, 1, 2), "doors"), rng)
 
 
 def garage_row(seed: int) -> Solid:
     """Two to seven garages side by side, some of their doors sprayed on."""
     rng = variant_rng("garage_row", seed)
-    return _garage(seed, rng.choose((2, 3, 4, 5, 7)), rng)
+    return _garage(seed, rng.choose((2, 3, 4, 5, 7), "doors"), rng)
 
 
 def _garage(seed: int, doors: int, rng: VariantRng) -> Solid:
-    deep, high = rng.between(5.6, 6.5), rng.between(2.5, 2.9)
+    deep, high = rng.between(5.6, 6.5, "depth_m"), rng.between(2.5, 2.9, "height_m")
     half = 0.5 * (doors * 3.0 + 0.2)
     holes = [
         Opening((-half + 0.35 + 3.0 * k, -half + 2.85 + 3.0 * k), (0.02, 2.15), 0.12)
@@ -49,7 +49,11 @@ def _garage(seed: int, doors: int, rng: VariantRng) -> Solid:
 def shed(seed: int) -> Solid:
     """A garden shed or a hut of boards, sheet or brick, 1.8-4.5 m wide."""
     rng = variant_rng("shed", seed)
-    wide, deep, high = rng.between(1.8, 4.5), rng.between(1.8, 3.4), rng.between(1.95, 2.4)
+    wide, deep, high = (
+        rng.between(1.8, 4.5, "width_m"),
+        rng.between(1.8, 3.4, "depth_m"),
+        rng.between(1.95, 2.4, "height_m"),
+    )
     plan = draw_design(
         rng.choose(("farmhouse", "warehouse", "house")), seed + int(40 * rng.random())
     )
@@ -70,8 +74,8 @@ def shed(seed: int) -> Solid:
 
 def _shed_roof(deep: float, wide: float, rng: VariantRng) -> Patch:
     """A gable either way round, or a flat lid."""
-    kind = rng.choose(("gable", "gable", "front", "lid"))
-    pitch = rng.between(0.25, 0.7)
+    kind = rng.choose(("gable", "gable", "front", "lid"), "kind")
+    pitch = rng.between(0.25, 0.7, "pitch_m")
     if kind == "lid":
         x, y = 0.5 * deep + 0.15, 0.5 * wide + 0.15
         return block((-x, -y, 0.0), (x, y, 0.1), slot=METAL)

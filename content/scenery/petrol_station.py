@@ -34,9 +34,9 @@ def petrol_shop(seed: int) -> Solid:
     """
     rng = variant_rng("petrol_shop", seed)
     x, half, high = (
-        0.5 * rng.between(6.5, 9.0),
-        0.5 * rng.between(10.0, 15.0),
-        rng.between(3.6, 4.2),
+        0.5 * rng.between(6.5, 9.0, "depth_m"),
+        0.5 * rng.between(10.0, 15.0, "width_m"),
+        rng.between(3.6, 4.2, "height_m"),
     )
     parts = [
         block((-x, -half, 0.0), (x, half, high - 0.8), 0.0, 0),
@@ -83,7 +83,11 @@ def price_sign(seed: int) -> Solid:
     Slots: body, stripe, display, digits, base.
     """
     rng = variant_rng("price_sign", seed)
-    high, half, thick = rng.between(5.0, 7.5), 0.5 * rng.between(1.5, 1.9), 0.16
+    high, half, thick = (
+        rng.between(5.0, 7.5, "height_m"),
+        0.5 * rng.between(1.5, 1.9, "width_m"),
+        0.16,
+    )
     parts = [
         block((-0.3, -half - 0.1, 0.0), (0.3, half + 0.1, 0.25), 0.02, 4),
         block((-thick, -half, 0.25), (thick, half, high), 0.02, 0),
@@ -127,9 +131,10 @@ def fountain(seed: int) -> Solid:
 
     Slots: stone, water, steel.
     """
-    kind, rng = in_turn(FOUNTAINS, seed), variant_rng("fountain", seed)
-    radius, rim = rng.between(1.6, 2.8), rng.between(0.45, 0.6)
-    sides = rng.choose((8, 24, 24))
+    rng = variant_rng("fountain", seed)
+    kind = rng.turn(FOUNTAINS, "kind")
+    radius, rim = rng.between(1.6, 2.8, "radius_m"), rng.between(0.45, 0.6, "rim_m")
+    sides = rng.choose((8, 24, 24), "sides")
     profile = [(radius + 0.25, 0.0), (radius + 0.25, 0.12), (radius, 0.14), (radius, rim - 0.08),
                (radius + 0.08, rim - 0.06), (radius + 0.08, rim), (radius - 0.24, rim),
                (radius - 0.24, rim - 0.16)]  # fmt: skip
@@ -144,7 +149,7 @@ def fountain(seed: int) -> Solid:
         parts += [lathe(bowl, 18), lathe([(0.86, z + 0.19), (0.0, z + 0.2)], 18, 1)]
         parts.append(cone((0.1, z + 0.1), (0.05, z + 0.65), 10))
     elif kind == "column":
-        high = rng.between(2.2, 3.2)
+        high = rng.between(2.2, 3.2, "height_m")
         parts.append(block((-0.3, -0.3, 0.0), (0.3, 0.3, high - 0.5), 0.04))
         parts.append(block((-0.4, -0.4, high - 0.5), (0.4, 0.4, high - 0.35), 0.03))
         knob = ball(lambda d: 0.3 * d, 8, 12).moved(z=high - 0.1)
@@ -167,4 +172,4 @@ def _spout(number: int) -> Patch:
 
 def fountain_facts(seed: int) -> Facts:
     """Its kind."""
-    return Facts("fountain", {"kind": in_turn(FOUNTAINS, seed)})
+    return Facts("fountain", {"kind": variant_rng("fountain", seed).turn(FOUNTAINS, "kind")})

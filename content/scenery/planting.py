@@ -53,11 +53,11 @@ def hedge(seed: int) -> Solid:
     long = float(in_turn((2.0, 3.0, 4.0), seed // 3))
     if hedge_facts(seed).subcategory == "wild_hedge":
         return _wild_hedge(long, rng)
-    wide, high = rng.between(0.45, 0.9), rng.between(0.8, 2.0)
+    wide, high = rng.between(0.45, 0.9, "width_m"), rng.between(0.8, 2.0, "height_m")
     core = block(
         (-0.5 * wide + 0.05, -0.5 * long, 0.0), (0.5 * wide - 0.05, 0.5 * long, high - 0.05)
     )
-    size = rng.between(0.26, 0.36)
+    size = rng.between(0.26, 0.36, "leaf_m")
     area = 2.0 * long * high + wide * (long + 2.0 * high)
     count = min(1400, round(4.5 * area / size**2))
     at, outward = _box_skin((wide, long, high), count, rng)
@@ -76,7 +76,7 @@ def shrub(seed: int) -> Solid:
     """A shrub, 0.5-3 m high, upright, round or spreading; every third one flowers."""
     rng = variant_rng("shrub", seed)
     wide, high = in_turn(((0.8, 1.0), (1.1, 0.8), (0.6, 1.4), (1.4, 0.7), (0.9, 1.2)), seed)
-    scale = rng.between(0.6, 1.7)
+    scale = rng.between(0.6, 1.7, "scale")
     radius, height = 0.6 * wide * scale, 1.1 * high * scale
     lobes = [(0.0, 0.0, 0.55 * height, 0.72 * radius), (0.0, 0.0, 0.4 * radius, 0.6 * radius)]
     for k in range(6):
@@ -93,7 +93,7 @@ def grass_tuft(seed: int) -> Solid:
     """Tall grass and weeds, 0.12-0.7 m high, in a patch along a kerb or a joint."""
     rng = variant_rng("grass_tuft", seed)
     high = in_turn((0.14, 0.28, 0.45, 0.62), seed)
-    long, wide = rng.between(0.15, 1.4), rng.between(0.05, 0.22)
+    long, wide = rng.between(0.15, 1.4, "length_m"), rng.between(0.05, 0.22, "width_m")
     count = max(18, round(rng.between(26, 40) * max(long, 0.5)))
     x, y = ((uniform(count, rng) - 0.5) * side for side in (wide, long))
     foot = np.stack([x, y, np.zeros(count)], axis=1)
@@ -123,7 +123,11 @@ def grass_tuft(seed: int) -> Solid:
 def flower_bed(seed: int) -> Solid:
     """A bed of 1.2-3 m with an edging of stone or steel, leaves and flowers in drifts."""
     rng = variant_rng("flower_bed", seed)
-    wide, long, rim = rng.between(0.6, 1.2), rng.between(1.2, 3.0), rng.between(0.05, 0.2)
+    wide, long, rim = (
+        rng.between(0.6, 1.2, "width_m"),
+        rng.between(1.2, 3.0, "length_m"),
+        rng.between(0.05, 0.2, "rim_m"),
+    )
     x, y = 0.5 * wide, 0.5 * long
     soil = block((-x, -y, 0.0), (x, y, max(0.03, rim - 0.03))).painted(1)
     sides = [((-x - 0.06, -y - 0.06), (-x, y + 0.06)), ((x, -y - 0.06), (x + 0.06, y + 0.06)),
@@ -156,7 +160,7 @@ def flower_bed(seed: int) -> Solid:
 def ivy_wall(seed: int) -> Solid:
     """Ivy on a wall at x = 0 that faces +X: a ragged patch 1.5-4 m wide and 2-6 m high."""
     rng = variant_rng("ivy_wall", seed)
-    wide, high = rng.between(1.5, 4.0), rng.between(2.0, 6.0)
+    wide, high = rng.between(1.5, 4.0, "width_m"), rng.between(2.0, 6.0, "height_m")
     lanes = 6
     tops = high * (0.35 + 0.65 * uniform(lanes, rng))
     tops[int(rng.between(1, lanes - 1))] = high
@@ -187,7 +191,7 @@ def _towards_wall(vectors: Array) -> Array:
 
 def _wild_hedge(long: float, rng: VariantRng) -> Solid:
     """Shrubs in a row that nobody clips."""
-    high = rng.between(1.2, 2.8)
+    high = rng.between(1.2, 2.8, "height_m")
     spots = round(long / 0.8)
     lobes = []
     for k in range(2 * spots):

@@ -45,7 +45,7 @@ def railway_track(seed: int, length_m: float) -> Solid:
         a, b = sorted((near, near + way * HEAD_M))
         parts.append(block((-half, a, TOP_M - 0.17), (half, b, TOP_M), 0.0, 2))
     rng = variant_rng("railway_track", seed)
-    tone, rust = rng.between(0.5, 0.75), rng.between(0.8, 1.2)
+    tone, rust = rng.between(0.5, 0.75), rng.between(0.8, 1.2, "rust")
     materials = (
         Material((tone, 0.92 * tone, 0.84 * tone), 0.97, texture=f"texture/gravel?seed={seed % 4}"),
         Material((0.3, 0.29, 0.27), roughness=0.9),

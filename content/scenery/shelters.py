@@ -22,7 +22,7 @@ from gen_data.content.procedural.surface_shapes import block, cone, grid, rounde
 from gen_data.content.scenery.basic_shapes import facing_rectangle, make_solid, post
 from gen_data.content.scenery.clutter_shapes import rod, worn_paint, worn_steel
 from gen_data.core.asset_types import Material
-from gen_data.core.variant_rng import VariantRng, in_turn, variant_rng
+from gen_data.core.variant_rng import VariantRng, variant_rng
 
 ROOFS = ("flat", "vault", "pitched", "flat", "cantilever", "vault")
 PHONES = ("glass", "paned", "pillar", "glass", "pillar", "paned")
@@ -34,8 +34,13 @@ def bus_shelter(seed: int) -> Solid:
 
     Slots: frame, glass, roof, seat, two prints, sign.
     """
-    kind, rng = in_turn(ROOFS, seed), variant_rng("bus_shelter", seed)
-    half, x, high = 0.5 * rng.between(3.0, 5.0), 0.5 * rng.between(1.3, 1.7), rng.between(2.3, 2.5)
+    rng = variant_rng("bus_shelter", seed)
+    kind = rng.turn(ROOFS, "roof")
+    half, x, high = (
+        0.5 * rng.between(3.0, 5.0, "width_m"),
+        0.5 * rng.between(1.3, 1.7, "depth_m"),
+        rng.between(2.3, 2.5, "height_m"),
+    )
     bays = 3 if half < 2.1 else 4
     edges = np.linspace(-half, half, bays + 1).tolist()
     parts = [block((-x - 0.03, y - 0.03, 0.0), (-x + 0.03, y + 0.03, high)) for y in edges]
@@ -77,7 +82,7 @@ def bus_shelter(seed: int) -> Solid:
 
 def bus_shelter_facts(seed: int) -> Facts:
     """Kind of its roof."""
-    return Facts("bus_shelter", {"roof": in_turn(ROOFS, seed)})
+    return Facts("bus_shelter", {"roof": variant_rng("bus_shelter", seed).turn(ROOFS, "roof")})
 
 
 def _shelter_roof(kind: str, x: float, half: float, high: float) -> list[Patch]:
@@ -137,8 +142,9 @@ def phone_box(seed: int) -> Solid:
 
     Slots: frame, glass, roof, telephone, notices.
     """
-    kind, rng = in_turn(PHONES, seed), variant_rng("phone_box", seed)
-    half, high = rng.between(0.43, 0.48), rng.between(2.2, 2.45)
+    rng = variant_rng("phone_box", seed)
+    kind = rng.turn(PHONES, "kind")
+    half, high = 0.5 * rng.between(0.86, 0.96, "width_m"), rng.between(2.2, 2.45, "height_m")
     if kind == "pillar":
         parts = [
             block((-0.18, -0.3, 0.0), (-0.06, 0.3, 2.05), 0.02),
@@ -169,7 +175,7 @@ def phone_box(seed: int) -> Solid:
 
 def phone_box_facts(seed: int) -> Facts:
     """Its kind."""
-    return Facts("phone_box", {"kind": in_turn(PHONES, seed)})
+    return Facts("phone_box", {"kind": variant_rng("phone_box", seed).turn(PHONES, "kind")})
 
 
 def _booth(half: float, high: float, rows: int) -> list[Patch]:
@@ -204,7 +210,7 @@ def level_crossing_barrier(seed: int) -> Solid:
     grey, lens, black.
     """
     rng = variant_rng("level_crossing_barrier", seed)
-    raised, reach = seed % 3 == 2, rng.between(3.5, 5.5)
+    raised, reach = _is_raised(seed), rng.between(3.5, 5.5, "reach_m")
     parts = [
         block((-0.22, -0.25, 0.0), (0.22, 0.25, 0.1), 0.01, 2),
         block((-0.18, -0.2, 0.1), (0.18, 0.2, 1.05), 0.02, 2),
@@ -241,7 +247,11 @@ def level_crossing_barrier(seed: int) -> Solid:
 
 def level_crossing_barrier_facts(seed: int) -> Facts:
     """Whether it is lowered."""
-    return Facts("level_crossing", {"state": "raised" if seed % 3 == 2 else "lowered"})
+    return Facts("level_crossing", {"state": "raised" if _is_raised(seed) else "lowered"})
+
+
+def _is_raised(seed: int) -> bool:
+    return variant_rng("level_crossing_barrier", seed).turn((False, False, True), "raised")
 
 
 def petrol_canopy(seed: int) -> Solid:
@@ -290,7 +300,8 @@ def pump_islands_m(seed: int) -> tuple[float, ...]:
 
 def _canopy_m(rng: VariantRng) -> tuple[float, float, float]:
     """Half extents along X and Y, and the height below it."""
-    return rng.between(3.5, 4.5), rng.between(5.5, 8.0), rng.between(4.5, 5.2)
+    depth_m, length_m = rng.between(7.0, 9.0, "depth_m"), rng.between(11.0, 16.0, "length_m")
+    return 0.5 * depth_m, 0.5 * length_m, rng.between(4.5, 5.2, "clearance_m")
 
 
 def _islands_m(half: float) -> tuple[float, ...]:

@@ -35,7 +35,7 @@ _FLOWERS = ("#b33a4a", "#d8c7d9", "#d9b23a", "#9a4f9c", "#e6e2dc")
 def bush(seed: int) -> Solid:
     """A free-growing shrub, 0.7-1.8 m high. Slots: core, then shades of leaf."""
     rng = variant_rng("bush", seed)
-    h = rng.between(0.7, 1.8)
+    h = rng.between(0.7, 1.8, "height_m")
     lobes = []
     for k in range(5):
         turn = 2.0 * math.pi * (k + rng.between(-0.3, 0.3)) / 5
@@ -53,7 +53,11 @@ def bush(seed: int) -> Solid:
 def planter(seed: int) -> Solid:
     """A tub or trough with a plant, flowering in some. Slots: tub, soil and core, leaves."""
     rng = variant_rng("planter", seed)
-    w, long, h = (rng.between(0.45, 0.6), rng.between(0.6, 1.4), rng.between(0.4, 0.6))
+    w, long, h = (
+        rng.between(0.45, 0.6, "width_m"),
+        rng.between(0.6, 1.4, "length_m"),
+        rng.between(0.4, 0.6, "height_m"),
+    )
     x, y = 0.5 * w + 0.03, 0.5 * long + 0.03
     tub = [
         block((-0.5 * w, -0.5 * long, 0.0), (0.5 * w, 0.5 * long, h - 0.05), 0.012),

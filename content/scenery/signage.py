@@ -17,7 +17,7 @@ from gen_data.content.procedural.surface_shapes import block, grid, lathe, round
 from gen_data.content.scenery.basic_shapes import facing_rectangle, make_solid, post
 from gen_data.content.scenery.clutter_shapes import on_ground, worn_paint, worn_steel
 from gen_data.core.asset_types import Material
-from gen_data.core.variant_rng import in_turn, variant_rng
+from gen_data.core.variant_rng import variant_rng
 
 BILLBOARDS = ("hoarding", "light_box", "a_board", "tall", "light_box", "hoarding", "a_board")
 POSTERS, WIDE_POSTERS, STREET_NAMES = 12, 8, 12
@@ -29,21 +29,24 @@ def billboard(seed: int) -> Solid:
 
     Slots: frame, print in front, print behind.
     """
-    kind, rng = in_turn(BILLBOARDS, seed), variant_rng("billboard", seed)
+    rng = variant_rng("billboard", seed)
+    kind = rng.turn(BILLBOARDS, "kind")
     prints = _posters(seed, "wide_poster" if kind in {"hoarding", "tall"} else "poster")
     if kind == "a_board":
         parts, hull = _a_board()
     elif kind == "light_box":
-        parts, hull = _light_box(rng.between(0.0, 0.5))
+        parts, hull = _light_box(rng.between(0.0, 0.5, "foot_m"))
     else:
-        parts, hull = _hoarding(3.2 if kind == "tall" else rng.between(0.6, 1.1), kind == "tall")
+        parts, hull = _hoarding(
+            3.2 if kind == "tall" else rng.between(0.6, 1.1, "foot_m"), kind == "tall"
+        )
     frame = worn_paint(("#3b3d3f", "#8d9091", "#2f4236", "#55585a"), 0.5, rng)
     return make_solid(parts, (frame, *prints), [hull])
 
 
 def billboard_facts(seed: int) -> Facts:
     """Its kind."""
-    return Facts("billboard", {"kind": in_turn(BILLBOARDS, seed)})
+    return Facts("billboard", {"kind": variant_rng("billboard", seed).turn(BILLBOARDS, "kind")})
 
 
 def _posters(seed: int, family: str) -> tuple[Material, Material]:
@@ -99,7 +102,7 @@ def _a_board() -> tuple[list[Patch], np.ndarray]:
 def advertising_column(seed: int) -> Solid:
     """A column of 1.2 to 1.4 m for posters, with a foot and a cap. Slots: body, trim, 4 posters."""
     rng = variant_rng("advertising_column", seed)
-    r, high = rng.between(0.58, 0.7), rng.between(2.7, 3.3)
+    r, high = rng.between(0.58, 0.7, "radius_m"), rng.between(2.7, 3.3, "height_m")
     parts = [
         lathe([(0.0, 0.0), (r + 0.08, 0.0), (r + 0.08, 0.3), (r, 0.36), (r, high)], 28),
         lathe([(r, high), (r + 0.1, high + 0.05), (r + 0.1, high + 0.14), (0.4 * r, high + 0.34),
@@ -134,7 +137,7 @@ def _pasted(radius: float, turn: tuple[float, float], z_m: tuple[float, float], 
 def street_name_plate(seed: int) -> Solid:
     """One or two name plates of a crossing on a post, 0.8-0.95 x 0.2 m. Slots: post, plates."""
     rng = variant_rng("street_name_plate", seed)
-    high, half = rng.between(2.5, 2.9), rng.between(0.38, 0.47)
+    high, half = rng.between(2.5, 2.9, "height_m"), 0.5 * rng.between(0.76, 0.94, "width_m")
     parts = [
         post(0.03, (0.0, high)),
         lathe([(0.034, high), (0.03, high + 0.03), (0.0, high + 0.04)], 8),

@@ -62,7 +62,7 @@ def traffic_sign(seed: int, sign: str) -> Solid:
     half_high = float(outline[:, 1].max())
     foot = float(-outline[:, 1].min())
     # Over a pavement the lower edge hangs 2.0-2.2 m high, so that people walk below.
-    centre_z = rng.between(2.0, 2.2) + foot
+    centre_z = rng.between(2.0, 2.2, "lower_edge_m") + foot
     face = _plate(outline, made.size_m).moved(0.045, 0.0, centre_z)
     pole = post(0.03, (0.0, centre_z + half_high - 0.02), sides=10).painted(2)
     texture = f"texture/traffic_sign?seed={seed % 3}&sign={name}"

@@ -34,7 +34,7 @@ _IRON_PAINTS = ("#2f3234", "#3b3d3f", "#2f4236", "#55585a")
 def street_light(seed: int) -> Solid:
     """A lamp on a mast of 6-8 m. Slots: mast, lamp. Keypoint ``lamp``."""
     rng = variant_rng("street_light", seed)
-    height, reach = rng.between(6.0, 8.0), rng.between(0.8, 1.8)
+    height, reach = rng.between(6.0, 8.0, "height_m"), rng.between(0.8, 1.8, "reach_m")
     foot = [(0.0, 0.0), (0.085, 0.0), (0.085, 1.1), (0.06, 1.16)]
     mast = lathe([*foot, (0.038, height), (0.0, height)], 12)
     rise = rng.choose((0.12, 0.12, 0.5, None))
@@ -52,7 +52,7 @@ def litter_bin(seed: int) -> Solid:
     color = rng.choose(("#3a5a40", "#d9702b", "#44484a", "#2f3234", "#6b7073"))
     materials = (painted_material(color, 0.45), GALVANISED)
     if rng.chance(0.5):
-        r, h = rng.between(0.16, 0.21), rng.between(0.45, 0.55)
+        r, h = rng.between(0.16, 0.21, "radius_m"), rng.between(0.45, 0.55, "height_m")
         z = 0.95 - h + 0.15
         shell = [(0.0, z), (0.85 * r, z), (r, z + h), (0.9 * r, z + h), (0.9 * r, z + h - 0.08)]
         body = lathe([*shell, (0.0, z + h - 0.08)], 18).moved(r + 0.04)
@@ -61,7 +61,7 @@ def litter_bin(seed: int) -> Solid:
         parts = [body, mast.painted(1), bracket.painted(1)]
         hull = hulls.frustum((r, z), (r, z + h), 12) + np.array([r + 0.04, 0.0, 0.0])
         return make_solid(parts, materials, [hull])
-    r, h = rng.between(0.22, 0.3), rng.between(0.75, 0.95)
+    r, h = rng.between(0.22, 0.3, "radius_m"), rng.between(0.75, 0.95, "height_m")
     profile = [(0.0, 0.0), (0.9 * r, 0.0), (r, 0.06), (r, h), (0.9 * r, h), (0.88 * r, h - 0.12)]
     body = lathe([*profile, (0.0, h - 0.12)], 20)
     hood = lathe([(0.0, h + 0.16), (r, h + 0.16), (r, h + 0.19), (0.0, h + 0.26)], 20)
@@ -74,7 +74,7 @@ def litter_bin(seed: int) -> Solid:
 def bench(seed: int) -> Solid:
     """A park bench, sat on from +X. Slots: slats, frame."""
     rng = variant_rng("bench", seed)
-    half, seat = 0.5 * rng.between(1.5, 2.0), rng.between(0.42, 0.46)
+    half, seat = 0.5 * rng.between(1.5, 2.0, "length_m"), rng.between(0.42, 0.46, "seat_m")
     slats = [(-0.18 + 0.115 * k, seat - 0.03, 0.09, 0.03) for k in range(4)]
     if rng.chance(0.75):
         slats += [(-0.24 - 0.03 * k, seat + 0.14 + 0.12 * k, 0.03, 0.09) for k in range(3)]
@@ -93,7 +93,7 @@ def bench(seed: int) -> Solid:
 def hydrant(seed: int) -> Solid:
     """A pillar hydrant with two outlets (EN 14384). Slots: body, caps."""
     rng = variant_rng("hydrant", seed)
-    h = rng.between(0.75, 0.95)
+    h = rng.between(0.75, 0.95, "height_m")
     foot = [(0.0, 0.0), (0.16, 0.0), (0.16, 0.04), (0.105, 0.06)]
     shares = ((0.1, 0.62), (0.135, 0.65), (0.135, 0.72), (0.11, 0.74), (0.1, 0.9), (0.05, 0.97))
     body = lathe([*foot, *((r, z * h) for r, z in shares), (0.0, 0.97 * h)], 18)
@@ -115,14 +115,14 @@ def hydrant(seed: int) -> Solid:
 def bollard(seed: int) -> Solid:
     """A bollard: iron with a cap, steel with a reflecting band, or stone. Slots: body, band."""
     rng = variant_rng("bollard", seed)
-    h, kind = rng.between(0.8, 1.0), _bollard_kind(seed)
+    h, kind = rng.between(0.8, 1.0, "height_m"), _bollard_kind(seed)
     if kind == "stone":
-        r = rng.between(0.13, 0.18)
+        r = rng.between(0.13, 0.18, "radius_m")
         shares = ((0.0, 0.0), (1.0, 0.0), (0.92, 0.7), (0.6, 0.82), (0.0, 0.86))
         body = lathe([(x * r, z * h) for x, z in shares], 18)
         stone = patterned_material("texture/concrete?seed=3", 1.5, 0.9, (0.9, 0.88, 0.85))
         return make_solid([body], (stone,), [hulls.frustum((r, 0.0), (0.9 * r, 0.8 * h), 12)])
-    r = rng.between(0.035, 0.055)
+    r = rng.between(0.035, 0.055, "radius_m")
     if kind == "iron":
         r = 1.4 * r
         foot = [(0.0, 0.0), (1.5 * r, 0.0), (1.5 * r, 0.12), (r, 0.16)]
@@ -151,7 +151,7 @@ def bollard_symmetries(seed: int) -> tuple[Symmetry, ...]:
 def traffic_cone(seed: int) -> Solid:
     """A traffic cone with two white sleeves (EN 13422). Slots: orange, white, foot."""
     rng = variant_rng("cone", seed)
-    h = rng.choose((0.5, 0.75, 0.75))
+    h = rng.choose((0.5, 0.75, 0.75), "height_m")
     half = 0.27 * h + 0.06
     profile = [
         (0.235 * h * (1 - t) + 0.045 * h * t, 0.04 + t * (h - 0.04))
@@ -171,8 +171,12 @@ def traffic_cone(seed: int) -> Solid:
 def post_box(seed: int) -> Solid:
     """A letter box on two legs or on a wall post. Slots: body, flap, legs."""
     rng = variant_rng("post_box", seed)
-    w, d, h = (rng.between(0.45, 0.6), rng.between(0.3, 0.4), rng.between(0.6, 0.75))
-    z = rng.between(0.65, 0.8)
+    w, d, h = (
+        rng.between(0.45, 0.6, "width_m"),
+        rng.between(0.3, 0.4, "depth_m"),
+        rng.between(0.6, 0.75, "height_m"),
+    )
+    z = rng.between(0.65, 0.8, "legs_m")
     body = rounded_box((d, w, h), 0.03, 2).moved(z=z + 0.5 * h)
     x = 0.5 * d
     flap = block((x, -0.4 * w, z + 0.68 * h), (x + 0.03, 0.4 * w, z + 0.82 * h), 0.008).painted(1)
@@ -189,7 +193,11 @@ def post_box(seed: int) -> Solid:
 def bus_stop(seed: int) -> Solid:
     """A shelter, open to +X, with a seat. Slots: frame, glass, roof, seat, panel."""
     rng = variant_rng("bus_stop", seed)
-    half, d, h = (0.5 * rng.between(3.2, 4.2), rng.between(1.3, 1.6), rng.between(2.35, 2.55))
+    half, d, h = (
+        0.5 * rng.between(3.2, 4.2, "width_m"),
+        rng.between(1.3, 1.6, "depth_m"),
+        rng.between(2.35, 2.55, "height_m"),
+    )
     x = 0.5 * d
     feet = [(-x, -half), (-x, -half / 3), (-x, half / 3), (-x, half), (x - 0.25, -half),
             (x - 0.25, half)]  # fmt: skip
@@ -225,7 +233,11 @@ def bus_stop(seed: int) -> Solid:
 def cabinet(seed: int) -> Solid:
     """A distribution cabinet with two doors and a lid. Slots: body, seams, plinth."""
     rng = variant_rng("cabinet", seed)
-    w, d, h = (rng.between(0.7, 1.5), rng.between(0.3, 0.45), rng.between(0.95, 1.35))
+    w, d, h = (
+        rng.between(0.7, 1.5, "width_m"),
+        rng.between(0.3, 0.45, "depth_m"),
+        rng.between(0.95, 1.35, "height_m"),
+    )
     x, y = 0.5 * d, 0.5 * w
     body = rounded_box((d, w, h - 0.15), 0.015, 1).moved(z=0.15 + 0.5 * (h - 0.15))
     lid = block((-x - 0.02, -y - 0.02, h - 0.04), (x + 0.02, y + 0.02, h + 0.015), 0.01)
@@ -244,8 +256,8 @@ def cabinet(seed: int) -> Solid:
 def bike_rack(seed: int) -> Solid:
     """A row of hoops; bicycles lean against them along X. Slot: hoops."""
     rng = variant_rng("bike_rack", seed)
-    count, pitch = rng.choose((2, 3, 4, 5)), rng.between(0.8, 1.0)
-    half, h = rng.between(0.35, 0.45), rng.between(0.75, 0.85)
+    count, pitch = rng.choose((2, 3, 4, 5), "count"), rng.between(0.8, 1.0, "pitch_m")
+    half, h = 0.5 * rng.between(0.7, 0.9, "width_m"), rng.between(0.75, 0.85, "height_m")
     bend = [(half, 0.0), (half, h - 0.15), (half - 0.04, h - 0.04), (half - 0.15, h)]
     hoop = tube([*((-x, 0.0, z) for x, z in bend), *((x, 0.0, z) for x, z in bend[::-1])], 0.024)
     at = [pitch * (k - 0.5 * (count - 1)) for k in range(count)]

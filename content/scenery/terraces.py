@@ -18,7 +18,7 @@ from gen_data.content.procedural.surface_shapes import block
 from gen_data.content.scenery.cafe import cafe_set
 from gen_data.content.scenery.foliage import merge_meshes
 from gen_data.core.asset_types import ConvexParts, Material
-from gen_data.core.variant_rng import VariantRng, in_turn, variant_rng
+from gen_data.core.variant_rng import VariantRng, variant_rng
 
 _KINDS = ("terrace", "path", "deck", "path")
 _PATH_M, _SLAB_M = (0.5, 60.0), 0.06
@@ -31,12 +31,18 @@ def terrace(seed: int) -> Solid:
 
     Slots: pavement, then those of the chairs.
     """
-    rng, kind = variant_rng("terrace", seed), in_turn(_KINDS, seed)
+    rng = variant_rng("terrace", seed)
+    kind = rng.turn(_KINDS, "kind")
     if kind == "path":
-        wide, long, high, pieces = rng.between(0.6, 1.1), rng.between(5.0, 10.0), 0.03, 12
+        wide, long, high, pieces = (
+            rng.between(0.6, 1.1, "width_m"),
+            rng.between(5.0, 10.0, "length_m"),
+            0.03,
+            12,
+        )
     else:
-        wide, long, pieces = rng.between(2.8, 4.0), rng.between(3.2, 5.0), 1
-        high = rng.between(0.12, 0.2) if kind == "deck" else 0.05
+        wide, long, pieces = rng.between(2.8, 4.0, "width_m"), rng.between(3.2, 5.0, "length_m"), 1
+        high = rng.between(0.12, 0.2, "height_m") if kind == "deck" else 0.05
     x, edges = 0.5 * wide, np.linspace(-0.5 * long, 0.5 * long, pieces + 1)
     joint = _JOINT_M if pieces > 1 else 0.0
     slabs = [
@@ -64,7 +70,7 @@ def garden_path(seed: int, length_m: float) -> Solid:
     if not _PATH_M[0] <= length_m <= _PATH_M[1]:
         raise ValueError(f"length_m is {length_m:g}; expected a number from 0.5 to 60")
     rng = variant_rng("garden_path", seed)
-    half, is_slabs = 0.5 * rng.between(1.0, 1.6), _is_slabs(seed)
+    half, is_slabs = 0.5 * rng.between(1.0, 1.6, "width_m"), _is_slabs(seed)
     pieces = max(1, round(length_m / 0.7)) if is_slabs else 1
     joint = _JOINT_M if is_slabs else 0.0
     edges = np.linspace(-0.5 * length_m, 0.5 * length_m, pieces + 1)
@@ -94,7 +100,7 @@ def _is_slabs(seed: int) -> bool:
 
 def terrace_facts(seed: int) -> Facts:
     """Whether it is a terrace, a deck or a path."""
-    return Facts(in_turn(_KINDS, seed))
+    return Facts(variant_rng("terrace", seed).turn(_KINDS, "kind"))
 
 
 def _pavement(kind: str, rng: VariantRng) -> Material:

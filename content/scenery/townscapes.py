@@ -60,7 +60,7 @@ def skyline(seed: int) -> Solid:
     By night, a lamp may light each piece's windows (role ``window``).
     """
     rng = variant_rng("horizon/skyline", seed)
-    tall = rng.choose((0.15, 0.4, 0.7))
+    tall = rng.choose((0.15, 0.4, 0.7), "height_m")
     parts: list[Patch] = []
     for row in range(2):
         y = -0.5 * SKYLINE_M
@@ -226,7 +226,11 @@ def _ridged(plan: _Block, rise: float, hip: float, *, along: bool, slot: int) ->
 
 def _church(rng: VariantRng) -> Iterator[Patch]:
     """A nave with a tower under a spire or an onion dome, 25 to 45 m high, behind the houses."""
-    y, width, storey = rng.between(-18.0, 18.0), rng.between(5.5, 7.0), rng.between(3.4, 4.2)
+    y, width, storey = (
+        rng.between(-18.0, 18.0),
+        rng.between(5.5, 7.0, "width_m"),
+        rng.between(3.4, 4.2, "storey_m"),
+    )
     tower = _Block(-46.0, y, -46.0 + width, y + width, 0.0, round(rng.between(4.6, 6.4)), storey, 0)
     nave = _Block(-44.0, y + width, -32.0, y + width + rng.between(16.0, 24.0), 0.0, 2, 5.0, 0)
     yield from _walls(tower)

@@ -45,13 +45,13 @@ def traffic_light(seed: int, mount: str) -> Solid:
     """
     rng = variant_rng("traffic_light", seed)
     arm = _choose_mount(seed, mount) == "mast_arm"
-    lens_m = 0.15 if arm else rng.choose((0.1, 0.1, 0.15))
+    lens_m = 0.15 if arm else rng.choose((0.1, 0.1, 0.15), "lens_m")
     low = head(VEHICLE_LENSES, 0.1 if arm else lens_m).moved(0.11, 0.0, rng.between(2.15, 2.5))
     radius = 0.09 if arm else 0.055
-    top = rng.between(5.6, 6.2) if arm else float(low.bounds_m()[1][2]) + 0.1
+    top = rng.between(5.6, 6.2, "top_m") if arm else float(low.bounds_m()[1][2]) + 0.1
     parts = [low, post(radius, (0.0, top), sides=12).painted(POLE)]
     if arm:
-        reach = rng.between(3.5, 5.5)
+        reach = rng.between(3.5, 5.5, "reach_m")
         path = [(0.0, 0.0, top - 0.1), (0.0, -0.6 * reach, top + 0.05), (0.0, -reach, top + 0.1)]
         high = head(VEHICLE_LENSES, lens_m)
         plate = _backboard(high)
@@ -71,7 +71,7 @@ def traffic_light_facts(seed: int, mount: str) -> Facts:
 def pedestrian_signal(seed: int) -> Solid:
     """A red and green signal for people, with a push button. Slots as above."""
     rng = variant_rng("pedestrian_signal", seed)
-    signal = head(PEDESTRIAN_LENSES, 0.1).moved(0.11, 0.0, rng.between(2.1, 2.3))
+    signal = head(PEDESTRIAN_LENSES, 0.1).moved(0.11, 0.0, rng.between(2.1, 2.3, "height_m"))
     top = float(signal.bounds_m()[1][2]) + 0.1
     button = shapes.rounded_box((0.09, 0.11, 0.2), 0.02, 1).moved(0.06, 0.0, 1.05).painted(BOARD)
     parts = [signal, button, post(0.052, (0.0, top), sides=12).painted(POLE)]

@@ -16,7 +16,7 @@ ANCHOR_M, POLE_M = 6.9, 7.2
 def tram_pole(seed: int) -> Solid:
     """A steel pole that holds a cross wire. Slots: paint, foot."""
     rng = variant_rng("tram_pole", seed)
-    foot = rng.between(0.11, 0.14)
+    foot = rng.between(0.11, 0.14, "foot_m")
     parts = [
         cone((foot, 0.0), (0.62 * foot, POLE_M), 10),
         block((-0.22, -0.22, 0.0), (0.22, 0.22, 0.08), 0.0, 1),

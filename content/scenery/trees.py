@@ -279,7 +279,7 @@ def _flare_roots(patch: Patch) -> Patch:
 
 def _conifer(rng: VariantRng) -> Solid:
     """A spruce: whorls of drooping branches along a straight trunk, evergreen."""
-    height, base_m = rng.between(6.0, 12.0), rng.between(0.1, 0.17)
+    height, base_m = rng.between(6.0, 12.0, "height_m"), rng.between(0.1, 0.17, "base_m")
     clear, spread = rng.between(0.2, 0.9), rng.between(0.17, 0.24) * height
     line = np.array([(0.0, 0.0, 0.0), (0.0, 0.0, 0.6 * height), (0.0, 0.0, height)])
     trunk = sweep(line, circle(base_m, 8), up=(1.0, 0.0, 0.0), scale=np.array([1.0, 0.5, 0.08]))
@@ -354,9 +354,14 @@ def leaf_greens(codes: tuple[str, ...], rng: VariantRng) -> tuple[Material, ...]
 
 
 def _draw_shape(species: Species, rng: VariantRng) -> Shape:
-    height, clear = rng.between(*species.height_m), rng.between(*species.clear_m)
+    height = rng.between(*species.height_m, "height_m")
+    clear = rng.between(*species.clear_m, "clear_m")
     crown = height - clear + species.overlap_m
-    wide = rng.between(*species.width) if species.width[0] < species.width[1] else species.width[0]
+    wide = (
+        rng.between(*species.width, "width")
+        if species.width[0] < species.width[1]
+        else species.width[0]
+    )
     if species.boughs:
         centre_z = height - species.middle * crown
         lobes = _draw_boughs(crown * wide, crown, centre_z, species.boughs, rng)
@@ -370,7 +375,7 @@ def _draw_shape(species: Species, rng: VariantRng) -> Shape:
         r = 0.5 * crown
         lobes = (Lobe((0.0, 0.0, height - r), (wide * r, wide * r, r)),)
     green = rng.choose(species.greens) if len(species.greens) > 1 else species.greens[0]
-    trunk = rng.between(*species.trunk_m)
+    trunk = rng.between(*species.trunk_m, "trunk_m")
     return Shape(height, clear, trunk, lobes, green, species.bark, species.droop)
 
 

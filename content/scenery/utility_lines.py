@@ -26,7 +26,7 @@ from gen_data.content.scenery.street_furniture import GALVANISED
 from gen_data.core.asset_types import Material
 from gen_data.core.errors import AssetError
 from gen_data.core.se3 import Vec3
-from gen_data.core.variant_rng import VariantRng, in_turn, variant_rng
+from gen_data.core.variant_rng import VariantRng, variant_rng
 
 POLES = ("wood", "concrete", "wood_transformer", "wood_lamp", "concrete_double", "wood_double")
 BOXES = ("telecom", "power", "kiosk", "meter", "parcel", "telecom_tall", "substation", "power")
@@ -58,9 +58,10 @@ def utility_pole(seed: int, span_m: float) -> Solid:
     """
     if not 0.0 <= span_m <= SPAN_MAX_M:
         raise AssetError(f"utility_pole: span_m={span_m} is not between 0 and {SPAN_MAX_M:g}")
-    kind, rng = in_turn(POLES, seed), variant_rng("utility_pole", seed)
-    high = rng.between(8.9, 9.8)
-    foot = 0.15 if kind.startswith("concrete") else rng.between(0.12, 0.15)
+    rng = variant_rng("utility_pole", seed)
+    kind = rng.turn(POLES, "kind")
+    high = rng.between(8.9, 9.8, "height_m")
+    foot = 0.15 if kind.startswith("concrete") else rng.between(0.12, 0.15, "foot_m")
     radii = (foot, 0.62 * foot)
     if kind.startswith("concrete"):
         pole = lathe([(0.0, 0.0), (radii[0], 0.0), (radii[1], high), (0.0, high)], 8)
@@ -88,7 +89,7 @@ def utility_pole(seed: int, span_m: float) -> Solid:
 def utility_pole_facts(seed: int, span_m: float) -> Facts:
     """Its kind, whatever the span."""
     del span_m
-    return Facts("utility_pole", {"kind": in_turn(POLES, seed)})
+    return Facts("utility_pole", {"kind": variant_rng("utility_pole", seed).turn(POLES, "kind")})
 
 
 def _cross_arms(double: bool, radius: float) -> list[Patch]:
@@ -159,14 +160,15 @@ def power_box(seed: int) -> Solid:
 
     Faces +X. Slots: body, seams, plinth, sticker, roof. Sizes: assumed from makers' catalogues.
     """
-    kind, rng = in_turn(BOXES, seed), variant_rng("power_box", seed)
+    rng = variant_rng("power_box", seed)
+    kind = rng.turn(BOXES, "kind")
     w, d, h = {
         "telecom": (0.75, 0.31, 1.05), "power": (0.79, 0.32, 1.1), "kiosk": (1.25, 0.45, 1.4),
         "meter": (0.45, 0.2, 0.95), "parcel": (1.5, 0.6, 1.95), "telecom_tall": (0.8, 0.5, 1.65),
         "substation": (2.2, 1.6, 1.75),
     }[kind]  # fmt: skip
     w, h = w * rng.between(0.92, 1.08), h * rng.between(0.95, 1.05)
-    x, y, foot = 0.5 * d, 0.5 * w, rng.between(0.06, 0.16)
+    x, y, foot = 0.5 * d, 0.5 * w, rng.between(0.06, 0.16, "foot_m")
     parts = [
         block((-x, -y, foot), (x, y, h - 0.04), 0.012),
         block((-x + 0.02, -y + 0.02, 0.0), (x - 0.02, y - 0.02, foot + 0.01), 0.0, 2),
@@ -195,7 +197,7 @@ def power_box(seed: int) -> Solid:
 
 def power_box_facts(seed: int) -> Facts:
     """Its kind."""
-    return Facts("power_box", {"kind": in_turn(BOXES, seed)})
+    return Facts("power_box", {"kind": variant_rng("power_box", seed).turn(BOXES, "kind")})
 
 
 def _roof(kind: str, x: float, y: float, h: float) -> Patch:

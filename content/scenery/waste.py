@@ -22,10 +22,10 @@ from gen_data.core.asset_types import Material
 from gen_data.core.se3 import Vec3
 from gen_data.core.variant_rng import VariantRng, in_turn, variant_rng
 
-_BINS: dict[str, tuple[float, float, float]] = {
-    "120": (0.603, 0.49, 0.935),
-    "240": (0.741, 0.58, 1.08),
-    "1100": (1.08, 1.36, 1.47),
+_BINS: dict[int, tuple[float, float, float]] = {
+    120: (0.603, 0.49, 0.935),
+    240: (0.741, 0.58, 1.08),
+    1100: (1.08, 1.36, 1.47),
 }
 """Depth, width and height [m] by volume [l], of bins after EN 840-1 to EN 840-3 as a German county
 lists them (amtfa.de, "Bauarten der Abfallbehälter")."""
@@ -33,6 +33,7 @@ _SCHEMES = ("#3c4042 #3c4042", "#3c4042 #1f5fa8", "#3c4042 #e0b61e", "#5c4433 #5
             "#2f5f3a #2f5f3a", "#3c4042 #2f6f3a", "#1f4f8f #1f4f8f", "#e0b61e #e0b61e",
             "#3c4042 #a8261f", "#7d8284 #7d8284")  # fmt: skip
 """Body and lid."""
+_LOADS = ("rubble", "wood", "green", "empty")
 _BAGS = ("#17181a", "#17181a", "#212327", "#2c4f86", "#c9ad4a", "#bfc2c0", "#47604c")
 
 
@@ -45,7 +46,7 @@ def wheelie_bin(seed: int) -> Solid:
     rng = variant_rng("wheelie_bin", seed)
     d, w, h = _BINS[size]
     body_color, lid_color = in_turn(_SCHEMES, seed).split()
-    parts = _big_bin(d, w, h, state) if size == "1100" else _small_bin(d, w, h, state)
+    parts = _big_bin(d, w, h, state) if size == 1100 else _small_bin(d, w, h, state)
     if state != "closed":
         bag = lump((0.3 * d, 0.3 * w, 0.2), 0.12, rng, 7).moved(0.0, 0.0, 0.84 * h).painted(5)
         parts.append(bag)
@@ -65,12 +66,13 @@ def wheelie_bin(seed: int) -> Solid:
 def wheelie_bin_facts(seed: int) -> Facts:
     """Its volume [l], and whether its lid is closed."""
     size, state = _bin_kind(seed)
-    return Facts("wheelie_bin", {"volume_l": size, "lid": state})
+    return Facts("wheelie_bin", {"volume_l": str(size), "lid": state})
 
 
-def _bin_kind(seed: int) -> tuple[str, str]:
-    sizes, states = ("240", "120", "240", "1100"), ("closed", "closed", "overfull", "open")
-    return in_turn(sizes, seed), in_turn(states, seed // 4 + seed % 3)
+def _bin_kind(seed: int) -> tuple[int, str]:
+    sizes, states = (240, 120, 240, 1100), ("closed", "closed", "overfull", "open")
+    rng = variant_rng("wheelie_bin", seed)
+    return rng.turn(sizes, "volume_l"), rng.turn(states, "lid", seed // 4 + seed % 3)
 
 
 def _small_bin(d: float, w: float, h: float, state: str) -> list[Patch]:
@@ -148,7 +150,7 @@ def rubbish_bags(seed: int) -> Solid:
     Slots: bags in two colours, cardboard, printed cardboard.
     """
     rng = variant_rng("rubbish_bags", seed)
-    count = (1, 3, 5, 2, 4, 6, 3, 5)[seed % 8]
+    count = rng.turn((1, 3, 5, 2, 4, 6, 3, 5), "count")
     parts, r = [], 0.0
     for k in range(count):
         high = rng.between(0.22, 0.34)
@@ -213,7 +215,7 @@ def skip_container(seed: int) -> Solid:
         for y in (-top_half + 0.1, top_half - 0.1):
             mark = block((-0.012, -0.07, high - 0.3), (0.012, 0.07, high - 0.1), 0.0, 4)
             parts.append(mark.moved(sign * wide, y))
-    load = in_turn(("rubble", "wood", "green", "empty"), seed)
+    load = rng.turn(_LOADS, "load")
     if load != "empty":
         heap = mound((2 * wide - 0.12, 2 * top_half - 0.12), rng.between(0.2, 0.5), (8, 14), rng)
         parts.append(heap.moved(0.0, 0.0, high - 0.12).painted(2))
@@ -239,7 +241,7 @@ def skip_container(seed: int) -> Solid:
 
 def skip_container_facts(seed: int) -> Facts:
     """What it holds."""
-    return Facts("skip", {"load": in_turn(("rubble", "wood", "green", "empty"), seed)})
+    return Facts("skip", {"load": variant_rng("skip_container", seed).turn(_LOADS, "load")})
 
 
 def _trough(

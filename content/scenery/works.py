@@ -37,7 +37,7 @@ from gen_data.content.scenery.clutter_shapes import (
     worn_steel,
 )
 from gen_data.core.asset_types import Material
-from gen_data.core.variant_rng import VariantRng, in_turn, variant_rng
+from gen_data.core.variant_rng import VariantRng, variant_rng
 
 CONES = ("cone", "cone", "beacon", "cone", "fallen", "post")
 BARRIERS = ("boards", "new_jersey", "plastic", "boards", "water_filled", "trestle")
@@ -50,9 +50,10 @@ def traffic_cone(seed: int) -> Solid:
 
     Slots: colour, white, foot.
     """
-    kind, rng = in_turn(CONES, seed), variant_rng("traffic_cone", seed)
+    rng = variant_rng("traffic_cone", seed)
+    kind = rng.turn(CONES, "kind")
     color = rng.choose(("#e2561b", "#e2561b", "#d8401f", "#c9c41f"))
-    dirt = rng.between(0.55, 1.0)
+    dirt = rng.between(0.55, 1.0, "dirt")
     red, green, blue = (dirt * c for c in hex_to_linear(_WHITE))
     materials = (
         worn_paint((_RED if kind == "beacon" else color,), 0.6, rng),
@@ -64,7 +65,7 @@ def traffic_cone(seed: int) -> Solid:
     elif kind == "post":
         parts, high, half = _flexible_post()
     else:
-        high = rng.choose((0.5, 0.75, 0.75, 1.0))
+        high = rng.choose((0.5, 0.75, 0.75, 1.0), "height_m")
         parts, half = _cone(high)
     if kind == "fallen":
         # It rests on the rim of its foot and on its tip.
@@ -80,7 +81,7 @@ def traffic_cone(seed: int) -> Solid:
 
 def traffic_cone_facts(seed: int) -> Facts:
     """Its kind."""
-    return Facts("cone", {"kind": in_turn(CONES, seed)})
+    return Facts("cone", {"kind": variant_rng("traffic_cone", seed).turn(CONES, "kind")})
 
 
 def _cone(high: float) -> tuple[list[Patch], float]:
@@ -130,7 +131,8 @@ def road_barrier(seed: int) -> Solid:
     Kinds: boards on posts, concrete safety shapes, plastic grilles, water-filled plastic shapes,
     boards on trestles.
     """
-    kind, rng = in_turn(BARRIERS, seed), variant_rng("road_barrier", seed)
+    rng = variant_rng("road_barrier", seed)
+    kind = rng.turn(BARRIERS, "kind")
     stone = patterned_material("texture/concrete?seed=3", 2.0, 0.92, (0.9, 0.89, 0.86))
     color = rng.choose((_RED, _RED, "#d9571e"))
     materials = (
@@ -152,13 +154,13 @@ def road_barrier(seed: int) -> Solid:
 
 def road_barrier_facts(seed: int) -> Facts:
     """Its kind."""
-    return Facts(in_turn(BARRIERS, seed))
+    return Facts(variant_rng("road_barrier", seed).turn(BARRIERS, "kind"))
 
 
 def _safety_shape(plastic: bool, seed: int, rng: VariantRng) -> tuple[list[Patch], np.ndarray]:
     """A New Jersey profile: foot 0.6 m wide (0.41 m plastic), 0.8 m high (EN 1317 systems)."""
     half, wide = (0.6, 0.68) if plastic else (1.0, 1.0)
-    high = rng.between(0.8, 0.85)
+    high = rng.between(0.8, 0.85, "height_m")
     flank = [(0.0, 0.3), (0.075, 0.3), (0.33, 0.17), (high, 0.09)]
     outline = np.array([(wide * x, z) for z, x in flank] + [(-wide * x, z) for z, x in flank[::-1]])
     # The outline's second axis becomes Z, the extrusion runs along -Y.
@@ -247,7 +249,8 @@ def construction_fence(seed: int) -> Solid:
 
     Panel size: usual of mobile site fences (assumed, 5 %). Slots: steel, feet, sheet, sign.
     """
-    kind, rng = in_turn(_SITE_FENCES, seed), variant_rng("construction_fence", seed)
+    rng = variant_rng("construction_fence", seed)
+    kind = rng.turn(_SITE_FENCES, "covering")
     half, high, foot = 1.75, 2.0, 0.13
     frame = [(-half, foot), (-half, high), (half, high), (half, foot)]
     parts = [rod([(0.0, y, z) for y, z in frame], 0.021, 6)]
@@ -287,7 +290,10 @@ _SITE_FENCES = ("plain", "netting", "sign", "sheet")
 
 def construction_fence_facts(seed: int) -> Facts:
     """Its covering."""
-    return Facts("construction_fence", {"covering": in_turn(_SITE_FENCES, seed)})
+    return Facts(
+        "construction_fence",
+        {"covering": variant_rng("construction_fence", seed).turn(_SITE_FENCES, "covering")},
+    )
 
 
 def scaffold(seed: int) -> Solid:
@@ -298,7 +304,7 @@ def scaffold(seed: int) -> Solid:
     """
     rng = variant_rng("scaffold", seed)
     # Neighbouring bays have standards of their own, side by side.
-    half, x0, x1, lifts = 1.25, -0.365, 0.365, (3, 4, 3, 5)[seed % 4]
+    half, x0, x1, lifts = 1.25, -0.365, 0.365, rng.turn((3, 4, 3, 5), "lifts")
     top = 2.0 * lifts
     parts = []
     for x in (x0, x1):
@@ -317,7 +323,7 @@ def scaffold(seed: int) -> Solid:
         if k % 2 == seed % 2:
             low, high = 2.0 * k + 0.1, 2.0 * k + 1.9
             parts.append(bar((x1 + 0.03, -half, low), (x1 + 0.03, half, high), 0.017, 5))
-    if seed % 4 in {1, 3}:
+    if rng.turn((False, True), "netting"):
         x = x1 + 0.06
         waves = np.linspace(-half, half, 9)
         rows = [[(x + 0.03 * math.sin(3.0 * float(y) + 1.7 * z), float(y), z) for y in waves]
@@ -336,4 +342,11 @@ def scaffold(seed: int) -> Solid:
 
 def scaffold_facts(seed: int) -> Facts:
     """Whether it carries netting."""
-    return Facts("scaffold", {"netting": "yes" if seed % 4 in {1, 3} else "no"})
+    return Facts(
+        "scaffold",
+        {
+            "netting": "yes"
+            if variant_rng("scaffold", seed).turn((False, True), "netting")
+            else "no"
+        },
+    )

@@ -36,10 +36,10 @@ _HALF_M = 1.275
 def bus(seed: int) -> Solid:
     """A city bus with its doors on the right. Slots and keypoints are those of all vehicles."""
     rng = variant_rng("bus", seed)
-    x, top = 0.5 * rng.between(11.2, 12.2), rng.between(2.95, 3.08)
+    x, top = 0.5 * rng.between(11.2, 12.2, "depth_m"), rng.between(2.95, 3.08, "top_m")
     axles = Axles(x - 2.72, -x + 3.35, 1.08, 0.48, 0.29, 0.56, "truck")
     livery = rng.choose(COLORS["liveries"]).split()
-    body = _body(x, top, axles, striped=rng.chance(0.6))
+    body = _body(x, top, axles, striped=rng.chance(0.6, "striped"))
     body = _doors(body, (x - 0.55, x - 6.0, *((x - 9.6,) if rng.chance(0.5) else ())), top)
     shell = [body, *(drop_uvs(p) for p in axles.wheels(0.0))]
     parts = [*shell, *_fittings(x, top, mirrors=True)]

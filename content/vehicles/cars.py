@@ -99,7 +99,7 @@ def draw_car(body: str, era: str, rng: VariantRng) -> Design:
         ("twin_exhaust", 0.12 if era < "2020s" else 0.05),
     )
     extras = tuple(word for word, share in words if rng.chance(share) and not design.soft_top)
-    bare = rng.chance(time.bare_bumpers)
+    bare = rng.chance(time.bare_bumpers, "bare")
     return replace(
         design,
         length_m=design.length_m * long,
@@ -123,13 +123,13 @@ def draw_car(body: str, era: str, rng: VariantRng) -> Design:
         roof_end=design.roof_end + rng.between(-0.015, 0.01),
         lamp_m=(design.lamp_m[0] + rise, design.lamp_m[1] + rise),
         face=_draw_face(body, time.faces, rng),
-        tail=rng.choose(("pillars", "pillars_red"))
+        tail=rng.choose(("pillars", "pillars_red"), "tail")
         if design.upright_lamps
         else rng.choose(time.tails),
         cladding=design.cladding and (body != "coupe_suv" or rng.chance(0.5)),
         rails=design.rails and rng.chance(0.7),
         bare_bumpers=bare,
-        strip=rng.chance(time.strips),
+        strip=rng.chance(time.strips, "strip"),
         extras=extras,
     )
 
@@ -144,14 +144,14 @@ def draw_van(body: str, era: str, rng: VariantRng) -> Design:
         height_m=design.height_m * high,
         wheelbase_m=design.wheelbase_m * long,
         front_axle_m=design.front_axle_m * long,
-        cladding=rng.chance(0.4),
+        cladding=rng.chance(0.4, "cladding"),
         wheel_radius_m=design.wheel_radius_m + rng.between(-0.01, 0.01),
-        wheel=rng.choose(("steel", "steel", "cap", "cap_ten", "five", "seven")),
+        wheel=rng.choose(("steel", "steel", "cap", "cap_ten", "five", "seven"), "wheel"),
         rows=time.rows,
         face=rng.choose(_VAN_FACES[era]),
-        tail=rng.choose(("pillars", "pillars_red")),
-        bare_bumpers=rng.chance(0.6),
-        strip=rng.chance(0.5),
+        tail=rng.choose(("pillars", "pillars_red"), "tail"),
+        bare_bumpers=rng.chance(0.6, "bare_bumpers"),
+        strip=rng.chance(0.5, "strip"),
         extras=("antenna",) if rng.chance(0.4) else (),
     )
 

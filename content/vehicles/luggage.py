@@ -24,7 +24,11 @@ def draw_color(rng: VariantRng) -> Vec3:
 
 def backpack(seat: Seat, rng: VariantRng) -> Patch:
     """A bag on the rider's back."""
-    depth, width, height = rng.between(0.12, 0.2), rng.between(0.28, 0.34), rng.between(0.4, 0.5)
+    depth, width, height = (
+        rng.between(0.12, 0.2),
+        rng.between(0.28, 0.34),
+        rng.between(0.4, 0.5),
+    )
     back = -0.1
     bag = block((back - depth, -0.5 * width, 0.08), (back, 0.5 * width, 0.08 + height), 0.05, _SLOT)
     return bag.rotated("y", seat.lean_rad).moved(*seat.hips)
@@ -33,7 +37,11 @@ def backpack(seat: Seat, rng: VariantRng) -> Patch:
 def panniers(carrier: Vec3, rng: VariantRng) -> list[Patch]:
     """Bags that hang from a carrier whose middle is given, on one side or both."""
     x, _, z = carrier
-    length, width, height = rng.between(0.28, 0.36), rng.between(0.12, 0.18), rng.between(0.3, 0.4)
+    length, width, height = (
+        rng.between(0.28, 0.36),
+        rng.between(0.12, 0.18),
+        rng.between(0.3, 0.4),
+    )
     first = 1.0 if rng.chance(0.5) else -1.0
     sides = (first, -first) if rng.chance(BOTH_SIDES) else (first,)
     bags = []

@@ -41,7 +41,8 @@ def parked_bicycle(seed: int) -> Solid:
     Some variants are rows of bicycles beside each other in a rack. Slots: those of the bicycles,
     then the hoop's or rack's.
     """
-    kind, rng = in_turn(PARKINGS, seed), variant_rng("parked_bicycle", seed)
+    rng = variant_rng("parked_bicycle", seed)
+    kind = rng.turn(PARKINGS, "parking")
     steel = (GALVANISED if rng.chance(0.6) else painted_material("#3b3d3f", 0.5),)
     count = {"rack": 3, "hoop_pair": 2}.get(kind, 1)
     pieces: list[tuple[list[Patch], tuple[Material, ...]]] = []
@@ -71,7 +72,10 @@ def parked_bicycle(seed: int) -> Solid:
 
 def parked_bicycle_facts(seed: int) -> Facts:
     """How it is parked."""
-    return Facts("parked", {"parking": in_turn(PARKINGS, seed), "rider": "no"})
+    return Facts(
+        "parked",
+        {"parking": variant_rng("parked_bicycle", seed).turn(PARKINGS, "parking"), "rider": "no"},
+    )
 
 
 def _stack(
@@ -138,7 +142,7 @@ def kick_scooter(seed: int) -> Solid:
         rod([(-0.3, 0.0, 0.24), (-0.46, 0.0, 0.28), (-0.55, 0.0, 0.22)], 0.03, 5, 3),
         rod([(-0.05, 0.06, 0.13), (-0.08, 0.16, 0.03)], 0.009, 5, 3),
     ]  # fmt: skip
-    fallen = seed % 5 == 4
+    fallen = _is_fallen(seed)
     lean = 1.42 if fallen else -0.12
     body = join_patches(parts).rotated("x", lean)
     color = in_turn(("#2fb35a", "#17181a", "#e9e9e4", "#e0622a", "#1fa0a8", "#7fc31f"), seed)
@@ -157,7 +161,11 @@ def kick_scooter(seed: int) -> Solid:
 
 def kick_scooter_facts(seed: int) -> Facts:
     """Whether it stands or has fallen over."""
-    return Facts("kick_scooter", {"parking": "fallen" if seed % 5 == 4 else "stand"})
+    return Facts("kick_scooter", {"parking": "fallen" if _is_fallen(seed) else "stand"})
+
+
+def _is_fallen(seed: int) -> bool:
+    return variant_rng("kick_scooter", seed).turn((False,) * 4 + (True,), "fallen")
 
 
 def trailer(seed: int) -> Solid:
@@ -166,8 +174,10 @@ def trailer(seed: int) -> Solid:
     Boxes of 2.0-2.6 x 1.1-1.3 m (assumed from makers' catalogues). Slots: body, second, rim, tyre,
     taillights, tarpaulin, steel, and those of the wheels.
     """
-    kind, rng = in_turn(TRAILERS, seed), variant_rng("trailer", seed)
-    half, wide, floor = 0.5 * rng.between(2.0, 2.6), 0.5 * rng.between(1.1, 1.3), 0.52
+    rng = variant_rng("trailer", seed)
+    kind = rng.turn(TRAILERS, "kind")
+    half, floor = 0.5 * rng.between(2.0, 2.6, "length_m"), 0.52
+    wide = 0.5 * rng.between(1.1, 1.3, "width_m")
     reach = half + 1.15
     parts: list[Patch] = []
     for side in (-1.0, 1.0):
@@ -232,7 +242,7 @@ def trailer(seed: int) -> Solid:
 
 def trailer_facts(seed: int) -> Facts:
     """Its kind."""
-    return Facts(in_turn(TRAILERS, seed))
+    return Facts(variant_rng("trailer", seed).turn(TRAILERS, "kind"))
 
 
 def _paint_wheel(made: Patch) -> Patch:

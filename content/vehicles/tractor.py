@@ -32,9 +32,9 @@ _HALF_M = 1.2
 def tractor(seed: int) -> Solid:
     """A tractor without implements. Slots and keypoints are those of all vehicles."""
     rng = variant_rng("tractor", seed)
-    x = 0.5 * rng.between(4.1, 4.8)
-    rear, front = rng.between(0.84, 0.95), rng.between(0.55, 0.68)
-    top = rng.between(2.75, 3.05)
+    x = 0.5 * rng.between(4.1, 4.8, "depth_m")
+    rear, front = rng.between(0.84, 0.95, "rear_m"), rng.between(0.55, 0.68, "front_m")
+    top = rng.between(2.75, 3.05, "top_m")
     rear_x, front_x = -x + rear + 0.12, x - front - 0.28
     parts = [*_wheels(rear_x, rear, front_x, front)]
     parts += _bonnet(rear_x + 0.85, x, rng)
@@ -81,7 +81,7 @@ def _wheels(rear_x: float, rear: float, front_x: float, front: float) -> list[Pa
 
 def _bonnet(rear_x: float, x: float, rng: VariantRng) -> list[Patch]:
     """Engine, bonnet that falls to the front, grille, weights, exhaust."""
-    low, high, nose = 1.0, rng.between(1.6, 1.75), x - 0.3
+    low, high, nose = 1.0, rng.between(1.6, 1.75, "bonnet_m"), x - 0.3
     side = np.array([(low, 0.0), (high, 0.0), (high - 0.08, nose - rear_x - 0.25),
                      (high - 0.3, nose - rear_x), (low, nose - rear_x)])  # fmt: skip
     path = np.array([(rear_x, -0.42, 0.0), (rear_x, 0.42, 0.0)])

@@ -43,7 +43,7 @@ _SILL_M, _LINTEL_M = 1.0, 2.62
 def tram(seed: int) -> Solid:
     """A tram with doors on both sides. Slots and keypoints are those of all vehicles."""
     rng = variant_rng("tram", seed)
-    half, x = 0.5 * _WIDTHS_M[seed % len(_WIDTHS_M)], 0.5 * rng.between(27.0, 35.0)
+    half, x = 0.5 * rng.turn(_WIDTHS_M, "width_m"), 0.5 * rng.between(27.0, 35.0, "length_m")
     joints = np.linspace(-x, x, (3 if seed % 2 else 5) + 1)[1:-1].tolist()
     main, second = (hex_to_linear(code) for code in rng.choose(COLORS["liveries"]).split())
     shell = [_body(half, x, joints, rng), *_running_gear(x)]

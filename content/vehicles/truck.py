@@ -31,7 +31,7 @@ from gen_data.content.vehicles.vehicle_materials import COLORS, SIDES, Print, ma
 from gen_data.content.vehicles.vehicle_materials import VehicleSlot as Slot
 from gen_data.content.vehicles.wheels import Axles
 from gen_data.core.asset_types import Material
-from gen_data.core.variant_rng import in_turn, variant_rng
+from gen_data.core.variant_rng import variant_rng
 
 _FLOOR_M = 0.42
 _HALF_M = 1.16
@@ -50,12 +50,13 @@ def truck(seed: int) -> Solid:
 
     Randomizers paint the cab; boxes, tanks and beds keep the colour of their kind.
     """
-    rng, kind = variant_rng("truck", seed), in_turn(KINDS, seed)
+    rng = variant_rng("truck", seed)
+    kind = rng.turn(KINDS, "kind")
     longest = 7.6 if kind in ("tipper", "refuse_truck") else 9.8
     x, cab, roof = (
-        0.5 * rng.between(6.6, longest),
-        rng.between(1.75, 2.05),
-        rng.between(2.45, 2.75),
+        0.5 * rng.between(6.6, longest, "depth_m"),
+        rng.between(1.75, 2.05, "cab_m"),
+        rng.between(2.45, 2.75, "roof_m"),
     )
     top = max(roof + 0.25, rng.between(3.0, 3.75))
     loads = {"tipper": _tipper, "tanker": _tank, "flatbed": _flatbed, "car_transporter": _decks,
@@ -67,18 +68,24 @@ def truck(seed: int) -> Solid:
     paints = materials(rng, cab_paint, box_paint)
     keep = replace(paints[Slot.SECOND_PAINT], printed=True)
     finish = (*paints[: Slot.SECOND_PAINT], keep, *paints[Slot.SECOND_PAINT + 1 :])
-    return assemble_truck((x, cab, roof, top), rng.between(0.42, 0.49), load, finish, spoiler)
+    return assemble_truck(
+        (x, cab, roof, top), rng.between(0.42, 0.49, "wheel_radius_m"), load, finish, spoiler
+    )
 
 
 def truck_facts(seed: int) -> Facts:
     """Its kind."""
-    return Facts(in_turn(KINDS, seed))
+    return Facts(variant_rng("truck", seed).turn(KINDS, "kind"))
 
 
 def fire_engine(seed: int) -> Solid:
     """A fire engine with lockers, roller shutters, a ladder and beacons."""
     rng = variant_rng("fire_engine", seed)
-    x, cab, roof = 0.5 * rng.between(7.2, 8.4), rng.between(2.4, 2.7), rng.between(2.6, 2.8)
+    x, cab, roof = (
+        0.5 * rng.between(7.2, 8.4, "depth_m"),
+        rng.between(2.4, 2.7, "cab_m"),
+        rng.between(2.6, 2.8, "roof_m"),
+    )
     top = roof + rng.between(0.15, 0.4)
     red, stripe = hex_to_linear("#b5121b"), hex_to_linear(rng.choose(("#f2e600", "#e9e9e6")))
     finish = materials(rng, red, stripe, printed=Print(fixed=True))

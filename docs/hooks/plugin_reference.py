@@ -165,6 +165,7 @@ def _index() -> str:
     )
     links = ", ".join(f"[{stem}](template.md#{stem})" for stem in stems)
     lines.append(f"| [Templates](template.md) | {links} |")
+    lines.append("| [Families of assets](asset_family.md) | parameters of asset ids |")
     shipped = sorted(path.stem for path in Path(str(files("gen_data.configs"))).glob("*.yaml"))
     names = ", ".join(f"[{name}](../gallery.md#{name})" for name in shipped)
     lines.append(f"| [Configurations](../gallery.md) | {names} |")

@@ -20,6 +20,7 @@ ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT))
 
 from docs.hooks.command_reference import command_page  # noqa: E402
+from docs.hooks.family_reference import family_page  # noqa: E402
 from docs.hooks.plugin_reference import first_comment, plugin_pages, yaml_block  # noqa: E402
 from docs.hooks.python_reference import python_page  # noqa: E402
 
@@ -61,6 +62,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         files.append(File.generated(config, uri, content=(ROOT / path).read_text("utf-8")))
     for uri, text in (
         *plugin_pages(),
+        ("reference/asset_family.md", family_page()),
         ("reference/commands.md", command_page()),
         ("reference/python.md", python_page()),
     ):

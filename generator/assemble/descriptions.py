@@ -10,6 +10,9 @@ from pydantic import BaseModel
 
 from gen_data.assemble.config import GeneralSettings
 from gen_data.assemble.plugin_tables import TABLES, find_plugin
+from gen_data.assets.asset_ids import format_parameter
+from gen_data.assets.families import KIND, family_summary, known_families
+from gen_data.assets.library import open_library
 from gen_data.config.describe import TEXT_WIDTH, describe
 from gen_data.core.errors import ConfigError, did_you_mean
 
@@ -18,11 +21,12 @@ SECTION = "section"
 
 
 def describe_name(name: str) -> str:
-    """Kind, name and description of a plug-in, section, nested mapping or word that selects one.
+    """Kind, name and description of a plug-in, section, nested mapping or family of assets.
 
     Args:
         name: ``coco``, ``exporter/coco``, ``labels``, ``labels.map``, ``rgb_camera.lens``,
-            ``brown_conrady``.
+            ``brown_conrady``, ``desk``; a family of assets has the name of a plug-in:
+            ``asset_family/overpass``.
 
     Raises:
         ConfigError: there is nothing of that name; the message has the nearest.
@@ -47,10 +51,14 @@ def describe_name(name: str) -> str:
         found = _selected_by(first)
     if found:
         return "\n".join(f"{_title(at, model)}\n{describe(model)}" for at, model in found)
+    family = name.removeprefix(f"{KIND}/")
+    if family in known_families() and (name != family or not _is_plugin(name)):
+        return f"{KIND} {family}\n{_describe_family(family)}"
     try:
         kind, plugin = find_plugin(first)
     except ConfigError as error:
         known = {*_sections(), *_words(), *(n for t in TABLES.values() for n in t)}
+        known |= known_families().keys()
         short = first.rpartition("/")[2]
         if "several" in str(error):
             raise
@@ -59,6 +67,35 @@ def describe_name(name: str) -> str:
             "gen-data describe"
         ) from None
     return f"{kind} {first}\n{describe(plugin)}"
+
+
+def _is_plugin(name: str) -> bool:
+    return any(name in table for table in TABLES.values())
+
+
+def _describe_family(name: str) -> str:
+    """Summary of a family of assets, its parameters with their values, and an example."""
+    family = known_families()[name]
+    lines = [_fill(family_summary(family)), ""]
+    lines += [f"{key}: default {_in_id(value)}" for key, value in family.parameters.items()]
+    if not family.variants:
+        return "\n".join(lines) + "\n"
+    lines += [f"seed: the variants 0 to {family.variants - 1} are offered for selection; default 0"]
+    drawn = open_library().parameters(name)
+    for parameter in drawn:
+        some = "" if parameter.is_common else " (of some variants)"
+        lines.append(_fill(f"{parameter.name}: {parameter.words()}{some}", "        "))
+    lines += ["", "Values that an id does not give are drawn from the seed. Example:"]
+    asked = [f"{p.name}={_in_id(p.values[0])}" for p in drawn[:1] if p.is_common]
+    return "\n".join((*lines, f"  asset: {name}?{'&'.join((*asked, 'seed=0'))}")) + "\n"
+
+
+def _in_id(value: Any) -> str:
+    return format_parameter(round(value, 3) if isinstance(value, float) else value)
+
+
+def _fill(text: str, others: str = "") -> str:
+    return textwrap.fill(text, TEXT_WIDTH, subsequent_indent=others, break_on_hyphens=False)
 
 
 def described_models(kind: str) -> Iterator[tuple[str, type[BaseModel]]]:

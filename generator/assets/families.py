@@ -12,7 +12,7 @@ from functools import cache
 from typing import Any
 
 from gen_data.assets.content import content
-from gen_data.assets.family import EnvironmentFamily, Family, Lazy, TextureFamily
+from gen_data.assets.family import EnvironmentFamily, Family, Lazy, TextureFamily, Worn
 from gen_data.core.errors import AssetError, ConfigError
 from gen_data.core.plugins import loaded, package_of, third_party
 
@@ -63,6 +63,19 @@ def third_party_families() -> Mapping[str, tuple[AnyFamily, str]]:
             )
         found[_PREFIXES[kind_of(family)] + name] = (family, package_of(entry))
     return found
+
+
+def known_families() -> Mapping[str, AnyFamily]:
+    """Our own families and those of third-party packages, by the first part of ids."""
+    return {**{n: family for n, (family, _) in third_party_families().items()}, **own_families()}
+
+
+def family_summary(family: AnyFamily) -> str:
+    """First line of the docstring of a family's function."""
+    build: Any = family.build
+    while isinstance(build, (Worn, Lazy)):
+        build = build.build if isinstance(build, Worn) else build.value
+    return (getattr(build, "__doc__", None) or "").strip().partition("\n")[0]
 
 
 def declared(asset_id: str, fact: str, default: Any = _REQUIRED) -> Any:

@@ -10,6 +10,7 @@ import numpy as np
 
 from gen_data.assets.asset_cache import Arrays, DiskCache, Store, content_key
 from gen_data.assets.asset_ids import parse_asset_id
+from gen_data.assets.family_parameters import FamilyParameter
 from gen_data.assets.file_library import FileLibrary
 from gen_data.assets.importer import FileRemarks, ImportedMesh
 from gen_data.assets.paths import packs_dir
@@ -128,6 +129,16 @@ class Library:
     def _hold(self, asset: Asset) -> Asset:
         """Keep a description, so that asking for it by its id reads nothing again."""
         return self._entries.get(asset.asset_id, lambda: asset)
+
+    def parameters(self, family: str, variants: int = 24) -> tuple[FamilyParameter, ...]:
+        """Named draws of a procedural family in its first variants, which it makes.
+
+        Raises:
+            UnknownAsset: if there is no such family.
+        """
+        if not self._is_generated(family):
+            raise UnknownAsset(f"asset '{family}': is a file, which has no parameters")
+        return self._generated.parameters(family, variants)
 
     def materials(self, asset_id: str) -> tuple[Material, ...]:
         """The asset's own materials, one per mesh slot."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 from functools import partial
 from typing import Any, TypeVar
 
@@ -16,10 +16,12 @@ from gen_data.assets.asset_cache import Arrays, Store, content_key
 from gen_data.assets.asset_ids import AssetId, ParameterValue, format_parameter
 from gen_data.assets.families import AnyFamily, kind_of, own_families, third_party_families
 from gen_data.assets.family import EnvironmentFamily, Facts, Family, TextureFamily
+from gen_data.assets.family_parameters import FamilyParameter, merge_draws
 from gen_data.assets.importer import ImportedMesh
 from gen_data.core.asset_types import Asset, Float32, Symmetry, TextureData
 from gen_data.core.bounded_cache import CountCache, Sized
 from gen_data.core.errors import AssetError, did_you_mean
+from gen_data.core.variant_rng import Draw, drawing
 
 VERSION = 4
 """Increased whenever code shared by all families generates different geometry."""
@@ -30,6 +32,7 @@ _offered: CountCache[tuple[AnyFamily, Asset]] = CountCache(16384)
 """Descriptions of assets offered for selection, about 1 kB each: every library of a process has the
 same, each search by tags finds many of them, and their facts take a millisecond."""
 S = TypeVar("S", bound=Sized)
+T = TypeVar("T")
 F = TypeVar("F", Family, TextureFamily, EnvironmentFamily)
 
 
@@ -69,7 +72,22 @@ class ProceduralLibrary:
         name = f"{id(family)}/{asset_id}"
         return _offered.get(name, lambda: (family, self._describe(asset_id, family)))[1]
 
+    def draws(self, asset_id: AssetId) -> dict[str, Draw]:
+        """Named draws of an asset with a known name, in their order; makes the asset."""
+        try:
+            return _make_and_list(asset_id, self._families[asset_id.name])[1]
+        except ValueError as error:
+            raise AssetError(f"asset '{asset_id}': {error}") from error
+
+    def parameters(self, name: str, variants: int) -> tuple[FamilyParameter, ...]:
+        """Named draws of the first variants of a family with a known name, which are made."""
+        seeds = range(min(self._families[name].variants, variants))
+        return merge_draws(self.draws(AssetId(name, {"seed": k})) for k in seeds)
+
     def _describe(self, asset_id: AssetId, family: AnyFamily) -> Asset:
+        if _merge_arguments(asset_id, family)[1]:
+            # Possible values depend on other draws: only making the asset finds wrong ones.
+            _MAKE[kind_of(family)](self, asset_id)
         facts = _read_facts(asset_id, family)
         origin = family.origin
         return Asset(
@@ -93,7 +111,7 @@ class ProceduralLibrary:
         family = self._find(asset_id, Family, "an object")
 
         def compute() -> ImportedMesh:
-            solid = family.build(**_merge_arguments(asset_id, family))
+            solid = _make(asset_id, family)
             return ImportedMesh(
                 solid.mesh, solid.collision, {}, solid.keypoints, solid.body_bounds_m
             )
@@ -103,15 +121,13 @@ class ProceduralLibrary:
     def texture(self, asset_id: AssetId) -> TextureData:
         """Images of a texture."""
         family = self._find(asset_id, TextureFamily, "a texture")
-        arguments = _merge_arguments(asset_id, family)
-        compute: Callable[[], TextureData] = partial(family.build, **arguments)
+        compute: Callable[[], TextureData] = partial(_make, asset_id, family)
         return self._result(asset_id, family, compute, pack_texture, unpack_texture)
 
     def environment(self, asset_id: AssetId) -> Float32:
         """Pixels of an environment."""
         family = self._find(asset_id, EnvironmentFamily, "an environment")
-        arguments = _merge_arguments(asset_id, family)
-        compute: Callable[[], Float32] = partial(family.build, **arguments)
+        compute: Callable[[], Float32] = partial(_make, asset_id, family)
         pack, unpack = (lambda image: {"radiance": image}), (lambda arrays: arrays["radiance"])
         return self._result(asset_id, family, compute, pack, unpack)
 
@@ -148,8 +164,9 @@ class ProceduralLibrary:
         return self._keys.get(str(asset_id), lambda: self._content_key(asset_id, family))
 
     def _content_key(self, asset_id: AssetId, family: AnyFamily) -> str:
-        arguments = _merge_arguments(asset_id, family)
-        parameters = {name: format_parameter(value) for name, value in arguments.items()}
+        arguments, asked = _merge_arguments(asset_id, family)
+        given = {**arguments, **asked}
+        parameters = {name: format_parameter(value) for name, value in given.items()}
         version = [VERSION, family.version]
         content = {"family": asset_id.name, "version": version, "parameters": parameters}
         if asset_id.name in self._packages:
@@ -167,13 +184,47 @@ def _is_offered(asset_id: AssetId, family: AnyFamily) -> bool:
 def _read_facts(asset_id: AssetId, family: AnyFamily) -> Facts:
     if not isinstance(family, Family) or family.facts is None:
         return Facts()
-    return family.facts(**_merge_arguments(asset_id, family))
+    return _call(family.facts, asset_id, family)[0]
 
 
 def _list_symmetries(asset_id: AssetId, family: AnyFamily) -> tuple[Symmetry, ...]:
     if not isinstance(family, Family) or family.symmetries is None:
         return ()
-    return family.symmetries(**_merge_arguments(asset_id, family))
+    return _call(family.symmetries, asset_id, family)[0]
+
+
+def _make(asset_id: AssetId, family: AnyFamily) -> Any:
+    return _make_and_list(asset_id, family)[0]
+
+
+def _make_and_list(asset_id: AssetId, family: AnyFamily) -> tuple[Any, dict[str, Draw]]:
+    """An asset, and its named draws.
+
+    Raises:
+        AssetError: the id has a parameter that the variant neither takes nor draws.
+        ValueError: it has an impossible value.
+    """
+    made, drawn = _call(family.build, asset_id, family)
+    arguments, asked = _merge_arguments(asset_id, family)
+    for key in asked:
+        if key not in drawn:
+            raise _unknown_parameter(asset_id, key, {*arguments, *drawn})
+    return made, drawn
+
+
+def _call(
+    function: Callable[..., T], asset_id: AssetId, family: AnyFamily
+) -> tuple[T, dict[str, Draw]]:
+    arguments, asked = _merge_arguments(asset_id, family)
+    with drawing(asked) as drawn:
+        return function(**arguments), drawn
+
+
+def _unknown_parameter(asset_id: AssetId, key: str, known: Collection[str]) -> AssetError:
+    return AssetError(
+        f"asset '{asset_id}': '{asset_id.name}' has no parameter '{key}'"
+        f"{did_you_mean(key, known)}; expected {', '.join(sorted(known)) or 'none'}"
+    )
 
 
 def _list_tags(name: str, family: AnyFamily) -> tuple[str, ...]:
@@ -183,23 +234,26 @@ def _list_tags(name: str, family: AnyFamily) -> tuple[str, ...]:
     return tuple(sorted(words))
 
 
-def _merge_arguments(asset_id: AssetId, family: AnyFamily) -> dict[str, Any]:
-    """Every parameter of a family's function, from the id or by default.
+def _merge_arguments(
+    asset_id: AssetId, family: AnyFamily
+) -> tuple[dict[str, Any], dict[str, ParameterValue]]:
+    """Every parameter of a family's function, from the id or by default; values of draws.
 
     Raises:
-        AssetError: if the id has an unknown parameter, or one of the wrong type.
+        AssetError: if the id has a parameter of the wrong type, or an unknown one and no seed.
     """
-    defaults: dict[str, Any] = dict(family.parameters)
+    arguments: dict[str, Any] = dict(family.parameters)
+    asked: dict[str, ParameterValue] = {}
     if family.variants or not isinstance(family, Family):
-        defaults.setdefault("seed", 0)
+        arguments.setdefault("seed", 0)
     for key, value in asset_id.parameters.items():
-        if key not in defaults:
-            raise AssetError(
-                f"asset '{asset_id}': '{asset_id.name}' has no parameter '{key}'"
-                f"{did_you_mean(key, defaults)}; expected {', '.join(sorted(defaults)) or 'none'}"
-            )
-        defaults[key] = _check_type(asset_id, key, value, defaults[key])
-    return defaults
+        if key in arguments:
+            arguments[key] = _check_type(asset_id, key, value, arguments[key])
+        elif "seed" in arguments:
+            asked[key] = value
+        else:
+            raise _unknown_parameter(asset_id, key, arguments)
+    return arguments, asked
 
 
 def _check_type(asset_id: AssetId, key: str, value: ParameterValue, default: Any) -> ParameterValue:
@@ -216,3 +270,10 @@ def _check_type(asset_id: AssetId, key: str, value: ParameterValue, default: Any
         expected = "a word" if isinstance(default, str) else "a number"
         raise AssetError(f"asset '{asset_id}': {key} expects {expected}")
     return float(value) if isinstance(default, float) and isinstance(value, int) else value
+
+
+_MAKE: Mapping[str, Callable[[ProceduralLibrary, AssetId], object]] = {
+    "object": ProceduralLibrary.imported,
+    "texture": ProceduralLibrary.texture,
+    "environment": ProceduralLibrary.environment,
+}

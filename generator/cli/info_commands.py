@@ -13,10 +13,10 @@ import click
 @click.command()
 @click.argument("name", required=False)
 def describe(name: str | None) -> None:
-    """Explain a plug-in, section, distribution, template or configuration.
+    """Explain a plug-in, section, distribution, template, configuration or family of assets.
 
-    NAME may be a nested mapping: labels.map, rgb_camera.lens, brown_conrady. Without NAME,
-    all are listed.
+    NAME may be a nested mapping: labels.map, rgb_camera.lens, brown_conrady; or the part of
+    asset ids before the question mark: desk. Without NAME, all but families are listed.
     """
     from gen_data.assemble.descriptions import describe_name, list_names_of, section_names
     from gen_data.assemble.plugin_tables import TABLES

@@ -36,6 +36,7 @@ class Label:
         truncation, visible_fraction: Fractions; None = not annotated.
         distance_m: Horizontal distance from the camera to the box's centre; None = not annotated.
         size_lwh_m: Length (along X), width, height; None = not annotated.
+        asset: Id of its asset; empty = not known.
     """
 
     image: tuple[str, str]
@@ -48,6 +49,7 @@ class Label:
     visible_fraction: float | None = None
     distance_m: float | None = None
     size_lwh_m: Vec3 | None = None
+    asset: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,6 +159,7 @@ def _label(split: str, category: str, row: dict[str, Any]) -> Label:
         row.get("visible_fraction"),
         None if box is None else math.hypot(box["center_m"][0], box["center_m"][2]),
         None if box is None else tuple(box["size_m"]),
+        row.get("attributes", {}).get("asset", ""),
     )
 
 

@@ -29,11 +29,13 @@ class Survey:
         images: Number of objects by (split, image).
         numbers: Rows of ``COLUMNS``, one per object, by (category, KITTI's type).
         points: Numbers of keypoints outside the image, hidden and visible, by category.
+        assets: Number of objects by (category, id of the asset).
     """
 
     images: Counter[tuple[str, str]] = field(default_factory=Counter)
     numbers: dict[tuple[str, str], array[float]] = field(default_factory=dict)
     points: dict[str, list[int]] = field(default_factory=dict)
+    assets: Counter[tuple[str, str]] = field(default_factory=Counter)
 
     @property
     def categories(self) -> tuple[str, ...]:
@@ -80,6 +82,8 @@ def add_record(found: Survey, record: Picture | Label | Points) -> None:
         found.images[record.image] += 1
         column = found.numbers.setdefault((record.category, record.kind), array("d"))
         column.extend(_row(record))
+        if record.asset:
+            found.assets[record.category, record.asset] += 1
 
 
 def _row(label: Label) -> tuple[float, ...]:

@@ -44,6 +44,7 @@ TYPES = {name: KittiType(**row) for name, row in _KITTI["types"].items()}
 DIFFICULTIES = tuple(Difficulty(**row) for row in _KITTI["difficulties"])
 
 NOTHING = "-"
+EVERY = "all"
 TRUNCATED = 0.15
 """Fraction outside the image above which KITTI's easy level excludes an object."""
 
@@ -75,6 +76,8 @@ class Histogram:
 def make_tables(found: Survey) -> tuple[Table, ...]:
     """All tables of a report; keypoints and the comparison with KITTI only if they apply."""
     made = [_images(found), _objects(found), _hidden(found), _sizes(found)]
+    if found.assets:
+        made.append(_diversity(found))
     if found.points:
         made.append(_keypoints(found))
     if any(kind in TYPES and kind != "Misc" for _, kind in found.numbers):
@@ -211,6 +214,31 @@ def _sizes(found: Survey) -> Table:
         rows.append((name, _quantiles(c["distance_m"], 1), *sizes))
     header = ("category", "distance m", "height m", "width m", "length m")
     return Table("Distance and size", header, tuple(rows), "Sizes: mean and standard deviation.")
+
+
+def _diversity(found: Survey) -> Table:
+    families: dict[tuple[str, str], list[int]] = {}
+    for (category, asset), n in sorted(found.assets.items()):
+        family, question_mark, _ = asset.partition("?")
+        families.setdefault((category, EVERY), []).append(n)
+        if question_mark:
+            families.setdefault((category, family), []).append(n)
+    rows = [
+        (category, family, f"{sum(counts)}", f"{len(counts)}", f"{entropy_bits(counts):.2f}")
+        for (category, family), counts in sorted(families.items())
+    ]
+    header = ("category", "family", "objects", "variants", "entropy bits")
+    note = (
+        "Variants: different asset ids. Entropy (Shannon 1948): 3 bits are as diverse as 8 equally "
+        "frequent variants."
+    )
+    return Table("Diversity", header, tuple(rows), note)
+
+
+def entropy_bits(counts: Sequence[int]) -> float:
+    """Shannon entropy of frequencies [bits]; 0 for a single value."""
+    share = np.array(counts, np.float64) / sum(counts)
+    return float(-(share * np.log2(share)).sum()) + 0.0
 
 
 def _keypoints(found: Survey) -> Table:

@@ -189,6 +189,7 @@ def _records(image: ImageLabels, item: Mapping[str, Any]) -> Iterator[Label | Po
         item.get("visible_fraction"),
         None if center_m is None else math.hypot(center_m[0], center_m[2]),
         None if box3d is None else tuple(box3d["size_m"]),
+        plain["asset"],
     )
     points = item.get("keypoints")
     if points:

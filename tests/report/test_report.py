@@ -83,10 +83,30 @@ def test_cocos_files_are_read_an_object_at_a_time(street: Path) -> None:
     ]
     labels = [r for r in found if isinstance(r, Label)]
     assert labels[1] == Label(
-        ("train", "1"), "car", "Car", 60, 45, 1, 0.0, 0.6, 13.0, (4.0, 1.6, 1.5)
+        ("train", "1"), "car", "Car", 60, 45, 1, 0.0, 0.6, 13.0, (4.0, 1.6, 1.5), "it"
     )
     assert (labels[3].kind, labels[3].occlusion_level) == ("Person_sitting", 2)
     assert [r for r in found if isinstance(r, Points)] == [Points("person", (1, 1, 2))]
+
+
+def test_diversity_counts_variants_by_category_and_family() -> None:
+    """Four cars of one family, one half of them alike: 2/4, 1/4, 1/4 have 1.5 bits."""
+    ids = ["car?seed=1", "car?seed=1", "car?seed=2", "car?seed=3", "user/van", "user/van"]
+    labels = [Label(("train", "1"), "car", "Car", 9, 9, asset=asset) for asset in ids]
+    survey = collect_statistics([*labels, Label(("train", "1"), "dog", "Misc", 9, 9)])
+
+    (table,) = (one for one in make_tables(survey) if one.title == "Diversity")
+
+    assert table.header == ("category", "family", "objects", "variants", "entropy bits")
+    # All: 2/6, 1/6, 1/6, 2/6, so 2/3 log2 3 + 1/3 log2 6 = 1.9183 bits.
+    assert table.rows == (("car", "all", "6", "4", "1.92"), ("car", "car", "4", "3", "1.50"))
+
+
+def test_labels_without_assets_have_no_table_of_diversity() -> None:
+    """KITTI's files name none."""
+    survey = collect_statistics([Label(("train", "1"), "Car", "Car", 9, 9)])
+
+    assert "Diversity" not in {one.title for one in make_tables(survey)}
 
 
 def test_kittis_files_are_read_where_there_is_no_coco(tmp_path: Path) -> None:
