@@ -242,14 +242,16 @@ def _print_findings(findings: Sequence[Finding]) -> None:
 
     from gen_data.assets.checking import NO_LICENCE
 
-    rows = []
+    rows = [("id", "state", "kind", "category", "size [m]", "triangles", "unit", "up")]
     for one in findings:
         size = " x ".join(f"{edge:.3g}" for edge in one.size_m) if one.size_m else ""
         doubts = set(one.warnings) - {NO_LICENCE}
         state = "cannot be used" if one.error else "doubtful" if doubts else "ok"
         facts = (one.asset_id, state, one.kind, one.category, size, str(one.triangles or ""))
         rows.append((*facts, one.unit, one.up))
-    header = ("id", "state", "kind", "category", "size [m]", "triangles", "unit", "up")
+    # A sky has no triangles: columns without a value are left out.
+    columns = (column for column in zip(*rows, strict=True) if any(column[1:]))
+    header, *rows = zip(*columns, strict=True)
     print_tables(Console(), [{"title": "", "header": header, "rows": rows, "note": ""}])
     for one in findings:
         for problem in (one.error, one.note, *one.warnings):
