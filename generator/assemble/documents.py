@@ -101,7 +101,9 @@ def load_config_document(name: str) -> Node:
     Raises:
         ConfigError: a file is missing or invalid, or extends itself.
     """
-    path = find_path(name, None, "", "configuration", shipped=_shipped_files(configs))
+    shipped = _shipped_files(configs)
+    also = "the folder of a data set"
+    path = find_path(name, None, "", "configuration", shipped=shipped, also=also)
     return _complete(load_yaml(path), (path,))
 
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from gen_data.cli.tables import print_tables
 from gen_data.core.errors import AssetError, ConfigError, did_you_mean
 
 if TYPE_CHECKING:
@@ -236,23 +237,22 @@ def _nothing_has(tags: tuple[str, ...], library: Library) -> str:
 
 
 def _print_findings(findings: Sequence[Finding]) -> None:
-    """Print a table, followed by all errors, measurements and warnings in full."""
+    """Print a table, followed by all errors, measurements and warnings, each on one line."""
     from rich.console import Console
-    from rich.table import Table
-    from rich.text import Text
 
     from gen_data.assets.checking import NO_LICENCE
 
-    table = Table("id", "kind", "category", "triangles", "size [m]", "unit", "up", "state")
+    rows = [("id", "state", "kind", "category", "size [m]", "triangles", "unit", "up")]
     for one in findings:
         size = " x ".join(f"{edge:.3g}" for edge in one.size_m) if one.size_m else ""
         doubts = set(one.warnings) - {NO_LICENCE}
         state = "cannot be used" if one.error else "doubtful" if doubts else "ok"
-        cells = (one.asset_id, one.kind, one.category, str(one.triangles or ""), size, one.unit)
-        table.add_row(*(Text(cell) for cell in (*cells, one.up, state)))
-    # A fixed width for log files; a terminal uses its own.
-    console = Console()
-    Console(width=None if console.is_terminal else 160).print(table)
+        facts = (one.asset_id, state, one.kind, one.category, size, str(one.triangles or ""))
+        rows.append((*facts, one.unit, one.up))
+    # A sky has no triangles: columns without a value are left out.
+    columns = (column for column in zip(*rows, strict=True) if any(column[1:]))
+    header, *rows = zip(*columns, strict=True)
+    print_tables(Console(), [{"title": "", "header": header, "rows": rows, "note": ""}])
     for one in findings:
         for problem in (one.error, one.note, *one.warnings):
             if problem and problem != NO_LICENCE:

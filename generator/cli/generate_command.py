@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from gen_data.api.generate import generate
 from gen_data.cli.options import ConfigurationOptions
+from gen_data.cli.tables import print_facts
 from gen_data.core.errors import SamplesSkipped
 
 if TYPE_CHECKING:
@@ -117,12 +118,8 @@ def print_summary(summary: Summary) -> None:
         SamplesSkipped: the data set does not have all of its samples.
     """
     from rich.console import Console
-    from rich.table import Table
 
-    table = Table(title=summary.folder, show_header=False)
-    for name, value in summary.rows():
-        table.add_row(name, value)
-    Console(stderr=True).print(table)
+    print_facts(Console(stderr=True), summary.folder, summary.rows())
     if summary.failed:
         raise SamplesSkipped(
             f"{len(summary.failed)} samples could not be made and were skipped; the first one: "

@@ -11,6 +11,7 @@ import click
 
 from gen_data.cli.cost_estimate import Prices, Probe, estimate_rows
 from gen_data.cli.options import ConfigurationOptions, configuration_options
+from gen_data.cli.tables import print_facts
 from gen_data.core.errors import ConfigError, NoLabels
 from gen_data.core.system_calls import usable_cores
 
@@ -51,19 +52,13 @@ def plan(
     if probe is None and prices != Prices():
         raise ConfigError("--price-per-...: needs measured hours; expected --probe K with it")
     from rich.console import Console
-    from rich.table import Table
 
     choice = ConfigurationOptions(source, seed, overrides, without)
     config = choice.config()
-    table = Table(title=f"{config.name}: {n} samples", show_header=False)
-    for name, value in _rows(config, n):
-        table.add_row(name, value)
+    facts = list(_rows(config, n))
     if probe is not None:
-        cores = usable_cores()
-        for name, value in estimate_rows(_measure(choice, probe), n, cores, prices):
-            table.add_row(name, value)
-    console = Console()
-    Console(width=None if console.is_terminal else 120).print(table)
+        facts += estimate_rows(_measure(choice, probe), n, usable_cores(), prices)
+    print_facts(Console(), f"{config.name}: {n} samples", facts)
 
 
 def _rows(config: Config, n: int) -> Iterator[tuple[str, str]]:
@@ -102,7 +97,7 @@ def _rows(config: Config, n: int) -> Iterator[tuple[str, str]]:
         yield f"export {name}", docstring_summary(type(exporter))
     used = [asset.asset_id for asset in possible_assets(factory)]
     for remarks in collect_remarks(factory.library, used):
-        yield f"not used in {remarks.file}", "; ".join(remarks.unused)
+        yield "not used", f"{remarks.file}: {'; '.join(remarks.unused)}"
     yield "size, estimated", f"{format_bytes(estimate_image_bytes(config, info) * n)} of images"
 
 

@@ -7,11 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rich.console import Console
+    from rich.table import Table
 
 GAP = 3
 """Blanks between two columns, and around a table."""
 TEXT_WIDTH = 40
 """Columns of the longest texts, which are wrapped."""
+_UNLIMITED = 10_000
 
 
 def print_tables(console: Console, tables: Iterable[Mapping[str, Any]]) -> None:
@@ -44,7 +46,29 @@ def print_tables(console: Console, tables: Iterable[Mapping[str, Any]]) -> None:
             for row in table["rows"]:
                 # Names are text: brackets in them are not markup.
                 shown.add_row(*(Text(row[number]) for number in group))
-            console.print(shown)
+            _print_whole(console, shown)
+
+
+def print_facts(console: Console, title: str, facts: Iterable[tuple[str, str]]) -> None:
+    """Print names and their values as a table; values are wrapped between words."""
+    from rich.table import Table
+    from rich.text import Text
+
+    rows = [(Text(name), Text(value)) for name, value in facts]
+    table = Table(title=Text(title), show_header=False)
+    table.add_column(min_width=max(len(name) for name, _ in rows))
+    table.add_column(overflow="fold")
+    for row in rows:
+        table.add_row(*row)
+    _print_whole(console, table)
+
+
+def _print_whole(console: Console, table: Table) -> None:
+    """Print a table without cutting a word: files have lines as long as paths need."""
+    if not console.is_terminal:
+        needed = console.measure(table, options=console.options.update(width=_UNLIMITED)).minimum
+        console.width = max(console.width, needed)
+    console.print(table)
 
 
 def _width(column: Sequence[str]) -> int:

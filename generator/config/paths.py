@@ -32,6 +32,7 @@ def find_path(
     *,
     shipped: Sequence[Path] = (),
     is_folder: bool = False,
+    also: str = "",
 ) -> Path:
     """Find a file or folder that a configuration names.
 
@@ -42,6 +43,7 @@ def find_path(
         kind: Noun for the message, such as ``template``.
         shipped: Files of the package.
         is_folder: Whether a folder is expected.
+        also: What the caller takes instead of a file, for the message; empty = nothing.
 
     Raises:
         ConfigError: there is none; the message gives the path.
@@ -67,9 +69,11 @@ def find_path(
             "with 'aws s3 cp --recursive'"
         )
     elif name and not is_folder and path.is_dir():
-        fact = f"'{abbreviate(str(path), 300)}' is a folder; expected a file with a {kind}"
+        expected = f"a file with a {kind}{also and f', or {also}'}"
+        fact = f"'{abbreviate(str(path), 300)}' is a folder; expected {expected}"
     elif by_name:
-        fact += f"{did_you_mean(name, by_name)}; gen-data describe lists the shipped ones"
+        expected = f"a file{also and f', {also}'} or a shipped name, which gen-data describe lists"
+        fact += f"{did_you_mean(name, by_name)}; expected {expected}"
     raise _error(position, field, fact)
 
 

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from tests.architecture.test_import_root import FOLDERS, LINKS, ROOT
+from tests.repository import repository_files
 
 BUILT = ("pyproject.toml", "setup.py", "README.md", "LICENSE")
 
@@ -73,6 +74,18 @@ def test_a_checkout_imports_its_own_folders(tmp_path: Path, links: bool) -> None
         place / "exporters/__init__.py",
         place / "generator/core/se3.py",
     ]
+
+
+@pytest.mark.skipif(
+    not ((ROOT / ".git").exists() and shutil.which("git")), reason="an archive, or no git"
+)
+def test_files_are_found_without_git() -> None:
+    """The same ones as git finds; deleted ones and links to folders are none."""
+    command = ["git", "ls-files", "--cached", "--others", "--exclude-standard"]
+    listed = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout
+
+    files = {name for name in listed.splitlines() if (ROOT / name).is_file()}
+    assert set(repository_files()) == files
 
 
 @pytest.mark.slow

@@ -88,6 +88,24 @@ def test_the_command_fails_if_an_asset_cannot_be_used(folder: Path) -> None:
     assert "1 asset can be used" in result.output
 
 
+def test_what_a_check_prints_fits_a_terminal(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """80 columns also where the output is piped, with whole words; the state stands first."""
+    name = "a_crate_with_a_long_name"
+    (folder / "crate.glb").rename(folder / f"{name}.glb")
+    text = (folder / "assets.yaml").read_text()
+    (folder / "assets.yaml").write_text(text.replace("crate.glb", f"{name}.glb"))
+    monkeypatch.chdir(folder)
+
+    lines = CliRunner().invoke(assets, ["check", "."]).output.splitlines()
+
+    assert max(map(len, lines)) <= 80
+    words = [line.split() for line in lines]
+    assert [f"user/{name}", "ok", "object", "props"] in words
+    assert ["user/broken", "cannot", "be", "used", "object", "props"] in words
+    assert not any("…" in line for line in lines)
+    assert "unit may be mm (0.04 m), cm (0.4 m), in (1.016 m)" in " ".join(" ".join(lines).split())
+
+
 def test_pictures_show_every_asset(folder: Path, tmp_path: Path) -> None:
     """Each tile has something brighter than its background, and something of it is seen."""
     (folder / "assets.yaml").write_text("assets: [{file: crate.glb}]\n")

@@ -92,8 +92,8 @@ def test_the_message_says_where_it_was_looked_for(tmp_path: Path) -> None:
 
     assert str(caught.value) == (
         f"{document}:2:5: template: there is no template 'stret'; "
-        f"looked for '{tmp_path / 'stret'}' (did you mean 'street.yaml'?); gen-data describe lists "
-        "the shipped ones"
+        f"looked for '{tmp_path / 'stret'}' (did you mean 'street.yaml'?); expected a file or a "
+        "shipped name, which gen-data describe lists"
     )
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import subprocess
 from importlib.metadata import PathDistribution
 from pathlib import Path
 
@@ -14,8 +13,8 @@ from gen_data.cli.doctor import CHECKS
 from gen_data.core import distribution
 from gen_data.core.distribution import DISTRIBUTION, install_command
 from gen_data.core.errors import SampleError
+from tests.repository import ROOT, repository_files
 
-ROOT = Path(__file__).parents[2]
 HISTORY = {"CHANGELOG.md", "tests/core/test_distribution.py"}
 """The page of past changes, and this list of what must not be."""
 AS_REQUIREMENT = re.compile(
@@ -49,13 +48,10 @@ def test_the_name_is_that_of_the_project() -> None:
 
 def test_nothing_asks_an_index_for_the_project_that_took_the_short_name() -> None:
     """Neither documents nor messages, workflows, plug-ins or the project's own extras."""
-    listed = subprocess.run(
-        ["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True
-    ).stdout.splitlines()
     found = [
         f"{name}:{text.count(chr(10), 0, hit.start()) + 1}: {hit.group()}"
-        for name in listed
-        if name not in HISTORY and (ROOT / name).is_file()
+        for name in repository_files()
+        if name not in HISTORY
         for text in [(ROOT / name).read_text("utf-8", "replace")]
         for hit in AS_REQUIREMENT.finditer(text)
     ]

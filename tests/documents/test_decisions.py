@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import re
-import subprocess
 from functools import cache
 from pathlib import Path, PurePosixPath
 
 import pytest
 
-ROOT = Path(__file__).parents[2]
+from tests.repository import ROOT, repository_files
+
 PAGES = sorted({*ROOT.glob("docs/decisions/*.md")} - {ROOT / "docs/decisions/README.md"})
 PARTS = ("Answer", "Because", "Would change if")
 MOST_ENTRIES = 12
@@ -39,11 +39,8 @@ def parts(entry: str) -> list[str]:
 
 @cache
 def paths() -> frozenset[str]:
-    """Files of the repository and their folders, without those that are deleted."""
-    listed = subprocess.run(
-        ["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True
-    ).stdout.splitlines()
-    files = [PurePosixPath(name) for name in listed if (ROOT / name).is_file()]
+    """Files of the repository and their folders."""
+    files = map(PurePosixPath, repository_files())
     return frozenset(str(path) for file in files for path in (file, *file.parents))
 
 

@@ -68,6 +68,29 @@ def test_configurations_are_suggested_only_if_similar(tmp_path: Path) -> None:
     assert "did you mean 'tabletop.yaml'?" in near.stderr
 
 
+@pytest.mark.parametrize(
+    "command", [("repro", "-i", "0"), ("sample", "-i", "0", "-o", "x"), ("contact-sheet",)]
+)
+def test_commands_that_take_a_configuration_or_a_data_set_expect_both(
+    command: tuple[str, ...], tmp_path: Path
+) -> None:
+    """In one line, whether the name is missing or the folder holds neither."""
+    (tmp_path / "photos").mkdir()
+
+    missing = run(*command, "nosuch", cwd=tmp_path)
+    folder = run(*command, "photos", cwd=tmp_path)
+
+    assert missing.returncode == folder.returncode == 2
+    assert missing.stderr == (
+        "gen-data: there is no configuration 'nosuch'; looked for 'nosuch'; expected a file, the "
+        "folder of a data set or a shipped name, which gen-data describe lists\n"
+    )
+    assert folder.stderr == (
+        "gen-data: 'photos' is a folder; expected a file with a configuration, or the folder of a "
+        "data set\n"
+    )
+
+
 def test_many_names_are_the_nearest_five() -> None:
     """Few are listed all."""
     few, many = ["coco", "voc"], [f"name_{k}" for k in range(100)]

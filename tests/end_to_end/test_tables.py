@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 from typing import Any
 
 import click
@@ -11,13 +12,14 @@ from click.testing import CliRunner
 from rich.console import Console
 
 from gen_data.cli.main import cli
-from gen_data.cli.tables import print_tables
+from gen_data.cli.tables import print_facts, print_tables
 
 
-def printed(table: dict[str, Any], columns: int = 80) -> str:
+def printed(table: dict[str, Any], columns: int = 80, terminal: bool = True) -> str:
     file = io.StringIO()
-    print_tables(Console(file=file, width=columns), [{"title": "t", "note": "", **table}])
-    return file.getvalue()
+    console = Console(file=file, width=columns, force_terminal=terminal, color_system=None)
+    print_tables(console, [{"title": "t", "note": "", **table}])
+    return re.sub(r"\x1b\[[0-9;]*m", "", file.getvalue())
 
 
 HEADER = ["category", "visible", "occluded", "truncated", "visibility", "distance [m]", "area [px]",
@@ -56,8 +58,25 @@ def test_a_word_longer_than_the_terminal_is_folded() -> None:
     """Nothing is lost: paths can be copied in pieces."""
     path = "/very/long" * 12
     text = printed({"header": ["file", "n"], "rows": [[path, "1"]]})
+    assert max(map(len, text.splitlines())) == 80
     assert path in "".join(line.strip().split(" ")[0] for line in text.splitlines())
     assert "…" not in text
+
+
+def test_a_path_in_a_file_is_whole() -> None:
+    """Lines of logs are as long as paths, and no longer."""
+    path = "/very/long" * 12
+    text = printed({"header": ["file", "n"], "rows": [[path, "1"]]}, terminal=False)
+    assert path in text
+    assert max(map(len, text.splitlines())) == len(f"  {path}   1  ")
+
+    file = io.StringIO()
+    facts = [("not used", f"{path}: {'joints without a position ' * 9}"), ("scenes", "4 scenes")]
+    print_facts(Console(file=file), "plan", facts)
+    lines = file.getvalue().splitlines()
+    assert path in file.getvalue()
+    assert "…" not in file.getvalue()
+    assert max(map(len, lines)) == len(f"│ not used │ {path}: │")
 
 
 def helps(group: click.Group, names: tuple[str, ...] = ()) -> list[tuple[str, ...]]:
@@ -73,7 +92,16 @@ def helps(group: click.Group, names: tuple[str, ...] = ()) -> list[tuple[str, ..
 
 
 @pytest.mark.parametrize(
-    "arguments", [*helps(cli), ("--help",), ("assets", "list"), ("formats",)], ids=" ".join
+    "arguments",
+    [
+        *helps(cli),
+        ("--help",),
+        ("assets", "list"),
+        ("formats",),
+        ("plan", "tabletop.yaml", "--n", "20"),
+        ("plan", "kitti_rig.yaml", "--n", "20"),
+    ],
+    ids=" ".join,
 )
 def test_help_and_lists_fit_a_terminal(
     arguments: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
