@@ -9,10 +9,10 @@ import pytest
 import warp as wp
 
 from gen_data.renderers.warp.device import launch, open_device
+from gen_data.renderers.warp.native_code import LANES
 from gen_data.renderers.warp.realtime.kernels import soft_shadows
-from gen_data.renderers.warp.realtime.kernels.lattice import Lattice
+from gen_data.renderers.warp.scene.kernels.lattice import Lattice
 from gen_data.renderers.warp.scene.kernels.records import View
-from gen_data.renderers.warp.scene.kernels.simd import LANES
 
 CPU = open_device("cpu")
 WIDTH, HEIGHT = 37, 22
