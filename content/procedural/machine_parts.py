@@ -89,7 +89,7 @@ def washer(seed: int) -> Solid:
 def stepped_shaft(seed: int) -> Solid:
     """A turned shaft of several diameters, lying along X. Slot: body."""
     rng = variant_rng("stepped_shaft", seed)
-    radii = [rng.between(*bounds) for bounds in _SIZES["shaft_radii"]][
+    radii = [rng.between(low, high) for low, high in _SIZES["shaft_radii"]][
         : rng.choose((3, 4, 5), "steps")
     ]
     chamfer, z = 0.0008, 0.0

@@ -154,7 +154,8 @@ def _draw_value(item: Any, rng: VariantRng, name: str = "") -> Any:
         return rng.choose(item["choose"], name)
     if "chance" in item:
         return rng.chance(item["chance"], name)
-    value = rng.between(*item["uniform"], name)
+    low, high = item["uniform"]
+    value = rng.between(low, high, name)
     return round(value, item["digits"]) if "digits" in item else value
 
 
