@@ -81,7 +81,7 @@ def test_every_family_has_a_named_draw_or_a_reason(library: ProceduralLibrary, n
 def test_every_value_of_a_named_draw_makes_a_valid_object(
     library: ProceduralLibrary, name: str
 ) -> None:
-    """Low, middle and high; in some variant they differ in shape or material.
+    """Low, middle and high; in some variant two differ in shape or material.
 
     A house without a wing has a width of its wing, which nothing shows. Parts draw what their
     piece needs.
@@ -94,7 +94,8 @@ def test_every_value_of_a_named_draw_makes_a_valid_object(
         named |= draws.keys()
         for key in new | (draws.keys() - shown):
             values = dict.fromkeys(some_values(draws[key]))
-            if len({make_valid(library, one, key, value) for value in values}) == len(values):
+            made = {make_valid(library, one, key, value) for value in values}
+            if len(made) > 1 or len(values) == 1:
                 shown.add(key)
     assert "part_of" in FAMILIES[name].tags or shown == named
 
