@@ -60,7 +60,7 @@ def skyline(seed: int) -> Solid:
     By night, a lamp may light each piece's windows (role ``window``).
     """
     rng = variant_rng("horizon/skyline", seed)
-    tall = rng.choose((0.15, 0.4, 0.7), "height_m")
+    tall = rng.choose((0.15, 0.4, 0.7))
     parts: list[Patch] = []
     for row in range(2):
         y = -0.5 * SKYLINE_M

@@ -72,7 +72,7 @@ def bicycle_parts(seed: int) -> tuple[list[Patch], tuple[Material, ...]]:
     """Triangles of the same bicycle, without texture coordinates, and materials by slot."""
     rng = variant_rng("bicycle", seed)
     frame = _FRAMES[in_turn(STYLES, seed)]
-    parts = _machine(in_turn(STYLES, seed), frame, rng.between(0.0, 2.0 * math.pi, "turn_rad"), rng)
+    parts = _machine(in_turn(STYLES, seed), frame, rng.between(0.0, 2.0 * math.pi), rng)
     paint = hex_to_linear(rng.choose(COLORS["bicycles"]))
     return [drop_uvs(part) for part in parts], materials(rng, paint)
 

@@ -129,7 +129,7 @@ def draw_car(body: str, era: str, rng: VariantRng) -> Design:
         cladding=design.cladding and (body != "coupe_suv" or rng.chance(0.5)),
         rails=design.rails and rng.chance(0.7),
         bare_bumpers=bare,
-        strip=rng.chance(time.strips, "strip"),
+        strip=rng.chance(time.strips),
         extras=extras,
     )
 
@@ -151,7 +151,7 @@ def draw_van(body: str, era: str, rng: VariantRng) -> Design:
         face=rng.choose(_VAN_FACES[era]),
         tail=rng.choose(("pillars", "pillars_red"), "tail"),
         bare_bumpers=rng.chance(0.6, "bare_bumpers"),
-        strip=rng.chance(0.5, "strip"),
+        strip=rng.chance(0.5),
         extras=("antenna",) if rng.chance(0.4) else (),
     )
 

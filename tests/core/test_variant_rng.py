@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from gen_data.core.variant_rng import Draw, VariantRng, drawing, variant_rng
+from gen_data.core.variant_rng import Draw, DrawnValue, VariantRng, drawing, variant_rng
 
 
 def draw_desk(seed: int) -> dict[str, object]:
@@ -30,10 +30,12 @@ def draw_desk(seed: int) -> dict[str, object]:
         ("panel", "true", True),
     ],
 )  # fmt: skip
-def test_a_value_asked_for_changes_no_other_draw(name: str, asked: object, value: object) -> None:
+def test_a_value_asked_for_changes_no_other_draw(
+    name: str, asked: DrawnValue, value: object
+) -> None:
     """It replaces the number drawn; the number is taken from the stream all the same."""
     free = draw_desk(4)
-    with drawing({name: asked}) as drawn:  # type: ignore[dict-item]
+    with drawing({name: asked}) as drawn:
         found = draw_desk(4)
     assert found == {**free, name: value}
     assert drawn[name].value == asked
@@ -73,14 +75,9 @@ def test_draws_are_recorded_in_order_with_all_possible_values() -> None:
         ("drawers", 1, "drawers is none of false, true"),
     ],
 )
-def test_impossible_values_are_refused(name: str, asked: object, message: str) -> None:
+def test_impossible_values_are_refused(name: str, asked: DrawnValue, message: str) -> None:
     """The message has the range, or all options and the nearest."""
-    with (
-        drawing({name: asked}),
-        pytest.raises(  # type: ignore[dict-item]
-            ValueError, match=f"^{re.escape(message)}$"
-        ),
-    ):
+    with drawing({name: asked}), pytest.raises(ValueError, match=f"^{re.escape(message)}$"):
         draw_desk(0)
 
 

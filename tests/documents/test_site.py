@@ -13,6 +13,7 @@ from PIL import Image
 
 from docs import pictures
 from docs.hooks.command_reference import command_page
+from docs.hooks.family_reference import family_section
 from docs.hooks.plugin_reference import (
     KINDS,
     distribution_page,
@@ -23,6 +24,9 @@ from docs.hooks.plugin_reference import (
 )
 from gen_data import configs, scene_templates
 from gen_data.assemble.plugin_tables import TABLES
+from gen_data.assets.families import own_families
+from gen_data.assets.family import Family
+from gen_data.assets.library import open_library
 from gen_data.cli.main import cli
 from gen_data.config.distributions import DISTRIBUTIONS
 from gen_data.config.yaml_tree import parse_yaml
@@ -106,6 +110,21 @@ def test_distributions_templates_and_commands_are_complete() -> None:
             assert all(word in commands[f"gen-data {name}"] for word in option.opts[:1]) or (
                 isinstance(option, click.Argument)
             )
+
+
+def test_parameters_of_a_family_are_listed_with_their_values() -> None:
+    """Draws of every variant, of some, and parameters with a default."""
+    library, families = open_library(), own_families()
+
+    def text(name: str) -> str:
+        family = families[name]
+        assert isinstance(family, Family)
+        return "\n".join(family_section(name, family, library))
+
+    assert text("chair").startswith("A chair for tables")
+    assert "| `seat_m` | 0.44 to 0.47 |" in text("chair")
+    assert "| `slats` | 2, 3; some variants |" in text("chair")
+    assert "| `size_m` | default 4,4 |" in text("floor")
 
 
 def test_every_plugin_with_an_effect_in_images_has_pictures_or_a_reason() -> None:
