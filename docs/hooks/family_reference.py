@@ -10,7 +10,7 @@ from gen_data.assets.families import family_summary, own_families
 from gen_data.assets.family import Family
 from gen_data.assets.library import Library, open_library
 
-VARIANTS = 8
+VARIANTS = 4
 """Variants made per family: ranges hardly depend on further ones, and all would take minutes."""
 
 

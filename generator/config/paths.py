@@ -43,7 +43,7 @@ def find_path(
         kind: Noun for the message, such as ``template``.
         shipped: Files of the package.
         is_folder: Whether a folder is expected.
-        also: What the caller takes instead of a file, for the message; empty = nothing.
+        also: Input that the caller takes instead of a file, for the message; empty = nothing.
 
     Raises:
         ConfigError: there is none; the message gives the path.
