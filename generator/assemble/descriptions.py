@@ -12,9 +12,9 @@ from gen_data.assemble.config import GeneralSettings
 from gen_data.assemble.plugin_tables import TABLES, find_plugin
 from gen_data.assets.asset_ids import format_parameter
 from gen_data.assets.families import KIND, family_summary, known_families
-from gen_data.assets.library import open_library
 from gen_data.config.describe import TEXT_WIDTH, describe
 from gen_data.core.errors import ConfigError, did_you_mean
+from gen_data.packs.provision import open_assets
 
 SECTION = "section"
 """Kind of the mappings of a configuration that are no plug-ins."""
@@ -81,7 +81,7 @@ def _describe_family(name: str) -> str:
     if not family.variants:
         return "\n".join(lines) + "\n"
     lines += [f"seed: the variants 0 to {family.variants - 1} are offered for selection; default 0"]
-    drawn = open_library().parameters(name)
+    drawn = open_assets().parameters(name)
     for parameter in drawn:
         some = "" if parameter.is_common else " (of some variants)"
         lines.append(_fill(f"{parameter.name}: {parameter.words()}{some}", "        "))

@@ -140,16 +140,16 @@ def check(folder: Path, sheet: Path | None, overlays: Path | None) -> None:
 
     library = open_library([folder])
     findings = tuple(check_folder(folder, library))
+    if not findings:
+        raise AssetError(
+            f"{folder}: has no assets; expected OBJ, GLB, PLY, STL, DAE, USD, URDF, MJCF, SDF"
+        )
     _print_findings(findings)
     if sheet is not None:
         _write_thumbnails(library, tuple(f.asset_id for f in findings if not f.error), sheet)
     if overlays is not None:
         plates = [f.asset_id for f in findings if f.kind == "plate" and not f.error]
         _write_overlays(library, plates, overlays)
-    if not findings:
-        raise AssetError(
-            f"{folder}: has no assets; expected OBJ, GLB, PLY, STL, DAE, USD, URDF, MJCF, SDF"
-        )
     unusable = [finding for finding in findings if finding.error]
     if unusable:
         raise AssetError(f"{folder}: {len(unusable)} of {len(findings)} assets cannot be used")
