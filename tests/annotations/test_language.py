@@ -194,6 +194,7 @@ def test_answers_about_places_follow_from_relations(config: str, index: int) -> 
             )
 
 
+@pytest.mark.slow
 def test_sentences_state_relations() -> None:
     """Of a scene in which a hand holds a thing."""
     seen = picture("tabletop", 5)

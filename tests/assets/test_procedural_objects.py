@@ -72,6 +72,7 @@ def test_objects_have_the_size_of_real_ones(built: tuple[str, Solid]) -> None:
     assert LONGEST_SIDE_M[name][0] <= longest <= LONGEST_SIDE_M[name][1]
 
 
+@pytest.mark.slow
 @for_every_variant
 def test_the_origin_is_the_centre_of_the_bounding_box(built: tuple[str, Solid]) -> None:
     """Objects are placed by the centre of their box."""

@@ -223,6 +223,7 @@ def test_worley_distances_agree_with_brute_force() -> None:
     assert np.allclose(points.nearest, np.sort(away, axis=2)[..., 0], atol=1e-4)
 
 
+@pytest.mark.slow
 def test_every_printed_character_has_a_glyph() -> None:
     """Words of tables are in ASCII, for OpenCV 4 has no other letters; others are in Pillow's font.
 

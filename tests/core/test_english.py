@@ -91,6 +91,7 @@ def test_one_and_two_of_every_other_category() -> None:
     assert ours == {name: (engine.a(name), f"two {engine.plural_noun(name)}") for name in regular}
 
 
+@pytest.mark.slow
 def test_no_category_is_a_plural_without_a_measure() -> None:
     """A pair of scissors: a name that inflect takes for a plural is counted in something."""
     inflect = pytest.importorskip("inflect")

@@ -26,6 +26,7 @@ def test_scenes_that_are_drawn_again_are_the_stored_ones(drawn: DrawnParameters)
     assert (drawn.scenes, drawn.different) == (3, 0)
 
 
+@pytest.mark.slow
 def test_drawn_values_are_those_of_the_stored_scenes(drawn: DrawnParameters, dataset: Path) -> None:
     """Fields of view follow from stored focal lengths, and robots from stored shared values."""
     values = {p.name: p.values for p in drawn.parameters}

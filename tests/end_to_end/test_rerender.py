@@ -34,6 +34,7 @@ def dark_dataset(dataset: Path, tmp_path_factory: pytest.TempPathFactory) -> Pat
     return out
 
 
+@pytest.mark.slow
 def test_it_is_repaired_from_the_scenes_that_it_has(dataset: Path, dark_dataset: Path) -> None:
     """Without the data set of the scenes it cannot be."""
     before = digest(dark_dataset)

@@ -80,6 +80,7 @@ def test_a_delta_moves_the_hand_as_told(engine: str) -> None:
     assert math.degrees(angle) < 0.1
 
 
+@pytest.mark.slow
 def test_poses_are_reached_in_the_frame_of_the_base() -> None:
     """A hand that points down at a given place, turned by 30 degrees about Z."""
     env = nominal(INSTALLED[0], "ik")

@@ -35,6 +35,7 @@ def test_a_sample_alone_equals_the_one_in_its_sequence(sequence: list[Sample]) -
     assert images[0].tobytes() == images[1].tobytes()
 
 
+@pytest.mark.slow
 def test_the_robots_box_follows_its_arm_and_what_is_carried_follows_the_hand(
     sequence: list[Sample],
 ) -> None:

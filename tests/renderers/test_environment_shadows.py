@@ -132,6 +132,7 @@ def test_a_disc_in_the_sky_is_found_where_and_as_large_as_it_is(
     assert (red / green, blue / green) == pytest.approx((1.2, 0.7), rel=0.03)
 
 
+@pytest.mark.slow
 def test_a_fine_panorama_is_lit_and_mirrored_like_a_coarse_one() -> None:
     """1200 rows: the reflected image and the lamps together have the panorama's light."""
     image = panorama(((0.6, 0.3, 0.7), 0.05, 900.0), height=1200)

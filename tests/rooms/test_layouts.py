@@ -424,6 +424,7 @@ def test_nothing_on_a_wardrobe_reaches_into_the_ceiling() -> None:
         assert max(heights_m(b)[1] for b in pieces(scene) if family(b) != "ceiling_lamp") < 2.3
 
 
+@pytest.mark.slow
 def test_an_impossible_room_says_what_has_no_place_and_what_to_change() -> None:
     """A bed of two metres does not fit a room of 1.5 m."""
     small = Furnish(name="furniture", length_m=dist.Constant(1.5), width_m=dist.Constant(1.5))

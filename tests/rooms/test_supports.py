@@ -24,6 +24,7 @@ def heights_m(asset_id: str) -> np.ndarray:
     return 5.0 - hits.distance - low[2]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("family", ["armchair", "chair", "sofa", "trolley", "wash_basin"])
 def test_nothing_sticks_out_of_a_surface_that_carries_things(family: str) -> None:
     """Neither piping nor pillows nor throws: things would stand in them. Cushions sag a little."""

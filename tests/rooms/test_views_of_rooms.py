@@ -207,6 +207,7 @@ def test_a_walk_looks_where_it_goes() -> None:
     assert np.mean(np.array(ahead) > 0.5) > 0.9
 
 
+@pytest.mark.slow
 def test_a_walk_without_carrier_is_refused() -> None:
     """The text names the field and the element."""
     with pytest.raises(ConfigError, match=r"randomizers.p.carrier: .*'hand' of type carrier"):

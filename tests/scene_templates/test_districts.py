@@ -131,6 +131,7 @@ def districts() -> dict[tuple[SharedValue, SharedValue], Scene]:
     return scenes
 
 
+@pytest.mark.slow
 def test_every_district_and_junction_is_drawn() -> None:
     """All outcomes of both shared values."""
     names = {name for key in districts() for name in key}

@@ -123,6 +123,7 @@ def test_noise_of_range_azimuth_and_velocity_is_that_of_the_data_sheet() -> None
     assert rows["velocity_m_s"].std() == pytest.approx(0.028, rel=0.15)
 
 
+@pytest.mark.slow
 def test_half_of_the_reference_targets_are_detected_at_the_reach() -> None:
     """What 10 dBsm is at 250 m is what the radar equation makes of it: P = p^(1 / (1 + SNR))."""
     assert one_cell_share(250.0, 400) == pytest.approx(0.5, abs=0.09)

@@ -108,9 +108,8 @@ def overlapping(scene: Scene) -> list[str]:
     return found
 
 
-@pytest.mark.parametrize(
-    "seed", [1, *(pytest.param(k, marks=pytest.mark.slow) for k in range(2, 7))]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(1, 7))
 def test_nothing_collides_in_random_streets(seed: int) -> None:
     """Oriented boxes of everything that moves, every 0.1 s for four seconds."""
     scene = scene_of(seed)
@@ -276,6 +275,7 @@ def test_what_cannot_be_is_told_in_one_message(message: str) -> None:
         checked_and_moving(wrong)
 
 
+@pytest.mark.slow
 def test_a_route_through_a_wall_is_refused() -> None:
     """A point of the route lies in a house: the message names the house."""
     scene = scene_of(1)
