@@ -77,6 +77,11 @@ INSET = 0.0201
 """Vertices of polygons lie 0.02 px inside the edges of pixels."""
 
 
+def but_the_last(read: Read) -> Read:
+    """All views but the last: with flow, a frame without a next one is left out."""
+    return lambda folder: list(read(folder))[:-1]
+
+
 def frame(number: str) -> str:
     """Name of a view from the number of the frame."""
     return f"{int(number):09d}_image_02"
@@ -186,8 +191,8 @@ READERS: tuple[Reader, ...] = (
            tolerance=0.15, because="tenths of pixels; boxes around the corners"),
     Reader("torchvision", "cityscapes", records.by_torchvision_cityscapes,
            Boxes(LEFT, name_of=city_class), "rig", iou=1),
-    Reader("torchvision", "kitti_stereo", S.by_torchvision_stereo, Images(LEFT, STEREO), "rig",
-           is_partial=True, because="flow of frames that have a next one"),
+    Reader("torchvision", "kitti_stereo", S.by_torchvision_stereo,
+           but_the_last(Images(LEFT, STEREO)), "rig", because="frames that have a next one"),
     Reader("trackeval", "kitti_tracking", S.by_trackeval,
            Boxes(LEFT, (0, 0, -1, -1), tracked), "rig", is_partial=True,
            because="KITTI's numbers: first and last pixel; DontCare is left out"),

@@ -41,11 +41,13 @@ class StoredPipeline:
 
     Attributes:
         asset_folders: Of the data set's configuration.
+        has_points: Whether samples have the points of their scans, which exporters do not need.
     """
 
     stored: StoredSamples
     exporters: Mapping[str, Exporter]
     asset_folders: tuple[Path, ...] = ()
+    has_points: bool = False
 
     @property
     def info(self) -> DatasetInfo:
@@ -53,8 +55,8 @@ class StoredPipeline:
         return self.stored.info
 
     def sample(self, index: int) -> Sample:
-        """Read a sample without points; its images are decoded on access."""
-        sample = self.stored.sample(index, has_points=False)
+        """Read a sample; its images are decoded on access."""
+        sample = self.stored.sample(index, self.has_points)
         capture = sample.capture
         times_s = {name: one.time_s for name, one in capture.readings.items()}
         times_s |= {name: one.time_s for name, one in capture.clouds.items()}

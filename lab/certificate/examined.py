@@ -118,7 +118,7 @@ class Examined:
 
     def chosen_samples(self) -> list[Sample]:
         """The samples of these numbers."""
-        pipeline = StoredPipeline(self.stored, {}, self.config.asset_folders)
+        pipeline = StoredPipeline(self.stored, {}, self.config.asset_folders, has_points=True)
         return [pipeline.sample(index) for index in self.chosen_indices()]
 
     def timeline(self, sample: Sample) -> Timeline:

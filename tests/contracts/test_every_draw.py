@@ -35,6 +35,7 @@ WITHOUT = {
     **dict.fromkeys(("gimbal", "router", "shoes", "vacuum_cleaner", "iron", "vise", "knife_block",
                      "toilet_brush", "bathroom_scale", "guitar", "drill"), FIXED),
     **dict.fromkeys(("overpass", "embankment"), PARAMETRIC),
+    **dict.fromkeys(("bicycle", "horizon/skyline"), "its unnamed draws turn and place parts only"),
     **dict.fromkeys(("crockery", "groceries", "hanging_clothes"), MIXED),
     "motorcycle": "styles and riders take turns by seed, in step with their facts",
     "cyclist": "styles and riders take turns by seed, in step with their facts",
