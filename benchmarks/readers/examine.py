@@ -32,6 +32,8 @@ def examine(reader: Reader, folder: Path) -> Comparison | None:
             warnings.simplefilter("ignore")  # they concern the packages
             found = list(reader.read(folder / reader.data / reader.format))
         comparison.add_views(reader.expected(stated), found, reader.is_partial)
+    except ModuleNotFoundError:
+        return None  # a requirement of the package is absent
     # A reader may refuse a file in any way.
     except Exception as error:
         comparison.faults.append(f"{type(error).__name__}: {error}")

@@ -89,7 +89,9 @@ def test_every_value_of_a_named_draw_makes_a_valid_object(
     """
     named: set[str] = set()
     shown: set[str] = set()
-    for one in some_variants(name, 16):
+    for number, one in enumerate(some_variants(name, 16)):
+        if number > 2 and shown == named:
+            break
         draws = library.draws(one)
         new = draws.keys() - named
         named |= draws.keys()
