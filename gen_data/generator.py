@@ -12,8 +12,23 @@ from importlib.machinery import ModuleSpec
 from types import ModuleType
 
 __path__: list[str] = []
-_LAB = re.compile(r"^(certificate|environment|matching|study)\b")
-_CONTENT = re.compile(r"^assets\.(interiors|people|procedural|roads|scenery|skies|vehicles)\b")
+_MOVED = (
+    (r"^assets\.procedural\.noise$", "core.noise"),
+    (r"^assets\.procedural\.data_tables$", "config.data_files"),
+    (r"^assets\.procedural\.family$", "assets.family"),
+    (r"^assets\.procedural\.variant_rng$", "core.variant_rng"),
+    (r"^assets\.skies\.(clouds|daylight|equirectangular|sky)$", r"sky.\1"),
+    (
+        r"^assets\.(interiors|people|procedural|roads|scenery|skies|vehicles)\b",
+        r"content.\1",
+    ),
+    (
+        r"^packs\.(example_robot_data|mjcf|panoramas|pybullet_files|robosuite|sweethome3d)$",
+        r"content.packs.\1",
+    ),
+    (r"^(certificate|environment|matching|study)\b", r"lab.\1"),
+)
+"""Patterns of names and their successors; the first that matches decides."""
 
 
 class _Former(MetaPathFinder, Loader):
@@ -27,8 +42,8 @@ class _Former(MetaPathFinder, Loader):
 
     def create_module(self, spec: ModuleSpec) -> ModuleType:
         name = spec.name.removeprefix(f"{__name__}.")
-        name = _CONTENT.sub(r"content.\1", _LAB.sub(r"lab.\1", name))
-        module = import_module(f"gen_data.{name}")
+        new = (re.sub(old, to, name) for old, to in _MOVED if re.match(old, name))
+        module = import_module(f"gen_data.{next(new, name)}")
         # The import system is about to replace it.
         spec.loader_state = module.__spec__
         return module
