@@ -22,8 +22,8 @@ def examine_rows(rows: Sequence[int], folder: Path, scratch: str) -> dict[int, C
 
 
 def examine(reader: Reader, folder: Path) -> Comparison | None:
-    """Compare what a reader finds with what the data set states; None without its package."""
-    if not installed(reader.package):
+    """Compare what a reader finds with what the data set states; None without its packages."""
+    if not all(map(installed, (reader.package, *reader.needs))):
         return None
     comparison, stated = Comparison(), folder / reader.data.replace("runs", "tabletop")
     logging.disable(logging.ERROR)
@@ -32,8 +32,6 @@ def examine(reader: Reader, folder: Path) -> Comparison | None:
             warnings.simplefilter("ignore")  # they concern the packages
             found = list(reader.read(folder / reader.data / reader.format))
         comparison.add_views(reader.expected(stated), found, reader.is_partial)
-    except ModuleNotFoundError:
-        return None  # a requirement of the package is absent
     # A reader may refuse a file in any way.
     except Exception as error:
         comparison.faults.append(f"{type(error).__name__}: {error}")

@@ -54,6 +54,7 @@ class Reader:
         lens: Largest difference of lenses [px, coefficients]; None if it reads none.
         is_partial: Whether the format leaves things out by its definition.
         because: Reason of tolerances other than 0 and 1, and of conventions.
+        needs: Further distributions that the reader imports, but its package does not require.
     """
 
     package: str
@@ -67,6 +68,7 @@ class Reader:
     lens: float | None = None
     is_partial: bool = False
     because: str = ""
+    needs: tuple[str, ...] = ()
 
 
 ALL, COLOR = Boxes(), Boxes(("color",))
@@ -196,7 +198,8 @@ READERS: tuple[Reader, ...] = (
     Reader("trackeval", "kitti_tracking", S.by_trackeval,
            Boxes(LEFT, (0, 0, -1, -1), tracked), "rig", is_partial=True,
            because="KITTI's numbers: first and last pixel; DontCare is left out"),
-    Reader("open3d", "semantickitti", S.by_open3d_ml, scanned_instances, "rig", "m"),
+    Reader("open3d", "semantickitti", S.by_open3d_ml, scanned_instances, "rig", "m",
+           needs=("addict",)),
     Reader("pandas", "tables", S.by_pandas_tables, measurements, "rig", "SI", 1e-5,
            because="seven digits of 32-bit floats"),
     Reader("pandas", "birdseye", S.by_pandas_birdseye, birdseye, "rig", "m", 2e-4, iou=1,
