@@ -16,6 +16,11 @@ def cases(values: Iterable[Any], quick: Collection[Any]) -> list[Any]:
     return [value if value in quick else _slow(value) for value in values]
 
 
+def sampled(values: Iterable[Any], step: int) -> list[Any]:
+    """Parameters of a test: the first of every ``step`` is quick, the others are slow."""
+    return [_slow(value) if i % step else value for i, value in enumerate(values)]
+
+
 first_and_all = pytest.mark.parametrize(
     "how_many", ["first", pytest.param("all", marks=slow)], ids=str
 )

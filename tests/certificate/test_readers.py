@@ -16,17 +16,12 @@ from gen_data.lab.certificate.readers import READERS
 from gen_data.lab.certificate.scoring import average_precision
 from gen_data.runner.stored import StoredSamples
 from tests.certificate.sealing import SMALL
+from tests.tiers import cases
 
 # pycocotools' decoder predates numpy 2's __array__(copy=...).
 pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
 
-LARGE = {"datasets", "mlcroissant", "open3d", "supervision"}
-"""Packages that only slow tests have."""
-
-NAMES = [
-    pytest.param(name, marks=pytest.mark.slow) if reader.package in LARGE else name
-    for name, reader in sorted(READERS.items())
-]
+NAMES = cases(sorted(READERS), {"coco", "yolo"})
 FORMATS = ", ".join(f"{{type: {name}}}" for name in READERS)
 MASKED = {"coco", "webdataset", "huggingface"}
 BOXED = MASKED | {"croissant", "hdf5", "tfrecord", "voc", "yolo"}

@@ -16,6 +16,7 @@ from gen_data.core.interfaces import Modality, Sensor
 from gen_data.runner.verify import verify
 from tests.contracts.stage_digests import find_change
 from tests.end_to_end.running import gen_data
+from tests.tiers import sampled
 
 CONFIGS = sorted(path.stem for path in Path(configs.__path__[0]).glob("*.yaml"))
 
@@ -71,7 +72,7 @@ def test_one_sample_is_rendered_exported_and_verified(name: str, tmp_path: Path)
     assert not changed, f"{name}: the first stage with other contents is: {changed}"
 
 
-@pytest.mark.parametrize("name", CONFIGS)
+@pytest.mark.parametrize("name", sampled(CONFIGS, 6))
 def test_no_sensor_of_a_sequence_reads_before_its_first_instant(name: str) -> None:
     """Nothing moves before it: velocities of moving things would be 0."""
     config = load_config(f"{name}.yaml")

@@ -23,7 +23,7 @@ from gen_data.core.scene import Body, Scene
 from gen_data.core.scene_time import place_sensors
 from gen_data.core.serialization import canonical_json
 from gen_data.core.streams import Streams
-from tests.tiers import cases, slow
+from tests.tiers import cases, sampled, slow
 
 CONFIGS = sorted(path.stem for path in Path(configs.__path__[0]).glob("*.yaml"))
 QUICK = ("bin_picking", "shelf", "tabletop")
@@ -114,7 +114,7 @@ def test_configuration_tells_editors_its_schema(name: str) -> None:
     assert text.startswith("# yaml-language-server: $schema=schema.json\n")
 
 
-@pytest.mark.parametrize("name", CONFIGS)
+@pytest.mark.parametrize("name", sampled(CONFIGS, 6))
 def test_configuration_satisfies_the_schema_that_editors_check_it_against(name: str) -> None:
     """jsonschema, an independent validator, finds no error in any file that is shipped."""
     document = load_yaml(Path(configs.__path__[0]) / f"{name}.yaml").plain()

@@ -19,11 +19,12 @@ from gen_data.cli.own_meshes import guess_unit
 from gen_data.core.asset_types import Asset
 from gen_data.exporters import TABLE
 from tests.end_to_end.running import gen_data
+from tests.tiers import sampled
 
 SHIPPED = ("tabletop", "street", "pedestrians", "bin_picking", "kitti_rig", "shelf")
 
 
-@pytest.mark.parametrize("name", SHIPPED)
+@pytest.mark.parametrize("name", sampled(SHIPPED, 4))
 def test_init_writes_a_configuration_and_its_template(name: str, tmp_path: Path) -> None:
     """They read as the shipped ones, beside each other in an empty folder."""
     done = gen_data("init", "--template", name, cwd=tmp_path)

@@ -124,6 +124,7 @@ def test_a_single_sample_has_the_bytes_that_it_has_in_the_data_set(
     assert "one: is not empty" in again.stderr
 
 
+@pytest.mark.slow
 def test_attributes_state_what_the_new_scenes_show(tmp_path: Path) -> None:
     """A changed shared value is the new one; one that no longer holds is no attribute."""
     config = tmp_path / "lit.yaml"

@@ -151,6 +151,7 @@ def test_latency_delays_by_exactly_its_steps(latency: int) -> None:
     assert len(set(at_once)) == len(at_once)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", INSTALLED)
 def test_drawn_dynamics_reach_the_engine(engine: str) -> None:
     """Masses and friction read from the engine are the nominal ones times factors in the range."""

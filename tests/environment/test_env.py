@@ -41,6 +41,7 @@ def test_gymnasium_s_checker_finds_nothing(engine: str, control: str) -> None:
     env.close()
 
 
+@pytest.mark.slow
 def test_gymnasium_s_checker_finds_nothing_in_the_defaults() -> None:
     """Without its tries of all rendering modes, each of which makes an environment."""
     env = gymnasium.make(ENV_ID, config=CONFIG).unwrapped
@@ -116,6 +117,7 @@ def _yaw(env: Env) -> float:
     return 2.0 * float(np.arctan2(z, w))
 
 
+@pytest.mark.slow
 def test_obstacles_stop_the_arm(engine: str) -> None:
     """Told to go down for a second, no finger enters the table by more than 2 mm and a step."""
     env = nominal(engine, "cartesian_delta")

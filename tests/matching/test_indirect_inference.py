@@ -40,6 +40,7 @@ def model(seed: int, scenes: int = 40):  # type: ignore[no-untyped-def]  # noqa:
     return lambda parameters, count: (noise + parameters @ SLOPES.T)[:count]
 
 
+@pytest.mark.slow
 def test_parameters_of_a_linear_model_are_found_within_their_intervals() -> None:
     """True parameters lie in 95 % intervals as often as that says: 0.90 to 0.99 of 150 sets."""
     truth = np.array([1.5, -2.0])

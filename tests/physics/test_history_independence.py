@@ -94,6 +94,7 @@ def test_bodies_that_once_ignored_each_other_meet_again(engine_name: EngineName)
     assert heights[1] == pytest.approx(0.05, abs=0.0005)
 
 
+@pytest.mark.slow
 def test_memory_does_not_grow_with_the_number_of_scenes(engine: Engine) -> None:
     """After a warm-up, sixty small scenes of ever new scale need less than 4 MB more."""
 

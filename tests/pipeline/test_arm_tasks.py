@@ -46,7 +46,7 @@ def demonstrated(task: str, scene_index: int = 0, failures: str = "{}") -> Scene
         return pipeline.accepted_scene(scene_index).scene
 
 
-QUICK = ("bin_picking_suction", "open_drawer", "pick_and_place", "stack")
+QUICK = ("bin_picking_suction", "open_drawer")
 
 
 @pytest.mark.parametrize("task", cases(sorted(tasks()), QUICK))
@@ -74,6 +74,7 @@ def test_failures_are_drawn_by_their_share(failure: str) -> None:
     assert (episode.succeeded, episode.failure) == (False, failure)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("robot", ["kuka_iiwa_gripper", "xarm6_gripper"])
 def test_arms_with_made_fingers_put_things_down_where_they_should(robot: str) -> None:
     """The fingers are those of ``robot_tools``; physics confirms the place."""
@@ -195,6 +196,7 @@ def own_arm(folder: Path, urdf: str) -> Path:
     return config
 
 
+@pytest.mark.slow
 def test_an_arm_of_a_user_stacks_with_fingers_made_for_it(tmp_path: Path) -> None:
     """From a URDF of six joints; physics confirms the stack."""
     config = own_arm(tmp_path, my_arm())

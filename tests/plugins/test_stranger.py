@@ -116,6 +116,7 @@ def test_each_kind_of_plug_in_takes_one_file_and_one_line(installed: str) -> Non
     assert not [name for name, text in files.items() if "from stranger" in text]
 
 
+@pytest.mark.slow
 def test_the_room_has_the_pieces_of_its_type_at_the_places_of_its_rule(dataset: Path) -> None:
     """Two blocks in a room 6 m long, a quarter of it from its middle, on a striped floor."""
     for scene in scenes(dataset):
@@ -128,6 +129,7 @@ def test_the_room_has_the_pieces_of_its_type_at_the_places_of_its_rule(dataset: 
         assert material["texture"].startswith("texture/stranger_stripes?seed=")
 
 
+@pytest.mark.slow
 def test_the_contact_sheet_shows_the_drawing_of_the_device(dataset: Path, installed: str) -> None:
     """The last tile is white up to the share of 50 cd/m^2 that the device measured."""
     arguments = ("contact-sheet", "strange.yaml", "-n", "1", "--channels", "written")

@@ -31,6 +31,7 @@ from tests.renderers.fake_library import (
     room_mesh,
     sphere_mesh,
 )
+from tests.tiers import sampled
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 PLAIN = RenderSettings(ambient_occlusion_radius_m=0.0, antialias=1)
@@ -99,12 +100,10 @@ SKIES = {
 }
 
 
-@pytest.mark.parametrize("lights", SKIES.values(), ids=SKIES)
-def test_lamps_and_the_rest_give_the_irradiance_of_the_panorama(
-    lights: tuple[tuple[Vec3, float, float], ...],
-) -> None:
+@pytest.mark.parametrize("sky", sampled(SKIES, 3))
+def test_lamps_and_the_rest_give_the_irradiance_of_the_panorama(sky: str) -> None:
     """On surfaces of any orientation, to 1 % of the brightest one's irradiance."""
-    image, normals = panorama(*lights), every_normal()
+    image, normals = panorama(*SKIES[sky]), every_normal()
 
     rest, lamps = remove_peaks(image)
 

@@ -12,6 +12,7 @@ import pytest
 import warp as wp
 
 from gen_data.renderers.warp.native_code import ROOT, native
+from tests.tiers import sampled
 
 HEADERS = sorted(str(path.relative_to(ROOT)) for path in ROOT.glob("*/kernels/*.h"))
 SCALARS = {bool: "bool", float: "float", int: "int", wp.bool: "bool"}
@@ -60,7 +61,7 @@ def test_every_header_is_the_body_of_a_function_or_part_of_one() -> None:
     assert not [header for header in HEADERS if native(header).strip() not in bodies]
 
 
-@pytest.mark.parametrize("name", sorted(FUNCTIONS.keys() - {ON_CPU_ONLY}))
+@pytest.mark.parametrize("name", sampled(sorted(FUNCTIONS.keys() - {ON_CPU_ONLY}), 9))
 def test_a_native_function_compiles_alone(name: str) -> None:
     """With g++, from its declaration in Python and its header."""
     function = FUNCTIONS[name]

@@ -112,6 +112,7 @@ def test_only_what_is_asked_for_is_returned() -> None:
     assert reading.sensor == "camera"
 
 
+@pytest.mark.slow
 def test_memory_stays_flat_over_many_scenes() -> None:
     """After a warm-up, sixty scenes add less than 8 MB."""
     renderer = WarpRenderer(library(), "cpu")

@@ -16,6 +16,7 @@ from gen_data.core.errors import AssetError
 from gen_data.roads.cross_section import RoadShape, height_m
 from gen_data.roads.junction_shape import JunctionShape, make_fan
 from gen_data.roads.roundabout_shape import RoundaboutShape
+from tests.tiers import sampled
 
 SLOTS = ("asphalt", "asphalt_new", "marking", "kerb", "pavement", "verge", "ground")
 
@@ -167,10 +168,10 @@ def test_textures_tile_and_repeat_exactly(name: str) -> None:
         assert steps[0] <= max(2.0 * np.quantile(steps[1:], 0.9), 1.1 * steps[1:].max())
 
 
-@pytest.mark.parametrize(("name", "low", "high"), [
+@pytest.mark.parametrize(("name", "low", "high"), sampled([
     ("asphalt", 0.05, 0.16), ("grass", 0.08, 0.24), ("paving", 0.15, 0.42),
     ("road_paint", 0.4, 0.8), ("asphalt_lane", 0.05, 0.16), ("concrete_lane", 0.25, 0.4),
-])  # fmt: skip
+], 3))  # fmt: skip
 def test_albedo_is_that_of_the_real_thing(name: str, low: float, high: float) -> None:
     """Mean linear albedo within published ranges (LBNL-43442; grass about 0.2 at most)."""
     srgb = TEXTURES[name].build(0).albedo.astype(np.float64) / 255.0
@@ -192,6 +193,7 @@ def test_asphalt_turns_grey_with_age(seed: int) -> None:
     assert albedo(2.0) < albedo(10.0)
 
 
+@pytest.mark.slow
 def test_tiles_of_any_damage_meet_without_a_seam() -> None:
     """Both ends of a damaged tile equal those of the undamaged one of the same seed."""
     plain = asphalt_lane(2).albedo

@@ -139,6 +139,7 @@ def test_an_error_without_text_is_named_as_such(tmp_path: Path) -> None:
         make(tmp_path, trouble=Trouble(errors={5: ValueError()}))
 
 
+@pytest.mark.slow
 def test_a_sample_that_hangs_is_killed_after_its_limit_and_skipped(tmp_path: Path) -> None:
     """One try; the samples before it are made again."""
     settings = replace(SKIP, limits=Limits(sample_s=1.5))

@@ -142,6 +142,7 @@ def test_every_district_and_junction_is_drawn() -> None:
     }
 
 
+@pytest.mark.slow
 def test_traffic_can_go_on_where_roads_meet() -> None:
     """In every district, the lanes of roads that lead to a junction or another road continue."""
     for key, scene in districts().items():

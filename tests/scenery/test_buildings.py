@@ -41,6 +41,7 @@ def window_faces(solid: Solid) -> np.ndarray:
     return np.isin(solid.mesh.face_slots, slots)
 
 
+@pytest.mark.slow
 @for_some_of_every_style
 def test_panes_lie_behind_the_front_wall_by_a_real_recess(built: tuple[str, int, Solid]) -> None:
     """Rays along -X through the front panes meet glass 0.1-0.35 m behind the wall's plane."""

@@ -14,6 +14,7 @@ from gen_data.core.asset_types import MeshData
 from gen_data.core.colorimetry import luminance
 from gen_data.core.variant_rng import variant_rng
 from tests.scenery.rays import cast
+from tests.tiers import sampled
 
 LEAFY = [name for name in SPECIES if name != "conifer"]
 
@@ -30,7 +31,7 @@ def leaves_of(mesh: MeshData) -> np.ndarray:
     return np.isin(mesh.face_slots, slots)
 
 
-@pytest.mark.parametrize("species", LEAFY)
+@pytest.mark.parametrize("species", sampled(LEAFY, 6))
 def test_leaves_come_and_go_but_the_trunk_stays(species: str) -> None:
     """The share of leaves is what it says; the trunk of the same tree is the same."""
     full, half, bare = summer_mesh(species), *(tree(1, species, k).mesh for k in (0.5, 0.0))
@@ -60,7 +61,7 @@ def test_deciduous_trees_are_bare_in_winter(species: str, season: str, foliage: 
     assert leaves_of(mesh).any() == (foliage == "leafy")
 
 
-@pytest.mark.parametrize("species", SPECIES)
+@pytest.mark.parametrize("species", sampled(SPECIES, 6))
 def test_leaves_in_the_depth_of_a_crown_are_as_bright_as_at_its_surface(species: str) -> None:
     """Reflectance is the leaf's own: renderers find how little light reaches the depth."""
     leafy = [m.base_color for m in tree(2, species, 1.0).mesh.materials if m.role == "leaf"]
@@ -88,7 +89,7 @@ def test_autumn_is_redder_than_summer_and_spring_blossoms() -> None:
     assert share == pytest.approx(0.5, abs=0.01)
 
 
-@pytest.mark.parametrize("species", LEAFY)
+@pytest.mark.parametrize("species", sampled(LEAFY, 6))
 def test_a_crown_is_dense_but_not_a_ball(species: str) -> None:
     """Level rays through the middle of the crown: most meet a leaf, some pass by all holes."""
     mesh = summer_mesh(species)

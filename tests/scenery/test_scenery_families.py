@@ -14,7 +14,7 @@ from gen_data.content.scenery import FAMILIES, TEXTURES
 from gen_data.core.errors import AssetError
 from tests.every_value import for_every
 from tests.scenery.clutter_limits import CLUTTER
-from tests.tiers import first_and_all
+from tests.tiers import first_and_all, sampled
 
 # Height range [m] of real ones, and the largest number of triangles that a street affords.
 LIMITS = {
@@ -215,7 +215,7 @@ def test_unknown_parameters_are_refused_by_name(name: str, parameters: dict[str,
         FAMILIES[name].build(seed=0, **parameters)
 
 
-@pytest.mark.parametrize("name", TEXTURES)
+@pytest.mark.parametrize("name", sampled(TEXTURES, 5))
 def test_textures_are_repeatable_images(name: str) -> None:
     """8 bits per channel; two builds are equal; all maps have one size."""
     family = TEXTURES[name]

@@ -87,6 +87,7 @@ def test_shape_and_print_stay_as_they_are(name: str) -> None:
         assert (np.abs(used.uvs[used.faces[~others]] - 0.5) <= 0.5).all()
 
 
+@pytest.mark.slow
 def test_older_vehicles_are_dirtier() -> None:
     """The amount in the texture follows the variant's wear, in tenths."""
     for seed in range(12):

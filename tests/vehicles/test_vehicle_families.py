@@ -308,6 +308,7 @@ def test_steering_turns_the_front_wheels_alone(name: str) -> None:
     assert straight.keypoints == turned.keypoints
 
 
+@pytest.mark.slow
 @for_every_variant
 def test_same_seed_makes_the_same_bytes_and_others_do_not(built: tuple[str, Solid]) -> None:
     """Pure functions of the seed."""
