@@ -51,7 +51,7 @@ SKIPS_ALLOWED_IN_CI = (
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
-    """One process more than cores, as tests also wait; at 2 GB each; none for single files.
+    """As many processes as this one may use cores and 2 GB each; none for single files.
 
     One thread each: a second one of OpenMP or BLAS would spin while it waits for a core.
     """
@@ -61,7 +61,7 @@ def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     cores = len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1
     memory_gb = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") / 1e9
-    return max(1, min(cores + 1, int(memory_gb / 2.0)))
+    return max(1, min(cores, int(memory_gb / 2.0)))
 
 
 @pytest.fixture(scope="session")

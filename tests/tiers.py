@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 slow = pytest.mark.slow
-"""Takes more than about a second of processor time, or repeats a quick test for more cases."""
+"""Takes more than about half a second of processor time, or repeats a quick test for more cases."""
 
 
 def cases(values: Iterable[Any], quick: Collection[Any]) -> list[Any]:

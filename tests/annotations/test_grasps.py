@@ -42,6 +42,7 @@ def cast(mesh: trimesh.Trimesh, origin: Any, direction: Any) -> tuple[float, Any
     return float(hit.distance), hit.normal
 
 
+@pytest.mark.slow
 def test_every_grasp_is_antipodal_and_its_score_is_the_friction_it_needs() -> None:
     """Rays from both fingers along the closing direction meet the object at the contacts."""
     _, frame, meshes = settled()
@@ -61,6 +62,7 @@ def test_every_grasp_is_antipodal_and_its_score_is_the_friction_it_needs() -> No
         assert grasp.width_m + 2 * SETTINGS.clearance_m <= SETTINGS.opening_m + 1e-6
 
 
+@pytest.mark.slow
 def test_open_grippers_touch_nothing() -> None:
     """Points sampled on all surfaces, tables and walls included, are outside fingers and palm."""
     _, frame, meshes = settled()

@@ -124,6 +124,7 @@ def resolve(seen: Picture, text: str) -> set[int]:
     return found
 
 
+@pytest.mark.slow
 @each
 def test_an_expression_refers_to_its_thing_and_no_other(config: str, index: int) -> None:
     """A reader who knows all visible things, also barely visible ones, finds exactly that one."""
@@ -308,6 +309,7 @@ def test_cielab_is_that_of_opencv() -> None:
     assert np.abs(cielab(rgb[0].astype(float)) - expected[0]).max() < 0.2
 
 
+@pytest.mark.slow
 def test_most_limits_each_kind() -> None:
     """Spread evenly over what could be said."""
     seen = picture("tabletop", 5)

@@ -145,6 +145,7 @@ BINS = [("bin_picking", 0, engine) for engine in INSTALLED]
 each = pytest.mark.parametrize(("config", "index", "engine"), cases([*WORLDS, *BINS], WORLDS[:1]))
 
 
+@pytest.mark.slow
 @each
 def test_supported_things_touch_what_supports_them_from_above(
     config: str, index: int, engine: str
@@ -191,6 +192,7 @@ def test_no_two_things_carry_each_other(config: str, index: int, engine: str) ->
     assert not {(a, b) for a, b in pairs if (b, a) in pairs}
 
 
+@pytest.mark.slow
 @each
 def test_near_things_are_nearer_than_half_the_smaller_one(
     config: str, index: int, engine: str
@@ -227,6 +229,7 @@ def test_parts_in_a_bin_are_inside_it_and_things_on_a_table_are_not() -> None:
     assert table_world.pairs("on") <= table_world.pairs("supported_by")
 
 
+@pytest.mark.slow
 def test_what_the_hand_holds_is_held_and_on_nothing() -> None:
     """The arm's goal of this scene is to hold a thing; its pads touch it."""
     world = settled("tabletop", 0)
@@ -281,6 +284,7 @@ def test_views_follow_from_boxes_and_depths(config: str, index: int, engine: str
             assert ((one, "in_front_of", other) in stated) == (nearer and not apart)
 
 
+@pytest.mark.slow
 def test_images_tell_only_of_what_they_show() -> None:
     """A thing that no pixel shows is in the scene's graph and in no image's."""
     world = settled("bin_picking", 0)

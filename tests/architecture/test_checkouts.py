@@ -51,6 +51,7 @@ def run(code: str, folder: Path, first_on_path: Path | None = None) -> str:
     return done.stdout
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("links", [True, False])
 def test_a_checkout_imports_its_own_folders(tmp_path: Path, links: bool) -> None:
     """Whatever an editable installation of another checkout points to, as in the tests' own."""

@@ -50,6 +50,7 @@ def test_no_source_imports_a_folder_by_its_bare_name() -> None:
     assert not offenders
 
 
+@pytest.mark.slow
 def test_a_sample_imports_no_folder_by_its_bare_name() -> None:
     """Tables of plug-ins, ``module:Class``, name modules below the import root too."""
     program = (

@@ -24,6 +24,7 @@ def test_may_skip() -> None:
 MODULE = "import pytest\npytest.importorskip('missing_library')"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("ci", "result"), [("", "3 skipped"), ("1", "1 failed, 1 skipped, 1 error")]
 )

@@ -50,6 +50,7 @@ def test_what_cannot_be_is_told_at_its_place(tmp_path: Path, annotations: str, f
         loaded(tmp_path, annotations)
 
 
+@pytest.mark.slow
 def test_editors_know_both_spellings() -> None:
     """The schema lists every name, and a mapping for each that has parameters."""
     names, *mappings = config_schema()["properties"]["annotations"]["items"]["oneOf"]

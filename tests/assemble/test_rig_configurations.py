@@ -38,6 +38,7 @@ def on_rig(scene: Scene, pose: SE3) -> SE3:
     return scene.rig_pose("ego").inverse() @ pose
 
 
+@pytest.mark.slow
 def test_kittis_colour_cameras_are_a_stereo_pair() -> None:
     """0.54 m apart along the left camera's X axis, parallel, 1.65 m above the ground; 721.5 px."""
     scene = rig_scene("kitti_rig")
@@ -93,12 +94,14 @@ def test_a_sensor_on_a_rig_that_is_not_there_is_refused(name: str) -> None:
         rig_scene(name, "sensors[0].rig=eg")
 
 
+@pytest.mark.slow
 def test_a_sensor_inside_its_carrier_is_refused() -> None:
     """A camera in the middle of the car sees nothing but the car."""
     with pytest.raises(ConfigError, match=r"'image_02': offset_m is .* inside 'ego'"):
         rig_scene("kitti_rig", "sensors.image_02.offset_m=[1.0, 0, 0.7]")
 
 
+@pytest.mark.slow
 def test_a_rate_that_does_not_fit_is_refused() -> None:
     """KITTI's rig steps by 0.1 s."""
     fixed = ("shared.district=residential", "shared.junction=x", "shared.crossing=lines")
@@ -107,6 +110,7 @@ def test_a_rate_that_does_not_fit_is_refused() -> None:
         open_pipeline(spec)
 
 
+@pytest.mark.slow
 def test_elements_that_a_configuration_adds_can_be_overridden_by_name() -> None:
     """The ego is no element of the template."""
     spec = load_config("kitti_rig", overrides=("elements.ego.asset=car?seed=4",))

@@ -128,6 +128,7 @@ def test_probes_are_the_configurations_that_their_shared_values_give_alone(name:
         assert repr(config.scene_config(probe.shared)) == repr(probe)
 
 
+@pytest.mark.slow
 def test_a_configuration_with_finished_scenes_may_probe_the_first_alone() -> None:
     """Exports draw nothing: outcomes of shared values were checked before their data set."""
     (probe,) = load_config("street.yaml", first_scene_only=True).probes

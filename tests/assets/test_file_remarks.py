@@ -42,6 +42,7 @@ def findings(folder: Path) -> dict[str, Finding]:
 REMARKS = ("material 'm': map_Bump (a height image) is not used", "lines are not read")
 
 
+@pytest.mark.slow
 def test_remarks_name_the_file_and_survive_the_cache(folder: Path) -> None:
     """A second library reads them from the cache, without the reader."""
     expected = (FileRemarks(str(folder / "a.obj"), REMARKS),)
@@ -50,6 +51,7 @@ def test_remarks_name_the_file_and_survive_the_cache(folder: Path) -> None:
     assert opened(folder).remarks("user/a", read=False) == expected
 
 
+@pytest.mark.slow
 def test_check_lists_remarks_and_still_succeeds(folder: Path) -> None:
     """The picture is right but for what is listed."""
     result = CliRunner().invoke(assets, ["check", str(folder)])

@@ -33,6 +33,7 @@ def entries(folder: Path) -> list[Path]:
     return sorted(folder.rglob("*.arrays"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("asset", ["car?seed=3", ASSET])
 def test_stored_bounds_are_those_of_the_mesh_which_is_not_read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, asset: str
@@ -158,6 +159,7 @@ def test_no_temporary_file_stays_behind(tmp_path: Path) -> None:
     assert not list(tmp_path.rglob("*.part"))
 
 
+@pytest.mark.slow
 def test_several_processes_may_share_a_cache(tmp_path: Path) -> None:
     """Two processes import the same asset at once and agree."""
     program = (

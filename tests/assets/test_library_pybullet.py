@@ -92,6 +92,7 @@ def test_meshes_are_in_the_normal_form(library: Library, name: str) -> None:
         mesh.vertices_m[0] = 0.0
 
 
+@pytest.mark.slow
 def test_a_thousand_random_shapes_are_found_by_tag(library: Library) -> None:
     """Every folder of random_urdfs is listed, sorted by id, but the one whose mesh has NaNs."""
     found = library.find({"random_shape"})

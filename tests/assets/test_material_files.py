@@ -77,6 +77,7 @@ def checker(low: int, high: int) -> np.ndarray:
     return np.where((x + y) % 2, high, low).astype(np.uint8)
 
 
+@pytest.mark.slow
 def test_gltf_extensions_become_coat_glass_and_light(folder: Path) -> None:
     """Numbers as written; a volume makes glass a solid; nits stay nits; F0 follows the index."""
     gltf(folder, {

@@ -81,6 +81,7 @@ def test_the_origin_is_the_centre_of_the_bounding_box(built: tuple[str, Solid]) 
     assert np.allclose(np.add(low, high), 0.0, atol=3e-6)
 
 
+@pytest.mark.slow
 @for_every_variant
 def test_arrays_are_finite_typed_and_within_the_budget(built: tuple[str, Solid]) -> None:
     """Shapes and types are the contract's; a mesh has at most 12 000 triangles."""
@@ -112,6 +113,7 @@ def test_texture_coordinates_stay_in_the_image(built: tuple[str, Solid]) -> None
     assert uvs.max() <= 1.0
 
 
+@pytest.mark.slow
 @for_every_variant
 def test_surfaces_are_closed(built: tuple[str, Solid]) -> None:
     """Every edge is walked as often in one direction as in the other."""
@@ -178,6 +180,7 @@ def test_collision_has_the_bounds_of_what_is_seen(built: tuple[str, Solid]) -> N
     assert np.abs(points.max(axis=0) - high).max() < 0.003
 
 
+@pytest.mark.slow
 @for_every_variant
 def test_most_of_what_is_seen_lies_near_the_collision(built: tuple[str, Solid]) -> None:
     """Half of the vertices within 2.5 mm of a part, nine in ten within 3.5 mm."""

@@ -158,6 +158,7 @@ def test_concrete_is_grey_and_even(name: str, seed: int) -> None:
     assert (grey < 0.8 * grey.mean()).mean() < 0.02
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["tiles", "floor_tiles"])
 def test_two_in_three_tiles_are_white_grey_or_beige(name: str) -> None:
     """Mean colours whose channels differ by less than 30 of 255."""

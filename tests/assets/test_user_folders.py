@@ -309,6 +309,7 @@ def test_edges_that_do_not_fit_the_file_are_refused(folder: Path, tmp_path: Path
         sized(folder, tmp_path, "size_m: [0.1, 0.3, 0.2]")
 
 
+@pytest.mark.slow
 def test_a_pattern_stands_for_every_file_that_matches(folder: Path, tmp_path: Path) -> None:
     """Ids and categories follow from paths; the rest of the entry holds for all."""
     for name in ("bolts/m8.stl", "bolts/long/m10.stl", "nuts/m8.stl", "nut.stl", ".git/x.stl"):

@@ -159,6 +159,7 @@ def test_p_values_of_true_parameters_are_uniform() -> None:
     assert stats.kstest(p_values, "uniform").pvalue > ALPHA
 
 
+@pytest.mark.slow
 def test_families_of_true_parameters_fail_at_the_stated_rate() -> None:
     """30 independent uniform p-values each: Holm refuses 1 - (1 - alpha / 30)^30 of the families.
 

@@ -61,6 +61,7 @@ def read(folder: Path, name: str) -> Finding:
     return findings[name]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_readers_find_what_labels_say(exported: Path, name: str) -> None:
     """Two images whose boxes, and masks where the format has them, score 1."""

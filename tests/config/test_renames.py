@@ -97,6 +97,7 @@ def test_old_and_new_word_side_by_side_are_refused() -> None:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::FutureWarning")
 def test_the_command_line_may_use_old_words_too(tmp_path: Path) -> None:
     """They win over what the file says, as overrides do."""
@@ -126,6 +127,7 @@ def test_every_new_word_is_one_of_its_plugin_and_no_old_one_is() -> None:
         assert not set(RANDOMIZERS) & fields.keys()
 
 
+@pytest.mark.slow
 def test_the_command_line_shows_a_warning_as_one_plain_line(tmp_path: Path) -> None:
     """On standard error, before anything else; no source line of Python's."""
     inherited = len(load_config("street.yaml").resolved["randomizers"])

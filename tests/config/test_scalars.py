@@ -87,6 +87,7 @@ PLAIN = st.recursive(
 )
 
 
+@pytest.mark.slow
 @settings(max_examples=300, deadline=None, derandomize=True)
 @given(PLAIN)
 def test_what_is_written_in_flow_style_reads_back_equal(value: object) -> None:

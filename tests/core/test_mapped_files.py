@@ -103,6 +103,7 @@ def test_pages_are_dropped_once_enough_were_read(tmp_path: Path) -> None:
     assert read_statm(2) < resident - (7 << 20)
 
 
+@pytest.mark.slow
 def test_a_file_is_unmapped_with_its_last_view(tmp_path: Path) -> None:
     """Parts of an array count as views."""
     path = tmp_path / "file"

@@ -44,6 +44,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return made
 
 
+@pytest.mark.slow
 def test_the_plan_is_that_of_a_run_without_the_options(folder: Path) -> None:
     """They are options of the run, also as keys of the configuration."""
     config = json.loads((folder / "plan.json").read_text())["config"]

@@ -40,6 +40,7 @@ def test_drawn_values_are_those_of_the_stored_scenes(drawn: DrawnParameters, dat
     assert values["shared.robot"] == [dict(scenes[k].shared)["robot"] for k in (0, 5, 10)]
 
 
+@pytest.mark.slow
 def test_declared_values_are_drawn_from_the_declared_distribution(drawn: DrawnParameters) -> None:
     """The expected mean and limits of {uniform: [0.9, 1.5]}."""
     (distance,) = (p for p in drawn.parameters if p.name == "orbit.distance_m")

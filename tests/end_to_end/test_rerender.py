@@ -47,6 +47,7 @@ def test_it_is_repaired_from_the_scenes_that_it_has(dataset: Path, dark_dataset:
     assert digest(dark_dataset) == before
 
 
+@pytest.mark.slow
 def test_other_light_changes_colours_and_nothing_else(dataset: Path, dark_dataset: Path) -> None:
     """Ids, depth, boxes and poses are equal: a counterfactual pair."""
     bright, dark = package.open(dataset), package.open(dark_dataset)

@@ -63,6 +63,7 @@ def settled(env: Env, action: NDArray[np.float32], steps: int = 20) -> NDArray[n
     return simulation_of(env).positions.copy()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", INSTALLED)
 def test_a_delta_moves_the_hand_as_told(engine: str) -> None:
     """By (20, -10, 15) mm and 5 degrees about Z of the base, to 0.2 mm and 0.1 degrees."""
@@ -96,6 +97,7 @@ def test_poses_are_reached_in_the_frame_of_the_base() -> None:
     assert observation["hand_position"] == pytest.approx(place_m, abs=1e-4)
 
 
+@pytest.mark.slow
 def test_joint_actions_are_positions_within_the_limits_of_the_urdf() -> None:
     """-1 and 1 are the limits, 0 the middle of each joint."""
     env = nominal(INSTALLED[0], "joint")
@@ -129,6 +131,7 @@ def test_motors_follow_the_step_response_of_a_damped_oscillator(ratio: float) ->
             assert positions[0] == pytest.approx(1.0 - (decay * wave).real, abs=2e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("latency", [1, 3])
 def test_latency_delays_by_exactly_its_steps(latency: int) -> None:
     """The joints do the same, exactly so many steps later, and nothing before."""

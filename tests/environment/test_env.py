@@ -49,6 +49,7 @@ def test_gymnasium_s_checker_finds_nothing_in_the_defaults() -> None:
     env.close()
 
 
+@pytest.mark.slow
 def test_a_seed_is_a_scene_of_the_data_set() -> None:
     """The first photograph is that of the data set's sample, byte for byte."""
     observation, info = small(settings={"steps_max": 3}).reset(seed=2)
@@ -57,6 +58,7 @@ def test_a_seed_is_a_scene_of_the_data_set() -> None:
     assert observation["rgb"].tobytes() == sample.cameras["color"].rgb.tobytes()
 
 
+@pytest.mark.slow
 def test_equal_seeds_give_equal_bytes_whatever_happened_before() -> None:
     """Two environments, one of which has had another episode; different seeds differ."""
     one, other = small(), small()
@@ -73,6 +75,7 @@ def test_equal_seeds_give_equal_bytes_whatever_happened_before() -> None:
     assert not same(one.reset(seed=4)[0], first[0])
 
 
+@pytest.mark.slow
 def test_resets_without_a_seed_continue_from_the_latest_one() -> None:
     """The same sequence of scenes after the same seed, all of them different."""
     env = nominal(INSTALLED[0], "joint")
@@ -146,6 +149,7 @@ def test_what_cannot_be_reached_changes_nothing() -> None:
     assert np.abs(simulation_of(env).speeds).max() == 0.0
 
 
+@pytest.mark.slow
 def test_proximity_is_the_height_of_the_fingers_over_the_table(engine: str) -> None:
     """Of a hand that points down beside all things, the lowest corner of the fingers' boxes."""
     env = nominal(engine, "ik")
@@ -179,6 +183,7 @@ def test_rendering_shows_the_latest_photograph() -> None:
     assert env.metadata["render_fps"] == 20
 
 
+@pytest.mark.slow
 def test_vectors_equal_single_environments() -> None:
     """Environment ``k`` of a vector has the seed ``s + k``."""
     vector = gymnasium.vector.SyncVectorEnv([partial(small)] * 2)
@@ -227,6 +232,7 @@ def test_wrong_settings_are_refused_with_their_place(options: dict[str, Any], me
         Env(CONFIG, **options)
 
 
+@pytest.mark.slow
 def test_configurations_without_one_robot_with_a_gripper_are_refused() -> None:
     """None, several kinds, and one without a gripper."""
     with pytest.raises(ConfigError, match=r"elements: there is no robot; expected one with"):
@@ -251,6 +257,7 @@ def test_a_task_without_solution_is_refused_with_reasons() -> None:
         Env(CONFIG, overrides=changes).reset(seed=0)
 
 
+@pytest.mark.slow
 def test_without_gymnasium_the_extra_is_named() -> None:
     """By the error of a first use; importing gen_data needs no Gymnasium."""
     program = (

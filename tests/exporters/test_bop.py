@@ -186,6 +186,7 @@ def dataset(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return world.export(Bop(), world.info(7), samples, tmp_path_factory.mktemp("bop"))
 
 
+@pytest.mark.slow
 def test_models_in_the_written_poses_give_the_images(dataset: Path) -> None:
     """Masks, depth, visibility, boxes and targets follow from models, poses and intrinsics."""
     assert problems(dataset) == []

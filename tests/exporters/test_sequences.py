@@ -20,6 +20,7 @@ from gen_data.exporters.semantickitti import SemanticKitti
 from tests.exporters.drives import DRIVE, drive_info, stems
 
 
+@pytest.mark.slow
 def test_sensors_that_miss_a_step_have_no_files_there(
     world: Any, slow: Any, tmp_path: Path
 ) -> None:

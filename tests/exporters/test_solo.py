@@ -165,6 +165,7 @@ def test_the_official_converter_makes_coco_of_it(dataset: Path, world: Any, tmp_
     assert sorted(row["bbox"] for row in rows) == sorted(boxes)
 
 
+@pytest.mark.slow
 def test_sequences_have_steps(world: Any, samples: Any, tmp_path: Path) -> None:
     """Two cameras on a moving rig; each split numbers its sequences from 0."""
     info = world.info(8, ("left", "right"), steps_per_scene=4)

@@ -97,6 +97,7 @@ def test_objects_that_look_different_after_any_turn_have_none(library: Library, 
     assert not {"symmetries_discrete", "symmetries_continuous"} & set(info)
 
 
+@pytest.mark.slow
 def test_what_assets_state_is_found_without_them(library: Library) -> None:
     """The groups of a nut, a flange, an elbow and a screwdriver with a flat tip, by their order."""
     for asset in ("nut?seed=2", "flange?seed=1", "pipe_elbow?seed=2", "screwdriver?seed=3"):

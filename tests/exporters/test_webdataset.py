@@ -62,6 +62,7 @@ def faults(folder: Path, world: Any) -> list[str]:
     return found
 
 
+@pytest.mark.slow
 def test_samples_are_read_back_with_all_fields(dataset: Path, world: Any) -> None:
     """Images, scans, rows and labels under one key; splits have folders of their own."""
     assert faults(dataset / "train", world) == []
@@ -92,6 +93,7 @@ def test_images_are_the_bytes_of_the_shards(dataset: Path) -> None:
         assert member.read() == (shard / "color/depth/000000003.png").read_bytes()
 
 
+@pytest.mark.slow
 def test_sensors_that_do_not_read_have_no_field(world: Any, slow: Any, tmp_path: Path) -> None:
     """The right camera and the scanner read at every second step."""
     info = world.info(8, ("left", "right"), ("top",), devices={}, steps_per_scene=4)

@@ -65,6 +65,7 @@ def names_in(folder: Path) -> set[str]:
     return {path.name for path in folder.iterdir()} - {".lock"}
 
 
+@pytest.mark.slow
 def test_an_installed_pack_joins_the_library(pack: Pack, archive: Path, tmp_path: Path) -> None:
     """Its assets have ids that start with its name, and their own licence and author."""
     record = install(pack, tmp_path / "packs", archive)

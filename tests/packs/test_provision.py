@@ -116,6 +116,7 @@ def test_without_a_network_the_error_says_what_helps(index: Callable[[str], None
     assert "GEN_DATA_OFFLINE=1" in message
 
 
+@pytest.mark.slow
 def test_processes_that_start_together_fetch_once(
     index: Callable[[str], None], tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:

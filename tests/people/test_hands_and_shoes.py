@@ -69,6 +69,7 @@ def test_what_is_held_touches_palm_and_fingers_without_filling_the_hand(pose: st
     assert np.linalg.norm(thing - wrist, axis=1).min() > 0.02
 
 
+@pytest.mark.slow
 def test_the_rim_of_the_sole_has_its_colour_and_the_upper_another() -> None:
     """Mean texels above and below the edge; a worn rim is up to a third darker."""
     for seed, design in enumerate(DESIGNS.values()):

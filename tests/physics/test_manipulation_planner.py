@@ -215,6 +215,7 @@ def test_what_was_put_down_does_not_move_when_left_alone(
     assert math.dist(resting, last.body("it").T_world_body.translation_m) < 1e-3
 
 
+@pytest.mark.slow
 def test_the_same_scene_moves_in_the_same_way_whatever_was_before(
     engine: Engine, engine_name: EngineName
 ) -> None:

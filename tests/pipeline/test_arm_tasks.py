@@ -86,6 +86,7 @@ def test_arms_with_made_fingers_put_things_down_where_they_should(robot: str) ->
     assert any("tool_left_finger + things/0" in span.label for span in arm.episode.contacts)
 
 
+@pytest.mark.slow
 def test_a_thing_that_pivots_is_pressed_by_the_mat_and_turns_in_the_hand() -> None:
     """Held while it turns by 55 degrees; the mat pushes with the pads' torque over the lever arm.
 
@@ -276,6 +277,7 @@ def test_a_demonstration_alone_equals_the_one_after_others() -> None:
     assert canonical_json(alone) == canonical_json(later)
 
 
+@pytest.mark.slow
 def test_things_are_where_physics_left_them_at_every_step() -> None:
     """The upper block of a stack is on the table at first and on the lower one at last."""
     changes = ("shared.task=stack", *NONE_FAIL)

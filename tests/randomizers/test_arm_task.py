@@ -123,6 +123,7 @@ def failure_of(task: ArmTask, scene: int, attempt: int = 0) -> str:
     return arm.assignment.failure
 
 
+@pytest.mark.slow
 def test_failures_follow_their_shares() -> None:
     """Chi-square over 4,000 scenes; its false-alarm rate is 1e-4 over seeds, and the seed fixed."""
     shares = {"slip": 0.1, "miss": 0.05, "collision": 0.2, "": 0.65}

@@ -80,6 +80,7 @@ def test_a_thing_is_one_instance_whose_parts_are_its_links(library: Library) -> 
     assert bodies["cabinet/drawer"].T_world_body.translation_m == pytest.approx((1.0, 2.21, 0.65))
 
 
+@pytest.mark.slow
 def test_object_states_move_its_parts_and_labels_state_the_joints(library: Library) -> None:
     """The drawer slides 0.3 m along the world's Y, and the door turns by -90 degrees."""
     bodies, attributes = opened(placed(library), library)

@@ -223,6 +223,7 @@ def radiance_of(
     return reading.channels[Channel.RADIANCE]
 
 
+@pytest.mark.slow
 def test_a_matte_plane_under_a_ceiling_panel_is_lit_as_by_quadrature() -> None:
     """Whole images, at every pixel: luminance = E rho / pi."""
     panel = replace(RECTANGLE, position_m=(0.0, 0.0, 0.8), direction=(0.0, 0.0, -1.0))

@@ -146,6 +146,7 @@ def test_a_pinhole_has_no_table_of_directions() -> None:
     assert not view.directions
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CAMERAS)
 def test_ranges_are_embrees_along_opencvs_directions(name: str) -> None:
     """Boxes and balls before and beside the camera: 0.1 mm and equal ids on 99.9 % of pixels."""
@@ -179,6 +180,7 @@ def test_ranges_are_embrees_along_opencvs_directions(name: str) -> None:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CAMERAS)
 def test_a_ball_covers_the_pixels_whose_rays_meet_it(name: str) -> None:
     """In closed form: rays within asin(r / d) of the centre's direction agree except at the rim."""

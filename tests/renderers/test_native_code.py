@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import shutil
 import subprocess
 from collections.abc import Iterator
 from pathlib import Path
@@ -61,6 +62,7 @@ def test_every_header_is_the_body_of_a_function_or_part_of_one() -> None:
     assert not [header for header in HEADERS if native(header).strip() not in bodies]
 
 
+@pytest.mark.skipif(not shutil.which("g++"), reason="needs a C++ compiler, g++")
 @pytest.mark.parametrize("name", sampled(sorted(FUNCTIONS.keys() - {ON_CPU_ONLY}), 9))
 def test_a_native_function_compiles_alone(name: str) -> None:
     """With g++, from its declaration in Python and its header."""

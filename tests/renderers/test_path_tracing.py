@@ -284,6 +284,7 @@ def mixed_scene() -> tuple[Scene, Camera, FakeLibrary]:
     return Scene("mixed", bodies, lights=lights, environment=environment), camera, library
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lights", [ASKED, MET], ids=["asked", "met"])
 def test_either_technique_alone_agrees_with_both_together(lights: int) -> None:
     """Three estimators of one integral: z-test of the mean over the image, sixteen replicates."""
@@ -388,6 +389,7 @@ def test_snow_whitens_and_puddles_mirror() -> None:
     assert 3.0 < radiance_of(soaked, from_above(), ground(dark), 32).mean() < 10.0
 
 
+@pytest.mark.slow
 def test_the_other_tier_never_loads_the_kernels_of_paths() -> None:
     """A cold start of the realtime tier takes as long as before."""
     code = (

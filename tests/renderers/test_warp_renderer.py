@@ -189,6 +189,7 @@ def test_settings_refuse_what_they_do_not_know() -> None:
             RenderSettings.model_validate(wrong)
 
 
+@pytest.mark.slow
 def test_rendering_prints_nothing() -> None:
     """Neither Warp's banner nor its warning about a missing driver reaches the terminal."""
     code = (

@@ -315,6 +315,7 @@ def test_bad_input_has_one_clear_message(hand: Path, tmp_path: Path) -> None:
         describe_dataset(folder, scenes_max=0)
 
 
+@pytest.mark.slow
 def test_the_page_of_a_large_data_set_is_bounded(tmp_path: Path) -> None:
     """The browser has a limited number of images, and a limited size; figures count all images."""
     rng = np.random.default_rng(2)

@@ -321,6 +321,7 @@ OBJECTS = (
 )
 
 
+@pytest.mark.slow
 def test_what_has_no_effect_is_named_and_counted(tmp_path: Path) -> None:
     """By the check of a folder."""
     inner = (

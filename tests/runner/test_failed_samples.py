@@ -150,6 +150,7 @@ def test_a_sample_that_hangs_is_killed_after_its_limit_and_skipped(tmp_path: Pat
     assert summary.samples == 9
 
 
+@pytest.mark.slow
 def test_a_sample_that_hangs_gets_no_second_try_after_a_chosen_limit(tmp_path: Path) -> None:
     """Without the other option, its shard is abandoned and all others are finished."""
     settings = Settings(write_media=write_raw_images, limits=Limits(sample_s=1.5))
@@ -171,6 +172,7 @@ def test_a_sample_that_crashes_its_worker_every_time_is_skipped(tmp_path: Path) 
     assert summary.worker_deaths == 3
 
 
+@pytest.mark.slow
 def test_a_worker_that_is_killed_once_loses_no_sample(tmp_path: Path) -> None:
     """Its shard is made again, as without the option."""
     make(tmp_path / "whole")

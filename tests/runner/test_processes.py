@@ -83,6 +83,7 @@ def committed(out: Path) -> int:
     return len(list((out / "shards").glob("*.json"))) if (out / "shards").exists() else 0
 
 
+@pytest.mark.slow
 def test_a_killed_worker_is_replaced_and_its_shard_made_again(
     tmp_path: Path, reference_digest: str
 ) -> None:
@@ -98,6 +99,7 @@ def test_a_killed_worker_is_replaced_and_its_shard_made_again(
     assert "shard 1, sample 5" in note
 
 
+@pytest.mark.slow
 def test_a_poisoned_sample_is_named_and_all_other_shards_are_made(tmp_path: Path) -> None:
     """Three deaths on shard 1, then WorkerLost with the command that makes sample 6 alone."""
     with pytest.raises(WorkerLost) as caught:
@@ -124,6 +126,7 @@ def test_a_healed_run_completes_what_a_poisoned_one_left(
     assert tree_digest(tmp_path / "out") == reference_digest
 
 
+@pytest.mark.slow
 def test_a_hanging_worker_is_killed_and_its_shard_made_by_another(
     tmp_path: Path, reference_digest: str
 ) -> None:
@@ -136,6 +139,7 @@ def test_a_hanging_worker_is_killed_and_its_shard_made_by_another(
     assert tree_digest(tmp_path / "out") == reference_digest
 
 
+@pytest.mark.slow
 def test_killed_workers_leave_no_temporary_files(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -183,6 +187,7 @@ def test_a_wrong_sample_is_named_with_the_command_that_makes_it(tmp_path: Path) 
     )
 
 
+@pytest.mark.slow
 def test_workers_that_cannot_start_end_the_run(tmp_path: Path) -> None:
     """Not an endless loop of processes."""
     with pytest.raises(WorkerLost, match="while they start: killed by signal 9"):
@@ -197,6 +202,7 @@ def test_what_workers_print_and_how_they_crash_is_kept_in_the_run_folder(tmp_pat
     assert "a wheel came off" in (tmp_path / "out/run/worker-0.log").read_text()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_ctrl_c_stops_quickly_keeps_shards_and_tells_how_to_go_on(
     tmp_path: Path, number: signal.Signals
@@ -294,6 +300,7 @@ def with_standby(standby: StandbyWorker) -> Settings:
     )
 
 
+@pytest.mark.slow
 def test_a_worker_that_stood_by_makes_the_same_files(tmp_path: Path, reference_digest: str) -> None:
     """It takes part until it is dismissed; its output goes to the log of the first worker."""
     with StandbyWorker() as standby:

@@ -59,6 +59,7 @@ def finish(process: subprocess.Popen[str]) -> str:
         raise
 
 
+@pytest.mark.slow
 def test_a_worker_killed_at_birth_is_replaced_however_large_the_job_is(tmp_path: Path) -> None:
     """A job three times as large as a pipe, and nobody there to read it: the run goes on."""
     environment = with_action_at_birth(tmp_path, "os.kill(os.getpid(), signal.SIGKILL)")
@@ -96,6 +97,7 @@ def test_a_signal_while_a_worker_starts_ends_the_run(
     wait_for(lambda: processes_of_session(process.pid) == [])
 
 
+@pytest.mark.slow
 def test_a_worker_that_cannot_be_imported_is_reported_in_the_run_folder(tmp_path: Path) -> None:
     """The terminal shows no traceback of a process that the user never started."""
     environment = with_action_at_birth(tmp_path, "sys.modules['gen_data.runner'] = None")

@@ -212,6 +212,7 @@ def test_sections_differ_by_district() -> None:
     assert len(forward) >= 2
 
 
+@pytest.mark.slow
 def test_towers_stand_where_one_sees_a_city() -> None:
     """Often at arterials, seldom in suburbs, never in villages; never on more than a third."""
     config = street()

@@ -18,6 +18,7 @@ def test_boxes_and_posts_of_streets_are_grimy() -> None:
     assert {"bollard", "cabinet", "hydrant", "litter_bin", "post_box"} <= set(GRIMY)
 
 
+@pytest.mark.slow
 @for_every(VARIANTS)
 def test_grime_changes_neither_shape_nor_print(variant: tuple[str, int]) -> None:
     """Corners stay; other slots keep materials and coordinates."""

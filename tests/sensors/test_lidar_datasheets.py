@@ -56,6 +56,7 @@ def told(folder: Path, line: str, **files: str) -> str:
     return str(refused.value).replace(f"{folder}/", "")
 
 
+@pytest.mark.slow
 def test_a_data_sheet_beside_the_configuration_is_a_model(tmp_path: Path) -> None:
     """Its name is the file's; the scanner has its lasers and its turns."""
     sensor = spec(tmp_path, "model: ./sheet.yaml", sheet_yaml=SHEET).sensors[1]
@@ -65,6 +66,7 @@ def test_a_data_sheet_beside_the_configuration_is_a_model(tmp_path: Path) -> Non
     np.testing.assert_allclose(np.degrees(sensor.device.elevations_rad()), [1, 0, -1])
 
 
+@pytest.mark.slow
 def test_a_plan_holds_the_data_sheet_and_needs_no_file(tmp_path: Path) -> None:
     """Other numbers in the file are another data set; a plan is made again without it."""
     made = spec(tmp_path, "model: sheet.yaml", sheet_yaml=SHEET)
@@ -77,6 +79,7 @@ def test_a_plan_holds_the_data_sheet_and_needs_no_file(tmp_path: Path) -> None:
     assert load_config(str(tmp_path)).sensors == made.sensors
 
 
+@pytest.mark.slow
 def test_a_table_of_beams_replaces_the_lasers_of_a_model(tmp_path: Path) -> None:
     """Sorted from the top, each with its own offset to the left; comments are skipped."""
     table = "azimuth_offset_deg, elevation_deg\n# down first\n-2, -10\n\n4, 5  # up\n"
@@ -175,6 +178,7 @@ def test_a_sheet_of_a_few_lines_has_the_rest_of_a_named_scanner(tmp_path: Path) 
     assert len(make_sweep(device, 0.0).ring) == 4 * round(289352 / 10 / 16)
 
 
+@pytest.mark.slow
 def test_a_step_in_azimuth_gives_the_pulses_of_a_turn(tmp_path: Path) -> None:
     """0.5 degrees: 720 of each laser, at any speed of rotation; 2 s / 20 turns / 720 apart."""
     text = "like: OS1-64\nelevations_deg: [3, 1, -2]\nazimuth_step_deg: 0.5\n"

@@ -105,6 +105,7 @@ def test_ideal_ranges_and_angles_are_those_of_the_near_face() -> None:
     assert (height_m < 1.55).all()
 
 
+@pytest.mark.slow
 def test_noise_of_range_azimuth_and_velocity_is_that_of_the_data_sheet() -> None:
     """Near scan: 0.1 m, 0.3 degrees ahead, 0.1 km/h; a post alone, which is one peak."""
     post = thing(2, "post", "car", SE3((25.2, 0.0, 0.0)), ((-0.15, -0.15, 0), (0.15, 0.15, 1)))

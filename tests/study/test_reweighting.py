@@ -121,6 +121,7 @@ def test_the_parameter_that_misses_depend_on_is_found() -> None:
     assert factors[-1] > 2.0 * factors[0]
 
 
+@pytest.mark.slow
 def test_false_alarms_are_as_rare_as_stated() -> None:
     """In 60 experiments without any dependence: at most 5 % of them, at four deviations."""
     alarms = sum(

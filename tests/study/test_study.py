@@ -61,6 +61,7 @@ def test_results_of_detectors_are_compared(tmp_path: Path) -> None:
     assert groups["size", "small"]["objects"] == 48
 
 
+@pytest.mark.slow
 def test_the_page_shows_the_worst_pictures_and_requests_nothing(tmp_path: Path) -> None:
     """Twelve pictures of the worse detector, none of the perfect one."""
     write_coco(tmp_path / "real", BOXES)

@@ -100,6 +100,7 @@ def test_an_exported_world_comes_back(tmp_path: Path) -> None:
     assert both.mean() > 0.5 and np.quantile(depth, 0.99) < 1e-4
 
 
+@pytest.mark.slow
 def test_lights_and_cameras_come_back(tmp_path: Path) -> None:
     """Intensities, colours, cones and poses, turned with the element; cameras become rigs."""
     library = opened_library(tmp_path)

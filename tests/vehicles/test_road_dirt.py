@@ -46,6 +46,7 @@ def shares(solid: Solid, seed: int) -> tuple[np.ndarray, np.ndarray]:
     return np.einsum("nk,nkd->nd", weights, corners[chosen]), linear / DUST[0]
 
 
+@pytest.mark.slow
 @for_every([("car", s) for s in range(0, 124, 13)] + [("van", 3), ("taxi", 1)])
 def test_dirt_lies_low_behind_wheels_and_on_the_rear(variant: tuple[str, int]) -> None:
     """Places in metres, from the keypoints of the wheels."""
@@ -97,6 +98,7 @@ def test_older_vehicles_are_dirtier() -> None:
         assert amount == pytest.approx(draw_wear("car", seed), abs=0.051)
 
 
+@pytest.mark.slow
 def test_brake_dust_darkens_and_dulls_rims() -> None:
     """On every car."""
     worn = FAMILIES["car"].build
@@ -110,6 +112,7 @@ def test_brake_dust_darkens_and_dulls_rims() -> None:
         assert all(u <= n + 1e-6 for u, n in zip(used.base_color, new.base_color, strict=True))
 
 
+@pytest.mark.slow
 @for_every([(0.012, 0.011, 0.014), (0.8, 0.8, 0.78), (0.25, 0.01, 0.012)])
 def test_a_clean_texture_is_the_paint_and_a_dirty_one_nears_dust(
     color: tuple[float, float, float],
