@@ -79,6 +79,7 @@ def test_open_grippers_touch_nothing() -> None:
         assert not fingers.any(), grasp
 
 
+@pytest.mark.slow
 def test_suctions_are_on_flat_places_that_face_up() -> None:
     """The rim of the cup meets the object everywhere within the seal's tolerance."""
     _, frame, meshes = settled()

@@ -134,6 +134,7 @@ def test_an_expression_refers_to_its_thing_and_no_other(config: str, index: int)
         assert resolve(seen, said.text) == set(said.instances), said.text
 
 
+@pytest.mark.slow
 @each
 def test_nothing_is_said_about_what_cannot_be_seen(config: str, index: int) -> None:
     """Every thing that an utterance is about has at least the pixels of the threshold."""

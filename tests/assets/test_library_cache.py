@@ -55,6 +55,7 @@ def test_stored_bounds_are_those_of_the_mesh_which_is_not_read(
     assert (of_body is not None) == asset.startswith("car")
 
 
+@pytest.mark.slow
 def test_cold_warm_and_another_cache_give_the_same_bytes(tmp_path: Path) -> None:
     """Cached values equal computed ones."""
     cold = open_library(cache_dir=tmp_path / "a")

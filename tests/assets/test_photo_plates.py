@@ -117,6 +117,7 @@ def test_a_given_horizon_is_kept_to_the_pixel(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.slow
 def test_the_estimate_is_reported_with_its_error(tmp_path: Path) -> None:
     """``gen-data assets check`` shows the horizon; the plate has the pose of the camera."""
     pose, lens = tilted(-6.0, 1.5), Intrinsics.from_hfov(*SIZE_PX, math.radians(65.0))

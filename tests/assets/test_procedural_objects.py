@@ -104,6 +104,7 @@ def test_arrays_are_finite_typed_and_within_the_budget(built: tuple[str, Solid])
     assert mesh.faces.max() == n - 1
 
 
+@pytest.mark.slow
 @for_every_variant
 def test_texture_coordinates_stay_in_the_image(built: tuple[str, Solid]) -> None:
     """Labels are never cut off by wrapping around."""

@@ -47,6 +47,7 @@ def test_the_panda_reaches_where_its_maker_says(library: Library) -> None:
     assert flange.rotate(np.array([0.0, 0.0, 1.0])) == pytest.approx([0.0, 0.0, -1.0], abs=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", TOOLED)
 def test_tools_point_out_of_the_flange_and_close_at_the_grasp(library: Library, name: str) -> None:
     """Closed fingers meet at the grasp frame's origin; a cup's rim is there, below its tube."""

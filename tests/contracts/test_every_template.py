@@ -26,7 +26,7 @@ from gen_data.core.streams import Streams
 from tests.tiers import cases, sampled, slow
 
 CONFIGS = sorted(path.stem for path in Path(configs.__path__[0]).glob("*.yaml"))
-QUICK = ("bin_picking", "shelf", "tabletop")
+QUICK = ("bin_picking", "tabletop")
 """Configurations of which the default run draws scenes; ``tests/traffic`` draws streets."""
 TEMPLATES = sorted(path.stem for path in Path(scene_templates.__path__[0]).glob("*.yaml"))
 

@@ -70,6 +70,7 @@ def test_shipped_schema_is_the_generated_one(tmp_path: Path) -> None:
     assert json.loads(done.stdout) == json.loads(shipped.read_text())
 
 
+@pytest.mark.slow
 def test_doctor_finds_this_machine_fit(tmp_path: Path) -> None:
     """Every check of a machine that runs the tests passes, and one tells how fast it is."""
     done = gen_data("doctor", cwd=tmp_path)

@@ -61,6 +61,7 @@ def test_other_light_changes_colours_and_nothing_else(dataset: Path, dark_datase
         assert not np.array_equal(a.rgb, b.rgb)
 
 
+@pytest.mark.slow
 def test_other_cameras_see_the_same_scenes(dataset: Path, tmp_path: Path) -> None:
     """The camera of the same name keeps its pose, a new one has it too."""
     (tmp_path / "rig.yaml").write_text(

@@ -99,7 +99,7 @@ def helps(group: click.Group, names: tuple[str, ...] = ()) -> list[tuple[str, ..
         ("assets", "list"),
         ("formats",),
         ("plan", "tabletop.yaml", "--n", "20"),
-        ("plan", "kitti_rig.yaml", "--n", "20"),
+        pytest.param(("plan", "kitti_rig.yaml", "--n", "20"), marks=pytest.mark.slow),
     ],
     ids=" ".join,
 )

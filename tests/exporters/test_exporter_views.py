@@ -21,6 +21,7 @@ from gen_data.core.scene import Scene
 from gen_data.exporters import TABLE
 from gen_data.pipeline.exporter_views import ExporterView, view_of
 from tests.exporters.bent import LENSES, bent_samples, opencv_maps
+from tests.tiers import sampled
 
 PINHOLES_ONLY = ("bop", "cityscapes", "kitti", "scannet", "semantickitti", "solo", "tum_rgbd")
 
@@ -125,7 +126,7 @@ def test_scanners_can_be_left_out(world: Any, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("model", sorted(LENSES))
-@pytest.mark.parametrize("kind", [*PINHOLES_ONLY, "coco", "hdf5", "yolo"])
+@pytest.mark.parametrize("kind", sampled([*PINHOLES_ONLY, "coco", "hdf5", "yolo"], 4))
 def test_formats_of_pinholes_take_rectified_images(
     world: Any, tmp_path: Path, kind: str, model: Any
 ) -> None:

@@ -13,6 +13,7 @@ from gen_data.core.capture import Channel
 from gen_data.core.se3 import SE3
 from gen_data.exporters import TABLE
 from tests.exporters.label_readers import READERS, Found
+from tests.tiers import sampled
 
 # pycocotools' decoder predates numpy 2's __array__(copy=...).
 pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
@@ -64,16 +65,23 @@ def assert_objects(kind: str, folder: Path, samples: list[Any]) -> None:
 
 @pytest.mark.parametrize(
     ("kind", "options"),
-    [
-        *((kind, {}) for kind in READERS if kind not in ("tfrecord", "yolo")),
-        ("coco", {"segmentation": "rle"}),
-        *((kind, {"shapes": s}) for kind in ("cvat", "label_studio") for s in ("box", "polygon")),
-        ("label_studio", {"shapes": "mask"}),
-        ("huggingface", {"rows_per_file": 2}),
-        ("tfrecord", {"rows_per_file": 2, "masks": "png"}),
-        ("webdataset", {"samples_per_tar": 2}),
-        ("yolo", {"tasks": ("detect",)}),
-    ],
+    sampled(
+        [
+            *((kind, {}) for kind in READERS if kind not in ("tfrecord", "yolo")),
+            ("coco", {"segmentation": "rle"}),
+            *(
+                (kind, {"shapes": s})
+                for kind in ("cvat", "label_studio")
+                for s in ("box", "polygon")
+            ),
+            ("label_studio", {"shapes": "mask"}),
+            ("huggingface", {"rows_per_file": 2}),
+            ("tfrecord", {"rows_per_file": 2, "masks": "png"}),
+            ("webdataset", {"samples_per_tar": 2}),
+            ("yolo", {"tasks": ("detect",)}),
+        ],
+        3,
+    ),
 )
 def test_objects_are_those_of_the_samples(
     kind: str, options: dict[str, Any], world: Any, tmp_path: Path

@@ -81,6 +81,7 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+@pytest.mark.slow
 def test_an_arm_gets_its_meshes_and_fingers(package: Path, tmp_path: Path) -> None:
     """Three triangles where their node is, linear colours, and no marker at the flange."""
     folder = tmp_path / "packs" / "arms"

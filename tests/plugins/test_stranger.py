@@ -207,6 +207,7 @@ def test_the_plan_names_the_package(
     assert json.loads((dataset / "plan.json").read_text())["versions"]["stranger"] == "1.0"
 
 
+@pytest.mark.slow
 def test_describe_and_schema_include_the_plug_ins(installed: str, tmp_path: Path) -> None:
     """Fields and docstrings of third parties appear like those of the project."""
     done = run("describe", "stranger_boxes", path=installed, cwd=tmp_path)

@@ -108,6 +108,7 @@ def test_object_states_move_its_parts_and_labels_state_the_joints(library: Libra
     }
 
 
+@pytest.mark.slow
 def test_a_drawer_opens_only_until_something_is_in_the_way(library: Library) -> None:
     """A box 0.25 m ahead of the drawer leaves room for 0.6 of its way, not for all."""
     scene = placed(library)

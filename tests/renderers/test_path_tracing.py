@@ -28,6 +28,8 @@ from tests.renderers.fake_library import (
 )
 from tests.renderers.paths import ASKED, BOTH, MET, radiance_of, replicates_of, settings_of
 
+pytestmark = pytest.mark.slow
+
 FURNACE = Environment(luminance_cd_m2=100.0)
 WHITE = (1.0, 1.0, 1.0)
 

@@ -211,6 +211,7 @@ def test_silhouettes_roll_with_their_rows(renderer: WarpRenderer) -> None:
     assert beside.silhouettes[1].mask.sum() > (beside.channels[Channel.INSTANCE] == 1).sum() + 200
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "lens", [PINHOLE, Lens("kannala_brandt", (-0.02, 0.01, -0.004, 0.0005), 1.4)]
 )

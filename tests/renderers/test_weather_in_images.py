@@ -43,6 +43,8 @@ from gen_data.renderers.warp.settings import RenderSettings
 from tests.randomizers.doubles import rng_of
 from tests.renderers.fake_library import FakeLibrary, box_mesh, plane_mesh
 
+pytestmark = pytest.mark.slow
+
 RADIANCE = frozenset({Channel.RADIANCE})
 SEEN = frozenset({Channel.RADIANCE, Channel.RANGE, Channel.INSTANCE})
 LENS = Intrinsics(96, 64, 80.0, 80.0, 48.0, 32.0)

@@ -156,6 +156,7 @@ def test_traffic_can_go_on_where_roads_meet() -> None:
         assert all(lane.successors for lane in crossing), key
 
 
+@pytest.mark.slow
 def test_cyclists_ride_along_across_and_towards() -> None:
     """On the right of their lanes: directions of all quarters, in streets of all districts."""
     config, ways = street(), []

@@ -66,6 +66,7 @@ def test_panes_lie_behind_the_front_wall_by_a_real_recess(built: tuple[str, int,
     assert depth.max() < 0.36
 
 
+@pytest.mark.slow
 @for_some_of_every_style
 def test_windows_have_the_size_and_sills_of_real_ones(built: tuple[str, int, Solid]) -> None:
     """Building practice: 1.0-2.9 m wide, 1.2-2.6 m high, storeys of 2.7-4.7 m; halls to 6.5 m."""

@@ -98,6 +98,7 @@ def test_options_become_variants() -> None:
     )
 
 
+@pytest.mark.slow
 def test_pictures_that_train_a_variant_judge_none(tmp_path: Path) -> None:
     """The same ones are kept for all seeds; their order depends on the seed."""
     config = tmp_path / "small.yaml"
