@@ -173,8 +173,8 @@ def drawn(kind: str, stream: str = "stream", scene_index: int = 0) -> Scene:
     return made(kind)(*world_of(kind), rng_of(stream, scene_index))
 
 
-IN_ROOMS = {"ceiling_camera", "furnish", "object_states", "room_camera", "room_lighting"}
-each = pytest.mark.parametrize("kind", cases(TABLE, set(TABLE) - IN_ROOMS))
+SLOW = {"ceiling_camera", "furnish", "object_states", "room_camera", "room_lighting"}
+each = pytest.mark.parametrize("kind", cases(TABLE, set(TABLE) - SLOW))
 
 
 @each
