@@ -97,6 +97,7 @@ def test_suctions_are_on_flat_places_that_face_up() -> None:
             assert distance_m == pytest.approx(0.003, abs=1.5 * SETTINGS.seal_m)
 
 
+@pytest.mark.slow
 def test_only_loose_annotated_things_are_grasped_best_first() -> None:
     """No furniture, no robot; at most as many as asked for."""
     scene, frame, _ = settled()

@@ -143,6 +143,7 @@ def test_nothing_is_said_about_what_cannot_be_seen(config: str, index: int) -> N
         assert all(seen.pixels.get(n, 0) >= 256 for n in said.instances), said
 
 
+@pytest.mark.slow
 @each
 def test_numbers_are_those_in_the_picture(config: str, index: int) -> None:
     """Counted in the image of instance ids, with everything of that name."""

@@ -51,6 +51,7 @@ def test_kittis_colour_cameras_are_a_stereo_pair() -> None:
     assert left.intrinsics.fx_px == pytest.approx(721.5377, abs=0.5)
 
 
+@pytest.mark.slow
 def test_kittis_navigation_unit_is_where_its_calibration_has_it() -> None:
     """``calib_imu_to_velo``: (-0.81, 0.32, -0.80), to a centimetre."""
     scene = rig_scene("kitti_rig")
@@ -61,6 +62,7 @@ def test_kittis_navigation_unit_is_where_its_calibration_has_it() -> None:
     assert offset == pytest.approx((0.81, 0.32, 0.80), abs=0.01)
 
 
+@pytest.mark.slow
 def test_nuscenes_cameras_see_all_around() -> None:
     """Every direction at the horizon is in some camera's field of view."""
     scene = rig_scene("nuscenes_rig")

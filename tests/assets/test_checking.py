@@ -36,6 +36,7 @@ def folder(tmp_path: Path) -> Path:
     return root
 
 
+@pytest.mark.slow
 def test_every_asset_is_found_out_about(folder: Path, tmp_path: Path) -> None:
     """A broken asset does not hide the others."""
     library = open_library([folder], cache_dir=tmp_path / "cache")
@@ -75,6 +76,7 @@ def test_a_folder_without_assets_is_refused(tmp_path: Path) -> None:
     assert "has no assets; expected OBJ" in str(result.exception)
 
 
+@pytest.mark.slow
 def test_the_command_fails_if_an_asset_cannot_be_used(folder: Path) -> None:
     """The message names the asset and the reason."""
     result = CliRunner().invoke(assets, ["check", str(folder)])

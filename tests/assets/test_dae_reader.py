@@ -123,6 +123,7 @@ def test_diffuse_images_have_paths_beside_the_file_and_coordinates(tmp_path: Pat
     assert soup.uvs[0].tolist() == [[0, 0], [1, 0], [1, 1]]
 
 
+@pytest.mark.slow
 def test_alone_a_file_stands_as_its_up_axis_states(tmp_path: Path) -> None:
     """The plate lies in XY for Z up, and stands for Y up."""
     heights = {}

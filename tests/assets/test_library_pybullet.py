@@ -128,6 +128,7 @@ def test_neither_duck_nor_bicycle_are_offered(library: Library) -> None:
             library.get(name)
 
 
+@pytest.mark.slow
 def test_every_asset_names_licence_author_and_source(library: Library) -> None:
     """Source of a data set's attribution."""
     for kind in ("object", "robot", "texture", "environment"):

@@ -46,6 +46,7 @@ def robot(
     return open_library([tmp_path], tmp_path / "cache", tmp_path).robot("user/arm")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("hand", ["hand.urdf", "hand.xml"])
 def test_a_hand_of_its_own_file_is_on_the_flange(tmp_path: Path, hand: str) -> None:
     """2 cm beyond it, turned by 90 degrees: at 0.03 m the finger is 0.03 m along -X."""

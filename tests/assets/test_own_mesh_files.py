@@ -413,6 +413,7 @@ def test_origin_file_keeps_coordinates_and_other_origins_state_their_shift(tmp_p
         assert low == pytest.approx((0.03, 0.02, 0.01), abs=1e-7)
 
 
+@pytest.mark.slow
 def test_links_of_robots_keep_colours_of_vertices(tmp_path: Path) -> None:
     """A link with a gradient has an image of its own; one of one colour a base colour."""
     root = tmp_path / "robots"

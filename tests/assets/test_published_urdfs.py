@@ -53,6 +53,7 @@ def visual(material: str = "", geometry: str = BOX) -> str:
     return f"<visual>{geometry}{material}</visual>"
 
 
+@pytest.mark.slow
 def test_alpha_of_a_colour_is_opacity(tmp_path: Path) -> None:
     """Of own and of shared materials; sRGB 0.5 is 0.214041 linear (IEC 61966-2-1)."""
     own = '<material name="m"><color rgba="0.5 0 0 0.3"/></material>'

@@ -192,6 +192,7 @@ def test_before_version_1_7_a_joint_may_have_the_name_of_its_link(tmp_path: Path
     assert (hinge.name, hinge.child) == ("door_joint", "door")
 
 
+@pytest.mark.slow
 def test_meshes_materials_and_textures_of_gazebo(tmp_path: Path) -> None:
     """Diffuse colours replace those of a mesh; sRGB 0.5 is 0.214041 linear (IEC 61966-2-1)."""
     (tmp_path / "meshes").mkdir()

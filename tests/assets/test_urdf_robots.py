@@ -92,6 +92,7 @@ def test_the_panda_has_seven_joints_and_two_fingers(library: Library) -> None:
     assert robot.gripper.stroke_m == 0.08
 
 
+@pytest.mark.slow
 def test_the_grasp_frame_lies_between_the_finger_tips(library: Library) -> None:
     """Fully open, the tips are 0.08 m apart along the grasp frame's Y, at its height."""
     robot = library.robot("franka_panda")

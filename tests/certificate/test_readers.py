@@ -74,6 +74,7 @@ def test_readers_find_what_labels_say(exported: Path, name: str) -> None:
     assert (finding.figures.get("AP of masks") == 1.0) == (name in MASKED)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_an_export_without_its_largest_file_fails(
     exported: Path, tmp_path: Path, name: str

@@ -28,6 +28,9 @@ from gen_data.core.scene import Scene
 from gen_data.core.serialization import canonical_json, to_plain
 from tests.streets import thin_street
 
+# All of them label one street, of which assets and kernels are made first.
+pytestmark = pytest.mark.slow
+
 ANNOTATORS: dict[str, type[AnyAnnotator]] = {
     **{name: TABLE.load(name) for name in TABLE},
     "stranger_distance": Distance,

@@ -140,6 +140,7 @@ def _fingers(env: Env) -> tuple[str, str]:
     return ("arm/panda_leftfinger", "arm/panda_rightfinger")
 
 
+@pytest.mark.slow
 def test_what_cannot_be_reached_changes_nothing() -> None:
     """The far corner of the workspace: the targets stay, and ``info`` says so."""
     env = small(settings={"control": "ik", "workspace_m": [[0.3, -3.0, 0.1], [0.6, 3.0, 0.5]]})

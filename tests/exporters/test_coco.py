@@ -191,6 +191,7 @@ def test_amodal_boxes_are_those_of_the_silhouettes_in_the_image(
     assert Coco(bbox="amodal", amodal=False).needs == {"instance_masks", "boxes2d"}
 
 
+@pytest.mark.slow
 def test_boxes_only_and_no_amodal_keys_on_request(world: Any, tmp_path: Path) -> None:
     """Options leave out what they say, and nothing else."""
     exporter = Coco(segmentation="none", amodal=False)

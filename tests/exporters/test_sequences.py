@@ -35,6 +35,7 @@ def test_sensors_that_miss_a_step_have_no_files_there(
         assert [line.split(":")[-1] for line in lines] == ["00.000000000", "00.200000000"]
 
 
+@pytest.mark.slow
 def test_frames_are_numbered_by_the_camera_that_a_format_is_about(
     world: Any, slow: Any, tmp_path: Path
 ) -> None:

@@ -30,6 +30,7 @@ def save(path: Path, width: int = 96, height: int = 80, mode: str = "RGB", **opt
     Image.new(mode, (width, height), 100).save(path, **options)  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 def test_photographs_are_read_and_everything_else_is_counted_with_its_reason(
     tmp_path: Path,
 ) -> None:

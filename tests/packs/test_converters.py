@@ -145,6 +145,7 @@ def test_lamps_are_cut_out_on_both_sides() -> None:
     ]
 
 
+@pytest.mark.slow
 def test_a_region_takes_its_triangles_and_no_others(tmp_path: Path) -> None:
     """The upper face of a box becomes a lamp: 2 of 12 triangles."""
     folder = tmp_path / "packs" / "test"

@@ -69,6 +69,7 @@ def test_the_pack_has_what_the_index_needs_and_nothing_else(installed: Path) -> 
     assert not names & {"policies", "pybullet.so", "pybullet_data"}
 
 
+@pytest.mark.slow
 def test_assets_are_the_same_as_those_of_pybullet(
     installed: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

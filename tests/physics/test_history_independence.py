@@ -41,6 +41,7 @@ def settle_alone(name: EngineName, seed: int) -> str:
         return digest(engine, with_arm(dropped_clutter(seed)))
 
 
+@pytest.mark.slow
 def test_a_scene_settles_the_same_whatever_was_settled_before(
     engine: Engine, engine_name: EngineName
 ) -> None:

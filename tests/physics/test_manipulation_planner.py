@@ -102,6 +102,7 @@ def overlaps_m(scene: Scene, pairs: list[tuple[str, str]]) -> list[float]:
     return found
 
 
+@pytest.mark.slow
 def test_joints_keep_to_their_limits_and_to_the_share_of_their_speed(
     engine_name: EngineName,
 ) -> None:

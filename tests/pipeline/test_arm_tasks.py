@@ -133,6 +133,7 @@ def test_tasks_of_a_users_file_are_demonstrated(tmp_path: Path) -> None:
         load_config(str(config))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("mass_kg", "holds"), [(4.0, True), (4.5, False)])
 def test_a_cup_lifts_what_its_force_bears(tmp_path: Path, mass_kg: float, holds: bool) -> None:
     """42.4 N: 4 kg weigh 39.2 N, 4.5 kg 44.1 N."""

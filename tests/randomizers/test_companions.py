@@ -124,6 +124,7 @@ def test_everybody_has_one_way_to_walk_in_company_and_one_to_talk(library: Asset
     assert not any("phase" in asset for asset in found)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("pose", "companions"), [("walk", 0), ("stand", 8)])
 def test_a_mesh_that_stands_joins_a_circle_but_walks_with_nobody(
     tmp_path: Path, pose: str, companions: int

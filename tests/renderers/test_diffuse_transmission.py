@@ -57,6 +57,7 @@ def sun_along(x: float, z: float) -> Light:
     return Light("sun", "sun", direction=(x, 0.0, z), illuminance_lux=1000.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("z", "albedo"), [(0.8, PASSED), (-0.8, REFLECTED)])
 def test_the_sun_through_a_leaf_is_transmittance_times_lux_over_pi(z: float, albedo: Vec3) -> None:
     """A cosine of 0.8 leaves 800 lx of 1000, from below or from above, in both tiers."""
@@ -153,6 +154,7 @@ def test_a_sheet_never_scatters_more_than_it_receives() -> None:
     np.testing.assert_allclose(passed, (0.7, 0.5, 0.7), rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_snow_on_a_leaf_hides_the_light_below_it() -> None:
     """Snow transmits nothing here, whatever the albedo that it gives the surface."""
     scene, library = over(sheet())

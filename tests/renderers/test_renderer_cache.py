@@ -145,6 +145,7 @@ def filling(allocate: Callable[..., wp.array], byte: int) -> Callable[..., wp.ar
     return filled
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("visibility", ["raster", "rays"])
 def test_images_depend_on_no_memory_of_earlier_frames(
     visibility: Literal["raster", "rays"], monkeypatch: pytest.MonkeyPatch

@@ -95,6 +95,7 @@ def test_a_failed_sample_leaves_no_file_and_changes_no_other(
     assert lacking[labels].splitlines() == [lines[0], *lines[2:]]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("index", [0, 3, 4, 9])
 def test_the_bytes_depend_on_the_plan_and_the_failed_samples_alone(
     tmp_path: Path, index: int

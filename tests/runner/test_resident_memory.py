@@ -21,6 +21,7 @@ def pattern() -> np.ndarray:
     return np.arange(SIZE // 4, dtype=np.uint32)
 
 
+@pytest.mark.slow
 def test_pages_of_files_are_returned_and_come_back(tmp_path: Path) -> None:
     """A mapped file of 8 MB: its pages leave the process, its content does not change."""
     path = tmp_path / "file"

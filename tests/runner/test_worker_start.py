@@ -75,6 +75,7 @@ def test_a_worker_killed_at_birth_is_replaced_however_large_the_job_is(tmp_path:
     assert message == ""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("action", "ballast_bytes"),
     [

@@ -82,6 +82,7 @@ def test_windows_have_the_size_and_sills_of_real_ones(built: tuple[str, int, Sol
     assert 1 <= plan.floors <= 13
 
 
+@pytest.mark.slow
 @for_some_of_every_style
 def test_who_looks_at_it_from_outside_never_sees_an_inside(built: tuple[str, int, Solid]) -> None:
     """Rays from all around meet the front of a face first; thin railings excepted."""
@@ -213,6 +214,7 @@ def test_palettes_give_the_albedo_of_whole_walls(name: str) -> None:
     assert np.mean(means) == pytest.approx(TEXTURE_ALBEDOS[name], rel=0.12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "cells", "share"), [("home", 4, 0.4), ("office", 4, 0.3)])
 def test_windows_are_lit_one_by_one(kind: str, cells: int, share: float) -> None:
     """Of the panes of eight atlases the stated share shines, within three standard errors."""

@@ -19,6 +19,7 @@ def simulate(
     return Scores(measured, resampled)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("by_pictures", "by_seeds", "seeds"), [(0.02, 0.0, 1), (0.02, 0.01, 3), (0.005, 0.03, 3)]
 )

@@ -73,6 +73,7 @@ def test_perfect_results_score_one_and_no_results_zero(drawn_set: RealSet) -> No
     assert evaluate(drawn_set, []).summary().tolist() == [0.0, 0.0]
 
 
+@pytest.mark.slow
 def test_objects_are_found_missed_or_ignored(tmp_path: Path) -> None:
     """A hit, a miss, a crowd, a false alarm; detections below the best F1 do not count."""
     write_coco(

@@ -18,6 +18,7 @@ DontCare -1 -1 -10 0.00 0.00 9.00 9.00 -1 -1 -1 -1000 -1000 -1000 -10
 """
 
 
+@pytest.mark.slow
 def test_cocos_boxes_crowds_and_occlusion_are_read(tmp_path: Path) -> None:
     """A hidden fraction has KITTI's level; ids are those of the file."""
     write_coco(

@@ -115,6 +115,7 @@ def test_pictures_that_train_a_variant_judge_none(tmp_path: Path) -> None:
     assert len({tuple(order) for order in orders}) > 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("changes", "message"),
     [

@@ -103,6 +103,7 @@ def test_every_variant_is_as_big_as_real_ones_and_within_its_budget(
         assert 1000 <= len(mesh.faces) <= triangles, seed
 
 
+@pytest.mark.slow
 @for_every_variant
 def test_tyres_touch_the_ground_and_nothing_reaches_below(built: tuple[str, Solid]) -> None:
     """The ground is z = 0."""
