@@ -196,7 +196,7 @@ def find_segments(
         of_label[number] = ids.get(name, 0)
     for k, name in ground.items():
         of_label[count + k] = ids.get(name, 0)
-    labels = np.where(surfaces > 0, surfaces + np.uint16(count), instances)
+    labels = np.where(surfaces > 0, surfaces + np.uint16(count), instances) if ground else instances
     return labels, of_label, known
 
 
