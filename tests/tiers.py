@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+exhaustive = pytest.mark.exhaustive
 slow = pytest.mark.slow
 """Takes more than about half a second of processor time, or repeats a quick test for more cases."""
 
@@ -28,9 +29,15 @@ first_and_all = pytest.mark.parametrize(
 
 
 def seeds(quick: int, count: int) -> pytest.MarkDecorator:
-    """A test of the first seeds, and a slow one of the others, as its argument ``seeds``."""
-    first, others = range(quick), range(quick, count)
-    named = [pytest.param(first, id="first"), pytest.param(others, id="others", marks=slow)]
+    """A test of the first seeds, a slow one of as many others, and an exhaustive one of the rest.
+
+    As its argument ``seeds``.
+    """
+    named = [
+        pytest.param(range(quick), id="first"),
+        pytest.param(range(quick, 2 * quick), id="others", marks=slow),
+        pytest.param(range(2 * quick, count), id="rest", marks=exhaustive),
+    ]
     return pytest.mark.parametrize("seeds", named)
 
 

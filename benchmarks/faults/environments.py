@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import random
 import shutil
 import subprocess
 import sys
@@ -97,13 +96,16 @@ ENVIRONMENTS = {
     "2106": _clock("2106-03-01 00:00:00"),
 }
 
+QUICK = "Turkish locale"
+"""The one that a quick campaign has: lower and upper case are other letters there."""
+
 
 def environments(scale: Scale, folder: Path) -> Result:
     """Generate the tiny data set in every environment; the first one is this process's own."""
     result = Result()
     names = list(ENVIRONMENTS)
     if not scale.is_full:
-        names = random.Random(scale.seed).sample(names, 1)
+        names = [QUICK]
     folder.chmod(0o777)
     own = _generate(Environment(), folder / "own")
     digest = tree_digest(folder / "own/out")

@@ -37,7 +37,7 @@ def main() -> int:
     given = parser.parse_args()
     if given.venv is not None and Path(sys.prefix) != given.venv.resolve():
         return run_in(given.venv.resolve())
-    from benchmarks.readers.examine import examine_rows
+    from benchmarks.readers.examine import examine_rows, is_installed
     from benchmarks.readers.table import READERS
 
     rows = [
@@ -46,12 +46,12 @@ def main() -> int:
         if not given.only or {reader.package, reader.format} & {*given.only}
     ]
     parts: dict[str, list[int]] = defaultdict(list)
-    for k in rows:
+    for k in filter(lambda k: is_installed(READERS[k]), rows):
         parts[READERS[k].package].append(k)
     with tempfile.TemporaryDirectory(prefix="readers-") as scratch:
         folder = given.out or Path(scratch) / "data"
         make_data(folder)
-        found: dict[int, Comparison | None] = {}
+        found: dict[int, Comparison | None] = dict.fromkeys(rows)
         for part in parts.values():
             # A process for each package: some disturb others, such as by copies of a C library.
             with ProcessPoolExecutor(1, get_context("spawn")) as pool:

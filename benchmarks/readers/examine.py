@@ -23,7 +23,7 @@ def examine_rows(rows: Sequence[int], folder: Path, scratch: str) -> dict[int, C
 
 def examine(reader: Reader, folder: Path) -> Comparison | None:
     """Compare what a reader finds with what the data set states; None without its packages."""
-    if not all(map(installed, (reader.package, *reader.needs))):
+    if not is_installed(reader):
         return None
     comparison, stated = Comparison(), folder / reader.data.replace("runs", "tabletop")
     logging.disable(logging.ERROR)
@@ -57,6 +57,11 @@ def _limits(
     return (
         (found < limit if smallest else found > limit, f"{name}: {found:.6g}, limit {limit:g}"),
     )
+
+
+def is_installed(reader: Reader) -> bool:
+    """Whether the packages of a reader are there."""
+    return all(map(installed, (reader.package, *reader.needs)))
 
 
 def installed(package: str) -> str:

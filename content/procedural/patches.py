@@ -136,9 +136,10 @@ def finish_mesh(patch: Patch, materials: Sequence[Material], crease_deg: float) 
     cells = np.round(round_values(patch.corners_m) / GRID_M).astype(np.int64)
     corners, keep = _whole_triangles(cells)
     cells, uvs, slots = cells[keep], round_values(patch.uvs[keep]), patch.slots[keep]
-    normals = round_values(_corner_normals(cells.reshape(-1, 3), corners, crease_deg))
+    places, _ = first_occurrences(cells.reshape(-1, 3))
+    normals = round_values(_corner_normals(places, corners, crease_deg))
     shading = [np.round(normals * 2048), np.round(uvs.reshape(-1, 2) * 65536)]
-    key = np.concatenate([cells.reshape(-1, 3), *(s.astype(np.int64) for s in shading)], axis=1)
+    key = np.concatenate([places[:, None], *(s.astype(np.int64) for s in shading)], axis=1)
     inverse, first = first_occurrences(key)
     return MeshData(
         vertices_m=(cells.reshape(-1, 3)[first] * GRID_M).astype(np.float32),
@@ -171,17 +172,16 @@ def _whole_triangles(cells: Indices) -> tuple[Array, NDArray[np.bool_]]:
     return corners[keep], keep
 
 
-def _corner_normals(cells: Indices, corners: Array, crease_deg: float) -> Array:
-    """Unit normal per corner: the mean over the faces that meet there without a crease.
+def _corner_normals(vertex: Indices, corners: Array, crease_deg: float) -> Array:
+    """Unit normal per corner: the mean over the faces at its vertex that meet without a crease.
 
     Weighted by the angle of each face at the vertex (Thürmer and Wüthrich, "Computing vertex
     normals from polygonal facets", J. Graphics Tools 3(1), 1998) and by its area, so that a flat
     face stays flat next to a small bevel.
     """
     cross = face_crosses(corners)
-    face_normals = np.repeat(unit(cross), 3, axis=0)
-    weighted = np.repeat(cross, 3, axis=0) * _corner_angles(corners).reshape(-1, 1)
-    vertex, _ = first_occurrences(cells)
+    x, y, z = unit(cross).T
+    weighted = np.repeat(cross.T, 3, axis=1) * _corner_angles(corners).reshape(-1)
     order = np.argsort(vertex, kind="stable")
     counts = np.bincount(vertex)
     starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
@@ -189,10 +189,14 @@ def _corner_normals(cells: Indices, corners: Array, crease_deg: float) -> Array:
     mine = np.repeat(order, fan)
     steps = np.arange(fan.sum()) - np.repeat(np.cumsum(fan) - fan, fan)
     theirs = order[np.repeat(starts[vertex[order]], fan) + steps]
-    cosine = (face_normals[mine] * face_normals[theirs]).sum(axis=1)
+    mine_face, their_face = mine // 3, theirs // 3
+    cosine = x[mine_face] * x[their_face] + y[mine_face] * y[their_face]
+    cosine += z[mine_face] * z[their_face]
     smooth = cosine > math.cos(math.radians(crease_deg))
-    parts = weighted[theirs[smooth]].T
-    return unit(np.stack([np.bincount(mine[smooth], p, len(cells)) for p in parts], axis=1))
+    mine, theirs = mine[smooth], theirs[smooth]
+    return unit(
+        np.stack([np.bincount(mine, part[theirs], len(vertex)) for part in weighted], axis=1)
+    )
 
 
 def _corner_angles(corners: Array) -> Array:

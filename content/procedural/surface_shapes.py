@@ -8,17 +8,19 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import cache, lru_cache
 
 import numpy as np
 
 from gen_data.assets.triangle_soup import face_crosses
-from gen_data.content.procedural.patches import Array, Patch, join_patches, unit
+from gen_data.content.procedural.patches import Array, Indices, Patch, join_patches, unit
 from gen_data.core.se3 import Vec3
 
 Point2 = tuple[float, float]
 Corner = Sequence[float] | Array
 UvRect = tuple[float, float, float, float]
 WHOLE_IMAGE: UvRect = (0.0, 0.0, 1.0, 1.0)
+_GRIDS_KEPT = 256
 
 # Face of a box: (outward axis, image right, image up), so that right x up = outward.
 BOX_FACES: Mapping[str, tuple[Vec3, Vec3, Vec3]] = {
@@ -45,9 +47,11 @@ def grid(points: Array, u: Array | None = None, v: Array | None = None, slot: in
     if v is None:
         steps = np.sqrt(((points[1:] - points[:-1]) ** 2).sum(axis=2)).mean(axis=1)
         v = np.concatenate([[0.0], np.cumsum(steps)]) / max(float(steps.sum()), 1e-12)
-    uv = np.stack(np.broadcast_arrays(u[None, :], v[:, None]), axis=2)
-    corners, uvs = _quads(points), _quads(uv)
-    return Patch(corners, uvs, np.full((rows - 1) * (columns - 1) * 2, slot, dtype=np.int64))
+    uv = np.zeros((rows, columns, 2))
+    uv[..., 0], uv[..., 1] = u, v[:, None]
+    places = _quads(rows, columns)
+    slots = np.full(len(places), slot, dtype=np.int64)
+    return Patch(points.reshape(-1, 3)[places], uv.reshape(-1, 2)[places], slots)
 
 
 def lathe(
@@ -194,9 +198,12 @@ def block(
 ) -> Patch:
     """A box between two corners; a small edge radius catches highlights."""
     size: Vec3 = (high[0] - low[0], high[1] - low[1], high[2] - low[2])
-    centre = [0.5 * (a + b) for a, b in zip(low, high, strict=True)]
-    made = rounded_box(size, radius_m, 1) if radius_m > 0 else _plain_box(size)
-    return made.moved(*centre).painted(slot)
+    x, y, z = (0.5 * (a + b) for a, b in zip(low, high, strict=True))
+    if radius_m > 0:
+        made = rounded_box(size, radius_m, 1)
+    else:
+        made = _cube().scaled(0.5 * size[0], 0.5 * size[1], 0.5 * size[2])
+    return made.moved(x, y, z).painted(slot)
 
 
 def extrude(
@@ -292,11 +299,13 @@ def map_along_grain(patch: Patch, repeat_m: float) -> Patch:
     return replace(patch, uvs=uv * [0.5, 1.0])
 
 
-def _quads(points: Array) -> Array:
+@lru_cache(maxsize=_GRIDS_KEPT)
+def _quads(rows: int, columns: int) -> Indices:
+    """Corners of the two triangles of each quad, shape [n, 3], as numbers of a grid's points."""
+    points = np.arange(rows * columns, dtype=np.int64).reshape(rows, columns)
     a, b = points[:-1, :-1], points[:-1, 1:]
     c, d = points[1:, 1:], points[1:, :-1]
-    pairs = np.stack([np.stack([a, b, c], axis=2), np.stack([a, c, d], axis=2)], axis=2)
-    return np.array(pairs.reshape(-1, 3, points.shape[2]))
+    return np.stack([a, b, c, a, c, d], axis=2).reshape(-1, 3)
 
 
 def _rounded_ticks(half: float, radius: float, steps: int) -> Array:
@@ -306,11 +315,12 @@ def _rounded_ticks(half: float, radius: float, steps: int) -> Array:
     return np.concatenate([edge, -edge[::-1] if half > radius + 1e-9 else -edge[-2::-1]])
 
 
-def _plain_box(size: Sequence[float]) -> Patch:
-    half = 0.5 * np.array(size)
+@cache
+def _cube() -> Patch:
+    """A cube from -1 to 1."""
     patches = []
     for axes in BOX_FACES.values():
-        outward, right, up = (np.array(axis) * half for axis in axes)
+        outward, right, up = (np.array(axis) for axis in axes)
         rows = [[outward - right + s * up, outward + right + s * up] for s in (-1.0, 1.0)]
         patches.append(grid(np.array(rows)))
     return join_patches(patches)

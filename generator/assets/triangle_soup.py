@@ -168,9 +168,11 @@ def first_occurrences(keys: Int64) -> tuple[Int64, Int64]:
     Returns:
         The number of each row [n], and the index of the first row with each number.
     """
-    order = np.lexsort(keys.T[::-1])
-    ordered = keys[order]
-    starts = np.concatenate([[True], (ordered[1:] != ordered[:-1]).any(axis=1)])
+    columns = _pack_columns(keys)
+    order = np.lexsort(columns)
+    changes = [column[order] for column in columns]
+    starts = np.ones(len(keys), dtype=bool)
+    starts[1:] = np.any([column[1:] != column[:-1] for column in changes], axis=0)
     group = np.cumsum(starts) - 1
     # lexsort is stable: the first row of a group is its first occurrence.
     first = order[starts]
@@ -180,6 +182,21 @@ def first_occurrences(keys: Int64) -> tuple[Int64, Int64]:
     numbers = np.zeros(len(keys), dtype=np.int64)
     numbers[order] = rank[group]
     return numbers, first[rank_order]
+
+
+def _pack_columns(keys: Int64) -> list[Int64]:
+    """Columns [n] that tell the same rows apart as those of ``keys``, as few as 63 bits allow."""
+    packed, room = list[Int64](), 0
+    for column in keys.T:
+        low = int(column.min(initial=0))
+        span = int(column.max(initial=0)) - low + 1
+        if span <= room:
+            packed[-1] = packed[-1] * span + (column - low)
+            room //= span
+        else:
+            packed.append(column - low if span < 2**62 else column)
+            room = 2**62 // span
+    return packed
 
 
 def box(size_m: tuple[float, float, float]) -> Float64:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
 from hashlib import sha256
 
 import numpy as np
@@ -13,9 +15,8 @@ from gen_data.assets.asset_arrays import pack_imported
 from gen_data.assets.asset_ids import AssetId, ParameterValue, parse_asset_id
 from gen_data.assets.families import own_families
 from gen_data.assets.family import Family
-from gen_data.assets.procedural_library import ProceduralLibrary
-from gen_data.core.variant_rng import Draw, VariantRng
-from tests.contracts.asset_digests import open_procedural
+from gen_data.assets.importer import ImportedMesh
+from gen_data.core.variant_rng import Draw, VariantRng, drawing
 from tests.tiers import cases
 
 FAMILIES = {
@@ -44,105 +45,140 @@ WITHOUT = {
 """Families without a named draw, and the reason."""
 
 
+SEEDS = 6
+"""Variants whose draws are read: no draw of a shipped family shows later for the first time."""
+MORE_SEEDS = 16
+
+
+@dataclass(frozen=True)
+class Made:
+    """One object of a family.
+
+    Attributes:
+        draws: Its named draws.
+        twice: Names that one stream draws twice: a value asked for would go to both.
+        digest: Digest of its geometry and materials.
+    """
+
+    draws: Mapping[str, Draw]
+    twice: tuple[str, ...]
+    digest: bytes
+
+
+class Variants:
+    """Objects of one family; variants without values asked for are made once for all tests."""
+
+    def __init__(self, name: str) -> None:
+        self.name, self.family = name, FAMILIES[name]
+        self._made: dict[int, Made] = {}
+
+    def first(self, most: int = SEEDS) -> Iterator[tuple[int, Made]]:
+        """The first variants and their seeds."""
+        for seed in range(min(most, self.family.variants)):
+            if seed not in self._made:
+                self._made[seed] = self.make(seed)
+            yield seed, self._made[seed]
+
+    def make(self, seed: int, **asked: ParameterValue) -> Made:
+        """An object with values asked for, after checks."""
+        with drawing(asked) as draws, names_drawn_twice() as twice:
+            solid = self.family.build(**{**self.family.parameters, "seed": seed})
+        assert np.isfinite(solid.mesh.vertices_m).all()
+        assert len(solid.mesh.faces)
+        assert len(solid.collision.parts_m)
+        for key, value in asked.items():
+            assert draws[key].value == pytest.approx(value)
+        arrays = pack_imported(ImportedMesh(solid.mesh, solid.collision, {}))
+        parts = b"".join(array.tobytes() for _, array in sorted(arrays.items()))
+        return Made(draws, tuple(twice), sha256(parts).digest())
+
+
+@contextmanager
+def names_drawn_twice() -> Iterator[list[str]]:
+    """Record names that a stream draws once more."""
+    settle, alive = VariantRng._settle, list[VariantRng]()
+    seen: set[tuple[int, str]] = set()
+    twice: list[str] = []
+
+    def once(rng: VariantRng, key: str, *arguments: object, **options: bool) -> object:
+        if key:
+            if (id(rng), key) in seen:
+                twice.append(key)
+            seen.add((id(rng), key))
+            # Else another generator may take its id.
+            alive.append(rng)
+        return settle(rng, key, *arguments, **options)  # type: ignore[arg-type]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(VariantRng, "_settle", once)
+        yield twice
+
+
 @pytest.fixture(scope="module")
-def library(tmp_path_factory: pytest.TempPathFactory) -> ProceduralLibrary:
-    """Procedural assets with an empty cache."""
-    return open_procedural(tmp_path_factory.mktemp("cache"))
+def variants(request: pytest.FixtureRequest) -> Variants:
+    """Objects of one family; tests of one family follow each other."""
+    return Variants(request.param)
 
 
-def some_variants(name: str, most: int) -> Iterator[AssetId]:
-    """The first variants of a family."""
-    for seed in range(min(most, FAMILIES[name].variants)):
-        yield AssetId(name, {"seed": seed})
+def every(names: Iterable[str]) -> pytest.MarkDecorator:
+    """A test of each of some families."""
+    return pytest.mark.parametrize("variants", cases(sorted(names), QUICK), indirect=True)
 
 
 def some_values(draw: Draw) -> tuple[ParameterValue, ...]:
-    """The lowest, middle and highest value."""
+    """The lowest, middle and highest value; of a range, the ends and the value drawn."""
     if draw.is_range:
         low, high = (float(end) for end in draw.options if isinstance(end, (int, float)))
-        return (low, 0.5 * (low + high), high) if high > low else (low,)
+        return (low, draw.value, high) if high > low else (low,)
     return tuple({0: draw.options[0], 1: draw.options[len(draw.options) // 2],
                   2: draw.options[-1]}.values())  # fmt: skip
 
 
-@pytest.mark.parametrize("name", cases(FAMILIES, QUICK))
-def test_every_family_has_a_named_draw_or_a_reason(library: ProceduralLibrary, name: str) -> None:
+@every(FAMILIES)
+def test_every_family_has_a_named_draw_or_a_reason(variants: Variants) -> None:
     """Names are keys of ids that hide no parameter; values are written as in ids."""
-    found = [library.draws(one) for one in some_variants(name, 6)]
-    assert any(found) == (name not in WITHOUT)
+    found = [made.draws for _, made in variants.first()]
+    assert any(found) == (variants.name not in WITHOUT)
     for key, draw in ((key, draw) for draws in found for key, draw in draws.items()):
         assert re.fullmatch("[a-z][a-z0-9_]*", key)
-        assert key not in {"seed", *FAMILIES[name].parameters}
+        assert key not in {"seed", *variants.family.parameters}
         for value in draw.options:
-            asked = parse_asset_id(str(AssetId(name, {key: value})))
+            asked = parse_asset_id(str(AssetId(variants.name, {key: value})))
             assert asked.parameters[key] == value
 
 
-@pytest.mark.parametrize("name", cases(sorted(set(FAMILIES) - set(WITHOUT)), QUICK))
-def test_every_value_of_a_named_draw_makes_a_valid_object(
-    library: ProceduralLibrary, name: str
-) -> None:
-    """Low, middle and high; in some variant two differ in shape or material.
+@every(FAMILIES.keys() - WITHOUT)
+def test_every_value_of_a_named_draw_makes_a_valid_object(variants: Variants) -> None:
+    """Both ends and a value between; in some variant two differ in shape or material.
 
     A house without a wing has a width of its wing, which nothing shows. Parts draw what their
     piece needs.
     """
     named: set[str] = set()
     shown: set[str] = set()
-    for number, one in enumerate(some_variants(name, 16)):
-        if number > 2 and shown == named:
+    for seed, made in variants.first(MORE_SEEDS):
+        if seed >= SEEDS and shown == named:
             break
-        draws = library.draws(one)
-        new = draws.keys() - named
-        named |= draws.keys()
-        for key in new | (draws.keys() - shown):
-            values = dict.fromkeys(some_values(draws[key]))
-            made = {make_valid(library, one, key, value) for value in values}
-            if len(made) > 1 or len(values) == 1:
+        new = made.draws.keys() - named
+        named |= made.draws.keys()
+        for key in new | (made.draws.keys() - shown):
+            draw = made.draws[key]
+            values = dict.fromkeys(some_values(draw))
+            others = [variants.make(seed, **{key: one}) for one in values if one != draw.value]
+            if len(values) == 1 or {other.digest for other in others} - {made.digest}:
                 shown.add(key)
-    assert "part_of" in FAMILIES[name].tags or shown == named
+    assert "part_of" in variants.family.tags or shown == named
 
 
-def make_valid(library: ProceduralLibrary, one: AssetId, key: str, value: ParameterValue) -> bytes:
-    """Bytes of an object with one value asked for, after checks."""
-    asked = AssetId(one.name, {**one.parameters, key: value})
-    assert library.draws(asked)[key].value == pytest.approx(value)
-    imported = library.imported(asked)
-    assert imported.mesh is not None
-    assert imported.collision is not None
-    assert np.isfinite(imported.mesh.vertices_m).all()
-    assert len(imported.mesh.faces)
-    arrays = pack_imported(imported)
-    return sha256(b"".join(array.tobytes() for _, array in sorted(arrays.items()))).digest()
-
-
-@pytest.mark.parametrize("name", cases(FAMILIES, QUICK))
-def test_no_stream_draws_a_name_twice(
-    library: ProceduralLibrary, name: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@every(FAMILIES)
+def test_no_stream_draws_a_name_twice(variants: Variants) -> None:
     """A value asked for would go to both draws."""
-    settle, alive = VariantRng._settle, list[VariantRng]()
-    seen: set[tuple[int, str]] = set()
-
-    def once(rng: VariantRng, key: str, *arguments: object, **options: bool) -> object:
-        if key:
-            assert (id(rng), key) not in seen, f"{name} draws {key} twice"
-            seen.add((id(rng), key))
-            # Else another generator may take its id.
-            alive.append(rng)
-        return settle(rng, key, *arguments, **options)  # type: ignore[arg-type]
-
-    monkeypatch.setattr(VariantRng, "_settle", once)
-    for one in some_variants(name, 6):
-        library.draws(one)
+    assert [made.twice for _, made in variants.first() if made.twice] == []
 
 
-@pytest.mark.parametrize(
-    "name", cases([name for name, family in FAMILIES.items() if "part_of" in family.tags], QUICK)
-)
-def test_parts_draw_what_their_piece_draws(library: ProceduralLibrary, name: str) -> None:
+@every(name for name, family in FAMILIES.items() if "part_of" in family.tags)
+def test_parts_draw_what_their_piece_draws(variants: Variants) -> None:
     """A piece's id with other parameters is its part's id: the door fits."""
-    piece = name.rpartition("/")[0]
-    for one in some_variants(name, 6):
-        part = library.draws(one)
-        assert library.draws(AssetId(piece, one.parameters)).keys() <= part.keys()
+    piece = Variants(variants.name.rpartition("/")[0])
+    for (_, whole), (_, part) in zip(piece.first(), variants.first(), strict=True):
+        assert whole.draws.keys() <= part.draws.keys()

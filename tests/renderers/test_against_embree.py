@@ -89,10 +89,17 @@ def test_scenes_of_users_agree_with_embree(tabletop: Pipeline, index: int) -> No
     assert_sample_agrees(tabletop, index)
 
 
-@pytest.mark.slow
-def test_twenty_scenes_of_both_kinds_agree_with_embree(tabletop: Pipeline) -> None:
-    """Every shipped scene, for cases that a few scenes might miss."""
+@pytest.mark.parametrize(
+    "numbers",
+    [
+        pytest.param(range(3, 7), marks=pytest.mark.slow),
+        pytest.param(range(7, 23), marks=pytest.mark.exhaustive),
+    ],
+    ids=["four", "sixteen"],
+)
+def test_scenes_of_both_kinds_agree_with_embree(tabletop: Pipeline, numbers: range) -> None:
+    """Further scenes, for cases that a few might miss."""
     renderer = WarpRenderer(LIBRARY, "cpu")
-    for number in range(3, 23):
+    for number in numbers:
         assert_agrees_with_embree(renderer, LIBRARY, *random_scene(number))
         assert_sample_agrees(tabletop, number)

@@ -106,7 +106,7 @@ DAMAGES: tuple[Callable[[Path, int], None], ...] = (
 
 
 @pytest.mark.parametrize(
-    "rounds", [40, pytest.param(1000, marks=pytest.mark.slow)], ids=["some", "many"]
+    "rounds", [40, pytest.param(1000, marks=pytest.mark.exhaustive)], ids=["some", "many"]
 )
 def test_every_damage_is_found_and_repaired(dataset: Path, rounds: int) -> None:
     """Each one in any file, sealing files included; the bytes are the same afterwards."""

@@ -9,7 +9,6 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -149,75 +148,42 @@ def test_a_folder_of_another_study_is_refused(tmp_path: Path) -> None:
         perform(prepared, tmp_path / "out", 1, print)
 
 
-@pytest.mark.slow
-def test_an_interrupted_study_is_continued(tmp_path: Path) -> None:
-    """With the figures of one that was not; the finished run is not repeated."""
-    config = tmp_path / "small.yaml"
-    config.write_text(CONFIG)
-    gen_data.generate(str(config), 16, out=tmp_path / "real", seed=900, workers=0)
-    variants = (
-        Variant("baseline", str(config)),
-        Variant("with 4 real", str(config), real=4),
-    )
-    experiment = Experiment(
-        tmp_path / "real/coco", variants, n=12, seeds=2, steps=8, batch=4, size_px=64
-    )
-
-    def stop(line: str) -> None:
-        if "trained" in line:
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        run_study(experiment, tmp_path / "stopped", workers=1, report=stop)
-    done = tmp_path / "stopped/runs/00-0/results.json"
-    written_ns = done.stat().st_mtime_ns
-
-    continued = run_study(experiment, tmp_path / "stopped", workers=1)
-    whole = run_study(experiment, tmp_path / "whole", workers=2)
-
-    assert done.stat().st_mtime_ns == written_ns
-    assert continued["variants"] == whole["variants"]
-    assert continued["pictures"] == 12
-    assert not list((tmp_path / "whole").glob("data/*"))
-
-
-SMALL_STUDY = {"n": 8, "seeds": 1, "steps": 40, "size": 64, "workers": 1}
-
-
-def small_study(folder: Path) -> Callable[[Path], list[str]]:
-    """The command of a study with two runs, for an output folder."""
-    folder.mkdir()
-    config = folder / "small.yaml"
-    config.write_text(CONFIG)
-    gen_data.generate(str(config), 8, out=folder / "real", seed=900, workers=0)
-    command = [sys.executable, "-m", "gen_data", "study", str(folder / "real/coco"), str(config)]
-    command += ["--without", "lamps", *(f"--{name}={k}" for name, k in SMALL_STUDY.items())]
-    return lambda out: [*command, f"--out={out}"]
+SMALL_STUDY = {"without": "lamps", "mix": 4, "n": 8, "seeds": 1, "steps": 12, "size": 64}
 
 
 @pytest.mark.slow
 def test_a_killed_study_goes_on(tmp_path: Path) -> None:
-    """After SIGKILL while data are generated, and then while a detector is trained.
+    """After SIGKILL while data are generated, and then while detectors are trained.
 
-    The finished run is kept, and all detections and findings are the same.
+    The finished run is kept, and all detections and findings are those of a study that was not
+    killed, and had as many processes as variants.
     """
-    command = small_study(tmp_path / "input")
-    whole, killed = tmp_path / "whole", tmp_path / "killed"
-    subprocess.run(command(whole), check=True)
-    first, second = (killed / f"runs/0{k}-0/results.json" for k in (0, 1))
+    config = tmp_path / "small.yaml"
+    config.write_text(CONFIG)
+    gen_data.generate(str(config), 8, out=tmp_path / "real", seed=900, workers=0)
+    real, whole, killed = tmp_path / "real/coco", tmp_path / "whole", tmp_path / "killed"
+    options = [f"--{name}={value}" for name, value in SMALL_STUDY.items()]
+    command = [sys.executable, "-m", "gen_data", "study", str(real), str(config), *options]
+    command += ["--workers=1", f"--out={killed}"]
+    first, *others = (killed / f"runs/0{k}-0/results.json" for k in range(3))
     written_ns = set()
-    for file, text in (("data/01-0/plan.json", "{"), ("runs/01-0/training.log", "step 20:")):
-        process = subprocess.Popen(command(killed))
+    for file, text in (("data/01-0/plan.json", "{"), ("runs/01-0/training.log", "step 0:")):
+        process = subprocess.Popen(command)
         while not ((killed / file).is_file() and text in (killed / file).read_text()):
             assert process.poll() is None, f"the study ended before {file} had '{text}'"
             time.sleep(0.02)
         os.kill(process.pid, signal.SIGKILL)
         process.wait()
         written_ns.add(first.stat().st_mtime_ns)
-        assert not second.exists()
+        assert not any(file.exists() for file in others)
 
-    subprocess.run(command(killed), check=True)
+    subprocess.run(command, check=True)
+    variants = list_variants(str(config), ("lamps",), (), (), (4,))
+    experiment = Experiment(real, variants, n=8, seeds=1, steps=12, size_px=64)
+    findings = run_study(experiment, whole, workers=3)
 
     assert written_ns == {first.stat().st_mtime_ns}
-    for name in ("runs/00-0/results.json", "runs/01-0/results.json", "findings.json"):
+    for name in (*(f"runs/0{k}-0/results.json" for k in range(3)), "findings.json"):
         assert (killed / name).read_bytes() == (whole / name).read_bytes()
+    assert findings["pictures"] == 4
+    assert not [*whole.glob("data/*"), *killed.glob("data/*")]
