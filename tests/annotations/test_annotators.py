@@ -90,14 +90,12 @@ OF_OBJECTS = [name for name in TABLE.names() if isinstance(TABLE.load(name)(), A
 
 
 def annotators(*names: str) -> list[Annotator]:
-    """The named annotators, or all that are about objects."""
     made = [TABLE.load(name)() for name in names or TABLE]
     return [annotator for annotator in made if isinstance(annotator, Annotator)]
 
 
 @pytest.fixture
 def truths() -> tuple[ObjectTruth, ...]:
-    """Arm and mug, with everything known about them."""
     return annotate_objects(*scene_and_reading(), annotators(), Thresholds()).objects
 
 
@@ -178,7 +176,6 @@ def test_part_pixels_are_counted_by_name(truths: tuple[ObjectTruth, ...]) -> Non
 
 
 def test_the_pose_in_the_camera_undoes_the_cameras_own(truths: tuple[ObjectTruth, ...]) -> None:
-    """Matrix arithmetic: inverse(T_world_camera) times T_world_object."""
     for truth in truths:
         assert truth.T_camera_object is not None
         expected = np.linalg.inv(CAMERA.T_world_camera.matrix()) @ (
@@ -367,7 +364,6 @@ def _emptied(silhouette: Silhouette) -> Silhouette:
     ],
 )
 def test_a_silhouette_that_contradicts_the_image_stops_the_sample(spoil: Any, fault: str) -> None:
-    """Naming sensor, instance and fault."""
     scene, reading = scene_and_reading()
     bad = replace(reading, silhouettes={**reading.silhouettes, 2: spoil(reading.silhouettes[2])})
 
@@ -376,7 +372,6 @@ def test_a_silhouette_that_contradicts_the_image_stops_the_sample(spoil: Any, fa
 
 
 def test_a_silhouette_that_was_not_rendered_stops_the_sample() -> None:
-    """Instead of an object without amodal labels."""
     scene, reading = scene_and_reading()
 
     with pytest.raises(SampleError, match="instance 2 'arm': the renderer returned no silhouette"):
@@ -396,7 +391,6 @@ def test_a_silhouette_that_was_not_rendered_stops_the_sample() -> None:
     ],
 )
 def test_an_instance_that_cannot_be_stops_the_sample(changes: dict[str, Any], fault: str) -> None:
-    """A label that contradicts another one is never written."""
     scene, reading = scene_and_reading()
     scene = replace(scene, instances=(replace(ARM, **changes), MUG))
 

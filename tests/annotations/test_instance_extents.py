@@ -33,12 +33,10 @@ def test_a_run_does_not_pass_from_one_row_into_the_next() -> None:
 
 
 def test_the_largest_id_is_one_like_any_other() -> None:
-    """Instance ids are 16-bit."""
     assert find_extents(np.full((2, 3), 65_535, np.uint16)) == {
         65_535: Extent(6, BoxPx(0, 0, 3, 2))
     }
 
 
 def test_an_image_of_nothing_has_no_extents() -> None:
-    """0 stands for nothing."""
     assert find_extents(np.zeros((4, 5), np.uint16)) == {}

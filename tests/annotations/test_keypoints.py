@@ -141,7 +141,6 @@ def test_the_first_pixel_belongs_to_the_image() -> None:
 
 
 def test_points_keep_the_instances_order() -> None:
-    """Formats list them by position."""
     names = ["b", "a", "c"]
 
     assert [p.name for p in seen(*(Keypoint(n, (0.0, 0.0, 2.0)) for n in names))] == names

@@ -31,7 +31,6 @@ SAMPLING_M = 0.001
 
 
 def box(size_m: tuple[float, float, float], at_m: tuple[float, float, float]) -> Any:
-    """Triangles of a box around a point."""
     made = trimesh.creation.box(size_m).apply_translation(at_m)
     return np.asarray(made.triangles, np.float64)
 
@@ -87,7 +86,6 @@ def test_distances_between_faces_are_exact(gap_m: float, near: bool) -> None:
 
 
 def test_rays_hit_what_is_before_them() -> None:
-    """Not what is behind."""
     wall = box((0.1, 4, 4), (2, 0, 0))
 
     hits = hits_by_rays(np.zeros((3, 3)), np.eye(3), wall)
@@ -186,7 +184,6 @@ def test_everything_at_rest_is_supported_down_to_the_furniture(
 
 @each
 def test_no_two_things_carry_each_other(config: str, index: int, engine: str) -> None:
-    """Gravity has one direction."""
     pairs = settled(config, index, engine).pairs("supported_by")
 
     assert not {(a, b) for a, b in pairs if (b, a) in pairs}

@@ -35,7 +35,6 @@ CAR = "car?seed=0"
 
 @cache
 def library() -> Library:
-    """The assets that come with the package."""
     return open_library(())
 
 
@@ -225,7 +224,6 @@ def test_a_map_is_level_and_looks_ahead_on_any_slope() -> None:
 
 
 def test_a_map_needs_a_rig() -> None:
-    """One clear error that tells what to add."""
     scene = replace(street(), rigs=(), cameras=(), lidars=())
 
     with pytest.raises(ConfigError, match="no rig to centre the map on; add an element 'ego'"):

@@ -32,7 +32,6 @@ def test_an_unknown_asset_is_told_where_the_configuration_names_it(
 
 
 def test_a_file_of_a_user_that_is_missing_is_told_with_what_there_is(tmp_path: Path) -> None:
-    """The folders count by kind."""
     (tmp_path / "props").mkdir()
     path = tmp_path / "mine.yaml"
     path.write_text(

@@ -20,7 +20,6 @@ HEAD = (
 
 
 def refusal(folder: Path, *lines: str) -> str:
-    """The message of a configuration with these randomizers."""
     path = folder / "mine.yaml"
     path.write_text(HEAD + "".join(f"  - {line}\n" for line in lines))
     factory = PipelineFactory(load_config(str(path)), n=1)
@@ -82,7 +81,6 @@ def refusal(folder: Path, *lines: str) -> str:
 def test_an_unknown_name_is_refused_with_its_place_before_anything_runs(
     tmp_path: Path, line: str, place: str, fact: str
 ) -> None:
-    """File, line, column and field; the known names."""
     message = refusal(tmp_path, line)
 
     assert place in message
@@ -91,11 +89,8 @@ def test_an_unknown_name_is_refused_with_its_place_before_anything_runs(
 
 
 def test_all_unknown_names_are_told_at_once(tmp_path: Path) -> None:
-    """One problem per randomizer, in the order of the file."""
     message = refusal(
-        tmp_path,
-        "{type: textures, name: t, textures: [wod]}",
-        "{type: objects, name: cluter}",
+        tmp_path, "{type: textures, name: t, textures: [wod]}", "{type: objects, name: cluter}"
     )
 
     assert message.index("mine.yaml:4:") < message.index("mine.yaml:5:")
@@ -110,7 +105,6 @@ def test_textures_are_named_by_id_tag_or_family() -> None:
 
 
 def test_of_many_textures_the_nearest_are_listed(tmp_path: Path) -> None:
-    """Not all 123."""
     text = refusal(tmp_path, "{type: textures, name: t, textures: [wod]}")
     assert "did you mean 'wood'?" in text
     assert len(text.splitlines()[0]) < 250

@@ -91,7 +91,6 @@ def test_nuscenes_cameras_are_released_as_the_scanner_passes_them() -> None:
 
 @pytest.mark.parametrize("name", sampled(["kitti_rig", "nuscenes_rig", "carla_table"], 3))
 def test_a_sensor_on_a_rig_that_is_not_there_is_refused(name: str) -> None:
-    """Before anything is drawn."""
     with pytest.raises(ConfigError, match=r"the scene has no rig 'eg'; its rigs: ego .*'ego'"):
         rig_scene(name, "sensors[0].rig=eg")
 
@@ -114,7 +113,6 @@ def test_a_rate_that_does_not_fit_is_refused() -> None:
 
 @pytest.mark.slow
 def test_elements_that_a_configuration_adds_can_be_overridden_by_name() -> None:
-    """The ego is no element of the template."""
     spec = load_config("kitti_rig", overrides=("elements.ego.asset=car?seed=4",))
 
     assert next(e for e in spec.probes[0].elements if e.name == "ego").asset == "car?seed=4"

@@ -17,12 +17,10 @@ from gen_data.core.variant_rng import Draw
 
 @pytest.fixture
 def library(tmp_path: Path) -> Library:
-    """A library with an empty cache."""
     return open_library(cache_dir=tmp_path)
 
 
 def size_m(library: Library, asset_id: str) -> np.ndarray:
-    """Extents of the mesh."""
     low, high = library.bounds_m(asset_id)
     return np.subtract(high, low)
 
@@ -87,14 +85,12 @@ def test_wrong_values_and_names_are_refused_when_the_id_is_read(
 
 
 def test_a_refused_id_is_refused_again(library: Library) -> None:
-    """No cache keeps it."""
     for _ in range(2):
         with pytest.raises(AssetError, match="width_m expects"):
             library.mesh("desk?width_m=9")
 
 
 def test_files_have_no_parameters(library: Library) -> None:
-    """Only families draw."""
     with pytest.raises(UnknownAsset):
         library.parameters("user/mug")
 
@@ -111,7 +107,6 @@ def test_parameters_unite_the_variants() -> None:
 
 
 def test_describe_lists_parameters_with_their_values() -> None:
-    """Ranges of sizes, options of choices."""
     result = CliRunner().invoke(cli, ["describe", "desk"])
     assert result.exit_code == 0, result.output
     assert "asset_family desk\nA desk, some with drawers at one side." in result.output
@@ -121,7 +116,6 @@ def test_describe_lists_parameters_with_their_values() -> None:
 
 
 def test_describe_finds_a_family_that_has_the_name_of_a_plugin() -> None:
-    """The kind before the name tells them apart."""
     for name, start in (
         ("overpass", "element overpass"),
         ("asset_family/overpass", "asset_family overpass"),

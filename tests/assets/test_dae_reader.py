@@ -55,7 +55,6 @@ SECOND = """<node id="b"><translate>0 0 100</translate><instance_geometry url="#
 
 
 def folder_of(tmp_path: Path, **changes: str) -> Folder:
-    """A folder with ``a.dae``."""
     values = {"tool": "Some CAD", "up": "Z_UP", "scale": "1 1 1", "material": "paint",
               "second": "", "transparency": ""} | changes  # fmt: skip
     (tmp_path / "a.dae").write_text(HEAD.format(**values))
@@ -183,7 +182,6 @@ def test_images_of_other_models_and_computers_are_found(tmp_path: Path, path: st
 def test_malformed_files_are_refused_by_name(
     tmp_path: Path, old: str, new: str, reason: str
 ) -> None:
-    """One error with the file's name and what is wrong."""
     folder = folder_of(tmp_path)
     text = (tmp_path / "a.dae").read_text().replace(old, new)
     (tmp_path / "a.dae").write_text(text)

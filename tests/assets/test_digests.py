@@ -37,7 +37,6 @@ def settled(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def digest_of(folder: Folder, cache: Path) -> str:
-    """Digest of the file by a new process."""
     known = ContentHashes(DiskCache(cache))
     found = known.of(Folder(folder.root), "a.obj")["a.obj"]
     known.save()
@@ -45,7 +44,6 @@ def digest_of(folder: Folder, cache: Path) -> str:
 
 
 def rewrite(path: Path, data: bytes) -> None:
-    """Other bytes in the same file, of the same size and modification time."""
     status = path.stat()
     path.write_bytes(data)
     os.utime(path, ns=(status.st_atime_ns, status.st_mtime_ns))

@@ -284,14 +284,12 @@ def test_animations_lines_and_further_scenes_are_named(builder: Builder, tmp_pat
 def test_files_of_another_kind_are_refused_in_words(
     tmp_path: Path, data: bytes, reason: str
 ) -> None:
-    """Not by the exception of a decoder."""
     (tmp_path / "a.glb").write_bytes(data)
     with pytest.raises(AssetError, match=reason):
         read_mesh(Folder(tmp_path), "a.glb")
 
 
 def test_an_unknown_component_type_is_named(builder: Builder, tmp_path: Path) -> None:
-    """With its number and its accessor."""
     builder.tree["accessors"][0]["componentType"] = 9999
     with pytest.raises(AssetError, match="accessor 0 has the unknown componentType 9999"):
         builder.read(tmp_path)

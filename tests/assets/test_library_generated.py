@@ -13,7 +13,6 @@ from gen_data.core.errors import AssetError
 
 @pytest.fixture
 def library(tmp_path: Path) -> Library:
-    """A library with a fresh cache."""
     return open_library(cache_dir=tmp_path / "cache")
 
 
@@ -56,7 +55,6 @@ def test_libraries_of_a_process_share_descriptions_of_offered_assets(tmp_path: P
 
 
 def test_made_and_cached_solids_are_equal(library: Library, tmp_path: Path) -> None:
-    """Bit by bit, materials included."""
     made = library.mesh("mug?seed=2")
     loaded = open_library(cache_dir=tmp_path / "cache").mesh("mug?seed=2")
     for name in ("vertices_m", "faces", "normals", "uvs", "face_slots"):
@@ -82,13 +80,11 @@ def test_made_and_cached_solids_are_equal(library: Library, tmp_path: Path) -> N
 def test_wrong_parameters_are_refused_with_the_right_ones(
     library: Library, asset_id: str, reason: str
 ) -> None:
-    """Before anything is built."""
     with pytest.raises(AssetError, match=reason):
         library.mesh(asset_id)
 
 
 def test_kinds_are_not_confused(library: Library) -> None:
-    """A mug has no pixels, and is no robot."""
     with pytest.raises(AssetError, match="not a texture"):
         library.texture("mug?seed=0")
     with pytest.raises(AssetError, match="not an environment"):

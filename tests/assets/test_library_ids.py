@@ -30,7 +30,6 @@ def test_values_are_numbers_lists_or_words() -> None:
 
 
 def test_a_plain_id_is_its_own_canonical_form() -> None:
-    """Paths and image names pass through."""
     assert str(parse_asset_id("pybullet/teddy")) == "pybullet/teddy"
     assert str(parse_asset_id("random_urdfs/000")) == "random_urdfs/000"
 
@@ -55,6 +54,5 @@ def test_canonical_ids_read_back_as_themselves(
     ],
 )  # fmt: skip
 def test_malformed_ids_are_refused(text: str) -> None:
-    """Nothing that is not an id reaches the file system."""
     with pytest.raises(AssetError, match="asset"):
         parse_asset_id(text)

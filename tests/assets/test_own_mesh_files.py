@@ -25,7 +25,6 @@ RED = "newmtl red\nKd 1 0 0\n"
 
 
 def material_of(folder: Path, name: str = "a.obj") -> Material:
-    """The material of the first triangle."""
     soup = read_mesh(Folder(folder), name).soup
     return soup.slots[int(soup.face_slots[0])].material
 
@@ -453,7 +452,6 @@ MODEL_3MF = (
     ids=["cycle", "missing object", "entities", "a bomb of blanks"],
 )
 def test_hostile_3mf_is_one_clear_error(tmp_path: Path, model: str, reason: str) -> None:
-    """Whatever its archive unpacks to."""
     root = tmp_path / "props"
     root.mkdir()
     with zipfile.ZipFile(root / "a.3mf", "w", zipfile.ZIP_DEFLATED) as archive:

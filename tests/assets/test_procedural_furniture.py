@@ -60,7 +60,6 @@ def test_a_light_panel_shines_down_with_all_of_its_lower_side(shape: str) -> Non
 
 
 def test_a_light_panel_of_another_shape_is_refused() -> None:
-    """With what was probably meant."""
     with pytest.raises(AssetError, match="disk"):
         FAMILIES["light_panel"].build(shape="disc")
 
@@ -187,7 +186,6 @@ def test_a_backdrop_carries_things_on_its_floor_and_curves_up() -> None:
 def test_unusable_parameters_are_refused_with_a_remedy(
     name: str, parameters: dict[str, object], message: str
 ) -> None:
-    """One clear message: place, fact, what is expected."""
     with pytest.raises(AssetError, match=message):
         FAMILIES[name].build(**parameters)
 

@@ -47,7 +47,6 @@ OPEN_EDGES = {"milk_carton": 0.02, "pipe_elbow": 0.02, "flange": 0.005}
 
 @cache
 def variant(name: str, seed: int) -> Solid:
-    """A variant of a family, built once for all tests."""
     return FAMILIES[name].build(seed=seed)
 
 
@@ -222,7 +221,6 @@ def test_vessels_are_hollow_in_physics(name: str, seed: int) -> None:
 @pytest.mark.slow
 @for_every(OBJECTS)
 def test_equal_seeds_make_equal_bytes_and_others_differ(name: str) -> None:
-    """A variant is a pure function of its seed."""
     digests = [_digest(FAMILIES[name].build(seed=seed)) for seed in range(4)]
 
     assert digests[:2] == [_digest(variant(name, seed)) for seed in (0, 1)]

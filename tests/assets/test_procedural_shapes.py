@@ -46,7 +46,6 @@ def test_a_lathe_puts_the_middle_of_the_image_at_plus_x() -> None:
 
 
 def test_a_sweep_does_not_twist_along_a_helix() -> None:
-    """Neighbouring sections turn with the path only: no face is turned inside out."""
     t = np.linspace(0.0, 4 * math.pi, 80)
     path = np.stack([np.cos(t), np.sin(t), 0.2 * t], axis=1)
     tube = sweep(path, circle(0.1, 12))
@@ -112,7 +111,6 @@ def test_triangles_of_a_star_cover_it_exactly(teeth: int) -> None:
 
 
 def test_a_hole_outside_its_outline_is_refused() -> None:
-    """Instead of triangles that overlap."""
     with pytest.raises(ValueError, match="outside"):
         triangulate(circle(1.0, 8), [circle(0.2, 8, (3.0, 0.0))[::-1]])
 
@@ -128,7 +126,6 @@ def test_a_fillet_touches_both_sides_and_keeps_its_radius() -> None:
 
 
 def test_a_spline_passes_through_its_points() -> None:
-    """Catmull-Rom interpolates."""
     points = [(0.0, 0.0), (1.0, 2.0), (2.0, -1.0), (3.0, 0.5)]
 
     assert np.allclose(spline(points, 31)[::10], points)
@@ -144,7 +141,6 @@ def test_seams_of_the_image_do_not_crease_the_surface() -> None:
 
 
 def test_degenerate_triangles_are_left_out() -> None:
-    """A pole of a sphere is a fan, not quads with a side of no length."""
     rings, segments = 6, 12
     mesh = finish_mesh(ball(lambda d: d, rings, segments), [Material()], CREASE_DEG)
 
@@ -162,7 +158,6 @@ def test_grain_follows_the_longest_side_whatever_the_direction() -> None:
 
 
 def test_turning_and_moving_keep_the_volume() -> None:
-    """Patches are rigid, and painted slots survive joining."""
     cylinder = cone((0.1, 0.0), (0.05, 0.3), 16)
     both = join_patches([cylinder, cylinder.rotated("x", 0.7).moved(1.0, 2.0, 3.0).painted(1)])
 

@@ -43,14 +43,12 @@ def test_a_row_takes_the_fields_that_it_leaves_out_from_another() -> None:
 
 
 def test_a_table_of_another_type_is_refused() -> None:
-    """A field that the type has not is an error, not ignored."""
     with pytest.raises(KeyError):
         load_table(VEHICLES, "bicycles", Design)
 
 
 @pytest.mark.parametrize("path", TABLES, ids=lambda path: f"{path.parent.name}/{path.stem}")
 def test_no_key_is_given_twice(path: Path) -> None:
-    """YAML would silently keep the last."""
     for node in _mappings(yaml.compose(path.read_text("utf-8"))):
         keys = [key.value for key, _ in node.value]
         assert len(keys) == len(set(keys)), path

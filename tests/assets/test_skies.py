@@ -199,13 +199,11 @@ def test_preethams_zenith_is_as_bright_as_published() -> None:
     ],
 )
 def test_preethams_sky_is_clear_and_by_day(given: dict[str, float], said: str) -> None:
-    """Unknown parameters are refused."""
     with pytest.raises(ValueError, match=said):
         luminance_cd_m2(SkyModel(model="preetham", **given), 64)
 
 
 def test_an_unknown_model_of_the_sky_is_refused() -> None:
-    """The message lists the known ones."""
     with pytest.raises(ValueError, match="expected one of measured, preetham"):
         luminance_cd_m2(SkyModel(model="hosek"), 64)
 
@@ -262,7 +260,6 @@ def test_clouds_cover_more_the_cloudier_it_is() -> None:
 
 
 def test_same_arguments_make_the_same_bytes() -> None:
-    """Another seed makes other clouds."""
     first, again, other = (sky(seed, 30.0, 2.5, 0.4, 0.18) for seed in (1, 1, 2))
 
     assert first.tobytes() == again.tobytes()
@@ -272,7 +269,6 @@ def test_same_arguments_make_the_same_bytes() -> None:
 
 
 def test_library_refuses_a_sky_that_cannot_be(tmp_path) -> None:  # noqa: ANN001
-    """The message names parameter, value and range."""
     library = open_library(cache_dir=tmp_path)
 
     with pytest.raises(AssetError, match=r"cloudiness is 2; expected a number in \[0, 1\]"):

@@ -49,7 +49,6 @@ def write_box(path: Path, size: tuple[float, float, float]) -> None:
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """An empty folder for assets."""
     root = tmp_path / "props"
     root.mkdir()
     return root
@@ -136,7 +135,6 @@ def test_a_changed_file_is_another_asset(folder: Path, tmp_path: Path) -> None:
 
 
 def test_a_users_robot_is_as_good_as_ours(folder: Path, tmp_path: Path) -> None:
-    """Primitives, fixed joints, a home position and a normalised axis."""
     (folder / "arm.urdf").write_text(ARM)
     (folder / "assets.yaml").write_text(
         "robots: [{id: arm, file: arm.urdf, tags: [arm], licence: MIT, author: me, source: here}]\n"
@@ -156,7 +154,6 @@ def test_a_users_robot_is_as_good_as_ours(folder: Path, tmp_path: Path) -> None:
 
 
 def test_a_robot_entry_that_names_a_missing_joint_is_refused(folder: Path, tmp_path: Path) -> None:
-    """The message suggests the nearest name."""
     (folder / "arm.urdf").write_text(ARM)
     (folder / "assets.yaml").write_text(
         "robots: [{id: arm, file: arm.urdf, home: {sholder: 1.0}}]\n"
@@ -166,7 +163,6 @@ def test_a_robot_entry_that_names_a_missing_joint_is_refused(folder: Path, tmp_p
 
 
 def test_textures_and_panoramas_can_be_listed(folder: Path, tmp_path: Path) -> None:
-    """A panorama comes with mean luminance 1 over the sphere."""
     import cv2
 
     Image.fromarray(np.full((8, 8, 3), 200, np.uint8)).save(folder / "grey.jpg", quality=100)
@@ -298,13 +294,11 @@ def test_axes_that_are_named_come_to_z_and_x(up: str, front: str) -> None:
 def test_a_contradiction_is_refused_with_its_place(
     folder: Path, tmp_path: Path, entry: str, fault: str
 ) -> None:
-    """File, line and column, as everywhere in the configuration."""
     with pytest.raises(ConfigError, match=rf"(?s)assets\.yaml:1:\d+: assets\[0\].*{fault}"):
         sized(folder, tmp_path, entry)
 
 
 def test_edges_that_do_not_fit_the_file_are_refused(folder: Path, tmp_path: Path) -> None:
-    """They reveal a wrong axis."""
     with pytest.raises(AssetError, match=r"0\.1 x 0\.2 x 0\.3 m, not 0\.1 x 0\.3 x 0\.2 m"):
         sized(folder, tmp_path, "size_m: [0.1, 0.3, 0.2]")
 
@@ -402,7 +396,6 @@ def test_images_need_to_be_placed(folder: Path, tmp_path: Path) -> None:
 
 
 def test_a_panorama_needs_no_index(folder: Path, tmp_path: Path) -> None:
-    """Neither does a mesh."""
     import cv2
 
     cv2.imwrite(str(folder / "hall.hdr"), np.full((8, 16, 3), 2.0, np.float32))
@@ -426,7 +419,6 @@ def test_an_unknown_id_tells_what_the_folders_hold(folder: Path, tmp_path: Path)
 def test_a_tree_that_is_no_folder_of_assets_is_refused(
     folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Every entry counts, not only meshes."""
     for k in range(6):
         (folder / f"{k}.txt").write_text("")
     monkeypatch.setattr(asset_folder, "MAX_ENTRIES", 5)
@@ -443,7 +435,6 @@ def test_proc_is_refused_without_a_traceback(tmp_path: Path) -> None:
 def test_a_folder_that_cannot_be_read_is_named(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The message gives the system's reason."""
     error = PermissionError(13, "Permission denied", str(folder / "locked"))
     monkeypatch.setattr(os, "scandir", raising(error))
     with pytest.raises(AssetError, match=r"locked: Permission denied; all folders"):
@@ -451,8 +442,6 @@ def test_a_folder_that_cannot_be_read_is_named(
 
 
 def raising(error: Exception) -> Callable[..., NoReturn]:
-    """A function that raises."""
-
     def fail(*_: object) -> NoReturn:
         raise error
 

@@ -28,7 +28,6 @@ randomizers:
 
 
 def message_of(text: str) -> str:
-    """What reading a text complains about."""
     with pytest.raises(ConfigError) as caught:
         parse_yaml(text, "x.yaml")
     return str(caught.value)
@@ -59,7 +58,6 @@ def test_a_document_becomes_plain_data() -> None:
     ],
 )
 def test_every_value_knows_its_place(path: tuple[str | int, ...], line: int, column: int) -> None:
-    """Line and column count from 1."""
     node = parse_yaml(TABLETOP, "t.yaml").get(*path)
 
     assert node is not None
@@ -119,12 +117,10 @@ def test_aliases_are_expanded() -> None:
 
 
 def test_a_byte_order_mark_is_ignored() -> None:
-    """Some editors write one."""
     assert parse_yaml("\ufeffa: 1", "x.yaml").plain() == {"a": 1}
 
 
 def test_windows_line_ends_are_line_ends() -> None:
-    """Lines are counted right."""
     assert message_of("a: 1\r\na: 2\r\n").startswith("x.yaml:2:1: a: duplicate key")
 
 
@@ -193,7 +189,6 @@ REFUSED = {
 
 @pytest.mark.parametrize("case", REFUSED)
 def test_refused_documents_say_place_fact_and_remedy(case: str) -> None:
-    """The whole message, literally."""
     text, message = REFUSED[case]
 
     assert message_of(text) == message
@@ -202,10 +197,7 @@ def test_refused_documents_say_place_fact_and_remedy(case: str) -> None:
 NASTY = {
     "deep flow": ("a: " + "[" * 100_000, "nested deeper than 32 levels"),
     "deep flow mapping": ("{a: " * 100_000, "nested deeper than 32 levels"),
-    "deep block": (
-        "\n".join(" " * i + "a:" for i in range(200)),
-        "nested deeper than 32 levels",
-    ),
+    "deep block": ("\n".join(" " * i + "a:" for i in range(200)), "nested deeper than 32 levels"),
     "deep block list": ("- " * 50_000, "nested deeper than 32 levels"),
     "5000-digit int": ("a: " + "9" * 5000, "a text longer than 4096 bytes"),
     "4000-digit int": ("a: " + "9" * 4000, "is too large for a whole number (64 bits)"),
@@ -314,7 +306,6 @@ def test_a_large_document_is_read_in_a_second() -> None:
 
 
 def test_a_file_is_read_by_its_path(tmp_path: Path) -> None:
-    """Messages name it as the user did."""
     path = tmp_path / "a.yaml"
     path.write_text("a: 1\n")
 
@@ -414,7 +405,6 @@ def test_any_mutation_of_a_valid_document_gives_a_tree_or_an_error(data: st.Data
 def test_any_bytes_in_a_file_give_a_tree_or_an_error(
     tmp_path_factory: pytest.TempPathFactory, data: bytes
 ) -> None:
-    """Decoding is part of reading."""
     path = tmp_path_factory.getbasetemp() / "fuzz.yaml"
     path.write_bytes(data)
     try:

@@ -15,12 +15,7 @@ def test_merging_lays_mappings_over_each_other() -> None:
 
     merged = merge_nodes(base, override)
 
-    assert merged.plain() == {
-        "a": {"x": 1, "y": [3], "w": 4},
-        "b": {"v": 5},
-        "c": {"z": 1},
-        "d": 6,
-    }
+    assert merged.plain() == {"a": {"x": 1, "y": [3], "w": 4}, "b": {"v": 5}, "c": {"z": 1}, "d": 6}
 
 
 def test_merged_values_keep_the_place_they_came_from() -> None:
@@ -62,7 +57,6 @@ def test_share_of_the_image_and_distance_take_each_others_place() -> None:
 
 
 def test_merging_leaves_its_arguments_alone() -> None:
-    """Trees are values."""
     base, override = parse_yaml("a: {x: 1}", "b.yaml"), parse_yaml("a: {y: 2}", "o.yaml")
 
     merge_nodes(base, override)

@@ -22,7 +22,6 @@ randomizers:
 
 @pytest.fixture
 def document() -> Node:
-    """A configuration in short."""
     return parse_yaml(TEXT, "t.yaml")
 
 
@@ -134,7 +133,6 @@ def test_an_overridden_value_knows_that_it_came_from_the_command_line(document: 
 def test_overrides_that_lead_nowhere_say_so(
     document: Node, path: str, value: str, message: str
 ) -> None:
-    """The whole message, literally."""
     with pytest.raises(ConfigError) as caught:
         with_override(document, path, value)
 
@@ -142,7 +140,6 @@ def test_overrides_that_lead_nowhere_say_so(
 
 
 def test_a_list_without_names_is_addressed_by_index() -> None:
-    """The message says how."""
     document = parse_yaml("a: [1, 2]", "t.yaml")
 
     with pytest.raises(ConfigError, match=r"no item is named 'x'; expected an index such as \[0\]"):

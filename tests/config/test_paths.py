@@ -15,7 +15,6 @@ SENSOR = "sensors: [{type: rgb_camera, name: color, size_px: [64, 48], hfov_deg:
 
 
 def at(file: Path) -> Position:
-    """A place in a document."""
     return Position(str(file), 2, 5)
 
 
@@ -39,7 +38,6 @@ def test_a_path_starts_from_the_file_that_names_it(
 def test_on_the_command_line_a_path_starts_from_the_current_folder(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, position: Position | None
 ) -> None:
-    """As everywhere in a shell."""
     (tmp_path / "assets").mkdir()
     monkeypatch.chdir(tmp_path)
 
@@ -118,7 +116,6 @@ def test_asset_folders_start_from_the_configuration_and_do_not_enter_its_identit
 
 
 def test_a_missing_asset_folder_is_told_with_its_place(tmp_path: Path) -> None:
-    """Before anything runs."""
     source = tmp_path / "mine.yaml"
     source.write_text("template: tabletop\nassets: {folders: [mehses]}\n" + SENSOR)
 

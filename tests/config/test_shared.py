@@ -163,7 +163,6 @@ def test_a_reference_that_leads_nowhere_is_one_clear_error(text: str, fact: str)
 
 
 def test_values_that_need_one_another_are_refused() -> None:
-    """A circle has no beginning."""
     with pytest.raises(ConfigError, match="need one another"):
         draw_shared(parse_yaml("a: $shared.b\nb: $shared.a", "test"), Streams(0, 0))
 

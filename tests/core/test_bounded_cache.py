@@ -18,7 +18,6 @@ def test_bytes_are_bounded_whatever_the_sizes() -> None:
 
 
 def test_a_value_larger_than_the_bound_displaces_all_others() -> None:
-    """It is in use anyway."""
     cache: ByteCache[np.ndarray] = ByteCache(1000)
     cache.get("small", lambda: np.zeros(100, np.uint8))
     cache.get("large", lambda: np.zeros(5000, np.uint8))

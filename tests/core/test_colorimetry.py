@@ -57,7 +57,6 @@ def test_codes_stand_for_the_light_of_the_standard(code: int, linear: float) -> 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 def test_every_byte_survives_decoding_and_encoding(dtype: type[np.float32 | np.float64]) -> None:
-    """All 256 codes, in the type that was given."""
     codes = np.arange(256)
     again = srgb_encode(srgb_decode((codes / 255.0).astype(dtype)))
 

@@ -42,7 +42,6 @@ def origin(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
 
 
 def test_the_name_is_that_of_the_project() -> None:
-    """In code as in pyproject.toml."""
     assert f'[project]\nname = "{DISTRIBUTION}"\n' in (ROOT / "pyproject.toml").read_text()
 
 
@@ -96,7 +95,6 @@ def test_an_installation_takes_extras_from_where_it_came(
     "record", ["", '{"url": "file:///nowhere/at/all"}', '{"url": "https://example.com/x.whl"}']
 )
 def test_without_its_source_an_installation_asks_the_index(origin: Path, record: str) -> None:
-    """For the project's own name."""
     origin.write_text(record)
 
     assert install_command("ray") == f"pip install '{DISTRIBUTION}[ray]'"

@@ -54,7 +54,6 @@ def test_projection_is_that_of_the_calibration_matrix() -> None:
 
 
 def test_what_lies_behind_has_no_image() -> None:
-    """NaN, not a mirrored point."""
     pixels = VGA.project(np.array([[0.0, 0, 1], [0, 0, 0], [0, 0, -1]]))
 
     assert np.isfinite(pixels[0]).all()
@@ -62,7 +61,6 @@ def test_what_lies_behind_has_no_image() -> None:
 
 
 def test_pixels_that_saw_nothing_have_no_point() -> None:
-    """Infinite depth becomes NaN."""
     depth = np.array([[1.0, np.inf]])
 
     points = Intrinsics(2, 1, 1.0, 1.0, 1.0, 0.5).unproject(depth)

@@ -36,14 +36,12 @@ def few_descriptors() -> Iterator[int]:
 
 
 def write(path: Path, size: int = SIZE) -> bytes:
-    """Write a file without a repeated page."""
     content = np.arange(size, dtype=np.uint32).tobytes()[:size]
     path.write_bytes(content)
     return content
 
 
 def mapped(path: Path) -> memoryview:
-    """The mapped content of a file."""
     with path.open("rb") as file:
         return map_file(file.fileno(), path.stat().st_size)
 

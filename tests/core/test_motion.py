@@ -148,7 +148,6 @@ def test_outside_its_knots_a_body_stands_still() -> None:
 
 
 def test_a_track_of_one_knot_is_refused() -> None:
-    """It is no way."""
     with pytest.raises(ValueError, match="two knots"):
         Trajectory("car", 0.1, (SE3(),))
 

@@ -26,7 +26,6 @@ CORNERS_PX = ((200.0, 790.0), (1000.0, 790.0), (700.0, 480.0), (500.0, 480.0))
 
 
 def plate_seen_by(pose: SE3) -> Plate:
-    """A plate with a camera."""
     return Plate(SIZE_PX, FOCAL_PX, pose, CORNERS_PX)
 
 

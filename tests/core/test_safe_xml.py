@@ -28,7 +28,6 @@ class Strict:
         setattr(self.__dict__["own"], name, value)
 
     def Parse(self, data: bytes, is_final: bool) -> None:  # noqa: N802  (the parser's own name)
-        """Parse the whole document."""
         if b"version" in data[:40] and b"1." not in data[:40]:
             raise expat.ExpatError("XML declaration not well-formed")
         self.__dict__["own"].Parse(data, is_final)

@@ -47,11 +47,7 @@ class Outer:
 
 
 numbers = st.floats(allow_nan=False, allow_infinity=False)
-inners = st.builds(
-    Inner,
-    pose=st.builds(SE3, st.tuples(numbers, numbers, numbers)),
-    ratio=numbers,
-)
+inners = st.builds(Inner, pose=st.builds(SE3, st.tuples(numbers, numbers, numbers)), ratio=numbers)
 outers = st.builds(
     Outer,
     kind=st.sampled_from(["a", "b"]),
@@ -114,7 +110,6 @@ def test_canonical_json_is_one_line_with_sorted_keys() -> None:
 
 
 def test_not_a_number_is_refused() -> None:
-    """JSON has none."""
     with pytest.raises(ValueError, match="Out of range float"):
         canonical_json(float("nan"))
 
@@ -127,19 +122,16 @@ def test_whole_numbers_become_floats_where_floats_are_declared() -> None:
 
 
 def test_values_outside_a_closed_set_are_refused() -> None:
-    """Not carried on into the program."""
     with pytest.raises(TypeError, match="'c' is not one of"):
         from_plain(Outer, {"kind": "c", "inner": {}})
 
 
 def test_unknown_fields_are_refused() -> None:
-    """A file of another version does not pass for one of this."""
     with pytest.raises(KeyError, match="colour"):
         from_plain(Inner, {"ratio": 1.0, "colour": "red"})
 
 
 def test_plain_data_holds_no_tuples_and_no_enums() -> None:
-    """Only what JSON knows."""
     assert to_plain({"a": (Colour.RED, {3, 1})}) == {"a": ["red", [1, 3]]}
 
 

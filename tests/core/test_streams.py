@@ -15,12 +15,10 @@ BASE = Streams(seed=7, scene=3, view=1, attempt=0, index=16)
 
 
 def first(streams: Streams, name: str = "lighting/sun") -> float:
-    """The first number of a stream."""
     return streams.rng(name).random()
 
 
 def test_the_same_key_gives_the_same_numbers() -> None:
-    """Streams have no memory."""
     assert first(BASE) == first(BASE)
     assert (BASE.rng("a").random(5) == BASE.rng("a").random(5)).all()
 
@@ -47,17 +45,14 @@ def test_drawing_elsewhere_moves_nothing() -> None:
     ],
 )
 def test_each_part_of_the_key_matters(other: Streams) -> None:
-    """Seed, scene, view and attempt."""
     assert first(other) != first(BASE)
 
 
 def test_the_name_matters() -> None:
-    """Two randomizers of one kind draw different numbers."""
     assert first(BASE, "lighting/sun") != first(BASE, "lighting/lamp")
 
 
 def test_the_index_is_carried_but_draws_nothing() -> None:
-    """It only serves sequences."""
     other = replace(BASE, index=99)
 
     assert other.rng("a").index == 99

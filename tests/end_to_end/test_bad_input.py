@@ -97,7 +97,6 @@ def test_unknown_asset_exits_with_3(tmp_path: Path) -> None:
     ],
 )
 def test_unfit_mesh_exits_with_3(tmp_path: Path, name: str, content: str, text: str) -> None:
-    """An empty mesh, a NaN, a file of noise: named by their path."""
     folder = tmp_path / "mine"
     folder.mkdir()
     (folder / name).write_text(content)
@@ -211,7 +210,6 @@ def test_dataset_of_another_configuration_exits_with_4_and_stays(
 
 
 def test_unwritable_place_exits_with_4(tmp_path: Path) -> None:
-    """A file where the folder should be."""
     (tmp_path / "taken").write_text("a file")
     arguments = ("--config", "tabletop.yaml", *JOB, "--out", "taken/out")
     assert_refused(tmp_path, arguments, 4, "taken")

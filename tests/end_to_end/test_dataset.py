@@ -149,7 +149,6 @@ def test_every_object_is_labelled_where_it_is_seen(dataset: Path) -> None:
 
 
 def test_licences_name_what_was_used_and_nothing_else(dataset: Path) -> None:
-    """The families in LICENSES-ASSETS.md are those of the scenes that were kept."""
     from gen_data.runner.stored import StoredSamples
 
     used, stored = set(), StoredSamples(dataset)

@@ -21,7 +21,6 @@ AWAY = {**CAMERA, "rig": "cart", "offset_m": [0.5, 0, 0.9], "pitch_deg": 80}
 
 
 def room(*sensors: dict[str, Any], **sections: Any) -> dict[str, Any]:
-    """Four balls on the floor of a room, with a carrier of sensors."""
     balls = {"ids": ["apple", "orange"]}
     elements = [
         {"type": "room", "name": "room", "size_m": [5, 4, 2.8]},

@@ -28,7 +28,6 @@ def test_without_a_change_every_sample_has_the_same_bytes(dataset: Path, tmp_pat
 
 @pytest.fixture(scope="module")
 def dark_dataset(dataset: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The scenes in other light."""
     out = tmp_path_factory.mktemp("dark") / "dark"
     package.rerender(dataset, out, overrides=["lamps.illuminance_lux=40"], workers=0)
     return out
@@ -98,7 +97,6 @@ def test_other_cameras_see_the_same_scenes(dataset: Path, tmp_path: Path) -> Non
 def test_what_would_change_the_scenes_is_refused(
     dataset: Path, tmp_path: Path, arguments: tuple[str, ...], text: str
 ) -> None:
-    """With the reason and a remedy."""
     (tmp_path / "empty.yaml").write_text("seed: 1\n")
     done = gen_data("rerender", str(dataset), "--out", "out", *arguments, cwd=tmp_path)
 

@@ -80,7 +80,6 @@ def test_a_path_in_a_file_is_whole() -> None:
 
 
 def helps(group: click.Group, names: tuple[str, ...] = ()) -> list[tuple[str, ...]]:
-    """Arguments that print the help of every command below a group."""
     context = click.Context(group)
     found = []
     for name in group.list_commands(context):

@@ -77,7 +77,6 @@ def test_lanes_are_columns_at_rows_as_tusimple_has_them(
 
 
 def test_a_line_that_misses_every_row_has_no_column() -> None:
-    """It lies between two of them."""
     short = replace(BORDER, points_px=((5.0, 12.0), (6.0, 18.0)), visible=(True, True))
 
     assert columns_at(short, [0, 10, 20]) == [-2, -2, -2]

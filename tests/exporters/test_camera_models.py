@@ -30,18 +30,15 @@ Camera = tuple[Any, str, Any]
 
 
 def pinhole(fx: Any, fy: Any, cx: Any, cy: Any) -> Camera:
-    """A camera without a lens."""
     return np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]], float), "", ()
 
 
 def in_bop(folder: Path) -> Camera:
-    """The camera of the data set."""
     camera = json.loads((folder / "camera.json").read_text())
     return pinhole(*(camera[name] for name in ("fx", "fy", "cx", "cy")))
 
 
 def in_cityscapes(folder: Path) -> Camera:
-    """Of the first image."""
     camera = json.loads(min(folder.rglob("*_camera.json")).read_text())["intrinsic"]
     return pinhole(*(camera[name] for name in ("fx", "fy", "u0", "v0")))
 

@@ -56,14 +56,12 @@ def average_precision(truth: COCO, kind: str, path: Path | None = None) -> float
 
 @pytest.fixture(scope="module")
 def dataset(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Seven frames of a street, exported with all defaults."""
     folder = tmp_path_factory.mktemp("coco")
     return world.export(Coco(), world.info(7), world.samples, folder)
 
 
 @pytest.fixture(scope="module")
 def train(dataset: Path) -> COCO:
-    """The train split."""
     return opened(dataset / "annotations/instances_train.json")
 
 
@@ -193,7 +191,6 @@ def test_amodal_boxes_are_those_of_the_silhouettes_in_the_image(
 
 @pytest.mark.slow
 def test_boxes_only_and_no_amodal_keys_on_request(world: Any, tmp_path: Path) -> None:
-    """Options leave out what they say, and nothing else."""
     exporter = Coco(segmentation="none", amodal=False)
 
     folder = world.export(exporter, world.info(7), world.samples, tmp_path)

@@ -42,12 +42,10 @@ def dataset(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def read(folder: Path, split: str = "train") -> Any:
-    """The JSON of a split."""
     return json.loads((folder / f"annotations/panoptic_{split}.json").read_text())
 
 
 def problems(folder: Path) -> list[str]:
-    """What the format's definition forbids."""
     truth, found = read(folder), []
     isthing = {c["id"]: c["isthing"] for c in truth["categories"]}
     if [a["image_id"] for a in truth["annotations"]] != [i["id"] for i in truth["images"]]:

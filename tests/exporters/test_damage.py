@@ -210,17 +210,14 @@ class Row:
 
 
 def row(samples: Source, changes: str, *tests: Callable[..., Any], **options: Any) -> Row:
-    """A row."""
     return Row(samples, changes, tests, options)
 
 
 def street(world: Any) -> tuple[Any, Any]:
-    """The seven frames."""
     return world.info(7), world.samples
 
 
 def few(world: Any) -> tuple[Any, Any]:
-    """A frame of each split."""
     return world.info(7), [world.samples[0], world.samples[2]]
 
 
@@ -236,13 +233,11 @@ def bodies(world: Any) -> tuple[Any, Any]:
 
 
 def normals(world: Any) -> tuple[Any, Any]:
-    """The seven frames with normals."""
     media = {"color": (*world.info(7).media["color"], Channel.NORMALS)}
     return world.info(7, media=media), world.samples
 
 
 def drive(world: Any) -> tuple[Any, Any]:
-    """Two sequences of four steps."""
     return drive_info(world), world.drive()
 
 
@@ -263,7 +258,6 @@ def slips(world: Any) -> tuple[Any, Any]:
 
 
 def graspable(world: Any) -> tuple[Any, Any]:
-    """A frame with grasps."""
     return world.info(1), [test_graspnet.with_grasps(world)]
 
 
@@ -273,7 +267,6 @@ def labels(made: Made) -> None:
 
 
 def solo(made: Made) -> list[str]:
-    """Faults of the split train."""
     root = made.folder / "train"
     samples = [sample for sample in made.samples if sample.split == "train"]
     return [*test_solo.problems(root, test_solo.read_json(root), samples)]
@@ -382,7 +375,6 @@ class Copied:
         self._world, self._folder = world, folder
 
     def export(self, *_: Any, **__: Any) -> Path:
-        """Return the finished export."""
         return self._folder
 
     def __getattr__(self, name: str) -> Any:
@@ -436,7 +428,6 @@ def test_an_export_of_unchanged_samples_passes(
 def test_a_changed_fact_is_noticed(
     kind: str, change: str, make: Callable[..., Made], tmp_path: Path
 ) -> None:
-    """A comparison fails."""
     made = make(kind, tmp_path, CHANGES[change])
 
     with pytest.raises(AssertionError):
@@ -445,5 +436,4 @@ def test_a_changed_fact_is_noticed(
 
 @needs_rerun
 def test_every_format_has_a_row() -> None:
-    """A new one, too."""
     assert {*ROWS, "usd"} == set(TABLE)

@@ -27,7 +27,6 @@ PINHOLES_ONLY = ("bop", "cityscapes", "kitti", "scannet", "semantickitti", "solo
 
 
 def viewed(kind: str, **fields: Any) -> Any:
-    """An exporter as a configuration with these fields makes it."""
     own = TABLE.load(kind).model_validate_json(json.dumps({"type": kind, **fields}))
     return view_of(own, own, Thresholds())
 
@@ -92,7 +91,6 @@ def test_only_the_listed_cameras_are_exported(world: Any, tmp_path: Path, camera
 
 @pytest.mark.parametrize("kind", [*PINHOLES_ONLY, "nuscenes"])
 def test_a_bent_camera_that_is_not_listed_blocks_no_format(world: Any, kind: str) -> None:
-    """With it, formats of rectified images refuse the data set and name both remedies."""
     info, _ = two_cameras(world)
     own = {"camera": "wide"} if kind not in ("nuscenes", "solo") else {}
     refused = viewed(kind, **own)
@@ -104,7 +102,6 @@ def test_a_bent_camera_that_is_not_listed_blocks_no_format(world: Any, kind: str
 
 
 def test_a_name_of_no_sensor_is_refused_with_the_nearest(world: Any) -> None:
-    """Cameras and other sensors apart."""
     info, _ = two_cameras(world)
     with pytest.raises(ConfigError, match=r"exporter 'coco': cameras: 'colour' .*'color'\?"):
         viewed("coco", cameras=["colour"]).check(info)

@@ -46,13 +46,11 @@ def assert_rows(folder: Path, sample: Sample) -> None:
 
 
 def test_rows_are_in_the_camera_frame_of_visible_objects(world: Any, tmp_path: Path) -> None:
-    """Hidden things are left out."""
     graspable = with_grasps(world)
     assert_rows(world.export(GraspNet(), world.info(1), [graspable], tmp_path), graspable)
 
 
 def test_an_image_without_grasps_has_empty_arrays(world: Any, tmp_path: Path) -> None:
-    """Of the right width."""
     folder = world.export(GraspNet(), world.info(7), world.samples, tmp_path)
 
     assert np.load(folder / "train/000000003_color_grasps.npy").shape == (0, 17)

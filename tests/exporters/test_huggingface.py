@@ -21,7 +21,6 @@ pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:Depreca
 
 @pytest.fixture(scope="module")
 def dataset(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Seven frames of a street, at most two in a file."""
     folder = tmp_path_factory.mktemp("huggingface")
     return world.export(HuggingFace(rows_per_file=2), world.info(7), world.samples, folder)
 
@@ -95,7 +94,6 @@ def test_flow_is_binary_and_missing_channels_are_null(world: Any, tmp_path: Path
 
 
 def test_ignored_objects_are_crowds(world: Any, tmp_path: Path) -> None:
-    """As in COCO, which excludes them from scores."""
     ignored = world.ignoring(world.samples[0])
     folder = world.export(HuggingFace(), world.info(1), [ignored], tmp_path)
 
@@ -105,7 +103,6 @@ def test_ignored_objects_are_crowds(world: Any, tmp_path: Path) -> None:
 
 
 def card(folder: Path) -> Any:
-    """Header of the card."""
     header = re.match(r"---\n(.*?)\n---\n", (folder / "README.md").read_text(), re.DOTALL)
     assert header
     return yaml.safe_load(header.group(1))

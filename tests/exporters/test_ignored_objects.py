@@ -59,7 +59,6 @@ def in_voc(folder: Path) -> list[Row]:
 
 
 def in_tar(folder: Path) -> list[Row]:
-    """Ids stay unique."""
     (sample,) = tar_samples(folder / "train")
     rows = sample["json"]["cameras"]["color"]["annotations"]
     assert len({row["id"] for row in rows}) == len(rows)

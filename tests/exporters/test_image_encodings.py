@@ -50,18 +50,15 @@ MAGIC = {".jpg": b"\xff\xd8\xff", ".webp": b"RIFF"}
 
 @pytest.fixture(params=[JPEG, WEBP, LOSSLESS], ids=lambda encoding: encoding.format)
 def encoding(request: Any) -> ImageEncoding:
-    """One of the encodings beside PNG."""
     return request.param
 
 
 @pytest.fixture
 def info(world: Any, encoding: ImageEncoding) -> Any:
-    """The street's data set in this encoding."""
     return encoded(world.info(7), encoding)
 
 
 def encoded(info: Any, encoding: ImageEncoding) -> Any:
-    """The data set with photographs of all cameras in this encoding."""
     sensors = (replace(s, rgb_encoding=encoding) if s.channels else s for s in info.sensors)
     return replace(info, sensors=tuple(sensors))
 
@@ -150,7 +147,6 @@ Found = tuple[bytes, str]
 
 
 def file_of(path: Path) -> Found:
-    """A file, and the format that its ending states."""
     return path.read_bytes(), path.suffix
 
 
@@ -194,7 +190,6 @@ def in_panoptic(folder: Path) -> Found:
 
 
 def in_solo(folder: Path) -> Found:
-    """By the first capture."""
     frame = json.loads((folder / "train/sequence.0/step0.frame_data.json").read_text())
     capture = frame["captures"][0]
     path = folder / "train/sequence.0" / capture["filename"]
@@ -323,7 +318,6 @@ def is_near(image: Any, expected: Any) -> bool:
 
 
 def test_hdf5_has_the_pixels(tmp_path: Path, info: Any, world: Any) -> None:
-    """It decodes photographs."""
     boxes = world.export(Hdf5(), info, world.samples, tmp_path)
     with h5py.File(next(boxes.rglob("000000000_*.hdf5"))) as file:
         made = world.samples[0].capture.readings["color"].channels[Channel.RGB]

@@ -48,7 +48,6 @@ def devkit_corners(row: str) -> Array:
 
 
 def devkit_calib(path: Path) -> dict[str, Array]:
-    """Matrices by name; readers take the rows in this order."""
     found = calibration(path)
     names = ["P0", "P1", "P2", "P3", "R0_rect", "Tr_velo_to_cam", "Tr_imu_to_velo"]
     assert list(found) == names

@@ -145,7 +145,6 @@ def test_grey_images_have_the_luma_of_the_colours(exported: Any) -> None:
 def test_drives_with_another_calibration_have_another_date(
     world: Any, samples: Any, tmp_path: Path
 ) -> None:
-    """A date has one calibration."""
     wider = SE3((0.0, 0.0, 1.93))
     moved = [
         replace(s, scene=replace(s.scene, lidars=(replace(s.scene.lidars[0], T_rig_lidar=wider),)))
@@ -180,6 +179,5 @@ def test_cameras_that_look_elsewhere_cannot_be_a_rectified_pair(
 
 @pytest.mark.parametrize("date", ["2011-09-26", "2011_13_01", "2011_9_26", "today"])
 def test_a_date_is_a_day(date: str) -> None:
-    """Year, month and day with underscores."""
     with pytest.raises(ValueError, match="2011_09_26"):
         KittiRaw(date=date)

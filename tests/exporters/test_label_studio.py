@@ -24,7 +24,6 @@ SHAPES = ("mask", "polygon", "box")
 
 @pytest.fixture(scope="module")
 def dataset(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The seven frames with each shape."""
     folder = tmp_path_factory.mktemp("label_studio")
     for shapes in SHAPES:
         world.export(LabelStudio(shapes=shapes), world.info(7), world.samples, folder / shapes)

@@ -21,7 +21,6 @@ pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:Depreca
 
 @pytest.fixture
 def samples(world: Any) -> list[Sample]:
-    """The world's frames; in the first one the objects are related."""
     first, *others = world.samples
     a, b, *_ = (t.instance.instance_id for t in first.truth["color"].objects)
     related = (Relation(a, "left_of", b), Relation(b, "near", a))

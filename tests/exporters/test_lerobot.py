@@ -27,13 +27,11 @@ from tests.exporters.drives import drive_info
 
 @pytest.fixture(scope="module")
 def reach(world: Any) -> Any:
-    """Two sequences of four steps, the first for training."""
     return world.reach()
 
 
 @pytest.fixture(scope="module", params=["v3.0", "v2.1"])
 def dataset(request: Any, world: Any, reach: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Data sets of both splits, in either format."""
     exporter = LeRobot(version=request.param)
     return world.export(exporter, drive_info(world), reach, tmp_path_factory.mktemp("lerobot"))
 
@@ -60,7 +58,6 @@ def tasks_of(folder: Path) -> dict[int, str]:
 
 
 def episodes_of(folder: Path) -> list[dict[str, Any]]:
-    """Length, tasks and statistics of all episodes, in order."""
     path = folder / "meta/episodes/chunk-000/file-000.parquet"
     if not path.exists():
         stats = lines(folder / "meta/episodes_stats.jsonl")
@@ -76,7 +73,6 @@ def episodes_of(folder: Path) -> list[dict[str, Any]]:
 
 
 def rows_of(folder: Path) -> list[dict[str, Any]]:
-    """Rows of all episodes, in order."""
     rows = []
     for path in sorted((folder / "data").rglob("*.parquet")):
         with pyarrow.parquet.ParquetFile(path) as file:
@@ -85,7 +81,6 @@ def rows_of(folder: Path) -> list[dict[str, Any]]:
 
 
 def faults(folder: Path, samples: Any) -> list[str]:
-    """Differences between a data set and the samples of its episodes."""
     info = json.loads((folder / "meta/info.json").read_text())
     episodes, tasks = episodes_of(folder), tasks_of(folder)
     rows, found = rows_of(folder), []

@@ -53,7 +53,6 @@ def test_runs_of_every_length() -> None:
 
 
 def test_nothing_is_an_empty_image() -> None:
-    """Of an invisible object."""
     for mask in (None, MaskPx(0, 0, np.zeros((0, 0), bool))):
         assert not decoded(encode_mask(mask, 48, 64)).any()
 

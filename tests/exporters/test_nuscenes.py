@@ -37,13 +37,11 @@ ORIGIN_M = (50.0, 50.0, 0.0)
 
 
 def table(folder: Path, name: str) -> list[dict[str, Any]]:
-    """Rows of a table."""
     rows: list[dict[str, Any]] = json.loads((folder / f"v1.0-mini/{name}.json").read_text())
     return rows
 
 
 def by_token(folder: Path, name: str) -> dict[str, dict[str, Any]]:
-    """Rows of a table by token, which is unique."""
     rows = table(folder, name)
     found = {row["token"]: row for row in rows}
     assert len(found) == len(rows)
@@ -51,7 +49,6 @@ def by_token(folder: Path, name: str) -> dict[str, dict[str, Any]]:
 
 
 def pose(row: Mapping[str, Any]) -> SE3:
-    """Pose of a row."""
     return SE3(tuple(row["translation"]), tuple(row["rotation"]))
 
 
@@ -150,7 +147,6 @@ def test_files_of_a_scanner_look_ahead_however_it_is_mounted(yaw_deg: int, turns
 
 
 def test_the_lowest_laser_is_ring_0() -> None:
-    """Ours count from the top."""
     points = np.zeros(3, POINT)
     points["ring"] = [0, 30, 31]
     rings = np.frombuffer(lidar_bytes(points, 0), "<f4").reshape(-1, 5)[:, 4]
@@ -251,7 +247,6 @@ def test_boxes_are_where_pulses_hit_the_object(
 
 
 def test_objects_that_labels_ignore_have_no_box(world: Any, samples: Any) -> None:
-    """And those that are not annotated."""
     sample = samples[0]
     image = sample.truth["left"]
     flagged = tuple(replace(t, ignored=t.instance.instance_id == 2) for t in image.objects)
@@ -291,8 +286,7 @@ def without(sample: Any, numbers: tuple[int, ...]) -> Any:
     """The sample of which no sensor senses some instances."""
     truth = {
         name: replace(
-            image,
-            objects=tuple(t for t in image.objects if t.instance.instance_id not in numbers),
+            image, objects=tuple(t for t in image.objects if t.instance.instance_id not in numbers)
         )
         for name, image in sample.truth.items()
     }

@@ -19,7 +19,6 @@ from gen_data.exporters.png import SIGNATURE, RowFilter, decode_png, encode_png
 
 
 def noise(shape: tuple[int, ...], dtype: Any) -> NDArray[Any]:
-    """Every value of the type, in an order without pattern."""
     count = int(np.prod(shape))
     return (np.arange(count, dtype=np.uint64) * 2654435761 >> 7).astype(dtype).reshape(shape)
 
@@ -67,7 +66,6 @@ def test_other_arrays_are_refused(wrong: NDArray[Any]) -> None:
 def test_the_fast_decoder_agrees_with_opencv(
     shape: tuple[int, ...], dtype: Any, row_filter: RowFilter
 ) -> None:
-    """Of every file that the encoder writes."""
     data = encode_png(noise(shape, dtype), row_filter, 1)
     expected = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
     read = decode_png(data)

@@ -23,14 +23,12 @@ NYU40 = {"pedestrian": 31, "crate": 29, "car": 0}
 
 @pytest.fixture(scope="module")
 def tum(exported: Any) -> Path:
-    """The drive of two sequences with four steps each."""
     folder: Path = exported(TumRgbd())
     return folder
 
 
 @pytest.fixture(scope="module")
 def scannet(exported: Any) -> Path:
-    """The same as ScanNet."""
     folder: Path = exported(ScanNet())
     return folder
 
@@ -70,7 +68,6 @@ def read_units(path: Path, units: float) -> Any:
 
 
 def sequence(samples: Sequence[Sample], number: int) -> Sequence[Sample]:
-    """Frames of one of the two drives."""
     return samples[4 * number : 4 * number + 4]
 
 
@@ -121,7 +118,6 @@ def test_tum_accelerometer_has_the_readings_of_the_imu(world: Any, tmp_path: Pat
 
 
 def scan_folder(scannet: Path, number: int) -> Path:
-    """Folder of a sequence: every scene has one view."""
     return scannet / f"scans/scene{number:04d}_00"
 
 

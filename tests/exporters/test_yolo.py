@@ -25,13 +25,11 @@ TASKS = ("detect", "segment", "pose", "obb")
 
 @pytest.fixture(scope="module")
 def samples(world: Any) -> list[Any]:
-    """The seven frames, and an object in two parts."""
     return [*world.samples, divided(world)]
 
 
 @pytest.fixture(scope="module")
 def dataset(world: Any, samples: list[Any], tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """All tasks."""
     return world.export(Yolo(tasks=TASKS), world.info(8), samples, tmp_path_factory.mktemp("yolo"))
 
 
@@ -41,7 +39,6 @@ def rows_of(task_folder: Path, split: str, stem: str) -> list[list[float]]:
 
 
 def objects_of(samples: list[Any], folder: Path) -> Iterator[tuple[list[float], Any]]:
-    """Row and truth of every object of the split train."""
     for sample in (s for s in samples if s.split == "train"):
         rows = rows_of(folder, "train", f"{sample.index:09d}_color")
         yield from zip(rows, truth_of(sample), strict=True)
@@ -144,7 +141,6 @@ def test_pose_of_another_category(world: Any, tmp_path: Path) -> None:
 
 
 def test_a_missing_split_is_said_in_the_file(world: Any, tmp_path: Path) -> None:
-    """Ultralytics requires both."""
     folder = world.export(Yolo(tasks=("detect",)), world.info(2), world.samples[:2], tmp_path)
 
     text = (folder / "detect/data.yaml").read_text()

@@ -25,7 +25,6 @@ from gen_data.lab.matching.real_files import (
 
 
 def save(path: Path, width: int = 96, height: int = 80, mode: str = "RGB", **options: int) -> None:
-    """Write an image."""
     path.parent.mkdir(parents=True, exist_ok=True)
     Image.new(mode, (width, height), 100).save(path, **options)  # type: ignore[arg-type]
 
@@ -93,7 +92,6 @@ def test_folders_without_recordings_are_refused(tmp_path: Path) -> None:
 
 
 def points(n: int = 200) -> np.ndarray:
-    """Records of a scan."""
     rng = np.random.default_rng(1)
     made = np.zeros(n, POINT)
     made["position_m"] = rng.normal(0.0, 10.0, (n, 3))
@@ -140,7 +138,6 @@ def test_scans_of_every_format_have_the_same_points(tmp_path: Path, name: str) -
 def test_damaged_scans_state_the_fact(
     tmp_path: Path, name: str, content: bytes, reason: str
 ) -> None:
-    """One sentence for the table."""
     (tmp_path / name).write_bytes(content)
     with pytest.raises(ValueError, match=reason):
         read_point_file(tmp_path / name)

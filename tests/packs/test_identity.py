@@ -73,9 +73,6 @@ def test_another_content_of_the_pack_is_another_data_set(
     assert compare_plans(before, before) == []
 
 
-def test_panoramas_that_may_light_a_scene_belong_to_the_data_set(
-    factory: PipelineFactory,
-) -> None:
-    """Light changes every byte."""
+def test_panoramas_that_may_light_a_scene_belong_to_the_data_set(factory: PipelineFactory) -> None:
     environments = [name for name in make_plan(factory).assets if name.startswith("environment/")]
     assert environments

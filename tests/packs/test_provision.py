@@ -80,7 +80,6 @@ def test_they_are_fetched_when_an_asset_is_wanted(
 
 @pytest.mark.usefixtures("index")
 def test_they_are_not_fetched_for_anything_else(tmp_path: Path) -> None:
-    """Nor by a library that may not."""
     library = open_assets()
 
     assert library.find(("car",)) and library.find((), "plate") and library.find((), "texture")

@@ -45,7 +45,6 @@ def test_bones_keep_their_lengths_in_every_pose(kind: str) -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_rotations_are_rotations(kind: str) -> None:
-    """Orthonormal, without reflection."""
     body = body_of(kind)
     heads = body.points_m[: len(body.bones)]
     for pose in POSES:

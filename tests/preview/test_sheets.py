@@ -41,7 +41,6 @@ def event_table() -> Measurements:
 
 
 def sample() -> Sample:
-    """Two cameras, a radar and an event camera."""
     lens = Intrinsics(32, 24, 30.0, 30.0, 16.0, 12.0)
     color, depth = Camera("color", SE3(), lens), Camera("depth", SE3(), lens)
     images = {

@@ -35,7 +35,6 @@ def street(**group: Any) -> Scene:
 
 
 def drawn(scene: Scene, stream: str = "stream", **fields: Any) -> Scene:
-    """After one draw."""
     return LaneObjects(name="things", **fields)(scene, FakeAssets(), rng_of(stream))
 
 
@@ -75,7 +74,6 @@ def test_share_of_used_places_is_that_of_the_distribution() -> None:
 
 
 def test_count_is_a_choice_of_all_places_and_ids_are_unique() -> None:
-    """Ten of about forty."""
     scene = drawn(street(), gap_m=Constant(1.94), count=Constant(10))
     ids = [i.instance_id for i in scene.instances]
 
@@ -195,7 +193,6 @@ def test_a_camera_on_a_pole_does_not_look_out_of_a_tree() -> None:
 
 
 def test_a_street_without_such_a_lane_is_one_clear_error() -> None:
-    """It tells which there are."""
     with pytest.raises(ConfigError, match="no lane of kind sidewalk; there is driving"):
         CameraOnLane(name="walk", lanes=("sidewalk",))(street(), FakeAssets(), rng_of())
 

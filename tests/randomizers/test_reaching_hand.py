@@ -26,7 +26,6 @@ HELD = ("can?seed=9", "jar?seed=18", "cup?seed=9", "mug?seed=27")
 
 @pytest.fixture(scope="module")
 def library(tmp_path_factory: pytest.TempPathFactory) -> Library:
-    """The procedural library."""
     folder: Path = tmp_path_factory.mktemp("hands")
     return open_library(cache_dir=folder)
 
@@ -41,7 +40,6 @@ def table(things: tuple[str, ...]) -> Scene:
 
 
 def reaching(*, holding: bool) -> ReachingHand:
-    """A randomizer that always draws a hand."""
     return ReachingHand(
         name="hands",
         probability=Probability(1.0),
@@ -122,7 +120,6 @@ def test_hands_are_labelled(library: Library) -> None:
 
 
 def test_nothing_is_held_that_is_too_wide(library: Library) -> None:
-    """The hand rests instead."""
     scene = reaching(holding=True)(table(("vase?seed=5",)), library, rng_of())
     (hand,) = scene.bodies
 
@@ -140,7 +137,6 @@ def test_radii_leave_out_handles_and_contents(library: Library) -> None:
 
 
 def test_unknown_poses_and_radii_are_refused() -> None:
-    """With the possible ones."""
     with pytest.raises(AssetError, match="hand: pose=wave is unknown; expected one of any, relax"):
         FAMILIES["hand"].build(seed=0, pose="wave")
     with pytest.raises(ValueError, match="are not all from 15 to 46"):

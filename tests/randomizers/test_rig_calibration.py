@@ -35,7 +35,6 @@ SCENE = place_sensors(
 
 
 def drawn(scene_index: int = 0, **given: object) -> Scene:
-    """The scene after one draw."""
     randomizer = RigCalibration(name="calibration", **given)  # type: ignore[arg-type]
     return randomizer(SCENE, FakeAssets(), rng_of("calibration", scene_index))
 

@@ -33,18 +33,15 @@ CARLA = (
 
 
 def made(kind: str, **fields: Any) -> Any:
-    """A randomizer, read as YAML would be."""
     plain = {"type": kind, "name": kind, **fields}
     return TABLE.load(kind).model_validate_json(json.dumps(plain))
 
 
 def drawn(kind: str, scene: Scene | None = None, seed: int = 0, **fields: Any) -> Scene:
-    """A scene after one draw."""
     return made(kind, **fields)(scene or Scene("t"), FakeAssets(), rng_of(kind, seed))
 
 
 def suns(scene: Scene) -> list[Light]:
-    """The suns of a scene."""
     return [light for light in scene.lights if light.kind == "sun"]
 
 
@@ -89,7 +86,6 @@ def test_fields_replace_what_the_preset_says() -> None:
 
 
 def test_unknown_preset_is_refused_when_it_is_read() -> None:
-    """With the name that was meant, wherever it stands in a distribution."""
     for preset in ("ClearNon", {"choice": {"WetNoon": 1, "ClearNon": 2}}):
         with pytest.raises(ValidationError, match="did you mean 'ClearNoon'"):
             made("weather", preset=preset)
@@ -133,13 +129,11 @@ def test_time_of_day_can_be_preethams() -> None:
 def test_a_time_that_preethams_sky_does_not_know_is_refused(
     given: dict[str, object], said: str
 ) -> None:
-    """When it is read, before anything is drawn."""
     with pytest.raises(ValidationError, match=said):
         TimeOfDay.model_validate({"name": "time", "sky": "preetham", **given})
 
 
 def test_time_of_day_keeps_the_clouds_of_the_weather() -> None:
-    """Unless it is told otherwise."""
     rainy = drawn("weather", preset="HardRainNoon")
 
     assert dict(drawn("time_of_day", rainy).shared)["cloudiness"] == 1.0
@@ -215,5 +209,4 @@ def test_warm_lamps_look_warm_and_cold_ones_do_not() -> None:
 
 
 def test_street_lights_are_a_frozen_record() -> None:
-    """Read from YAML and from Python alike."""
     assert made("street_lights") == StreetLights(type="street_lights", name="street_lights")

@@ -182,7 +182,6 @@ def test_a_panel_far_away_is_a_point_with_a_cosine() -> None:
 
 @pytest.mark.parametrize("light", [RECTANGLE, DISK])
 def test_nothing_is_lit_behind_a_panel(light: Light) -> None:
-    """Its back is dark, exactly."""
     behind = np.asarray(light.position_m) - 0.4 * np.asarray(light.direction)
     turned = -np.asarray(light.direction)
 

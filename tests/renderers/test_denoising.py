@@ -46,7 +46,6 @@ def test_a_denoised_image_is_closer_to_the_converged_one() -> None:
 def test_without_its_package_the_error_says_what_to_install(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Before anything is traced."""
     monkeypatch.setitem(sys.modules, "pyoidn", None)
 
     with pytest.raises(ConfigError, match=r"render\.denoise .*pip install .*\[denoise\]"):

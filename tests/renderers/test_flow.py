@@ -37,7 +37,6 @@ WALL = Body("wall", "wall", replace(FACING, translation_m=(0.0, 0.0, 6.0)))
 
 @pytest.fixture(scope="module")
 def renderer() -> WarpRenderer:
-    """On the CPU."""
     return WarpRenderer(MESHES, "cpu")
 
 

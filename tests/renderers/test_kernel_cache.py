@@ -34,7 +34,6 @@ def object_file(code: bytes) -> bytes:
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """A cache of two modules."""
     for name in MODULES:
         (tmp_path / name).mkdir()
         (tmp_path / name / "m.cpu27.o").write_bytes(object_file(name.encode()))
@@ -101,7 +100,6 @@ STAMP = "gen-data-0123-cpu"
 
 @pytest.fixture
 def temporary(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The folder of temporary files of this test alone."""
     folder = tmp_path_factory.mktemp("temporary")
     monkeypatch.setattr(tempfile, "tempdir", str(folder))
     return folder

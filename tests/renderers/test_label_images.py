@@ -23,7 +23,6 @@ ALL = frozenset(Channel)
 
 @pytest.fixture(scope="module")
 def library() -> FakeLibrary:
-    """A unit box, a sphere of radius 0.5 and a plane of 10 m."""
     return FakeLibrary(
         {"box": box_mesh(), "ball": sphere_mesh(0.5, rings=64), "plane": plane_mesh()}
     )
@@ -31,12 +30,10 @@ def library() -> FakeLibrary:
 
 @pytest.fixture(scope="module", params=["raster", "rays"])
 def renderer(library: FakeLibrary, request: pytest.FixtureRequest) -> WarpRenderer:
-    """Both methods of visibility."""
     return WarpRenderer(library, "cpu", RenderSettings(visibility=request.param))
 
 
 def scene_of(*bodies: Body) -> Scene:
-    """Bodies with an instance each."""
     instances = tuple(
         Instance(
             b.instance_id, b.name, "thing", 7, b.asset,
@@ -183,6 +180,5 @@ def test_surface_through_the_camera_plane_is_clipped_not_lost(renderer: WarpRend
 
 
 def test_unknown_device_is_refused(library: FakeLibrary) -> None:
-    """The message names what this machine has."""
     with pytest.raises(ConfigError, match="cuda:9"):
         WarpRenderer(library, "cuda:9")

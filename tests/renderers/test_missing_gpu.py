@@ -97,6 +97,5 @@ def test_a_full_gpu_is_an_error_that_names_workers_and_device(text: str) -> None
 
 
 def test_memory_that_the_system_refuses_is_not_taken_for_that_of_a_gpu() -> None:
-    """Warp words both alike."""
     with pytest.raises(SampleError, match="the system refused more memory"), explain_errors("x"):
         raise RuntimeError("Failed to allocate 4915200 bytes on device 'cpu'")

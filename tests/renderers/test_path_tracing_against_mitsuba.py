@@ -116,7 +116,6 @@ def still_life(
     exact: bool = True,
     sky: float = 60.0,
 ) -> Picture:
-    """A ball on the ground."""
     library = FakeLibrary(
         {
             "ground": plane_mesh(6.0, matte(0.4, 0.35, 0.3)),

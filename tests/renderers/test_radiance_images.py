@@ -26,7 +26,6 @@ DARK = Environment(luminance_cd_m2=0.0)
 
 @pytest.fixture(scope="module")
 def library() -> FakeLibrary:
-    """Bodies of grey chalk."""
     return FakeLibrary(
         {
             "plane": plane_mesh(materials=CHALK),
@@ -38,7 +37,6 @@ def library() -> FakeLibrary:
 
 @pytest.fixture(scope="module")
 def renderer(library: FakeLibrary) -> WarpRenderer:
-    """Settings without ambient occlusion: closed forms apply."""
     return WarpRenderer(library, "cpu", PLAIN)
 
 
@@ -97,7 +95,6 @@ def test_white_metal_reflects_all_light_but_what_it_shades(roughness: float) -> 
 def test_invisible_environment_is_black_and_visible_one_has_its_luminance(
     renderer: WarpRenderer,
 ) -> None:
-    """Pixels that hit nothing."""
     up = Camera("up", look_at((0.0, 0.0, 1.0), (0.0, 0.0, 5.0)), LENS)
     seen = Scene("t", environment=Environment(luminance_cd_m2=60.0))
     hidden = Scene("t", environment=Environment(luminance_cd_m2=60.0, visible=False))
@@ -185,7 +182,6 @@ def test_antialiasing_changes_edges_only(library: FakeLibrary) -> None:
 
 
 def test_picture_does_not_depend_on_what_was_rendered_before(library: FakeLibrary) -> None:
-    """A, then twenty others, then A again: the same bytes, in a fresh renderer too."""
     renderer = WarpRenderer(library, "cpu")
     lamp = Light("lamp", "sphere", (1.0, 1.0, 3.0), intensity_cd=900.0)
 

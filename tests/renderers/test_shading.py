@@ -32,10 +32,7 @@ OPEN = RenderSettings(ambient_occlusion_radius_m=0.0)
 
 
 def luminance_of(
-    scene: Scene,
-    camera: Camera,
-    library: FakeLibrary,
-    settings: RenderSettings = OPEN,
+    scene: Scene, camera: Camera, library: FakeLibrary, settings: RenderSettings = OPEN
 ) -> np.ndarray:
     """cd/m^2 of every pixel and channel."""
     renderer = WarpRenderer(library, "cpu", settings)

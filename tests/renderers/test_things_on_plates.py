@@ -95,7 +95,6 @@ def world(*, cube: bool, photo: bool) -> Scene:
 def seen(
     library: FakeLibrary, scene: Scene, channels: frozenset[Channel] = SEEN, **settings: Any
 ) -> SensorReading:
-    """The reading of its camera."""
     renderer = WarpRenderer(library, "cpu", RenderSettings(**settings))
     return renderer.render(scene, scene.cameras[0], channels)
 
@@ -115,7 +114,6 @@ def empty_photo() -> NDArray[np.uint8]:
 
 @cache
 def composite() -> SensorReading:
-    """The cube on the photograph."""
     return seen(PlateLibrary(empty_photo()), world(cube=True, photo=True))
 
 

@@ -34,7 +34,6 @@ MESHES = {
 
 @pytest.fixture(params=["raster", "rays"])
 def renderer(request: pytest.FixtureRequest) -> WarpRenderer:
-    """Both methods of visibility."""
     settings = RenderSettings(visibility=request.param)
     return WarpRenderer(FakeLibrary(MESHES), "cpu", settings)
 
@@ -59,9 +58,7 @@ def test_z_depth_of_a_facing_plane_is_its_distance_at_every_pixel(renderer: Warp
     assert np.abs(reading.channels[Channel.Z_DEPTH] - 2.5).max() < 1e-5
 
 
-def test_range_of_a_facing_plane_grows_with_the_angle_from_the_axis(
-    renderer: WarpRenderer,
-) -> None:
+def test_range_of_a_facing_plane_grows_with_the_angle_from_the_axis(renderer: WarpRenderer) -> None:
     """Range is measured along the ray of the pixel's centre."""
     camera = forward_camera((4, 2), focal_px=2.0)
 
@@ -111,7 +108,6 @@ def test_normals_of_a_sphere_point_from_its_centre_and_towards_the_camera(
 def test_the_inside_of_a_surface_is_seen_with_its_normal_turned_round(
     renderer: WarpRenderer,
 ) -> None:
-    """Surfaces have two sides: a plane is visible from behind, and its normal faces the camera."""
     scene = scene_of(Body("plane", "plane", SE3((0.0, 0.0, 2.0))))
 
     normals = seen(renderer, scene, forward_camera()).channels[Channel.NORMALS]

@@ -157,12 +157,7 @@ def test_a_cache_drops_what_was_used_longest_ago() -> None:
 
 @pytest.mark.parametrize(
     ("mesh", "convex"),
-    [
-        (box_mesh(), True),
-        (sphere_mesh(0.3, 12), True),
-        (plane_mesh(), True),
-        (room_mesh(), False),
-    ],
+    [(box_mesh(), True), (sphere_mesh(0.3, 12), True), (plane_mesh(), True), (room_mesh(), False)],
 )
 def test_a_solid_is_convex_if_no_vertex_lies_outside_a_face(mesh: object, convex: bool) -> None:
     """A room seen from inside is a cavity, not a solid."""
@@ -176,7 +171,6 @@ def test_a_device_that_is_not_there_is_an_error_that_names_the_remedy() -> None:
 
 
 def test_the_table_loads_the_renderer() -> None:
-    """By its name in YAML."""
     renderer = TABLE.load("warp")(device="cpu").open(FakeLibrary({}))  # type: ignore[call-arg]
 
     assert isinstance(renderer, WarpRenderer)

@@ -42,7 +42,6 @@ def annotation(number: int, image_id: int, category_id: int, **keys: Any) -> dic
 
 
 def write_coco(folder: Path, split: str, stem: str, n: int, rows: list[dict[str, Any]]) -> None:
-    """A file as the exporter lays it out: a line per image and per annotation."""
     head = {"categories": [{"id": 1, "name": "car"}, {"id": 2, "name": "person"}]}
     images = ",\n".join(json.dumps({"id": k}) for k in range(1, n + 1))
     lines = ",\n".join(map(json.dumps, rows))
@@ -103,7 +102,6 @@ def test_diversity_counts_variants_by_category_and_family() -> None:
 
 
 def test_labels_without_assets_have_no_table_of_diversity() -> None:
-    """KITTI's files name none."""
     survey = collect_statistics([Label(("train", "1"), "Car", "Car", 9, 9)])
 
     assert "Diversity" not in {one.title for one in make_tables(survey)}
@@ -129,14 +127,12 @@ def test_kittis_files_are_read_where_there_is_no_coco(tmp_path: Path) -> None:
 
 
 def test_a_folder_without_labels_is_refused(tmp_path: Path) -> None:
-    """With the remedy."""
     with pytest.raises(StorageError, match=r"there are no labels.*exported as coco or kitti"):
         list(read_records(tmp_path))
 
 
 @pytest.mark.parametrize("text", ["Car 0 0 0\n", "Car a 0 0 1 1 2 2 1 1 1 1 1 1 1\n"])
 def test_a_damaged_label_is_named_with_its_line(tmp_path: Path, text: str) -> None:
-    """Too few columns, or no number."""
     test_kittis_files_are_read_where_there_is_no_coco(tmp_path)
     path = tmp_path / "kitti/training/label_2/000007.txt"
     path.write_text(text)
@@ -190,7 +186,6 @@ def test_labels_that_were_not_annotated_are_left_blank() -> None:
 
 
 def test_a_data_set_without_objects_has_a_report() -> None:
-    """Only negatives."""
     found = collect_statistics([Picture("train", "1")])
 
     assert row_of(make_tables(found), "Images", "train")["empty"] == "100.0 %"
@@ -233,7 +228,6 @@ def test_histograms_lose_nothing(street: Path) -> None:
 
 
 def test_the_command_prints_tables_and_writes_a_page(street: Path, tmp_path: Path) -> None:
-    """From one pass over the files."""
     html = tmp_path / "out/report.html"
 
     done = CliRunner().invoke(report, [str(street), "--html", str(html)])
@@ -300,7 +294,6 @@ def test_of_many_scans_some_are_read(tmp_path: Path) -> None:
 
 
 def test_a_scan_whose_labels_do_not_fit_is_refused(tmp_path: Path) -> None:
-    """The message names the file."""
     write_scan(tmp_path, "000007", [0, 0], "")
     (tmp_path / "training/velodyne/000007.bin").write_bytes(b"1234")
 

@@ -24,12 +24,10 @@ ROAD = {"type": "road", "name": "main", "length_m": 100.0}
 
 @pytest.fixture(scope="module")
 def library(tmp_path_factory: pytest.TempPathFactory) -> Library:
-    """Generated assets, cached in a folder of these tests."""
     return open_library((), Path(tmp_path_factory.mktemp("cache")))
 
 
 def built(library: Library, *lines: dict[str, Any]) -> Scene:
-    """The nominal scene of some elements."""
     elements: list[Element] = [
         TABLE.load(line["type"]).model_validate(line, strict=False) for line in lines
     ]
@@ -37,7 +35,6 @@ def built(library: Library, *lines: dict[str, Any]) -> Scene:
 
 
 def by_name(scene: Scene) -> dict[str, Lane]:
-    """The scene's lanes."""
     return {lane.name: lane for lane in scene.lanes}
 
 

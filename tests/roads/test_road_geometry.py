@@ -43,7 +43,6 @@ def test_arc_keeps_its_distance_from_the_centre(curvature: float, length: float)
 @settings(max_examples=60, deadline=None)
 @given(CURVATURES, CURVATURES, st.floats(5.0, 120.0))
 def test_spiral_is_the_integral_of_its_heading(start: float, end: float, length: float) -> None:
-    """Against adaptive quadrature."""
     s = np.array([0.0, 0.3 * length, length])
     poses = Spiral(length, start, end).local(s)
 

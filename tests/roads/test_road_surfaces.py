@@ -22,7 +22,6 @@ SLOTS = ("asphalt", "asphalt_new", "marking", "kerb", "pavement", "verge", "grou
 
 
 def mesh_of(name: str, **parameters: object) -> MeshData:
-    """The mesh of a family with some of its parameters changed."""
     family = FAMILIES[name]
     mesh: MeshData = family.build(**{**family.parameters, **parameters}).mesh
     return mesh

@@ -25,12 +25,10 @@ MEDIAN = {"median_m": 3.0, "length_m": 60.0}
 
 @cache
 def library() -> Library:
-    """Procedural assets."""
     return open_library(())
 
 
 def built(*elements: Element) -> Scene:
-    """The nominal scene of some elements."""
     return build_scene("test", elements, library())
 
 
@@ -113,7 +111,6 @@ def test_impossible_turn_lanes_are_refused(changed: dict[str, float], field: str
 
 
 def junction_mesh(**changed: object) -> MeshData:
-    """The mesh of a junction with some of its parameters changed."""
     family = FAMILIES["junction"]
     mesh: MeshData = family.build(**{**family.parameters, **changed}).mesh
     return mesh

@@ -16,7 +16,6 @@ DIM = IrradianceVolume((0.0, 0.0, 0.0), (4.0, 3.0, 2.5), (1, 1, 1), (ROOM_CD_M2,
 
 
 def room(*holes: Hole) -> LitRoom:
-    """Four by three metres."""
     return LitRoom((0.0, 0.0, 0.0), (4.0, 3.0, 2.5), GREY, holes)
 
 

@@ -36,7 +36,6 @@ LICENCES += "| here | MIT | me | mug |\n| there | CC0-1.0 | you | bowl |\n"
 
 
 def facts(publication: Publication = PUBLICATION) -> DatasetFacts:
-    """Facts of the fake data set of ten samples."""
     info: DatasetInfo = FakePipeline(10, Trouble()).info
     counts = (SplitCount("train", 8, {"mug": 8}), SplitCount("val", 2, {"bowl": 1}))
     info = replace(info, publication=publication)
@@ -107,7 +106,6 @@ def test_the_card_states_what_has_no_labels(
 
 
 def test_without_a_publication_only_licences_of_assets_are_stated() -> None:
-    """No licence is invented."""
     bare = facts(Publication())
 
     assert "The publisher has stated no licence of its own." in data_card(bare)
@@ -118,13 +116,11 @@ def test_without_a_publication_only_licences_of_assets_are_stated() -> None:
 
 
 def test_texts_without_a_table_have_no_licences() -> None:
-    """The header is no licence."""
     assert licences_in("# Assets\n\nnone\n") == []
     assert licences_in(LICENCES.rpartition("|---")[0]) == []
 
 
 def test_size_does_not_depend_on_the_number_of_samples() -> None:
-    """Files are listed as sets."""
     few = facts()
     many = replace(few, plan=replace(few.plan, n=90), info=replace(few.info, n=90))
 

@@ -31,13 +31,11 @@ BUG = FailedSample(5, "sample", "ValueError")
 
 
 def manifest_of(folder: Path) -> Mapping[str, Any]:
-    """The manifest of a data set."""
     manifest: Mapping[str, Any] = json.loads((folder / "manifest.json").read_text())
     return manifest
 
 
 def files_of(folder: Path) -> dict[str, bytes]:
-    """Contents of the files of all shards."""
     paths = (path for path in (folder / "shards").rglob("*") if path.is_file())
     return {path.relative_to(folder).as_posix(): path.read_bytes() for path in paths}
 

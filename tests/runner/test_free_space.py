@@ -107,5 +107,4 @@ def test_a_merge_that_will_not_fit_is_refused_before_anything_is_written(
 
 
 def fail() -> NoReturn:
-    """A record is missing."""
     raise AssertionError

@@ -49,7 +49,6 @@ def memory() -> Iterator[str]:
 def make_at(
     url: str, n: int = 10, progress: Callable[[RunProgress], None] | None = None, **changes: object
 ) -> Summary:
-    """A fake data set at a URL, made in this process."""
     return run(
         replace(fake_plan(n), **changes),
         FakeFactory(n),
@@ -63,7 +62,6 @@ def make_at(
 
 
 def download(url: str, folder: Path) -> Path:
-    """A data set at a URL as a folder."""
     objects = ObjectFolder(url)
     objects.download({name: folder / name for name in objects.tree()})
     return folder

@@ -27,7 +27,6 @@ HANG_S = 120.0
 
 @pytest.fixture(scope="module")
 def reference_digest(tmp_path_factory: pytest.TempPathFactory) -> str:
-    """Digest of the ten-sample data set, made in this process."""
     out = tmp_path_factory.mktemp("reference") / "out"
     make(out)
     return tree_digest(out)
@@ -44,7 +43,6 @@ def start_fake_run(
     ballast_bytes: int = 0,
     environment: Mapping[str, str] | None = None,
 ) -> subprocess.Popen[str]:
-    """A run in a process group of its own."""
     arguments = [str(out), str(workers), str(delay_s), str(ballast_bytes)]
     return subprocess.Popen(
         [sys.executable, "-m", "tests.runner.fake_run", *arguments],
@@ -57,7 +55,6 @@ def start_fake_run(
 
 
 def wait_for(condition: Callable[[], bool]) -> None:
-    """Poll until ``condition()`` holds."""
     deadline_s = time.monotonic() + HANG_S
     while time.monotonic() < deadline_s:
         if condition():
@@ -189,7 +186,6 @@ def test_a_wrong_sample_is_named_with_the_command_that_makes_it(tmp_path: Path) 
 
 @pytest.mark.slow
 def test_workers_that_cannot_start_end_the_run(tmp_path: Path) -> None:
-    """Not an endless loop of processes."""
     with pytest.raises(WorkerLost, match="while they start: killed by signal 9"):
         make(tmp_path / "out", workers=1, trouble=Trouble(start_fails=True))
 
@@ -286,7 +282,6 @@ def test_lack_of_memory_in_a_worker_is_one_line() -> None:
 
 
 def test_an_error_that_cannot_travel_arrives_as_its_nearest_relative() -> None:
-    """Kind and text survive; only the class of the plug-in is lost."""
     arrived = make_sendable(Stubborn())
 
     assert type(arrived) is SampleError

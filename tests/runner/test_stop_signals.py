@@ -69,7 +69,6 @@ CLEANS_UP_FOR_LONG = """
 
 
 def start(body: str, folder: Path) -> subprocess.Popen[str]:
-    """Start the command and wait until it has begun."""
     marker = folder / "begun"
     process = subprocess.Popen(
         [sys.executable, "-c", START.format(body=body), str(marker)],
@@ -118,8 +117,7 @@ def test_an_error_that_an_interruption_caused_is_no_traceback(tmp_path: Path) ->
 
 
 @pytest.mark.parametrize(
-    "error",
-    ["MemoryError", "ImportError('x.so: failed to map segment from shared object')"],
+    "error", ["MemoryError", "ImportError('x.so: failed to map segment from shared object')"]
 )
 def test_lack_of_memory_is_one_line(tmp_path: Path, error: str) -> None:
     """Under ``ulimit -v``, libraries cannot even be loaded; a traceback tells nothing."""

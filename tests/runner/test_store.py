@@ -43,7 +43,6 @@ from tests.runner.fragile_disk import ERRNOS, FragileDisk, Killed
 
 @pytest.fixture(scope="module")
 def reference_digest(tmp_path_factory: pytest.TempPathFactory) -> str:
-    """Digest of the ten-sample data set, made without interruption."""
     out = tmp_path_factory.mktemp("reference") / "out"
     make(out)
     return tree_digest(out)
@@ -242,7 +241,6 @@ def test_an_extension_can_be_interrupted(tmp_path: Path) -> None:
 
 
 def test_a_smaller_n_is_refused(tmp_path: Path) -> None:
-    """Nothing is removed."""
     make(tmp_path / "out", 10)
     before = tree_digest(tmp_path / "out")
 
@@ -268,7 +266,6 @@ def test_a_foreign_folder_is_refused_and_not_touched(tmp_path: Path, name: str) 
 
 
 def test_a_file_in_place_of_the_folder_is_refused(tmp_path: Path) -> None:
-    """One message with the path."""
     (tmp_path / "out").write_text("a file")
 
     with pytest.raises(StorageError, match=r"out: is not a folder"):

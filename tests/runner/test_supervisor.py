@@ -37,12 +37,10 @@ SHARD_SIZE = 4
 
 
 def samples_of(shard: int) -> range:
-    """Four samples per shard."""
     return range(shard * SHARD_SIZE, (shard + 1) * SHARD_SIZE)
 
 
 def make_supervisor(shards: int, workers: int, **limits: float) -> Supervisor:
-    """One that makes ``shards`` shards of four samples."""
     return Supervisor(
         shards=range(shards),
         samples_of=samples_of,
@@ -127,7 +125,6 @@ def test_a_shard_finished_just_before_the_kill_is_not_made_again() -> None:
 
 
 def test_a_rejected_scene_lets_the_others_finish_their_shard() -> None:
-    """No new shard is handed out; the error is kept; committed work is not thrown away."""
     supervisor = make_supervisor(shards=9, workers=2)
     supervisor.start(0.0)
     supervisor.handle(Ready(0), 1.0)

@@ -16,7 +16,6 @@ from tests.runner.doubles import make
 
 @pytest.fixture(scope="module")
 def pristine(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A finished data set of ten samples; tests work on copies."""
     out = tmp_path_factory.mktemp("pristine") / "out"
     make(out)
     return out
@@ -24,7 +23,6 @@ def pristine(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def dataset(pristine: Path, tmp_path: Path) -> Path:
-    """A copy that a test may damage."""
     return Path(shutil.copytree(pristine, tmp_path / "out"))
 
 
@@ -124,7 +122,6 @@ def test_swapped_files_are_found(dataset: Path) -> None:
 
 
 def test_all_deviations_are_listed_together(dataset: Path) -> None:
-    """One look, one complete list."""
     for index in (1, 4, 8):
         (dataset / f"lines/images/{index:09d}_color.png").unlink()
 

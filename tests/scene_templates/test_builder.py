@@ -21,13 +21,11 @@ HOUSEHOLD = {"tags": ["household"]}
 
 
 def element(**plain: Any) -> Element:
-    """An element as YAML would give it."""
     made: Element = TABLE.load(plain["type"]).model_validate(plain, strict=False)
     return made
 
 
 def built(*lines: dict[str, Any]) -> Scene:
-    """The nominal scene of some elements."""
     return build_scene("test", [element(**line) for line in lines], FakeAssets())
 
 
@@ -37,7 +35,6 @@ ARM = {"type": "robot", "name": "arm", "asset": "two_link", "on": "table", "at_m
 
 
 def clutter(**other: Any) -> dict[str, Any]:
-    """A line for a group of objects."""
     return {"type": "objects", "name": "clutter", "on": "table", "assets": HOUSEHOLD, **other}
 
 
@@ -97,11 +94,7 @@ def test_robot_stands_at_its_home_pose_with_a_body_per_link() -> None:
     assert [links[f"arm/{part}"].part_id for part in instance.parts] == [1, 2, 3, 4, 5]
     upper = (-0.45, 0.1, base_z + 0.3)
     hand = (upper[0] + 0.3 * math.sin(0.4), 0.1, upper[2] + 0.3 * math.cos(0.4))
-    left = (
-        hand[0] + 0.3 * math.sin(1.3),
-        0.14,
-        hand[2] + 0.3 * math.cos(1.3),
-    )
+    left = (hand[0] + 0.3 * math.sin(1.3), 0.14, hand[2] + 0.3 * math.cos(1.3))
     for name, place in (("upper", upper), ("hand", hand), ("left", left)):
         body = links[f"arm/{name}"]
         assert body.T_world_body.translation_m == pytest.approx(place, abs=2e-6)
@@ -272,20 +265,17 @@ def test_a_panel_need_not_be_seen(kind: str) -> None:
     ],
 )
 def test_an_impossible_lamp_is_refused_when_it_is_read(given: dict[str, object], said: str) -> None:
-    """Before anything is built."""
     with pytest.raises(ValidationError, match=said):
         built(DESK, {"type": "light", "name": "lamp", **given})
 
 
 def test_backdrop_is_background() -> None:
-    """A plane under everything has no instance."""
     scene = built({"type": "backdrop", "name": "ground", "asset": "plane?size_m=6,6"}, DESK)
 
     assert scene.body("ground").instance_id == 0
 
 
 def test_same_elements_build_the_same_scene() -> None:
-    """Nothing is drawn."""
     lines = (ROOM, DESK, ARM, clutter(count=7))
 
     assert built(*lines) == built(*lines)

@@ -30,28 +30,21 @@ from gen_data.scene_templates.signals import Signals
 from tests.randomizers.doubles import rng_of
 
 BENCHES = LaneObjects(
-    name="benches",
-    lanes=("furniture",),
-    count=4,
-    assets=AssetChoice(ids=("bench",)),
-    present=False,
+    name="benches", lanes=("furniture",), count=4, assets=AssetChoice(ids=("bench",)), present=False
 )
 
 
 @cache
 def library() -> Library:
-    """Procedural assets."""
     return open_library(())
 
 
 @cache
 def street() -> Config:
-    """The shipped street."""
     return load_config("street")
 
 
 def built(*elements: Element) -> Scene:
-    """The nominal scene of some elements."""
     return build_scene("test", elements, library())
 
 

@@ -26,12 +26,10 @@ BENT = ROAD.model_copy(update={"curvature_per_m": 0.005})
 
 @cache
 def library() -> Library:
-    """Procedural assets."""
     return open_library(())
 
 
 def built(*elements: Element) -> Scene:
-    """The nominal scene of some elements."""
     return build_scene("test", elements, library())
 
 

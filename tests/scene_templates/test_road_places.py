@@ -40,12 +40,10 @@ VEHICLE_M = 4.4
 
 @cache
 def library() -> Library:
-    """Procedural assets."""
     return open_library(())
 
 
 def built(*elements: Element) -> Scene:
-    """The nominal scene of some elements."""
     return build_scene("test", elements, library())
 
 
@@ -55,7 +53,6 @@ def built(*elements: Element) -> Scene:
     scope="module",
 )
 def scene(request: pytest.FixtureRequest) -> Scene:
-    """A road with one place."""
     return built(*request.param)
 
 

@@ -21,7 +21,6 @@ from gen_data.scene_templates.signals import Signals
 
 @cache
 def library() -> Library:
-    """Procedural assets."""
     return open_library(())
 
 
@@ -35,12 +34,10 @@ def crossing() -> list[object]:
 
 
 def built(*elements: object) -> Scene:
-    """The scene of a crossing and more elements."""
     return build_scene("test", [*crossing(), *elements], library())  # type: ignore[list-item]
 
 
 def yaw_of(body: Body) -> float:
-    """Direction of a body's front [rad]."""
     ahead = body.T_world_body.rotation()[:, 0]
     return math.atan2(ahead[1], ahead[0])
 
@@ -109,7 +106,6 @@ def test_every_road_that_comes_to_a_junction_has_a_signal_that_faces_it() -> Non
     ],
 )
 def test_what_has_no_place_is_one_clear_error(element: object, fact: str) -> None:
-    """The element is named, and what was expected."""
     with pytest.raises(ConfigError, match=fact):
         built(element)
 

@@ -80,7 +80,6 @@ ROLES = {
 
 
 def build(name: str, seed: int) -> Solid:
-    """Build a variant, with the other parameters at their defaults."""
     return FAMILIES[name].build(seed=seed, **FAMILIES[name].parameters)
 
 
@@ -144,7 +143,6 @@ def test_arrays_are_finite_typed_and_normals_unit(built: tuple[str, Solid]) -> N
 
 @for_every_variant
 def test_no_triangle_is_degenerate(built: tuple[str, Solid]) -> None:
-    """Every face has an area."""
     corners = built[1].mesh.vertices_m[built[1].mesh.faces].astype(np.float64)
     cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
 
@@ -167,7 +165,6 @@ def test_materials_have_known_roles_and_textures_that_exist(built: tuple[str, So
 
 @for_every_variant
 def test_collision_lies_within_the_mesh_bounds(built: tuple[str, Solid]) -> None:
-    """Nothing collides that is not there."""
     name, solid = built
     low, high = solid.mesh.bounds_m()
     points = np.concatenate(solid.collision.parts_m)
@@ -209,7 +206,6 @@ def test_facts_are_known_without_building(name: str) -> None:
     ],
 )
 def test_unknown_parameters_are_refused_by_name(name: str, parameters: dict[str, object]) -> None:
-    """The message says what was given."""
     wrong = next(str(v) for v in parameters.values() if v not in ("birch", "house", 1.0))
     with pytest.raises(AssetError, match=wrong):
         FAMILIES[name].build(seed=0, **parameters)
@@ -230,7 +226,6 @@ def test_textures_are_repeatable_images(name: str) -> None:
 
 
 def digest(solid: Solid) -> str:
-    """Hash of everything a solid holds."""
     mesh = solid.mesh
     sha = hashlib.sha256()
     for array in (mesh.vertices_m, mesh.faces, mesh.normals, mesh.uvs, mesh.face_slots):

@@ -90,7 +90,6 @@ def test_cables_of_different_poles_meet_at_mid_span() -> None:
 
 @pytest.mark.parametrize("span_m", [-1.0, 81.0])
 def test_spans_that_no_pole_carries_are_refused(span_m: float) -> None:
-    """The message says what was given."""
     with pytest.raises(AssetError, match="span_m"):
         utility_pole(0, span_m)
 

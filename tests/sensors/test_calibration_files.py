@@ -34,7 +34,6 @@ sensors:
 
 
 def sensor(folder: Path, text: str, name: str = "camera.yaml", **files: str) -> Any:
-    """The camera of a configuration beside a file; ``FILE`` in its line is the file's name."""
     if files.get("content"):
         (folder / name).write_text(files["content"], encoding="utf-8")
     (folder / "mine.yaml").write_text(CONFIG % text.replace("FILE", name), encoding="utf-8")
@@ -64,7 +63,6 @@ def assert_projects(found: Intrinsics, expected_px: Array) -> None:
 
 
 def opencv_text(D: Array, ending: str, folder: Path, **more: Any) -> str:
-    """A file as OpenCV writes it."""
     path = folder / f"written{ending}"
     storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_WRITE)
     for key, value in {"image_width": 640, "image_height": 512, "camera_matrix": K,
@@ -555,9 +553,7 @@ def test_a_calibration_of_kitti_places_cameras_from_the_scanner(
     image = points @ (P.reshape(3, 4) @ Tr.reshape(4, 4)).T
     eye = np.linalg.inv(rig_pose(found)) @ points.T
     np.testing.assert_allclose(
-        found.nominal_intrinsics().project(eye[:3].T),
-        image[:, :2] / image[:, 2:] + 0.5,
-        atol=0.01,
+        found.nominal_intrinsics().project(eye[:3].T), image[:, :2] / image[:, 2:] + 0.5, atol=0.01
     )
 
 

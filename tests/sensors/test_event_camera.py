@@ -53,7 +53,6 @@ class Film(BoxRays):
 def seen(
     sensor: EventCamera, film: Renderer, step: int, scene: Scene | None = None, seed: int = 0
 ) -> Measurements:
-    """One reading of a camera on the rig."""
     mounted = place_sensors(sensor.mount(scene or world()))
     return sensor.capture(scene_at(mounted, 0.1 * step), film, frozenset(), rng(step, seed))
 
@@ -118,7 +117,6 @@ def test_thresholds_differ_from_pixel_to_pixel_and_stay() -> None:
 
 
 def test_events_come_in_order_of_time_within_their_step() -> None:
-    """With noise and all."""
     rows = seen(
         EventCamera(rig="ego", size_px=SIZE_PX, leak_hz=50.0), Film(lambda t: 100.0 * t + 10.0), 3
     ).rows
@@ -167,7 +165,6 @@ def test_pixels_rest_after_an_event() -> None:
 
 
 def test_first_instant_has_no_events_and_needs_no_picture() -> None:
-    """Nothing came before it."""
     film = Film(lambda t: 0.5)
 
     assert len(seen(EventCamera(rig="ego"), film, 0).rows) == 0
@@ -175,7 +172,6 @@ def test_first_instant_has_no_events_and_needs_no_picture() -> None:
 
 
 def test_every_reading_sees_its_first_and_last_instant() -> None:
-    """One image more than parts."""
     film = Film(lambda t: 0.5)
     seen(EventCamera(rig="ego", size_px=SIZE_PX, frames_per_step=3), film, 1)
 
@@ -222,7 +218,6 @@ def test_it_may_share_the_place_of_a_camera() -> None:
 
 
 def test_missing_cameras_and_rigs_are_told() -> None:
-    """By name."""
     with pytest.raises(ConfigError, match="no camera 'color' is listed before it"):
         EventCamera().mount(world())
     with pytest.raises(ConfigError, match="the scene has no rig 'wrist'"):
@@ -234,6 +229,5 @@ def test_missing_cameras_and_rigs_are_told() -> None:
     [{"threshold": 0.0}, {"threshold_spread": -0.1}, {"leak_hz": -1.0}, {"frames_per_step": 0}],
 )
 def test_impossible_values_are_refused(fields: dict) -> None:
-    """When they are read."""
     with pytest.raises(ValidationError):
         EventCamera(**fields)

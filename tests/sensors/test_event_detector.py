@@ -86,7 +86,6 @@ def test_boxes_touch_exactly_where_their_corners_reach() -> None:
 
 
 def test_boxes_above_each_other_do_not_touch() -> None:
-    """A bridge over the car."""
     bridge = thing(2, "bridge", "building", SE3((0.0, 0.0, 1.51)), ((-9, -9, 0), (9, 9, 1)))
     own, its = find_obstacles(world(straight((0.0, 0.0), (0.0, 0.0)), [bridge]))
 
@@ -104,7 +103,6 @@ def test_changing_lanes_crosses_one_line() -> None:
 
 
 def test_lines_of_junctions_do_not_count() -> None:
-    """Nothing is painted there."""
     junction = moved(
         world(straight((10.0, 0.0), (10.0, -1.0))),
         lanes=(Lane("x", "driving", ((0.0, 0.0, 0.0), (60.0, 0.0, 0.0)), 3.5, junction=True),),
@@ -138,7 +136,6 @@ def test_obstacle_that_only_reaches_into_the_way_counts_from_where_it_does() -> 
 
 
 def test_far_obstacles_are_not_reported() -> None:
-    """Beyond the threshold."""
     wall = thing(4, "wall", "building", SE3((40.0, 0.0, 0.0)), WALL_M)
     scene = world(others=[wall])
 
@@ -198,7 +195,6 @@ def test_slow_watcher_reports_all_since_its_last_reading() -> None:
 
 
 def test_a_carrier_without_a_box_is_named() -> None:
-    """A rig on something unlabelled."""
     scene = world()
     bare = moved(scene, bodies=(*scene.bodies, Body("mast", "mast?")), rigs=(Rig("ego", "mast"),))
     with pytest.raises(SampleError, match="'mast', which carries rig 'ego', has no box"):
@@ -206,6 +202,5 @@ def test_a_carrier_without_a_box_is_named() -> None:
 
 
 def test_unknown_occurrences_are_refused() -> None:
-    """When they are read."""
     with pytest.raises(ValidationError, match="events"):
         EventDetector(events=("crash",))  # type: ignore[arg-type]

@@ -149,7 +149,6 @@ def test_white_noise_has_the_density_of_the_data_sheet() -> None:
     ],
 )
 def test_what_does_not_fit_the_scene_is_told(fields: dict, words: str) -> None:
-    """When it is mounted, before anything is made."""
     with pytest.raises(ConfigError, match=words):
         Imu(**fields).mount(world())
 
@@ -166,7 +165,6 @@ def test_what_does_not_fit_the_scene_is_told(fields: dict, words: str) -> None:
     ],
 )
 def test_impossible_values_are_refused(kind: type, fields: dict) -> None:
-    """When they are read."""
     with pytest.raises(ValidationError):
         kind(**fields)
 

@@ -42,7 +42,6 @@ sensors:
 
 
 def spec(folder: Path, line: str, **files: str) -> Config:
-    """The configuration with one line of the scanner's, beside some files."""
     for name, text in files.items():
         (folder / name.replace("_", ".", 1)).write_text(text, encoding="utf-8")
     (folder / "mine.yaml").write_text(CONFIG % line, encoding="utf-8")
@@ -50,7 +49,6 @@ def spec(folder: Path, line: str, **files: str) -> Config:
 
 
 def told(folder: Path, line: str, **files: str) -> str:
-    """What a user is told, without folders."""
     with pytest.raises(ConfigError) as refused:
         spec(folder, line, **files)
     return str(refused.value).replace(f"{folder}/", "")
@@ -109,7 +107,6 @@ def test_a_table_of_beams_replaces_the_lasers_of_a_model(tmp_path: Path) -> None
 def test_what_is_wrong_in_a_table_is_told_with_its_place(
     table: str, message: str, tmp_path: Path
 ) -> None:
-    """File, line and column."""
     assert message in told(tmp_path, "beams: table.csv", table_csv=table)
 
 
@@ -127,7 +124,6 @@ def test_what_is_wrong_in_a_table_is_told_with_its_place(
 def test_what_is_wrong_with_a_model_is_told_with_its_place(
     line: str, sheet: str, message: str, tmp_path: Path
 ) -> None:
-    """In the sheet, or where the configuration names it."""
     assert message in told(tmp_path, line, sheet_yaml=sheet)
 
 

@@ -37,7 +37,6 @@ def moving(body: str, start: tuple[float, float, float], turning: bool = True) -
 
 
 def scene_of(bodies: list[Body], *tracks: Trajectory) -> Scene:
-    """Bodies about a scanner on a cart at the origin."""
     cart = Body("cart", "cart", SE3((0.0, 0.0, -3.0)))
     rig = Rig("rig", "cart", SE3((0.0, 0.0, 3.0)))
     lidar = Lidar("velodyne", "", SE3((0.5, 0.0, 0.0)), rig="rig", sweep_s=PERIOD_S)
@@ -46,7 +45,6 @@ def scene_of(bodies: list[Body], *tracks: Trajectory) -> Scene:
 
 
 def sweep(scene: Scene, motion: str, **fields: object) -> PointCloud:
-    """A sweep without noise."""
     sensor = LidarSensor(
         name="velodyne", model="VLP-16", ideal=True, motion_distortion=motion, **fields
     )  # type: ignore[arg-type]

@@ -150,7 +150,6 @@ def test_range_noise_is_that_of_the_data_sheet_on_steps_of_the_device() -> None:
 
 
 def test_nothing_nearer_or_farther_than_the_device_reports() -> None:
-    """Its range is 0.5 to 100 m."""
     sensor = LidarSensor(model="VLP-16", ideal=True)
 
     assert len(scan(sensor, Wall(0.4))) == 0
@@ -240,7 +239,6 @@ def test_the_air_has_a_sensitivity_of_its_own() -> None:
 
 
 def test_thicker_fog_answers_more() -> None:
-    """Its strength rises with extinction."""
     strengths = [fog_peak(a)[1] for a in (0.005, 0.01, 0.02, 0.06)]
 
     assert strengths == sorted(strengths)

@@ -74,9 +74,7 @@ def test_radial_velocity_is_the_relative_velocity_along_the_ray() -> None:
 def test_what_recedes_is_positive() -> None:
     """A car that drives away from one that stands."""
     scene = world(
-        STILL,
-        others=[car_at(30.0)],
-        tracks=[track_of("car/2", straight((30.0, 0.0), (7.0, 0.0)))],
+        STILL, others=[car_at(30.0)], tracks=[track_of("car/2", straight((30.0, 0.0), (7.0, 0.0)))]
     )
     rows = reading(ideal(), scene, 0).rows
 
@@ -176,7 +174,6 @@ def test_rain_takes_what_itu_says() -> None:
 
 
 def test_a_car_behind_a_wall_gives_no_detection() -> None:
-    """The wall does."""
     wall = thing(3, "wall", "building", SE3((20.0, 0.0, 0.0)), WALL_M)
     scene = world(STILL, others=[car_at(35.0), wall])
     for seed in range(10):
@@ -255,7 +252,6 @@ def test_nothing_is_seen_outside_the_field_of_view_or_beyond_the_range() -> None
 
 
 def test_radar_does_not_see_the_car_that_carries_it() -> None:
-    """Even from inside its box."""
     sensor = Radar(noise=0.0, offset_m=(0.0, 0.0, 0.5))
 
     assert len(reading(sensor, world(STILL), 0).rows) == 0
@@ -295,7 +291,6 @@ def test_every_make_is_complete(name: str) -> None:
     "fields", [{"noise": -1.0}, {"false_alarms": -1.0}, {"model": "ARS408"}, {"rate_hz": 0.0}]
 )
 def test_impossible_values_are_refused(fields: dict) -> None:
-    """When they are read."""
     with pytest.raises(ValidationError):
         Radar(**fields)
 

@@ -70,7 +70,6 @@ def test_mounting_leaves_a_camera_of_that_name_alone() -> None:
 
 
 def test_a_capture_renders_its_own_channels_and_those_asked_for() -> None:
-    """From the camera of its name."""
     sensor = RgbCamera(name="eye", channels=("rgb", "depth"))
     scene = RgbCamera(name="other").mount(sensor.mount(Scene("t")))
     renderer = Asked()
@@ -101,5 +100,4 @@ def test_values_that_make_no_camera_are_refused(wrong: dict[str, object]) -> Non
 
 
 def test_the_table_loads_the_camera() -> None:
-    """By its name in YAML."""
     assert TABLE.load("rgb_camera") is RgbCamera

@@ -74,7 +74,6 @@ def test_turns_are_left_then_up_then_clockwise() -> None:
 
 @pytest.mark.parametrize("sensor", [RgbCamera(rig="egg"), LidarSensor(rig="egg")])
 def test_a_sensor_on_an_unknown_rig_is_refused(sensor: Any) -> None:
-    """Naming the sensor, what there is, and what was meant."""
     with pytest.raises(ConfigError, match=r"the scene has no rig 'egg'; its rigs: ego .*'ego'"):
         driven(sensor)
 
@@ -140,9 +139,7 @@ class AtRest:
 
 
 def sampled(
-    index: int,
-    offsets_s: Mapping[str, float] = {},
-    **recipe: Any,
+    index: int, offsets_s: Mapping[str, float] = {}, **recipe: Any
 ) -> tuple[Sample, dict[str, float], dict[str, float]]:
     """What a camera and a scanner return, and the times that truth was asked for."""
     annotated: dict[str, float] = {}

@@ -13,7 +13,6 @@ from gen_data.sensors.camera.rgb_camera import RgbCamera
 
 
 def shutter(**fields: Any) -> Shutter:
-    """Of the camera that is mounted."""
     return RgbCamera.model_validate(fields).mount(Scene("t")).cameras[0].shutter
 
 
@@ -24,7 +23,6 @@ def test_a_camera_sees_an_instant_unless_told_otherwise() -> None:
 
 
 def test_an_exposure_has_a_time_and_a_number_of_samples() -> None:
-    """Eight by default."""
     assert shutter(exposure={"time_s": 0.01}) == Shutter(0.01, 0.0, 8)
     assert shutter(exposure={"time_s": 0.01, "samples": 32}) == Shutter(0.01, 0.0, 32)
 

@@ -37,7 +37,6 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> Library:
 
 @pytest.fixture(scope="module")
 def sequence(library: Library, tmp_path_factory: pytest.TempPathFactory) -> Any:
-    """The stage of three steps."""
     path = exported(table_world(library), library, tmp_path_factory.mktemp("out"), steps=STEPS)
     return Usd.Stage.Open(str(path))
 
@@ -201,7 +200,6 @@ def test_other_processes_write_the_same_bytes(kind: str, library: Library, tmp_p
 
 
 def test_a_scene_without_motion_has_no_time_codes(library: Library, tmp_path: Path) -> None:
-    """One step: nothing varies, and no range is claimed."""
     scene: Scene = table_world(library)
     stage = Usd.Stage.Open(str(exported(scene, library, tmp_path, format="usda")))
     assert not stage.HasAuthoredTimeCodeRange()

@@ -26,7 +26,6 @@ def opened_library(folder: Path, *roots: Path) -> Library:
 
 
 def new_stage(path: Path, up: str = "Y", metres: float = 0.01) -> Usd.Stage:
-    """A stage in centimetres, Y up, as most tools write it."""
     path.parent.mkdir(parents=True, exist_ok=True)
     stage = Usd.Stage.CreateNew(str(path))
     UsdGeom.SetStageUpAxis(stage, up)
@@ -297,7 +296,6 @@ def test_a_bad_stage_is_one_clear_error(
 
 
 def test_bytes_that_are_no_crate_file_are_refused(tmp_path: Path) -> None:
-    """Truncated and scrambled binary layers."""
     stage = new_stage(tmp_path / "whole.usdc")
     add_quad(stage, "/Quad")
     stage.Save()
@@ -349,7 +347,6 @@ def test_what_a_stage_refers_to_belongs_to_its_content(tmp_path: Path) -> None:
 def test_an_impossible_light_of_a_stage_is_refused(
     tmp_path: Path, attribute: str, value: object, said: str
 ) -> None:
-    """One error names the file and the light; nothing is imported."""
     (tmp_path / "props").mkdir()
     stage = new_stage(tmp_path / "props/s.usda")
     add_quad(stage, "/Quad")

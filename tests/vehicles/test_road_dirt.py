@@ -23,12 +23,10 @@ SOILED = sorted(name for name, family in FAMILIES.items() if isinstance(family.b
 
 
 def build(name: str, seed: int) -> Solid:
-    """A variant with straight wheels."""
     return FAMILIES[name].build(seed=seed, **FAMILIES[name].parameters)
 
 
 def shares(solid: Solid, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """Random places on paint [n, 3], and how far their colour is from black paint to dust."""
     mesh, rng = solid.mesh, np.random.default_rng(0)
     painted = [k for k, m in enumerate(mesh.materials) if m.role == "paint" and is_soiled(m)]
     faces = mesh.faces[np.isin(mesh.face_slots, painted)]
@@ -100,7 +98,6 @@ def test_older_vehicles_are_dirtier() -> None:
 
 @pytest.mark.slow
 def test_brake_dust_darkens_and_dulls_rims() -> None:
-    """On every car."""
     worn = FAMILIES["car"].build
     assert isinstance(worn, Worn)
     for seed in range(4):

@@ -32,17 +32,14 @@ PATTERNS: tuple[Pattern, ...] = ("rggb", "bggr", "grbg", "gbrg")
 
 
 def rng(name: str = "test") -> Rng:
-    """A stream."""
     return Streams(seed=5, scene=0).rng(name)
 
 
 def flat(*color: float, shape: tuple[int, int] = (48, 64)) -> Any:
-    """An image of one colour."""
     return np.full((*shape, 3), color, np.float32)
 
 
 def made(**values: Any) -> ImagePipeline:
-    """An image pipeline of plain values, as YAML gives them."""
     return ImagePipeline.model_validate_json(json.dumps(values))
 
 
@@ -443,7 +440,6 @@ def test_every_preset_takes_the_same_picture_twice(name: str) -> None:
 
 
 def test_given_values_win_over_a_preset() -> None:
-    """Also inside the sensor's data."""
     pipeline = made(preset="phone", image_sensor={"bits": 14}, tone="srgb")
     assert pipeline.tone == "srgb"
     assert pipeline.image_sensor is not None
@@ -460,6 +456,5 @@ def test_given_values_win_over_a_preset() -> None:
     ],
 )
 def test_impossible_cameras_are_refused(values: dict[str, Any], fact: str) -> None:
-    """Each with its reason."""
     with pytest.raises(ValidationError, match=fact):
         made(**values)

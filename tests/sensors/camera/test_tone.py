@@ -43,13 +43,7 @@ def test_filmic_is_uchimuras_curve(value: float, expected: float) -> None:
 
 @pytest.mark.parametrize(
     ("value", "expected"),
-    [
-        (0.0, 0.0),
-        (0.3, 0.3),
-        (0.5, 0.5),
-        (1.0, 1.0 - 0.5 / math.e),
-        (2.0, 1.0 - 0.5 / math.e**3),
-    ],
+    [(0.0, 0.0), (0.3, 0.3), (0.5, 0.5), (1.0, 1.0 - 0.5 / math.e), (2.0, 1.0 - 0.5 / math.e**3)],
 )
 def test_knee_is_straight_and_then_an_exponential(value: float, expected: float) -> None:
     """The identity to a half; above it half the room is left every ln(2) / 2."""
