@@ -81,8 +81,7 @@ def test_distances_between_faces_are_exact(gap_m: float, near: bool) -> None:
     """Large triangles, whose corners are all farther apart."""
     plate, tip = box((8, 8, 0.1), (0, 0, -0.05)), box((0.2, 0.2, 0.2), (1, 1, 0.1 + gap_m))
 
-    assert are_within(plate, tip, 0.3) == near
-    assert are_within(tip, plate, 0.3) == near
+    assert (are_within(plate, tip, 0.3), are_within(tip, plate, 0.3)) == (near, near)
 
 
 def test_rays_hit_what_is_before_them() -> None:

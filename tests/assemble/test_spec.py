@@ -59,8 +59,7 @@ def test_configuration_overrides_its_template_by_element_name(tmp_path: Path) ->
 
     table = {e.name: e for e in load_config(source).probes[0].elements}["table"]
 
-    assert table.height_m == 0.9
-    assert table.top_size_m == nominal["table"].top_size_m
+    assert (table.height_m, table.top_size_m) == (0.9, nominal["table"].top_size_m)
 
 
 def test_override_of_an_unknown_element_is_refused(tmp_path: Path) -> None:

@@ -170,8 +170,7 @@ def test_several_processes_may_share_a_cache(tmp_path: Path) -> None:
     ]
     answers = {process.communicate(timeout=120)[0] for process in running}
     assert {process.returncode for process in running} == {0}
-    assert len(answers) == 1
-    assert len(entries(tmp_path)) == 1
+    assert (len(answers), len(entries(tmp_path))) == (1, 1)
 
 
 def test_memory_is_bounded_and_forgets_the_oldest(tmp_path: Path) -> None:

@@ -218,8 +218,7 @@ def test_mtl_says_opacity_light_coat_and_holes(folder: Path) -> None:
 
     material, texture = loaded(folder)
 
-    assert material.opacity == 0.6
-    assert material.emission_cd_m2 == (10.0, 20.0, 30.0)
+    assert (material.opacity, material.emission_cd_m2) == (0.6, (10.0, 20.0, 30.0))
     assert (material.coat, material.coat_roughness, material.ior) == (0.7, 0.1, 1.4)
     assert texture is not None
     np.testing.assert_array_equal(texture.alpha >= 128, hole >= 128)

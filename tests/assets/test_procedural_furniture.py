@@ -54,8 +54,7 @@ def test_a_light_panel_shines_down_with_all_of_its_lower_side(shape: str) -> Non
     assert (normals[:, 2] < 0.0).all()
     expected = 0.4 if shape == "rectangle" else np.pi * 0.16
     assert -normals[:, 2].sum() == pytest.approx(expected, rel=0.002)
-    assert mesh.materials[1].role == "lamp"
-    assert mesh.materials[1].emission_cd_m2 == (0.0, 0.0, 0.0)
+    assert (mesh.materials[1].role, mesh.materials[1].emission_cd_m2) == ("lamp", (0.0, 0.0, 0.0))
     assert mesh.bounds_m()[1][2] == pytest.approx(0.04)
 
 

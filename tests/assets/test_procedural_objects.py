@@ -94,8 +94,7 @@ def test_arrays_are_finite_typed_and_within_the_budget(built: tuple[str, Solid])
         (mesh.faces, (m, 3), np.int32),
         (mesh.face_slots, (m,), np.int32),
     ):
-        assert array.shape == shape
-        assert array.dtype == dtype
+        assert (array.shape, array.dtype) == (shape, dtype)
         assert np.isfinite(array).all()
     assert 60 <= m <= 12_000
     assert set(np.unique(mesh.face_slots)) <= set(range(len(mesh.materials)))

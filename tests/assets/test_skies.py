@@ -264,8 +264,7 @@ def test_same_arguments_make_the_same_bytes() -> None:
 
     assert first.tobytes() == again.tobytes()
     assert first.tobytes() != other.tobytes()
-    assert first.shape == (512, 1024, 3)
-    assert first.dtype == np.float32
+    assert (first.shape, first.dtype) == ((512, 1024, 3), np.float32)
 
 
 def test_library_refuses_a_sky_that_cannot_be(tmp_path) -> None:  # noqa: ANN001

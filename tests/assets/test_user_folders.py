@@ -141,8 +141,7 @@ def test_a_users_robot_is_as_good_as_ours(folder: Path, tmp_path: Path) -> None:
     )
     library = open_library([folder], cache_dir=tmp_path / "cache")
     robot = library.robot("user/arm")
-    assert robot.links == ("base", "upper", "tip")
-    assert robot.home == (1.0,)
+    assert (robot.links, robot.home) == (("base", "upper", "tip"), (1.0,))
     assert robot.movable[0].axis == (0.0, 1.0, 0.0)
     assert ("upper", "tip") in robot.no_collide
     assert ("base", "tip") in robot.no_collide

@@ -195,8 +195,7 @@ def test_a_chain_of_selections_costs_in_proportion_to_its_length() -> None:
             drawn = draw_shared(section, Streams(0, 0))
         finally:
             sys.setprofile(None)
-        assert len(drawn) == length
-        assert len(set(drawn.values())) == 1
+        assert (len(drawn), len(set(drawn.values()))) == (length, 1)
         return counted
 
     # Quadratic cost would be a factor of 4; collections of garbage add some calls.

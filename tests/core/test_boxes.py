@@ -44,10 +44,8 @@ def test_the_tight_box_holds_every_pixel_and_no_empty_border(
     if box is None:
         assert not pixels
         return
-    assert box.x_min == min(x for x, _ in pixels)
-    assert box.x_max == max(x for x, _ in pixels) + 1
-    assert box.y_min == min(y for _, y in pixels)
-    assert box.y_max == max(y for _, y in pixels) + 1
+    assert (box.x_min, box.x_max) == (min(x for x, _ in pixels), max(x for x, _ in pixels) + 1)
+    assert (box.y_min, box.y_max) == (min(y for _, y in pixels), max(y for _, y in pixels) + 1)
 
 
 edges = st.integers(-20, 40)

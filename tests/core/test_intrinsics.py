@@ -78,5 +78,4 @@ def test_the_field_of_view_spans_the_image_edges(width: int, height: int, hfov_d
 
     assert math.degrees(angle) == pytest.approx(hfov_deg, rel=1e-6)
     assert (camera.cx_px, camera.cy_px) == (width / 2, height / 2)
-    assert camera.fx_px == camera.fy_px
-    assert camera.fx_px == round(camera.fx_px, 6)
+    assert (camera.fx_px, camera.fx_px) == (camera.fy_px, round(camera.fx_px, 6))

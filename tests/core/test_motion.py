@@ -239,6 +239,5 @@ def test_what_moves_is_known_to_its_instance() -> None:
 def test_joint_positions_are_linear_between_knots_and_constant_outside() -> None:
     """Half a radian in half a second, from the first second on."""
     track = JointTrajectory(0.5, ((0.0, 1.0), (0.5, 1.0)), start_s=1.0)
-    assert track.positions(0.0) == (0.0, 1.0)
-    assert track.positions(1.25) == (0.25, 1.0)
+    assert (track.positions(0.0), track.positions(1.25)) == ((0.0, 1.0), (0.25, 1.0))
     assert track.positions(9.0) == (0.5, 1.0)

@@ -55,8 +55,7 @@ def test_other_light_changes_colours_and_nothing_else(dataset: Path, dark_datase
         a, b = one.cameras["color"], other.cameras["color"]
         assert np.array_equal(a.instance_ids, b.instance_ids)
         assert np.array_equal(a.depth_m, b.depth_m)
-        assert a.boxes2d == b.boxes2d
-        assert a.boxes3d == b.boxes3d
+        assert (a.boxes2d, a.boxes3d) == (b.boxes2d, b.boxes3d)
         assert not np.array_equal(a.rgb, b.rgb)
 
 

@@ -246,8 +246,7 @@ def test_every_frame_has_every_file(dataset: Path) -> None:
         assert found == [f"{frame}.{ending}" for frame in frames]
     assert (dataset / "training/label_2/000003.txt").read_bytes() == b""
     lists = {p.stem: p.read_text().split() for p in (dataset / "ImageSets").iterdir()}
-    assert lists["val"] == ["000002", "000004"]
-    assert lists["test"] == []
+    assert (lists["val"], lists["test"]) == (["000002", "000004"], [])
     assert sorted(lists["train"] + lists["val"]) == frames
 
 

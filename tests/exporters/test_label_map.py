@@ -138,8 +138,7 @@ def test_public_lists_have_the_published_classes() -> None:
         "bottle", "wine glass", "cup", "fork", "knife", "spoon", "bowl", "banana",
     ]  # fmt: skip
     assert list(public_classes("cityscapes")) == CITYSCAPES_THINGS
-    assert len(public_classes("nuscenes")) == 10
-    assert len(public_classes("kitti")) == 8
+    assert (len(public_classes("nuscenes")), len(public_classes("kitti"))) == (10, 8)
     nyu, ade = list(public_classes("nyu40")), list(public_classes("ade20k"))
     assert (len(nyu), nyu[0], nyu[21], nyu[-1]) == (40, "wall", "ceiling", "otherprop")
     assert (len(ade), ade[0], ade[5], ade[-1]) == (150, "wall", "ceiling", "flag")

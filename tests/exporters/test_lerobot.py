@@ -262,8 +262,7 @@ def test_images_of_statistics_are_thinned_as_lerobot_does(tmp_path: Path) -> Non
     n = 160 * 120
     assert sums["count"] == n
     assert sums["min"] == sums["max"] == [10, 20, 30]
-    assert sums["sum"] == [10 * n, 20 * n, 30 * n]
-    assert sums["squares"] == [100 * n, 400 * n, 900 * n]
+    assert (sums["sum"], sums["squares"]) == ([10 * n, 20 * n, 30 * n], [100 * n, 400 * n, 900 * n])
 
 
 def test_tasks_are_sentences(reach: Any) -> None:

@@ -295,8 +295,7 @@ def test_visibility_adds_up_over_the_cameras(samples: Any) -> None:
     half = [replace(view, visible_px=100, occlusion=0.0, truncation=0.5) for view in views[:2]]
 
     assert len(views) == 2
-    assert visibility_level(half) == "4"
-    assert visibility_level(half[:1]) == "2"
+    assert (visibility_level(half), visibility_level(half[:1])) == ("4", "2")
     assert visibility_level([replace(view, occlusion=0.5) for view in half]) == "2"
     assert visibility_level([replace(view, occlusion=0.3) for view in half]) == "3"
     assert visibility_level([]) == "1"
@@ -379,8 +378,7 @@ def test_attributes_tell_how_objects_stand(world: Any) -> None:
     assert attribute(fast, "a", "parked") == "vehicle.moving"
     assert attribute(car, "a", "parked") == "vehicle.parked"
     assert attribute(car, "a", "traffic") == "vehicle.stopped"
-    assert attribute(car, "waiting") == "vehicle.stopped"
-    assert attribute(car, "a") == "vehicle.parked"
+    assert (attribute(car, "waiting"), attribute(car, "a")) == ("vehicle.stopped", "vehicle.parked")
     assert attribute(person, "a", pose="sitting") == "pedestrian.sitting_lying_down"
     assert attribute(person, "a", pose="walk") == "pedestrian.moving"
     assert attribute(person, "waiting", pose="walk") == "pedestrian.standing"

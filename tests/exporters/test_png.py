@@ -174,5 +174,4 @@ def test_regions_are_those_of_their_masks(size: tuple[int, int]) -> None:
     assert sorted(regions) == np.unique(labels).tolist()
     for label, region in regions.items():
         mask = labels == label
-        assert region.area_px == np.count_nonzero(mask)
-        assert region.box == tight_box(mask)
+        assert (region.area_px, region.box) == (np.count_nonzero(mask), tight_box(mask))

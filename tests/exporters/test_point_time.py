@@ -71,8 +71,7 @@ def test_static_points_of_a_ply_file_lie_in_their_boxes(
 
     assert len(mine) > 50
     assert share_inside(where, T_world_box, box["size_m"]) >= 0.99
-    assert row["point_time"] == "sweep_middle"
-    assert row["sweep_s"] == SWEEP_S
+    assert (row["point_time"], row["sweep_s"]) == ("sweep_middle", SWEEP_S)
 
 
 def test_static_points_of_an_mcap_file_lie_in_their_cubes(

@@ -160,8 +160,7 @@ def test_files_do_not_depend_on_clock_or_hashing(tmp_path: Path) -> None:
         store.write_rrd(str(path), application_id="test", recording_id="name")
         theirs.add(path.read_bytes())
 
-    assert len(ours) == 1
-    assert len(theirs) == 4
+    assert (len(ours), len(theirs)) == (1, 4)
 
 
 _SCRIPT = """

@@ -51,8 +51,7 @@ def test_the_hue_is_the_direction(direction: tuple[float, float], hue_deg: float
 
 
 def test_the_saturation_is_the_length() -> None:
-    assert color_of_flow(5.0, 0.0) == (255, 127, 127)
-    assert color_of_flow(20.0, 0.0) == (191, 0, 0)
+    assert (color_of_flow(5.0, 0.0), color_of_flow(20.0, 0.0)) == ((255, 127, 127), (191, 0, 0))
 
 
 @pytest.mark.parametrize(
@@ -66,8 +65,7 @@ def test_every_channel_of_flow_can_be_looked_at(channel: Channel, depth: int) ->
 
     image = channel_image(SensorReading("c", camera, {channel: data}), channel)
 
-    assert image.shape == (4, 6, 3)
-    assert image.dtype == np.uint8
+    assert (image.shape, image.dtype) == ((4, 6, 3), np.uint8)
     assert image.max() == 255
 
 

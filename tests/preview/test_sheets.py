@@ -83,8 +83,7 @@ def test_the_last_event_of_a_pixel_decides_its_colour() -> None:
     view = event_view(event_table(), Scene("t"), 1.0)
 
     assert view.shape == (8, 10, 3)
-    assert tuple(view[7, 9]) == DARKER
-    assert tuple(view[2, 3]) == BRIGHTER
+    assert (tuple(view[7, 9]), tuple(view[2, 3])) == (DARKER, BRIGHTER)
     assert (view[0] == GREY).all()
 
 

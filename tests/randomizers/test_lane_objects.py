@@ -166,12 +166,8 @@ def test_hidden_shares_are_those_of_boxes_seen_in_perspective() -> None:
         board = Body("board", "ball", SE3((ahead_m, y_m, 1.0)), scale=100.0, instance_id=1)
         return hidden_share(camera, Scene("test", bodies=(board,)), FakeAssets(), near_m)
 
-    assert share(10.0) == 0.5
-    assert share(-10.0) == 0.5
-    assert share(0.0) == 1.0
-    assert share(0.0, near_m=1.9) == 0.0
-    assert share(0.0, ahead_m=-12.0) == 0.0
-    assert share(0.0, ahead_m=0.0) == 1.0
+    assert (share(10.0), share(-10.0), share(0.0), share(0.0, near_m=1.9)) == (0.5, 0.5, 1.0, 0.0)
+    assert (share(0.0, ahead_m=-12.0), share(0.0, ahead_m=0.0)) == (0.0, 1.0)
 
 
 def test_a_camera_on_a_pole_does_not_look_out_of_a_tree() -> None:

@@ -254,8 +254,7 @@ def test_broken_ceiling_panels_are_dark_and_there() -> None:
     unseen = ceiling(rows=1, columns=2, visible=False)
 
     assert dark.lights == ()
-    assert len(dark.bodies) == 2
-    assert len(unseen.lights) == 2
+    assert (len(dark.bodies), len(unseen.lights)) == (2, 2)
     assert unseen.bodies == ()
 
 

@@ -183,8 +183,7 @@ def test_broken_lamps_and_dark_windows_stay_dark() -> None:
     """Probability 1 of being broken, 0 of being lit."""
     night = drawn("street_lights", street(), broken=True, windows=False)
 
-    assert night.lights == ()
-    assert night.bodies == street().bodies
+    assert (night.lights, night.bodies) == ((), street().bodies)
 
 
 def test_spot_sends_out_its_flux() -> None:

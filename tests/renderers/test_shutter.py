@@ -172,8 +172,7 @@ def test_an_edge_that_passes_leans_by_its_speed_times_the_time_between_rows(
         assert mask[0] == pytest.approx(expected, abs=0.5 + 0.13)
         assert mask[-1] + 1 == pytest.approx(expected + 32.0, abs=0.5 + 0.13)
         lit = np.flatnonzero(bright[row])
-        assert lit[0] == pytest.approx(mask[0], abs=1)
-        assert lit[-1] == pytest.approx(mask[-1], abs=1)
+        assert (lit[0], lit[-1]) == (pytest.approx(mask[0], abs=1), pytest.approx(mask[-1], abs=1))
 
 
 def test_depth_of_what_approaches_is_that_of_each_row(renderer: WarpRenderer) -> None:

@@ -130,8 +130,7 @@ def test_the_nearer_of_two_boxes_hides_the_other(renderer: WarpRenderer) -> None
     assert row[26:32].tolist() == [65535] * 6
     assert row[:25].tolist() == [0] * 25
     assert channels[Channel.INSTANCE].dtype == np.uint16
-    assert channels[Channel.PART][24, 40] == 2
-    assert channels[Channel.PART][24, 30] == 0
+    assert (channels[Channel.PART][24, 40], channels[Channel.PART][24, 30]) == (2, 0)
     assert channels[Channel.CATEGORY][24, [20, 30, 40]].tolist() == [0, 4, 3]
 
 

@@ -270,8 +270,7 @@ def test_points_on_cars_are_counted_by_distance(tmp_path: Path) -> None:
 
     assert (scan.points, scan.dark) == (6, 3)
     assert scan.cars == ((5.0, 3), (20.0, 0))
-    assert whole.rows[0][1:4] == ("6", "120000", "104450")
-    assert whole.rows[0][-1] == "50.00 %"
+    assert (whole.rows[0][1:4], whole.rows[0][-1]) == (("6", "120000", "104450"), "50.00 %")
     assert [row[1] for row in cars.rows] == ["1", "0", "1", "0", "0", "0", "0", "0"]
     assert cars.rows[0][2] == "3.0" and cars.rows[2][4] == "100.0 %"
 

@@ -150,8 +150,7 @@ def test_kerbed_median_has_a_lane_for_plants(library: Library) -> None:
     median = {"median_m": 3.0, "median_kerb_m": 0.12}
     lane = by_name(built(library, {**ROAD, **median}))["main/verge_median"]
 
-    assert lane.kind == "verge"
-    assert lane.width_m == pytest.approx(2.7)
+    assert (lane.kind, lane.width_m) == ("verge", pytest.approx(2.7))
     assert lane.center_m[0] == pytest.approx((0.0, 0.0, 0.02 * 3.5 + 0.12))
     assert "main/verge_median" not in by_name(built(library, {**ROAD, "median_m": 3.0}))
 

@@ -96,7 +96,8 @@ def test_pieces_follow_one_another() -> None:
     """A line, then an arc from where and as the line ends."""
     line = reference_line.ReferenceLine(
         (reference_line.Placed(0.0, 1.0, 2.0, 0.5, reference_line.Line(10.0)),
-         reference_line.Placed(10.0, 1.0 + 10 * math.cos(0.5), 2.0 + 10 * math.sin(0.5), 0.5, reference_line.Arc(20.0, 0.05)))
+         reference_line.Placed(10.0, 1.0 + 10 * math.cos(0.5), 2.0 + 10 * math.sin(0.5), 0.5,
+                               reference_line.Arc(20.0, 0.05)))
     )  # fmt: skip
     before, after = line.poses(np.array([10.0 - 1e-7, 10.0 + 1e-7]))
 

@@ -260,8 +260,7 @@ def test_kerbed_median_stands_above_the_lanes() -> None:
     heights = height_m(shape, np.array([0.0, 1.3, 1.5, 5.0]))
 
     assert heights[0] == heights[1] == pytest.approx(heights[2] + 0.12)
-    assert heights[2] == pytest.approx(0.02 * 3.5)
-    assert heights[3] == pytest.approx(0.0)
+    assert (heights[2], heights[3]) == (pytest.approx(0.02 * 3.5), pytest.approx(0.0))
 
 
 def test_roundabout_has_the_area_of_its_plan() -> None:

@@ -33,8 +33,7 @@ def test_what_faces_outdoors_has_its_light_and_what_faces_the_room_has_none_of_i
     light = dict(enumerate(np.array(niche.light_cd_m2).reshape(6, 3)[:, 1].tolist()))
     aside = [v for k, v in light.items() if abs(AXES[k] @ AXES[side]) < 0.5]
 
-    assert light[side] == OUTSIDE_CD_M2
-    assert light[side ^ 1] == ROOM_CD_M2
+    assert (light[side], light[side ^ 1]) == (OUTSIDE_CD_M2, ROOM_CD_M2)
     assert all(2.0 * ROOM_CD_M2 < v < 0.5 * OUTSIDE_CD_M2 for v in aside)
 
 

@@ -111,8 +111,7 @@ def test_without_a_publication_only_licences_of_assets_are_stated() -> None:
     assert "The publisher has stated no licence of its own." in data_card(bare)
     assert "## Publication" not in data_card(bare)
     metadata = json.loads(croissant_json(bare))
-    assert metadata["license"] == ["CC0-1.0", "MIT"]
-    assert metadata["name"] == "fake"
+    assert (metadata["license"], metadata["name"]) == (["CC0-1.0", "MIT"], "fake")
 
 
 def test_texts_without_a_table_have_no_licences() -> None:

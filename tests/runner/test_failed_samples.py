@@ -144,8 +144,7 @@ def test_a_sample_that_hangs_is_killed_after_its_limit_and_skipped(tmp_path: Pat
     settings = replace(SKIP, limits=Limits(sample_s=1.5))
     summary = make(tmp_path, trouble=Trouble(hangs_at=5), settings=settings, workers=1)
 
-    assert summary.failed == (FailedSample(5, "process", "hang"),)
-    assert summary.worker_deaths == 1
+    assert (summary.failed, summary.worker_deaths) == ((FailedSample(5, "process", "hang"),), 1)
     assert summary.samples == 9
 
 
@@ -166,8 +165,7 @@ def test_a_sample_that_crashes_its_worker_every_time_is_skipped(tmp_path: Path) 
     """After as many tries as without the option, because a worker may die for other reasons."""
     summary = make(tmp_path, trouble=Trouble(killed_at=5), settings=SKIP, workers=1)
 
-    assert summary.failed[0].index == 5
-    assert summary.failed[0].stage == "process"
+    assert (summary.failed[0].index, summary.failed[0].stage) == (5, "process")
     assert summary.worker_deaths == 3
 
 
@@ -228,8 +226,7 @@ def test_a_finished_data_set_is_not_made_again_for_its_failed_samples(tmp_path: 
     again = make(tmp_path, settings=SKIP)
 
     assert again.already_complete
-    assert again.failed == (BUG,)
-    assert again.samples == 9
+    assert (again.failed, again.samples) == ((BUG,), 9)
 
 
 def test_repair_tries_failed_samples_again(tmp_path: Path) -> None:

@@ -155,8 +155,7 @@ def test_damage_at_a_url_is_found_and_made_again(tmp_path: Path, memory: str) ->
 
     copy_outline(ObjectFolder(memory), tmp_path / "outline")
     [finding] = find_deviations(tmp_path / "outline")
-    assert finding.path == "shards/000001/color/rgb/000000005.png"
-    assert finding.samples == "sample 5"
+    assert (finding.path, finding.samples) == ("shards/000001/color/rgb/000000005.png", "sample 5")
 
     assert not make_at(memory).already_complete
     assert tree_digest(download(memory, tmp_path / "copy")) == tree_digest(tmp_path / "here")

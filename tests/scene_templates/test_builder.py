@@ -248,8 +248,7 @@ def test_a_panel_need_not_be_seen(kind: str) -> None:
     scene = built(DESK, lamp)
 
     assert [body.name for body in scene.bodies] == [body.name for body in built(DESK).bodies]
-    assert scene.lights[0].direction == (0.0, 0.6, -0.8)
-    assert scene.lights[0].body == ""
+    assert (scene.lights[0].direction, scene.lights[0].body) == ((0.0, 0.6, -0.8), "")
 
 
 @pytest.mark.parametrize(

@@ -217,8 +217,7 @@ def test_textures_are_repeatable_images(name: str) -> None:
     family = TEXTURES[name]
     first, second = (family.build(seed=0, **family.parameters) for _ in range(2))
 
-    assert first.albedo.dtype == np.uint8
-    assert first.albedo.ndim == 3
+    assert (first.albedo.dtype, first.albedo.ndim) == (np.uint8, 3)
     assert (first.albedo == second.albedo).all()
     assert first.albedo.std() > 3.0
     if first.normal is not None:

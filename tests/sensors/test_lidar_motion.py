@@ -76,8 +76,7 @@ def test_the_scene_s_instant_is_the_middle_of_the_sweep() -> None:
         scene_of([Body("hall", "hall", SE3((0, 0, -5.0)))], moving("cart", (0, 0, -3))), "raw"
     )
 
-    assert cloud.time_s == 0.2
-    assert cloud.start_s == pytest.approx(0.15)
+    assert (cloud.time_s, cloud.start_s) == (0.2, pytest.approx(0.15))
     x, y, _ = cloud.points["position_m"].T
     ahead = np.abs(np.arctan2(y, x)) < 0.01
     np.testing.assert_allclose(times_s(cloud)[ahead], 0.2, atol=2e-4)

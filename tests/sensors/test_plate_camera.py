@@ -34,8 +34,7 @@ def test_it_looks_as_the_photograph() -> None:
     assert camera.T_world_camera == PLATE.T_world_camera
     assert camera.intrinsics == fitted_intrinsics(PLATE.intrinsics, 320, 200)
     assert camera.ev100 == EV100
-    assert made().image_pipeline.preset == "photograph"
-    assert made().image_pipeline.tone == "srgb"
+    assert (made().image_pipeline.preset, made().image_pipeline.tone) == ("photograph", "srgb")
 
 
 def test_mounting_twice_changes_nothing() -> None:

@@ -80,8 +80,7 @@ def test_a_sensor_on_an_unknown_rig_is_refused(sensor: Any) -> None:
 
 def test_a_rate_that_does_not_fit_the_step_is_refused() -> None:
     """12 Hz in steps of 0.1 s; and one faster than the steps; with a rate that fits."""
-    assert stride("cam", 5.0, 0.1) == 2
-    assert stride("cam", None, 0.1) == 1
+    assert (stride("cam", 5.0, 0.1), stride("cam", None, 0.1)) == (2, 1)
     with pytest.raises(ConfigError, match=r"'cam': rate_hz 12 does not fit .* such as 10 Hz"):
         stride("cam", 12.0, 0.1)
     with pytest.raises(ConfigError, match=r"rate_hz 4 does not fit .* such as 5 Hz"):

@@ -387,7 +387,6 @@ def test_a_scaled_stage_keeps_its_light(tmp_path: Path) -> None:
     index = "assets:\n  - {id: s, file: s.usda, category: room, scale: 0.02}\n"
     (tmp_path / "props/assets.yaml").write_text(index)
     (light,) = opened_library(tmp_path, tmp_path / "props").stage("user/s").lights
-    assert light.kind == "sphere"
-    assert light.position_m == pytest.approx((0.0, 0.0, 0.06))
+    assert (light.kind, light.position_m) == ("sphere", pytest.approx((0.0, 0.0, 0.06)))
     # 1000 nits of a disc of 0.1 m, at 1 / 50 of the distance.
     assert light.intensity_cd == pytest.approx(1000.0 * np.pi * 0.01 / 2500.0)
