@@ -25,6 +25,15 @@ def test_a_value_larger_than_the_bound_displaces_all_others() -> None:
     assert len(cache) == 1
 
 
+def test_the_value_used_longest_ago_goes_first() -> None:
+    """Two of 4 bytes fit into 10."""
+    cache: ByteCache[np.ndarray] = ByteCache(10)
+    made: list[str] = []
+    for name in "abacab":
+        cache.get(name, lambda name=name: made.append(name) or np.zeros(4, np.uint8))
+    assert made == ["a", "b", "c", "b"]
+
+
 def test_small_values_are_bounded_by_number_too() -> None:
     """Four of them, although thousands would fit."""
     cache: ByteCache[np.ndarray] = ByteCache(1_000_000, limit=4)

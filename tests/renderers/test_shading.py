@@ -48,15 +48,16 @@ def from_above(size_px: tuple[int, int] = (48, 36)) -> Camera:
     return camera_at((0.0, 0.0, 3.0), (0.0, 0.0, 0.0), size_px, hfov_deg=20.0)
 
 
-def test_a_matte_plane_under_a_sun_has_luminance_e_rho_over_pi() -> None:
-    """Lambert: 2000 lx at 60 degrees on an albedo of 0.5 is 1000 * 0.5 / pi = 159 cd/m^2."""
-    s, c = math.sin(math.radians(60.0)), math.cos(math.radians(60.0))
+@pytest.mark.parametrize("angle_deg", [60.0, 82.0])
+def test_a_matte_plane_under_a_sun_has_luminance_e_rho_over_pi(angle_deg: float) -> None:
+    """Lambert: 2000 lx at 60 degrees on an albedo of 0.5 is 159 cd/m^2; no acne at grazing light."""
+    s, c = math.sin(math.radians(angle_deg)), math.cos(math.radians(angle_deg))
     sun = Light("sun", "sun", direction=(s, 0.0, -c), illuminance_lux=2000.0)
     scene = Scene("t", (Body("p", "plane"),), lights=(sun,), environment=DARK)
 
     luminance = luminance_of(scene, from_above(), ground())
 
-    np.testing.assert_allclose(luminance, 1000.0 * 0.5 / math.pi, rtol=0.012)
+    np.testing.assert_allclose(luminance, 2000.0 * c * 0.5 / math.pi, rtol=0.012)
 
 
 def test_a_lamp_falls_off_with_the_square_of_its_distance() -> None:
