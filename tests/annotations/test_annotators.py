@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import pickle
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
@@ -84,9 +83,6 @@ def scene_and_reading() -> tuple[Scene, SensorReading]:
         },
     )
     return Scene("hand", instances=(MUG, CARPET, ARM)), reading
-
-
-OF_OBJECTS = [name for name in TABLE.names() if isinstance(TABLE.load(name)(), Annotator)]
 
 
 def annotators(*names: str) -> list[Annotator]:
@@ -218,55 +214,6 @@ def test_boxes_of_space_leave_out_what_is_beside_the_body() -> None:
         assert between == pytest.approx(moved)
     assert seen.box3d_camera.size_m == seen.box3d_world.size_m
     assert frame[5] == MUG.box3d
-
-
-@pytest.mark.parametrize("name", OF_OBJECTS)
-def test_every_annotator_fills_only_its_own_fields(name: str) -> None:
-    """And leaves the truth it is given as it is."""
-    fields = {
-        "amodal_masks": {"amodal_mask"},
-        "boxes2d": {"amodal_box"},
-        "boxes3d": {"box3d_world", "box3d_camera"},
-        "instance_masks": {"mask"},
-        "keypoints": {"keypoints"},
-        "motion": {"motion"},
-        "oriented_boxes2d": {"oriented_box"},
-        "part_masks": {"part_px"},
-        "poses": {"T_camera_object"},
-        "semantic_masks": set(),
-        "visibility": {"visible_fraction", "occlusion", "truncation"},
-    }
-    scene, reading = scene_and_reading()
-    (annotator,) = annotators(name)
-
-    (arm, _) = annotate_objects(scene, reading, [annotator], Thresholds()).objects
-
-    optional = set().union(*fields.values())
-    assert {f for f in optional if getattr(arm, f) is not None} == fields[name]
-
-
-@pytest.mark.parametrize("name", OF_OBJECTS)
-def test_every_annotator_is_a_picklable_value_that_names_its_channels(name: str) -> None:
-    """The id image is always among them: no truth without it."""
-    (annotator,) = annotators(name)
-
-    assert isinstance(annotator, Annotator)
-    assert Channel.INSTANCE in annotator.channels
-    assert pickle.loads(pickle.dumps(annotator)) == annotator
-
-
-@pytest.mark.parametrize("name", OF_OBJECTS)
-def test_every_annotator_needs_only_the_channels_it_names(name: str) -> None:
-    """Others need not have been rendered."""
-    scene, reading = scene_and_reading()
-    (annotator,) = annotators(name)
-    lean = replace(
-        reading,
-        channels={c: a for c, a in reading.channels.items() if c in annotator.channels},
-        silhouettes=reading.silhouettes if Channel.AMODAL in annotator.channels else {},
-    )
-
-    assert len(annotate_objects(scene, lean, [annotator], Thresholds()).objects) == 2
 
 
 @pytest.mark.parametrize(

@@ -274,12 +274,6 @@ def test_backdrop_is_background() -> None:
     assert scene.body("ground").instance_id == 0
 
 
-def test_same_elements_build_the_same_scene() -> None:
-    lines = (ROOM, DESK, ARM, clutter(count=7))
-
-    assert built(*lines) == built(*lines)
-
-
 @pytest.mark.parametrize(
     ("chosen", "assets"),
     [

@@ -120,16 +120,6 @@ def test_walk_grows_with_the_root_of_time() -> None:
     assert abs(ends.std() / math.hypot(math.sqrt(2) * white, 10.0 * walk) - 1.0) < 0.1
 
 
-def test_a_step_made_alone_has_the_same_bytes() -> None:
-    """Whatever was made before it, in this process or another."""
-    sensor, scene = Imu(), world(circle(20.0, 8.0))
-    alone = reading(sensor, scene, 7).rows.tobytes()
-    for k in range(7):
-        reading(sensor, scene, k)
-
-    assert reading(sensor, scene, 7).rows.tobytes() == alone
-
-
 def test_white_noise_has_the_density_of_the_data_sheet() -> None:
     """0.2 degrees per root hour at 100 Hz: 5.8e-4 rad/s; 0.005 m/s per root hour: 8.3e-4 m/s^2."""
     still = world(straight((0.0, 0.0), (0.0, 0.0)))

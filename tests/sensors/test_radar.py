@@ -269,15 +269,6 @@ def test_strongest_are_kept_and_the_nearest_comes_first() -> None:
     assert (np.diff(rows["range_m"]) >= 0.0).all()
 
 
-def test_a_reading_made_again_has_the_same_bytes() -> None:
-    """And another stream makes another one."""
-    scene = world(others=[car_at(30.0)])
-    rows = reading(Radar(**AHEAD), scene, 3).rows  # type: ignore[arg-type]
-
-    assert reading(Radar(**AHEAD), scene, 3).rows.tobytes() == rows.tobytes()  # type: ignore[arg-type]
-    assert reading(Radar(**AHEAD), scene, 3, 1).rows.tobytes() != rows.tobytes()  # type: ignore[arg-type]
-
-
 @pytest.mark.parametrize("name", preset_names(PRESETS))
 def test_every_make_is_complete(name: str) -> None:
     """Its looks cover what they say, and reach where they report."""

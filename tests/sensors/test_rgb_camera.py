@@ -11,7 +11,6 @@ from pydantic import ValidationError
 from gen_data.core.capture import Channel, SensorReading
 from gen_data.core.scene import Camera, Region, Scene
 from gen_data.core.streams import Rng, Streams
-from gen_data.sensors import TABLE
 from gen_data.sensors.camera.rgb_camera import RgbCamera
 
 FOCUS = Region((0.5, -0.2, 0.75), (1.2, 0.8, 0.4))
@@ -97,7 +96,3 @@ def test_values_that_make_no_camera_are_refused(wrong: dict[str, object]) -> Non
     """Unknown channels, sizes and angles out of range, unknown fields."""
     with pytest.raises(ValidationError, match=next(iter(wrong))):
         RgbCamera.model_validate(wrong)
-
-
-def test_the_table_loads_the_camera() -> None:
-    assert TABLE.load("rgb_camera") is RgbCamera

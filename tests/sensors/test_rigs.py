@@ -72,12 +72,6 @@ def test_turns_are_left_then_up_then_clockwise() -> None:
     np.testing.assert_allclose(sensor.T_rig_sensor.rotation(), expected, atol=1e-7)
 
 
-@pytest.mark.parametrize("sensor", [RgbCamera(rig="egg"), LidarSensor(rig="egg")])
-def test_a_sensor_on_an_unknown_rig_is_refused(sensor: Any) -> None:
-    with pytest.raises(ConfigError, match=r"the scene has no rig 'egg'; its rigs: ego .*'ego'"):
-        driven(sensor)
-
-
 def test_a_rate_that_does_not_fit_the_step_is_refused() -> None:
     """12 Hz in steps of 0.1 s; and one faster than the steps; with a rate that fits."""
     assert (stride("cam", 5.0, 0.1), stride("cam", None, 0.1)) == (2, 1)
