@@ -95,7 +95,7 @@ def truths() -> tuple[ObjectTruth, ...]:
     return annotate_objects(*scene_and_reading(), annotators(), Thresholds()).objects
 
 
-def test_instances_come_in_order_of_id_and_the_unannotated_not_at_all(
+def test_instances_come_by_id_and_the_unannotated_not_at_all(
     truths: tuple[ObjectTruth, ...],
 ) -> None:
     """The scene lists the mug first; the carpet is seen and has no annotation."""
@@ -110,7 +110,7 @@ def test_visible_box_and_count_are_of_the_visible_pixels(truths: tuple[ObjectTru
     assert (mug.visible_px, mug.box) == (24, BoxPx(4, 4, 8, 10))
 
 
-def test_amodal_box_is_of_the_silhouette_and_may_leave_the_image(
+def test_amodal_box_is_of_the_silhouette_beyond_the_image(
     truths: tuple[ObjectTruth, ...],
 ) -> None:
     """Hidden columns count, and so do those left of the image."""
@@ -229,7 +229,7 @@ def test_boxes_of_space_leave_out_what_is_beside_the_body() -> None:
         (Thresholds(min_visible_px=999, include_invisible=True), ["arm", "mug"]),
     ],
 )
-def test_thresholds_are_the_smallest_values_that_are_listed(
+def test_thresholds_are_the_smallest_listed_values(
     thresholds: Thresholds, listed: list[str]
 ) -> None:
     """Arm: 36 px, 0.45 visible, 6 x 8 px. Mug: 24 px, whole, 4 x 6 px."""
@@ -382,9 +382,7 @@ class _Liar:
         ({"keypoints": (keypoint((2.0, math.nan), 1),)}, "'tip' is nowhere"),
     ],
 )
-def test_labels_are_checked_against_the_image_whoever_made_them(
-    changes: dict[str, Any], fault: str
-) -> None:
+def test_labels_are_checked_against_the_image_always(changes: dict[str, Any], fault: str) -> None:
     """Third-party annotators are held to the same contract."""
     with pytest.raises(SampleError, match=f"instance 2 'arm': .*{fault}"):
         annotate_objects(*scene_and_reading(), [*annotators(), _Liar(**changes)], Thresholds())

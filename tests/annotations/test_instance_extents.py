@@ -12,7 +12,7 @@ from gen_data.core.boxes import BoxPx, tight_box
 
 @settings(max_examples=200, deadline=None)
 @given(st.integers(1, 8), st.integers(1, 8), st.integers(0, 4), st.integers(0, 2**32 - 1))
-def test_extents_are_count_and_tight_box_of_every_id(
+def test_extents_are_count_and_box_of_every_id(
     height: int, width: int, largest: int, seed: int
 ) -> None:
     """Small images, so that runs often end and begin at row ends; ids may be missing."""

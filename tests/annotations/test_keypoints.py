@@ -76,9 +76,7 @@ def test_positions_follow_the_instance() -> None:
 
 
 @pytest.mark.parametrize(("depth_m", "expected"), [(1.9, 2), (2.04, 2), (2.06, 1), (3.0, 1)])
-def test_a_point_below_its_own_surface_is_visible_down_to_its_radius(
-    depth_m: float, expected: int
-) -> None:
+def test_a_point_below_its_surface_is_visible_to_its_radius(depth_m: float, expected: int) -> None:
     """On the optical axis; behind more than 5 cm of the object it is hidden by the object."""
     assert visibility(0.0, 0.0, depth_m) == expected
 
@@ -124,7 +122,7 @@ def test_a_ray_that_misses_the_silhouette_by_a_pixel_is_visible(
 @pytest.mark.parametrize(
     "place_m", [(-2.01, 0.0, 2.0), (2.0, 0.0, 2.0), (0.0, 1.2, 2.0), (0.0, 0.0, -2.0), (0, 0, 0)]
 )
-def test_a_point_outside_the_image_or_behind_the_camera_is_at_zero(
+def test_a_point_outside_the_image_or_behind_is_at_zero(
     place_m: tuple[float, float, float],
 ) -> None:
     """The image covers [0, 20) x [0, 12); its camera position is known all the same."""

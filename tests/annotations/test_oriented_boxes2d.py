@@ -69,7 +69,7 @@ def rectangle(truth: ObjectTruth) -> Array:
 
 @pytest.mark.parametrize("yaw_deg", range(-170, 190, 40))
 @pytest.mark.parametrize("eye", [(0.0, 0.01, 60.0), (20.0, 15.0, 50.0)])
-def test_it_begins_at_the_front_left_and_goes_clockwise(
+def test_it_goes_clockwise_from_the_front_left(
     eye: tuple[float, float, float], yaw_deg: float
 ) -> None:
     """Each corner is nearest to that corner of the projected box."""

@@ -144,9 +144,7 @@ each = pytest.mark.parametrize(("config", "index", "engine"), cases([*WORLDS, *B
 
 @pytest.mark.slow
 @each
-def test_supported_things_touch_what_supports_them_from_above(
-    config: str, index: int, engine: str
-) -> None:
+def test_things_touch_what_supports_them_from_above(config: str, index: int, engine: str) -> None:
     """Rays straight down from points of the subject, and up from its support, find the other."""
     world = settled(config, index, engine)
     assert world.pairs("supported_by")
@@ -163,9 +161,7 @@ def test_supported_things_touch_what_supports_them_from_above(
 
 
 @each
-def test_everything_at_rest_is_supported_down_to_the_furniture(
-    config: str, index: int, engine: str
-) -> None:
+def test_all_at_rest_is_supported_down_to_furniture(config: str, index: int, engine: str) -> None:
     """Physics stability: nothing floats. Chains of supports end at what physics cannot move."""
     world = settled(config, index, engine)
     below: dict[int, set[int]] = {}
@@ -190,9 +186,7 @@ def test_no_two_things_carry_each_other(config: str, index: int, engine: str) ->
 
 @pytest.mark.slow
 @each
-def test_near_things_are_nearer_than_half_the_smaller_one(
-    config: str, index: int, engine: str
-) -> None:
+def test_near_things_are_nearer_than_half_the_smaller(config: str, index: int, engine: str) -> None:
     """And all others are farther; things that touch, hold or contain each other are left out."""
     world = settled(config, index, engine)
     annotated = sorted(i.instance_id for i in world.scene.instances if i.annotated)

@@ -170,7 +170,7 @@ def test_faults_in_a_dictionary_name_the_field() -> None:
         gen_data.Dataset(wrong)
 
 
-def test_what_is_read_back_is_what_was_generated(
+def test_what_is_read_is_what_was_made(
     data: gen_data.Dataset, stored: gen_data.StoredDataset
 ) -> None:
     """Colour, ids, labels and scene are equal; depth up to half a unit of its file."""

@@ -104,7 +104,7 @@ def test_a_lazy_data_set_takes_the_split_as_an_argument() -> None:
     assert not gen_data.Dataset(CONFIG, split="train").is_bounded
 
 
-def test_loaders_yield_the_samples_of_the_split_and_resume_in_it(
+def test_loaders_yield_the_split_and_resume_in_it(
     data: gen_data.SampleSequence,
 ) -> None:
     """Every sample once per epoch, whole scenes together; the rest after an interruption."""
@@ -171,7 +171,7 @@ def test_the_data_set_of_torch_warns_of_mixed_splits(data: gen_data.SampleSequen
         ("trian", "there is no split 'trian'; expected one of train, val, all .*mean 'train'"),
     ],
 )
-def test_an_unknown_split_names_those_that_exist(
+def test_an_unknown_split_names_the_others(
     data: gen_data.SampleSequence, name: str, fact: str
 ) -> None:
     """Splits without a share have no samples."""

@@ -75,9 +75,7 @@ def test_the_data_loader_of_torch_reads_a_finished_set(stored: Any) -> None:
     assert sorted(numbers) == list(range(10))
 
 
-def test_rendering_while_training_gives_the_samples_of_the_finished_set(
-    stored: Any, tmp_path: Path
-) -> None:
+def test_rendering_in_training_gives_the_finished_samples(stored: Any, tmp_path: Path) -> None:
     """The same tensors in the same order, by worker processes, resumed in mid-epoch."""
     import torch
 
@@ -154,9 +152,7 @@ def stand_in_for_torchvision() -> tuple[ModuleType, ModuleType]:
     return package, module
 
 
-def test_targets_are_wrapped_for_torchvisions_transforms(
-    stored: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_targets_are_wrapped_for_torchvision(stored: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """Kinds, format and canvas as torchvision defines them; the same numbers; labels stay."""
     import torch
 

@@ -186,9 +186,7 @@ def test_a_chain_has_an_end(folder: Path) -> None:
         ("extends: base.yaml\nwithout: {sensors: a}\n", "2:20: without.sensors: expected a list"),
     ],
 )
-def test_what_cannot_be_extended_is_refused_at_its_place(
-    folder: Path, text: str, fact: str
-) -> None:
+def test_what_cannot_be_extended_is_refused_in_place(folder: Path, text: str, fact: str) -> None:
     assert fact in refusal(written(folder, text))
 
 

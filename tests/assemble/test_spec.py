@@ -43,7 +43,7 @@ def test_shipped_configurations_are_valid_from_any_folder(
     )
 
 
-def test_a_file_of_the_user_comes_before_a_shipped_one(
+def test_a_users_file_comes_before_a_shipped(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "tabletop.yaml").write_text("template: tabletop\nseed: 41\n" + CAMERA)

@@ -43,9 +43,7 @@ def test_one_spelling_for_one_asset(library: Library) -> None:
     assert library.get("desk?width_m=1.60&seed=2").asset_id == "desk?seed=2&width_m=1.6"
 
 
-def test_a_seed_looks_the_same_after_another_size_was_asked_for(
-    library: Library, tmp_path: Path
-) -> None:
+def test_a_seed_looks_the_same_after_another_size(library: Library, tmp_path: Path) -> None:
     """Nothing that was asked for remains in a cache."""
     before = library.mesh("bookcase?seed=1").vertices_m.copy()
     library.mesh("bookcase?height_m=1.5&seed=1")
@@ -75,9 +73,7 @@ def test_a_door_fits_its_wardrobe(library: Library) -> None:
         ("floor?seed=1", "asset 'floor?seed=1': 'floor' has no parameter 'seed'; expected size_m"),
     ],
 )  # fmt: skip
-def test_wrong_values_and_names_are_refused_when_the_id_is_read(
-    library: Library, asset_id: str, message: str
-) -> None:
+def test_wrong_values_are_refused_when_read(library: Library, asset_id: str, message: str) -> None:
     """Describing an asset finds them: configurations are refused before the first sample."""
     with pytest.raises(AssetError) as caught:
         library.get(asset_id)

@@ -103,7 +103,7 @@ def test_radiance_in_xyz_is_refused_in_words() -> None:
     ],
     ids=["plain", "Blender's layer", "lower case", "grey"],
 )
-def test_openexr_channels_by_their_names(
+def test_openexr_by_names(
     tmp_path: Path, names: tuple[str, ...], expected: tuple[float, ...]
 ) -> None:
     exr = pytest.importorskip("OpenEXR")

@@ -71,9 +71,7 @@ def test_check_lists_remarks_and_still_succeeds(folder: Path) -> None:
     ],
     ids=["missing image", "no image", "unknown material", "another case"],
 )
-def test_check_refuses_what_would_look_wrong(
-    folder: Path, files: dict[str, str], reason: str
-) -> None:
+def test_check_refuses_wrong_looks(folder: Path, files: dict[str, str], reason: str) -> None:
     """Each is found without rendering anything, and ends with exit code 3."""
     for name, text in files.items():
         (folder / name).write_text(text)

@@ -77,7 +77,7 @@ def test_made_and_cached_solids_are_equal(library: Library, tmp_path: Path) -> N
         ("mgu?seed=3", "did you mean 'mug"),
     ],
 )
-def test_wrong_parameters_are_refused_with_the_right_ones(
+def test_wrong_parameters_are_refused_with_right(
     library: Library, asset_id: str, reason: str
 ) -> None:
     with pytest.raises(AssetError, match=reason):

@@ -36,7 +36,7 @@ def test_a_plain_id_is_its_own_canonical_form() -> None:
 
 @settings(deadline=None, derandomize=True)
 @given(st.dictionaries(KEYS, NUMBERS | WORDS | LISTS, max_size=4))
-def test_canonical_ids_read_back_as_themselves(
+def test_canonical_ids_are_stable(
     parameters: dict[str, float | int | str | tuple[float, ...]],
 ) -> None:
     """Writing and reading an id loses nothing."""

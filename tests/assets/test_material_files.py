@@ -279,9 +279,7 @@ def test_mtl_values_out_of_range_are_one_clear_error(folder: Path, line: str) ->
         ("emission_cd_m2", "[-1, 0, 0]"),
     ],
 )
-def test_index_values_out_of_range_are_one_clear_error(
-    folder: Path, field: str, value: str
-) -> None:
+def test_index_values_out_of_range_are_one_error(folder: Path, field: str, value: str) -> None:
     (folder / "t.obj").write_text(TRIANGLE_OBJ)
     (folder / "m.mtl").write_text("newmtl m\n")
     (folder / "assets.yaml").write_text(

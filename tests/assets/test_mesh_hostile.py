@@ -308,9 +308,7 @@ def test_hostile_urdfs_are_refused(tmp_path: Path, name: str) -> None:
         ("no limits", "joint 'j' has no limits"),
     ],
 )
-def test_urdfs_with_faulty_joints_are_refused_by_their_names(
-    tmp_path: Path, name: str, cause: str
-) -> None:
+def test_faulty_joints_of_urdfs_are_refused_by_name(tmp_path: Path, name: str, cause: str) -> None:
     """A robot's author finds the joint by its name and its place, which is not that of the root."""
     (tmp_path / "a.urdf").write_text(URDFS[name])
     with pytest.raises(AssetError, match=rf"a\.urdf:1:\d\d+: .*{cause}"):

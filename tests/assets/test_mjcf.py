@@ -73,9 +73,7 @@ def poses_of(described: RobotDescription, positions: dict[str, float]) -> dict[s
 
 
 @pytest.mark.parametrize("positions", [(0.0, 0.0, 0.0), (0.3, -0.05, 1.2), (-1.5, 0.3, -3.0)])
-def test_geoms_are_where_mujoco_puts_them(
-    tmp_path: Path, positions: tuple[float, float, float]
-) -> None:
+def test_geoms_are_where_mujoco_has(tmp_path: Path, positions: tuple[float, float, float]) -> None:
     """At any joint positions, with anchors beside the origin, a reference and two joints a body."""
     described = read_mjcf(write(tmp_path), "arm.xml")
     model = mujoco.MjModel.from_xml_path(str(tmp_path / "arm.xml"))

@@ -58,7 +58,7 @@ def angle_deg(pose: SE3, zenith: np.ndarray) -> float:
     ("pitch_deg", "roll_deg", "yaw_deg", "hfov_deg"),
     [(-8.0, 2.0, 10.0, 70.0), (5.0, -3.0, 25.0, 50.0)],
 )
-def test_the_horizon_of_a_street_is_found(
+def test_a_street_has_its_horizon(
     pitch_deg: float, roll_deg: float, yaw_deg: float, hfov_deg: float
 ) -> None:
     pose = tilted(pitch_deg, roll_deg)

@@ -29,9 +29,7 @@ def test_defaults_build_finite_meshes_with_the_documented_slots(name: str) -> No
 
 @pytest.mark.parametrize("name", SIZED)
 @pytest.mark.parametrize("size_m", [(1.6, 0.7, 0.9), (0.5, 0.4, 0.7)])
-def test_the_bounding_box_is_the_size_asked_for(
-    name: str, size_m: tuple[float, float, float]
-) -> None:
+def test_the_box_is_the_size_asked_for(name: str, size_m: tuple[float, float, float]) -> None:
     """Centred on its footprint, standing on z = 0; collision agrees."""
     solid = FAMILIES[name].build(size_m=size_m)
     low, high = solid.mesh.bounds_m()
@@ -182,7 +180,7 @@ def test_a_backdrop_carries_things_on_its_floor_and_curves_up() -> None:
         ("bin", {"size_m": (500.0, 0.4, 0.2)}, r"bin: size_m"),
     ],
 )
-def test_unusable_parameters_are_refused_with_a_remedy(
+def test_unusable_parameters_are_told(
     name: str, parameters: dict[str, object], message: str
 ) -> None:
     with pytest.raises(AssetError, match=message):

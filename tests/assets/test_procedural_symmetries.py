@@ -101,7 +101,7 @@ def test_a_turn_leaves_the_mesh_in_place(family: str, library: Library) -> None:
         ("sphere?diameter_m=0.3", {0}),
     ],
 )
-def test_parametric_objects_turn_about_their_centre(
+def test_parametric_objects_turn_about_centre(
     asset: str, folds: set[int], library: Library
 ) -> None:
     """Their origin is on the floor; equal sides have quarter turns."""

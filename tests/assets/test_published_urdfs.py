@@ -184,9 +184,7 @@ def test_an_invisible_visual_is_left_out(tmp_path: Path) -> None:
         '<link name="$(arg prefix)b"/>',
     ],
 )
-def test_a_xacro_file_is_refused_with_the_command_that_expands_it(
-    tmp_path: Path, part: str
-) -> None:
+def test_a_xacro_file_is_refused_with_the_command_for_it(tmp_path: Path, part: str) -> None:
     """At the line of the first macro or expression."""
     (tmp_path / "a.urdf").write_text(
         f'<robot name="r" xmlns:xacro="http://ros.org/wiki/xacro">\n{part}\n{link("a")}\n</robot>'

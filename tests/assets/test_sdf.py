@@ -83,9 +83,7 @@ def test_a_door_turns_about_its_hinge(tmp_path: Path) -> None:
         ("<xyz>0 1 0</xyz><use_parent_model_frame>true</use_parent_model_frame>", [1.0, 0.1, 0.5]),
     ],
 )
-def test_axes_are_in_the_frame_that_they_name(
-    tmp_path: Path, axis: str, expected: list[float]
-) -> None:
+def test_axes_are_in_the_named_frame(tmp_path: Path, axis: str, expected: list[float]) -> None:
     """By default in the joint's own, which here has Y along the model's -X."""
     slide = HINGED[2].replace("revolute", "prismatic").replace("<xyz>0 0 1</xyz>", axis)
     described = read(tmp_path, *HINGED[:2], slide)

@@ -196,9 +196,7 @@ HAND = """<robot name="hand">
 HAND_INDEX = "robots: [{id: hand, file: hand.urdf, home: {%s}}]\n"
 
 
-def test_a_joint_that_mimics_another_has_its_multiplier_and_offset(
-    folder: Path, tmp_path: Path
-) -> None:
+def test_a_mimic_joint_has_its_multiplier_and_offset(folder: Path, tmp_path: Path) -> None:
     """At home 0.3 the follower is at -1 * 0.3 + 0.1 = -0.2, and its link is turned so far."""
     (folder / "hand.urdf").write_text(HAND)
     (folder / "assets.yaml").write_text(HAND_INDEX % "finger: 0.3")
@@ -225,7 +223,7 @@ def test_a_follower_cannot_be_told_to_stand_elsewhere(folder: Path, tmp_path: Pa
         ('joint="finger" offset="nan"', r"hand\.urdf:7:3: .*'nan' is not a number"),
     ],
 )
-def test_a_wrong_mimic_is_refused_with_its_place(
+def test_a_wrong_mimic_is_told_in_place(
     folder: Path, tmp_path: Path, mimic: str, fault: str
 ) -> None:
     """File, line and column of the joint."""
@@ -256,9 +254,7 @@ def sized(folder: Path, tmp_path: Path, entry: str, name: str = "a.obj") -> tupl
         ("front: -z, up: y", (3.0, 1.0, 2.0)),
     ],
 )
-def test_units_edges_and_axes(
-    folder: Path, tmp_path: Path, entry: str, size: tuple[float, ...]
-) -> None:
+def test_units_and_axes(folder: Path, tmp_path: Path, entry: str, size: tuple[float, ...]) -> None:
     """By hand for a box of 1 x 2 x 3: the up axis becomes Z, the front axis X."""
     assert sized(folder, tmp_path, entry) == pytest.approx(size, rel=1e-6)
 
@@ -290,7 +286,7 @@ def test_axes_that_are_named_come_to_z_and_x(up: str, front: str) -> None:
         ("materials: {'*': {maps: {orm: a.png, metallic: b.png}}}", "not both"),
     ],
 )
-def test_a_contradiction_is_refused_with_its_place(
+def test_a_contradiction_is_told_in_place(
     folder: Path, tmp_path: Path, entry: str, fault: str
 ) -> None:
     with pytest.raises(ConfigError, match=rf"(?s)assets\.yaml:1:\d+: assets\[0\].*{fault}"):
@@ -334,7 +330,7 @@ def test_a_pattern_stands_for_every_file_that_matches(folder: Path, tmp_path: Pa
         ),
     ],
 )
-def test_a_missing_file_is_told_with_its_place(
+def test_a_missing_file_is_told_in_place(
     folder: Path, tmp_path: Path, entry: str, fault: str
 ) -> None:
     """The message suggests the nearest name, or summarises the folder."""
@@ -431,9 +427,7 @@ def test_proc_is_refused_without_a_traceback(tmp_path: Path) -> None:
         open_library([Path("/proc")], cache_dir=tmp_path / "cache").find({"user"})
 
 
-def test_a_folder_that_cannot_be_read_is_named(
-    folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_unreadable_folder_is_named(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     error = PermissionError(13, "Permission denied", str(folder / "locked"))
     monkeypatch.setattr(os, "scandir", raising(error))
     with pytest.raises(AssetError, match=r"locked: Permission denied; all folders"):
@@ -464,7 +458,7 @@ def write_car(path: Path) -> None:
 
 
 @pytest.mark.parametrize("suffix", ["obj", "glb"])
-def test_parts_named_like_mirrors_are_outside_the_body_of_a_vehicle(
+def test_mirrors_are_outside_the_body_of_a_vehicle(
     folder: Path, tmp_path: Path, suffix: str
 ) -> None:
     """A cabinet with the same parts is measured with its mirrors."""

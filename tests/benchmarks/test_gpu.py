@@ -147,9 +147,7 @@ def answering(folder: Path, count: int) -> Iterator[list[rates._Worker]]:
         worker.end()
 
 
-def test_workers_that_are_not_ready_are_left_out(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_workers_not_ready_are_left_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of four workers, the third has ended: the other three are measured, and two, and one."""
     monkeypatch.setattr(rates, "_started", lambda *a: answering(tmp_path, a[3]))
 

@@ -135,18 +135,14 @@ def read(field: str, text: str) -> Distribution[Any]:
 
 
 @pytest.mark.parametrize(("field", "text", "expected"), YAML_FORMS)
-def test_each_yaml_form_is_a_distribution(
-    field: str, text: str, expected: Distribution[Any]
-) -> None:
+def test_each_form_is_a_distribution(field: str, text: str, expected: Distribution[Any]) -> None:
     """A plain value is a constant, a one-key mapping is a distribution."""
     assert read(field, text) == expected
     assert type(read(field, text)) is type(expected)
 
 
 @pytest.mark.parametrize(("field", "text", "expected"), YAML_FORMS)
-def test_each_distribution_writes_yaml_that_reads_back(
-    field: str, text: str, expected: Distribution[Any]
-) -> None:
+def test_each_distribution_reads_back(field: str, text: str, expected: Distribution[Any]) -> None:
     """So a resolved configuration is a configuration."""
     del text
 
@@ -154,9 +150,7 @@ def test_each_distribution_writes_yaml_that_reads_back(
 
 
 @pytest.mark.parametrize(("field", "text", "expected"), YAML_FORMS)
-def test_each_distribution_is_a_picklable_hashable_value(
-    field: str, text: str, expected: Distribution[Any]
-) -> None:
+def test_each_distribution_is_a_value(field: str, text: str, expected: Distribution[Any]) -> None:
     """It goes to worker processes, and equal ones are equal after the trip."""
     del field, text
     travelled = pickle.loads(pickle.dumps(expected))
@@ -167,9 +161,7 @@ def test_each_distribution_is_a_picklable_hashable_value(
 
 
 @pytest.mark.parametrize(("field", "text", "expected"), YAML_FORMS)
-def test_what_is_drawn_lies_in_the_support(
-    field: str, text: str, expected: Distribution[Any]
-) -> None:
+def test_draws_lie_in_the_support(field: str, text: str, expected: Distribution[Any]) -> None:
     """Numbers between both ends; listed values where they are listed."""
     del field, text
     rng = rng_of(2)
@@ -220,9 +212,7 @@ ZERO_WIDTH: list[tuple[Distribution[Any], Any]] = [
 
 
 @pytest.mark.parametrize(("distribution", "value"), ZERO_WIDTH)
-def test_a_range_of_zero_width_gives_the_constant(
-    distribution: Distribution[Any], value: object
-) -> None:
+def test_a_range_of_no_width_is_constant(distribution: Distribution[Any], value: object) -> None:
     """Bit for bit, so that a range can be narrowed to nothing."""
     rng = rng_of(0)
 
@@ -246,7 +236,7 @@ SUPPORTS: list[tuple[Numeric[Any], tuple[float, float]]] = [
 
 
 @pytest.mark.parametrize(("distribution", "support"), SUPPORTS)
-def test_supports_are_known_without_drawing(
+def test_supports_are_known_undrawn(
     distribution: Numeric[Any], support: tuple[float, float]
 ) -> None:
     """Values without weight do not count."""
@@ -378,7 +368,7 @@ FAULTS = [
 
 
 @pytest.mark.parametrize(("text", "place", "fact"), FAULTS, ids=[text for text, _, _ in FAULTS])
-def test_faults_inside_a_distribution_are_told_with_their_place(
+def test_faults_in_a_distribution_are_told_with_their_place(
     text: str, place: str, fact: str
 ) -> None:
     """The column of the part that is wrong, at any depth."""
@@ -390,7 +380,7 @@ def test_faults_inside_a_distribution_are_told_with_their_place(
     assert (str(problem.position), problem.fact) == (f"x.yaml:{place}", fact)
 
 
-def test_a_distribution_of_a_third_party_needs_fields_and_a_draw_only(
+def test_a_distribution_of_a_plugin_needs_fields_and_draw(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Its YAML form, messages and JSON Schema follow from its fields."""

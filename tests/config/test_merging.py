@@ -79,9 +79,7 @@ def test_merging_leaves_its_arguments_alone() -> None:
         ("{tags: [car]}", "{tags: [van], ids: [bus]}", {"tags": ["van"], "ids": ["bus"]}),
     ],
 )
-def test_one_choice_of_assets_replaces_another(
-    base: str, override: str, merged: dict[str, object]
-) -> None:
+def test_assets_are_chosen_one_way(base: str, override: str, merged: dict[str, object]) -> None:
     """Tags and ids are alternatives: who names ids does not want the inherited tags besides."""
     result = merge_nodes(
         parse_yaml(f"assets: {base}", "base"), parse_yaml(f"assets: {override}", "over")
@@ -103,9 +101,7 @@ def test_one_choice_of_assets_replaces_another(
         ),
     ],
 )
-def test_a_mapping_of_another_kind_inherits_nothing(
-    base: str, override: str, merged: dict[str, object]
-) -> None:
+def test_another_kind_inherits_nothing(base: str, override: str, merged: dict[str, object]) -> None:
     """The coefficients of one lens mean nothing to another; a sensor keeps its mount."""
     result = merge_nodes(parse_yaml(f"it: {base}", "base"), parse_yaml(f"it: {override}", "over"))
 

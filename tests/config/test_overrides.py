@@ -130,9 +130,7 @@ def test_an_overridden_value_knows_that_it_came_from_the_command_line(document: 
         ),
     ],
 )
-def test_overrides_that_lead_nowhere_say_so(
-    document: Node, path: str, value: str, message: str
-) -> None:
+def test_overrides_to_nowhere_say_so(document: Node, path: str, value: str, message: str) -> None:
     with pytest.raises(ConfigError) as caught:
         with_override(document, path, value)
 

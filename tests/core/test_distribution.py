@@ -79,9 +79,7 @@ def test_a_checkout_installs_extras_of_itself() -> None:
 
 
 @pytest.mark.parametrize("name", ["checkout", "gen_data_perception-1-py3-none-any.whl"])
-def test_an_installation_takes_extras_from_where_it_came(
-    origin: Path, tmp_path: Path, name: str
-) -> None:
+def test_extras_come_from_where_the_project_came(origin: Path, tmp_path: Path, name: str) -> None:
     """A folder or a wheel; spaces are quoted in the record and in the command."""
     source = tmp_path / "my folder" / name
     source.parent.mkdir()

@@ -83,7 +83,7 @@ def test_any_brown_conrady_lens_is_that_of_opencv(
 @pytest.mark.slow
 @settings(max_examples=40, deadline=None, derandomize=True)
 @given(st.floats(-0.1, 0.1), SMALL, SMALL, SMALL, st.floats(60.0, 400.0))
-def test_any_fisheye_is_that_of_opencv(
+def test_any_fisheye_is_opencvs(
     k1: float, k2: float, k3: float, k4: float, focal_px: float
 ) -> None:
     """From a moderate angle of view to one of more than a half sphere."""

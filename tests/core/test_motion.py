@@ -114,9 +114,7 @@ STEP_S = 0.1
 
 @pytest.mark.parametrize("knots", [4, 12])
 @pytest.mark.parametrize("motion", ["circle", "clothoid"])
-def test_acceleration_and_turn_rate_are_those_of_the_curve_at_every_knot(
-    motion: str, knots: int
-) -> None:
+def test_acceleration_and_turn_rate_are_the_curves_at_every_knot(motion: str, knots: int) -> None:
     """Centripetal acceleration v w to the left and turn rate w, at both ends of the track too."""
     way, speed = (circular, 8.0) if motion == "circle" else (clothoid, 10.0)
     track = Trajectory("car", STEP_S, tuple(way(STEP_S * k) for k in range(knots)))

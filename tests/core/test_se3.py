@@ -90,9 +90,7 @@ def test_rotations_are_proper(q: tuple[float, float, float, float]) -> None:
 
 @QUICK
 @given(poses, st.lists(vectors, min_size=1, max_size=5))
-def test_points_move_as_by_the_homogeneous_matrix(
-    pose: SE3, points: list[tuple[float, float, float]]
-) -> None:
+def test_points_move_as_by_the_matrix(pose: SE3, points: list[tuple[float, float, float]]) -> None:
     """Any leading shape; directions are rotated only."""
     p = np.array(points)
     homogeneous = np.concatenate([p, np.ones((len(p), 1))], axis=1)

@@ -55,9 +55,7 @@ def assert_refused(tmp_path: Path, arguments: tuple[str, ...], code: int, *texts
         ),
     ],
 )  # fmt: skip
-def test_wrong_usage_exits_with_2(
-    tmp_path: Path, arguments: tuple[str, ...], texts: tuple[str, ...]
-) -> None:
+def test_misuse_exits_2(tmp_path: Path, arguments: tuple[str, ...], texts: tuple[str, ...]) -> None:
     """Usage and configuration errors name the argument or field, and what was expected."""
     assert_refused(tmp_path, arguments, 2, *texts)
 
@@ -165,9 +163,7 @@ def test_corrupt_files_of_assets_exit_with_3(
     ],
     ids=["roughness", "range of roughness", "lens"],
 )
-def test_values_that_do_not_exist_in_nature_exit_with_2(
-    tmp_path: Path, line: str, texts: tuple[str, ...]
-) -> None:
+def test_unnatural_values_exit_with_2(tmp_path: Path, line: str, texts: tuple[str, ...]) -> None:
     """With file, line, column and field."""
     heads = "template: tabletop\n" + ("randomizers:\n" if line.startswith("  -") else "seed: 1\n")
     (tmp_path / "wrong.yaml").write_text(heads + line)
@@ -194,9 +190,7 @@ def test_folder_with_other_things_in_it_exits_with_4(tmp_path: Path) -> None:
     assert (tmp_path / "mine" / "thesis.txt").read_text() == "irreplaceable"
 
 
-def test_dataset_of_another_configuration_exits_with_4_and_stays(
-    dataset: Path, tmp_path: Path
-) -> None:
+def test_dataset_of_another_configuration_exits_with_4(dataset: Path, tmp_path: Path) -> None:
     """The error names the differing field, and no file changes."""
     before = digest(dataset)
     done = gen_data(

@@ -185,7 +185,7 @@ S = "shards/000000"
     ],
     ids=lambda value: str(value)[:30],
 )
-def test_each_damaged_file_is_named(
+def test_damaged_files_are_named(
     dataset: Path, tmp_path: Path, name: str, text: str | None
 ) -> None:
     """By one typed error, whatever is in the file; None removes it."""

@@ -98,7 +98,7 @@ def test_a_rerendering_lacks_the_same_sample(folder: Path, tmp_path: Path) -> No
     assert [sample.index for sample in gen_data.open(tmp_path / "out")] == [0, 2, 3]
 
 
-def test_the_command_line_ends_with_its_own_exit_code(
+def test_the_command_has_its_own_exit_code(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     command = ["-c", "tabletop.yaml", "-n", "4", "--out", str(folder), "-w", "0", "--skip-failed"]

@@ -122,9 +122,7 @@ def asset_albedo(folder: Path, asset_id: str) -> tuple[int, ...]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("template", ["tabletop", "bin_picking"])
-def test_the_comments_of_init_tell_how_to_leave_the_robot_out(
-    template: str, tmp_path: Path
-) -> None:
+def test_the_comments_of_init_tell_how_to_omit_the_robot(template: str, tmp_path: Path) -> None:
     """Done as they say, the configuration is valid and its scenes have no robot."""
     trimesh.creation.box((0.1, 0.05, 0.03)).export(tmp_path / "part.stl")
     done = gen_data("init", "--template", template, "--mesh", "part.stl", cwd=tmp_path)
@@ -217,9 +215,7 @@ def test_formats_lists_every_exporter(tmp_path: Path) -> None:
         ("tabletop", "template tabletop"),
     ],
 )
-def test_describe_knows_everything_that_a_configuration_names(
-    name: str, text: str, tmp_path: Path
-) -> None:
+def test_describe_knows_all_that_is_configured(name: str, text: str, tmp_path: Path) -> None:
     done = gen_data("describe", name, cwd=tmp_path)
 
     assert done.returncode == 0, done.stderr

@@ -114,7 +114,7 @@ def test_a_fitted_configuration_can_be_planned(folder: Path) -> None:
         (("s3://bucket/real", "configs/base.yaml"), "s3://bucket/real"),
     ],
 )  # fmt: skip
-def test_wrong_arguments_are_one_line(
+def test_wrong_arguments_are_told(
     unmatched: Path, arguments: tuple[str, ...], message: str
 ) -> None:
     done = run("match", *arguments, cwd=unmatched)

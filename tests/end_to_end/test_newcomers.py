@@ -44,9 +44,7 @@ def test_what_is_no_command_is_told_what_was_probably_meant(
         ("repair", "nosuch"),
     ],
 )
-def test_a_folder_that_does_not_exist_is_called_so(
-    arguments: tuple[str, ...], tmp_path: Path
-) -> None:
+def test_a_missing_folder_is_called_so(arguments: tuple[str, ...], tmp_path: Path) -> None:
     """With the nearest name beside it."""
     (tmp_path / "nosuchh").mkdir()
     done = run(*arguments, cwd=tmp_path)

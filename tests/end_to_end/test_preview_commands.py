@@ -133,7 +133,7 @@ def test_a_report_counts_the_annotations_of_a_dataset(dataset: Path, tmp_path: P
 
 @needs_rerun
 @pytest.mark.parametrize("signal_number", cases([signal.SIGINT, signal.SIGKILL], {signal.SIGINT}))
-def test_a_preview_for_browsers_listens_on_this_machine_only(
+def test_a_preview_listens_on_this_machine_only(
     tmp_path: Path, signal_number: signal.Signals
 ) -> None:
     """The page is served, every socket is on loopback, and none is left after the end."""

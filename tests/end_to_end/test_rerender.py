@@ -103,9 +103,7 @@ def test_what_would_change_the_scenes_is_refused(
     assert re.search(text, done.stderr), done.stderr
 
 
-def test_a_single_sample_has_the_bytes_that_it_has_in_the_data_set(
-    dataset: Path, tmp_path: Path
-) -> None:
+def test_a_single_sample_has_its_bytes_in_the_data_set(dataset: Path, tmp_path: Path) -> None:
     """Images, laser scans and labels, and a folder per format."""
     done = gen_data("sample", str(dataset), "--index", "7", "--out", "one", cwd=tmp_path)
 

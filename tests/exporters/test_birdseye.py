@@ -63,7 +63,7 @@ def test_frames_tell_where_the_map_is_and_what_is_on_it(world: Any, tmp_path: Pa
     assert frames[3]["boxes3d"]["ego"] == []
 
 
-def test_lanes_are_columns_at_rows_as_tusimple_has_them(
+def test_lanes_are_columns_at_rows_as_in_tusimple(
     world: Any, sample: Sample, tmp_path: Path
 ) -> None:
     """Rows every ten pixels; pixel centres at whole numbers, so half a pixel less than ours."""

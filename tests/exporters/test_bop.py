@@ -28,8 +28,6 @@ from gen_data.exporters.bop import Bop
 from gen_data.exporters.rigid_models import Piece, build_model
 from tests.embree import RayCaster
 
-pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
-
 DELTA_MM = 5.0
 
 

@@ -157,9 +157,7 @@ def assert_is(found: Any, lens: Intrinsics) -> None:
     assert found.size_px == (lens.width_px, lens.height_px)
 
 
-def test_every_photograph_has_its_pose_in_the_model_of_its_scene(
-    samples: Any, exported: Any
-) -> None:
+def test_every_photograph_has_its_pose_in_its_model(samples: Any, exported: Any) -> None:
     """COLMAP's poses take the world to the camera; its images are there."""
     folder = exported(CalibrationFiles())
     samples = [s for s in samples if s.scene_index == 0]

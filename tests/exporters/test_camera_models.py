@@ -117,9 +117,7 @@ READERS: dict[str, Callable[[Path], Camera]] = {
 
 
 @pytest.mark.parametrize("kind", READERS)
-def test_the_ground_is_level_where_pixels_are_as_stated(
-    kind: str, world: Any, tmp_path: Path
-) -> None:
+def test_the_ground_is_level_at_the_stated_pixels(kind: str, world: Any, tmp_path: Path) -> None:
     """Height of ground points below the camera: z (v - cy) / fy, with v of the pixel's centre."""
     exporter = TABLE.load(kind)()
     samples = world.with_bodies(world.samples)
@@ -142,7 +140,7 @@ def test_the_ground_is_level_where_pixels_are_as_stated(
 
 @pytest.mark.parametrize("model", LENSES)
 @pytest.mark.parametrize("kind", ["coco", "croissant", "hdf5", "huggingface", "tfrecord"])
-def test_opencv_projects_with_the_lens_of_a_bent_camera(
+def test_opencv_projects_with_the_bent_lens(
     kind: str, model: Any, world: Any, tmp_path: Path
 ) -> None:
     """With K, and pixel centres where the format has them; to float32 where it holds no more."""

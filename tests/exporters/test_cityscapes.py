@@ -19,9 +19,6 @@ from gen_data.exporters.cityscapes import Cityscapes
 from gen_data.exporters.cityscapes_classes import city_classes
 from tests.exporters.test_labels import truth_of
 
-# pycocotools' decoder predates numpy 2's __array__(copy=...).
-pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
-
 CLASS_OF = {"car": 26, "crate": 5, "pedestrian": 24}
 
 

@@ -16,9 +16,6 @@ from PIL import Image
 from gen_data.exporters.coco_panoptic import CocoPanoptic
 from tests.exporters.label_readers import segments_of
 
-# pycocotools' decoder predates numpy 2's __array__(copy=...).
-pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
-
 
 def scenery(world: Any) -> Any:
     """A tree and a hood, neither annotated, behind and beside an annotated crate."""

@@ -57,9 +57,7 @@ def values(example: Any, key: str) -> list[Any]:
     return list(getattr(feature, feature.WhichOneof("kind")).value)
 
 
-def test_lerobot_has_what_the_arm_does_at_every_step(
-    world: Any, samples: Any, tmp_path: Path
-) -> None:
+def test_lerobot_has_what_the_arm_does_each_step(world: Any, samples: Any, tmp_path: Path) -> None:
     """At 0, 0.1, 0.2 and 0.3 s; the hand's pose is that of the step's joints."""
     folder = world.export(LeRobot(), drive_info(world), samples, tmp_path) / "train/toys_arm"
     rows = pyarrow.parquet.read_table(folder / "data/chunk-000/file-000.parquet").to_pylist()
@@ -115,9 +113,7 @@ def assert_written(folder: Path, samples: Any) -> None:
     assert np.array_equal(np.asarray(Image.open(io.BytesIO(picture))), expected)
 
 
-def test_rlds_has_an_episode_per_record_with_steps_of_equal_length(
-    world: Any, samples: Any, tmp_path: Path
-) -> None:
+def test_rlds_has_an_episode_per_record(world: Any, samples: Any, tmp_path: Path) -> None:
     """Of the lengths that its description states."""
     folder = world.export(Rlds(), drive_info(world), samples, tmp_path) / "train/toys_arm"
 

@@ -59,9 +59,7 @@ def written(exporter: Any, world: Any, tmp_path_factory: pytest.TempPathFactory)
     return folder
 
 
-def test_shards_can_be_written_in_any_order(
-    exporter: Any, world: Any, written: Path, tmp_path: Path
-) -> None:
+def test_shards_come_in_any_order(exporter: Any, world: Any, written: Path, tmp_path: Path) -> None:
     info, samples = given(exporter, world)
 
     backwards = world.export(exporter, info, samples, tmp_path, backwards=True)
@@ -97,7 +95,7 @@ def test_file_names_of_a_shard_depend_on_indices_only(
     assert files(written / "shards/000001") == files(tmp_path / "shards/000000")
 
 
-def test_only_formats_with_a_mark_for_it_have_ignored_objects(
+def test_only_formats_with_a_mark_have_ignored_objects(
     exporter: Any, world: Any, tmp_path: Path
 ) -> None:
     """All others write the same bytes as without the object."""

@@ -124,7 +124,7 @@ def test_scanners_can_be_left_out(world: Any, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("model", sorted(LENSES))
 @pytest.mark.parametrize("kind", sampled([*PINHOLES_ONLY, "coco", "hdf5", "yolo"], 4))
-def test_formats_of_pinholes_take_rectified_images(
+def test_pinhole_formats_take_rectified_images(
     world: Any, tmp_path: Path, kind: str, model: Any
 ) -> None:
     """In every format the photographs are OpenCV's, and the bent ones are nowhere."""
@@ -172,9 +172,7 @@ def test_the_matrix_of_bop_is_that_of_the_rectified_image(world: Any, tmp_path: 
         assert columns.min() - 8 < u < columns.max() + 8
 
 
-def test_exporters_with_equal_settings_share_the_rectified_images(
-    world: Any, tmp_path: Path
-) -> None:
+def test_exporters_of_equal_settings_share_rectified_images(world: Any, tmp_path: Path) -> None:
     """One copy in the shard, whichever exporter comes first."""
     samples = world.with_bodies(bent_samples(world, "brown_conrady"))
     info = world.info(len(samples), lenses={"color": "brown_conrady"})

@@ -94,9 +94,7 @@ def test_containers_hold_the_street(dataset: Path, world: Any) -> None:
 
 
 @pytest.mark.parametrize("container", CONTAINERS)
-def test_files_without_compression_hold_the_same(
-    container: str, world: Any, tmp_path: Path
-) -> None:
+def test_uncompressed_files_hold_the_same(container: str, world: Any, tmp_path: Path) -> None:
     sizes = {}
     for compression in ("gzip", "none"):
         exporter = Hdf5(container=container, compression=compression)

@@ -15,9 +15,6 @@ from gen_data.exporters import huggingface
 from gen_data.exporters.huggingface import HuggingFace
 from tests.exporters.label_readers import parquet
 
-# pycocotools' decoder predates numpy 2's __array__(copy=...).
-pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
-
 
 @pytest.fixture(scope="module")
 def dataset(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -64,9 +61,7 @@ def test_the_card_has_the_splits_with_sizes(dataset: Path) -> None:
     assert facts["dataset_info"]["download_size"] == sum(sizes)
 
 
-def test_row_groups_are_bounded(
-    world: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_groups_are_bounded(world: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """By rows and by bytes of images."""
     monkeypatch.setattr(huggingface, "GROUP_ROWS", 3)
     folder = world.export(HuggingFace(), world.info(7), world.samples, tmp_path / "a")

@@ -14,9 +14,6 @@ from gen_data.exporters.voc import YEAR
 from tests.exporters.label_readers import opened, parquet, records, tar_samples, voc_objects
 from tests.exporters.test_coco import average_precision
 
-# pycocotools' decoder predates numpy 2's __array__(copy=...).
-pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
-
 Row = tuple[str, bool]
 """Class of an object, and whether it is ignored."""
 

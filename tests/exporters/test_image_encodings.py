@@ -106,7 +106,7 @@ def test_formats_without_loss_have_no_quality() -> None:
             RgbEncoding(format=kind, quality=90)
 
 
-def test_stored_images_are_found(
+def test_stored_images_are_read(
     tmp_path: Path, info: Any, world: Any, encoding: ImageEncoding
 ) -> None:
     """Photographs have the encoding's ending, labels stay PNG; both are read again."""
@@ -290,7 +290,7 @@ STATED = {
 
 @pytest.mark.parametrize("encoding", [JPEG, WEBP, LOSSLESS], ids=lambda e: e.format)
 @pytest.mark.parametrize("kind", READERS)
-def test_readers_find_the_photographs(
+def test_readers_find_photos(
     kind: str, encoding: ImageEncoding, world: Any, tmp_path: Path
 ) -> None:
     """The first one, in the stated format; its pixels are those of the first sample."""

@@ -151,9 +151,7 @@ def test_a_link_shares_the_file_where_links_are_possible(tmp_path: Path) -> None
     assert (tmp_path / "new/b").samefile(tmp_path / "a")
 
 
-def test_a_copy_is_made_where_links_are_impossible(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_copy_is_made_without_links(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Another file system, FAT, or too many links."""
 
     def refuse(*_: Any) -> None:

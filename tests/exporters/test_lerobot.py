@@ -299,9 +299,7 @@ def test_cameras_that_skip_steps_are_refused(world: Any) -> None:
 
 
 @pytest.mark.parametrize("version", ["v3.0", "v2.1"])
-def test_a_sample_that_does_not_exist_ends_the_episode(
-    world: Any, tmp_path: Path, version: Any
-) -> None:
+def test_a_missing_sample_ends_the_episode(world: Any, tmp_path: Path, version: Any) -> None:
     """Frames are 1 / fps apart by definition: what follows a gap is another episode."""
     samples = [replace(sample, split="train") for sample in world.reach()]
     kept = [sample for sample in samples if sample.index != 1]

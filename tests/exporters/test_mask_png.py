@@ -33,9 +33,7 @@ def decoded(png: bytes) -> np.ndarray:
     right=st.integers(0, 30),
 )
 @settings(max_examples=150, deadline=None)
-def test_any_mask_comes_back(
-    crop: np.ndarray, above: int, left: int, below: int, right: int
-) -> None:
+def test_masks_come_back(crop: np.ndarray, above: int, left: int, below: int, right: int) -> None:
     """Also at the image's edges, where runs of different rows meet."""
     expected = np.pad(crop, [(above, below), (left, right)]).astype(np.uint8) * 255
 

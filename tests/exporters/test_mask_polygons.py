@@ -17,9 +17,6 @@ from pycocotools import mask as coco_mask
 from gen_data.core.sample import MaskPx
 from gen_data.exporters.mask_polygons import drawable_polygons, join_polygons, mask_polygons
 
-# pycocotools' decoder predates numpy 2's __array__(copy=...).
-pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
-
 masks = arrays(bool, st.tuples(st.integers(1, 12), st.integers(1, 12)))
 
 

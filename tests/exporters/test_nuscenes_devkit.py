@@ -123,9 +123,7 @@ def predictions(devkit: Any) -> dict[str, list[dict[str, Any]]]:
     return results
 
 
-def test_velocities_of_neighbouring_boxes_are_those_of_the_objects(
-    folder: Path, driven: Any
-) -> None:
+def test_velocities_of_neighbouring_boxes_are_the_objects(folder: Path, driven: Any) -> None:
     """Away from the ends of tracks."""
     devkit = open_devkit(folder)
     steps = {int(row["timestamp"]): k for k, row in enumerate(devkit.sample)}

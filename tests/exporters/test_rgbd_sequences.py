@@ -137,9 +137,7 @@ def test_scannet_points_lie_on_the_scene(scannet: Path, samples: Sequence[Sample
             assert np.abs(forward_m).max() < 1e-8
 
 
-def test_scannet_labels_are_nyu40_of_the_instances(
-    scannet: Path, samples: Sequence[Sample]
-) -> None:
+def test_scannet_labels_are_nyu40_of_instances(scannet: Path, samples: Sequence[Sample]) -> None:
     """And instances have the ids of the data set wherever there is a class."""
     with (scannet / "scannetv2-labels.combined.tsv").open(encoding="utf-8") as file:
         classes = {int(row["id"]): row for row in csv.DictReader(file, delimiter="\t")}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -12,9 +11,6 @@ from pycocotools import mask as coco_mask
 from gen_data.core.boxes import tight_box
 from gen_data.core.sample import MaskPx
 from gen_data.exporters.rle import encode_rle, run_lengths
-
-# pycocotools' decoder predates numpy 2's __array__(copy=...).
-pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
 
 
 def tight(image: NDArray[np.bool_]) -> MaskPx:

@@ -14,9 +14,6 @@ from gen_data.core.capture import POINT, Channel
 from gen_data.exporters.webdataset import WebDataset
 from tests.exporters.label_readers import tar_samples
 
-# pycocotools' decoder predates numpy 2's __array__(copy=...).
-pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
-
 
 @pytest.fixture(scope="module")
 def dataset(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:

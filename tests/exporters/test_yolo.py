@@ -17,9 +17,6 @@ from gen_data.exporters.yolo import Yolo, inner_rectangle
 from tests.exporters.label_readers import drawn
 from tests.exporters.test_labels import divided, truth_of
 
-# pycocotools' decoder predates numpy 2's __array__(copy=...).
-pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
-
 TASKS = ("detect", "segment", "pose", "obb")
 
 
@@ -44,7 +41,7 @@ def objects_of(samples: list[Any], folder: Path) -> Iterator[tuple[list[float], 
         yield from zip(rows, truth_of(sample), strict=True)
 
 
-def test_a_segment_is_the_outline_of_the_mask(
+def test_segments_are_the_outline_of_the_mask(
     dataset: Path, samples: list[Any], world: Any
 ) -> None:
     """Drawn by pycocotools and OpenCV, every polygon gives the mask back, also of two parts."""

@@ -23,7 +23,7 @@ def save(path: Path, width: int = 96, height: int = 80, mode: str = "RGB", **opt
 
 
 @pytest.mark.slow
-def test_photographs_are_read_and_everything_else_is_counted_with_its_reason(
+def test_photographs_are_read_and_all_else_is_counted_with_reasons(
     tmp_path: Path,
 ) -> None:
     """Damaged, tiny, grey and label images; depth folders and second links are no photographs."""
@@ -128,9 +128,7 @@ def test_scans_of_every_format_have_the_same_points(tmp_path: Path, name: str) -
          "shorter than its 9 points"),
     ],
 )  # fmt: skip
-def test_damaged_scans_state_the_fact(
-    tmp_path: Path, name: str, content: bytes, reason: str
-) -> None:
+def test_damaged_scans_state_why(tmp_path: Path, name: str, content: bytes, reason: str) -> None:
     (tmp_path / name).write_bytes(content)
     with pytest.raises(ValueError, match=reason):
         read_point_file(tmp_path / name)

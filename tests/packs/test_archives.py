@@ -116,7 +116,7 @@ def test_a_symbolic_link_in_a_zip_is_refused(tmp_path: Path) -> None:
 @pytest.mark.hostile
 @pytest.mark.parametrize("make", [zipped, tarred])
 @pytest.mark.parametrize("wanted", ["data/*", "other/*"])
-def test_a_bomb_is_refused_before_it_fills_the_disk(
+def test_a_bomb_is_refused_before_the_disk_is_full(
     make: Maker, wanted: str, tmp_path: Path
 ) -> None:
     """Forty megabytes of zeros compress a thousandfold; unwanted members cost time, too."""

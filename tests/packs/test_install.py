@@ -79,9 +79,7 @@ def test_without_packs_the_library_is_as_before(tmp_path: Path) -> None:
     assert not (tmp_path / "packs").exists()
 
 
-def test_another_archive_is_refused_and_nothing_installed(
-    pack: Pack, archive: Path, tmp_path: Path
-) -> None:
+def test_another_archive_is_refused_entirely(pack: Pack, archive: Path, tmp_path: Path) -> None:
     """One byte is enough; the message gives both sums."""
     archive.write_bytes(archive.read_bytes() + b"\0")
     with pytest.raises(AssetError, match=f"expected {pack.sha256}"):
@@ -106,7 +104,7 @@ def test_the_client_fetches_the_pinned_version(
     assert names_in(tmp_path / "packs") == {"boxes"}
 
 
-def test_a_missing_client_is_named(
+def test_missing_clients_are_named(
     pack: Pack, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
@@ -139,9 +137,7 @@ def test_an_archive_without_an_end_is_refused(pack: Pack, tmp_path: Path) -> Non
         install(pack, tmp_path / "packs", Path("/dev/zero"))
 
 
-def test_a_killed_installation_leaves_nothing_behind(
-    pack: Pack, archive: Path, tmp_path: Path
-) -> None:
+def test_a_killed_installation_leaves_nothing(pack: Pack, archive: Path, tmp_path: Path) -> None:
     """No pack is seen, and the next installation sweeps up."""
     folder = tmp_path / "packs"
     dying = replace(pack, converter="tests.packs.converters:killed")
@@ -165,9 +161,7 @@ def test_a_failed_exchange_keeps_the_old_pack(pack: Pack, archive: Path, tmp_pat
     verify("boxes", folder)
 
 
-def test_two_installations_at_once_are_kept_apart(
-    pack: Pack, archive: Path, tmp_path: Path
-) -> None:
+def test_two_installations_at_once_stay_apart(pack: Pack, archive: Path, tmp_path: Path) -> None:
     import fcntl
 
     folder = tmp_path / "packs"
@@ -179,9 +173,7 @@ def test_two_installations_at_once_are_kept_apart(
 
 
 @pytest.mark.parametrize("damage", ["changed", "missing", "was not installed"])
-def test_verify_finds_every_difference(
-    damage: str, pack: Pack, archive: Path, tmp_path: Path
-) -> None:
+def test_verify_finds_differences(damage: str, pack: Pack, archive: Path, tmp_path: Path) -> None:
     """One byte, one file less, one file more."""
     folder = tmp_path / "packs"
     install(pack, folder, archive)
@@ -206,7 +198,7 @@ def test_a_removed_pack_is_gone(pack: Pack, archive: Path, tmp_path: Path) -> No
         remove("boxes", folder)
 
 
-def test_a_new_revision_of_the_conversion_is_out_of_date(
+def test_a_new_conversion_makes_packs_out_of_date(
     pack: Pack, archive: Path, tmp_path: Path
 ) -> None:
     """An upgrade of gen-data then requires a new installation."""

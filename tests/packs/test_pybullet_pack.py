@@ -97,9 +97,7 @@ def test_without_pybullet_and_its_pack_everything_else_is_there(
         bare.get("pybullet/no")
 
 
-def test_the_tabletop_without_its_arm_names_the_pack(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_missing_arm_names_its_pack(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Where nothing may be fetched: before anything is generated, with the place of the name."""
     without_pybullet(monkeypatch)
     monkeypatch.setenv("GEN_DATA_OFFLINE", "1")

@@ -76,7 +76,7 @@ def test_people_from_formulas_are_always_offered(tmp_path: Path) -> None:
     assert len(library.keypoints(asset.asset_id)) == 17
 
 
-def test_without_the_pack_only_people_from_formulas_exist(
+def test_without_the_pack_people_are_formulas(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The family of the pack is absent; with the file it is there and has the tag ``pack``."""
@@ -91,7 +91,7 @@ def test_without_the_pack_only_people_from_formulas_exist(
         importlib.reload(people)
 
 
-def test_packs_lie_in_the_folder_that_the_environment_names(
+def test_packs_lie_where_the_environment_says(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Else in the user's data folder."""

@@ -88,9 +88,7 @@ def test_the_last_event_of_a_pixel_decides_its_colour() -> None:
 
 
 @pytest.mark.parametrize(("velocity", "channel"), [(-20.0, 2), (0.0, 1), (20.0, 0)])
-def test_detections_are_seen_from_above_in_the_colour_of_their_speed(
-    velocity: float, channel: int
-) -> None:
+def test_detections_are_seen_from_above_by_their_speed(velocity: float, channel: int) -> None:
     """10 m ahead and 10 m to the left: a fifth of 50 m right of and above the middle."""
     table = radar_table(
         range_m=10.0 * 2.0**0.5, azimuth_rad=np.pi / 4, velocity_compensated_m_s=velocity,

@@ -216,9 +216,7 @@ def test_cameras_and_lamps_keep_clear_of_housings() -> None:
         ({"luminous_flux_lm": 5.0, "illuminance_lux": 5.0}, "exclude each other"),
     ],
 )
-def test_impossible_lights_are_refused_when_they_are_read(
-    given: dict[str, float], said: str
-) -> None:
+def test_impossible_lights_are_refused_when_read(given: dict[str, float], said: str) -> None:
     with pytest.raises(ValidationError, match=said):
         Lighting.model_validate({"name": "lamps", **given})
 

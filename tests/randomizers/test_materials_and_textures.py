@@ -94,7 +94,7 @@ def test_unknown_target_is_named(made: Callable[[tuple[str, ...]], RandomizerBas
 
 
 @looks
-def test_geometry_and_labels_are_left_alone(
+def test_geometry_and_labels_are_left(
     made: Callable[[tuple[str, ...]], RandomizerBase],
 ) -> None:
     """Looks are looks: poses, assets, instances stay."""

@@ -50,9 +50,7 @@ def reaching(*, holding: bool) -> ReachingHand:
 
 @pytest.mark.parametrize("radius_m", [0.018, 0.026, 0.033, 0.04, 0.046])
 @pytest.mark.parametrize("seed", [2, 9])
-def test_a_grasping_hand_touches_a_cylinder_and_hardly_enters_it(
-    radius_m: float, seed: int
-) -> None:
+def test_a_grasping_hand_touches_and_hardly_enters_a_cylinder(radius_m: float, seed: int) -> None:
     """The nearest of all vertices of skin lies within 3 mm of the cylinder; it is a hand's."""
     radii_mm = (1e3 * radius_m,) * 4
     solid = FAMILIES["hand"].build(seed=seed, pose="grasp", radii_mm=radii_mm)

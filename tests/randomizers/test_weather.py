@@ -126,9 +126,7 @@ def test_time_of_day_can_be_preethams() -> None:
         ({"turbidity": float("nan")}, "finite"),
     ],
 )
-def test_a_time_that_preethams_sky_does_not_know_is_refused(
-    given: dict[str, object], said: str
-) -> None:
+def test_a_time_unknown_to_preethams_sky_is_refused(given: dict[str, object], said: str) -> None:
     with pytest.raises(ValidationError, match=said):
         TimeOfDay.model_validate({"name": "time", "sky": "preetham", **given})
 

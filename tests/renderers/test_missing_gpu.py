@@ -54,7 +54,7 @@ def machine(monkeypatch: pytest.MonkeyPatch) -> Any:
         ),
     ],
 )
-def test_a_machine_without_a_usable_gpu_is_told_why(
+def test_an_unusable_gpu_is_told_with_why(
     machine: Any, toolkit: Any, driver: Any, text: str
 ) -> None:
     """In the error of a configuration that asks for a GPU, on one line."""

@@ -50,7 +50,7 @@ def from_above(size_px: tuple[int, int] = (48, 36)) -> Camera:
 
 @pytest.mark.parametrize("angle_deg", [60.0, 82.0])
 def test_a_matte_plane_under_a_sun_has_luminance_e_rho_over_pi(angle_deg: float) -> None:
-    """Lambert: 2000 lx at 60 degrees on an albedo of 0.5 is 159 cd/m^2; no acne at grazing light."""
+    """Lambert: 2000 lx at 60 degrees on an albedo of 0.5 is 159 cd/m^2; no acne when grazing."""
     s, c = math.sin(math.radians(angle_deg)), math.cos(math.radians(angle_deg))
     sun = Light("sun", "sun", direction=(s, 0.0, -c), illuminance_lux=2000.0)
     scene = Scene("t", (Body("p", "plane"),), lights=(sun,), environment=DARK)
@@ -166,9 +166,7 @@ def _lobe_albedo(  # noqa: ANN202
 @pytest.mark.parametrize("n_v", [0.3, 0.6, 0.95])
 @pytest.mark.parametrize("roughness", [0.3, 0.5, 0.8, 1.0])
 @pytest.mark.parametrize("metallic", [0.0, 1.0])
-def test_lamps_and_sky_see_the_same_reflectance(
-    roughness: float, metallic: float, n_v: float
-) -> None:
+def test_lamps_and_sky_see_one_reflectance(roughness: float, metallic: float, n_v: float) -> None:
     """The GGX lobe that lamps use sums to the albedo that the sky uses; white metal to 1."""
     open_device("cpu")
     fitted, summed = wp.zeros(1, device="cpu"), wp.zeros(1, device="cpu")

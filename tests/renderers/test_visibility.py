@@ -78,7 +78,7 @@ def test_depth_of_a_sphere_is_that_of_the_quadratic_equation(renderer: WarpRende
     assert np.isinf(depth[root < -0.05]).all()
 
 
-def test_normals_of_a_sphere_point_from_its_centre_and_towards_the_camera(
+def test_normals_of_a_sphere_point_outwards_and_to_the_camera(
     renderer: WarpRenderer,
 ) -> None:
     """Normals are unit, in the camera frame, and zero in the background."""
@@ -97,7 +97,7 @@ def test_normals_of_a_sphere_point_from_its_centre_and_towards_the_camera(
     assert not normals[~hit].any()
 
 
-def test_the_inside_of_a_surface_is_seen_with_its_normal_turned_round(
+def test_the_inside_of_a_surface_has_its_normal_turned_round(
     renderer: WarpRenderer,
 ) -> None:
     scene = scene_of(Body("plane", "plane", SE3((0.0, 0.0, 2.0))))
@@ -135,9 +135,7 @@ def test_the_nearer_of_two_boxes_hides_the_other(renderer: WarpRenderer) -> None
 
 
 @pytest.mark.parametrize(("edge_px", "first"), [(22.45, 22), (22.55, 23), (22.0, 22), (23.0, 23)])
-def test_a_pixel_belongs_to_what_covers_its_centre(
-    renderer: WarpRenderer, edge_px: float, first: int
-) -> None:
+def test_a_pixel_belongs_to_its_centre(renderer: WarpRenderer, edge_px: float, first: int) -> None:
     """The centre of pixel i is at i + 0.5."""
     camera = fake_library.forward_camera((64, 48), focal_px=50.0)
     left_m = (edge_px - 32.0) / 50.0 * 2.0

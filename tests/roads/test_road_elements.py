@@ -174,9 +174,7 @@ def test_roads_one_after_the_other_are_one_path(
 @pytest.mark.parametrize(
     "arms", [[0, 90, 180, 270], [0, 180, 270], [0, 70, 180, 300], [0, 140, 220], [0, 140, 180]]
 )
-def test_every_way_into_a_junction_leads_out_again(
-    library: Library, arms: list[float], lanes: int
-) -> None:
+def test_every_way_into_a_junction_leaves(library: Library, arms: list[float], lanes: int) -> None:
     """Each lane that comes in has a successor through the junction onto each road it may take."""
     roads = [
         {"type": "road", "name": f"arm{k}", "after": f"cross/{k}", "lanes": [lanes, lanes],
@@ -243,9 +241,7 @@ def test_car_park_has_a_lane_per_bay(library: Library) -> None:
         ({"type": "road_marking", "name": "m", "road": "main"}, "there is no road 'main'"),
     ],
 )
-def test_what_makes_no_street_is_refused(
-    library: Library, line: dict[str, Any], message: str
-) -> None:
+def test_what_is_no_street_is_refused(library: Library, line: dict[str, Any], message: str) -> None:
     """One message that names field and remedy."""
     with pytest.raises(ConfigError, match=message):
         built(library, line)
@@ -304,7 +300,7 @@ def test_roundabout_meets_the_road_before_it(library: Library) -> None:
         ({"arms_deg": [0, 180, 90]}, "ascending"),
     ],
 )
-def test_impossible_roundabouts_are_refused(
+def test_wrong_roundabouts_are_refused(
     library: Library, changed: dict[str, Any], message: str
 ) -> None:
     """One message that names field and remedy."""
@@ -346,9 +342,7 @@ def test_painted_signs_lie_in_their_lane(
         ({"station_m": 98}, "elements.m.station_m"),
     ],
 )
-def test_impossible_signs_are_refused(
-    library: Library, changed: dict[str, Any], message: str
-) -> None:
+def test_wrong_signs_are_refused(library: Library, changed: dict[str, Any], message: str) -> None:
     """One message that names field and remedy."""
     with pytest.raises(ConfigError, match=message):
         built(library, ROAD, {"type": "road_marking", "name": "m", "road": "main", **changed})

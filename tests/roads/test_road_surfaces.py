@@ -139,9 +139,7 @@ def test_junction_has_the_area_of_its_plan() -> None:
         ("road", {"curvature_per_m": -0.03, "traffic": "left", "rails": (0.0, 1.0)}),
     ],
 )
-def test_surfaces_are_the_same_every_time_and_face_up(
-    name: str, changed: dict[str, object]
-) -> None:
+def test_surfaces_are_always_the_same_and_face_up(name: str, changed: dict[str, object]) -> None:
     """Equal bytes; no slot is seen from below. Wires are closed tubes, no surfaces."""
     a, b = mesh_of(name, **changed), mesh_of(name, **changed)
 

@@ -92,9 +92,7 @@ def test_texts_of_users_are_no_html_in_the_card_and_the_table_of_licences() -> N
         ({"map": {"min_box_px": 20, "ignore": ["bowl"]}}, ["`min_box_px: 20, ignore: [bowl]`"]),
     ],
 )  # fmt: skip
-def test_the_card_states_what_has_no_labels(
-    labels: dict[str, Any] | None, words: list[str]
-) -> None:
+def test_a_card_states_what_has_no_labels(labels: dict[str, Any] | None, words: list[str]) -> None:
     """The configuration's limits, or the default ones."""
     given = {} if labels is None else {"labels": labels}
     plan = replace(fake_plan(), config={**fake_plan().config, **given})

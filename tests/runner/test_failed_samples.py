@@ -72,9 +72,7 @@ def test_the_manifest_of_a_whole_data_set_names_no_failures(tmp_path: Path) -> N
 @pytest.mark.parametrize(
     "trouble", [Trouble(bug_at=5), Trouble(nan_at=5)], ids=["raises", "fails while written"]
 )
-def test_a_failed_sample_leaves_no_file_and_changes_no_other(
-    tmp_path: Path, trouble: Trouble
-) -> None:
+def test_a_failed_sample_leaves_no_file_and_no_change(tmp_path: Path, trouble: Trouble) -> None:
     """Against the data set with that sample, only its image and its lines are missing."""
     make(tmp_path / "whole")
     make(tmp_path / "lacking", trouble=trouble, settings=SKIP)
@@ -95,9 +93,7 @@ def test_a_failed_sample_leaves_no_file_and_changes_no_other(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("index", [0, 3, 4, 9])
-def test_the_bytes_depend_on_the_plan_and_the_failed_samples_alone(
-    tmp_path: Path, index: int
-) -> None:
+def test_the_bytes_depend_on_the_plan_and_failed_samples(tmp_path: Path, index: int) -> None:
     """Where it fails, and how many workers there are, makes no difference to any data file."""
     make(tmp_path / "early", trouble=Trouble(bug_at=index), settings=SKIP)
     late = Trouble(errors={index: ValueError("another text")})
@@ -122,9 +118,7 @@ def test_whatever_a_plug_in_raises_fails_its_sample_alone(
 
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt(), SystemExit(3)])
-def test_what_would_end_a_process_is_an_error_of_its_sample(
-    tmp_path: Path, error: BaseException
-) -> None:
+def test_what_would_end_a_process_is_a_samples_error(tmp_path: Path, error: BaseException) -> None:
     """Without the option, the run ends with the sample, the class and a command."""
     with pytest.raises(SampleError, match=rf"sample 5: {type(error).__name__}: ") as caught:
         make(tmp_path, trouble=Trouble(errors={5: error}), workers=1)
@@ -180,9 +174,7 @@ def test_a_worker_that_is_killed_once_loses_no_sample(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("error", [OutOfMemory("no memory"), StorageError("disk full")])
-def test_errors_of_the_machine_are_no_failures_of_samples(
-    tmp_path: Path, error: BaseException
-) -> None:
+def test_errors_of_the_machine_fail_no_samples(tmp_path: Path, error: BaseException) -> None:
     """They would make a data set that depends on the machine."""
     with pytest.raises(type(error)):
         make(tmp_path, trouble=Trouble(errors={5: error}), settings=SKIP)
@@ -206,7 +198,7 @@ def test_a_shard_in_which_every_sample_fails_is_a_valid_part(tmp_path: Path) -> 
     assert StoredSamples(tmp_path).sample(8).index == 8
 
 
-def test_an_unfinished_data_set_is_resumed_without_trying_failed_samples_again(
+def test_an_unfinished_data_set_is_resumed_without_its_failed_samples(
     tmp_path: Path,
 ) -> None:
     """What was committed stays; the second run makes the shard that was missing."""

@@ -116,9 +116,7 @@ def test_a_record_with_a_path_outside_is_no_record(tmp_path: Path, key: str) -> 
     assert parse_unchecked_record(data) is None
 
 
-def test_opening_a_data_set_at_a_url_writes_nothing_outside_its_cache(
-    tmp_path: Path, memory: str
-) -> None:
+def test_opening_a_url_writes_nothing_outside_its_cache(tmp_path: Path, memory: str) -> None:
     make(tmp_path / "set")
     plant(tmp_path / "set")
     publish(tmp_path / "set", memory)

@@ -271,9 +271,7 @@ def test_the_command_that_made_a_data_set_repairs_an_object_of_equal_size(
 
 
 @pytest.mark.parametrize("lost", ["shards/000000/labels.jsonl", "manifest.json", "plan.json"])
-def test_damage_and_a_missing_object_are_repaired_by_one_command(
-    lost: str, tmp_path: Path, memory: str
-) -> None:
+def test_damage_and_missing_objects_are_repaired(lost: str, tmp_path: Path, memory: str) -> None:
     make(tmp_path / "here")
     make_at(memory)
     exchange(f"{memory}/shards/000001/color/rgb/000000005.png")

@@ -81,9 +81,7 @@ def committed(out: Path) -> int:
 
 
 @pytest.mark.slow
-def test_a_killed_worker_is_replaced_and_its_shard_made_again(
-    tmp_path: Path, reference_digest: str
-) -> None:
+def test_a_killed_workers_shard_is_made_again(tmp_path: Path, reference_digest: str) -> None:
     """One SIGKILL at sample 5: the same bytes, and the log says what happened."""
     trouble = Trouble(killed_once_at=5, marker=str(tmp_path / "marker"))
 
@@ -110,9 +108,7 @@ def test_a_poisoned_sample_is_named_and_all_other_shards_are_made(tmp_path: Path
 
 
 @pytest.mark.slow
-def test_a_healed_run_completes_what_a_poisoned_one_left(
-    tmp_path: Path, reference_digest: str
-) -> None:
+def test_a_healed_run_completes_a_poisoned_one(tmp_path: Path, reference_digest: str) -> None:
     """After the cause is gone, the same command makes the one missing shard."""
     with pytest.raises(WorkerLost):
         make(tmp_path / "out", workers=1, trouble=Trouble(killed_at=6))
@@ -124,9 +120,7 @@ def test_a_healed_run_completes_what_a_poisoned_one_left(
 
 
 @pytest.mark.slow
-def test_a_hanging_worker_is_killed_and_its_shard_made_by_another(
-    tmp_path: Path, reference_digest: str
-) -> None:
+def test_a_hanging_worker_is_killed_and_replaced(tmp_path: Path, reference_digest: str) -> None:
     """Silence over the limit counts as death."""
     trouble = Trouble(hangs_once_at=5, marker=str(tmp_path / "marker"))
 
@@ -137,9 +131,7 @@ def test_a_hanging_worker_is_killed_and_its_shard_made_by_another(
 
 
 @pytest.mark.slow
-def test_killed_workers_leave_no_temporary_files(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_killed_workers_leave_no_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """What engines put into temporary folders goes with the run, under a name of any length."""
     elsewhere = tmp_path / "temporary"
     elsewhere.mkdir()
@@ -200,7 +192,7 @@ def test_what_workers_print_and_how_they_crash_is_kept_in_the_run_folder(tmp_pat
 
 @pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_ctrl_c_stops_quickly_keeps_shards_and_tells_how_to_go_on(
+def test_ctrl_c_stops_quickly_and_tells_how_to_go_on(
     tmp_path: Path, number: signal.Signals
 ) -> None:
     """Exit code 130, the resume command, nobody left running."""
@@ -306,9 +298,7 @@ def test_a_worker_that_stood_by_makes_the_same_files(tmp_path: Path, reference_d
     assert notes_of(tmp_path / "out") == []
 
 
-def test_a_worker_that_died_while_it_stood_by_is_replaced(
-    tmp_path: Path, reference_digest: str
-) -> None:
+def test_a_worker_that_died_standing_by_is_replaced(tmp_path: Path, reference_digest: str) -> None:
     """The run starts another process in its place."""
     with StandbyWorker() as standby:
         standby.process.kill()

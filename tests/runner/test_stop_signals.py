@@ -94,9 +94,7 @@ def test_a_signal_lets_a_command_clean_up(tmp_path: Path, number: signal.Signals
 
 
 @pytest.mark.parametrize("body", [SWALLOWS, COMPUTES], ids=["swallowed", "native code"])
-def test_a_signal_that_has_no_effect_ends_the_process_all_the_same(
-    tmp_path: Path, body: str
-) -> None:
+def test_a_signal_without_effect_ends_the_process_all_the_same(tmp_path: Path, body: str) -> None:
     """Code that drops KeyboardInterrupt, or computes for hours, is ended after the patience."""
     process = start(body, tmp_path)
 

@@ -291,9 +291,7 @@ def test_a_second_run_on_the_folder_is_refused(tmp_path: Path) -> None:
     assert doubles.make(tmp_path / "out").made == 10
 
 
-def test_a_folder_without_record_is_quarantined_and_made_again(
-    tmp_path: Path, reference_digest: str
-) -> None:
+def test_a_folder_without_record_is_made_again(tmp_path: Path, reference_digest: str) -> None:
     """What a kill between folder and record leaves is no shard."""
     out = tmp_path / "out"
     doubles.make(out)
@@ -351,9 +349,7 @@ def test_a_damaged_shard_of_a_finished_data_set_is_made_again(
     assert doubles.tree_digest(out) == reference_digest
 
 
-def test_a_flipped_bit_of_a_finished_data_set_is_repaired(
-    tmp_path: Path, reference_digest: str
-) -> None:
+def test_a_flipped_bit_of_a_data_set_is_repaired(tmp_path: Path, reference_digest: str) -> None:
     """Equal sizes hide nothing: the same command hashes what it finds."""
     out = tmp_path / "out"
     doubles.make(out)
@@ -372,9 +368,7 @@ def test_a_flipped_bit_of_a_finished_data_set_is_repaired(
         ({"extra": {"mine": {"x": [float("nan")]}}}, r"sample 5: .*extra\.mine\.x\[0\]: is NaN"),
     ],
 )
-def test_an_invalid_sample_is_never_written(
-    tmp_path: Path, change: dict[str, object], message: str
-) -> None:
+def test_no_invalid_sample_is_left(tmp_path: Path, change: dict[str, object], message: str) -> None:
     """The run stops with exit code 6, sample and field; the shards before it stay."""
 
     class Invalid(doubles.FakePipeline):
@@ -634,9 +628,7 @@ def test_a_run_that_will_not_fit_stops_after_its_first_shard(
     assert names_in(tmp_path / "out" / "shards") == {"000000", "000000.json"}
 
 
-def test_a_plan_is_the_first_file_in_the_folder(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_plan_is_the_first_file_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Wherever a run stops, a folder with shards has a plan."""
     monkeypatch.setattr(LocalStore, "scan", lambda *_, **__: (_ for _ in ()).throw(Killed()))
 

@@ -97,9 +97,7 @@ def test_every_flipped_bit_is_found_by_full_verification(dataset: Path) -> None:
         ),
     ],
 )
-def test_a_deviation_names_file_and_sample(
-    dataset: Path, damage: Callable[[Path], object], message: str
-) -> None:
+def test_deviations_are_told(dataset: Path, damage: Callable[[Path], object], message: str) -> None:
     """Once each; sizes, missing and extra files are seen without hashing."""
     damage(dataset)
 

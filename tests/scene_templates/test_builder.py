@@ -300,9 +300,7 @@ def test_assets_are_chosen_by_tags_and_ids(chosen: dict[str, Any], assets: set[s
         ({**DESK, "height_m": 0.5}, r"elements\.table: two elements have this name"),
     ],
 )
-def test_relations_that_cannot_hold_are_told_with_their_place(
-    line: dict[str, Any], message: str
-) -> None:
+def test_impossible_relations_are_told_with_their_place(line: dict[str, Any], message: str) -> None:
     """One message naming the element, the fact and what was probably meant."""
     with pytest.raises(ConfigError, match=message):
         built(DESK, line)

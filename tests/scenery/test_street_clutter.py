@@ -132,9 +132,7 @@ class VehicleAssets(PoleAssets):
 
 
 @pytest.mark.parametrize(("assets", "is_free"), [(PoleAssets(), True), (VehicleAssets(), False)])
-def test_things_may_stand_and_cameras_be_below_the_cables_of_poles(
-    assets: PoleAssets, is_free: bool
-) -> None:
+def test_things_may_stand_below_the_cables_of_poles(assets: PoleAssets, is_free: bool) -> None:
     """Only the pole itself takes room, of the ground and of views."""
     body = Body("pole", "pole", SE3(), instance_id=1)
     ground = make_ground((body,), assets)

@@ -105,9 +105,7 @@ def test_a_published_camera_is_scaled_to_the_width_and_cut_to_the_height() -> No
         ),
     ],
 )
-def test_what_is_no_lens_is_refused_before_anything_is_made(
-    given: dict[str, Any], message: str
-) -> None:
+def test_what_is_no_lens_is_refused_before_anything(given: dict[str, Any], message: str) -> None:
     with pytest.raises(ValidationError, match=message):
         RgbCamera.model_validate(given)
 

@@ -104,9 +104,7 @@ def test_a_table_of_beams_replaces_the_lasers_of_a_model(tmp_path: Path) -> None
         ("", "table.csv:1:1: expected columns"),
     ],
 )
-def test_what_is_wrong_in_a_table_is_told_with_its_place(
-    table: str, message: str, tmp_path: Path
-) -> None:
+def test_a_wrong_table_is_told_with_its_place(table: str, message: str, tmp_path: Path) -> None:
     assert message in told(tmp_path, "beams: table.csv", table_csv=table)
 
 
@@ -202,7 +200,7 @@ def test_a_step_in_azimuth_gives_the_pulses_of_a_turn(tmp_path: Path) -> None:
         ("like: VLP-16\nrate_hz: 9\n", "unknown key 'rate_hz'"),
     ],
 )  # fmt: skip
-def test_a_short_sheet_with_a_fault_is_refused_in_one_message(
+def test_a_short_faulty_sheet_is_refused_in_one_message(
     tmp_path: Path, text: str, fact: str
 ) -> None:
     message = told(tmp_path, "model: s.yaml", s_yaml=text)

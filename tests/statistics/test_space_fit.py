@@ -139,7 +139,7 @@ def test_box_is_uniform_by_volume() -> None:
     ("radius_m", "elevation_deg"),
     [((0.6, 1.2), (15.0, 75.0)), ((0.0, 2.0), (-90.0, 90.0)), ((3.0, 3.5), (-20.0, 0.0))],
 )
-def test_shell_is_uniform_by_volume(
+def test_shells_are_by_volume(
     radius_m: tuple[float, float], elevation_deg: tuple[float, float]
 ) -> None:
     """Radius cubed, sine of elevation and azimuth are uniform and independent."""

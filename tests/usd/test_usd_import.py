@@ -278,7 +278,7 @@ def broken(folder: Path, kind: str) -> None:
         "compressed",
     ],
 )
-def test_a_bad_stage_is_one_clear_error(
+def test_bad_stages_are_one_error(
     fault: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     """The file is named, the fault and the remedy; the library behind prints nothing."""

@@ -111,7 +111,7 @@ def test_brake_dust_darkens_and_dulls_rims() -> None:
 
 @pytest.mark.slow
 @for_every([(0.012, 0.011, 0.014), (0.8, 0.8, 0.78), (0.25, 0.01, 0.012)])
-def test_a_clean_texture_is_the_paint_and_a_dirty_one_nears_dust(
+def test_a_clean_texture_is_paint_and_a_dirty_one_nears_dust(
     color: tuple[float, float, float],
 ) -> None:
     """Within a step of 8 bits; the dirtiest place is mostly dust."""

@@ -80,9 +80,7 @@ for_every_variant = for_every(
 
 @first_and_all
 @pytest.mark.parametrize("name", FAMILIES)
-def test_every_variant_is_as_big_as_real_ones_and_within_its_budget(
-    name: str, how_many: str
-) -> None:
+def test_every_variant_is_as_big_as_real_ones_and_in_budget(name: str, how_many: str) -> None:
     """The first two, or a dozen of the seeds that are offered for selection."""
     lengths, widths, heights, triangles = LIMITS[name]
     variants = FAMILIES[name].variants

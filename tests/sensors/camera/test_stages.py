@@ -365,9 +365,7 @@ def test_white_balance_takes_out_the_light_of_a_lamp() -> None:
 
 
 @pytest.mark.parametrize(("norm", "tolerance"), [(1, 0.4), (6, 0.06), (50, 0.03)])
-def test_white_surface_corrects_a_colored_scene_by_larger_norms(
-    norm: float, tolerance: float
-) -> None:
+def test_white_surface_corrects_a_scene_by_larger_norms(norm: float, tolerance: float) -> None:
     """A red wall with a white patch under a warm lamp: grey world takes the wall for light."""
     lamp = np.array([0.8, 0.6, 0.4], np.float32)
     image = np.broadcast_to(np.array([0.5, 0.2, 0.1], np.float32) * lamp, (48, 64, 3)).copy()
