@@ -9,21 +9,15 @@ import numpy as np
 import pytest
 
 from gen_data.assemble.config import load_config
-from gen_data.assemble.pipeline_factory import nominal_scene, open_pipeline
-from gen_data.assets.library import Library, open_library
+from gen_data.assemble.pipeline_factory import nominal_scene
 from gen_data.core.errors import ConfigError
 from gen_data.core.scene import Scene
 from gen_data.core.scene_time import place_sensors
 from gen_data.core.se3 import SE3
 from gen_data.sensors.camera.rgb_camera import RgbCamera
 from gen_data.sensors.lidar.lidar_sensor import LidarSensor
+from tests.libraries import library
 from tests.tiers import sampled
-
-
-@cache
-def library() -> Library:
-    """The assets that come with the package and its dependencies."""
-    return open_library(())
 
 
 @cache
@@ -100,15 +94,6 @@ def test_a_sensor_inside_its_carrier_is_refused() -> None:
     """A camera in the middle of the car sees nothing but the car."""
     with pytest.raises(ConfigError, match=r"'image_02': offset_m is .* inside 'ego'"):
         rig_scene("kitti_rig", "sensors.image_02.offset_m=[1.0, 0, 0.7]")
-
-
-@pytest.mark.slow
-def test_a_rate_that_does_not_fit_is_refused() -> None:
-    """KITTI's rig steps by 0.1 s."""
-    fixed = ("shared.district=residential", "shared.junction=x", "shared.crossing=lines")
-    spec = load_config("kitti_rig", overrides=("sensors.image_03.rate_hz=4", *fixed))
-    with pytest.raises(ConfigError, match=r"'image_03': rate_hz 4 does not fit step_s 0\.1"):
-        open_pipeline(spec)
 
 
 @pytest.mark.slow

@@ -38,11 +38,6 @@ def test_the_seed_may_be_left_out(library: Library) -> None:
     assert library.get("desk?width_m=1.6").sha256 == library.get("desk?seed=0&width_m=1.60").sha256
 
 
-def test_one_spelling_for_one_asset(library: Library) -> None:
-    """Numbers in their shortest form, keys sorted."""
-    assert library.get("desk?width_m=1.60&seed=2").asset_id == "desk?seed=2&width_m=1.6"
-
-
 def test_a_seed_looks_the_same_after_another_size(library: Library, tmp_path: Path) -> None:
     """Nothing that was asked for remains in a cache."""
     before = library.mesh("bookcase?seed=1").vertices_m.copy()

@@ -18,11 +18,6 @@ def first(streams: Streams, name: str = "lighting/sun") -> float:
     return streams.rng(name).random()
 
 
-def test_the_same_key_gives_the_same_numbers() -> None:
-    assert first(BASE) == first(BASE)
-    assert (BASE.rng("a").random(5) == BASE.rng("a").random(5)).all()
-
-
 def test_drawing_elsewhere_moves_nothing() -> None:
     """A randomizer can be inserted, removed or moved without changing what others draw."""
     alone = BASE.rng("lighting/sun").random(3)

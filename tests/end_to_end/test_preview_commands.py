@@ -50,16 +50,6 @@ def test_recording_is_accepted_by_rerun(tmp_path: Path) -> None:
     assert verified.returncode == 0, verified.stderr
 
 
-def test_describe_lists_and_explains(tmp_path: Path) -> None:
-    """Every plug-in and template is named; one is explained with its fields."""
-    listed = gen_data("describe", cwd=tmp_path)
-    explained = gen_data("describe", "lighting", cwd=tmp_path)
-
-    assert "template: arm_task, bin_picking, highway" in listed.stdout
-    assert "kitti_stereo" in listed.stdout
-    assert "illuminance_lux" in explained.stdout
-
-
 def test_shipped_schema_is_the_generated_one(tmp_path: Path) -> None:
     """Editors complete from configs/schema.json; ``gen-data schema`` prints the same."""
     from gen_data import configs

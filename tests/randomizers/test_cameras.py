@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from gen_data.config.distributions import Constant, Uniform
-from gen_data.core.errors import ConfigError, LayoutRejected
+from gen_data.core.errors import LayoutRejected
 from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.scene import Body, Camera, Region, Scene
 from gen_data.core.se3 import SE3
@@ -121,11 +121,6 @@ def test_one_of_several_cameras_can_be_moved_alone() -> None:
 
     assert scene.camera("left") == SCENE.camera("left")
     assert scene.camera("right") != SCENE.camera("right")
-
-
-def test_unknown_camera_is_named() -> None:
-    with pytest.raises(ConfigError, match=r"no camera 'rigth'.*did you mean 'right'"):
-        orbit(camera="rigth")
 
 
 def test_every_camera_is_drawn_for_itself() -> None:

@@ -16,7 +16,7 @@ from gen_data.core.scene import Body, Light, Scene
 from gen_data.core.scene import Weather as SceneWeather
 from gen_data.core.se3 import SE3
 from gen_data.randomizers import TABLE
-from gen_data.randomizers.street_lights import StreetLights, spot_intensity_cd, white_balanced_color
+from gen_data.randomizers.street_lights import spot_intensity_cd, white_balanced_color
 from gen_data.randomizers.time_of_day import TimeOfDay
 from gen_data.randomizers.weather import ALTITUDES_DEG, CONDITIONS, PRESETS
 from gen_data.sky import daylight
@@ -203,7 +203,3 @@ def test_warm_lamps_look_warm_and_cold_ones_do_not() -> None:
 
     assert ratios == sorted(ratios, reverse=True)
     assert 0.8 < ratios[-1] < 2.0
-
-
-def test_street_lights_are_a_frozen_record() -> None:
-    assert made("street_lights") == StreetLights(type="street_lights", name="street_lights")

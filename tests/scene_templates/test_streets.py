@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import math
-from functools import cache
 
 import numpy as np
 import pytest
 
-from gen_data.assets.library import Library, open_library
 from gen_data.core.errors import ConfigError
 from gen_data.core.scene import Body, Scene
 from gen_data.scene_templates.builder import build_scene
@@ -17,11 +15,7 @@ from gen_data.scene_templates.lane_objects import LaneObjects
 from gen_data.scene_templates.objects import AssetChoice
 from gen_data.scene_templates.road import Road
 from gen_data.scene_templates.signals import Signals
-
-
-@cache
-def library() -> Library:
-    return open_library(())
+from tests.libraries import library
 
 
 def crossing() -> list[object]:
