@@ -95,37 +95,19 @@ def truths() -> tuple[ObjectTruth, ...]:
     return annotate_objects(*scene_and_reading(), annotators(), Thresholds()).objects
 
 
-def test_instances_come_by_id_and_the_unannotated_not_at_all(
-    truths: tuple[ObjectTruth, ...],
-) -> None:
-    """The scene lists the mug first; the carpet is seen and has no annotation."""
-    assert [truth.instance.name for truth in truths] == ["arm", "mug"]
+def test_measures_are_of_visible_and_whole_silhouettes(truths: tuple[ObjectTruth, ...]) -> None:
+    """By instance id: of 80 px of the arm, 32 are left of the image and 12 behind the mug.
 
-
-def test_visible_box_and_count_are_of_the_visible_pixels(truths: tuple[ObjectTruth, ...]) -> None:
-    """48 px of the arm are in the image, 12 of them behind the mug."""
-    arm, mug = truths
-
-    assert (arm.visible_px, arm.box) == (36, BoxPx(0, 2, 6, 10))
-    assert (mug.visible_px, mug.box) == (24, BoxPx(4, 4, 8, 10))
-
-
-def test_amodal_box_is_of_the_silhouette_beyond_the_image(
-    truths: tuple[ObjectTruth, ...],
-) -> None:
-    """Hidden columns count, and so do those left of the image."""
-    arm, mug = truths
-
-    assert arm.amodal_box == BoxPx(-4, 2, 6, 10)
-    assert mug.amodal_box == mug.box
-
-
-def test_visibility_is_three_ratios_of_pixel_counts(truths: tuple[ObjectTruth, ...]) -> None:
-    """Arm: 36 of 80 visible, 12 of 48 hidden, 32 of 80 outside. Mug: whole."""
-    arm, mug = truths
-
-    assert (arm.visible_fraction, arm.occlusion, arm.truncation) == (36 / 80, 12 / 48, 32 / 80)
-    assert (mug.visible_fraction, mug.occlusion, mug.truncation) == (1.0, 0.0, 0.0)
+    The carpet is seen and has no annotation.
+    """
+    assert [
+        (t.instance.name, t.visible_px, t.box, t.amodal_box, t.visible_fraction, t.occlusion)
+        for t in truths
+    ] == [
+        ("arm", 36, BoxPx(0, 2, 6, 10), BoxPx(-4, 2, 6, 10), 36 / 80, 12 / 48),
+        ("mug", 24, BoxPx(4, 4, 8, 10), BoxPx(4, 4, 8, 10), 1.0, 0.0),
+    ]
+    assert [t.truncation for t in truths] == [32 / 80, 0.0]
 
 
 def test_masks_fill_their_boxes(truths: tuple[ObjectTruth, ...]) -> None:

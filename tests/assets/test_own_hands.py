@@ -67,12 +67,9 @@ def test_a_changed_hand_changes_the_digest(tmp_path: Path) -> None:
     assert one != two
 
 
-def test_links_of_one_name_are_refused(tmp_path: Path) -> None:
+def test_hands_that_do_not_fit_are_refused(tmp_path: Path) -> None:
     with pytest.raises(AssetError, match=r"arm\.urdf: it has a link or joint 'base', as its tool"):
         robot(tmp_path, "arm.urdf")
-
-
-def test_an_unknown_finger_joint_is_refused(tmp_path: Path) -> None:
     with pytest.raises(AssetError, match=r"no movable joint 'opn' \(did you mean 'open'\?\)"):
         robot(tmp_path, joint="opn")
 

@@ -117,11 +117,8 @@ def test_aliases_are_expanded() -> None:
     }
 
 
-def test_a_byte_order_mark_is_ignored() -> None:
+def test_byte_order_marks_and_windows_line_ends_are_read() -> None:
     assert parse_yaml("\ufeffa: 1", "x.yaml").plain() == {"a": 1}
-
-
-def test_windows_line_ends_are_line_ends() -> None:
     assert message_of("a: 1\r\na: 2\r\n").startswith("x.yaml:2:1: a: duplicate key")
 
 

@@ -14,14 +14,10 @@ PRIMARIES_XY = ((0.640, 0.330), (0.300, 0.600), (0.150, 0.060))
 """ITU-R BT.709-6, item 1.3."""
 
 
-def test_white_has_luminance_one() -> None:
-    """The weights add up to 1, and are the middle row of the matrix to XYZ."""
+def test_white_is_d65_of_luminance_one() -> None:
+    """Weights add up to 1, as the middle row of the matrix to XYZ; equal parts give D65."""
     assert colorimetry.luminance(np.ones((2, 3, 3))) == pytest.approx(np.ones((2, 3)), abs=1e-15)
     assert colorimetry.XYZ_FROM_REC709[1] == pytest.approx(colorimetry.REC709_LUMINANCE, abs=0.0)
-
-
-def test_white_is_d65() -> None:
-    """Equal parts of the primaries have the tristimulus values of D65."""
     assert colorimetry.XYZ_FROM_REC709 @ np.ones(3) == pytest.approx(D65_XYZ, abs=1e-4)
     white = colorimetry.REC709_FROM_XYZ @ D65_XYZ
     assert white == pytest.approx(np.ones(3), abs=1e-3)

@@ -43,14 +43,10 @@ def test_rle_of_a_crop_is_what_pycocotools_makes_of_the_whole_mask(
 
 
 def test_runs_begin_with_zeros_and_go_down_columns() -> None:
-    """Also where there are none; a last run of no zeros is left out."""
+    """A last run of no zeros is left out; amodal masks outside the image are empty."""
     one = MaskPx(2, 1, np.ones((1, 1), dtype=bool))
     assert run_lengths(one, 3, 4) == [7, 1, 4]  # two columns and a row before it
     assert run_lengths(MaskPx(0, 0, np.ones((3, 4), dtype=bool)), 3, 4) == [0, 12]
-
-
-def test_an_empty_mask_is_one_run_of_zeros() -> None:
-    """What amodal masks are of things wholly outside the image."""
     mask = MaskPx(0, 0, np.zeros((0, 0), dtype=bool))
 
     assert not coco_mask.decode(dict(encode_rle(mask, 5, 6))).any()

@@ -63,17 +63,11 @@ def test_a_task_that_refers_to_an_unknown_thing_is_refused() -> None:
         Task.model_validate_json((MINIMAL % "it").replace("{it}.", "{lid}."))
 
 
-def test_more_failures_than_demonstrations_are_refused() -> None:
+def test_a_task_that_cannot_be_is_refused_by_its_field() -> None:
     with pytest.raises(ValidationError, match="add up to more than 1"):
         Failures(slip=0.7, miss=0.4)
-
-
-def test_an_unknown_task_is_refused_by_its_field() -> None:
     with pytest.raises(ConfigError, match=r"randomizers\.things\.task: unknown task"):
         ArmTask(name="things", task=Constant("dance")).possible_assets(FakeAssets())
-
-
-def test_a_template_without_the_group_is_refused() -> None:
     with pytest.raises(
         ConfigError, match=r"randomizers\.toys\.group: the template has no object group 'toys'"
     ):

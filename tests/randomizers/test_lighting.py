@@ -256,12 +256,9 @@ def test_broken_ceiling_panels_are_dark_and_there() -> None:
     assert unseen.bodies == ()
 
 
-def test_unknown_kind_of_panel_is_named() -> None:
+def test_unknown_kinds_of_lights_and_panels_are_named() -> None:
     with pytest.raises(ValidationError, match=r"there is no 'dsik'.*did you mean 'disk'"):
         ceiling(kind="dsik")
-
-
-def test_unknown_kind_of_light_is_named() -> None:
     with pytest.raises(ValidationError, match=r"there is no 'spehre'.*did you mean 'sphere'"):
         lit(kind=Choice(["spehre"]))
 
@@ -281,8 +278,3 @@ def test_environment_is_one_of_those_asked_for() -> None:
         assert math.pi / 2 <= environment.yaw_rad <= math.pi + 1e-6
         assert not environment.visible
     assert seen == {f"environment/{name}?seed={k}" for name in ("studio", "sky") for k in (0, 1)}
-
-
-def test_unknown_environment_is_named() -> None:
-    with pytest.raises(ConfigError, match=r"no environment is 'studoi'.*did you mean 'studio'"):
-        EnvironmentLight(name="sky", images=("studoi",))(SCENE, FakeAssets(), rng_of())

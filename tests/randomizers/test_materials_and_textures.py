@@ -239,11 +239,6 @@ def test_an_impossible_probability_is_told_with_its_place(written: str, fact: st
     assert (str(problem.position), problem.fact) == ("x.yaml:1:24", fact)
 
 
-def test_unknown_texture_is_named() -> None:
-    with pytest.raises(ConfigError, match=r"no texture 'plastre'.*did you mean 'plaster'"):
-        after(Textures(name="t", textures=("plastre",)), scene_with("brick"))
-
-
 def test_backdrop_changes_floor_and_walls_only() -> None:
     """Ceiling, door and window of the room stay; no object and no table is touched."""
     scene = scene_with("brick")

@@ -306,15 +306,11 @@ def test_impossible_relations_are_told_with_their_place(line: dict[str, Any], me
         built(DESK, line)
 
 
-def test_surface_that_is_too_small_for_every_asset_is_told() -> None:
-    """A table of 25 cm under things that are larger."""
+def test_what_has_no_room_or_no_name_is_told() -> None:
+    """A table of 25 cm under things that are larger; the library knows the nearest names."""
     tiny = {**DESK, "top_size_m": (0.19, 0.19)}
     with pytest.raises(ConfigError, match="every asset is larger than surface 'table'"):
         built(tiny, clutter(assets={"ids": ["ball"]}))
-
-
-def test_unknown_asset_and_robot_are_refused() -> None:
-    """By the library, which knows the nearest names."""
     with pytest.raises(AssetError, match="did you mean 'bottle'"):
         built(DESK, clutter(assets={"ids": ["botle"]}))
     with pytest.raises(AssetError, match="is no robot"):

@@ -164,15 +164,11 @@ def test_pixels_rest_after_an_event() -> None:
     assert apply_refractory_period(events, 0.0).time_s.tolist() == times_s.tolist()
 
 
-def test_first_instant_has_no_events_and_needs_no_picture() -> None:
+def test_a_reading_sees_its_first_and_last_instant_but_the_first_has_none() -> None:
     film = Film(lambda t: 0.5)
 
     assert len(seen(EventCamera(rig="ego"), film, 0).rows) == 0
     assert film.frames == 0
-
-
-def test_every_reading_sees_its_first_and_last_instant() -> None:
-    film = Film(lambda t: 0.5)
     seen(EventCamera(rig="ego", size_px=SIZE_PX, frames_per_step=3), film, 1)
 
     assert film.frames == 4

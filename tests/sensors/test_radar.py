@@ -245,13 +245,10 @@ def test_false_alarms_come_at_the_given_rate_and_belong_to_nothing() -> None:
     assert np.degrees(np.abs(rows["azimuth_rad"])).max() > 45.0
 
 
-def test_nothing_is_seen_outside_the_field_of_view_or_beyond_the_range() -> None:
+def test_neither_its_carrier_nor_what_is_outside_its_field_is_seen() -> None:
     """Behind it, aside of it, and at 260 m."""
     for pose in ((-30.0, 0.0), (0.0, 30.0), (270.0, 0.0)):
         assert len(reading(ideal(), world(STILL, others=[car_at(*pose)]), 0).rows) == 0
-
-
-def test_radar_does_not_see_the_car_that_carries_it() -> None:
     sensor = Radar(noise=0.0, offset_m=(0.0, 0.0, 0.5))
 
     assert len(reading(sensor, world(STILL), 0).rows) == 0

@@ -16,13 +16,9 @@ def shutter(**fields: Any) -> Shutter:
     return RgbCamera.model_validate(fields).mount(Scene("t")).cameras[0].shutter
 
 
-def test_a_camera_sees_an_instant_unless_told_otherwise() -> None:
-    """Without either there is no shutter."""
+def test_a_camera_sees_an_instant_unless_an_exposure_has_a_time() -> None:
     assert shutter() == INSTANT
     assert INSTANT.open_s == 0.0
-
-
-def test_an_exposure_has_a_time_and_a_number_of_samples() -> None:
     assert shutter(exposure={"time_s": 0.01}) == Shutter(0.01, 0.0, 8)
     assert shutter(exposure={"time_s": 0.01, "samples": 32}) == Shutter(0.01, 0.0, 32)
 
