@@ -85,24 +85,6 @@ def test_whatever_is_drawn_was_projected() -> None:
     assert apart > 0
 
 
-def test_a_frame_does_not_depend_on_the_frames_before_it() -> None:
-    """The third of three views is the same when it is the first."""
-    meshes = {"slab": fake_library.box_mesh((8.0, 0.4, 1.0))}
-    scene = slabs_all_around()
-    targets = ((1.0, 0.2, 0.1), (-1.0, 0.4, -0.3), (0.2, 1.0, 0.5))
-    cameras = [fake_library.camera_at((0.0, 0.0, 0.0), target) for target in targets]
-    wanted = frozenset({Channel.INSTANCE, Channel.Z_DEPTH, Channel.RADIANCE})
-    warm, fresh = (WarpRenderer(fake_library.FakeLibrary(meshes), "cpu") for _ in range(2))
-
-    for camera in cameras:
-        after = warm.render(scene, camera, wanted)
-    alone = fresh.render(scene, cameras[-1], wanted)
-
-    for channel in wanted:
-        np.testing.assert_array_equal(after.channels[channel], alone.channels[channel])
-    assert (after.channels[Channel.Z_DEPTH] > 0.0).all()
-
-
 def test_labels_do_not_depend_on_bodies_out_of_view() -> None:
     """The same image and silhouettes with and without bodies behind the camera."""
     scene, camera = ring_of_boxes(), fake_library.camera_at((0.0, 0.0, 0.0), (1.0, 0.2, 0.1))

@@ -231,17 +231,6 @@ def test_bands_of_a_still_world_make_the_whole_image(renderer: WarpRenderer, len
     np.testing.assert_allclose(whole.radiance.numpy(), banded.radiance.numpy(), rtol=1e-5)
 
 
-def test_an_image_does_not_depend_on_what_was_rendered_before(renderer: WarpRenderer) -> None:
-    shutter = Shutter(0.01, 0.03, samples=4)
-    scene = passing(350.0, shutter)
-    fresh = shot(WarpRenderer(MESHES, "cpu"), scene)
-    shot(renderer, passing(-200.0, shutter, time_s=0.3))
-    again = shot(renderer, scene)
-
-    for channel, image in fresh.channels.items():
-        assert np.array_equal(again.channels[channel], image), channel
-
-
 def test_points_are_projected_where_their_rows_show_them(renderer: WarpRenderer) -> None:
     """Corners of the box's face, also with a moving camera: at the corners of the mask."""
     shutter = Shutter(0.0, 0.06)
