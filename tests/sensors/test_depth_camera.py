@@ -147,20 +147,6 @@ def test_a_lens_that_is_no_pinhole_is_refused() -> None:
         DepthCamera().capture(scene(lens=fisheye), RENDERER, frozenset(), rng)
 
 
-@pytest.mark.parametrize(
-    ("wrong", "why"),
-    [
-        ({"model": "kinect_v3"}, "did you mean 'kinect_v"),
-        ({"channels": ["measured"]}, "channels"),
-        ({"model": {"range_m": [3, 1]}}, "range_m must rise"),
-        ({"model": {"principle": {"kind": "sonar"}}}, "sonar"),
-    ],
-)
-def test_values_that_make_no_depth_camera_are_refused(wrong: dict[str, Any], why: str) -> None:
-    with pytest.raises(ValidationError, match=why):
-        DepthCamera.model_validate_json(json.dumps(wrong))
-
-
 # -- structured light ----------------------------------------------------------------------------
 
 
