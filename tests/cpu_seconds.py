@@ -18,7 +18,6 @@ _BEFORE_S = pytest.StashKey[float]()
 
 
 def pytest_collection_finish(session: pytest.Session) -> None:
-    """Start to count."""
     session.config.stash[_BEFORE_S] = _used_s()
 
 

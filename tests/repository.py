@@ -13,7 +13,6 @@ ROOT = Path(__file__).parents[1]
 
 @cache
 def repository_files() -> tuple[str, ...]:
-    """Paths of all files below the root, sorted, except what ``.gitignore`` lists."""
     return tuple(sorted(_below(ROOT, (ROOT / ".gitignore").read_text("utf-8").split())))
 
 

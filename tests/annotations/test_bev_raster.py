@@ -57,7 +57,6 @@ def test_heights_are_those_of_the_highest_plane() -> None:
 
 
 def test_nothing_covers_nothing() -> None:
-    """No triangle, and one that is far away."""
     grid = Grid(SE3(), 1.0, 8)
     far = np.array([[[90.0, 90.0, 0.0], [99.0, 90.0, 0.0], [90.0, 99.0, 0.0]]])
 

@@ -12,7 +12,7 @@ from gen_data.core.boxes import BoxPx, tight_box
 
 @settings(max_examples=200, deadline=None)
 @given(st.integers(1, 8), st.integers(1, 8), st.integers(0, 4), st.integers(0, 2**32 - 1))
-def test_extents_are_count_and_tight_box_of_every_id(
+def test_extents_are_count_and_box_of_every_id(
     height: int, width: int, largest: int, seed: int
 ) -> None:
     """Small images, so that runs often end and begin at row ends; ids may be missing."""
@@ -25,20 +25,12 @@ def test_extents_are_count_and_tight_box_of_every_id(
     }
 
 
-def test_a_run_does_not_pass_from_one_row_into_the_next() -> None:
-    """The last pixel of row 0 and the first of row 1 have the same id and are no neighbours."""
+def test_extents_end_with_rows_reach_the_largest_id_and_leave_out_nothing() -> None:
+    """Ids of the last pixel of row 0 and the first of row 1 are no neighbours; 0 is no id."""
     ids = np.array([[0, 0, 7], [7, 0, 0]], np.uint16)
 
     assert find_extents(ids) == {7: Extent(2, BoxPx(0, 0, 3, 2))}
-
-
-def test_the_largest_id_is_one_like_any_other() -> None:
-    """Instance ids are 16-bit."""
     assert find_extents(np.full((2, 3), 65_535, np.uint16)) == {
         65_535: Extent(6, BoxPx(0, 0, 3, 2))
     }
-
-
-def test_an_image_of_nothing_has_no_extents() -> None:
-    """0 stands for nothing."""
     assert find_extents(np.zeros((4, 5), np.uint16)) == {}

@@ -41,7 +41,6 @@ class Picture:
     scene: Scene
 
     def said(self, kind: str) -> list[Utterance]:
-        """Utterances of a kind."""
         return [u for u in self.truth.utterances or () if u.kind == kind]
 
 
@@ -216,12 +215,10 @@ def thing(number: int, category: str, x_min: int, x_max: int, **changes: Any) ->
 
 
 def view(*things: Thing, edges: set[tuple[int, str, int]] | None = None) -> View:
-    """What an image shows."""
     return View(things, frozenset(edges or ()), {t.category for t in things}, ("candle", "cup"))
 
 
 def texts(of: View, kind: str) -> list[str]:
-    """Texts of a kind."""
     return [u.text for u in of.utterances() if u.kind == kind]
 
 

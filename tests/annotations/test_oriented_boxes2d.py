@@ -24,7 +24,6 @@ LENGTH_M, WIDTH_M, HEIGHT_M = 4.4, 1.8, 1.5
 
 
 def car(yaw_rad: float) -> Instance:
-    """A car at the origin."""
     low, high = (-LENGTH_M / 2, -WIDTH_M / 2, 0.0), (LENGTH_M / 2, WIDTH_M / 2, HEIGHT_M)
     pose = SE3.about_z(yaw_rad)
     return Instance(1, "car", "car", 1, "car", T_world_instance=pose, box_min_m=low, box_max_m=high)
@@ -64,14 +63,13 @@ def pixel_corners(eye: tuple[float, float, float], yaw_deg: float) -> Array:
 
 
 def rectangle(truth: ObjectTruth) -> Array:
-    """Corners [4, 2]."""
     assert truth.oriented_box is not None
     return np.array(truth.oriented_box)
 
 
 @pytest.mark.parametrize("yaw_deg", range(-170, 190, 40))
 @pytest.mark.parametrize("eye", [(0.0, 0.01, 60.0), (20.0, 15.0, 50.0)])
-def test_it_begins_at_the_front_left_and_goes_clockwise(
+def test_it_goes_clockwise_from_the_front_left(
     eye: tuple[float, float, float], yaw_deg: float
 ) -> None:
     """Each corner is nearest to that corner of the projected box."""
@@ -139,7 +137,6 @@ def test_a_thing_seen_from_the_front_has_an_upright_box() -> None:
 
 
 def test_a_hidden_thing_has_none() -> None:
-    """No pixel, no box."""
     truth, _ = seen((0.0, 0.01, 60.0), 0.0)
     hidden = ObjectTruth(truth.instance, 0, None)
     camera = Camera("drone", look_at((0.0, 0.01, 60.0), (0.0, 0.0, 0.0)), LENS)

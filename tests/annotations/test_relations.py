@@ -31,7 +31,6 @@ SAMPLING_M = 0.001
 
 
 def box(size_m: tuple[float, float, float], at_m: tuple[float, float, float]) -> Any:
-    """Triangles of a box around a point."""
     made = trimesh.creation.box(size_m).apply_translation(at_m)
     return np.asarray(made.triangles, np.float64)
 
@@ -82,12 +81,10 @@ def test_distances_between_faces_are_exact(gap_m: float, near: bool) -> None:
     """Large triangles, whose corners are all farther apart."""
     plate, tip = box((8, 8, 0.1), (0, 0, -0.05)), box((0.2, 0.2, 0.2), (1, 1, 0.1 + gap_m))
 
-    assert are_within(plate, tip, 0.3) == near
-    assert are_within(tip, plate, 0.3) == near
+    assert (are_within(plate, tip, 0.3), are_within(tip, plate, 0.3)) == (near, near)
 
 
 def test_rays_hit_what_is_before_them() -> None:
-    """Not what is behind."""
     wall = box((0.1, 4, 4), (2, 0, 0))
 
     hits = hits_by_rays(np.zeros((3, 3)), np.eye(3), wall)
@@ -147,9 +144,7 @@ each = pytest.mark.parametrize(("config", "index", "engine"), cases([*WORLDS, *B
 
 @pytest.mark.slow
 @each
-def test_supported_things_touch_what_supports_them_from_above(
-    config: str, index: int, engine: str
-) -> None:
+def test_things_touch_what_supports_them_from_above(config: str, index: int, engine: str) -> None:
     """Rays straight down from points of the subject, and up from its support, find the other."""
     world = settled(config, index, engine)
     assert world.pairs("supported_by")
@@ -166,9 +161,7 @@ def test_supported_things_touch_what_supports_them_from_above(
 
 
 @each
-def test_everything_at_rest_is_supported_down_to_the_furniture(
-    config: str, index: int, engine: str
-) -> None:
+def test_all_at_rest_is_supported_down_to_furniture(config: str, index: int, engine: str) -> None:
     """Physics stability: nothing floats. Chains of supports end at what physics cannot move."""
     world = settled(config, index, engine)
     below: dict[int, set[int]] = {}
@@ -186,7 +179,6 @@ def test_everything_at_rest_is_supported_down_to_the_furniture(
 
 @each
 def test_no_two_things_carry_each_other(config: str, index: int, engine: str) -> None:
-    """Gravity has one direction."""
     pairs = settled(config, index, engine).pairs("supported_by")
 
     assert not {(a, b) for a, b in pairs if (b, a) in pairs}
@@ -194,9 +186,7 @@ def test_no_two_things_carry_each_other(config: str, index: int, engine: str) ->
 
 @pytest.mark.slow
 @each
-def test_near_things_are_nearer_than_half_the_smaller_one(
-    config: str, index: int, engine: str
-) -> None:
+def test_near_things_are_nearer_than_half_the_smaller(config: str, index: int, engine: str) -> None:
     """And all others are farther; things that touch, hold or contain each other are left out."""
     world = settled(config, index, engine)
     annotated = sorted(i.instance_id for i in world.scene.instances if i.annotated)

@@ -77,7 +77,6 @@ def test_borders_of_lanes_bend_with_the_rows() -> None:
     far = {Channel.RANGE: np.full((80, 100), 1e3, np.float32)}
 
     def border(shutter: Shutter) -> dict[int, float]:
-        """Column by row of the first border."""
         at = replace(camera, shutter=shutter)
         truth = Lanes(step_px=1.0).annotate_image(
             scene,

@@ -38,7 +38,6 @@ NAN, INF = math.nan, math.inf
 
 
 def make_info() -> DatasetInfo:
-    """A camera, a laser scanner and an IMU."""
     sensors = (
         SensorInfo("color", Modality.CAMERA, channels=CHANNELS),
         SensorInfo("imu", Modality.DEVICE, "imu"),
@@ -136,8 +135,6 @@ def change_instance(**fields: Any) -> Mutation:
 
 
 def change_pixel(channel: Channel, value: float) -> Mutation:
-    """Change one random pixel."""
-
     def mutate(rng: random.Random) -> Sample:
         sample = make_sample()
         image = sample.capture.readings["color"].channels[channel]
@@ -148,8 +145,6 @@ def change_pixel(channel: Channel, value: float) -> Mutation:
 
 
 def change_points(field: str, value: float) -> Mutation:
-    """Change one random laser point."""
-
     def mutate(rng: random.Random) -> Sample:
         sample = make_sample()
         sample.capture.clouds["top"].points[field][rng.randrange(50)] = value
@@ -159,7 +154,6 @@ def change_points(field: str, value: float) -> Mutation:
 
 
 def change_sample(change: Callable[[Sample], Sample]) -> Mutation:
-    """Change the sample as a whole."""
     return lambda rng: change(make_sample())
 
 
@@ -295,7 +289,6 @@ MUTATIONS: dict[str, Mutation] = {
 
 
 def test_a_valid_sample_passes() -> None:
-    """No check refuses what is right."""
     assert list(sample_faults(make_info(), make_sample())) == []
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import pytest
@@ -15,7 +14,6 @@ from gen_data.annotations.boxes3d import Boxes3d
 from gen_data.annotations.free_space import FreeSpace
 from gen_data.annotations.lanes import Lanes
 from gen_data.annotations.motion import Motion
-from gen_data.assets.library import Library, open_library
 from gen_data.core.capture import Channel, SensorReading
 from gen_data.core.errors import ConfigError
 from gen_data.core.intrinsics import Intrinsics
@@ -27,16 +25,11 @@ from gen_data.core.se3 import SE3, Array
 from gen_data.scene_templates.builder import build_scene
 from gen_data.scene_templates.crosswalk import Crosswalk
 from gen_data.scene_templates.road import Road
+from tests.libraries import library
 
 LENS = Intrinsics.from_hfov(320, 200, math.radians(80.0))
 EYE_M = 1.6
 CAR = "car?seed=0"
-
-
-@cache
-def library() -> Library:
-    """The assets that come with the package."""
-    return open_library(())
 
 
 def street(yaw_rad: float = 0.0) -> Scene:
@@ -225,7 +218,6 @@ def test_a_map_is_level_and_looks_ahead_on_any_slope() -> None:
 
 
 def test_a_map_needs_a_rig() -> None:
-    """One clear error that tells what to add."""
     scene = replace(street(), rigs=(), cameras=(), lidars=())
 
     with pytest.raises(ConfigError, match="no rig to centre the map on; add an element 'ego'"):

@@ -41,17 +41,14 @@ class Numbers(Sequence[int]):
 
 
 def itself(sample: Any) -> Any:
-    """The target of these tests."""
     return sample
 
 
 def loader(n: int | None = 31, **options: Any) -> gen_data.Loader[int]:
-    """A loader of numbers."""
     return gen_data.Loader(Numbers(n), itself, **options)  # type: ignore[arg-type]
 
 
 def flat(batches: Iterator[list[int]] | gen_data.Loader[int]) -> list[int]:
-    """All samples in order."""
     return [item for batch in batches for item in batch]
 
 
@@ -65,7 +62,6 @@ def test_every_epoch_has_every_sample_once() -> None:
 
 
 def test_without_shuffling_the_order_is_that_of_the_data_set() -> None:
-    """In every epoch."""
     source = loader()
 
     assert flat(source) == flat(source) == list(range(31))
@@ -158,7 +154,6 @@ def test_shuffled_orders_are_uniform() -> None:
     ],
 )
 def test_wrong_arguments_are_refused(options: Any, text: str) -> None:
-    """With what was expected."""
     with pytest.raises(ConfigError, match=text):
         loader(**options)
     state = loader(seed=1).state_dict()

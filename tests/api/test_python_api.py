@@ -100,7 +100,6 @@ def test_a_data_set_without_a_size_has_no_length_and_no_end(data: gen_data.Datas
 
 
 def test_an_index_beyond_the_data_set_is_an_index_error() -> None:
-    """Of a documented type with a message, so that ``for`` loops of other libraries end."""
     data = gen_data.Dataset("tabletop.yaml", n=5, overrides=SMALL)
 
     with pytest.raises(gen_data.SampleIndexError, match="index 5 is out of range for 5 samples"):
@@ -120,7 +119,6 @@ def test_an_unknown_name_tells_which_exist(data: gen_data.Dataset) -> None:
 
 
 def test_channels_can_be_rendered_in_addition() -> None:
-    """Unit normals where something is seen, though the configuration writes none."""
     data = gen_data.Dataset(MINIMAL, channels=["normals"])
     camera = data[0].cameras["color"]
 
@@ -172,7 +170,7 @@ def test_faults_in_a_dictionary_name_the_field() -> None:
         gen_data.Dataset(wrong)
 
 
-def test_what_is_read_back_is_what_was_generated(
+def test_what_is_read_is_what_was_made(
     data: gen_data.Dataset, stored: gen_data.StoredDataset
 ) -> None:
     """Colour, ids, labels and scene are equal; depth up to half a unit of its file."""
@@ -190,7 +188,6 @@ def test_what_is_read_back_is_what_was_generated(
 
 
 def test_masks_survive_the_disk(data: gen_data.Dataset, stored: gen_data.StoredDataset) -> None:
-    """Pixel by pixel, in the place where they were."""
     for ours, theirs in zip(data[6].objects["color"], stored[6].objects["color"], strict=True):
         assert ours.mask is not None and theirs.mask is not None
         assert (ours.mask.x_px, ours.mask.y_px) == (theirs.mask.x_px, theirs.mask.y_px)
@@ -198,12 +195,10 @@ def test_masks_survive_the_disk(data: gen_data.Dataset, stored: gen_data.StoredD
 
 
 def test_a_stored_data_set_can_be_pickled(stored: gen_data.StoredDataset) -> None:
-    """The copy reads the same files."""
     assert pickle.loads(pickle.dumps(stored))[2].boxes2d["color"] == stored[2].boxes2d["color"]
 
 
 def test_an_unfinished_folder_cannot_be_opened(tmp_path: Path) -> None:
-    """The message names what is missing."""
     with pytest.raises(gen_data.StorageError, match=r"plan\.json: missing"):
         gen_data.open(tmp_path)
 
@@ -239,7 +234,6 @@ def readme_block(language: str) -> str:
 
 
 def test_the_yaml_of_the_readme_is_valid() -> None:
-    """All of its names refer to something, and its exporters fit its sensors."""
     config = parse_config(readme_block("yaml"), "README.md", "README")
 
     assert [sensor.name for sensor in config.sensors] == ["color"]
@@ -362,7 +356,6 @@ def test_relabelled_samples_have_the_classes_of_the_map(stored: gen_data.StoredD
 
 
 def test_a_label_map_must_be_given_or_configured(stored: gen_data.StoredDataset) -> None:
-    """With the place of a fault."""
     with pytest.raises(gen_data.ConfigError, match=r"labels\.map: the configuration has none"):
         stored.relabelled()
     with pytest.raises(gen_data.ConfigError, match=r"<label map>:1:\d+: classess: unknown key"):

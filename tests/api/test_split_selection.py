@@ -20,16 +20,13 @@ CONFIG = {
     "template": "tabletop",
     "views_per_scene": VIEWS,
     "splits": {"train": 0.6, "val": 0.4},
-    "sensors": [
-        {"type": "rgb_camera", "name": "color", "size_px": [32, 24], "hfov_deg": 60},
-    ],
+    "sensors": [{"type": "rgb_camera", "name": "color", "size_px": [32, 24], "hfov_deg": 60}],
     "annotations": ["boxes2d"],
     "labels": {"map": {"classes": {"mug": None}}},
 }
 
 
 def number(sample: gen_data.Sample) -> int:
-    """The target of these tests."""
     return sample.index
 
 
@@ -60,12 +57,10 @@ VAL = [k for k in range(N) if SPLITS[k] == "val"]
 
 @pytest.fixture
 def data() -> gen_data.SampleSequence:
-    """Forty samples of twenty scenes."""
     return gen_data.SampleSequence(Numbered(), range(N))
 
 
 def numbers(samples: gen_data.SampleSequence) -> list[int]:
-    """Numbers of all samples in order."""
     return [sample.index for sample in samples]
 
 
@@ -99,7 +94,6 @@ def test_a_data_set_without_end_has_splits_without_end() -> None:
 
 
 def test_a_pickled_split_is_the_same(data: gen_data.SampleSequence) -> None:
-    """Worker processes get the split."""
     again = pickle.loads(pickle.dumps(data.split("val")))
     assert numbers(again) == VAL
 
@@ -110,7 +104,7 @@ def test_a_lazy_data_set_takes_the_split_as_an_argument() -> None:
     assert not gen_data.Dataset(CONFIG, split="train").is_bounded
 
 
-def test_loaders_yield_the_samples_of_the_split_and_resume_in_it(
+def test_loaders_yield_the_split_and_resume_in_it(
     data: gen_data.SampleSequence,
 ) -> None:
     """Every sample once per epoch, whole scenes together; the rest after an interruption."""
@@ -138,9 +132,7 @@ def test_scenes_of_a_split_are_those_of_its_samples(data: gen_data.SampleSequenc
 MIXED = "samples of the splits train and val"
 
 
-def test_loaders_warn_of_mixed_splits_unless_they_are_wanted(
-    data: gen_data.SampleSequence,
-) -> None:
+def test_loaders_warn_of_mixed_splits_unless_they_are_wanted(data: gen_data.SampleSequence) -> None:
     """The remedy is named; a choice of a split, or of all, is silent."""
     with pytest.warns(gen_data.ConfigWarning, match=MIXED) as caught:
         gen_data.Loader(data, number)
@@ -165,7 +157,6 @@ def test_loaders_warn_of_mixed_splits_unless_they_are_wanted(
 
 @pytest.mark.slow
 def test_the_data_set_of_torch_warns_of_mixed_splits(data: gen_data.SampleSequence) -> None:
-    """It has the samples as they are given, too."""
     import gen_data.torch
 
     with pytest.warns(gen_data.ConfigWarning, match=MIXED):
@@ -180,7 +171,7 @@ def test_the_data_set_of_torch_warns_of_mixed_splits(data: gen_data.SampleSequen
         ("trian", "there is no split 'trian'; expected one of train, val, all .*mean 'train'"),
     ],
 )
-def test_an_unknown_split_names_those_that_exist(
+def test_an_unknown_split_names_the_others(
     data: gen_data.SampleSequence, name: str, fact: str
 ) -> None:
     """Splits without a share have no samples."""

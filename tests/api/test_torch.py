@@ -20,7 +20,6 @@ SMALL = ("sensors[0].size_px=[96, 72]", "splits={train: 1, val: 0, test: 0}")
 
 @pytest.fixture(scope="module")
 def stored(tmp_path_factory: pytest.TempPathFactory) -> gen_data.StoredDataset:
-    """Ten samples of two scenes."""
     folder = tmp_path_factory.mktemp("torch") / "set"
     gen_data.generate("tabletop.yaml", 10, out=folder, seed=3, overrides=SMALL, workers=0)
     return gen_data.open(folder)
@@ -46,7 +45,6 @@ def test_detection_targets_are_those_of_torchvisions_reference(stored: Any) -> N
 
 
 def test_masks_lie_in_their_boxes_and_have_their_areas(stored: Any) -> None:
-    """One mask per box: its extent is the box, its sum the area."""
     import gen_data.torch as gt
     from gen_data.targets import segmentation_target
 
@@ -62,7 +60,6 @@ def test_masks_lie_in_their_boxes_and_have_their_areas(stored: Any) -> None:
 
 
 def test_the_data_loader_of_torch_reads_a_finished_set(stored: Any) -> None:
-    """With its own workers and shuffling."""
     from torch.utils.data import DataLoader
 
     import gen_data.torch as gt
@@ -78,9 +75,7 @@ def test_the_data_loader_of_torch_reads_a_finished_set(stored: Any) -> None:
     assert sorted(numbers) == list(range(10))
 
 
-def test_rendering_while_training_gives_the_samples_of_the_finished_set(
-    stored: Any, tmp_path: Path
-) -> None:
+def test_rendering_in_training_gives_the_finished_samples(stored: Any, tmp_path: Path) -> None:
     """The same tensors in the same order, by worker processes, resumed in mid-epoch."""
     import torch
 
@@ -157,9 +152,7 @@ def stand_in_for_torchvision() -> tuple[ModuleType, ModuleType]:
     return package, module
 
 
-def test_targets_are_wrapped_for_torchvisions_transforms(
-    stored: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_targets_are_wrapped_for_torchvision(stored: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """Kinds, format and canvas as torchvision defines them; the same numbers; labels stay."""
     import torch
 
@@ -188,7 +181,6 @@ def test_targets_are_wrapped_for_torchvisions_transforms(
 
 
 def test_importing_the_package_does_not_import_torch() -> None:
-    """Only ``gen_data.torch`` does."""
     import subprocess
 
     code = "import sys, gen_data, gen_data.targets; gen_data.Loader; print('torch' in sys.modules)"

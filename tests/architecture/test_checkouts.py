@@ -35,7 +35,6 @@ def checkout(folder: Path, links: bool) -> Path:
 
 
 def run(code: str, folder: Path, first_on_path: Path | None = None) -> str:
-    """Output of a program that is started in a folder."""
     variables = {k: v for k, v in os.environ.items() if k != "PYTHONPATH"}
     if first_on_path:
         variables["PYTHONPATH"] = str(first_on_path)

@@ -29,5 +29,4 @@ assert person == "gen_data.content.people.person"
 
 
 def test_former_names_are_the_same_modules() -> None:
-    """Classes are identical, so that errors are caught by either name."""
     subprocess.run([sys.executable, "-c", PROGRAM], check=True)

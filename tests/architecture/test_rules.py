@@ -16,7 +16,6 @@ LINES_PER_FUNCTION_MAX = 70
 
 
 def python_files(*packages: str) -> list[Path]:
-    """Every module of some packages, sorted."""
     return sorted(path for name in packages for path in (ROOT / name).rglob("*.py"))
 
 

@@ -28,9 +28,7 @@ MODULE = "import pytest\npytest.importorskip('missing_library')"
 @pytest.mark.parametrize(
     ("ci", "result"), [("", "3 skipped"), ("1", "1 failed, 1 skipped, 1 error")]
 )
-def test_a_skip_fails_in_ci_unless_its_reason_is_allowed(
-    tmp_path: Path, ci: str, result: str
-) -> None:
+def test_a_skip_fails_in_ci_unless_it_is_allowed(tmp_path: Path, ci: str, result: str) -> None:
     """Skips of tests and of modules; without GEN_DATA_CI, skips stay skips."""
     (tmp_path / "test_it.py").write_text(CASES)
     (tmp_path / "test_module.py").write_text(MODULE)

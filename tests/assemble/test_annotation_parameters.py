@@ -19,7 +19,6 @@ CAMERA = "template: tabletop\nsensors:\n  - {type: rgb_camera, name: color}\n"
 
 
 def loaded(tmp_path: Path, annotations: str) -> dict[str, object]:
-    """The annotators of a configuration, by name."""
     path = tmp_path / "some.yaml"
     path.write_text(f"{CAMERA}annotations: {annotations}\n")
     return dict(load_config(str(path)).annotations)
@@ -45,7 +44,6 @@ def test_names_and_mappings_may_be_mixed(tmp_path: Path) -> None:
     ],
 )
 def test_what_cannot_be_is_told_at_its_place(tmp_path: Path, annotations: str, fault: str) -> None:
-    """File, line, column, and what was expected."""
     with pytest.raises(ConfigError, match=rf"some.yaml:4:\d+: .*{fault}"):
         loaded(tmp_path, annotations)
 
@@ -63,7 +61,6 @@ def test_editors_know_both_spellings() -> None:
 
 @pytest.mark.parametrize("name", TABLE.names())
 def test_every_annotator_explains_itself(name: str) -> None:
-    """By its docstring, and a table of its fields if it has any."""
     text = describe(TABLE.load(name))
 
     assert len(text.splitlines()[0]) > 20

@@ -14,9 +14,7 @@ from gen_data.core.errors import ConfigError, UnknownAsset
 
 
 @pytest.mark.parametrize("wrong", ["../../../etc/passwd", "pybullet/teddie", "muug?seed=3"])
-def test_an_unknown_asset_is_told_where_the_configuration_names_it(
-    tmp_path: Path, wrong: str
-) -> None:
+def test_an_unknown_asset_is_told_where_it_is_named(tmp_path: Path, wrong: str) -> None:
     """File, line, column and field: the third line's list begins in column 26."""
     path = tmp_path / "mine.yaml"
     path.write_text(
@@ -32,7 +30,6 @@ def test_an_unknown_asset_is_told_where_the_configuration_names_it(
 
 
 def test_a_file_of_a_user_that_is_missing_is_told_with_what_there_is(tmp_path: Path) -> None:
-    """The folders count by kind."""
     (tmp_path / "props").mkdir()
     path = tmp_path / "mine.yaml"
     path.write_text(
@@ -47,7 +44,7 @@ def test_a_file_of_a_user_that_is_missing_is_told_with_what_there_is(tmp_path: P
         pass
 
 
-def test_a_data_set_finds_its_folders_from_anywhere(
+def test_a_data_set_finds_its_folders_anywhere(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Its plan keeps ``props`` as written; the run remembers where that was."""

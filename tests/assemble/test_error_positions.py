@@ -58,9 +58,7 @@ def test_a_device_that_the_machine_lacks_is_refused_with_its_place() -> None:
         ),
     ],
 )
-def test_errors_across_plugins_are_found_before_any_engine_starts(
-    override: str, message: str
-) -> None:
+def test_errors_across_plugins_are_found_before_engines_start(override: str, message: str) -> None:
     """They came from the first worker, without a position."""
     factory = PipelineFactory(load_config("tabletop.yaml", overrides=[override]), 1_000_001)
 
@@ -80,9 +78,7 @@ def test_errors_across_plugins_are_found_before_any_engine_starts(
         ("randomizers.lamps.kind={choice: [sphere, sqare]}", "--set:1:24: randomizers[9].kind:"),
     ],
 )
-def test_names_that_a_distribution_may_draw_are_checked_when_read(
-    override: str, message: str
-) -> None:
+def test_names_that_may_be_drawn_are_checked_when_read(override: str, message: str) -> None:
     """The sample that drew the name ended the run."""
     with pytest.raises(ConfigError) as caught:
         load_config("tabletop.yaml", overrides=[override])

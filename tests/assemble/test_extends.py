@@ -28,13 +28,11 @@ exporters: [{type: coco}]
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """A folder with a configuration to be extended."""
     (tmp_path / "base.yaml").write_text(BASE)
     return tmp_path
 
 
 def written(folder: Path, text: str, name: str = "mine.yaml") -> str:
-    """Path of a configuration."""
     path = folder / name
     path.parent.mkdir(exist_ok=True)
     path.write_text(text)
@@ -42,7 +40,6 @@ def written(folder: Path, text: str, name: str = "mine.yaml") -> str:
 
 
 def refusal(source: str) -> str:
-    """The message with which a configuration is refused."""
     with pytest.raises(ConfigError) as caught:
         load_config(source)
     return str(caught.value)
@@ -137,10 +134,7 @@ def test_a_chain_is_followed_and_paths_start_from_each_file(folder: Path) -> Non
     assert (spec.general.seed, spec.general.views_per_scene, spec.name) == (4, 2, "mine")
 
 
-def test_shipped_configurations_can_be_extended_even_by_one_of_the_same_name(
-    folder: Path,
-) -> None:
-    """A file never means itself."""
+def test_shipped_configurations_can_be_extended_even_by_one_of_the_same_name(folder: Path) -> None:
     spec = load_config(written(folder, "extends: tabletop.yaml\nseed: 99\n", "tabletop.yaml"))
 
     assert spec.general.seed == 99
@@ -156,7 +150,6 @@ def test_an_error_in_an_inherited_value_points_to_its_own_file(folder: Path) -> 
 
 
 def test_a_circle_is_named(folder: Path) -> None:
-    """Every file on the way."""
     first = written(folder, "extends: b.yaml\n", "a.yaml")
     second = written(folder, "extends: a.yaml\n", "b.yaml")
 
@@ -167,7 +160,6 @@ def test_a_circle_is_named(folder: Path) -> None:
 
 
 def test_a_chain_has_an_end(folder: Path) -> None:
-    """Eight files deep."""
     for k in range(10):
         written(folder, f"extends: c{k + 1}.yaml\n", f"c{k}.yaml")
     written(folder, BASE, "c10.yaml")
@@ -194,10 +186,7 @@ def test_a_chain_has_an_end(folder: Path) -> None:
         ("extends: base.yaml\nwithout: {sensors: a}\n", "2:20: without.sensors: expected a list"),
     ],
 )
-def test_what_cannot_be_extended_is_refused_at_its_place(
-    folder: Path, text: str, fact: str
-) -> None:
-    """Line, column, field and fact."""
+def test_what_cannot_be_extended_is_refused_in_place(folder: Path, text: str, fact: str) -> None:
     assert fact in refusal(written(folder, text))
 
 
@@ -225,7 +214,6 @@ def test_a_template_lays_down_what_elements_of_a_type_have_in_common(tmp_path: P
 
 
 def test_defaults_for_a_type_that_no_element_has_are_refused(tmp_path: Path) -> None:
-    """A misspelt type would otherwise change nothing."""
     message = refusal(template_of(tmp_path, "{surfaces: {height_m: 0.7}}"))
 
     assert f"{tmp_path / 'tables.yaml'}:1:12: defaults.surfaces: no element is of this" in message

@@ -20,7 +20,6 @@ HEAD = (
 
 
 def refusal(folder: Path, *lines: str) -> str:
-    """The message of a configuration with these randomizers."""
     path = folder / "mine.yaml"
     path.write_text(HEAD + "".join(f"  - {line}\n" for line in lines))
     factory = PipelineFactory(load_config(str(path)), n=1)
@@ -30,72 +29,35 @@ def refusal(folder: Path, *lines: str) -> str:
 
 
 @pytest.mark.parametrize(
-    ("line", "place", "fact"),
+    ("given", "column", "field", "fact"),
     [
-        (
-            "{type: textures, name: t, textures: [wod]}",
-            "mine.yaml:4:41: randomizers[0].textures",
-            "there is no texture 'wod'",
-        ),
-        (
-            "{type: backdrop, name: room, walls: [plastre]}",
-            "mine.yaml:4:41: randomizers[0].walls",
-            "there is no texture 'plastre'",
-        ),
-        (
-            "{type: environment, name: e, images: [studoi]}",
-            "mine.yaml:4:42: randomizers[0].images",
-            "no environment is 'studoi'",
-        ),
-        (
-            "{type: environment, name: e, images: [indoor, studoi]}",
-            "mine.yaml:4:42: randomizers[0].images",
-            "no environment is 'studoi'",
-        ),
-        (
-            "{type: objects, name: cluter}",
-            "mine.yaml:4:5: randomizers[0].group",
-            "no object group 'cluter'",
-        ),
-        (
-            "{type: objects, name: clutter, weights: {mugg: 2}}",
-            "mine.yaml:4:45: randomizers[0].weights",
-            "no category 'mugg'",
-        ),
-        (
-            "{type: camera_pose, name: orbit, aim: cluter}",
-            "mine.yaml:4:43: randomizers[0].aim",
-            "nothing in the scene is named 'cluter'",
-        ),
-        (
-            "{type: camera_pose, name: orbit, camera: colour}",
-            "mine.yaml:4:46: randomizers[0].camera",
-            "no camera 'colour'",
-        ),
-        (
-            "{type: camera_pose, name: orbit, aim: clutter, fills: 0.0005}",
-            "mine.yaml:4:59: randomizers[0].fills",
-            "at most 0.0005 of the image of camera 'color'",
-        ),
+        ("textures, name: t, textures: [wod]", 41, "textures", "there is no texture 'wod'"),
+        ("backdrop, name: room, walls: [plastre]", 41, "walls", "there is no texture 'plastre'"),
+        ("environment, name: e, images: [studoi]", 42, "images", "no environment is 'studoi'"),
+        ("environment, name: e, images: [indoor, studoi]", 42, "images",
+         "no environment is 'studoi'"),
+        ("objects, name: cluter", 5, "group", "no object group 'cluter'"),
+        ("objects, name: clutter, weights: {mugg: 2}", 45, "weights", "no category 'mugg'"),
+        ("camera_pose, name: orbit, aim: cluter", 43, "aim",
+         "nothing in the scene is named 'cluter'"),
+        ("camera_pose, name: orbit, camera: colour", 46, "camera", "no camera 'colour'"),
+        ("camera_pose, name: orbit, aim: clutter, fills: 0.0005", 59, "fills",
+         "at most 0.0005 of the image of camera 'color'"),
     ],
-)
+)  # fmt: skip
 def test_an_unknown_name_is_refused_with_its_place_before_anything_runs(
-    tmp_path: Path, line: str, place: str, fact: str
+    tmp_path: Path, given: str, column: int, field: str, fact: str
 ) -> None:
-    """File, line, column and field; the known names."""
-    message = refusal(tmp_path, line)
+    message = refusal(tmp_path, f"{{type: {given}}}")
 
-    assert place in message
+    assert f"mine.yaml:4:{column}: randomizers[0].{field}" in message
     assert fact in message
     assert "; expected " in message
 
 
 def test_all_unknown_names_are_told_at_once(tmp_path: Path) -> None:
-    """One problem per randomizer, in the order of the file."""
     message = refusal(
-        tmp_path,
-        "{type: textures, name: t, textures: [wod]}",
-        "{type: objects, name: cluter}",
+        tmp_path, "{type: textures, name: t, textures: [wod]}", "{type: objects, name: cluter}"
     )
 
     assert message.index("mine.yaml:4:") < message.index("mine.yaml:5:")
@@ -110,7 +72,6 @@ def test_textures_are_named_by_id_tag_or_family() -> None:
 
 
 def test_of_many_textures_the_nearest_are_listed(tmp_path: Path) -> None:
-    """Not all 123."""
     text = refusal(tmp_path, "{type: textures, name: t, textures: [wod]}")
     assert "did you mean 'wood'?" in text
     assert len(text.splitlines()[0]) < 250

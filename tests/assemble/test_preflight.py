@@ -31,18 +31,15 @@ def cart(*sensors: dict[str, Any], **sections: Any) -> dict[str, Any]:
 
 
 def table(*sensors: dict[str, Any], **sections: Any) -> dict[str, Any]:
-    """A tabletop with sensors."""
     left_out = {"sensors": "all", "exporters": "all"}
     return {"extends": "tabletop.yaml", "without": left_out, "sensors": [*sensors], **sections}
 
 
 def check(config: Any) -> None:
-    """Check a configuration as ``generate`` and ``plan`` do."""
     PipelineFactory(load_config(config), 2).check()
 
 
 def refusal(config: dict[str, Any]) -> str:
-    """The message with which a configuration is refused."""
     with pytest.raises(ConfigError) as caught:
         check(config)
     return str(caught.value)
@@ -55,11 +52,7 @@ def test_every_exporter_and_every_camera_that_does_not_fit_is_named() -> None:
             {**BENT, "name": "front"},
             {**BENT, "name": "side", "yaw_deg": 90},
             {**CAMERA, "name": "rear", "yaw_deg": 180},
-            exporters=[
-                {"type": "solo"},
-                {"type": "kitti", "camera": "front"},
-                {"type": "coco"},
-            ],
+            exporters=[{"type": "solo"}, {"type": "kitti", "camera": "front"}, {"type": "coco"}],
         )
     )
 

@@ -24,7 +24,6 @@ WIDE_OR_NARROW = "{switch: lens, wide: 90, narrow: 40}"
 
 
 def written(folder: Path, sensor: str) -> str:
-    """Path of a configuration with one sensor."""
     path = folder / "mine.yaml"
     path.write_text(f"{HEAD}sensors:\n  - {sensor}\n")
     return str(path)

@@ -17,14 +17,12 @@ CAMERA = "sensors: [{type: rgb_camera, name: color, size_px: [64, 48], hfov_deg:
 
 
 def written(folder: Path, text: str) -> str:
-    """Path of a configuration with that text."""
     path = folder / "mine.yaml"
     path.write_text(text)
     return str(path)
 
 
 def refusal(source: str, **options: object) -> str:
-    """The message with which a configuration is refused."""
     with pytest.raises(ConfigError) as error:
         load_config(source, **options)  # type: ignore[arg-type]
     return str(error.value)
@@ -45,10 +43,9 @@ def test_shipped_configurations_are_valid_from_any_folder(
     )
 
 
-def test_a_file_of_the_user_comes_before_a_shipped_one(
+def test_a_users_file_comes_before_a_shipped(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """``tabletop.yaml`` in the current folder is the user's."""
     (tmp_path / "tabletop.yaml").write_text("template: tabletop\nseed: 41\n" + CAMERA)
     monkeypatch.chdir(tmp_path)
 
@@ -62,12 +59,10 @@ def test_configuration_overrides_its_template_by_element_name(tmp_path: Path) ->
 
     table = {e.name: e for e in load_config(source).probes[0].elements}["table"]
 
-    assert table.height_m == 0.9
-    assert table.top_size_m == nominal["table"].top_size_m
+    assert (table.height_m, table.top_size_m) == (0.9, nominal["table"].top_size_m)
 
 
 def test_override_of_an_unknown_element_is_refused(tmp_path: Path) -> None:
-    """The position of the key, the known names, and the nearest of them."""
     source = written(tmp_path, "template: tabletop\nelements: {tabel: {height_m: 1}}\n" + CAMERA)
 
     message = refusal(source)
@@ -97,7 +92,6 @@ def test_command_line_wins_over_file_and_template() -> None:
 
 
 def test_without_leaves_a_randomizer_out() -> None:
-    """The others keep their order; an unknown name is refused."""
     names = [r.name for r in load_config("tabletop.yaml").probes[0].randomizers]
 
     kept = [r.name for r in load_config("tabletop.yaml", without=("colors",)).probes[0].randomizers]
@@ -159,7 +153,6 @@ def test_spec_crosses_process_borders() -> None:
     ],
 )
 def test_wrong_configuration_is_refused(tmp_path: Path, text: str, fact: str) -> None:
-    """The field and the fact are named."""
     assert fact in refusal(written(tmp_path, text))
 
 

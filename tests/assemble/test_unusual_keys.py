@@ -21,7 +21,6 @@ ENTRIES = {
 @pytest.mark.parametrize("key", KEYS)
 @pytest.mark.parametrize("section", ENTRIES)
 def test_an_unusual_key_is_quoted(tmp_path: Path, section: str, key: str) -> None:
-    """After ``file:line:column``, by which editors find it; never as it is."""
     path = tmp_path / "own.yaml"
     quoted = '"' + key.replace("\n", "\\n") + '"'
     base = "template: tabletop" if section == "elements" else "extends: tabletop.yaml"
@@ -44,7 +43,6 @@ def test_an_unusual_key_is_quoted(tmp_path: Path, section: str, key: str) -> Non
     ],
 )
 def test_an_unusual_key_of_a_template_is_quoted(tmp_path: Path, text: str, message: str) -> None:
-    """At its place in the template."""
     (tmp_path / "table.yaml").write_text(f"{text}\n")
     (tmp_path / "own.yaml").write_text("template: table.yaml\nsensors: [{type: rgb_camera}]\n")
 

@@ -68,7 +68,6 @@ def test_a_robot_is_measured_at_home(folder: Path, tmp_path: Path) -> None:
 
 
 def test_a_folder_without_assets_is_refused(tmp_path: Path) -> None:
-    """It is probably the wrong one."""
     (tmp_path / "thesis.txt").write_text("irreplaceable")
     result = CliRunner().invoke(assets, ["check", str(tmp_path)])
 
@@ -78,7 +77,6 @@ def test_a_folder_without_assets_is_refused(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_the_command_fails_if_an_asset_cannot_be_used(folder: Path) -> None:
-    """The message names the asset and the reason."""
     result = CliRunner().invoke(assets, ["check", str(folder)])
     assert isinstance(result.exception, AssetError)
     assert "1 of 4 assets cannot be used" in str(result.exception)
@@ -124,7 +122,6 @@ def test_pictures_show_every_asset(folder: Path, tmp_path: Path) -> None:
 
 
 def test_a_folder_is_listed(folder: Path) -> None:
-    """All that it holds, or what carries a tag."""
     listed = CliRunner().invoke(assets, ["list", "--folder", str(folder)], catch_exceptions=False)
     assert {line.split()[0] for line in listed.output.splitlines()} == {
         "user/arm", "user/bolt", "user/broken", "user/crate",
@@ -132,7 +129,6 @@ def test_a_folder_is_listed(folder: Path) -> None:
 
 
 def test_the_schema_describes_the_index() -> None:
-    """It lists the sections of the document."""
     printed = CliRunner().invoke(assets, ["schema"], catch_exceptions=False)
     described = json.loads(printed.output)
     assert {"assets", "robots", "textures", "environments"} <= set(described["properties"])
@@ -140,7 +136,6 @@ def test_the_schema_describes_the_index() -> None:
 
 
 def test_the_page_on_assets_shows_a_valid_index() -> None:
-    """Its largest example, as a user would copy it."""
     page = Path(__file__).parents[2] / "docs/assets.md"
     examples = page.read_text(encoding="utf-8").split("```yaml\n")[1:]
     text = max((example.partition("```")[0] for example in examples), key=len)

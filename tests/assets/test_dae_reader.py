@@ -55,7 +55,6 @@ SECOND = """<node id="b"><translate>0 0 100</translate><instance_geometry url="#
 
 
 def folder_of(tmp_path: Path, **changes: str) -> Folder:
-    """A folder with ``a.dae``."""
     values = {"tool": "Some CAD", "up": "Z_UP", "scale": "1 1 1", "material": "paint",
               "second": "", "transparency": ""} | changes  # fmt: skip
     (tmp_path / "a.dae").write_text(HEAD.format(**values))
@@ -107,9 +106,7 @@ def test_colours_are_srgb_but_for_blenders(tmp_path: Path, tool: str, red: float
         ("<transparency><float>0</float></transparency>", 1.0),
     ],
 )
-def test_transparency_is_that_of_the_specification(
-    tmp_path: Path, text: str, opacity: float
-) -> None:
+def test_transparency_is_that_of_the_format(tmp_path: Path, text: str, opacity: float) -> None:
     """A_ONE: alpha times factor; RGB_ZERO: 1 - luminance times factor; never invisible."""
     slot = read_mesh(folder_of(tmp_path, transparency=text), "a.dae").soup.slots[0]
     assert slot.material.opacity == pytest.approx(opacity)
@@ -180,10 +177,7 @@ def test_images_of_other_models_and_computers_are_found(tmp_path: Path, path: st
         ("COLLADA", "Collada", "its root element is <Collada>"),
     ],
 )
-def test_malformed_files_are_refused_by_name(
-    tmp_path: Path, old: str, new: str, reason: str
-) -> None:
-    """One error with the file's name and what is wrong."""
+def test_malformed_files_are_refused(tmp_path: Path, old: str, new: str, reason: str) -> None:
     folder = folder_of(tmp_path)
     text = (tmp_path / "a.dae").read_text().replace(old, new)
     (tmp_path / "a.dae").write_text(text)

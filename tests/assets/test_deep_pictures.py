@@ -88,7 +88,6 @@ def test_radiance_files_of_all_orders_show_the_same(first: str, second: str) -> 
 
 
 def test_radiance_in_xyz_is_refused_in_words() -> None:
-    """Its colours would be wrong."""
     data = radiance(2, 4, "-Y 2 +X 4", np.ones((2, 4, 3))).replace(b"rgbe", b"xyze")
     with pytest.raises(AssetError, match="holds CIE XYZ"):
         decode_radiance(data, "a.hdr")
@@ -104,10 +103,9 @@ def test_radiance_in_xyz_is_refused_in_words() -> None:
     ],
     ids=["plain", "Blender's layer", "lower case", "grey"],
 )
-def test_openexr_channels_by_their_names(
+def test_openexr_by_names(
     tmp_path: Path, names: tuple[str, ...], expected: tuple[float, ...]
 ) -> None:
-    """Beside a layer of depth."""
     exr = pytest.importorskip("OpenEXR")
     values = {name: np.full((2, 4), 0.1 * (k + 1), np.float32) for k, name in enumerate(names)}
     values["ViewLayer.Depth.Z"] = np.ones((2, 4), np.float32)

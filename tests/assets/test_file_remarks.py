@@ -71,9 +71,7 @@ def test_check_lists_remarks_and_still_succeeds(folder: Path) -> None:
     ],
     ids=["missing image", "no image", "unknown material", "another case"],
 )
-def test_check_refuses_what_would_look_wrong(
-    folder: Path, files: dict[str, str], reason: str
-) -> None:
+def test_check_refuses_wrong_looks(folder: Path, files: dict[str, str], reason: str) -> None:
     """Each is found without rendering anything, and ends with exit code 3."""
     for name, text in files.items():
         (folder / name).write_text(text)
@@ -83,7 +81,6 @@ def test_check_refuses_what_would_look_wrong(
 
 
 def test_warnings_are_given_once_per_file(folder: Path) -> None:
-    """Not again for what was told before, and not for generated assets."""
     library = opened(folder)
     with pytest.warns(AssetWarning, match="map_Bump") as told:
         known = warn_of_remarks(library, ["user/a", "mug?seed=3"])
@@ -93,7 +90,6 @@ def test_warnings_are_given_once_per_file(folder: Path) -> None:
 
 
 def test_large_folders_are_not_read_for_their_remarks(folder: Path) -> None:
-    """With none to read, only what was imported before is known."""
     assert collect_remarks(opened(folder), ["user/a"], read_max=0) == ()
     opened(folder).mesh("user/a")
     assert len(collect_remarks(opened(folder), ["user/a"], read_max=0)) == 1
@@ -137,7 +133,6 @@ def test_categories_of_published_layouts(tmp_path: Path, file: str, category: st
 
 
 def test_ids_defined_in_two_folders_are_refused_with_both_files(folder: Path) -> None:
-    """Whose order in the configuration would otherwise decide."""
     other = folder.parent / "more"
     other.mkdir()
     (other / "a.stl").write_text(STL)

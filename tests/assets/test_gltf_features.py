@@ -110,9 +110,7 @@ def test_the_second_set_of_texture_coordinates(builder: Builder, tmp_path: Path)
 
 
 @pytest.mark.parametrize("kind", ["f4", "u1", "u2"])
-def test_vertex_colours_are_linear_and_may_be_integers(
-    builder: Builder, tmp_path: Path, kind: str
-) -> None:
+def test_vertex_colours_are_linear_or_integers(builder: Builder, tmp_path: Path, kind: str) -> None:
     """COLOR_0 red, green, blue."""
     top = {"f4": 1, "u1": 255, "u2": 65535}[kind]
     colors = (np.eye(4)[:3] * top).astype(f"<{kind}")
@@ -218,7 +216,7 @@ def test_specular_glossiness(
     "name",
     ["KHR_materials_", "KHR_materials_sheen", "KHR_texture_transform2", "KHR_texture_basisu"],
 )
-def test_required_extensions_are_compared_by_their_whole_names(
+def test_extensions_are_compared_by_whole_names(
     builder: Builder, tmp_path: Path, name: str
 ) -> None:
     """What is not applied is refused if it is required, and named if it is used."""
@@ -252,7 +250,7 @@ def test_bytes_after_a_binary_file(builder: Builder, tmp_path: Path) -> None:
     ],
     ids=["BLEND", "MASK"],
 )
-def test_what_nobody_sees_is_no_asset(
+def test_the_invisible_is_no_asset(
     builder: Builder, tmp_path: Path, material: dict[str, Any]
 ) -> None:
     """Alpha 0, or below the threshold of a mask."""
@@ -281,17 +279,13 @@ def test_animations_lines_and_further_scenes_are_named(builder: Builder, tmp_pat
         (b'{"asset": 3', "malformed glTF"),
     ],
 )
-def test_files_of_another_kind_are_refused_in_words(
-    tmp_path: Path, data: bytes, reason: str
-) -> None:
-    """Not by the exception of a decoder."""
+def test_other_files_are_refused_in_words(tmp_path: Path, data: bytes, reason: str) -> None:
     (tmp_path / "a.glb").write_bytes(data)
     with pytest.raises(AssetError, match=reason):
         read_mesh(Folder(tmp_path), "a.glb")
 
 
 def test_an_unknown_component_type_is_named(builder: Builder, tmp_path: Path) -> None:
-    """With its number and its accessor."""
     builder.tree["accessors"][0]["componentType"] = 9999
     with pytest.raises(AssetError, match="accessor 0 has the unknown componentType 9999"):
         builder.read(tmp_path)

@@ -32,7 +32,6 @@ def test_every_category_has_forty_shapes(families: list[str]) -> None:
 
 @pytest.mark.parametrize("group", GROUPS)
 def test_the_first_seeds_are_of_different_kinds(group: str) -> None:
-    """Any prefix of a family is mixed."""
     kinds = [name for name in STYLES if name.startswith(f"{group}/")]
 
     assert len(kinds) >= 7
@@ -104,6 +103,5 @@ def test_hands_of_bananas_have_as_many_as_stated() -> None:
     "family", ["ceramic_decor", "drink_surface", "fruit_skin", "fruit_cut", "phone_screen"]
 )
 def test_unknown_kinds_of_prints_are_refused(family: str) -> None:
-    """With the known ones."""
     with pytest.raises(AssetError, match=f"{family}: kind=tartan is unknown; expected one of"):
         TEXTURES[family].build(0, kind="tartan")

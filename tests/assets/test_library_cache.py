@@ -19,7 +19,6 @@ ASSET = "random_urdfs/007"
 
 
 def assert_same(a: MeshData, b: MeshData) -> None:
-    """Bit by bit."""
     for field in fields(MeshData):
         left, right = getattr(a, field.name), getattr(b, field.name)
         if isinstance(left, np.ndarray):
@@ -57,7 +56,6 @@ def test_stored_bounds_are_those_of_the_mesh_which_is_not_read(
 
 @pytest.mark.slow
 def test_cold_warm_and_another_cache_give_the_same_bytes(tmp_path: Path) -> None:
-    """Cached values equal computed ones."""
     cold = open_library(cache_dir=tmp_path / "a")
     warm = open_library(cache_dir=tmp_path / "a")
     other = open_library(cache_dir=tmp_path / "b")
@@ -73,7 +71,6 @@ def test_cold_warm_and_another_cache_give_the_same_bytes(tmp_path: Path) -> None
 
 @pytest.mark.parametrize("damage", ["truncated", "bit flip", "empty", "foreign"])
 def test_a_damaged_entry_is_made_anew(tmp_path: Path, damage: str) -> None:
-    """Bit rot in the cache never reaches a data set."""
     good = open_library(cache_dir=tmp_path).mesh(ASSET)
     (path,) = entries(tmp_path)
     data = bytearray(path.read_bytes())
@@ -155,14 +152,12 @@ def test_a_cache_that_cannot_be_written_only_costs_time(tmp_path: Path) -> None:
 
 
 def test_no_temporary_file_stays_behind(tmp_path: Path) -> None:
-    """Entries appear whole or not at all."""
     open_library(cache_dir=tmp_path).mesh(ASSET)
     assert not list(tmp_path.rglob("*.part"))
 
 
 @pytest.mark.slow
 def test_several_processes_may_share_a_cache(tmp_path: Path) -> None:
-    """Two processes import the same asset at once and agree."""
     program = (
         "import sys; from pathlib import Path; from hashlib import sha256\n"
         "from gen_data.assets.library import open_library\n"
@@ -175,8 +170,7 @@ def test_several_processes_may_share_a_cache(tmp_path: Path) -> None:
     ]
     answers = {process.communicate(timeout=120)[0] for process in running}
     assert {process.returncode for process in running} == {0}
-    assert len(answers) == 1
-    assert len(entries(tmp_path)) == 1
+    assert (len(answers), len(entries(tmp_path))) == (1, 1)
 
 
 def test_memory_is_bounded_and_forgets_the_oldest(tmp_path: Path) -> None:

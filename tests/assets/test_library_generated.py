@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from gen_data.assets.library import Library, open_library
@@ -13,16 +12,7 @@ from gen_data.core.errors import AssetError
 
 @pytest.fixture
 def library(tmp_path: Path) -> Library:
-    """A library with a fresh cache."""
     return open_library(cache_dir=tmp_path / "cache")
-
-
-def test_every_spelling_of_an_id_is_one_asset(library: Library) -> None:
-    """The canonical id and the content hash do not depend on how an id is written."""
-    one = library.get("table?size_m=1.20,0.80,0.74")
-    two = library.get("table?size_m=1.2,0.8,0.74")
-    assert one == two
-    assert one.asset_id == "table?size_m=1.2,0.8,0.74"
 
 
 def test_defaults_count_as_parameters(library: Library) -> None:
@@ -55,16 +45,6 @@ def test_libraries_of_a_process_share_descriptions_of_offered_assets(tmp_path: P
     assert one.get("mug?seed=123456") is not two.get("mug?seed=123456")
 
 
-def test_made_and_cached_solids_are_equal(library: Library, tmp_path: Path) -> None:
-    """Bit by bit, materials included."""
-    made = library.mesh("mug?seed=2")
-    loaded = open_library(cache_dir=tmp_path / "cache").mesh("mug?seed=2")
-    for name in ("vertices_m", "faces", "normals", "uvs", "face_slots"):
-        assert getattr(made, name).tobytes() == getattr(loaded, name).tobytes()
-    assert made.materials == loaded.materials
-    assert np.asarray(made.face_slots).max() < len(made.materials)
-
-
 @pytest.mark.parametrize(
     ("asset_id", "reason"),
     [
@@ -79,16 +59,14 @@ def test_made_and_cached_solids_are_equal(library: Library, tmp_path: Path) -> N
         ("mgu?seed=3", "did you mean 'mug"),
     ],
 )
-def test_wrong_parameters_are_refused_with_the_right_ones(
+def test_wrong_parameters_are_refused_with_right(
     library: Library, asset_id: str, reason: str
 ) -> None:
-    """Before anything is built."""
     with pytest.raises(AssetError, match=reason):
         library.mesh(asset_id)
 
 
 def test_kinds_are_not_confused(library: Library) -> None:
-    """A mug has no pixels, and is no robot."""
     with pytest.raises(AssetError, match="not a texture"):
         library.texture("mug?seed=0")
     with pytest.raises(AssetError, match="not an environment"):

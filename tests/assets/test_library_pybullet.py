@@ -17,12 +17,10 @@ OBJECTS = ("domino", "jenga", "lego", "mug", "soccerball", "table", "teddy", "tr
 
 @pytest.fixture(scope="module")
 def library(tmp_path_factory: pytest.TempPathFactory) -> Library:
-    """A library with a fresh cache."""
     return open_library(cache_dir=tmp_path_factory.mktemp("cache"))
 
 
 def size_m(library: Library, asset_id: str) -> np.ndarray:
-    """Edges of the bounding box."""
     low, high = np.array(library.bounds_m(asset_id))
     return high - low
 
@@ -80,7 +78,6 @@ def test_collision_parts_cover_what_is_seen(library: Library, name: str) -> None
 
 @pytest.mark.parametrize("name", OBJECTS)
 def test_meshes_are_in_the_normal_form(library: Library, name: str) -> None:
-    """Types, ranges and unit normals that renderers rely on."""
     mesh = library.mesh(f"pybullet/{name}")
     assert mesh.vertices_m.dtype == mesh.normals.dtype == mesh.uvs.dtype == np.float32
     assert mesh.faces.dtype == mesh.face_slots.dtype == np.int32
@@ -122,7 +119,6 @@ def test_textures_of_objects_are_served(library: Library) -> None:
 
 
 def test_neither_duck_nor_bicycle_are_offered(library: Library) -> None:
-    """Their licences forbid it."""
     for name in ("pybullet/duck", "pybullet/bicycle"):
         with pytest.raises(AssetError):
             library.get(name)
@@ -130,7 +126,6 @@ def test_neither_duck_nor_bicycle_are_offered(library: Library) -> None:
 
 @pytest.mark.slow
 def test_every_asset_names_licence_author_and_source(library: Library) -> None:
-    """Source of a data set's attribution."""
     for kind in ("object", "robot", "texture", "environment"):
         for asset in library.find((), kind):
             assert asset.licence
@@ -141,7 +136,6 @@ def test_every_asset_names_licence_author_and_source(library: Library) -> None:
 
 
 def test_an_unknown_id_is_answered_with_the_nearest(library: Library) -> None:
-    """A typing slip costs one look."""
     with pytest.raises(AssetError, match=r"pybullet/tedy.*did you mean 'pybullet/teddy'"):
         library.mesh("pybullet/tedy")
     with pytest.raises(AssetError, match="pybullet/teddy"):

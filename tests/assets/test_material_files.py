@@ -59,7 +59,6 @@ def gltf(folder: Path, material: dict[str, Any], **images: np.ndarray) -> None:
 
 
 def loaded(folder: Path) -> tuple[Material, TextureData | None]:
-    """The material as the library serves it, and its texture."""
     library = open_library([folder], cache_dir=folder.parent / "cache")
     (material,) = library.mesh("user/t").materials
     return material, library.texture(material.texture) if material.texture else None
@@ -219,8 +218,7 @@ def test_mtl_says_opacity_light_coat_and_holes(folder: Path) -> None:
 
     material, texture = loaded(folder)
 
-    assert material.opacity == 0.6
-    assert material.emission_cd_m2 == (10.0, 20.0, 30.0)
+    assert (material.opacity, material.emission_cd_m2) == (0.6, (10.0, 20.0, 30.0))
     assert (material.coat, material.coat_roughness, material.ior) == (0.7, 0.1, 1.4)
     assert texture is not None
     np.testing.assert_array_equal(texture.alpha >= 128, hole >= 128)
@@ -258,7 +256,6 @@ BAD = {
 
 @pytest.mark.parametrize("field", sorted(BAD))
 def test_gltf_values_out_of_range_are_one_clear_error(folder: Path, field: str) -> None:
-    """It names the file, the material and the field."""
     gltf(folder, BAD[field])
     with pytest.raises(AssetError, match=rf"t\.gltf: .*material 'skin of it': .*{field}.* is"):
         read_mesh(Folder(folder), "t.gltf")
@@ -266,7 +263,6 @@ def test_gltf_values_out_of_range_are_one_clear_error(folder: Path, field: str) 
 
 @pytest.mark.parametrize("line", ["d 1.5", "Tr -0.5", "Pr nan", "Pm 2", "Pc -1", "Ke -1 0 0"])
 def test_mtl_values_out_of_range_are_one_clear_error(folder: Path, line: str) -> None:
-    """It names the file, the material and the statement."""
     (folder / "t.obj").write_text(TRIANGLE_OBJ)
     (folder / "m.mtl").write_text(f"newmtl m\n{line}\n")
     with pytest.raises(AssetError, match=rf"m\.mtl: material 'm': .*{line.partition(' ')[0]} is"):
@@ -283,10 +279,7 @@ def test_mtl_values_out_of_range_are_one_clear_error(folder: Path, line: str) ->
         ("emission_cd_m2", "[-1, 0, 0]"),
     ],
 )
-def test_index_values_out_of_range_are_one_clear_error(
-    folder: Path, field: str, value: str
-) -> None:
-    """It names the index and the field."""
+def test_index_values_out_of_range_are_one_error(folder: Path, field: str, value: str) -> None:
     (folder / "t.obj").write_text(TRIANGLE_OBJ)
     (folder / "m.mtl").write_text("newmtl m\n")
     (folder / "assets.yaml").write_text(

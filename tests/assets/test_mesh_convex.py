@@ -84,13 +84,11 @@ def test_a_sheet_of_paper_gets_a_thickness() -> None:
 
 
 def test_points_on_a_line_are_refused() -> None:
-    """There is nothing to collide with."""
     line = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [3, 0, 0], [4, 0, 0]])
     with pytest.raises(AssetError, match=r"line: .*collision"):
         hull_vertices(line, "line")
 
 
 def test_parts_are_the_same_every_time() -> None:
-    """Bit by bit."""
     one, two = (convex_parts(tray(), "tray").parts_m for _ in range(2))
     assert [p.tobytes() for p in one] == [p.tobytes() for p in two]

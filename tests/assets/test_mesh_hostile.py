@@ -52,13 +52,11 @@ def _base64(data: bytes) -> str:
 
 
 def shiny(**factors: Any) -> bytes:
-    """The triangle with these factors in its material."""
     primitive = {"attributes": {"POSITION": 0}, "material": 0}
     return gltf(materials=[{"pbrMetallicRoughness": factors}], meshes=[{"primitives": [primitive]}])
 
 
 def glb(text: bytes) -> bytes:
-    """A glTF text as a binary file."""
     text += b" " * (-len(text) % 4)
     return struct.pack("<4sIIII", b"glTF", 2, 20 + len(text), len(text), 0x4E4F534A) + text
 
@@ -280,7 +278,6 @@ def test_hostile_meshes_are_refused(tmp_path: Path, name: str) -> None:
     ],
 )
 def test_a_malformed_ply_is_explained(tmp_path: Path, name: str, cause: str) -> None:
-    """Different faults have different messages."""
     file, content = MESHES[name]
     assert isinstance(content, bytes)
     (tmp_path / file).write_bytes(content)
@@ -311,9 +308,7 @@ def test_hostile_urdfs_are_refused(tmp_path: Path, name: str) -> None:
         ("no limits", "joint 'j' has no limits"),
     ],
 )
-def test_urdfs_with_faulty_joints_are_refused_by_their_names(
-    tmp_path: Path, name: str, cause: str
-) -> None:
+def test_faulty_joints_of_urdfs_are_refused_by_name(tmp_path: Path, name: str, cause: str) -> None:
     """A robot's author finds the joint by its name and its place, which is not that of the root."""
     (tmp_path / "a.urdf").write_text(URDFS[name])
     with pytest.raises(AssetError, match=rf"a\.urdf:1:\d\d+: .*{cause}"):
@@ -377,7 +372,6 @@ def test_a_roughness_that_does_not_exist_is_told_by_name(tmp_path: Path) -> None
 
 
 def test_a_missing_texture_is_told(tmp_path: Path) -> None:
-    """Grey instead of an image would be a silent error."""
     folder = tmp_path / "assets"
     folder.mkdir()
     (folder / "a.mtl").write_text("newmtl m\nmap_Kd gone.png\n")
@@ -390,7 +384,6 @@ def test_a_missing_texture_is_told(tmp_path: Path) -> None:
 @pytest.mark.hostile
 @pytest.mark.parametrize("reference", ["../secret.mtl", "/etc/passwd", "C:\\x.png", "http://a/b"])
 def test_a_texture_outside_the_folder_is_refused(tmp_path: Path, reference: str) -> None:
-    """The mesh is refused, not only its picture."""
     folder = tmp_path / "assets"
     folder.mkdir()
     (folder / "a.mtl").write_text(f"newmtl m\nmap_Kd {reference}\n")
@@ -423,13 +416,11 @@ def test_only_regular_files_inside_the_folder_are_read(tmp_path: Path, kind: str
 @pytest.mark.hostile
 @pytest.mark.parametrize("name", ["a\0b", "x" * 5000, "../" * 30 + "etc/passwd", "/etc/passwd"])
 def test_strange_names_are_refused(tmp_path: Path, name: str) -> None:
-    """No index entry leads outside the folder."""
     with pytest.raises(AssetError):
         Folder(tmp_path).read(name)
 
 
 def test_image_ids_cannot_leave_the_folder(tmp_path: Path) -> None:
-    """A texture id is not an arbitrary path."""
     library = open_library(cache_dir=tmp_path / "cache")
     with pytest.raises(AssetError):
         library.texture("pybullet/teddy#../../../../../../etc/passwd")
@@ -450,7 +441,6 @@ def test_a_file_that_changes_while_it_is_read_is_refused(tmp_path: Path) -> None
 
 
 def test_a_polygon_of_twenty_thousand_corners_is_fine(tmp_path: Path) -> None:
-    """Large is not hostile."""
     turns = np.arange(20_000) * (2 * np.pi / 20_000)
     lines = [f"v {np.cos(t):.6f} {np.sin(t):.6f} 0" for t in turns]
     folder = tmp_path / "assets"
@@ -486,7 +476,6 @@ def test_reading_takes_no_more_memory_than_the_file(tmp_path: Path) -> None:
 def test_an_stl_with_too_many_triangles_is_refused_before_it_is_decoded(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The header states their number."""
     (tmp_path / "a.stl").write_bytes(stl(4, 4))
     monkeypatch.setattr("gen_data.assets.readers.mesh_source.MAX_FACES", 3)
     monkeypatch.setattr(TriangleSoup, "of", lambda *_: pytest.fail("decoded"))

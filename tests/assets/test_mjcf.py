@@ -54,7 +54,6 @@ ARM = """<mujoco model="arm">
 
 
 def write(folder: Path, text: str = ARM) -> Folder:
-    """A folder with ``arm.xml`` and the files it refers to."""
     for name in ("parts", "images"):
         (folder / name).mkdir(parents=True, exist_ok=True)
     (folder / "parts/wedge.obj").write_text(TETRAHEDRON)
@@ -64,7 +63,6 @@ def write(folder: Path, text: str = ARM) -> Folder:
 
 
 def poses_of(described: RobotDescription, positions: dict[str, float]) -> dict[str, SE3]:
-    """Forward kinematics of a description."""
     poses = {next(iter(described.links)): SE3()}
     for joint in described.joints:
         pose = poses[joint.parent] @ joint.T_parent_joint
@@ -75,9 +73,7 @@ def poses_of(described: RobotDescription, positions: dict[str, float]) -> dict[s
 
 
 @pytest.mark.parametrize("positions", [(0.0, 0.0, 0.0), (0.3, -0.05, 1.2), (-1.5, 0.3, -3.0)])
-def test_geoms_are_where_mujoco_puts_them(
-    tmp_path: Path, positions: tuple[float, float, float]
-) -> None:
+def test_geoms_are_where_mujoco_has(tmp_path: Path, positions: tuple[float, float, float]) -> None:
     """At any joint positions, with anchors beside the origin, a reference and two joints a body."""
     described = read_mjcf(write(tmp_path), "arm.xml")
     model = mujoco.MjModel.from_xml_path(str(tmp_path / "arm.xml"))
@@ -200,7 +196,6 @@ def test_what_is_not_used_is_named(tmp_path: Path) -> None:
 
 
 def test_a_height_field_is_named_and_its_file_not_opened(tmp_path: Path) -> None:
-    """Nothing outside the folder is read, and the robot on the terrain is used."""
     terrain = '<asset><hfield name="h" file="/etc/passwd" size="1 1 1 1"/>'
     ground = '<worldbody><geom type="hfield" hfield="h"/>'
     text = ARM.replace("<asset>", terrain).replace("<worldbody>", ground)
@@ -225,7 +220,6 @@ def test_included_files_are_part_of_the_asset(tmp_path: Path) -> None:
 
 
 def test_without_an_index_it_is_one_object(tmp_path: Path) -> None:
-    """Other XML files, and the meshes that it uses, are none."""
     write(tmp_path)
     (tmp_path / "package.xml").write_text("<package><name>arm</name></package>")
     library = open_library([tmp_path], tmp_path / "cache", tmp_path)
@@ -247,14 +241,12 @@ def test_without_an_index_it_is_one_object(tmp_path: Path) -> None:
     ],
 )
 def test_faults_have_one_clear_error(tmp_path: Path, old: str, new: str, reason: str) -> None:
-    """With the file's name and MuJoCo's reason."""
     folder = write(tmp_path, ARM.replace(old, new, 1))
     with pytest.raises(AssetError, match=rf"arm\.xml.*{reason}"):
         read_mjcf(folder, "arm.xml")
 
 
 def test_without_mujoco_the_extra_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """MuJoCo is no requirement everywhere."""
     monkeypatch.setitem(sys.modules, "mujoco", None)
     with pytest.raises(AssetError, match=r"run: pip install .*\[mjcf\]"):
         read_mjcf(write(tmp_path), "arm.xml")

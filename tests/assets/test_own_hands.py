@@ -60,7 +60,6 @@ def test_a_hand_of_its_own_file_is_on_the_flange(tmp_path: Path, hand: str) -> N
 
 
 def test_a_changed_hand_changes_the_digest(tmp_path: Path) -> None:
-    """Its files are files of the robot."""
     robot(tmp_path)
     one = open_library([tmp_path], tmp_path / "cache", tmp_path).get("user/arm").sha256
     (tmp_path / "hand.urdf").write_text(HAND.replace("0.04", "0.05"))
@@ -68,21 +67,15 @@ def test_a_changed_hand_changes_the_digest(tmp_path: Path) -> None:
     assert one != two
 
 
-def test_links_of_one_name_are_refused(tmp_path: Path) -> None:
-    """The arm as its own hand: ``base`` is there twice."""
+def test_hands_that_do_not_fit_are_refused(tmp_path: Path) -> None:
     with pytest.raises(AssetError, match=r"arm\.urdf: it has a link or joint 'base', as its tool"):
         robot(tmp_path, "arm.urdf")
-
-
-def test_an_unknown_finger_joint_is_refused(tmp_path: Path) -> None:
-    """With the nearest name."""
     with pytest.raises(AssetError, match=r"no movable joint 'opn' \(did you mean 'open'\?\)"):
         robot(tmp_path, joint="opn")
 
 
 @pytest.mark.parametrize("tool", ["{kind: file, flange: a}", "{kind: fingers, file: b, flange: a}"])
 def test_kind_and_file_go_together(tmp_path: Path, tool: str) -> None:
-    """One fault with its line."""
     (tmp_path / "assets.yaml").write_text(f"robots:\n  - {{file: arm.urdf, tool: {tool}}}\n")
     (tmp_path / "arm.urdf").write_text(ARM)
     with pytest.raises(ConfigError, match=r"assets\.yaml:2:.*expected file with kind: file"):

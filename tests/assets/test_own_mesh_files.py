@@ -25,7 +25,6 @@ RED = "newmtl red\nKd 1 0 0\n"
 
 
 def material_of(folder: Path, name: str = "a.obj") -> Material:
-    """The material of the first triangle."""
     soup = read_mesh(Folder(folder), name).soup
     return soup.slots[int(soup.face_slots[0])].material
 
@@ -53,9 +52,7 @@ def opened(tmp_path: Path, folder: Path) -> Library:
     ids=["tabs", "byte order marks", "continued lines", "CR", "comments", "indented",
          "two libraries", "foreign path"],
 )  # fmt: skip
-def test_obj_white_space_and_spelling_keep_faces_and_materials(
-    tmp_path: Path, obj: str, mtl: str
-) -> None:
+def test_obj_spelling_keeps_faces_and_materials(tmp_path: Path, obj: str, mtl: str) -> None:
     """One triangle in the red of its MTL."""
     (tmp_path / "a.obj").write_bytes(obj.encode())
     (tmp_path / "a.mtl").write_bytes(mtl.encode())
@@ -194,7 +191,7 @@ def test_gradients_become_an_image_that_returns_the_corners_colours(tmp_path: Pa
         assert color_at(read, (x - 0.5, y - 0.5)) == pytest.approx(rgb, abs=1.0)
 
 
-def test_few_colours_of_whole_faces_become_materials_and_one_colour_a_base_colour(
+def test_few_colours_of_faces_become_materials_and_one_a_base_colour(
     tmp_path: Path,
 ) -> None:
     """A PLY with a red and a blue face has two materials and no image."""
@@ -453,7 +450,6 @@ MODEL_3MF = (
     ids=["cycle", "missing object", "entities", "a bomb of blanks"],
 )
 def test_hostile_3mf_is_one_clear_error(tmp_path: Path, model: str, reason: str) -> None:
-    """Whatever its archive unpacks to."""
     root = tmp_path / "props"
     root.mkdir()
     with zipfile.ZipFile(root / "a.3mf", "w", zipfile.ZIP_DEFLATED) as archive:

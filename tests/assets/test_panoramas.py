@@ -23,7 +23,6 @@ def pixels(height: int = 8) -> np.ndarray:
 
 
 def exr_file(rgb: np.ndarray, names: str = "RGB") -> bytes:
-    """An OpenEXR file of 32-bit floats."""
     channels = {name: np.ascontiguousarray(rgb[..., k]) for k, name in enumerate(names)}
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
     with tempfile.NamedTemporaryFile(suffix=".exr") as file:
@@ -81,7 +80,6 @@ def test_a_little_ringing_below_zero_is_dark() -> None:
 def test_what_is_no_panorama_is_refused_and_nothing_is_kept(
     tmp_path: Path, make: Callable[[], bytes], said: str
 ) -> None:
-    """One error names the file and the fault; the cache stays empty."""
     folder, cache = tmp_path / "mine", tmp_path / "cache"
     folder.mkdir()
     (folder / "sky.exr").write_bytes(make())
@@ -102,7 +100,6 @@ def test_what_is_no_panorama_is_refused_and_nothing_is_kept(
     [b"", b"\x89PNG\r\n\x1a\n" + bytes(64), b"not an image at all", b"\xff\xd8\xff" + bytes(90)],
 )
 def test_a_corrupt_texture_is_refused_and_nothing_is_kept(tmp_path: Path, data: bytes) -> None:
-    """Empty, cut off or something else: one error that names the file."""
     folder, cache = tmp_path / "mine", tmp_path / "cache"
     folder.mkdir()
     (folder / "wood.png").write_bytes(data)

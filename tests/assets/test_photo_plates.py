@@ -58,10 +58,9 @@ def angle_deg(pose: SE3, zenith: np.ndarray) -> float:
     ("pitch_deg", "roll_deg", "yaw_deg", "hfov_deg"),
     [(-8.0, 2.0, 10.0, 70.0), (5.0, -3.0, 25.0, 50.0)],
 )
-def test_the_horizon_of_a_street_is_found(
+def test_a_street_has_its_horizon(
     pitch_deg: float, roll_deg: float, yaw_deg: float, hfov_deg: float
 ) -> None:
-    """To 0.1 degrees with a known field of view, and both without one."""
     pose = tilted(pitch_deg, roll_deg)
     lens = Intrinsics.from_hfov(*SIZE_PX, math.radians(hfov_deg))
     edges = find_edges(street_lines(pose, lens, yaw_deg))
@@ -88,7 +87,6 @@ def test_edges_without_common_directions_are_refused() -> None:
 
 
 def library_of(folder: Path, entry: str, image: UInt8 | None = None) -> Library:
-    """A folder with one photograph, by default an even one, and its entry."""
     folder.mkdir(exist_ok=True)
     if image is None:
         image = np.full((640, 960, 3), 120, np.uint8)
@@ -99,7 +97,6 @@ def library_of(folder: Path, entry: str, image: UInt8 | None = None) -> Library:
 
 
 def plate_of(folder: Path, entry: str, image: UInt8 | None = None) -> Plate:
-    """The plate of such a folder."""
     return library_of(folder, entry, image).plate("user/photo")
 
 
@@ -171,13 +168,11 @@ def test_exif_gives_the_field_of_view(tmp_path: Path) -> None:
     ],
 )
 def test_unusable_photographs_are_refused(tmp_path: Path, entry: str, fault: str) -> None:
-    """With the field and the remedy."""
     with pytest.raises(AssetError, match=fault):
         plate_of(tmp_path, entry)
 
 
 def test_a_mask_of_another_size_is_refused(tmp_path: Path) -> None:
-    """It could not say which pixels it covers."""
     Image.fromarray(np.zeros((8, 8), np.uint8)).save(tmp_path / "mask.png")
     entry = f"ground: {GROUND}, hfov_deg: 60, horizon: {{height_px: 300}}, mask: mask.png"
     with pytest.raises(AssetError, match="8 x 8 px; expected the size of its photograph"):
@@ -185,7 +180,6 @@ def test_a_mask_of_another_size_is_refused(tmp_path: Path) -> None:
 
 
 def test_wrong_fields_have_a_place(tmp_path: Path) -> None:
-    """As everywhere in ``assets.yaml``."""
     with pytest.raises(ConfigError, match=r"assets.yaml:3:\d+: .*ground"):
         plate_of(tmp_path, "hfov_deg: 60")
     with pytest.raises(ConfigError, match=r"assets.yaml:3:\d+: .*no such file"):

@@ -65,7 +65,6 @@ def test_an_overcast_zenith_is_about_three_times_the_horizon() -> None:
 
 
 def test_a_clear_sky_is_blue_and_a_sunset_is_warm_at_its_brightest() -> None:
-    """Colour where it matters."""
     blue = ENVIRONMENTS["clear_sky"].build(0)[:40].mean(axis=(0, 1))
     sunset = ENVIRONMENTS["sunset"].build(0)
     glow = sunset.reshape(-1, 3)[sunset.sum(axis=2).argmax()]
@@ -84,5 +83,4 @@ def test_studio_light_comes_from_a_few_small_places() -> None:
 
 
 def test_normalising_a_uniform_image_gives_ones() -> None:
-    """The scale of the input does not matter."""
     assert np.allclose(normalize_luminance(np.full((16, 32, 3), 7.0)), 1.0, atol=1e-6)

@@ -29,9 +29,7 @@ def test_defaults_build_finite_meshes_with_the_documented_slots(name: str) -> No
 
 @pytest.mark.parametrize("name", SIZED)
 @pytest.mark.parametrize("size_m", [(1.6, 0.7, 0.9), (0.5, 0.4, 0.7)])
-def test_the_bounding_box_is_the_size_asked_for(
-    name: str, size_m: tuple[float, float, float]
-) -> None:
+def test_the_box_is_the_size_asked_for(name: str, size_m: tuple[float, float, float]) -> None:
     """Centred on its footprint, standing on z = 0; collision agrees."""
     solid = FAMILIES[name].build(size_m=size_m)
     low, high = solid.mesh.bounds_m()
@@ -54,13 +52,11 @@ def test_a_light_panel_shines_down_with_all_of_its_lower_side(shape: str) -> Non
     assert (normals[:, 2] < 0.0).all()
     expected = 0.4 if shape == "rectangle" else np.pi * 0.16
     assert -normals[:, 2].sum() == pytest.approx(expected, rel=0.002)
-    assert mesh.materials[1].role == "lamp"
-    assert mesh.materials[1].emission_cd_m2 == (0.0, 0.0, 0.0)
+    assert (mesh.materials[1].role, mesh.materials[1].emission_cd_m2) == ("lamp", (0.0, 0.0, 0.0))
     assert mesh.bounds_m()[1][2] == pytest.approx(0.04)
 
 
 def test_a_light_panel_of_another_shape_is_refused() -> None:
-    """With what was probably meant."""
     with pytest.raises(AssetError, match="disk"):
         FAMILIES["light_panel"].build(shape="disc")
 
@@ -184,10 +180,9 @@ def test_a_backdrop_carries_things_on_its_floor_and_curves_up() -> None:
         ("bin", {"size_m": (500.0, 0.4, 0.2)}, r"bin: size_m"),
     ],
 )
-def test_unusable_parameters_are_refused_with_a_remedy(
+def test_unusable_parameters_are_told(
     name: str, parameters: dict[str, object], message: str
 ) -> None:
-    """One clear message: place, fact, what is expected."""
     with pytest.raises(AssetError, match=message):
         FAMILIES[name].build(**parameters)
 

@@ -47,7 +47,6 @@ OPEN_EDGES = {"milk_carton": 0.02, "pipe_elbow": 0.02, "flange": 0.005}
 
 @cache
 def variant(name: str, seed: int) -> Solid:
-    """A variant of a family, built once for all tests."""
     return FAMILIES[name].build(seed=seed)
 
 
@@ -95,8 +94,7 @@ def test_arrays_are_finite_typed_and_within_the_budget(built: tuple[str, Solid])
         (mesh.faces, (m, 3), np.int32),
         (mesh.face_slots, (m,), np.int32),
     ):
-        assert array.shape == shape
-        assert array.dtype == dtype
+        assert (array.shape, array.dtype) == (shape, dtype)
         assert np.isfinite(array).all()
     assert 60 <= m <= 12_000
     assert set(np.unique(mesh.face_slots)) <= set(range(len(mesh.materials)))
@@ -222,7 +220,6 @@ def test_vessels_are_hollow_in_physics(name: str, seed: int) -> None:
 @pytest.mark.slow
 @for_every(OBJECTS)
 def test_equal_seeds_make_equal_bytes_and_others_differ(name: str) -> None:
-    """A variant is a pure function of its seed."""
     digests = [_digest(FAMILIES[name].build(seed=seed)) for seed in range(4)]
 
     assert digests[:2] == [_digest(variant(name, seed)) for seed in (0, 1)]

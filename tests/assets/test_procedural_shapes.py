@@ -7,21 +7,8 @@ import math
 import numpy as np
 import pytest
 
+from gen_data.content.procedural import surface_shapes
 from gen_data.content.procedural.patches import CREASE_DEG, Patch, finish_mesh, join_patches
-from gen_data.content.procedural.surface_shapes import (
-    ball,
-    block,
-    circle,
-    cone,
-    extrude,
-    fillet,
-    lathe,
-    map_along_grain,
-    rounded_box,
-    spline,
-    sweep,
-    triangulate,
-)
 from gen_data.core.asset_types import Material
 
 
@@ -30,12 +17,14 @@ def test_a_turned_cylinder_has_the_volume_of_its_prism() -> None:
     radius, height, sides = 0.03, 0.1, 24
     area = 0.5 * sides * radius**2 * math.sin(2 * math.pi / sides)
 
-    assert _volume(cone((radius, 0.0), (radius, height), sides)) == pytest.approx(area * height)
+    assert _volume(surface_shapes.cone((radius, 0.0), (radius, height), sides)) == pytest.approx(
+        area * height
+    )
 
 
 def test_a_lathe_puts_the_middle_of_the_image_at_plus_x() -> None:
     """U = 1/2 at +X, and grows towards +Y: to the right of a viewer who looks at -X."""
-    patch = lathe([(1.0, 0.0), (1.0, 1.0)], 32)
+    patch = surface_shapes.lathe([(1.0, 0.0), (1.0, 1.0)], 32)
     points, uvs = patch.corners_m.reshape(-1, 3), patch.uvs.reshape(-1, 2)
 
     front = points[np.abs(uvs[:, 0] - 0.5) < 1e-9]
@@ -46,10 +35,9 @@ def test_a_lathe_puts_the_middle_of_the_image_at_plus_x() -> None:
 
 
 def test_a_sweep_does_not_twist_along_a_helix() -> None:
-    """Neighbouring sections turn with the path only: no face is turned inside out."""
     t = np.linspace(0.0, 4 * math.pi, 80)
     path = np.stack([np.cos(t), np.sin(t), 0.2 * t], axis=1)
-    tube = sweep(path, circle(0.1, 12))
+    tube = surface_shapes.sweep(path, surface_shapes.circle(0.1, 12))
 
     assert _volume(tube) == pytest.approx(
         math.pi * 0.01 * 4 * math.pi * math.hypot(1, 0.2), rel=0.06
@@ -62,7 +50,7 @@ def test_a_rounded_box_keeps_its_size_and_loses_its_corners() -> None:
     x, y, z = a - 2 * r, b - 2 * r, c - 2 * r
     steiner = x * y * z + 2 * r * (x * y + y * z + z * x) + math.pi * r**2 * (x + y + z)
     steiner += 4 / 3 * math.pi * r**3
-    patch = rounded_box((a, b, c), r, 6)
+    patch = surface_shapes.rounded_box((a, b, c), r, 6)
     low, high = patch.bounds_m()
 
     assert np.allclose(high - low, (a, b, c))
@@ -71,7 +59,9 @@ def test_a_rounded_box_keeps_its_size_and_loses_its_corners() -> None:
 
 def test_flat_faces_next_to_a_bevel_stay_flat() -> None:
     """Their normals lean by less than two degrees, or large faces would look like pillows."""
-    mesh = finish_mesh(block((0.0, 0.0, 0.0), (1.0, 0.6, 0.03), 0.003), [Material()], CREASE_DEG)
+    mesh = finish_mesh(
+        surface_shapes.block((0.0, 0.0, 0.0), (1.0, 0.6, 0.03), 0.003), [Material()], CREASE_DEG
+    )
     top = mesh.normals[(mesh.vertices_m[:, 2] > 0.0299) & (mesh.normals[:, 2] > 0.8)]
 
     assert len(top)
@@ -80,8 +70,8 @@ def test_flat_faces_next_to_a_bevel_stay_flat() -> None:
 
 def test_a_plain_box_is_split_at_its_edges_and_a_ball_is_not() -> None:
     """Creases have one normal per face; smooth surfaces one per vertex."""
-    box = finish_mesh(block((0, 0, 0), (1, 1, 1)), [Material()], CREASE_DEG)
-    sphere = finish_mesh(ball(lambda d: d, 12, 24), [Material()], CREASE_DEG)
+    box = finish_mesh(surface_shapes.block((0, 0, 0), (1, 1, 1)), [Material()], CREASE_DEG)
+    sphere = finish_mesh(surface_shapes.ball(lambda d: d, 12, 24), [Material()], CREASE_DEG)
 
     assert len(box.vertices_m) == 24
     assert {tuple(n) for n in np.abs(box.normals).tolist()} == {(1, 0, 0), (0, 1, 0), (0, 0, 1)}
@@ -90,11 +80,15 @@ def test_a_plain_box_is_split_at_its_edges_and_a_ball_is_not() -> None:
 
 def test_an_extruded_ring_has_the_volume_of_its_area() -> None:
     """Holes are holes, however many and however they are wound."""
-    outer, hole = circle(0.05, 40), circle(0.01, 16)
-    holes = [hole, hole[::-1] + np.array([0.03, 0.0]), circle(0.006, 12, (-0.02, 0.025))]
+    outer, hole = surface_shapes.circle(0.05, 40), surface_shapes.circle(0.01, 16)
+    holes = [
+        hole,
+        hole[::-1] + np.array([0.03, 0.0]),
+        surface_shapes.circle(0.006, 12, (-0.02, 0.025)),
+    ]
     area = _area(outer) - 2 * _area(hole) - _area(holes[2])
 
-    assert _volume(extrude(outer, 0.02, holes=holes)) == pytest.approx(area * 0.02)
+    assert _volume(surface_shapes.extrude(outer, 0.02, holes=holes)) == pytest.approx(area * 0.02)
 
 
 @pytest.mark.parametrize("teeth", [5, 9, 16])
@@ -103,23 +97,24 @@ def test_triangles_of_a_star_cover_it_exactly(teeth: int) -> None:
     turn = np.pi * np.arange(2 * teeth) / teeth
     reach = np.where(np.arange(2 * teeth) % 2 == 0, 1.0, 0.45)
     star = np.stack([reach * np.cos(turn), reach * np.sin(turn)], axis=1)
-    triangles = triangulate(star, [circle(0.2, 7)[::-1]])
+    triangles = surface_shapes.triangulate(star, [surface_shapes.circle(0.2, 7)[::-1]])
     a, b, c = triangles[:, 0], triangles[:, 1], triangles[:, 2]
     areas = 0.5 * ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0])
 
     assert (areas > 0).all()
-    assert areas.sum() == pytest.approx(_area(star) - _area(circle(0.2, 7)))
+    assert areas.sum() == pytest.approx(_area(star) - _area(surface_shapes.circle(0.2, 7)))
 
 
 def test_a_hole_outside_its_outline_is_refused() -> None:
-    """Instead of triangles that overlap."""
     with pytest.raises(ValueError, match="outside"):
-        triangulate(circle(1.0, 8), [circle(0.2, 8, (3.0, 0.0))[::-1]])
+        surface_shapes.triangulate(
+            surface_shapes.circle(1.0, 8), [surface_shapes.circle(0.2, 8, (3.0, 0.0))[::-1]]
+        )
 
 
 def test_a_fillet_touches_both_sides_and_keeps_its_radius() -> None:
     """The arc's points are at the radius from the centre of the rounded corner."""
-    line = fillet([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0)], [0.0, 0.25, 0.0], 8)
+    line = surface_shapes.fillet([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0)], [0.0, 0.25, 0.0], 8)
     arc = np.array(line[1:-1])
 
     assert np.allclose(np.hypot(arc[:, 0] - 0.75, arc[:, 1] - 0.25), 0.25)
@@ -128,15 +123,14 @@ def test_a_fillet_touches_both_sides_and_keeps_its_radius() -> None:
 
 
 def test_a_spline_passes_through_its_points() -> None:
-    """Catmull-Rom interpolates."""
     points = [(0.0, 0.0), (1.0, 2.0), (2.0, -1.0), (3.0, 0.5)]
 
-    assert np.allclose(spline(points, 31)[::10], points)
+    assert np.allclose(surface_shapes.spline(points, 31)[::10], points)
 
 
 def test_seams_of_the_image_do_not_crease_the_surface() -> None:
     """Vertices on both sides of the seam have one normal."""
-    mesh = finish_mesh(lathe([(0.1, 0.0), (0.1, 0.2)], 24), [Material()], CREASE_DEG)
+    mesh = finish_mesh(surface_shapes.lathe([(0.1, 0.0), (0.1, 0.2)], 24), [Material()], CREASE_DEG)
     seam = (mesh.vertices_m[:, 0] < -0.0999) & (mesh.vertices_m[:, 2] < 1e-6)
 
     assert seam.sum() == 2
@@ -144,9 +138,8 @@ def test_seams_of_the_image_do_not_crease_the_surface() -> None:
 
 
 def test_degenerate_triangles_are_left_out() -> None:
-    """A pole of a sphere is a fan, not quads with a side of no length."""
     rings, segments = 6, 12
-    mesh = finish_mesh(ball(lambda d: d, rings, segments), [Material()], CREASE_DEG)
+    mesh = finish_mesh(surface_shapes.ball(lambda d: d, rings, segments), [Material()], CREASE_DEG)
 
     assert len(mesh.faces) == 2 * segments * (rings - 1)
 
@@ -154,7 +147,7 @@ def test_degenerate_triangles_are_left_out() -> None:
 def test_grain_follows_the_longest_side_whatever_the_direction() -> None:
     """A board along Y and one along Z have u along their length, in repeats of twice 0.5 m."""
     for size in ((0.1, 1.0, 0.02), (0.1, 0.02, 1.0)):
-        patch = map_along_grain(block((0.0, 0.0, 0.0), size), 0.5)
+        patch = surface_shapes.map_along_grain(surface_shapes.block((0.0, 0.0, 0.0), size), 0.5)
         axis = int(np.argmax(size))
         long = np.ptp(patch.corners_m[:, :, axis], axis=1) > 0.5
         du = np.ptp(patch.uvs[long, :, 0], axis=1)
@@ -162,8 +155,7 @@ def test_grain_follows_the_longest_side_whatever_the_direction() -> None:
 
 
 def test_turning_and_moving_keep_the_volume() -> None:
-    """Patches are rigid, and painted slots survive joining."""
-    cylinder = cone((0.1, 0.0), (0.05, 0.3), 16)
+    cylinder = surface_shapes.cone((0.1, 0.0), (0.05, 0.3), 16)
     both = join_patches([cylinder, cylinder.rotated("x", 0.7).moved(1.0, 2.0, 3.0).painted(1)])
 
     assert _volume(both) == pytest.approx(2 * _volume(cylinder))

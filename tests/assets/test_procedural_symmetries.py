@@ -45,12 +45,10 @@ STATED = {
 
 @pytest.fixture(scope="module")
 def library() -> Library:
-    """The procedural library."""
     return open_library(())
 
 
 def turned(points_m: np.ndarray, symmetry: Symmetry) -> np.ndarray:
-    """The points after one turn of the symmetry."""
     angle_rad = 2.0 * math.pi / symmetry.fold if symmetry.fold else ANY_ANGLE_RAD
     x, y, z = (math.sin(0.5 * angle_rad) * v for v in symmetry.axis)
     turn = SE3((0.0, 0.0, 0.0), (math.cos(0.5 * angle_rad), x, y, z)).rotation()
@@ -83,7 +81,6 @@ def stated(library: Library, family: str) -> dict[str, tuple[Symmetry, ...]]:
 @pytest.mark.slow
 @pytest.mark.parametrize("family", STATED)
 def test_a_turn_leaves_the_mesh_in_place(family: str, library: Library) -> None:
-    """Every slot, so that colours stay in place too."""
     found = stated(library, family)
 
     assert {s.fold for listed in found.values() for s in listed} <= STATED[family]
@@ -104,7 +101,7 @@ def test_a_turn_leaves_the_mesh_in_place(family: str, library: Library) -> None:
         ("sphere?diameter_m=0.3", {0}),
     ],
 )
-def test_parametric_objects_turn_about_their_centre(
+def test_parametric_objects_turn_about_centre(
     asset: str, folds: set[int], library: Library
 ) -> None:
     """Their origin is on the floor; equal sides have quarter turns."""
@@ -135,5 +132,4 @@ def test_other_turns_are_found_out(asset: str, wrong: Any, library: Library) -> 
 @pytest.mark.slow
 @pytest.mark.parametrize("family", ["mug", "bottle", "can", "carton", "ball", "bracket", "hammer"])
 def test_printed_and_lopsided_objects_have_none(family: str, library: Library) -> None:
-    """A label or a handle shows the turn."""
     assert not any(stated(library, family).values())

@@ -26,16 +26,12 @@ def test_rows_have_the_type_of_the_table() -> None:
     assert not wine.clear
 
 
-def test_rows_keep_the_order_of_the_file() -> None:
-    """Seeds take the styles in turn, so the order is part of every variant."""
+def test_rows_keep_the_order_of_the_file_and_take_fields_from_another() -> None:
+    """Seeds take the styles in turn; an estate is a sedan with other measures."""
     assert " ".join(BOTTLES) == (
         "wine beer water soda ketchup detergent burgundy champagne white_wine longneck stubby "
         "ribbed family juice milk oil spirit sauce shampoo soap spray flask sport medicine squeeze"
     )
-
-
-def test_a_row_takes_the_fields_that_it_leaves_out_from_another() -> None:
-    """YAML's merge key: an estate is a sedan with other measures."""
     sedan, estate = DESIGNS["sedan"], DESIGNS["estate"]
 
     assert (sedan.rails, estate.rails) == (False, True)
@@ -43,14 +39,12 @@ def test_a_row_takes_the_fields_that_it_leaves_out_from_another() -> None:
 
 
 def test_a_table_of_another_type_is_refused() -> None:
-    """A field that the type has not is an error, not ignored."""
     with pytest.raises(KeyError):
         load_table(VEHICLES, "bicycles", Design)
 
 
 @pytest.mark.parametrize("path", TABLES, ids=lambda path: f"{path.parent.name}/{path.stem}")
 def test_no_key_is_given_twice(path: Path) -> None:
-    """YAML would silently keep the last."""
     for node in _mappings(yaml.compose(path.read_text("utf-8"))):
         keys = [key.value for key, _ in node.value]
         assert len(keys) == len(set(keys)), path

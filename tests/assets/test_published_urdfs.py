@@ -23,12 +23,10 @@ TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 
 
 
 def link(name: str, inside: str = "", collision: str = BOX) -> str:
-    """A link with a box to collide with."""
     return f'<link name="{name}">{inside}<collision>{collision}</collision></link>'
 
 
 def joint(name: str, parent: str, child: str, inside: str = "", kind: str = "fixed") -> str:
-    """A joint about Z."""
     return (
         f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
         f'<axis xyz="0 0 1"/>{inside}</joint>'
@@ -43,13 +41,11 @@ def describe(tmp_path: Path, *parts: str, file: str = "a.urdf") -> RobotDescript
 
 
 def seen(tmp_path: Path, *parts: str) -> Library:
-    """A library whose object ``user/a`` is that URDF."""
     describe(tmp_path, *parts)
     return open_library([tmp_path], tmp_path / "cache", tmp_path)
 
 
 def visual(material: str = "", geometry: str = BOX) -> str:
-    """A visual element."""
     return f"<visual>{geometry}{material}</visual>"
 
 
@@ -126,7 +122,6 @@ def test_a_joint_that_mimics_another_may_leave_out_its_limits(tmp_path: Path) ->
 
 
 def test_a_joint_without_limits_is_refused_with_the_remedy(tmp_path: Path) -> None:
-    """At the joint's own line."""
     with pytest.raises(AssetError, match=r"a\.urdf:4:1: .*'j' has no limits; give it a <limit>"):
         describe(tmp_path, link("a"), link("b"), joint("j", "a", "b", kind="revolute"))
 
@@ -174,7 +169,6 @@ def test_negative_sizes_are_refused_with_link_and_line(tmp_path: Path, shape: st
 
 
 def test_an_invisible_visual_is_left_out(tmp_path: Path) -> None:
-    """What nobody sees has no label."""
     clear = '<material name="m"><color rgba="1 0 0 0"/></material>'
     described = describe(tmp_path, link("a", visual(clear)))
     assert described.links["a"].visuals == ()
@@ -190,9 +184,7 @@ def test_an_invisible_visual_is_left_out(tmp_path: Path) -> None:
         '<link name="$(arg prefix)b"/>',
     ],
 )
-def test_a_xacro_file_is_refused_with_the_command_that_expands_it(
-    tmp_path: Path, part: str
-) -> None:
+def test_a_xacro_file_is_refused_with_the_command_for_it(tmp_path: Path, part: str) -> None:
     """At the line of the first macro or expression."""
     (tmp_path / "a.urdf").write_text(
         f'<robot name="r" xmlns:xacro="http://ros.org/wiki/xacro">\n{part}\n{link("a")}\n</robot>'
@@ -227,7 +219,6 @@ def test_a_ros_package_is_an_asset_folder(tmp_path: Path, urdf: str, mesh: str, 
 
 
 def test_a_third_slash_of_a_package_uri_is_no_part_of_the_path(tmp_path: Path) -> None:
-    """As in TALOS' full description."""
     (tmp_path / "arm_description/meshes").mkdir(parents=True)
     (tmp_path / "arm_description/meshes/a.obj").write_text(TETRAHEDRON)
     described = describe(tmp_path, PACKAGED.replace("package://", "package:///"))

@@ -47,7 +47,6 @@ def test_results_are_the_arrays_of_the_function(shared: Sandbox) -> None:
 
 
 def test_errors_of_readers_arrive_as_they_are(shared: Sandbox, tmp_path: Path) -> None:
-    """The message of the reader, without a traceback."""
     (tmp_path / "a.png").write_bytes(b"noise")
     with pytest.raises(AssetError, match=r"a\.png: unreadable.*; [^\n]*$"):
         shared.run(parse_image, tmp_path, {}, "a.png", "rgb", place="x", input_bytes=0)
@@ -56,7 +55,6 @@ def test_errors_of_readers_arrive_as_they_are(shared: Sandbox, tmp_path: Path) -
 def test_relative_paths_follow_the_folder_of_the_caller(
     shared: Sandbox, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A notebook changes its folder while the child lives; each call reads the file of its own."""
     for shade in (10, 200):
         here = tmp_path / str(shade)
         (here / "photos").mkdir(parents=True)

@@ -23,7 +23,6 @@ BOX = "<geometry><box><size>0.2 0.4 0.6</size></box></geometry>"
 
 
 def link(name: str, pose: str = "", extra: str = "") -> str:
-    """A link that shows and collides with a box."""
     return (
         f'<link name="{name}">{pose}<visual name="v">{BOX}{extra}</visual>'
         f'<collision name="c">{BOX}</collision></link>'
@@ -31,7 +30,6 @@ def link(name: str, pose: str = "", extra: str = "") -> str:
 
 
 def read(tmp_path: Path, *parts: str) -> RobotDescription:
-    """Read a model of these elements, one a line."""
     text = "\n".join(['<sdf version="1.9"><model name="m">', *parts, "</model></sdf>"])
     (tmp_path / "a.sdf").write_text(text)
     return read_sdf(Folder(tmp_path), "a.sdf")
@@ -49,7 +47,6 @@ def poses_at(described: RobotDescription, **positions: float) -> dict[str, SE3]:
 
 
 def middle(described: RobotDescription, link_name: str, **positions: float) -> list[float]:
-    """Middle of the first visual of a link in the root's frame."""
     (shape,) = described.links[link_name].visuals
     pose = poses_at(described, **positions)[link_name] @ shape.T_link_shape
     return [round(v, 6) + 0.0 for v in pose.translation_m]
@@ -86,9 +83,7 @@ def test_a_door_turns_about_its_hinge(tmp_path: Path) -> None:
         ("<xyz>0 1 0</xyz><use_parent_model_frame>true</use_parent_model_frame>", [1.0, 0.1, 0.5]),
     ],
 )
-def test_axes_are_in_the_frame_that_they_name(
-    tmp_path: Path, axis: str, expected: list[float]
-) -> None:
+def test_axes_are_in_the_named_frame(tmp_path: Path, axis: str, expected: list[float]) -> None:
     """By default in the joint's own, which here has Y along the model's -X."""
     slide = HINGED[2].replace("revolute", "prismatic").replace("<xyz>0 0 1</xyz>", axis)
     described = read(tmp_path, *HINGED[:2], slide)
@@ -182,7 +177,6 @@ def test_models_are_found_by_their_bare_names(tmp_path: Path) -> None:
 
 
 def test_before_version_1_7_a_joint_may_have_the_name_of_its_link(tmp_path: Path) -> None:
-    """Libsdformat renames it, too."""
     joint = HINGED[2].replace('name="hinge"', 'name="door"')
     with pytest.raises(AssetError, match="joint 'door': its name is missing or used twice"):
         read(tmp_path, *HINGED[:2], joint)
@@ -267,7 +261,6 @@ def test_of_a_loop_the_first_joint_is_kept(tmp_path: Path) -> None:
 
 
 def test_a_static_model_does_not_move(tmp_path: Path) -> None:
-    """Its joints have no positions."""
     described = read(tmp_path, "<static>true</static>", *HINGED)
     assert not any(joint.movable for joint in described.joints)
     assert middle(described, "door") == [1.0, 0.0, 0.5]
@@ -308,13 +301,11 @@ def test_what_is_not_used_is_named(tmp_path: Path) -> None:
     ],
 )  # fmt: skip
 def test_faults_have_one_clear_error(tmp_path: Path, part: str, reason: str) -> None:
-    """With the file, the line of the element, and its name."""
     with pytest.raises(AssetError, match=rf"a\.sdf.*{reason}"):
         read(tmp_path, part, *HINGED[:2])
 
 
 def test_entities_are_never_expanded(tmp_path: Path) -> None:
-    """A document type is refused."""
     (tmp_path / "a.sdf").write_text("<!DOCTYPE a [<!ENTITY b 'c'>]><sdf><model name='&b;'/></sdf>")
     with pytest.raises(AssetError, match=r"a\.sdf: .*declares a document type"):
         read_sdf(Folder(tmp_path), "a.sdf")

@@ -47,7 +47,7 @@ def test_clear_sun_has_the_illuminance_of_the_ies_formula(altitude_deg: float, l
 @pytest.mark.parametrize(
     ("altitude_deg", "lux", "factor"), [(-0.8, 453.0, 1.2), (-6.0, 3.4, 1.2), (-12.0, 0.0083, 1.3)]
 )
-def test_twilight_fades_as_the_naval_observatory_tells(
+def test_twilight_fades_as_observatories_tell(
     altitude_deg: float, lux: float, factor: float
 ) -> None:
     """Sunset, the end of civil and of nautical twilight; a city's own glow is taken off."""
@@ -82,9 +82,7 @@ def test_low_sun_is_redder() -> None:
 
 @pytest.mark.parametrize("azimuth_deg", [0.0, 70.0, 180.0])
 @pytest.mark.parametrize("elevation_deg", [10.0, 45.0, 80.0])
-def test_preethams_sky_follows_perez_with_his_coefficients(
-    elevation_deg: float, azimuth_deg: float
-) -> None:
+def test_preethams_sky_follows_his_coefficients(elevation_deg: float, azimuth_deg: float) -> None:
     """Ratios to the zenith at turbidity 2: A..E = -1.1056, -0.2833, 5.2797, -2.3359, 0.2363."""
     a, b, c, d, e = -1.1056, -0.2833, 5.2797, -2.3359, 0.2363
     sun, elevation, azimuth = (math.radians(v) for v in (40.0, elevation_deg, azimuth_deg))
@@ -158,9 +156,7 @@ def test_preethams_sky_is_shaped_as_the_standard_clear_sky(altitude_deg: float) 
 
 
 @pytest.mark.parametrize(("altitude_deg", "turbidity"), [(30.0, 2.5), (45.0, 3.0), (60.0, 2.5)])
-def test_preethams_sun_and_sky_give_the_light_of_a_clear_day(
-    altitude_deg: float, turbidity: float
-) -> None:
+def test_preethams_light_is_that_of_a_clear_day(altitude_deg: float, turbidity: float) -> None:
     """On level ground within 15 % of IES RP-21: 127.5 klx exp(-0.21 m) sin h, and the clear sky.
 
     Preetham's sky alone is up to twice as bright as that of IES, his sun the dimmer for it.
@@ -199,13 +195,11 @@ def test_preethams_zenith_is_as_bright_as_published() -> None:
     ],
 )
 def test_preethams_sky_is_clear_and_by_day(given: dict[str, float], said: str) -> None:
-    """Unknown parameters are refused."""
     with pytest.raises(ValueError, match=said):
         luminance_cd_m2(SkyModel(model="preetham", **given), 64)
 
 
 def test_an_unknown_model_of_the_sky_is_refused() -> None:
-    """The message lists the known ones."""
     with pytest.raises(ValueError, match="expected one of measured, preetham"):
         luminance_cd_m2(SkyModel(model="hosek"), 64)
 
@@ -262,17 +256,14 @@ def test_clouds_cover_more_the_cloudier_it_is() -> None:
 
 
 def test_same_arguments_make_the_same_bytes() -> None:
-    """Another seed makes other clouds."""
     first, again, other = (sky(seed, 30.0, 2.5, 0.4, 0.18) for seed in (1, 1, 2))
 
     assert first.tobytes() == again.tobytes()
     assert first.tobytes() != other.tobytes()
-    assert first.shape == (512, 1024, 3)
-    assert first.dtype == np.float32
+    assert (first.shape, first.dtype) == ((512, 1024, 3), np.float32)
 
 
 def test_library_refuses_a_sky_that_cannot_be(tmp_path) -> None:  # noqa: ANN001
-    """The message names parameter, value and range."""
     library = open_library(cache_dir=tmp_path)
 
     with pytest.raises(AssetError, match=r"cloudiness is 2; expected a number in \[0, 1\]"):

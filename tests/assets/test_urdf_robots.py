@@ -18,12 +18,10 @@ TOOLED = ("franka_panda_suction", "kuka_iiwa_gripper", "kuka_iiwa_suction", "xar
 
 @pytest.fixture(scope="module")
 def library(tmp_path_factory: pytest.TempPathFactory) -> Library:
-    """A library with a fresh cache."""
     return open_library(cache_dir=tmp_path_factory.mktemp("cache"))
 
 
 def link_poses(robot: RobotModel, positions: tuple[float, ...]) -> dict[str, SE3]:
-    """Forward kinematics, written here independently."""
     poses, remaining = {robot.links[0]: SE3()}, list(positions)
     for joint in robot.joints:
         motion = SE3()

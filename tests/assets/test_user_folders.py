@@ -49,7 +49,6 @@ def write_box(path: Path, size: tuple[float, float, float]) -> None:
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """An empty folder for assets."""
     root = tmp_path / "props"
     root.mkdir()
     return root
@@ -136,15 +135,13 @@ def test_a_changed_file_is_another_asset(folder: Path, tmp_path: Path) -> None:
 
 
 def test_a_users_robot_is_as_good_as_ours(folder: Path, tmp_path: Path) -> None:
-    """Primitives, fixed joints, a home position and a normalised axis."""
     (folder / "arm.urdf").write_text(ARM)
     (folder / "assets.yaml").write_text(
         "robots: [{id: arm, file: arm.urdf, tags: [arm], licence: MIT, author: me, source: here}]\n"
     )
     library = open_library([folder], cache_dir=tmp_path / "cache")
     robot = library.robot("user/arm")
-    assert robot.links == ("base", "upper", "tip")
-    assert robot.home == (1.0,)
+    assert (robot.links, robot.home) == (("base", "upper", "tip"), (1.0,))
     assert robot.movable[0].axis == (0.0, 1.0, 0.0)
     assert ("upper", "tip") in robot.no_collide
     assert ("base", "tip") in robot.no_collide
@@ -156,7 +153,6 @@ def test_a_users_robot_is_as_good_as_ours(folder: Path, tmp_path: Path) -> None:
 
 
 def test_a_robot_entry_that_names_a_missing_joint_is_refused(folder: Path, tmp_path: Path) -> None:
-    """The message suggests the nearest name."""
     (folder / "arm.urdf").write_text(ARM)
     (folder / "assets.yaml").write_text(
         "robots: [{id: arm, file: arm.urdf, home: {sholder: 1.0}}]\n"
@@ -166,7 +162,6 @@ def test_a_robot_entry_that_names_a_missing_joint_is_refused(folder: Path, tmp_p
 
 
 def test_textures_and_panoramas_can_be_listed(folder: Path, tmp_path: Path) -> None:
-    """A panorama comes with mean luminance 1 over the sphere."""
     import cv2
 
     Image.fromarray(np.full((8, 8, 3), 200, np.uint8)).save(folder / "grey.jpg", quality=100)
@@ -201,9 +196,7 @@ HAND = """<robot name="hand">
 HAND_INDEX = "robots: [{id: hand, file: hand.urdf, home: {%s}}]\n"
 
 
-def test_a_joint_that_mimics_another_has_its_multiplier_and_offset(
-    folder: Path, tmp_path: Path
-) -> None:
+def test_a_mimic_joint_has_its_multiplier_and_offset(folder: Path, tmp_path: Path) -> None:
     """At home 0.3 the follower is at -1 * 0.3 + 0.1 = -0.2, and its link is turned so far."""
     (folder / "hand.urdf").write_text(HAND)
     (folder / "assets.yaml").write_text(HAND_INDEX % "finger: 0.3")
@@ -230,7 +223,7 @@ def test_a_follower_cannot_be_told_to_stand_elsewhere(folder: Path, tmp_path: Pa
         ('joint="finger" offset="nan"', r"hand\.urdf:7:3: .*'nan' is not a number"),
     ],
 )
-def test_a_wrong_mimic_is_refused_with_its_place(
+def test_a_wrong_mimic_is_told_in_place(
     folder: Path, tmp_path: Path, mimic: str, fault: str
 ) -> None:
     """File, line and column of the joint."""
@@ -261,9 +254,7 @@ def sized(folder: Path, tmp_path: Path, entry: str, name: str = "a.obj") -> tupl
         ("front: -z, up: y", (3.0, 1.0, 2.0)),
     ],
 )
-def test_units_edges_and_axes(
-    folder: Path, tmp_path: Path, entry: str, size: tuple[float, ...]
-) -> None:
+def test_units_and_axes(folder: Path, tmp_path: Path, entry: str, size: tuple[float, ...]) -> None:
     """By hand for a box of 1 x 2 x 3: the up axis becomes Z, the front axis X."""
     assert sized(folder, tmp_path, entry) == pytest.approx(size, rel=1e-6)
 
@@ -295,16 +286,14 @@ def test_axes_that_are_named_come_to_z_and_x(up: str, front: str) -> None:
         ("materials: {'*': {maps: {orm: a.png, metallic: b.png}}}", "not both"),
     ],
 )
-def test_a_contradiction_is_refused_with_its_place(
+def test_a_contradiction_is_told_in_place(
     folder: Path, tmp_path: Path, entry: str, fault: str
 ) -> None:
-    """File, line and column, as everywhere in the configuration."""
     with pytest.raises(ConfigError, match=rf"(?s)assets\.yaml:1:\d+: assets\[0\].*{fault}"):
         sized(folder, tmp_path, entry)
 
 
 def test_edges_that_do_not_fit_the_file_are_refused(folder: Path, tmp_path: Path) -> None:
-    """They reveal a wrong axis."""
     with pytest.raises(AssetError, match=r"0\.1 x 0\.2 x 0\.3 m, not 0\.1 x 0\.3 x 0\.2 m"):
         sized(folder, tmp_path, "size_m: [0.1, 0.3, 0.2]")
 
@@ -341,7 +330,7 @@ def test_a_pattern_stands_for_every_file_that_matches(folder: Path, tmp_path: Pa
         ),
     ],
 )
-def test_a_missing_file_is_told_with_its_place(
+def test_a_missing_file_is_told_in_place(
     folder: Path, tmp_path: Path, entry: str, fault: str
 ) -> None:
     """The message suggests the nearest name, or summarises the folder."""
@@ -402,7 +391,6 @@ def test_images_need_to_be_placed(folder: Path, tmp_path: Path) -> None:
 
 
 def test_a_panorama_needs_no_index(folder: Path, tmp_path: Path) -> None:
-    """Neither does a mesh."""
     import cv2
 
     cv2.imwrite(str(folder / "hall.hdr"), np.full((8, 16, 3), 2.0, np.float32))
@@ -426,7 +414,6 @@ def test_an_unknown_id_tells_what_the_folders_hold(folder: Path, tmp_path: Path)
 def test_a_tree_that_is_no_folder_of_assets_is_refused(
     folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Every entry counts, not only meshes."""
     for k in range(6):
         (folder / f"{k}.txt").write_text("")
     monkeypatch.setattr(asset_folder, "MAX_ENTRIES", 5)
@@ -440,10 +427,7 @@ def test_proc_is_refused_without_a_traceback(tmp_path: Path) -> None:
         open_library([Path("/proc")], cache_dir=tmp_path / "cache").find({"user"})
 
 
-def test_a_folder_that_cannot_be_read_is_named(
-    folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The message gives the system's reason."""
+def test_an_unreadable_folder_is_named(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     error = PermissionError(13, "Permission denied", str(folder / "locked"))
     monkeypatch.setattr(os, "scandir", raising(error))
     with pytest.raises(AssetError, match=r"locked: Permission denied; all folders"):
@@ -451,8 +435,6 @@ def test_a_folder_that_cannot_be_read_is_named(
 
 
 def raising(error: Exception) -> Callable[..., NoReturn]:
-    """A function that raises."""
-
     def fail(*_: object) -> NoReturn:
         raise error
 
@@ -476,7 +458,7 @@ def write_car(path: Path) -> None:
 
 
 @pytest.mark.parametrize("suffix", ["obj", "glb"])
-def test_parts_named_like_mirrors_are_outside_the_body_of_a_vehicle(
+def test_mirrors_are_outside_the_body_of_a_vehicle(
     folder: Path, tmp_path: Path, suffix: str
 ) -> None:
     """A cabinet with the same parts is measured with its mirrors."""

@@ -24,14 +24,12 @@ KINDS = ("vessel", "dish", "metal", "plastic")
 
 @cache
 def clean(name: str, seed: int) -> TextureData:
-    """A print as new."""
     made: TextureData = getattr(printed_matter, name)(seed)
     return made
 
 
 @cache
 def worn(name: str, seed: int) -> TextureData:
-    """The same in use."""
     made: TextureData = TEXTURES[name].build(seed)
     return made
 
@@ -76,7 +74,6 @@ def surface(mesh: MeshData, slot: int, count: int) -> tuple[np.ndarray, np.ndarr
 
 
 def sample(image: np.ndarray, uvs: np.ndarray) -> np.ndarray:
-    """Pixels at texture coordinates."""
     height, width = image.shape[:2]
     rows = np.clip(((1.0 - uvs[:, 1]) * height).astype(int), 0, height - 1)
     return np.asarray(image[rows, np.clip((uvs[:, 0] * width).astype(int), 0, width - 1)])
@@ -93,7 +90,6 @@ def distances_m(points: np.ndarray, edges: np.ndarray) -> np.ndarray:
 
 @pytest.mark.slow
 def test_most_things_are_lightly_used_and_a_few_well() -> None:
-    """From new to worn."""
     drawn = np.array([draw_wear("anything", seed) for seed in range(2000)])
 
     assert drawn.min() < 0.01 and drawn.max() > 0.98
@@ -150,7 +146,6 @@ def test_dust_of_new_boxes_lies_on_their_upper_faces() -> None:
 
 @pytest.mark.slow
 def test_some_boxes_are_dusty() -> None:
-    """Their upper faces are paler or darker than printed."""
     dusty = [change("carton", seed)[390:500, 10:250].mean() for seed in range(0, 48, 2)]
 
     assert 0.1 < (np.array(dusty) > 12.0).mean() < 0.6
@@ -214,7 +209,6 @@ def test_marks_change_the_look_of_plain_slots_alone(variant: tuple[str, int]) ->
 
 @pytest.mark.slow
 def test_every_family_of_things_to_handle_has_new_and_marked_variants() -> None:
-    """Glass and print apart."""
     for name in ("fork", "remote", "mug", "plate", "hammer", "scissors"):
         textures = [
             {m.texture for m in FAMILIES[name].build(seed=seed).mesh.materials}
@@ -227,7 +221,6 @@ def test_every_family_of_things_to_handle_has_new_and_marked_variants() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_marks_grow_with_use(kind: str) -> None:
-    """Darker on average, and duller in more places."""
     light, heavy = (TEXTURES["use_marks"].build(step, kind=kind) for step in (2, 11))
     assert light.roughness is not None and heavy.roughness is not None
 

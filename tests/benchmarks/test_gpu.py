@@ -25,12 +25,10 @@ ROOT = Path(__file__).parents[2]
 
 
 def png(image: np.ndarray) -> Any:
-    """An image as the bytes of a PNG file."""
     return cv2.imencode(".png", image)[1].reshape(-1)
 
 
 def facts(reference: dict[str, Any], found: dict[str, Any]) -> list[tuple[str, str]]:
-    """Differences as pairs of place and fact."""
     return [(f.what, f.fact) for f in differences("sample 0", reference, found)]
 
 
@@ -91,7 +89,6 @@ def test_a_second_drawing_has_the_same_bytes_also_where_there_is_nothing() -> No
 
 
 def test_a_part_that_fails_names_file_line_kernel_and_error() -> None:
-    """And leaves the others alone."""
     result = run_part("broken", "report:format_report", 60.0, figures={"card": 1}, failures={})
 
     assert result.value is None
@@ -100,7 +97,6 @@ def test_a_part_that_fails_names_file_line_kernel_and_error() -> None:
 
 
 def test_a_part_that_takes_too_long_is_left_out() -> None:
-    """Its process is ended."""
     result = run_part("slow", "frames:time_kernels", 0.05, config="tabletop", device="cpu",
                       views=1, small=True)  # fmt: skip
 
@@ -142,7 +138,6 @@ for line in sys.stdin:
 
 @contextmanager
 def answering(folder: Path, count: int) -> Iterator[list[rates._Worker]]:
-    """Workers that answer without any work."""
     workers = [
         rates._Worker([sys.executable, "-c", WORKER, str(k)], folder / f"{k}.log")
         for k in range(count)
@@ -152,9 +147,7 @@ def answering(folder: Path, count: int) -> Iterator[list[rates._Worker]]:
         worker.end()
 
 
-def test_workers_that_are_not_ready_are_left_out(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_workers_not_ready_are_left_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Of four workers, the third has ended: the other three are measured, and two, and one."""
     monkeypatch.setattr(rates, "_started", lambda *a: answering(tmp_path, a[3]))
 
@@ -202,7 +195,6 @@ def test_references_that_are_too_large_to_be_carried_are_refused(
 
 
 def measure(*words: str | Path) -> None:
-    """The command, which fails if a part fails or a sample differs."""
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     line = [sys.executable, "-m", "benchmarks.gpu", *words, "--limit-s", "900"]
     subprocess.run(line, cwd=ROOT, env=environment, check=True)

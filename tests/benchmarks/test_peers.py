@@ -12,28 +12,14 @@ import pytest
 import trimesh
 
 from benchmarks.bench_peers import Figures, compare, format_table
+from benchmarks.peers import worlds
 from benchmarks.peers.workload import OBJECTS, ground_mesh, object_mesh
-from benchmarks.peers.worlds import (
-    FAR_M,
-    NEAR_M,
-    Images,
-    Lamp,
-    World,
-    encode_srgb,
-    mask_agreement,
-    plane_path,
-    projection,
-    read_worlds,
-    unproject_depth,
-    write_files,
-    write_worlds,
-)
 
-WORLD = World(
+WORLD = worlds.World(
     meshes=("/thing.obj",),
     T_world_bodies=(np.eye(4).tolist(),),
     ids=(3,),
-    lamps=(Lamp((1.0, 2.0, 3.0), 0.1, (10.0, 20.0, 30.0)),),
+    lamps=(worlds.Lamp((1.0, 2.0, 3.0), 0.1, (10.0, 20.0, 30.0)),),
     T_world_camera=np.eye(4).tolist(),
     size_px=(640, 480),
     focal_px=600.0,
@@ -62,23 +48,25 @@ def test_the_ground_is_a_box_with_outward_faces() -> None:
 
 def test_worlds_survive_their_file(tmp_path: Path) -> None:
     """Renderers in other interpreters read exactly what was drawn."""
-    write_worlds([WORLD, WORLD], tmp_path)
+    worlds.write_worlds([WORLD, WORLD], tmp_path)
 
-    assert read_worlds(tmp_path) == [WORLD, WORLD]
+    assert worlds.read_worlds(tmp_path) == [WORLD, WORLD]
 
 
 def test_depth_buffers_turn_into_metres() -> None:
     """A point at 2 m on the axis, through the projection matrix and back."""
-    clip = projection(WORLD) @ [0.0, 0.0, -2.0, 1.0]
+    clip = worlds.projection(WORLD) @ [0.0, 0.0, -2.0, 1.0]
     buffer = 0.5 * (clip[2] / clip[3] + 1)
 
-    assert unproject_depth(np.array([buffer, 0.0, 1.0])) == pytest.approx([2.0, NEAR_M, FAR_M])
+    assert worlds.unproject_depth(np.array([buffer, 0.0, 1.0])) == pytest.approx(
+        [2.0, worlds.NEAR_M, worlds.FAR_M]
+    )
 
 
 def test_the_projection_agrees_with_the_pinhole_formula() -> None:
     """``u = f x / z + w / 2`` [px], downward rows."""
     x, y, z = 0.3, -0.2, 1.5
-    clip = projection(WORLD) @ [x, -y, -z, 1.0]  # OpenGL looks along -Z, with Y up
+    clip = worlds.projection(WORLD) @ [x, -y, -z, 1.0]  # OpenGL looks along -Z, with Y up
     u_px = 320 * (1 + clip[0] / clip[3])
     v_px = 240 * (1 - clip[1] / clip[3])
 
@@ -90,10 +78,12 @@ def test_every_peer_writes_three_images_and_the_boxes(tmp_path: Path) -> None:
     ids = np.zeros((48, 64), np.uint16)
     ids[10:20, 5:9] = 7
     depth_m = np.where(ids == 7, 1.234, np.inf)
-    write_files(Images(np.full((48, 64, 3), (1, 2, 3), np.uint8), depth_m, ids), tmp_path, 4)
+    worlds.write_files(
+        worlds.Images(np.full((48, 64, 3), (1, 2, 3), np.uint8), depth_m, ids), tmp_path, 4
+    )
 
     def read(name: str) -> np.ndarray:
-        return cv2.imread(str(plane_path(tmp_path, name, 4)), cv2.IMREAD_UNCHANGED)
+        return cv2.imread(str(worlds.plane_path(tmp_path, name, 4)), cv2.IMREAD_UNCHANGED)
 
     assert read("rgb")[0, 0].tolist() == [3, 2, 1]
     assert np.unique(read("depth")).tolist() == [0, 1234]
@@ -106,12 +96,12 @@ def test_agreement_is_the_mean_intersection_over_union() -> None:
     ours = np.repeat([0, 1, 2], 4)
     theirs = np.array([0, 0, 0, 0, 1, 1, 0, 0, 2, 2, 2, 2])
 
-    assert mask_agreement(theirs, ours) == pytest.approx((0.5 + 1.0) / 2)
+    assert worlds.mask_agreement(theirs, ours) == pytest.approx((0.5 + 1.0) / 2)
 
 
 def test_srgb_has_the_values_of_the_standard() -> None:
     """IEC 61966-2-1: 18 % grey is 118, and 0.0031308 the end of the straight part."""
-    assert encode_srgb(np.array([0.0, 0.0031308, 0.18, 1.0, 7.0])).tolist() == [
+    assert worlds.encode_srgb(np.array([0.0, 0.0031308, 0.18, 1.0, 7.0])).tolist() == [
         0,
         10,
         118,

@@ -27,9 +27,6 @@ from gen_data.runner.verify import verify
 from tests.certificate.sealing import SMALL, edit_lines, reseal
 from tests.wheels import needs_open3d
 
-# pycocotools' decoder predates numpy 2's __array__(copy=...).
-pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
-
 QUICK = {"samples": 2, "rays": 400, "scenes": 0}
 """A scope for claims that need no scene drawn again."""
 

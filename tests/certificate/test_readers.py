@@ -18,9 +18,6 @@ from gen_data.runner.stored import StoredSamples
 from tests.certificate.sealing import SMALL
 from tests.tiers import cases
 
-# pycocotools' decoder predates numpy 2's __array__(copy=...).
-pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
-
 NAMES = cases(sorted(READERS), {"coco", "yolo"})
 FORMATS = ", ".join(f"{{type: {name}}}" for name in READERS)
 MASKED = {"coco", "webdataset", "huggingface"}

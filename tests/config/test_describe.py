@@ -88,7 +88,6 @@ Example:
 
 
 def test_a_description_is_summary_table_and_example() -> None:
-    """Everything from the class itself: docstring, types, defaults."""
     assert describe(Lighting) == DESCRIPTION
 
 
@@ -141,8 +140,6 @@ def test_a_model_that_refuses_every_made_up_value_has_no_example() -> None:
 
 
 def test_a_class_without_fields_is_described_by_its_summary() -> None:
-    """No empty table."""
-
     class Empty(Strict):
         """Nothing to set."""
 
@@ -191,7 +188,6 @@ def test_the_schema_accepts_what_validation_accepts(document: dict[str, Any]) ->
 
 @pytest.mark.parametrize("document", INVALID, ids=json.dumps)
 def test_the_schema_refuses_common_mistakes(document: dict[str, Any]) -> None:
-    """Editors underline what would be refused."""
     assert not validator_of(Lighting).is_valid(document)
 
 

@@ -53,7 +53,6 @@ from gen_data.core.streams import Rng, Streams
 
 
 def rng_of(index: int) -> Rng:
-    """A stream of scene or sample ``index``."""
     return Streams(seed=3, scene=index, index=index).rng("test")
 
 
@@ -128,7 +127,6 @@ YAML_FORMS: list[tuple[str, str, Distribution[Any]]] = [
 
 
 def read(field: str, text: str) -> Distribution[Any]:
-    """The distribution that a YAML text stands for in a field."""
     problems = Problems()
     fields = validate(parse_yaml(f"{field}: {text}", "x.yaml"), Fields, problems)
     problems.raise_if_any()
@@ -137,18 +135,14 @@ def read(field: str, text: str) -> Distribution[Any]:
 
 
 @pytest.mark.parametrize(("field", "text", "expected"), YAML_FORMS)
-def test_each_yaml_form_is_a_distribution(
-    field: str, text: str, expected: Distribution[Any]
-) -> None:
+def test_each_form_is_a_distribution(field: str, text: str, expected: Distribution[Any]) -> None:
     """A plain value is a constant, a one-key mapping is a distribution."""
     assert read(field, text) == expected
     assert type(read(field, text)) is type(expected)
 
 
 @pytest.mark.parametrize(("field", "text", "expected"), YAML_FORMS)
-def test_each_distribution_writes_yaml_that_reads_back(
-    field: str, text: str, expected: Distribution[Any]
-) -> None:
+def test_each_distribution_reads_back(field: str, text: str, expected: Distribution[Any]) -> None:
     """So a resolved configuration is a configuration."""
     del text
 
@@ -156,9 +150,7 @@ def test_each_distribution_writes_yaml_that_reads_back(
 
 
 @pytest.mark.parametrize(("field", "text", "expected"), YAML_FORMS)
-def test_each_distribution_is_a_picklable_hashable_value(
-    field: str, text: str, expected: Distribution[Any]
-) -> None:
+def test_each_distribution_is_a_value(field: str, text: str, expected: Distribution[Any]) -> None:
     """It goes to worker processes, and equal ones are equal after the trip."""
     del field, text
     travelled = pickle.loads(pickle.dumps(expected))
@@ -169,9 +161,7 @@ def test_each_distribution_is_a_picklable_hashable_value(
 
 
 @pytest.mark.parametrize(("field", "text", "expected"), YAML_FORMS)
-def test_what_is_drawn_lies_in_the_support(
-    field: str, text: str, expected: Distribution[Any]
-) -> None:
+def test_draws_lie_in_the_support(field: str, text: str, expected: Distribution[Any]) -> None:
     """Numbers between both ends; listed values where they are listed."""
     del field, text
     rng = rng_of(2)
@@ -185,7 +175,6 @@ def test_what_is_drawn_lies_in_the_support(
 
 
 def test_every_distribution_of_the_table_is_covered_here() -> None:
-    """A new line in the table needs a YAML form in this file."""
     covered = {type(distribution).name for _, _, distribution in YAML_FORMS}
 
     assert covered == set(DISTRIBUTIONS)
@@ -223,9 +212,7 @@ ZERO_WIDTH: list[tuple[Distribution[Any], Any]] = [
 
 
 @pytest.mark.parametrize(("distribution", "value"), ZERO_WIDTH)
-def test_a_range_of_zero_width_gives_the_constant(
-    distribution: Distribution[Any], value: object
-) -> None:
+def test_a_range_of_no_width_is_constant(distribution: Distribution[Any], value: object) -> None:
     """Bit for bit, so that a range can be narrowed to nothing."""
     rng = rng_of(0)
 
@@ -249,7 +236,7 @@ SUPPORTS: list[tuple[Numeric[Any], tuple[float, float]]] = [
 
 
 @pytest.mark.parametrize(("distribution", "support"), SUPPORTS)
-def test_supports_are_known_without_drawing(
+def test_supports_are_known_undrawn(
     distribution: Numeric[Any], support: tuple[float, float]
 ) -> None:
     """Values without weight do not count."""
@@ -266,7 +253,6 @@ def test_outcomes_lists_what_can_be_drawn_where_that_is_little() -> None:
 
 
 def test_names_have_no_range() -> None:
-    """Asking for one is a mistake of the program, not of the user."""
     with pytest.raises(TypeError, match="'a' is not a number"):
         Choice(("a", "b")).support()
 
@@ -317,7 +303,6 @@ WRONG: list[tuple[Callable[[], object], str]] = [
 
 @pytest.mark.parametrize(("make", "message"), WRONG, ids=[message for _, message in WRONG])
 def test_impossible_parameters_are_refused(make: Callable[[], object], message: str) -> None:
-    """In Python as in YAML, with the same words."""
     with pytest.raises(Malformed) as caught:
         make()
 
@@ -347,7 +332,6 @@ SPATIAL_MESSAGES = [
 
 @pytest.mark.parametrize(("text", "fact"), SPATIAL_MESSAGES)
 def test_mistakes_in_rotations_directions_and_positions_are_told(text: str, fact: str) -> None:
-    """In the same style as for numbers."""
     problems = Problems()
 
     validate(parse_yaml(text, "x.yaml"), Fields, problems)
@@ -384,7 +368,7 @@ FAULTS = [
 
 
 @pytest.mark.parametrize(("text", "place", "fact"), FAULTS, ids=[text for text, _, _ in FAULTS])
-def test_faults_inside_a_distribution_are_told_with_their_place(
+def test_faults_in_a_distribution_are_told_with_their_place(
     text: str, place: str, fact: str
 ) -> None:
     """The column of the part that is wrong, at any depth."""
@@ -396,7 +380,7 @@ def test_faults_inside_a_distribution_are_told_with_their_place(
     assert (str(problem.position), problem.fact) == (f"x.yaml:{place}", fact)
 
 
-def test_a_distribution_of_a_third_party_needs_fields_and_a_draw_only(
+def test_a_distribution_of_a_plugin_needs_fields_and_draw(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Its YAML form, messages and JSON Schema follow from its fields."""
@@ -410,11 +394,9 @@ def test_a_distribution_of_a_third_party_needs_fields_and_a_draw_only(
         reach: float = 1.0
 
         def draw(self, rng: Rng) -> float:
-            """One value."""
             return self.peak + self.reach * (rng.random() - rng.random())
 
         def support(self) -> tuple[float, float]:
-            """Both ends."""
             return self.peak - self.reach, self.peak + self.reach
 
     monkeypatch.setattr(base, "distribution_names", lambda kind: ("triangular",))
@@ -429,7 +411,6 @@ def test_a_distribution_of_a_third_party_needs_fields_and_a_draw_only(
 
 
 def test_reprs_show_how_to_make_the_value() -> None:
-    """For logs and test output."""
     assert repr(Uniform(0.1, 0.9)) == "Uniform(low=0.1, high=0.9)"
     assert repr(Choice({"a": 3, "b": 1})) == "Choice({'a': 3.0, 'b': 1.0})"
     assert repr(Choice(("a", "b"))) == "Choice(('a', 'b'))"
@@ -452,7 +433,6 @@ def test_equal_weights_need_not_be_written() -> None:
     ],
 )
 def test_bounds_read_like_mathematics(bounds: Bounds, text: str) -> None:
-    """Brackets include their end, parentheses do not."""
     assert bounds.within() == text
     if math.isfinite(bounds.low):
         assert (bounds.low in bounds) == ("[" in text or ">=" in text)
@@ -522,6 +502,5 @@ def test_other_names_are_refused_with_the_nearest(text: str) -> None:
 
 
 def test_the_schema_lists_the_names_of_a_closed_set() -> None:
-    """For editors."""
     constant, _ = Sides.model_json_schema()["properties"]["side"]["anyOf"]
     assert constant["enum"] == ["left", "right"]

@@ -15,12 +15,7 @@ def test_merging_lays_mappings_over_each_other() -> None:
 
     merged = merge_nodes(base, override)
 
-    assert merged.plain() == {
-        "a": {"x": 1, "y": [3], "w": 4},
-        "b": {"v": 5},
-        "c": {"z": 1},
-        "d": 6,
-    }
+    assert merged.plain() == {"a": {"x": 1, "y": [3], "w": 4}, "b": {"v": 5}, "c": {"z": 1}, "d": 6}
 
 
 def test_merged_values_keep_the_place_they_came_from() -> None:
@@ -62,7 +57,6 @@ def test_share_of_the_image_and_distance_take_each_others_place() -> None:
 
 
 def test_merging_leaves_its_arguments_alone() -> None:
-    """Trees are values."""
     base, override = parse_yaml("a: {x: 1}", "b.yaml"), parse_yaml("a: {y: 2}", "o.yaml")
 
     merge_nodes(base, override)
@@ -85,9 +79,7 @@ def test_merging_leaves_its_arguments_alone() -> None:
         ("{tags: [car]}", "{tags: [van], ids: [bus]}", {"tags": ["van"], "ids": ["bus"]}),
     ],
 )
-def test_one_choice_of_assets_replaces_another(
-    base: str, override: str, merged: dict[str, object]
-) -> None:
+def test_assets_are_chosen_one_way(base: str, override: str, merged: dict[str, object]) -> None:
     """Tags and ids are alternatives: who names ids does not want the inherited tags besides."""
     result = merge_nodes(
         parse_yaml(f"assets: {base}", "base"), parse_yaml(f"assets: {override}", "over")
@@ -109,9 +101,7 @@ def test_one_choice_of_assets_replaces_another(
         ),
     ],
 )
-def test_a_mapping_of_another_kind_inherits_nothing(
-    base: str, override: str, merged: dict[str, object]
-) -> None:
+def test_another_kind_inherits_nothing(base: str, override: str, merged: dict[str, object]) -> None:
     """The coefficients of one lens mean nothing to another; a sensor keeps its mount."""
     result = merge_nodes(parse_yaml(f"it: {base}", "base"), parse_yaml(f"it: {override}", "over"))
 

@@ -15,13 +15,10 @@ SENSOR = "sensors: [{type: rgb_camera, name: color, size_px: [64, 48], hfov_deg:
 
 
 def at(file: Path) -> Position:
-    """A place in a document."""
     return Position(str(file), 2, 5)
 
 
-def test_a_path_starts_from_the_file_that_names_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_path_starts_from_its_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Not from the current folder, even where that has a file of this name."""
     for folder in ("configs", "elsewhere"):
         (tmp_path / folder).mkdir()
@@ -39,7 +36,6 @@ def test_a_path_starts_from_the_file_that_names_it(
 def test_on_the_command_line_a_path_starts_from_the_current_folder(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, position: Position | None
 ) -> None:
-    """As everywhere in a shell."""
     (tmp_path / "assets").mkdir()
     monkeypatch.chdir(tmp_path)
 
@@ -118,7 +114,6 @@ def test_asset_folders_start_from_the_configuration_and_do_not_enter_its_identit
 
 
 def test_a_missing_asset_folder_is_told_with_its_place(tmp_path: Path) -> None:
-    """Before anything runs."""
     source = tmp_path / "mine.yaml"
     source.write_text("template: tabletop\nassets: {folders: [mehses]}\n" + SENSOR)
 
@@ -135,7 +130,7 @@ def test_a_missing_asset_folder_is_told_with_its_place(tmp_path: Path) -> None:
     ("name", "reason"),
     [("n" * 300, "too long"), ("~nobody-here/x", "home directory"), ("a\nb", r"'a\\nb'; looked")],
 )
-def test_a_name_that_no_file_can_have_is_refused_on_one_line(
+def test_an_impossible_file_name_is_refused_on_one_line(
     tmp_path: Path, name: str, reason: str
 ) -> None:
     """With its place, whatever the operating system says of it."""

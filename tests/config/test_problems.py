@@ -9,14 +9,12 @@ from gen_data.core.errors import ConfigError
 
 
 def told(problems: Problems) -> str:
-    """The message of the one error."""
     with pytest.raises(ConfigError) as caught:
         problems.raise_if_any()
     return str(caught.value)
 
 
 def test_no_problem_raises_nothing() -> None:
-    """The collector can be used without a condition."""
     problems = Problems()
 
     problems.raise_if_any()
@@ -35,7 +33,6 @@ def test_problems_are_told_in_the_order_of_the_source() -> None:
 
 
 def test_the_source_line_is_shown_with_a_caret() -> None:
-    """Under the message, with its number."""
     problems = Problems()
     problems.add(Position("a.yaml", 8, 5, "    fov: abc   "), "camera.fov", "expected a number")
 
@@ -45,7 +42,6 @@ def test_the_source_line_is_shown_with_a_caret() -> None:
 
 
 def test_a_long_line_is_shown_around_the_place() -> None:
-    """The caret stays in sight."""
     problems = Problems()
     problems.add(Position("a.yaml", 1, 501, "x" * 500 + "HERE" + "x" * 500), "a", "bad")
 

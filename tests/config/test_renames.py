@@ -47,7 +47,6 @@ sensors:
 
 
 def test_old_words_mean_what_the_new_ones_mean() -> None:
-    """The same document, word by word, and the order of its keys."""
     with pytest.warns(FutureWarning):
         current = replace_old_words(parse_yaml(OLD, "old.yaml"))
 
@@ -55,7 +54,6 @@ def test_old_words_mean_what_the_new_ones_mean() -> None:
 
 
 def test_the_warning_names_the_place_and_the_new_word() -> None:
-    """Each place once."""
     with pytest.warns(FutureWarning) as caught:
         replace_old_words(parse_yaml(OLD, "old.yaml"))
     messages = [str(warning.message) for warning in caught]
@@ -69,7 +67,6 @@ def test_the_warning_names_the_place_and_the_new_word() -> None:
 
 
 def test_current_words_warn_of_nothing() -> None:
-    """The document itself comes back."""
     document = parse_yaml(NEW, "new.yaml")
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -177,7 +174,6 @@ def test_an_override_without_a_type_may_use_old_words(tmp_path: Path) -> None:
 
 
 def test_a_field_that_a_shared_value_selects_may_use_old_words() -> None:
-    """In every entry of the selection."""
     text = "sensors: [{type: rgb_camera, formation: {given: s, a: {bloom: 1}, otherwise: {}}}]"
 
     with pytest.warns(FutureWarning):

@@ -68,7 +68,6 @@ def test_numbers_that_cannot_be_held_are_refused(text: str, message: str) -> Non
 
 
 def test_the_largest_whole_number_is_two_to_the_63_minus_1() -> None:
-    """Leading zeros do not count."""
     assert resolve_scalar("000" + "0" * 90 + str(2**63 - 1)) == 2**63 - 1
     assert resolve_scalar(str(-(2**63) + 1)) == -(2**63) + 1
 

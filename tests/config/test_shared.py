@@ -163,7 +163,6 @@ def test_a_reference_that_leads_nowhere_is_one_clear_error(text: str, fact: str)
 
 
 def test_values_that_need_one_another_are_refused() -> None:
-    """A circle has no beginning."""
     with pytest.raises(ConfigError, match="need one another"):
         draw_shared(parse_yaml("a: $shared.b\nb: $shared.a", "test"), Streams(0, 0))
 
@@ -196,8 +195,7 @@ def test_a_chain_of_selections_costs_in_proportion_to_its_length() -> None:
             drawn = draw_shared(section, Streams(0, 0))
         finally:
             sys.setprofile(None)
-        assert len(drawn) == length
-        assert len(set(drawn.values())) == 1
+        assert (len(drawn), len(set(drawn.values()))) == (length, 1)
         return counted
 
     # Quadratic cost would be a factor of 4; collections of garbage add some calls.

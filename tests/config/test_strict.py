@@ -37,7 +37,6 @@ class Values(Strict):
     ],
 )
 def test_nothing_is_coerced_or_ignored(wrong: dict[str, Any]) -> None:
-    """What is written must be what is meant."""
     with pytest.raises(ValidationError):
         Values(**wrong)
 
@@ -48,7 +47,6 @@ def test_whole_numbers_are_accepted_where_fractions_are_due() -> None:
 
 
 def test_models_are_frozen() -> None:
-    """A configuration is a value."""
     values = Values()
 
     with pytest.raises(ValidationError):

@@ -89,7 +89,6 @@ class Config(Strict):
 
 
 def told(text: str) -> str:
-    """The message about a text."""
     problems = Problems()
     assert validate(parse_yaml(text, "x.yaml"), Config, problems) is None
     with pytest.raises(ConfigError) as caught:
@@ -259,7 +258,6 @@ def test_all_mistakes_are_told_at_once() -> None:
 
 
 def test_fields_are_named_from_the_root_of_the_document() -> None:
-    """The prefix says where the validated node hangs."""
     document = parse_yaml("randomizers:\n  - {fov_deg: 0}\n", "x.yaml")
     node, problems = document.get("randomizers", 0), Problems()
 
@@ -271,7 +269,6 @@ def test_fields_are_named_from_the_root_of_the_document() -> None:
 
 
 def test_a_node_that_is_no_mapping_is_told() -> None:
-    """With the prefix alone as the field."""
     document, problems = parse_yaml("a: [1]", "x.yaml"), Problems()
     node = document.get("a", 0)
 
@@ -304,7 +301,6 @@ def test_a_mistake_on_the_command_line_is_placed_there() -> None:
     ],
 )
 def test_a_misspelt_override_is_an_unknown_key(path: str, message: str) -> None:
-    """New keys are allowed in the tree and judged by the model."""
     document, problems = parse_yaml("camera: {fov_deg: 60}", "x.yaml"), Problems()
 
     validate(with_override(document, path, "3"), Config, problems)

@@ -18,12 +18,20 @@ def test_bytes_are_bounded_whatever_the_sizes() -> None:
 
 
 def test_a_value_larger_than_the_bound_displaces_all_others() -> None:
-    """It is in use anyway."""
     cache: ByteCache[np.ndarray] = ByteCache(1000)
     cache.get("small", lambda: np.zeros(100, np.uint8))
     cache.get("large", lambda: np.zeros(5000, np.uint8))
 
     assert len(cache) == 1
+
+
+def test_the_value_used_longest_ago_goes_first() -> None:
+    """Two of 4 bytes fit into 10."""
+    cache: ByteCache[np.ndarray] = ByteCache(10)
+    made: list[str] = []
+    for name in "abacab":
+        cache.get(name, lambda name=name: made.append(name) or np.zeros(4, np.uint8))
+    assert made == ["a", "b", "c", "b"]
 
 
 def test_small_values_are_bounded_by_number_too() -> None:

@@ -42,7 +42,6 @@ def origin(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
 
 
 def test_the_name_is_that_of_the_project() -> None:
-    """In code as in pyproject.toml."""
     assert f'[project]\nname = "{DISTRIBUTION}"\n' in (ROOT / "pyproject.toml").read_text()
 
 
@@ -80,9 +79,7 @@ def test_a_checkout_installs_extras_of_itself() -> None:
 
 
 @pytest.mark.parametrize("name", ["checkout", "gen_data_perception-1-py3-none-any.whl"])
-def test_an_installation_takes_extras_from_where_it_came(
-    origin: Path, tmp_path: Path, name: str
-) -> None:
+def test_extras_come_from_where_the_project_came(origin: Path, tmp_path: Path, name: str) -> None:
     """A folder or a wheel; spaces are quoted in the record and in the command."""
     source = tmp_path / "my folder" / name
     source.parent.mkdir()
@@ -96,7 +93,6 @@ def test_an_installation_takes_extras_from_where_it_came(
     "record", ["", '{"url": "file:///nowhere/at/all"}', '{"url": "https://example.com/x.whl"}']
 )
 def test_without_its_source_an_installation_asks_the_index(origin: Path, record: str) -> None:
-    """For the project's own name."""
     origin.write_text(record)
 
     assert install_command("ray") == f"pip install '{DISTRIBUTION}[ray]'"

@@ -55,7 +55,6 @@ BY_HAND = {
 
 @cache
 def categories() -> frozenset[str]:
-    """Of all families and of the objects of all packs, in words."""
     modules = [importlib.import_module(name) for name in FAMILIES]
     found = {f.category for m in modules for f in getattr(m, "FAMILIES", {}).values()}
     for path in files("gen_data.packs").iterdir():
@@ -65,7 +64,6 @@ def categories() -> frozenset[str]:
 
 
 def named_in(value: object) -> set[str]:
-    """Values of all keys ``category``, at any depth."""
     if isinstance(value, dict):
         own = {str(v) for k, v in value.items() if k == "category" and isinstance(v, str)}
         return own.union(*map(named_in, value.values()))
@@ -80,7 +78,6 @@ def test_one_and_two_of_irregular_names(name: str) -> None:
 
 @pytest.mark.slow
 def test_one_and_two_of_every_other_category() -> None:
-    """As inflect has them."""
     inflect = pytest.importorskip("inflect")
     engine = inflect.engine()
     regular = sorted(categories() - set(BY_HAND))

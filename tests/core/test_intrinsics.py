@@ -54,7 +54,6 @@ def test_projection_is_that_of_the_calibration_matrix() -> None:
 
 
 def test_what_lies_behind_has_no_image() -> None:
-    """NaN, not a mirrored point."""
     pixels = VGA.project(np.array([[0.0, 0, 1], [0, 0, 0], [0, 0, -1]]))
 
     assert np.isfinite(pixels[0]).all()
@@ -62,7 +61,6 @@ def test_what_lies_behind_has_no_image() -> None:
 
 
 def test_pixels_that_saw_nothing_have_no_point() -> None:
-    """Infinite depth becomes NaN."""
     depth = np.array([[1.0, np.inf]])
 
     points = Intrinsics(2, 1, 1.0, 1.0, 1.0, 0.5).unproject(depth)
@@ -80,5 +78,4 @@ def test_the_field_of_view_spans_the_image_edges(width: int, height: int, hfov_d
 
     assert math.degrees(angle) == pytest.approx(hfov_deg, rel=1e-6)
     assert (camera.cx_px, camera.cy_px) == (width / 2, height / 2)
-    assert camera.fx_px == camera.fy_px
-    assert camera.fx_px == round(camera.fx_px, 6)
+    assert (camera.fx_px, camera.fx_px) == (camera.fy_px, round(camera.fx_px, 6))

@@ -13,7 +13,6 @@ from gen_data.roads.lane_graph import road_lanes
 
 
 def road(**given: object) -> tuple[Lane, ...]:
-    """The lanes of a road from the world's origin along X."""
     return road_lanes(RoadShape(**given), "main", SE3(), 10.0)  # type: ignore[arg-type]
 
 
@@ -75,10 +74,7 @@ def test_sides_are_seen_in_the_direction_of_travel() -> None:
 def test_junctions_and_other_strips_have_no_borders() -> None:
     """Their paths cross each other; people keep to no lane."""
     line = ((0.0, 0.0, 0.0), (9.0, 0.0, 0.0))
-    lanes = (
-        Lane("turn", "driving", line, 3.0, junction=True),
-        Lane("path", "sidewalk", line, 3.0),
-    )
+    lanes = (Lane("turn", "driving", line, 3.0, junction=True), Lane("path", "sidewalk", line, 3.0))
 
     assert lane_borders(lanes) == ()
     assert len(lane_borders((Lane("a", "driving", line, 3.0),))) == 2

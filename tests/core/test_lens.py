@@ -83,7 +83,7 @@ def test_any_brown_conrady_lens_is_that_of_opencv(
 @pytest.mark.slow
 @settings(max_examples=40, deadline=None, derandomize=True)
 @given(st.floats(-0.1, 0.1), SMALL, SMALL, SMALL, st.floats(60.0, 400.0))
-def test_any_fisheye_is_that_of_opencv(
+def test_any_fisheye_is_opencvs(
     k1: float, k2: float, k3: float, k4: float, focal_px: float
 ) -> None:
     """From a moderate angle of view to one of more than a half sphere."""
@@ -202,7 +202,6 @@ def test_coefficients_are_counted(values: tuple[float, ...]) -> None:
 
 
 def test_too_wide_a_field_is_refused() -> None:
-    """Naming where the field ends."""
     with pytest.raises(ValueError, match="nothing at 100 degrees from its axis"):
         Intrinsics.from_hfov(64, 48, math.radians(200.0), KITTI)
     with pytest.raises(ValueError, match="nothing at 90 degrees"):
@@ -210,7 +209,6 @@ def test_too_wide_a_field_is_refused() -> None:
 
 
 def test_lenses_survive_being_written() -> None:
-    """As scenes are."""
     camera = camera_of(TUM_VI)
 
     assert from_plain(Intrinsics, to_plain(camera)) == camera

@@ -12,14 +12,7 @@ import numpy as np
 import pytest
 
 from gen_data.assets.asset_cache import Arrays, DiskCache
-from gen_data.core.mapped_files import (
-    PageLimiter,
-    limit_mapped_pages,
-    map_file,
-    owned_bytes,
-    read_statm,
-    release_mapped_pages,
-)
+from gen_data.core import mapped_files
 
 SIZE = 300_001
 """No multiple of a page."""
@@ -36,16 +29,14 @@ def few_descriptors() -> Iterator[int]:
 
 
 def write(path: Path, size: int = SIZE) -> bytes:
-    """Write a file without a repeated page."""
     content = np.arange(size, dtype=np.uint32).tobytes()[:size]
     path.write_bytes(content)
     return content
 
 
 def mapped(path: Path) -> memoryview:
-    """The mapped content of a file."""
     with path.open("rb") as file:
-        return map_file(file.fileno(), path.stat().st_size)
+        return mapped_files.map_file(file.fileno(), path.stat().st_size)
 
 
 def test_a_view_shows_the_file_and_cannot_change_it(tmp_path: Path) -> None:
@@ -70,7 +61,7 @@ def test_maps_keep_no_descriptors(tmp_path: Path, few_descriptors: int) -> None:
 
     for k, array in enumerate(kept):
         np.testing.assert_array_equal(array, made[k % 3])
-        assert owned_bytes(array) == 0
+        assert mapped_files.owned_bytes(array) == 0
 
 
 def test_pages_are_dropped_and_come_back(tmp_path: Path) -> None:
@@ -78,13 +69,13 @@ def test_pages_are_dropped_and_come_back(tmp_path: Path) -> None:
     content = write(tmp_path / "file", 8 << 20)
     view = np.frombuffer(mapped(tmp_path / "file"), np.uint8)
     assert int(view.sum()) == sum(content)
-    resident = read_statm(2)
+    resident = mapped_files.read_statm(2)
 
-    limit_mapped_pages(resident)
-    assert read_statm(2) > resident - (1 << 20)
-    release_mapped_pages()
+    mapped_files.limit_mapped_pages(resident)
+    assert mapped_files.read_statm(2) > resident - (1 << 20)
+    mapped_files.release_mapped_pages()
 
-    assert read_statm(2) < resident - (7 << 20)
+    assert mapped_files.read_statm(2) < resident - (7 << 20)
     assert view.tobytes() == content
 
 
@@ -92,15 +83,15 @@ def test_pages_are_dropped_once_enough_were_read(tmp_path: Path) -> None:
     """Pages that were resident before do not count."""
     write(tmp_path / "file", 8 << 20)
     view = np.frombuffer(mapped(tmp_path / "file"), np.uint8)
-    limiter = PageLimiter()
+    limiter = mapped_files.PageLimiter()
     view.sum()
-    resident = read_statm(2)
+    resident = mapped_files.read_statm(2)
 
     limiter.limit_growth(16 << 20)
-    assert read_statm(2) > resident - (1 << 20)
+    assert mapped_files.read_statm(2) > resident - (1 << 20)
     limiter.limit_growth(4 << 20)
 
-    assert read_statm(2) < resident - (7 << 20)
+    assert mapped_files.read_statm(2) < resident - (7 << 20)
 
 
 @pytest.mark.slow
@@ -125,5 +116,5 @@ def test_only_views_of_files_are_not_owned(tmp_path: Path) -> None:
     view = np.frombuffer(mapped(tmp_path / "file"), np.uint8)
     in_bytes = np.frombuffer(bytes(100), np.uint8)
 
-    assert owned_bytes(view, view[:10].reshape(2, 5)) == 0
-    assert owned_bytes(view.copy(), in_bytes[50:]) == SIZE + 50
+    assert mapped_files.owned_bytes(view, view[:10].reshape(2, 5)) == 0
+    assert mapped_files.owned_bytes(view.copy(), in_bytes[50:]) == SIZE + 50

@@ -17,7 +17,6 @@ def scene_with_ids(*ids: int) -> Scene:
 
 
 def test_free_ids_are_the_smallest_positive_numbers_that_nothing_has() -> None:
-    """Gaps are filled first."""
     assert free_instance_ids(scene_with_ids(), 2) == [1, 2]
     assert free_instance_ids(scene_with_ids(1, 3, 6), 4) == [2, 4, 5, 7]
     assert free_instance_ids(scene_with_ids(1), 0) == []
@@ -39,7 +38,6 @@ def test_every_member_becomes_a_body_and_the_instance_that_labels_it() -> None:
 
 
 def test_members_leave_with_their_instances_and_nothing_else_does() -> None:
-    """The scene is as it was before they came."""
     before = scene_with_ids(1, 2)
 
     assert remove_members(add_members(before, GROUP, MEMBERS, FakeAssets()), "things") == before

@@ -114,9 +114,7 @@ STEP_S = 0.1
 
 @pytest.mark.parametrize("knots", [4, 12])
 @pytest.mark.parametrize("motion", ["circle", "clothoid"])
-def test_acceleration_and_turn_rate_are_those_of_the_curve_at_every_knot(
-    motion: str, knots: int
-) -> None:
+def test_acceleration_and_turn_rate_are_the_curves_at_every_knot(motion: str, knots: int) -> None:
     """Centripetal acceleration v w to the left and turn rate w, at both ends of the track too."""
     way, speed = (circular, 8.0) if motion == "circle" else (clothoid, 10.0)
     track = Trajectory("car", STEP_S, tuple(way(STEP_S * k) for k in range(knots)))
@@ -148,7 +146,6 @@ def test_outside_its_knots_a_body_stands_still() -> None:
 
 
 def test_a_track_of_one_knot_is_refused() -> None:
-    """It is no way."""
     with pytest.raises(ValueError, match="two knots"):
         Trajectory("car", 0.1, (SE3(),))
 
@@ -240,6 +237,5 @@ def test_what_moves_is_known_to_its_instance() -> None:
 def test_joint_positions_are_linear_between_knots_and_constant_outside() -> None:
     """Half a radian in half a second, from the first second on."""
     track = JointTrajectory(0.5, ((0.0, 1.0), (0.5, 1.0)), start_s=1.0)
-    assert track.positions(0.0) == (0.0, 1.0)
-    assert track.positions(1.25) == (0.25, 1.0)
+    assert (track.positions(0.0), track.positions(1.25)) == ((0.0, 1.0), (0.25, 1.0))
     assert track.positions(9.0) == (0.5, 1.0)

@@ -20,7 +20,6 @@ CLEAR_M = 1e-6
 
 
 def pose_of(place: Vec3, turn: tuple[float, ...]) -> SE3:
-    """A pose with a unit quaternion."""
     norm = math.sqrt(sum(c * c for c in turn))
     w, x, y, z = (c / norm for c in turn)
     return SE3(place, (w, x, y, z))

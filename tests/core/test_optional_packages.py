@@ -35,7 +35,6 @@ def extra_lists() -> dict[str, str]:
 
 
 def test_each_extra_brings_the_packages_that_messages_promise() -> None:
-    """As pyproject.toml lists them; the extra ``all`` names each of these extras."""
     lists = extra_lists()
 
     for package, extra in EXTRAS.values():
@@ -50,7 +49,6 @@ def test_what_is_installed_is_not_missing() -> None:
 
 
 def test_several_missing_packages_are_one_command(bare: None) -> None:
-    """Sorted, with each extra once."""
     assert missing_packages("pxr", "h5py", "mcap") == (
         "needs the packages h5py, mcap, usd-core: " + install_command("formats", "usd")
     )
@@ -73,7 +71,6 @@ def test_files_that_cannot_be_read_name_themselves(bare: None, tmp_path: Path) -
 
 
 def test_the_preview_names_its_extra_and_what_works_without(bare: None) -> None:
-    """No traceback of an import."""
     done = CliRunner().invoke(cli, ["preview", "tabletop.yaml"])
 
     assert isinstance(done.exception, ConfigError)

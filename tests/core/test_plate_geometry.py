@@ -7,27 +7,16 @@ import math
 import numpy as np
 import pytest
 
+from gen_data.core import plates
 from gen_data.core.intrinsics import Intrinsics
-from gen_data.core.plates import (
-    Plate,
-    crop_to,
-    fitted_intrinsics,
-    ground_points,
-    ground_rectangle,
-    horizon_px,
-    is_inside,
-    upright_pose,
-    zenith_from_horizon,
-)
 from gen_data.core.se3 import SE3, look_at
 
 SIZE_PX, FOCAL_PX, HEIGHT_M = (1200, 800), 900.0, 1.7
 CORNERS_PX = ((200.0, 790.0), (1000.0, 790.0), (700.0, 480.0), (500.0, 480.0))
 
 
-def plate_seen_by(pose: SE3) -> Plate:
-    """A plate with a camera."""
-    return Plate(SIZE_PX, FOCAL_PX, pose, CORNERS_PX)
+def plate_seen_by(pose: SE3) -> plates.Plate:
+    return plates.Plate(SIZE_PX, FOCAL_PX, pose, CORNERS_PX)
 
 
 def tilted(pitch_deg: float, roll_deg: float) -> SE3:
@@ -44,12 +33,14 @@ def test_two_points_of_the_horizon_give_the_pose(pitch_deg: float, roll_deg: flo
     plate = plate_seen_by(pose)
     far_m = np.array([[1e9, -2e8, 0.0], [1e9, 3e8, 0.0]])
     seen_px = plate.intrinsics.project(pose.inverse().apply(far_m))
-    (x0, y0), (x1, y1) = horizon_px(plate)
+    (x0, y0), (x1, y1) = plates.horizon_px(plate)
     rows = y0 + (seen_px[:, 0] - x0) / (x1 - x0) * (y1 - y0)
     np.testing.assert_allclose(rows, seen_px[:, 1], atol=1e-3)
 
     first, second = (tuple(point.tolist()) for point in seen_px)
-    found = upright_pose(zenith_from_horizon(plate.intrinsics, first, second), HEIGHT_M)
+    found = plates.upright_pose(
+        plates.zenith_from_horizon(plate.intrinsics, first, second), HEIGHT_M
+    )
     np.testing.assert_allclose(found.matrix(), pose.matrix(), atol=1e-6)
 
 
@@ -60,18 +51,18 @@ def test_ground_is_where_its_image_is() -> None:
     seen_px = plate.intrinsics.project(
         plate.T_world_camera.inverse().apply(np.column_stack([points_m, np.zeros(3)]))
     )
-    np.testing.assert_allclose(ground_points(plate, seen_px), points_m, rtol=1e-6)
-    assert np.isnan(ground_points(plate, np.array([[600.0, 20.0]]))).all()
+    np.testing.assert_allclose(plates.ground_points(plate, seen_px), points_m, rtol=1e-6)
+    assert np.isnan(plates.ground_points(plate, np.array([[600.0, 20.0]]))).all()
 
 
 def test_the_rectangle_is_inside_the_ground() -> None:
     """It is a large part of a trapezoid, and all of its corners are inside."""
     plate = plate_seen_by(tilted(-5.0, 0.0))
-    center, (length_m, width_m) = ground_rectangle(plate)
-    polygon = ground_points(plate, np.array(CORNERS_PX))
+    center, (length_m, width_m) = plates.ground_rectangle(plate)
+    polygon = plates.ground_points(plate, np.array(CORNERS_PX))
     signs = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
     corners = np.array(center.translation_m[:2]) + 0.49 * signs * (length_m, width_m)
-    assert is_inside(polygon, corners).all()
+    assert plates.is_inside(polygon, corners).all()
     x, y = polygon.T
     area = 0.5 * abs(float(x @ np.roll(y, -1) - y @ np.roll(x, -1)))
     assert 0.4 * area < length_m * width_m < area
@@ -82,17 +73,17 @@ def test_a_ground_without_room_is_refused() -> None:
     level = tilted(0.0, 0.0)
     thin = ((0.0, 700.0), (1200.0, 500.0), (1200.0, 500.01))
     with pytest.raises(ValueError, match="no rectangle"):
-        ground_rectangle(Plate(SIZE_PX, FOCAL_PX, level, thin))
+        plates.ground_rectangle(plates.Plate(SIZE_PX, FOCAL_PX, level, thin))
     high = ((0.0, 700.0), (900.0, 700.0), (600.0, 390.0))
     with pytest.raises(ValueError, match="horizon"):
-        ground_rectangle(Plate(SIZE_PX, FOCAL_PX, level, high))
+        plates.ground_rectangle(plates.Plate(SIZE_PX, FOCAL_PX, level, high))
 
 
 @pytest.mark.parametrize("size_px", [(600, 400), (640, 480), (1242, 375), (500, 500)])
 def test_cropped_images_show_the_same_directions(size_px: tuple[int, int]) -> None:
     """A pixel of the image and the pixel of the photograph under it have one ray."""
     whole = Intrinsics(*SIZE_PX, FOCAL_PX, FOCAL_PX, 600.0, 400.0)
-    part, fitted = crop_to(SIZE_PX, *size_px), fitted_intrinsics(whole, *size_px)
+    part, fitted = plates.crop_to(SIZE_PX, *size_px), plates.fitted_intrinsics(whole, *size_px)
     corner = np.array([[0.0, 0.0], [size_px[0], size_px[1]], [33.0, 77.0]])
     scale = np.array([part.width_px / size_px[0], part.height_px / size_px[1]])
     there = corner * scale + (part.x_px, part.y_px)

@@ -14,14 +14,12 @@ TABLE = PluginTable("noun", {"fraction": "fractions:Fraction", "decimal": "decim
 
 
 def test_a_plug_in_is_loaded_by_its_name() -> None:
-    """The module is imported when first asked for."""
     from fractions import Fraction
 
     assert TABLE.load("fraction") is Fraction
 
 
 def test_names_are_sorted() -> None:
-    """Whatever the order in the source."""
     assert TABLE.names() == ("decimal", "fraction")
     assert list(TABLE) == ["decimal", "fraction"]
     assert "decimal" in TABLE
@@ -29,7 +27,6 @@ def test_names_are_sorted() -> None:
 
 
 def test_an_unknown_name_is_told_with_all_known_ones() -> None:
-    """And the nearest."""
     with pytest.raises(ConfigError) as caught:
         TABLE.load("fractoin")
 
@@ -45,7 +42,6 @@ class Complete(BaseModel):
     size: int = 0
 
     def area(self) -> int:
-        """The square."""
         return self.size**2
 
 
@@ -67,7 +63,6 @@ class Plain:
     size = 0
 
     def area(self) -> int:
-        """The square."""
         return 0
 
 
@@ -75,13 +70,9 @@ class Square(Protocol):
     """The contract of these plug-ins."""
 
     @property
-    def size(self) -> int:
-        """The side."""
-        ...
+    def size(self) -> int: ...
 
-    def area(self) -> int:
-        """The square."""
-        ...
+    def area(self) -> int: ...
 
 
 SQUARES = PluginTable[Square](

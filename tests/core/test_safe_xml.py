@@ -28,7 +28,6 @@ class Strict:
         setattr(self.__dict__["own"], name, value)
 
     def Parse(self, data: bytes, is_final: bool) -> None:  # noqa: N802  (the parser's own name)
-        """Parse the whole document."""
         if b"version" in data[:40] and b"1." not in data[:40]:
             raise expat.ExpatError("XML declaration not well-formed")
         self.__dict__["own"].Parse(data, is_final)
@@ -39,9 +38,7 @@ class Strict:
     [b'<?xml version="0.0" ?>', b"<?xml version='2'?>", b'\xef\xbb\xbf<?xml version = "0.0"?>',
      b'<?xml version="1.0"?>', b'<?xml version="1.1" encoding="utf-8"?>', b""],
 )  # fmt: skip
-def test_documents_of_any_version_are_read_as_version_1(
-    start: bytes, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_any_version_is_read_as_version_1(start: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
     """Those of pybullet declare version 0.0, which newer parsers refuse; lines and columns stay."""
     monkeypatch.setattr(expat, "ParserCreate", Strict)
     text = start + b'\n<robot name="a">\n  <link/></robot>'

@@ -20,7 +20,6 @@ vectors = st.tuples(coordinates, coordinates, coordinates)
 
 @st.composite
 def quaternions(draw: st.DrawFn) -> tuple[float, float, float, float]:
-    """Unit quaternions, special ones included."""
     parts = draw(
         st.lists(st.floats(-1, 1, allow_subnormal=False), min_size=4, max_size=4).filter(
             lambda q: math.hypot(*q) > 0.1
@@ -41,7 +40,6 @@ def assert_same_pose(a: SE3, b: SE3) -> None:
 @QUICK
 @given(poses)
 def test_a_pose_and_its_inverse_cancel(pose: SE3) -> None:
-    """On both sides."""
     assert_same_pose(pose.inverse() @ pose, IDENTITY)
     assert_same_pose(pose @ pose.inverse(), IDENTITY)
 
@@ -92,9 +90,7 @@ def test_rotations_are_proper(q: tuple[float, float, float, float]) -> None:
 
 @QUICK
 @given(poses, st.lists(vectors, min_size=1, max_size=5))
-def test_points_move_as_by_the_homogeneous_matrix(
-    pose: SE3, points: list[tuple[float, float, float]]
-) -> None:
+def test_points_move_as_by_the_matrix(pose: SE3, points: list[tuple[float, float, float]]) -> None:
     """Any leading shape; directions are rotated only."""
     p = np.array(points)
     homogeneous = np.concatenate([p, np.ones((len(p), 1))], axis=1)
@@ -116,7 +112,6 @@ def test_half_turns_survive_the_matrix(axis: int) -> None:
 
 
 def test_about_z_turns_x_to_y() -> None:
-    """Right-handed."""
     pose = SE3.about_z(math.pi / 2, (1.0, 2.0, 3.0))
 
     np.testing.assert_allclose(pose.rotate(np.array([1.0, 0, 0])), [0, 1, 0], atol=1e-12)
@@ -178,7 +173,6 @@ def test_a_positive_roll_turns_the_camera_clockwise() -> None:
 
 @pytest.mark.parametrize("target", [(0.0, 0.0, 1.0), (0.0, 0.0, -1.0), (1e-9, 0.0, -3.0)])
 def test_looking_straight_up_or_down_is_defined(target: tuple[float, float, float]) -> None:
-    """No division by nothing."""
     T_world_camera = look_at((0, 0, 0), target)
 
     p_camera = T_world_camera.inverse().apply(np.array(target))
@@ -187,6 +181,5 @@ def test_looking_straight_up_or_down_is_defined(target: tuple[float, float, floa
 
 
 def test_looking_at_oneself_is_refused() -> None:
-    """There is no direction to look in."""
     with pytest.raises(ValueError, match="a target that differs from the eye"):
         look_at((1, 2, 3), (1, 2, 3))

@@ -41,7 +41,6 @@ def test_disparity_is_focal_length_times_baseline_over_depth() -> None:
 
 
 def test_the_baseline_is_what_lies_between_the_cameras() -> None:
-    """Wherever the pair is."""
     assert baseline_m(*pair(SE3((0.54, 0.0, 0.0)))) == pytest.approx(0.54, abs=1e-9)
 
 

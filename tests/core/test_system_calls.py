@@ -61,7 +61,6 @@ def program(system: str, code: str) -> list[str]:
 
 
 def run(system: str, code: str, folder: Path) -> str:
-    """Standard output of code that must succeed, in a folder."""
     done = subprocess.run(
         program(system, code),
         cwd=folder,
@@ -99,7 +98,6 @@ def test_a_data_set_is_the_same_on_a_system_with_fewer_calls(
 
 
 def test_workers_that_a_system_cannot_have_are_refused(tmp_path: Path) -> None:
-    """Not with a traceback from their start."""
     code = """
         import gen_data
         try:

@@ -64,10 +64,7 @@ def test_young_folders_and_those_of_others_stay(tmp_path: Path) -> None:
     assert link.is_symlink()
 
 
-def test_a_folder_lasts_as_long_as_its_block(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """It is removed with its contents, also after an error."""
+def test_a_folder_lasts_for_its_block(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(temporary_folders.tempfile, "tempdir", str(tmp_path))
 
     def fail() -> None:

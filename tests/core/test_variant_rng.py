@@ -30,9 +30,7 @@ def draw_desk(seed: int) -> dict[str, object]:
         ("panel", "true", True),
     ],
 )  # fmt: skip
-def test_a_value_asked_for_changes_no_other_draw(
-    name: str, asked: DrawnValue, value: object
-) -> None:
+def test_a_value_asked_for_moves_no_other(name: str, asked: DrawnValue, value: object) -> None:
     """It replaces the number drawn; the number is taken from the stream all the same."""
     free = draw_desk(4)
     with drawing({name: asked}) as drawn:

@@ -11,7 +11,6 @@ from tests.end_to_end.running import SMALL, gen_data
 
 @pytest.fixture(scope="session")
 def dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Fifteen small tabletop samples, made by one worker process."""
     folder = tmp_path_factory.mktemp("dataset")
     done = gen_data(
         "--config", "tabletop.yaml", "--n", "15", "--seed", "1", "--workers", "1",

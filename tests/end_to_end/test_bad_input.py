@@ -55,9 +55,7 @@ def assert_refused(tmp_path: Path, arguments: tuple[str, ...], code: int, *texts
         ),
     ],
 )  # fmt: skip
-def test_wrong_usage_exits_with_2(
-    tmp_path: Path, arguments: tuple[str, ...], texts: tuple[str, ...]
-) -> None:
+def test_misuse_exits_2(tmp_path: Path, arguments: tuple[str, ...], texts: tuple[str, ...]) -> None:
     """Usage and configuration errors name the argument or field, and what was expected."""
     assert_refused(tmp_path, arguments, 2, *texts)
 
@@ -97,7 +95,6 @@ def test_unknown_asset_exits_with_3(tmp_path: Path) -> None:
     ],
 )
 def test_unfit_mesh_exits_with_3(tmp_path: Path, name: str, content: str, text: str) -> None:
-    """An empty mesh, a NaN, a file of noise: named by their path."""
     folder = tmp_path / "mine"
     folder.mkdir()
     (folder / name).write_text(content)
@@ -166,9 +163,7 @@ def test_corrupt_files_of_assets_exit_with_3(
     ],
     ids=["roughness", "range of roughness", "lens"],
 )
-def test_values_that_do_not_exist_in_nature_exit_with_2(
-    tmp_path: Path, line: str, texts: tuple[str, ...]
-) -> None:
+def test_unnatural_values_exit_with_2(tmp_path: Path, line: str, texts: tuple[str, ...]) -> None:
     """With file, line, column and field."""
     heads = "template: tabletop\n" + ("randomizers:\n" if line.startswith("  -") else "seed: 1\n")
     (tmp_path / "wrong.yaml").write_text(heads + line)
@@ -195,9 +190,7 @@ def test_folder_with_other_things_in_it_exits_with_4(tmp_path: Path) -> None:
     assert (tmp_path / "mine" / "thesis.txt").read_text() == "irreplaceable"
 
 
-def test_dataset_of_another_configuration_exits_with_4_and_stays(
-    dataset: Path, tmp_path: Path
-) -> None:
+def test_dataset_of_another_configuration_exits_with_4(dataset: Path, tmp_path: Path) -> None:
     """The error names the differing field, and no file changes."""
     before = digest(dataset)
     done = gen_data(
@@ -211,7 +204,6 @@ def test_dataset_of_another_configuration_exits_with_4_and_stays(
 
 
 def test_unwritable_place_exits_with_4(tmp_path: Path) -> None:
-    """A file where the folder should be."""
     (tmp_path / "taken").write_text("a file")
     arguments = ("--config", "tabletop.yaml", *JOB, "--out", "taken/out")
     assert_refused(tmp_path, arguments, 4, "taken")

@@ -46,7 +46,6 @@ def test_info_tells_places_sizes_and_numbers_of_files(caches: Path) -> None:
 
 
 def test_clear_removes_the_named_cache_only(caches: Path) -> None:
-    """The others stay as they are."""
     done = CliRunner().invoke(cache, ["clear", "kernels"])
 
     assert done.output == "kernels: 1.0 MB removed\n"
@@ -66,7 +65,6 @@ def test_clear_removes_every_cache_and_no_result(caches: Path) -> None:
 
 
 def test_an_unknown_name_is_refused_with_the_known_ones(caches: Path) -> None:
-    """Nothing is removed."""
     done = CliRunner().invoke(cache, ["clear", "kernel"])
 
     assert done.exit_code != 0

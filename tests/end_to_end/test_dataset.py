@@ -142,14 +142,12 @@ def test_every_object_is_labelled_where_it_is_seen(dataset: Path) -> None:
                 rows, columns = np.nonzero(ids == instance_id)
                 x, y = int(columns.min()), int(rows.min())
                 box = [x, y, int(columns.max()) - x + 1, int(rows.max()) - y + 1]
-                assert annotation["bbox"] == box
-                assert annotation["area"] == len(rows)
+                assert (annotation["bbox"], annotation["area"]) == (box, len(rows))
                 found += 1
     assert found > 30
 
 
 def test_licences_name_what_was_used_and_nothing_else(dataset: Path) -> None:
-    """The families in LICENSES-ASSETS.md are those of the scenes that were kept."""
     from gen_data.runner.stored import StoredSamples
 
     used, stored = set(), StoredSamples(dataset)

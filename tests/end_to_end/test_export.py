@@ -38,7 +38,6 @@ def test_an_export_equals_generation_with_the_same_exporters(dataset: Path, tmp_
 
 
 def test_images_are_hard_links(dataset: Path, tmp_path: Path) -> None:
-    """An export takes no further space for them."""
     package.export(dataset, ["kitti"], tmp_path / "out", workers=0)
 
     image = Path("shards/000000/color/rgb/000000000.png")
@@ -82,7 +81,6 @@ def test_what_cannot_be_exported_is_refused_before_anything_is_written(
 
 
 def test_a_foreign_or_damaged_folder_is_named(dataset: Path, tmp_path: Path) -> None:
-    """No traceback."""
     foreign = gen_data("export", str(tmp_path), "-f", "coco", "-o", "out", cwd=tmp_path)
     damaged = tmp_path / "damaged"
     shutil.copytree(dataset, damaged)
@@ -97,7 +95,6 @@ def test_a_foreign_or_damaged_folder_is_named(dataset: Path, tmp_path: Path) -> 
 
 
 def _digit(path: Path, before: str, after: str) -> None:
-    """Change a text of a file, which keeps its size."""
     text = path.read_text("utf-8")
     assert before in text
     assert len(before) == len(after)
@@ -106,7 +103,6 @@ def _digit(path: Path, before: str, after: str) -> None:
 
 
 def _flip(path: Path) -> None:
-    """Flip a bit in the middle of a file."""
     data = bytearray(path.read_bytes())
     data[len(data) // 2] ^= 1
     path.unlink()
@@ -125,7 +121,6 @@ DAMAGES: dict[str, Callable[[Path], None]] = {
 
 @pytest.fixture(params=DAMAGES)
 def damaged(request: pytest.FixtureRequest, dataset: Path, tmp_path: Path) -> tuple[Path, str]:
-    """A copy with one damage, and the name of its file."""
     folder = tmp_path / "damaged"
     shutil.copytree(dataset, folder, copy_function=os.link)
     DAMAGES[request.param](folder)
@@ -190,7 +185,7 @@ S = "shards/000000"
     ],
     ids=lambda value: str(value)[:30],
 )
-def test_each_damaged_file_is_named(
+def test_damaged_files_are_named(
     dataset: Path, tmp_path: Path, name: str, text: str | None
 ) -> None:
     """By one typed error, whatever is in the file; None removes it."""

@@ -71,12 +71,10 @@ def test_a_loader_gives_the_other_samples(folder: Path) -> None:
 
 
 def number_of(sample: gen_data.Sample) -> int:
-    """The number of a sample in its plan."""
     return sample.index
 
 
 def test_every_sample_of_the_data_set_is_valid(folder: Path) -> None:
-    """And its sums are right."""
     assert verify(folder, full=True).samples == 3
     assert list(find_invalid_samples(folder)) == []
 
@@ -92,7 +90,6 @@ def test_an_export_lacks_the_same_sample(folder: Path, form: str, tmp_path: Path
 
 
 def test_a_rerendering_lacks_the_same_sample(folder: Path, tmp_path: Path) -> None:
-    """It has no scene."""
     summary = gen_data.rerender(
         folder, tmp_path / "out", overrides=["sensors.color.hfov_deg=50"], workers=0
     )
@@ -101,10 +98,9 @@ def test_a_rerendering_lacks_the_same_sample(folder: Path, tmp_path: Path) -> No
     assert [sample.index for sample in gen_data.open(tmp_path / "out")] == [0, 2, 3]
 
 
-def test_the_command_line_ends_with_its_own_exit_code(
+def test_the_command_has_its_own_exit_code(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Also when there is nothing to do."""
     command = ["-c", "tabletop.yaml", "-n", "4", "--out", str(folder), "-w", "0", "--skip-failed"]
     for override in TINY:
         command += ["--set", override]
@@ -127,7 +123,6 @@ def test_repair_makes_the_whole_data_set(folder: Path, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("limit_s", [0.0, -1.0, float("nan"), float("inf")])
 def test_a_time_limit_that_is_none_is_refused(limit_s: float, tmp_path: Path) -> None:
-    """Before anything is made."""
     with pytest.raises(
         gen_data.GenDataError, match="is not a time limit; expected seconds above 0"
     ):

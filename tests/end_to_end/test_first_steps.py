@@ -38,7 +38,6 @@ def test_init_writes_a_configuration_and_its_template(name: str, tmp_path: Path)
 
 
 def test_init_never_overwrites(tmp_path: Path) -> None:
-    """Exit code 2, and the file stays."""
     (tmp_path / "tabletop_scene.yaml").write_text("mine")
     done = gen_data("init", cwd=tmp_path)
 
@@ -71,7 +70,6 @@ def test_init_with_a_mesh_gives_a_data_set_of_that_class(tmp_path: Path) -> None
 
 
 def textured_obj(folder: Path, name: str, rgb: tuple[int, int, int]) -> None:
-    """A triangle with a material library and an image, as exporters write them."""
     from PIL import Image
 
     (folder / "images").mkdir(parents=True, exist_ok=True)
@@ -113,12 +111,10 @@ def test_init_takes_every_mesh_with_the_files_that_it_refers_to(tmp_path: Path) 
 
 
 def library_asset(folder: Path, asset_id: str) -> Asset:
-    """An asset of a user's folder."""
     return open_library([folder]).get(asset_id)
 
 
 def asset_albedo(folder: Path, asset_id: str) -> tuple[int, ...]:
-    """Colour of the image on an asset's first material."""
     library = open_library([folder])
     material = library.mesh(asset_id).materials[0]
     return tuple(library.texture(material.texture).albedo[0, 0].tolist())
@@ -126,9 +122,7 @@ def asset_albedo(folder: Path, asset_id: str) -> tuple[int, ...]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("template", ["tabletop", "bin_picking"])
-def test_the_comments_of_init_tell_how_to_leave_the_robot_out(
-    template: str, tmp_path: Path
-) -> None:
+def test_the_comments_of_init_tell_how_to_omit_the_robot(template: str, tmp_path: Path) -> None:
     """Done as they say, the configuration is valid and its scenes have no robot."""
     trimesh.creation.box((0.1, 0.05, 0.03)).export(tmp_path / "part.stl")
     done = gen_data("init", "--template", template, "--mesh", "part.stl", cwd=tmp_path)
@@ -165,7 +159,6 @@ def test_the_comments_of_init_tell_how_to_leave_the_robot_out(
 def test_init_refuses_what_it_cannot_write(
     tmp_path: Path, arguments: tuple[str, ...], code: int, text: str
 ) -> None:
-    """And writes nothing."""
     (tmp_path / "junk.stl").write_bytes(b"solid\n")
     (tmp_path / "junk.xyz").write_bytes(b"nonsense\n")
     (tmp_path / "empty").mkdir()
@@ -207,7 +200,6 @@ def test_plan_counts_without_rendering(tmp_path: Path) -> None:
 
 
 def test_formats_lists_every_exporter(tmp_path: Path) -> None:
-    """With what it is."""
     lines = gen_data("formats", cwd=tmp_path).stdout.splitlines()
 
     for name in TABLE:
@@ -223,10 +215,7 @@ def test_formats_lists_every_exporter(tmp_path: Path) -> None:
         ("tabletop", "template tabletop"),
     ],
 )
-def test_describe_knows_everything_that_a_configuration_names(
-    name: str, text: str, tmp_path: Path
-) -> None:
-    """Plug-ins, distributions, templates, configurations."""
+def test_describe_knows_all_that_is_configured(name: str, text: str, tmp_path: Path) -> None:
     done = gen_data("describe", name, cwd=tmp_path)
 
     assert done.returncode == 0, done.stderr

@@ -21,7 +21,6 @@ AWAY = {**CAMERA, "rig": "cart", "offset_m": [0.5, 0, 0.9], "pitch_deg": 80}
 
 
 def room(*sensors: dict[str, Any], **sections: Any) -> dict[str, Any]:
-    """Four balls on the floor of a room, with a carrier of sensors."""
     balls = {"ids": ["apple", "orange"]}
     elements = [
         {"type": "room", "name": "room", "size_m": [5, 4, 2.8]},
@@ -135,7 +134,7 @@ def test_plan_measures_labels_by_class(tmp_path: Path) -> None:
     assert "did you mean 'apple'?" in done.stderr
 
 
-def test_sensors_that_an_exporter_of_the_source_cannot_hold_are_rendered_without_it(
+def test_sensors_that_an_exporter_cannot_hold_are_rendered_without_it(
     tmp_path: Path,
 ) -> None:
     """It is named with its reason; an exporter that the user names is refused."""

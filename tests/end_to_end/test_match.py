@@ -35,7 +35,6 @@ randomizers: [{name: orbit, distance_m: {uniform: [0.6, 1.0]}}]
 
 
 def record(place: Path, n: int) -> Path:
-    """A configuration, and recordings of another one."""
     (place / "configs").mkdir()
     (place / "configs" / "base.yaml").write_text(BASE, encoding="utf-8")
     (place / "configs" / "real.yaml").write_text(REAL, encoding="utf-8")
@@ -47,13 +46,11 @@ def record(place: Path, n: int) -> Path:
 
 @pytest.fixture(scope="module")
 def unmatched(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Too few recordings for a fit."""
     return record(tmp_path_factory.mktemp("unmatched"), 1)
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Recordings, and the result of a fit."""
     place = record(tmp_path_factory.mktemp("match"), 20)
     arguments = ("real", "configs/base.yaml", "--out", "fits/a.yaml", "--scenes", "10")
     done = run("match", *arguments, cwd=place, COLUMNS="200")
@@ -100,7 +97,6 @@ def test_the_report_has_the_same_figures_in_all_forms(folder: Path) -> None:
 
 @pytest.mark.slow
 def test_a_fitted_configuration_can_be_planned(folder: Path) -> None:
-    """As any other."""
     done = run("plan", "fits/a.yaml", "--n", "4", cwd=folder)
 
     assert done.returncode == 0, done.stderr
@@ -118,10 +114,9 @@ def test_a_fitted_configuration_can_be_planned(folder: Path) -> None:
         (("s3://bucket/real", "configs/base.yaml"), "s3://bucket/real"),
     ],
 )  # fmt: skip
-def test_wrong_arguments_are_one_line(
+def test_wrong_arguments_are_told(
     unmatched: Path, arguments: tuple[str, ...], message: str
 ) -> None:
-    """And nothing is written."""
     done = run("match", *arguments, cwd=unmatched)
 
     assert done.returncode in (2, 4)

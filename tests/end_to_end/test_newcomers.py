@@ -27,7 +27,6 @@ from tests.end_to_end.running import gen_data as run
 def test_what_is_no_command_is_told_what_was_probably_meant(
     arguments: tuple[str, ...], expected: str, tmp_path: Path
 ) -> None:
-    """Generating has no verb."""
     done = run(*arguments, cwd=tmp_path)
     assert done.returncode == 2
     assert expected in done.stderr
@@ -45,9 +44,7 @@ def test_what_is_no_command_is_told_what_was_probably_meant(
         ("repair", "nosuch"),
     ],
 )
-def test_a_folder_that_does_not_exist_is_called_so(
-    arguments: tuple[str, ...], tmp_path: Path
-) -> None:
+def test_a_missing_folder_is_called_so(arguments: tuple[str, ...], tmp_path: Path) -> None:
     """With the nearest name beside it."""
     (tmp_path / "nosuchh").mkdir()
     done = run(*arguments, cwd=tmp_path)
@@ -92,7 +89,6 @@ def test_commands_that_take_a_configuration_or_a_data_set_expect_both(
 
 
 def test_many_names_are_the_nearest_five() -> None:
-    """Few are listed all."""
     few, many = ["coco", "voc"], [f"name_{k}" for k in range(100)]
     assert one_of("cocoo", few) == "expected one of coco, voc (did you mean 'coco'?)"
     text = one_of("name_1", [n for n in many if n != "name_1"])

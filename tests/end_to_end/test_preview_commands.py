@@ -50,16 +50,6 @@ def test_recording_is_accepted_by_rerun(tmp_path: Path) -> None:
     assert verified.returncode == 0, verified.stderr
 
 
-def test_describe_lists_and_explains(tmp_path: Path) -> None:
-    """Every plug-in and template is named; one is explained with its fields."""
-    listed = gen_data("describe", cwd=tmp_path)
-    explained = gen_data("describe", "lighting", cwd=tmp_path)
-
-    assert "template: arm_task, bin_picking, highway" in listed.stdout
-    assert "kitti_stereo" in listed.stdout
-    assert "illuminance_lux" in explained.stdout
-
-
 def test_shipped_schema_is_the_generated_one(tmp_path: Path) -> None:
     """Editors complete from configs/schema.json; ``gen-data schema`` prints the same."""
     from gen_data import configs
@@ -133,7 +123,7 @@ def test_a_report_counts_the_annotations_of_a_dataset(dataset: Path, tmp_path: P
 
 @needs_rerun
 @pytest.mark.parametrize("signal_number", cases([signal.SIGINT, signal.SIGKILL], {signal.SIGINT}))
-def test_a_preview_for_browsers_listens_on_this_machine_only(
+def test_a_preview_listens_on_this_machine_only(
     tmp_path: Path, signal_number: signal.Signals
 ) -> None:
     """The page is served, every socket is on loopback, and none is left after the end."""

@@ -15,14 +15,12 @@ from gen_data.runner.stored import StoredSamples
 
 @pytest.fixture(scope="module")
 def drawn(dataset: Path) -> DrawnParameters:
-    """All three scenes of the data set, drawn again."""
     with threadpool_limits(limits=1):
         return draw_parameters(StoredSamples(dataset), 3)
 
 
 @pytest.mark.slow
 def test_scenes_that_are_drawn_again_are_the_stored_ones(drawn: DrawnParameters) -> None:
-    """To the last bit."""
     assert (drawn.scenes, drawn.different) == (3, 0)
 
 
@@ -42,7 +40,6 @@ def test_drawn_values_are_those_of_the_stored_scenes(drawn: DrawnParameters, dat
 
 @pytest.mark.slow
 def test_declared_values_are_drawn_from_the_declared_distribution(drawn: DrawnParameters) -> None:
-    """The expected mean and limits of {uniform: [0.9, 1.5]}."""
     (distance,) = (p for p in drawn.parameters if p.name == "orbit.distance_m")
 
     assert list(distance.declared) == ["{uniform: [0.9, 1.5]}"]

@@ -28,7 +28,6 @@ def test_without_a_change_every_sample_has_the_same_bytes(dataset: Path, tmp_pat
 
 @pytest.fixture(scope="module")
 def dark_dataset(dataset: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The scenes in other light."""
     out = tmp_path_factory.mktemp("dark") / "dark"
     package.rerender(dataset, out, overrides=["lamps.illuminance_lux=40"], workers=0)
     return out
@@ -56,8 +55,7 @@ def test_other_light_changes_colours_and_nothing_else(dataset: Path, dark_datase
         a, b = one.cameras["color"], other.cameras["color"]
         assert np.array_equal(a.instance_ids, b.instance_ids)
         assert np.array_equal(a.depth_m, b.depth_m)
-        assert a.boxes2d == b.boxes2d
-        assert a.boxes3d == b.boxes3d
+        assert (a.boxes2d, a.boxes3d) == (b.boxes2d, b.boxes3d)
         assert not np.array_equal(a.rgb, b.rgb)
 
 
@@ -98,7 +96,6 @@ def test_other_cameras_see_the_same_scenes(dataset: Path, tmp_path: Path) -> Non
 def test_what_would_change_the_scenes_is_refused(
     dataset: Path, tmp_path: Path, arguments: tuple[str, ...], text: str
 ) -> None:
-    """With the reason and a remedy."""
     (tmp_path / "empty.yaml").write_text("seed: 1\n")
     done = gen_data("rerender", str(dataset), "--out", "out", *arguments, cwd=tmp_path)
 
@@ -106,9 +103,7 @@ def test_what_would_change_the_scenes_is_refused(
     assert re.search(text, done.stderr), done.stderr
 
 
-def test_a_single_sample_has_the_bytes_that_it_has_in_the_data_set(
-    dataset: Path, tmp_path: Path
-) -> None:
+def test_a_single_sample_has_its_bytes_in_the_data_set(dataset: Path, tmp_path: Path) -> None:
     """Images, laser scans and labels, and a folder per format."""
     done = gen_data("sample", str(dataset), "--index", "7", "--out", "one", cwd=tmp_path)
 

@@ -80,7 +80,6 @@ def test_a_path_in_a_file_is_whole() -> None:
 
 
 def helps(group: click.Group, names: tuple[str, ...] = ()) -> list[tuple[str, ...]]:
-    """Arguments that print the help of every command below a group."""
     context = click.Context(group)
     found = []
     for name in group.list_commands(context):
@@ -103,9 +102,7 @@ def helps(group: click.Group, names: tuple[str, ...] = ()) -> list[tuple[str, ..
     ],
     ids=" ".join,
 )
-def test_help_and_lists_fit_a_terminal(
-    arguments: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_help_fits_a_terminal(arguments: tuple[str, ...], monkeypatch: pytest.MonkeyPatch) -> None:
     """Examples of commands, which nobody wraps, too."""
     monkeypatch.setenv("COLUMNS", "80")
     done = CliRunner().invoke(cli, arguments)

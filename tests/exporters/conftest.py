@@ -217,7 +217,6 @@ def make_sample(
     split: str = "train",
     thresholds: Thresholds | None = None,
 ) -> Sample:
-    """A sample with every annotation."""
     scene = Scene("street", instances=tuple(instances), cameras=tuple(cameras))
     readings = {camera.name: ray_cast(scene, camera) for camera in cameras}
     truth = annotated(scene, readings, thresholds or Thresholds())
@@ -468,7 +467,6 @@ def with_bodies(samples: Sequence[Sample]) -> list[Sample]:
 def with_objects(
     sample: Sample, change: Callable[[tuple[ObjectTruth, ...]], tuple[ObjectTruth, ...]]
 ) -> Sample:
-    """The sample with the objects that a function makes of the objects of each image."""
     truth = {
         name: replace(image, objects=change(image.objects)) for name, image in sample.truth.items()
     }
@@ -538,7 +536,6 @@ def export(
     backwards: bool = False,
     keep_arrays: bool = False,
 ) -> Path:
-    """Write samples shard by shard, merge the shards, and return the data set's folder."""
     if exporter.type == "rerun":
         pytest.importorskip("rerun", reason=NO_RERUN)
     exporter = exporter.with_assets(Props())
@@ -598,7 +595,6 @@ def slow(world: Any) -> Any:
 
 @pytest.fixture(scope="session")
 def exported(world: Any, samples: Any, tmp_path_factory: pytest.TempPathFactory) -> Any:
-    """Exports once per exporter and remembers the folder."""
     folders: dict[str, Path] = {}
 
     def export(exporter: Any) -> Path:

@@ -52,32 +52,27 @@ Images = Iterator[tuple[str, str, list[Found]]]
 
 
 def sides(box: Any) -> tuple[float, ...]:
-    """Left, top, right and bottom of COCO's box."""
     x, y, width, height = map(float, box)
     return (x, y, x + width, y + height)
 
 
 def pixels(path: Path, mode: str | None = None) -> NDArray[Any]:
-    """Values of an image file of a mode."""
     with Image.open(path) as image:
         assert mode in (None, image.mode)
         return np.asarray(image)
 
 
 def drawn(polygons: list[list[float]], height: int, width: int) -> Mask:
-    """Union of polygons as pycocotools draws them."""
     shapes = coco_mask.frPyObjects(polygons, height, width)
     return np.asarray(coco_mask.decode(coco_mask.merge(shapes)), bool)
 
 
 def opened(path: Path) -> COCO:
-    """The file as the official reader sees it."""
     with contextlib.redirect_stdout(io.StringIO()):
         return COCO(str(path))
 
 
 def in_coco(folder: Path) -> Images:
-    """By pycocotools."""
     for path in folder.glob("annotations/instances_*.json"):
         coco = opened(path)
         for number, image in coco.imgs.items():
@@ -100,7 +95,6 @@ def segments_of(path: Path) -> NDArray[np.int64]:
 
 
 def in_panoptic(folder: Path) -> Images:
-    """Segments of things."""
     for path in folder.glob("annotations/panoptic_*.json"):
         truth = json.loads(path.read_text())
         names = {c["id"]: c["name"] for c in truth["categories"] if c["isthing"]}
@@ -236,7 +230,6 @@ def in_voc(folder: Path) -> Images:
 
 
 def in_yolo(folder: Path) -> Images:
-    """Centres and sizes as shares of the image, at Ultralytics' places."""
     data = yaml.safe_load((folder / "detect/data.yaml").read_text())
     for split in ("train", "val"):
         images = folder / "detect" / data[split]
@@ -254,13 +247,11 @@ def in_yolo(folder: Path) -> Images:
 
 
 def csv_rows(path: Path) -> list[dict[str, str]]:
-    """Rows of a table."""
     with path.open(newline="", encoding="utf-8") as file:
         return list(csv.DictReader(file))
 
 
 def in_croissant(folder: Path) -> Images:
-    """Tables of images and objects."""
     objects = csv_rows(folder / "objects.csv")
     for image in csv_rows(folder / "images.csv"):
         rows = [
@@ -273,7 +264,6 @@ def in_croissant(folder: Path) -> Images:
 
 
 def parquet(path: Path) -> pyarrow.Table:
-    """One Parquet file."""
     with pyarrow.parquet.ParquetFile(path) as file:
         return file.read()
 
@@ -363,12 +353,10 @@ def in_tar(folder: Path) -> Images:
 
 
 def json_lines(path: Path) -> list[Any]:
-    """A file of JSON lines."""
     return [json.loads(line) for line in path.read_text("utf-8").splitlines()]
 
 
 def in_lines(folder: Path) -> Images:
-    """Objects that texts refer to."""
     for path in folder.glob("*_images.jsonl"):
         for image in json_lines(path):
             rows = [

@@ -63,7 +63,7 @@ def test_frames_tell_where_the_map_is_and_what_is_on_it(world: Any, tmp_path: Pa
     assert frames[3]["boxes3d"]["ego"] == []
 
 
-def test_lanes_are_columns_at_rows_as_tusimple_has_them(
+def test_lanes_are_columns_at_rows_as_in_tusimple(
     world: Any, sample: Sample, tmp_path: Path
 ) -> None:
     """Rows every ten pixels; pixel centres at whole numbers, so half a pixel less than ours."""
@@ -77,7 +77,6 @@ def test_lanes_are_columns_at_rows_as_tusimple_has_them(
 
 
 def test_a_line_that_misses_every_row_has_no_column() -> None:
-    """It lies between two of them."""
     short = replace(BORDER, points_px=((5.0, 12.0), (6.0, 18.0)), visible=(True, True))
 
     assert columns_at(short, [0, 10, 20]) == [-2, -2, -2]

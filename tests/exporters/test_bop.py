@@ -28,8 +28,6 @@ from gen_data.exporters.bop import Bop
 from gen_data.exporters.rigid_models import Piece, build_model
 from tests.embree import RayCaster
 
-pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
-
 DELTA_MM = 5.0
 
 
@@ -172,7 +170,6 @@ def wrong_targets(root: Path) -> Iterator[str]:
 
 
 def problems(root: Path) -> list[str]:
-    """All contradictions in a data set."""
     return [*wrong_models(root), *wrong_images(root), *wrong_targets(root)]
 
 
@@ -223,7 +220,6 @@ def test_equal_geometries_share_a_model(dataset: Path) -> None:
 
 
 def test_each_scale_is_an_object_of_its_own(world: Any, tmp_path: Path) -> None:
-    """A model has one size."""
     first, *others = world.with_bodies(world.samples[:3])
     bodies = tuple(replace(b, scale=0.5) if "car" in b.name else b for b in first.scene.bodies)
     changed = replace(first, scene=replace(first.scene, bodies=bodies))
@@ -276,7 +272,6 @@ def test_invisible_objects_have_no_box(world: Any, tmp_path: Path) -> None:
 
 
 def test_views_of_a_scene_share_a_folder(world: Any, tmp_path: Path) -> None:
-    """Or a thousand samples do."""
     samples = [replace(s, split="train") for s in world.with_bodies(world.samples)]
     info = replace(world.info(7), views_per_scene=3)
 

@@ -29,7 +29,6 @@ POINTS_M = np.array([[-0.5, 0.3, 2.0], [0.4, -0.2, 1.7], [0.1, 0.1, 3.0]])
 
 
 def rig_scene() -> Scene:
-    """Four cameras and an IMU on a stand."""
     cameras = []
     for k, (name, lens) in enumerate(LENSES.items()):
         K = Intrinsics(640, 512, 612.4 + k, 611.9, 319.2 - k, 259.8, lens)
@@ -46,7 +45,6 @@ SCENE = rig_scene()
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The files of one calibration."""
     folder = tmp_path_factory.mktemp("calibration")
     for name, text in calibration_texts(SCENE, tuple(LENSES)).items():
         (folder / name).parent.mkdir(exist_ok=True)
@@ -159,9 +157,7 @@ def assert_is(found: Any, lens: Intrinsics) -> None:
     assert found.size_px == (lens.width_px, lens.height_px)
 
 
-def test_every_photograph_has_its_pose_in_the_model_of_its_scene(
-    samples: Any, exported: Any
-) -> None:
+def test_every_photograph_has_its_pose_in_its_model(samples: Any, exported: Any) -> None:
     """COLMAP's poses take the world to the camera; its images are there."""
     folder = exported(CalibrationFiles())
     samples = [s for s in samples if s.scene_index == 0]

@@ -30,18 +30,15 @@ Camera = tuple[Any, str, Any]
 
 
 def pinhole(fx: Any, fy: Any, cx: Any, cy: Any) -> Camera:
-    """A camera without a lens."""
     return np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]], float), "", ()
 
 
 def in_bop(folder: Path) -> Camera:
-    """The camera of the data set."""
     camera = json.loads((folder / "camera.json").read_text())
     return pinhole(*(camera[name] for name in ("fx", "fy", "cx", "cy")))
 
 
 def in_cityscapes(folder: Path) -> Camera:
-    """Of the first image."""
     camera = json.loads(min(folder.rglob("*_camera.json")).read_text())["intrinsic"]
     return pinhole(*(camera[name] for name in ("fx", "fy", "u0", "v0")))
 
@@ -120,9 +117,7 @@ READERS: dict[str, Callable[[Path], Camera]] = {
 
 
 @pytest.mark.parametrize("kind", READERS)
-def test_the_ground_is_level_where_pixels_are_as_stated(
-    kind: str, world: Any, tmp_path: Path
-) -> None:
+def test_the_ground_is_level_at_the_stated_pixels(kind: str, world: Any, tmp_path: Path) -> None:
     """Height of ground points below the camera: z (v - cy) / fy, with v of the pixel's centre."""
     exporter = TABLE.load(kind)()
     samples = world.with_bodies(world.samples)
@@ -145,7 +140,7 @@ def test_the_ground_is_level_where_pixels_are_as_stated(
 
 @pytest.mark.parametrize("model", LENSES)
 @pytest.mark.parametrize("kind", ["coco", "croissant", "hdf5", "huggingface", "tfrecord"])
-def test_opencv_projects_with_the_lens_of_a_bent_camera(
+def test_opencv_projects_with_the_bent_lens(
     kind: str, model: Any, world: Any, tmp_path: Path
 ) -> None:
     """With K, and pixel centres where the format has them; to float32 where it holds no more."""

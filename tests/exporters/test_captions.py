@@ -31,7 +31,6 @@ def test_a_caption_is_one_sentence(world: Any) -> None:
 
 
 def test_hidden_and_ignored_objects_do_not_count(world: Any) -> None:
-    """A reader of the image does not see them."""
     car, *others = world.samples[0].truth["color"].objects
 
     assert list_objects([replace(car, box=None), others[0]]) == "a pedestrian"
@@ -45,7 +44,6 @@ def test_hidden_and_ignored_objects_do_not_count(world: Any) -> None:
      ("traffic_light", 13, "many traffic lights"), ("apple", 1, "an apple")],
 )  # fmt: skip
 def test_numbers_and_plurals(world: Any, category: str, count: int, words: str) -> None:
-    """As in English."""
     thing = world.samples[0].truth["color"].objects[0]
     things = [replace(thing, instance=replace(thing.instance, category=category))] * count
 

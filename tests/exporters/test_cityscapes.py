@@ -19,9 +19,6 @@ from gen_data.exporters.cityscapes import Cityscapes
 from gen_data.exporters.cityscapes_classes import city_classes
 from tests.exporters.test_labels import truth_of
 
-# pycocotools' decoder predates numpy 2's __array__(copy=...).
-pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
-
 CLASS_OF = {"car": 26, "crate": 5, "pedestrian": 24}
 
 
@@ -37,7 +34,6 @@ def samples(world: Any) -> list[Any]:
 
 @pytest.fixture(scope="module")
 def dataset(world: Any, samples: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """All of them."""
     info = world.info(8, depth_scale_m=1 / 256)
     return world.export(Cityscapes(), info, samples, tmp_path_factory.mktemp("cityscapes"))
 
@@ -180,7 +176,6 @@ def test_riders_vans_and_the_ego_vehicle(world: Any, tmp_path: Path) -> None:
 
 
 def test_ignored_objects_are_unlabeled(world: Any, tmp_path: Path) -> None:
-    """Which evaluation leaves out."""
     sample = world.samples[0]
     first = sample.truth["color"].objects[0]
 

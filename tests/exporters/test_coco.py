@@ -23,9 +23,6 @@ from gen_data.core.se3 import SE3
 from gen_data.exporters.coco import Coco
 from tests.exporters.label_readers import opened
 
-# pycocotools' decoder predates numpy 2's __array__(copy=...).
-pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
-
 
 def average_precision(truth: COCO, kind: str, path: Path | None = None) -> float:
     """AP at IoU 0.50:0.95 of the ground truth, submitted as predictions.
@@ -56,14 +53,12 @@ def average_precision(truth: COCO, kind: str, path: Path | None = None) -> float
 
 @pytest.fixture(scope="module")
 def dataset(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Seven frames of a street, exported with all defaults."""
     folder = tmp_path_factory.mktemp("coco")
     return world.export(Coco(), world.info(7), world.samples, folder)
 
 
 @pytest.fixture(scope="module")
 def train(dataset: Path) -> COCO:
-    """The train split."""
     return opened(dataset / "annotations/instances_train.json")
 
 
@@ -82,8 +77,7 @@ def test_box_and_area_are_those_of_the_decoded_mask(train: COCO) -> None:
     assert len(train.anns) > 10
     for row in train.anns.values():
         rle = train.annToRLE(row)
-        assert row["bbox"] == coco_mask.toBbox(rle).tolist()
-        assert row["area"] == coco_mask.area(rle)
+        assert (row["bbox"], row["area"]) == (coco_mask.toBbox(rle).tolist(), coco_mask.area(rle))
         assert row["iscrowd"] == 0
 
 
@@ -170,9 +164,7 @@ def test_visibility_and_amodal_shapes_agree_with_the_masks(train: COCO) -> None:
     assert truncated > 0
 
 
-def test_amodal_boxes_are_those_of_the_silhouettes_in_the_image(
-    world: Any, tmp_path: Path, train: COCO
-) -> None:
+def test_amodal_boxes_are_those_of_the_silhouettes(world: Any, tmp_path: Path, train: COCO) -> None:
     """As pycocotools finds them; masks, areas and the score of the ground truth stay."""
     root = world.export(Coco(bbox="amodal"), world.info(7), world.samples, tmp_path)
     path = root / "annotations/instances_train.json"
@@ -193,7 +185,6 @@ def test_amodal_boxes_are_those_of_the_silhouettes_in_the_image(
 
 @pytest.mark.slow
 def test_boxes_only_and_no_amodal_keys_on_request(world: Any, tmp_path: Path) -> None:
-    """Options leave out what they say, and nothing else."""
     exporter = Coco(segmentation="none", amodal=False)
 
     folder = world.export(exporter, world.info(7), world.samples, tmp_path)
@@ -205,7 +196,7 @@ def test_boxes_only_and_no_amodal_keys_on_request(world: Any, tmp_path: Path) ->
     assert average_precision(truth, "bbox") == pytest.approx(1.0, abs=1e-9)
 
 
-def test_run_lengths_and_polygons_are_the_same_masks(
+def test_runs_and_polygons_are_the_same(
     world: Any, train: COCO, dataset: Path, tmp_path: Path
 ) -> None:
     """Polygons drawn as torchvision's reference recipe does, which takes polygons only."""
@@ -297,7 +288,7 @@ def object_keypoint_similarity(truth: COCO, sigmas: list[float] | None) -> float
     ("name", "sigmas"), [("pedestrian", None), ("car", [0.05] * 8)], ids=["pedestrian", "car"]
 )
 @pytest.mark.parametrize("split", ["train", "val"])
-def test_keypoints_as_predictions_score_one(
+def test_keypoints_score_one(
     dataset: Path, split: str, name: str, sigmas: list[float] | None
 ) -> None:
     """COCOeval compares one skeleton at a time: each category has a file of its own."""

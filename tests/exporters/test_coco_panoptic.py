@@ -16,9 +16,6 @@ from PIL import Image
 from gen_data.exporters.coco_panoptic import CocoPanoptic
 from tests.exporters.label_readers import segments_of
 
-# pycocotools' decoder predates numpy 2's __array__(copy=...).
-pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
-
 
 def scenery(world: Any) -> Any:
     """A tree and a hood, neither annotated, behind and beside an annotated crate."""
@@ -42,12 +39,10 @@ def dataset(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def read(folder: Path, split: str = "train") -> Any:
-    """The JSON of a split."""
     return json.loads((folder / f"annotations/panoptic_{split}.json").read_text())
 
 
 def problems(folder: Path) -> list[str]:
-    """What the format's definition forbids."""
     truth, found = read(folder), []
     isthing = {c["id"]: c["isthing"] for c in truth["categories"]}
     if [a["image_id"] for a in truth["annotations"]] != [i["id"] for i in truth["images"]]:

@@ -30,7 +30,6 @@ def rows_of(split: Path) -> list[Any]:
 
 
 def problems(root: Path, samples: list[Any], camera: str = "color") -> Iterator[str]:
-    """Contradictions between a data set and its samples."""
     listed = [(split, row) for split in sorted(root.iterdir()) for row in rows_of(split)]
     by_sample = {}
     for split, row in listed:
@@ -48,7 +47,6 @@ def problems(root: Path, samples: list[Any], camera: str = "color") -> Iterator[
 
 
 def wrong_frame(split: Path, row: Any, clip: Any, channels: Any) -> Iterator[str]:
-    """One frame: image, depth, segmentation, edges."""
     rgb = image(split / row["image_file_name"])
     if not np.array_equal(rgb, channels[Channel.RGB]):
         yield "image"
@@ -74,7 +72,6 @@ def wrong_frame(split: Path, row: Any, clip: Any, channels: Any) -> Iterator[str
 
 @pytest.fixture(scope="module")
 def dataset(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Seven frames of a street."""
     folder = tmp_path_factory.mktemp("clips")
     return world.export(ControlClips(), world.info(7), world.samples, folder)
 
@@ -137,7 +134,6 @@ def test_a_sequence_is_one_clip(world: Any, samples: Any, tmp_path: Path) -> Non
 
 
 def test_videos_have_the_same_bytes_in_every_run(world: Any, samples: Any, tmp_path: Path) -> None:
-    """Within one version of OpenCV."""
     exporter = FIXED.model_copy(update={"video": True})
     info = world.info(8, ("left", "right"), steps_per_scene=4)
 
@@ -190,7 +186,6 @@ def test_the_suggested_range_of_a_sequence_uses_most_greys(
 
 
 def test_categories_have_a_colour_each(world: Any, tmp_path: Path) -> None:
-    """Both crates the same one."""
     exporter = ControlClips(segmentation="category")
 
     root = world.export(exporter, world.info(1), world.samples[:1], tmp_path)

@@ -88,7 +88,6 @@ def test_files_with_room_repeat_the_statements(world: Any, tmp_path: Path) -> No
 
 
 def test_hdf5_files_have_them_as_attributes(world: Any, tmp_path: Path) -> None:
-    """Of the file itself."""
     h5py = pytest.importorskip("h5py")
     exporter = TABLE.load("hdf5")()
     folder = world.export(exporter, world.info(7), world.samples, tmp_path)

@@ -17,13 +17,11 @@ from tests.exporters.label_readers import csv_rows
 
 @pytest.fixture(scope="module")
 def dataset(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Seven frames of a street in two splits."""
     folder = tmp_path_factory.mktemp("croissant")
     return world.export(Croissant(), published(world), world.samples, folder)
 
 
 def published(world: Any, licence: str = "") -> DatasetInfo:
-    """Facts of the world's data set with a publication."""
     publication = Publication(
         license=licence,
         url="https://example.org",
@@ -45,7 +43,6 @@ def test_tables_list_images_and_objects(dataset: Path, world: Any) -> None:
 
 
 def test_files_are_described_with_their_sums(dataset: Path) -> None:
-    """Sizes and digests are those of the files."""
     metadata = json.loads((dataset / "croissant.json").read_text())
     files = [f for f in metadata["distribution"] if f["@type"] == "cr:FileObject"]
 

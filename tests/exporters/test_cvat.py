@@ -24,7 +24,6 @@ def assert_states(folder: Path, samples: list[Any]) -> None:
 
 
 def test_shapes_of_hidden_objects_are_occluded(world: Any, tmp_path: Path) -> None:
-    """One shape of each object."""
     folder = world.export(Cvat(shapes="box"), world.info(7), world.samples, tmp_path)
 
     assert_states(folder, world.samples)

@@ -49,19 +49,15 @@ def demonstrated(world: Any) -> Any:
 
 @pytest.fixture(scope="module")
 def samples(world: Any) -> Any:
-    """The same."""
     return demonstrated(world)
 
 
 def values(example: Any, key: str) -> list[Any]:
-    """Values of a key of an example."""
     feature = example.features.feature[key]
     return list(getattr(feature, feature.WhichOneof("kind")).value)
 
 
-def test_lerobot_has_what_the_arm_does_at_every_step(
-    world: Any, samples: Any, tmp_path: Path
-) -> None:
+def test_lerobot_has_what_the_arm_does_each_step(world: Any, samples: Any, tmp_path: Path) -> None:
     """At 0, 0.1, 0.2 and 0.3 s; the hand's pose is that of the step's joints."""
     folder = world.export(LeRobot(), drive_info(world), samples, tmp_path) / "train/toys_arm"
     rows = pyarrow.parquet.read_table(folder / "data/chunk-000/file-000.parquet").to_pylist()
@@ -117,9 +113,7 @@ def assert_written(folder: Path, samples: Any) -> None:
     assert np.array_equal(np.asarray(Image.open(io.BytesIO(picture))), expected)
 
 
-def test_rlds_has_an_episode_per_record_with_steps_of_equal_length(
-    world: Any, samples: Any, tmp_path: Path
-) -> None:
+def test_rlds_has_an_episode_per_record(world: Any, samples: Any, tmp_path: Path) -> None:
     """Of the lengths that its description states."""
     folder = world.export(Rlds(), drive_info(world), samples, tmp_path) / "train/toys_arm"
 
@@ -127,7 +121,6 @@ def test_rlds_has_an_episode_per_record_with_steps_of_equal_length(
 
 
 def test_rlds_rewards_the_last_step_of_a_success(world: Any, samples: Any, tmp_path: Path) -> None:
-    """One, and a terminal state."""
     done = [
         replace(s, scene=replace(s.scene, articulations=(
             replace(s.scene.articulations[0], episode=replace(EPISODE, succeeded=True, failure="")),
@@ -162,6 +155,5 @@ def test_the_hand_of_a_step_is_that_of_its_joints(samples: Any) -> None:
 
 
 def test_an_arm_that_demonstrates_nothing_has_no_step(world: Any) -> None:
-    """Its motion is not judged."""
     (arm,) = world.reach()[0].scene.articulations
     assert demonstration_step(arm, two_link_arm(), 0.0, 0.1) is None

@@ -29,7 +29,6 @@ def parse_dota(path: Path) -> list[dict[str, Any]]:
 
 @pytest.fixture
 def folder(world: Any, tmp_path: Path) -> Path:
-    """The world's frames in DOTA's layout."""
     exported: Path = world.export(Dota(), world.info(7), world.samples, tmp_path)
     return exported
 

@@ -25,7 +25,6 @@ TRACKS = {"kitti_raw", "nuscenes"}
 
 
 def files(folder: Path) -> dict[str, bytes]:
-    """Every file below a folder."""
     found = (p for p in folder.rglob("*") if p.is_file())
     return {str(p.relative_to(folder)): p.read_bytes() for p in found}
 
@@ -43,7 +42,6 @@ def given(exporter: Any, world: Any) -> tuple[Any, Any]:
 
 @pytest.fixture(scope="module", params=TABLE.names())
 def exporter(request: pytest.FixtureRequest) -> Any:
-    """One exporter with its defaults."""
     return TABLE.load(request.param)()
 
 
@@ -61,10 +59,7 @@ def written(exporter: Any, world: Any, tmp_path_factory: pytest.TempPathFactory)
     return folder
 
 
-def test_shards_can_be_written_in_any_order(
-    exporter: Any, world: Any, written: Path, tmp_path: Path
-) -> None:
-    """Ids are computed, not counted."""
+def test_shards_come_in_any_order(exporter: Any, world: Any, written: Path, tmp_path: Path) -> None:
     info, samples = given(exporter, world)
 
     backwards = world.export(exporter, info, samples, tmp_path, backwards=True)
@@ -100,7 +95,7 @@ def test_file_names_of_a_shard_depend_on_indices_only(
     assert files(written / "shards/000001") == files(tmp_path / "shards/000000")
 
 
-def test_only_formats_with_a_mark_for_it_have_ignored_objects(
+def test_only_formats_with_a_mark_have_ignored_objects(
     exporter: Any, world: Any, tmp_path: Path
 ) -> None:
     """All others write the same bytes as without the object."""
@@ -130,7 +125,6 @@ def test_no_image_is_stored_twice(exporter: Any, written: Path) -> None:
 
 
 def test_text_files_are_utf8_with_unix_line_ends(written: Path) -> None:
-    """On every system."""
     for name, data in files(written / "dataset").items():
         if name.endswith((".json", ".txt")):
             assert b"\r" not in data.decode("utf-8").encode()

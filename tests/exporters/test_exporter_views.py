@@ -27,7 +27,6 @@ PINHOLES_ONLY = ("bop", "cityscapes", "kitti", "scannet", "semantickitti", "solo
 
 
 def viewed(kind: str, **fields: Any) -> Any:
-    """An exporter as a configuration with these fields makes it."""
     own = TABLE.load(kind).model_validate_json(json.dumps({"type": kind, **fields}))
     return view_of(own, own, Thresholds())
 
@@ -92,7 +91,6 @@ def test_only_the_listed_cameras_are_exported(world: Any, tmp_path: Path, camera
 
 @pytest.mark.parametrize("kind", [*PINHOLES_ONLY, "nuscenes"])
 def test_a_bent_camera_that_is_not_listed_blocks_no_format(world: Any, kind: str) -> None:
-    """With it, formats of rectified images refuse the data set and name both remedies."""
     info, _ = two_cameras(world)
     own = {"camera": "wide"} if kind not in ("nuscenes", "solo") else {}
     refused = viewed(kind, **own)
@@ -104,7 +102,6 @@ def test_a_bent_camera_that_is_not_listed_blocks_no_format(world: Any, kind: str
 
 
 def test_a_name_of_no_sensor_is_refused_with_the_nearest(world: Any) -> None:
-    """Cameras and other sensors apart."""
     info, _ = two_cameras(world)
     with pytest.raises(ConfigError, match=r"exporter 'coco': cameras: 'colour' .*'color'\?"):
         viewed("coco", cameras=["colour"]).check(info)
@@ -127,7 +124,7 @@ def test_scanners_can_be_left_out(world: Any, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("model", sorted(LENSES))
 @pytest.mark.parametrize("kind", sampled([*PINHOLES_ONLY, "coco", "hdf5", "yolo"], 4))
-def test_formats_of_pinholes_take_rectified_images(
+def test_pinhole_formats_take_rectified_images(
     world: Any, tmp_path: Path, kind: str, model: Any
 ) -> None:
     """In every format the photographs are OpenCV's, and the bent ones are nowhere."""
@@ -175,9 +172,7 @@ def test_the_matrix_of_bop_is_that_of_the_rectified_image(world: Any, tmp_path: 
         assert columns.min() - 8 < u < columns.max() + 8
 
 
-def test_exporters_with_equal_settings_share_the_rectified_images(
-    world: Any, tmp_path: Path
-) -> None:
+def test_exporters_of_equal_settings_share_rectified_images(world: Any, tmp_path: Path) -> None:
     """One copy in the shard, whichever exporter comes first."""
     samples = world.with_bodies(bent_samples(world, "brown_conrady"))
     info = world.info(len(samples), lenses={"color": "brown_conrady"})

@@ -50,7 +50,6 @@ def test_no_flow_is_not_flow_of_nothing() -> None:
 
 @pytest.mark.parametrize("beyond_px", [512.0, -512.0, 1e6, np.inf])
 def test_flow_beyond_what_the_file_can_hold_is_none(beyond_px: float) -> None:
-    """It does not wrap around."""
     flow = np.zeros((H, W, 2), np.float32)
     flow[1, 1, 0] = beyond_px
     values = read(encode_channel(Channel.FLOW_FORWARD, flow, 0.001))

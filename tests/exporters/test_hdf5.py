@@ -28,7 +28,6 @@ def load(path: Path) -> dict[str, Any]:
 
 
 def problems(path: Path, sample: Any) -> Iterator[str]:
-    """Contradictions between a container and the geometry of its street."""
     data = load(path)
     reading = sample.capture.readings["color"]
     if not np.array_equal(data["colors"], reading.channels[Channel.RGB]):
@@ -81,7 +80,6 @@ def wrong_geometry(data: Any, sample: Any, entries: Any) -> Iterator[str]:
 
 @pytest.fixture(scope="module", params=CONTAINERS)
 def dataset(world: Any, request: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Seven frames with normals."""
     info = world.info(7, media={"color": (*MEDIA, Channel.NORMALS)})
     folder = tmp_path_factory.mktemp(request.param)
     return world.export(Hdf5(container=request.param), info, world.samples, folder)
@@ -96,10 +94,7 @@ def test_containers_hold_the_street(dataset: Path, world: Any) -> None:
 
 
 @pytest.mark.parametrize("container", CONTAINERS)
-def test_files_without_compression_hold_the_same(
-    container: str, world: Any, tmp_path: Path
-) -> None:
-    """They are larger."""
+def test_uncompressed_files_hold_the_same(container: str, world: Any, tmp_path: Path) -> None:
     sizes = {}
     for compression in ("gzip", "none"):
         exporter = Hdf5(container=container, compression=compression)

@@ -15,13 +15,9 @@ from gen_data.exporters import huggingface
 from gen_data.exporters.huggingface import HuggingFace
 from tests.exporters.label_readers import parquet
 
-# pycocotools' decoder predates numpy 2's __array__(copy=...).
-pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
-
 
 @pytest.fixture(scope="module")
 def dataset(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Seven frames of a street, at most two in a file."""
     folder = tmp_path_factory.mktemp("huggingface")
     return world.export(HuggingFace(rows_per_file=2), world.info(7), world.samples, folder)
 
@@ -65,9 +61,7 @@ def test_the_card_has_the_splits_with_sizes(dataset: Path) -> None:
     assert facts["dataset_info"]["download_size"] == sum(sizes)
 
 
-def test_row_groups_are_bounded(
-    world: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_groups_are_bounded(world: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """By rows and by bytes of images."""
     monkeypatch.setattr(huggingface, "GROUP_ROWS", 3)
     folder = world.export(HuggingFace(), world.info(7), world.samples, tmp_path / "a")
@@ -95,7 +89,6 @@ def test_flow_is_binary_and_missing_channels_are_null(world: Any, tmp_path: Path
 
 
 def test_ignored_objects_are_crowds(world: Any, tmp_path: Path) -> None:
-    """As in COCO, which excludes them from scores."""
     ignored = world.ignoring(world.samples[0])
     folder = world.export(HuggingFace(), world.info(1), [ignored], tmp_path)
 
@@ -105,7 +98,6 @@ def test_ignored_objects_are_crowds(world: Any, tmp_path: Path) -> None:
 
 
 def card(folder: Path) -> Any:
-    """Header of the card."""
     header = re.match(r"---\n(.*?)\n---\n", (folder / "README.md").read_text(), re.DOTALL)
     assert header
     return yaml.safe_load(header.group(1))

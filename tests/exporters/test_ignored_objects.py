@@ -14,9 +14,6 @@ from gen_data.exporters.voc import YEAR
 from tests.exporters.label_readers import opened, parquet, records, tar_samples, voc_objects
 from tests.exporters.test_coco import average_precision
 
-# pycocotools' decoder predates numpy 2's __array__(copy=...).
-pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
-
 Row = tuple[str, bool]
 """Class of an object, and whether it is ignored."""
 
@@ -59,7 +56,6 @@ def in_voc(folder: Path) -> list[Row]:
 
 
 def in_tar(folder: Path) -> list[Row]:
-    """Ids stay unique."""
     (sample,) = tar_samples(folder / "train")
     rows = sample["json"]["cameras"]["color"]["annotations"]
     assert len({row["id"] for row in rows}) == len(rows)

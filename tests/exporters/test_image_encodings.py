@@ -50,18 +50,15 @@ MAGIC = {".jpg": b"\xff\xd8\xff", ".webp": b"RIFF"}
 
 @pytest.fixture(params=[JPEG, WEBP, LOSSLESS], ids=lambda encoding: encoding.format)
 def encoding(request: Any) -> ImageEncoding:
-    """One of the encodings beside PNG."""
     return request.param
 
 
 @pytest.fixture
 def info(world: Any, encoding: ImageEncoding) -> Any:
-    """The street's data set in this encoding."""
     return encoded(world.info(7), encoding)
 
 
 def encoded(info: Any, encoding: ImageEncoding) -> Any:
-    """The data set with photographs of all cameras in this encoding."""
     sensors = (replace(s, rgb_encoding=encoding) if s.channels else s for s in info.sensors)
     return replace(info, sensors=tuple(sensors))
 
@@ -109,7 +106,7 @@ def test_formats_without_loss_have_no_quality() -> None:
             RgbEncoding(format=kind, quality=90)
 
 
-def test_stored_images_are_found(
+def test_stored_images_are_read(
     tmp_path: Path, info: Any, world: Any, encoding: ImageEncoding
 ) -> None:
     """Photographs have the encoding's ending, labels stay PNG; both are read again."""
@@ -150,7 +147,6 @@ Found = tuple[bytes, str]
 
 
 def file_of(path: Path) -> Found:
-    """A file, and the format that its ending states."""
     return path.read_bytes(), path.suffix
 
 
@@ -194,7 +190,6 @@ def in_panoptic(folder: Path) -> Found:
 
 
 def in_solo(folder: Path) -> Found:
-    """By the first capture."""
     frame = json.loads((folder / "train/sequence.0/step0.frame_data.json").read_text())
     capture = frame["captures"][0]
     path = folder / "train/sequence.0" / capture["filename"]
@@ -295,7 +290,7 @@ STATED = {
 
 @pytest.mark.parametrize("encoding", [JPEG, WEBP, LOSSLESS], ids=lambda e: e.format)
 @pytest.mark.parametrize("kind", READERS)
-def test_readers_find_the_photographs(
+def test_readers_find_photos(
     kind: str, encoding: ImageEncoding, world: Any, tmp_path: Path
 ) -> None:
     """The first one, in the stated format; its pixels are those of the first sample."""
@@ -323,7 +318,6 @@ def is_near(image: Any, expected: Any) -> bool:
 
 
 def test_hdf5_has_the_pixels(tmp_path: Path, info: Any, world: Any) -> None:
-    """It decodes photographs."""
     boxes = world.export(Hdf5(), info, world.samples, tmp_path)
     with h5py.File(next(boxes.rglob("000000000_*.hdf5"))) as file:
         made = world.samples[0].capture.readings["color"].channels[Channel.RGB]

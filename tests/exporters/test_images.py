@@ -23,7 +23,6 @@ H, W = 37, 53
 
 
 def read(data: bytes) -> tuple[str, NDArray[Any]]:
-    """Mode and pixels of a PNG, by Pillow."""
     with Image.open(io.BytesIO(data)) as image:
         return image.mode, np.asarray(image)
 
@@ -128,13 +127,11 @@ def test_object_coordinates_are_16_bit_colour() -> None:
 
 
 def test_silhouettes_cannot_be_written_as_an_image() -> None:
-    """The message lists what can."""
     with pytest.raises(ConfigError, match=r"'amodal'.*rgb, depth, range, instance"):
         encode_channel(Channel.AMODAL, np.zeros((2, 2), bool), 1.0)
 
 
 def test_every_channel_of_the_media_is_written_to_its_path(world: Any, tmp_path: Path) -> None:
-    """Of the sensor's own image, and nothing else."""
     info, sample = world.info(7, devices={}), world.samples[4]
 
     write_media(info, sample, tmp_path)
@@ -154,9 +151,7 @@ def test_a_link_shares_the_file_where_links_are_possible(tmp_path: Path) -> None
     assert (tmp_path / "new/b").samefile(tmp_path / "a")
 
 
-def test_a_copy_is_made_where_links_are_impossible(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_copy_is_made_without_links(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Another file system, FAT, or too many links."""
 
     def refuse(*_: Any) -> None:

@@ -21,14 +21,7 @@ from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.sample import ImageTruth, ObjectTruth
 from gen_data.core.scene import Camera, Instance
 from gen_data.core.se3 import IDENTITY, SE3
-from gen_data.exporters.kitti import (
-    Kitti,
-    calib_text,
-    label_row,
-    occlusion_level,
-    official_type,
-    upright_box,
-)
+from gen_data.exporters import kitti
 from tests.exporters import kitti_evaluation
 from tests.exporters.drives import calibration
 
@@ -48,17 +41,16 @@ def devkit_corners(row: str) -> Array:
 
 
 def devkit_calib(path: Path) -> dict[str, Array]:
-    """Matrices by name; readers take the rows in this order."""
     found = calibration(path)
     names = ["P0", "P1", "P2", "P3", "R0_rect", "Tr_velo_to_cam", "Tr_imu_to_velo"]
     assert list(found) == names
     return {name: values.reshape(3, -1) for name, values in found.items()}
 
 
-STYLE = Kitti(types="category", boxes="tight", low_px=2)
+STYLE = kitti.Kitti(types="category", boxes="tight", low_px=2)
 
 
-def row_of(box3d_camera: OrientedBox, style: Kitti = STYLE, **changes: Any) -> str:
+def row_of(box3d_camera: OrientedBox, style: kitti.Kitti = STYLE, **changes: Any) -> str:
     """The label row of a visible crate with the given box in the camera frame."""
     crate = Instance(1, "crate/1", "Crate box", 1, "crate")
     fields = {
@@ -69,14 +61,14 @@ def row_of(box3d_camera: OrientedBox, style: Kitti = STYLE, **changes: Any) -> s
         "truncation": 0.0,
         **changes,
     }
-    return label_row(ObjectTruth(crate, **fields), ImageTruth(CAMERA, ()), style)
+    return kitti.label_row(ObjectTruth(crate, **fields), ImageTruth(CAMERA, ()), style)
 
 
 @pytest.fixture(scope="module")
 def dataset(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Seven frames of a street; the images are so small that everything is labelled."""
     folder = tmp_path_factory.mktemp("kitti")
-    return world.export(Kitti(low_px=2), world.info(7), world.samples, folder)
+    return world.export(kitti.Kitti(low_px=2), world.info(7), world.samples, folder)
 
 
 def test_the_evaluation_scores_the_labels_as_perfect(dataset: Path) -> None:
@@ -137,7 +129,7 @@ def test_an_upright_object_before_a_level_camera_keeps_its_own_box(yaw: float) -
     T_world_box = SE3.about_z(yaw, (10.0, 2.0, -0.25))
     box = OrientedBox(T_camera_world @ T_world_box, (4.0, 1.8, 1.5))
 
-    upright = upright_box(box)
+    upright = kitti.upright_box(box)
 
     assert upright.size_hwl_m == pytest.approx((1.5, 1.8, 4.0))
     assert upright.bottom_m == pytest.approx((-2.0, 1.0, 10.0))
@@ -151,7 +143,7 @@ def test_the_heading_of_an_object_on_end_comes_from_its_y_axis() -> None:
     matrix = np.array([[0, 0, -1, 0], [-1, 0, 0, 0], [0, 1, 0, 5], [0, 0, 0, 1]], float)
     box = OrientedBox(SE3.from_matrix(matrix), (1.0, 2.0, 3.0))
 
-    upright = upright_box(box)
+    upright = kitti.upright_box(box)
 
     assert upright.heading_rad == pytest.approx(0.0, abs=1e-9)
     assert upright.size_hwl_m == pytest.approx((1.0, 2.0, 3.0))
@@ -190,7 +182,7 @@ def test_categories_become_the_types_of_kittis_own(category: str, pose: str, kin
     """The eight names in the devkit's readme.txt; what has none of them is Misc."""
     attributes = (("pose", pose),) if pose else ()
 
-    assert official_type(Instance(1, "it", category, 1, "it", attributes=attributes)) == kind
+    assert kitti.official_type(Instance(1, "it", category, 1, "it", attributes=attributes)) == kind
 
 
 @pytest.mark.parametrize(
@@ -198,7 +190,7 @@ def test_categories_become_the_types_of_kittis_own(category: str, pose: str, kin
 )
 def test_occlusion_has_three_levels(hidden: float, level: int) -> None:
     """Visible up to a tenth hidden, partly up to a half, largely above."""
-    assert occlusion_level(hidden) == level
+    assert kitti.occlusion_level(hidden) == level
 
 
 @pytest.mark.parametrize(
@@ -235,7 +227,7 @@ def test_dont_care_rows_come_last_and_hidden_objects_have_none(world: Any, tmp_p
         0, (beside, away, behind), [world.camera()], thresholds=Thresholds(include_invisible=True)
     )
 
-    folder = world.export(Kitti(low_px=2), world.info(1), [sample], tmp_path)
+    folder = world.export(kitti.Kitti(low_px=2), world.info(1), [sample], tmp_path)
 
     rows = (folder / "training/label_2/000000.txt").read_text().splitlines()
     assert [row.split(" ")[0] for row in rows] == ["Pedestrian", "DontCare"]
@@ -254,14 +246,13 @@ def test_every_frame_has_every_file(dataset: Path) -> None:
         assert found == [f"{frame}.{ending}" for frame in frames]
     assert (dataset / "training/label_2/000003.txt").read_bytes() == b""
     lists = {p.stem: p.read_text().split() for p in (dataset / "ImageSets").iterdir()}
-    assert lists["val"] == ["000002", "000004"]
-    assert lists["test"] == []
+    assert (lists["val"], lists["test"]) == (["000002", "000004"], [])
     assert sorted(lists["train"] + lists["val"]) == frames
 
 
 def test_calibration_puts_pixel_centres_at_whole_numbers() -> None:
     """The centred camera of W pixels has cx = (W - 1) / 2 in KITTI."""
-    rows = dict(line.split(": ") for line in calib_text(CAMERA.intrinsics).splitlines())
+    rows = dict(line.split(": ") for line in kitti.calib_text(CAMERA.intrinsics).splitlines())
 
     p2 = np.array(rows["P2"].split(" "), float).reshape(3, 4)
     np.testing.assert_array_equal(p2, [[150, 0, 99.5, 0], [0, 150, 49.5, 0], [0, 0, 1, 0]])
@@ -298,7 +289,7 @@ def test_far_and_low_things_are_dont_care(z_m: float, rows_px: int, labelled: bo
     """KITTI's annotators labelled what the scanner saw."""
     box3d = OrientedBox(SE3((0.0, 0.0, z_m)), (1.0, 1.0, 1.0))
 
-    row = row_of(box3d, Kitti(), box=BoxPx(10, 20, 40, 20 + rows_px))
+    row = row_of(box3d, kitti.Kitti(), box=BoxPx(10, 20, 40, 20 + rows_px))
 
     assert row.startswith("Misc " if labelled else "DontCare ")
 
@@ -318,7 +309,7 @@ def test_without_a_scanner_there_are_no_points(world: Any, tmp_path: Path) -> No
     """No velodyne folder; the calibration holds the axes of one at the camera's centre."""
     info = world.info(7, media={"color": (Channel.RGB,)})
 
-    folder = world.export(Kitti(), info, world.samples, tmp_path)
+    folder = world.export(kitti.Kitti(), info, world.samples, tmp_path)
 
     kinds = {p.name for p in (folder / "training").iterdir()}
     assert kinds == {"image_2", "label_2", "calib"}

@@ -69,9 +69,7 @@ def test_times_carry_over_seconds_and_midnight() -> None:
     assert timestamp(start, -0.05) == "2011-09-26 23:59:58.950000000"
 
 
-def test_raw_calibration_maps_points_into_the_image_they_belong_to(
-    exported: Any, samples: Any
-) -> None:
+def test_raw_calibration_maps_points_into_their_image(exported: Any, samples: Any) -> None:
     """By the devkit's formula, P_rect_03 R_rect_00 Tr x: points on a thing fall on its mask."""
     folder = exported(KittiRaw(image_03="right")) / "2011_09_26"
     cameras = calibration(folder / "calib_cam_to_cam.txt")
@@ -142,10 +140,7 @@ def test_grey_images_have_the_luma_of_the_colours(exported: Any) -> None:
     assert cameras["P_rect_02"][3] / cameras["P_rect_02"][0] == pytest.approx(-0.54)
 
 
-def test_drives_with_another_calibration_have_another_date(
-    world: Any, samples: Any, tmp_path: Path
-) -> None:
-    """A date has one calibration."""
+def test_another_calibration_has_another_date(world: Any, samples: Any, tmp_path: Path) -> None:
     wider = SE3((0.0, 0.0, 1.93))
     moved = [
         replace(s, scene=replace(s.scene, lidars=(replace(s.scene.lidars[0], T_rig_lidar=wider),)))
@@ -163,9 +158,7 @@ def test_drives_with_another_calibration_have_another_date(
     assert heights == pytest.approx([-0.13, -0.33])
 
 
-def test_cameras_that_look_elsewhere_cannot_be_a_rectified_pair(
-    world: Any, samples: Any, tmp_path: Path
-) -> None:
+def test_cameras_that_look_elsewhere_are_no_pair(world: Any, samples: Any, tmp_path: Path) -> None:
     """The message names the camera and what to do."""
     sample = samples[0]
     left, right = sample.scene.cameras
@@ -180,6 +173,5 @@ def test_cameras_that_look_elsewhere_cannot_be_a_rectified_pair(
 
 @pytest.mark.parametrize("date", ["2011-09-26", "2011_13_01", "2011_9_26", "today"])
 def test_a_date_is_a_day(date: str) -> None:
-    """Year, month and day with underscores."""
     with pytest.raises(ValueError, match="2011_09_26"):
         KittiRaw(date=date)

@@ -151,11 +151,7 @@ def test_cameras_that_are_not_beside_each_other_are_refused(world: Any, tmp_path
     scene = samples[0].scene
     low = scene.camera("right")
     up = SE3((0.0, -0.1, 0.0))
-    high = replace(
-        low,
-        T_world_camera=low.T_world_camera @ up,
-        T_rig_camera=low.T_rig_camera @ up,
-    )
+    high = replace(low, T_world_camera=low.T_world_camera @ up, T_rig_camera=low.T_rig_camera @ up)
     cameras = tuple(high if c.name == "right" else c for c in scene.cameras)
     wrong = replace(samples[0], scene=replace(scene, cameras=cameras))
 

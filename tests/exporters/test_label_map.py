@@ -24,19 +24,16 @@ CITYSCAPES_THINGS = ["person", "rider", "car", "truck", "bus", "train", "motorcy
 
 
 def truths(world: Any, label_map: LabelMap, *, renames: bool = True) -> list[Any]:
-    """Mapped objects of all frames."""
     applied = AppliedLabelMap(label_map, world.info(7), renames)
     mapped = [applied.map_sample(sample) for sample in world.samples]
     return [thing for s in mapped for image in s.truth.values() for thing in image.objects]
 
 
 def categories(world: Any) -> Counter[str]:
-    """Objects of the world by category."""
     return Counter(t.instance.category for t in truths(world, LabelMap()))
 
 
 def parse(text: str) -> LabelMap:
-    """A label map as in a configuration, which is validated strictly as JSON."""
     return LabelMap.model_validate_json(text)
 
 
@@ -64,7 +61,6 @@ def test_several_categories_become_one_class(world: Any) -> None:
 
 
 def test_other_and_ignored_categories_can_stay_as_ignored_regions(world: Any) -> None:
-    """Neither object nor background."""
     first, second, *_ = sorted(categories(world))
     others = parse(json.dumps({"classes": {first: None}, "others": "ignore"}))
     ignored = parse(json.dumps({"ignore": [second]}))
@@ -110,7 +106,6 @@ def test_formats_with_classes_of_their_own_keep_their_names(world: Any, tmp_path
 
 
 def test_ignored_objects_are_dont_care_regions_in_kitti(world: Any, tmp_path: Path) -> None:
-    """As many rows as before."""
     ignore_all = LabelMap(ignore=tuple(categories(world)))
     info = world.info(7, lidars=("top",))
     folder = world.export(
@@ -143,8 +138,7 @@ def test_public_lists_have_the_published_classes() -> None:
         "bottle", "wine glass", "cup", "fork", "knife", "spoon", "bowl", "banana",
     ]  # fmt: skip
     assert list(public_classes("cityscapes")) == CITYSCAPES_THINGS
-    assert len(public_classes("nuscenes")) == 10
-    assert len(public_classes("kitti")) == 8
+    assert (len(public_classes("nuscenes")), len(public_classes("kitti"))) == (10, 8)
     nyu, ade = list(public_classes("nyu40")), list(public_classes("ade20k"))
     assert (len(nyu), nyu[0], nyu[21], nyu[-1]) == (40, "wall", "ceiling", "otherprop")
     assert (len(ade), ade[0], ade[5], ade[-1]) == (150, "wall", "ceiling", "flag")
@@ -170,7 +164,6 @@ def test_class_names_are_printable(name: str) -> None:
 
 
 def test_a_category_in_two_places_is_refused() -> None:
-    """Two classes, or a class and the ignored ones."""
     with pytest.raises(ValidationError, match="'mug' belongs to the classes 'a' and 'b'"):
         parse('{"classes": {"a": "mug", "b": ["mug"]}}')
     with pytest.raises(ValidationError, match="'mug' is ignored and belongs to the class 'a'"):
@@ -203,7 +196,6 @@ def test_a_class_that_no_object_can_have_is_refused(classes: Any, fault: str) ->
 
 
 def test_all_classes_without_objects_are_named_at_once() -> None:
-    """Each on a line."""
     with pytest.raises(ConfigError) as caught:
         parse('{"classes": {"bottel": null, "mugg": null, "mug": null}}').check(["bottle", "mug"])
     assert [line.split(":")[0] for line in str(caught.value).splitlines()] == [

@@ -16,15 +16,11 @@ from gen_data.core.sample import MaskPx
 from gen_data.exporters.label_studio import LabelStudio, brush_rle
 from tests.exporters.label_readers import unpack
 
-# pycocotools' decoder predates numpy 2's __array__(copy=...).
-pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
-
 SHAPES = ("mask", "polygon", "box")
 
 
 @pytest.fixture(scope="module")
 def dataset(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The seven frames with each shape."""
     folder = tmp_path_factory.mktemp("label_studio")
     for shapes in SHAPES:
         world.export(LabelStudio(shapes=shapes), world.info(7), world.samples, folder / shapes)
@@ -63,9 +59,7 @@ def test_keypoints_are_regions_of_their_object(world: Any, dataset: Path) -> Non
     right=st.integers(0, 9),
 )
 @settings(max_examples=50, deadline=None)
-def test_any_mask_comes_back(
-    crop: np.ndarray, above: int, left: int, below: int, right: int
-) -> None:
+def test_masks_come_back(crop: np.ndarray, above: int, left: int, below: int, right: int) -> None:
     """Also at the image's edges, where runs of different rows meet."""
     expected = np.pad(crop, [(above, below), (left, right)])
 

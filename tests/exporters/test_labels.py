@@ -15,9 +15,6 @@ from gen_data.exporters import TABLE
 from tests.exporters.label_readers import READERS, Found
 from tests.tiers import sampled
 
-# pycocotools' decoder predates numpy 2's __array__(copy=...).
-pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
-
 
 def divided(world: Any) -> Any:
     """A car in two parts behind a pedestrian, seen by a tilted camera."""
@@ -83,7 +80,7 @@ def assert_objects(kind: str, folder: Path, samples: list[Any]) -> None:
         3,
     ),
 )
-def test_objects_are_those_of_the_samples(
+def test_objects_are_the_samples(
     kind: str, options: dict[str, Any], world: Any, tmp_path: Path
 ) -> None:
     """In seven frames, of which one is empty, and one with an object in two parts."""

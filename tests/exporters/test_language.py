@@ -15,13 +15,9 @@ from gen_data.exporters.label_map import AppliedLabelMap, LabelMap
 from gen_data.exporters.language import LanguageJsonl
 from tests.exporters.label_readers import json_lines
 
-# pycocotools' decoder predates numpy 2's __array__(copy=...).
-pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
-
 
 @pytest.fixture
 def samples(world: Any) -> list[Sample]:
-    """The world's frames; in the first one the objects are related."""
     first, *others = world.samples
     a, b, *_ = (t.instance.instance_id for t in first.truth["color"].objects)
     related = (Relation(a, "left_of", b), Relation(b, "near", a))
@@ -29,9 +25,7 @@ def samples(world: Any) -> list[Sample]:
     return [replace(first, truth=truth), *others]
 
 
-def test_lines_refer_to_objects_of_their_image(
-    world: Any, samples: list[Sample], tmp_path: Path
-) -> None:
+def test_lines_refer_to_their_objects(world: Any, samples: list[Sample], tmp_path: Path) -> None:
     """Ids are unique, and every file is there."""
     folder = world.export(LanguageJsonl(), world.info(7), samples, tmp_path)
     rows = json_lines(folder / "train.jsonl")
@@ -93,9 +87,7 @@ def test_relations_have_both_directions_here_and_in_coco(
     assert "relationships" not in json_lines(folder / "train_images.jsonl")[1]
 
 
-def test_label_maps_drop_relations_and_text_about_dropped_objects(
-    world: Any, samples: list[Sample]
-) -> None:
+def test_label_maps_drop_relations_and_text_too(world: Any, samples: list[Sample]) -> None:
     """What is left names only objects that are left, and says the same as before."""
     first = samples[0].truth["color"]
     dropped = first.objects[0].instance.category

@@ -27,13 +27,11 @@ from tests.exporters.drives import drive_info
 
 @pytest.fixture(scope="module")
 def reach(world: Any) -> Any:
-    """Two sequences of four steps, the first for training."""
     return world.reach()
 
 
 @pytest.fixture(scope="module", params=["v3.0", "v2.1"])
 def dataset(request: Any, world: Any, reach: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Data sets of both splits, in either format."""
     exporter = LeRobot(version=request.param)
     return world.export(exporter, drive_info(world), reach, tmp_path_factory.mktemp("lerobot"))
 
@@ -60,7 +58,6 @@ def tasks_of(folder: Path) -> dict[int, str]:
 
 
 def episodes_of(folder: Path) -> list[dict[str, Any]]:
-    """Length, tasks and statistics of all episodes, in order."""
     path = folder / "meta/episodes/chunk-000/file-000.parquet"
     if not path.exists():
         stats = lines(folder / "meta/episodes_stats.jsonl")
@@ -76,7 +73,6 @@ def episodes_of(folder: Path) -> list[dict[str, Any]]:
 
 
 def rows_of(folder: Path) -> list[dict[str, Any]]:
-    """Rows of all episodes, in order."""
     rows = []
     for path in sorted((folder / "data").rglob("*.parquet")):
         with pyarrow.parquet.ParquetFile(path) as file:
@@ -85,7 +81,6 @@ def rows_of(folder: Path) -> list[dict[str, Any]]:
 
 
 def faults(folder: Path, samples: Any) -> list[str]:
-    """Differences between a data set and the samples of its episodes."""
     info = json.loads((folder / "meta/info.json").read_text())
     episodes, tasks = episodes_of(folder), tasks_of(folder)
     rows, found = rows_of(folder), []
@@ -267,8 +262,7 @@ def test_images_of_statistics_are_thinned_as_lerobot_does(tmp_path: Path) -> Non
     n = 160 * 120
     assert sums["count"] == n
     assert sums["min"] == sums["max"] == [10, 20, 30]
-    assert sums["sum"] == [10 * n, 20 * n, 30 * n]
-    assert sums["squares"] == [100 * n, 400 * n, 900 * n]
+    assert (sums["sum"], sums["squares"]) == ([10 * n, 20 * n, 30 * n], [100 * n, 400 * n, 900 * n])
 
 
 def test_tasks_are_sentences(reach: Any) -> None:
@@ -305,9 +299,7 @@ def test_cameras_that_skip_steps_are_refused(world: Any) -> None:
 
 
 @pytest.mark.parametrize("version", ["v3.0", "v2.1"])
-def test_a_sample_that_does_not_exist_ends_the_episode(
-    world: Any, tmp_path: Path, version: Any
-) -> None:
+def test_a_missing_sample_ends_the_episode(world: Any, tmp_path: Path, version: Any) -> None:
     """Frames are 1 / fps apart by definition: what follows a gap is another episode."""
     samples = [replace(sample, split="train") for sample in world.reach()]
     kept = [sample for sample in samples if sample.index != 1]

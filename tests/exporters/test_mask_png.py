@@ -33,9 +33,7 @@ def decoded(png: bytes) -> np.ndarray:
     right=st.integers(0, 30),
 )
 @settings(max_examples=150, deadline=None)
-def test_any_mask_comes_back(
-    crop: np.ndarray, above: int, left: int, below: int, right: int
-) -> None:
+def test_masks_come_back(crop: np.ndarray, above: int, left: int, below: int, right: int) -> None:
     """Also at the image's edges, where runs of different rows meet."""
     expected = np.pad(crop, [(above, below), (left, right)]).astype(np.uint8) * 255
 
@@ -53,7 +51,6 @@ def test_runs_of_every_length() -> None:
 
 
 def test_nothing_is_an_empty_image() -> None:
-    """Of an invisible object."""
     for mask in (None, MaskPx(0, 0, np.zeros((0, 0), bool))):
         assert not decoded(encode_mask(mask, 48, 64)).any()
 

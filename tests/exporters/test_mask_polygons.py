@@ -17,14 +17,10 @@ from pycocotools import mask as coco_mask
 from gen_data.core.sample import MaskPx
 from gen_data.exporters.mask_polygons import drawable_polygons, join_polygons, mask_polygons
 
-# pycocotools' decoder predates numpy 2's __array__(copy=...).
-pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
-
 masks = arrays(bool, st.tuples(st.integers(1, 12), st.integers(1, 12)))
 
 
 def drawn(polygons: list[NDArray[np.int64]], height: int, width: int) -> NDArray[np.bool_]:
-    """Union of polygons as pycocotools draws them."""
     flat = [polygon.ravel().astype(float).tolist() for polygon in polygons]
     if not flat:
         return np.zeros((height, width), bool)
@@ -70,7 +66,6 @@ def drawn_by_opencv(polygons: list[NDArray[np.float64]], h: int, w: int) -> NDAr
 
 
 def drawn_by_pillow(polygons: list[NDArray[np.float64]], h: int, w: int) -> NDArray[np.bool_]:
-    """Union as PIL draws polygons."""
     picture = Image.new("1", (w, h))
     for polygon in polygons:
         ImageDraw.Draw(picture).polygon(polygon.astype(int).ravel().tolist(), fill=1)
@@ -145,7 +140,6 @@ def test_a_hole_is_reached_along_one_line() -> None:
 
 
 def test_nothing_has_no_polygon() -> None:
-    """An empty mask has an empty list, which cannot be joined."""
     assert mask_polygons(MaskPx(0, 0, np.zeros((0, 0), bool))) == []
     with pytest.raises(ValueError, match="no polygon"):
         join_polygons([])

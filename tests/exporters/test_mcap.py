@@ -24,7 +24,6 @@ NUMPY_TYPES = {1: "u1", 3: "<u2", 7: "<f4"}
 
 @pytest.fixture(scope="module")
 def dataset(exported: Any) -> Path:
-    """Two sequences of four steps; two cameras and a scanner on a rig."""
     return exported(Mcap())
 
 
@@ -42,7 +41,6 @@ def pose(translation: Any, rotation: Any) -> SE3:
 
 
 def faults(path: Path, samples: Any) -> list[str]:
-    """Differences between a file and the samples of its sequence."""
     try:
         found = messages(path)
     except (McapError, ValueError, OSError) as error:
@@ -62,7 +60,6 @@ def faults(path: Path, samples: Any) -> list[str]:
 
 
 def instant_faults(topics: dict[str, list[Any]], sample: Any) -> list[str]:
-    """Differences between the messages of one instant and a sample."""
     found = []
     parents = {t.child_frame_id: t for t in topics["/tf"]}
 

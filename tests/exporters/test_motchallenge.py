@@ -97,9 +97,7 @@ def trackeval_scores(dataset: Any, sequence: str, name: str) -> dict[str, float]
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("split", ["train", "val"])
-def test_trackeval_scores_the_ground_truth_as_perfect(
-    exported: Any, tmp_path: Path, split: str
-) -> None:
+def test_trackeval_scores_the_truth_as_perfect(exported: Any, tmp_path: Path, split: str) -> None:
     """And tracks that exchange their identities half way as worse."""
     import trackeval
 

@@ -18,16 +18,9 @@ from gen_data.core.measurement_dtypes import table_rows
 from gen_data.core.motion import Trajectory, Twist
 from gen_data.core.scene import Body, Lane, ObjectGroup, Scene
 from gen_data.core.se3 import SE3
+from gen_data.exporters import nuscenes_files
 from gen_data.exporters.nuscenes import NuScenes
 from gen_data.exporters.nuscenes_classes import attribute_of, category_of, classes
-from gen_data.exporters.nuscenes_files import (
-    RADAR_POINT,
-    lidar_bytes,
-    map_area,
-    map_bytes,
-    quarter_turns,
-    radar_bytes,
-)
 from gen_data.exporters.nuscenes_frames import annotated_things, views_by_instance, visibility_level
 from gen_data.sensors.radar.radar_sensor import Radar
 from tests.exporters.drives import drive_info
@@ -37,13 +30,11 @@ ORIGIN_M = (50.0, 50.0, 0.0)
 
 
 def table(folder: Path, name: str) -> list[dict[str, Any]]:
-    """Rows of a table."""
     rows: list[dict[str, Any]] = json.loads((folder / f"v1.0-mini/{name}.json").read_text())
     return rows
 
 
 def by_token(folder: Path, name: str) -> dict[str, dict[str, Any]]:
-    """Rows of a table by token, which is unique."""
     rows = table(folder, name)
     found = {row["token"]: row for row in rows}
     assert len(found) == len(rows)
@@ -51,7 +42,6 @@ def by_token(folder: Path, name: str) -> dict[str, dict[str, Any]]:
 
 
 def pose(row: Mapping[str, Any]) -> SE3:
-    """Pose of a row."""
     return SE3(tuple(row["translation"]), tuple(row["rotation"]))
 
 
@@ -138,22 +128,21 @@ def test_scans_have_the_axes_of_nuscenes(every: Path, samples: Any) -> None:
 def test_files_of_a_scanner_look_ahead_however_it_is_mounted(yaw_deg: int, turns: int) -> None:
     """A point ahead of the ego is along y, one on its left along negative x."""
     mount = SE3.about_z(np.radians(yaw_deg))
-    assert quarter_turns(mount) == turns
+    assert nuscenes_files.quarter_turns(mount) == turns
     points = np.zeros(2, POINT)
     ego_m = np.array([[10.0, 0.0, 1.0], [0.0, 10.0, 1.0]])
     points["position_m"] = mount.inverse().apply(ego_m)
 
-    xyz = np.frombuffer(lidar_bytes(points, turns), "<f4").reshape(-1, 5)[:, :3]
+    xyz = np.frombuffer(nuscenes_files.lidar_bytes(points, turns), "<f4").reshape(-1, 5)[:, :3]
 
     np.testing.assert_allclose(xyz, [[0, 10, 1], [-10, 0, 1]], atol=1.0)
     assert np.isclose(np.linalg.norm(xyz[0]), np.sqrt(101.0))
 
 
 def test_the_lowest_laser_is_ring_0() -> None:
-    """Ours count from the top."""
     points = np.zeros(3, POINT)
     points["ring"] = [0, 30, 31]
-    rings = np.frombuffer(lidar_bytes(points, 0), "<f4").reshape(-1, 5)[:, 4]
+    rings = np.frombuffer(nuscenes_files.lidar_bytes(points, 0), "<f4").reshape(-1, 5)[:, 4]
     assert rings.tolist() == [31, 1, 0]
 
 
@@ -251,7 +240,6 @@ def test_boxes_are_where_pulses_hit_the_object(
 
 
 def test_objects_that_labels_ignore_have_no_box(world: Any, samples: Any) -> None:
-    """And those that are not annotated."""
     sample = samples[0]
     image = sample.truth["left"]
     flagged = tuple(replace(t, ignored=t.instance.instance_id == 2) for t in image.objects)
@@ -291,8 +279,7 @@ def without(sample: Any, numbers: tuple[int, ...]) -> Any:
     """The sample of which no sensor senses some instances."""
     truth = {
         name: replace(
-            image,
-            objects=tuple(t for t in image.objects if t.instance.instance_id not in numbers),
+            image, objects=tuple(t for t in image.objects if t.instance.instance_id not in numbers)
         )
         for name, image in sample.truth.items()
     }
@@ -308,8 +295,7 @@ def test_visibility_adds_up_over_the_cameras(samples: Any) -> None:
     half = [replace(view, visible_px=100, occlusion=0.0, truncation=0.5) for view in views[:2]]
 
     assert len(views) == 2
-    assert visibility_level(half) == "4"
-    assert visibility_level(half[:1]) == "2"
+    assert (visibility_level(half), visibility_level(half[:1])) == ("4", "2")
     assert visibility_level([replace(view, occlusion=0.5) for view in half]) == "2"
     assert visibility_level([replace(view, occlusion=0.3) for view in half]) == "3"
     assert visibility_level([]) == "1"
@@ -326,11 +312,11 @@ def test_radar_files_have_the_fields_of_the_device() -> None:
         velocity_compensated_m_s=[-3.0, 0.1],
         rcs_dbsm=[12.5, 3.0],
     )
-    head, body = radar_bytes(rows).split(b"DATA binary\n")
+    head, body = nuscenes_files.radar_bytes(rows).split(b"DATA binary\n")
 
-    points = np.frombuffer(body[:-1], RADAR_POINT)
+    points = np.frombuffer(body[:-1], nuscenes_files.RADAR_POINT)
 
-    assert RADAR_POINT.itemsize == 43
+    assert nuscenes_files.RADAR_POINT.itemsize == 43
     assert b"WIDTH 2\n" in head
     np.testing.assert_allclose(points["x"], [10 * np.cos(np.pi / 6), 20], rtol=1e-6)
     np.testing.assert_allclose(points["y"], [5, 0], atol=1e-5)
@@ -346,8 +332,10 @@ def test_maps_show_where_one_may_drive() -> None:
         Lane("a", "driving", ((-20.0, 5.0, 0.0), (20.0, 5.0, 0.0)), 4.0),
         Lane("b", "sidewalk", ((-20.0, 12.0, 0.0), (20.0, 12.0, 0.0)), 2.0),
     )
-    area = map_area(lanes)
-    mask = cv2.imdecode(np.frombuffer(map_bytes(lanes, area), np.uint8), cv2.IMREAD_UNCHANGED)
+    area = nuscenes_files.map_area(lanes)
+    mask = cv2.imdecode(
+        np.frombuffer(nuscenes_files.map_bytes(lanes, area), np.uint8), cv2.IMREAD_UNCHANGED
+    )
 
     def is_driveable(x_m: float, y_m: float) -> bool:
         x, y, _ = area.T_global_world.apply(np.array([x_m, y_m, 0.0]))
@@ -390,8 +378,7 @@ def test_attributes_tell_how_objects_stand(world: Any) -> None:
     assert attribute(fast, "a", "parked") == "vehicle.moving"
     assert attribute(car, "a", "parked") == "vehicle.parked"
     assert attribute(car, "a", "traffic") == "vehicle.stopped"
-    assert attribute(car, "waiting") == "vehicle.stopped"
-    assert attribute(car, "a") == "vehicle.parked"
+    assert (attribute(car, "waiting"), attribute(car, "a")) == ("vehicle.stopped", "vehicle.parked")
     assert attribute(person, "a", pose="sitting") == "pedestrian.sitting_lying_down"
     assert attribute(person, "a", pose="walk") == "pedestrian.moving"
     assert attribute(person, "waiting", pose="walk") == "pedestrian.standing"

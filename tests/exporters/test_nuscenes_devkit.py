@@ -46,13 +46,11 @@ def with_radar(sample: Any) -> Any:
 
 @pytest.fixture(scope="module")
 def driven(samples: Any) -> Any:
-    """The drive with a radar."""
     return [with_radar(sample) for sample in samples]
 
 
 @pytest.fixture(scope="module")
 def folder(world: Any, driven: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """All steps as key frames."""
     info = world.info(8, ("left", "right"), ("top",), steps_per_scene=4, devices={"front": "radar"})
     exporter = NuScenes(key_frame_s=0.1)
     made: Path = world.export(exporter, info, driven, tmp_path_factory.mktemp("nuscenes"))
@@ -60,7 +58,6 @@ def folder(world: Any, driven: Any, tmp_path_factory: pytest.TempPathFactory) ->
 
 
 def open_devkit(folder: Path) -> Any:
-    """Load all tables."""
     from nuscenes.nuscenes import NuScenes
 
     return NuScenes(V, str(folder), verbose=False)
@@ -126,9 +123,7 @@ def predictions(devkit: Any) -> dict[str, list[dict[str, Any]]]:
     return results
 
 
-def test_velocities_of_neighbouring_boxes_are_those_of_the_objects(
-    folder: Path, driven: Any
-) -> None:
+def test_velocities_of_neighbouring_boxes_are_the_objects(folder: Path, driven: Any) -> None:
     """Away from the ends of tracks."""
     devkit = open_devkit(folder)
     steps = {int(row["timestamp"]): k for k, row in enumerate(devkit.sample)}
@@ -160,7 +155,6 @@ def test_boxes_contain_the_points_that_they_count(folder: Path) -> None:
 
 
 def test_maps_contain_the_poses_of_the_ego(folder: Path) -> None:
-    """By the mask of each log's map."""
     devkit = open_devkit(folder)
     for scene in devkit.scene:
         log = devkit.get("log", scene["log_token"])

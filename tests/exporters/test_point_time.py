@@ -54,9 +54,7 @@ def share_inside(points_m: Any, T_world_box: SE3, size_m: Any) -> float:
     return float((np.abs(local) <= 0.5 * np.array(size_m) + 0.02).all(axis=1).mean())
 
 
-def test_static_points_of_a_ply_file_lie_in_their_boxes(
-    sample: Any, world: Any, tmp_path: Path
-) -> None:
+def test_static_points_of_ply_files_lie_in_boxes(sample: Any, world: Any, tmp_path: Path) -> None:
     """``time_s`` of ``poses.jsonl`` plus ``time`` is the instant of a pulse."""
     folder = world.export(PointClouds(), drive_info(world), [sample], tmp_path)
     row = json.loads((folder / "top/poses.jsonl").read_text())
@@ -71,13 +69,10 @@ def test_static_points_of_a_ply_file_lie_in_their_boxes(
 
     assert len(mine) > 50
     assert share_inside(where, T_world_box, box["size_m"]) >= 0.99
-    assert row["point_time"] == "sweep_middle"
-    assert row["sweep_s"] == SWEEP_S
+    assert (row["point_time"], row["sweep_s"]) == ("sweep_middle", SWEEP_S)
 
 
-def test_static_points_of_an_mcap_file_lie_in_their_cubes(
-    sample: Any, world: Any, tmp_path: Path
-) -> None:
+def test_static_points_of_mcap_files_lie_in_cubes(sample: Any, world: Any, tmp_path: Path) -> None:
     """The stamp of the message plus ``time_s``; metadata state the base."""
     pytest.importorskip("mcap_protobuf")
     from mcap.reader import make_reader
@@ -108,9 +103,7 @@ def test_static_points_of_an_mcap_file_lie_in_their_cubes(
     assert facts["point_time"] == "sweep_middle"
 
 
-def test_times_may_count_from_the_start_of_the_sweep(
-    sample: Any, world: Any, tmp_path: Path
-) -> None:
+def test_times_may_count_from_the_sweeps_start(sample: Any, world: Any, tmp_path: Path) -> None:
     """Poses and boxes stay at its middle, ``time_s`` of the row."""
     chosen = PointClouds(point_time="sweep_start")
     folder = world.export(chosen, drive_info(world), [sample], tmp_path)

@@ -23,7 +23,6 @@ from tests.exporters.bent import LENSES, bent_samples, opencv_maps, opencv_matri
 
 @pytest.fixture(params=sorted(LENSES))
 def bent(request: pytest.FixtureRequest) -> Rectification:
-    """The rectification of each model, by default."""
     source = LENSES[request.param]
     return Rectification(source, rectified_intrinsics(source, Rectify()))
 
@@ -52,7 +51,6 @@ def test_the_default_pinhole_is_opencvs_without_empty_pixels() -> None:
 
 
 def test_the_default_pinhole_shows_no_pixel_that_the_original_lacks(bent: Rectification) -> None:
-    """And a wider one would."""
     u, v = opencv_maps(bent.source, bent.target)
     assert (u.min() > -1e-3, v.min() > -1e-3) == (True, True)
     assert (u.max() < 159 + 1e-3, v.max() < 119 + 1e-3) == (True, True)

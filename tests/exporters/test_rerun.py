@@ -18,18 +18,13 @@ from gen_data.core.interfaces import media_path
 from gen_data.exporters.rerun import Rerun
 from gen_data.exporters.rrd_container import write_recording, xxh32
 
-CLI = (
-    sys.executable,
-    "-c",
-    "import sys; from rerun_cli.__main__ import main; sys.exit(main())",
-)
+CLI = (sys.executable, "-c", "import sys; from rerun_cli.__main__ import main; sys.exit(main())")
 """The tool ``rerun`` of this environment."""
 Table = dict[str, dict[int, Any]]
 
 
 @pytest.fixture(scope="module")
 def dataset(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The seven frames in recordings of three."""
     folder = tmp_path_factory.mktemp("rerun")
     return world.export(Rerun(samples_per_file=3), world.info(7), world.samples, folder)
 
@@ -49,7 +44,6 @@ def tables(path: Path) -> dict[str, Table]:
 
 
 def problems(root: Path, shards: Path, world: Any) -> list[str]:
-    """Differences between the recordings and the samples."""
     read: dict[str, Table] = {}
     for path in sorted(root.glob("*/*.rrd")):
         try:
@@ -166,8 +160,7 @@ def test_files_do_not_depend_on_clock_or_hashing(tmp_path: Path) -> None:
         store.write_rrd(str(path), application_id="test", recording_id="name")
         theirs.add(path.read_bytes())
 
-    assert len(ours) == 1
-    assert len(theirs) == 4
+    assert (len(ours), len(theirs)) == (1, 4)
 
 
 _SCRIPT = """

@@ -23,14 +23,12 @@ NYU40 = {"pedestrian": 31, "crate": 29, "car": 0}
 
 @pytest.fixture(scope="module")
 def tum(exported: Any) -> Path:
-    """The drive of two sequences with four steps each."""
     folder: Path = exported(TumRgbd())
     return folder
 
 
 @pytest.fixture(scope="module")
 def scannet(exported: Any) -> Path:
-    """The same as ScanNet."""
     folder: Path = exported(ScanNet())
     return folder
 
@@ -70,7 +68,6 @@ def read_units(path: Path, units: float) -> Any:
 
 
 def sequence(samples: Sequence[Sample], number: int) -> Sequence[Sample]:
-    """Frames of one of the two drives."""
     return samples[4 * number : 4 * number + 4]
 
 
@@ -121,7 +118,6 @@ def test_tum_accelerometer_has_the_readings_of_the_imu(world: Any, tmp_path: Pat
 
 
 def scan_folder(scannet: Path, number: int) -> Path:
-    """Folder of a sequence: every scene has one view."""
     return scannet / f"scans/scene{number:04d}_00"
 
 
@@ -141,9 +137,7 @@ def test_scannet_points_lie_on_the_scene(scannet: Path, samples: Sequence[Sample
             assert np.abs(forward_m).max() < 1e-8
 
 
-def test_scannet_labels_are_nyu40_of_the_instances(
-    scannet: Path, samples: Sequence[Sample]
-) -> None:
+def test_scannet_labels_are_nyu40_of_instances(scannet: Path, samples: Sequence[Sample]) -> None:
     """And instances have the ids of the data set wherever there is a class."""
     with (scannet / "scannetv2-labels.combined.tsv").open(encoding="utf-8") as file:
         classes = {int(row["id"]): row for row in csv.DictReader(file, delimiter="\t")}

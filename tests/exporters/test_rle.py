@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -12,9 +11,6 @@ from pycocotools import mask as coco_mask
 from gen_data.core.boxes import tight_box
 from gen_data.core.sample import MaskPx
 from gen_data.exporters.rle import encode_rle, run_lengths
-
-# pycocotools' decoder predates numpy 2's __array__(copy=...).
-pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
 
 
 def tight(image: NDArray[np.bool_]) -> MaskPx:
@@ -47,14 +43,10 @@ def test_rle_of_a_crop_is_what_pycocotools_makes_of_the_whole_mask(
 
 
 def test_runs_begin_with_zeros_and_go_down_columns() -> None:
-    """Also where there are none; a last run of no zeros is left out."""
+    """A last run of no zeros is left out; amodal masks outside the image are empty."""
     one = MaskPx(2, 1, np.ones((1, 1), dtype=bool))
     assert run_lengths(one, 3, 4) == [7, 1, 4]  # two columns and a row before it
     assert run_lengths(MaskPx(0, 0, np.ones((3, 4), dtype=bool)), 3, 4) == [0, 12]
-
-
-def test_an_empty_mask_is_one_run_of_zeros() -> None:
-    """What amodal masks are of things wholly outside the image."""
     mask = MaskPx(0, 0, np.zeros((0, 0), dtype=bool))
 
     assert not coco_mask.decode(dict(encode_rle(mask, 5, 6))).any()

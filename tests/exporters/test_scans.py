@@ -39,14 +39,12 @@ POINT_FIELDS = [
 
 @pytest.fixture(scope="module")
 def kitti(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A KITTI data set with a scanner."""
     info = world.info(7, lidars=("top",))
     return world.export(Kitti(far_m=100.0), info, world.samples, tmp_path_factory.mktemp("kitti"))
 
 
 @pytest.fixture(scope="module")
 def semantic(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A SemanticKITTI data set."""
     info = world.info(7, lidars=("top",))
     return world.export(SemanticKitti(), info, world.samples, tmp_path_factory.mktemp("semantic"))
 
@@ -56,7 +54,6 @@ def bins(path: Path) -> np.ndarray:
 
 
 def labels(path: Path) -> tuple[np.ndarray, np.ndarray]:
-    """Lower and upper halves."""
     value = np.frombuffer(path.read_bytes(), "<u4")
     return value & 0xFFFF, value >> 16
 

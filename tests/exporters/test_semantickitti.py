@@ -18,9 +18,7 @@ def poses(folder: Path) -> list[Any]:
     return [np.vstack([np.array(r, float).reshape(3, 4), [0, 0, 0, 1]]) for r in rows]
 
 
-def test_semantic_sequences_are_views_and_poses_those_of_the_drive(
-    exported: Any, world: Any
-) -> None:
+def test_semantic_sequences_are_views_with_poses_of_the_drive(exported: Any, world: Any) -> None:
     """Tr^-1 pose Tr moves the scanner along the circle; times are a step apart."""
     folder = exported(SemanticKitti())
     assert stems(folder / "sequences") == ["00", "01"]

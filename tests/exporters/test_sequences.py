@@ -21,9 +21,7 @@ from tests.exporters.drives import DRIVE, drive_info, stems
 
 
 @pytest.mark.slow
-def test_sensors_that_miss_a_step_have_no_files_there(
-    world: Any, slow: Any, tmp_path: Path
-) -> None:
+def test_sensors_that_miss_a_step_have_no_files(world: Any, slow: Any, tmp_path: Path) -> None:
     """In raw drives: the numbers of the frames stay, times are those of the files."""
     exporter = KittiRaw(image_03="right")
     drive = world.export(exporter, drive_info(world), slow, tmp_path) / DRIVE.format(1)
@@ -36,9 +34,7 @@ def test_sensors_that_miss_a_step_have_no_files_there(
 
 
 @pytest.mark.slow
-def test_frames_are_numbered_by_the_camera_that_a_format_is_about(
-    world: Any, slow: Any, tmp_path: Path
-) -> None:
+def test_frames_are_numbered_by_the_formats_camera(world: Any, slow: Any, tmp_path: Path) -> None:
     """A camera at half the rate has half the frames, without gaps, at half the frame rate."""
     info = drive_info(world)
     mot = world.export(MotChallenge(camera="right"), info, slow, tmp_path / "m")
@@ -73,9 +69,7 @@ def test_a_sequence_ends_at_a_gap(world: Any, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("exporter", [MotChallenge(), ControlClips(near_m=5.0, far_m=60.0)])
-def test_every_second_frame_is_a_sequence_at_half_the_rate(
-    exporter: Any, world: Any, tmp_path: Path
-) -> None:
+def test_every_second_frame_is_half_the_rate(exporter: Any, world: Any, tmp_path: Path) -> None:
     """A selection at even distances has no gap."""
     kept = [sample for sample in world.drive() if sample.index % 2]
     folder = world.export(exporter, drive_info(world), kept, tmp_path)
@@ -88,7 +82,7 @@ def test_every_second_frame_is_a_sequence_at_half_the_rate(
 @pytest.mark.parametrize(
     "exporter", [Coco(), Kitti(camera="right"), SemanticKitti(), PointClouds(), Kitti()]
 )
-def test_every_format_can_do_without_some_readings(
+def test_formats_can_do_without_readings(
     exporter: Any, world: Any, slow: Any, tmp_path: Path
 ) -> None:
     """Files are those of the steps that were read, and no others."""

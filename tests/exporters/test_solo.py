@@ -20,7 +20,6 @@ SIGNS = np.stack(np.meshgrid([-1, 1], [-1, 1], [-1, 1]), -1).reshape(-1, 3)
 
 
 def read_json(root: Path) -> list[Any]:
-    """Frames as plain values, in the order that SOLO's readers derive from the metadata."""
     metadata = json.loads((root / "metadata.json").read_text())
     steps = metadata["totalFrames"] // metadata["totalSequences"]
     paths = [
@@ -53,7 +52,6 @@ def problems(root: Path, frames: Sequence[Any], samples: Sequence[Any]) -> Itera
 
 
 def wrong_capture(folder: Path, capture: Any, sample: Any) -> Iterator[str]:
-    """One image: pose, boxes, colours."""
     flat, solid, instances, labels = capture.annotations
     camera = sample.truth[capture.id].camera
     with Image.open(folder / capture.filename) as image:
@@ -129,7 +127,6 @@ def wrong_colors(folder: Path, flat: Any, instances: Any, labels: Any) -> Iterat
 
 @pytest.fixture(scope="module")
 def dataset(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Seven frames of a street."""
     return world.export(Solo(), world.info(7), world.samples, tmp_path_factory.mktemp("solo"))
 
 

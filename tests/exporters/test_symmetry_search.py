@@ -21,7 +21,6 @@ FACES = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (
 
 @pytest.fixture(scope="module")
 def library() -> Library:
-    """The shipped library."""
     return open_library(())
 
 
@@ -117,8 +116,7 @@ def test_what_assets_state_is_found_without_them(library: Library) -> None:
 
 
 @pytest.mark.parametrize(
-    ("size", "expected"),
-    [((1, 1, 1), {4}), ((1, 1, 2), {2, 4}), ((1, 2, 3), {2})],
+    ("size", "expected"), [((1, 1, 1), {4}), ((1, 1, 2), {2, 4}), ((1, 2, 3), {2})]
 )
 def test_boxes_have_the_turns_of_their_sides(size: Any, expected: set[int]) -> None:
     """A cube quarter turns about every axis, a column about one, a brick none."""
@@ -142,5 +140,4 @@ def test_a_symmetric_thing_may_stand_in_any_frame() -> None:
 
 
 def test_nothing_has_no_symmetries() -> None:
-    """Surfaces without area have no samples."""
     assert folds(CUBE * 0.0) == {}

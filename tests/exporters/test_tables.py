@@ -42,7 +42,6 @@ def test_sequences_have_a_file_each_also_across_shards(world: Any, tmp_path: Pat
 
 
 def test_numpy_files_hold_the_same_rows(world: Any, tmp_path: Path) -> None:
-    """As one array of records per sequence."""
     info = world.info(7, steps_per_scene=7)
     folder = world.export(Tables(format="npy"), info, world.samples, tmp_path)
 
@@ -81,7 +80,6 @@ def test_a_device_may_skip_samples(world: Any, tmp_path: Path) -> None:
 
 
 def test_damaged_rows_are_named(tmp_path: Path) -> None:
-    """A file that is not what it should be."""
     path = tmp_path / "000000000.npy"
     path.write_bytes(b"nothing of the kind")
 

@@ -16,7 +16,6 @@ from tests.exporters.label_readers import features, records
 
 @pytest.fixture(scope="module")
 def dataset(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Seven frames of a street with masks, at most two in a file."""
     folder = tmp_path_factory.mktemp("tfrecord")
     exporter = TfRecord(rows_per_file=2, masks="png")
     return world.export(exporter, world.info(7), world.samples, folder)
@@ -69,7 +68,6 @@ def test_other_channels_are_additional_keys(dataset: Path) -> None:
 
 
 def test_the_label_map_counts_from_one() -> None:
-    """Names are quoted."""
     text = label_map(("car", 'a "b"'))
 
     assert text == 'item {\n  id: 1\n  name: "car"\n}\nitem {\n  id: 2\n  name: "a \\"b\\""\n}\n'

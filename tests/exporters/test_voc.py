@@ -16,7 +16,6 @@ from tests.exporters.label_readers import voc_objects
 
 @pytest.fixture(scope="module")
 def dataset(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The seven frames."""
     return world.export(Voc(), world.info(7), world.samples, tmp_path_factory.mktemp("voc"))
 
 

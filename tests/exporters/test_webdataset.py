@@ -14,13 +14,9 @@ from gen_data.core.capture import POINT, Channel
 from gen_data.exporters.webdataset import WebDataset
 from tests.exporters.label_readers import tar_samples
 
-# pycocotools' decoder predates numpy 2's __array__(copy=...).
-pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
-
 
 @pytest.fixture(scope="module")
 def dataset(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Seven frames of a street, two in each tar file."""
     info = world.info(7, lidars=("top",))
     return world.export(
         WebDataset(samples_per_tar=2), info, world.samples, tmp_path_factory.mktemp("tars")
@@ -40,7 +36,6 @@ def same_columns(matrix: NDArray[Any], columns: list[str], truth: Any) -> bool:
 
 
 def faults(folder: Path, world: Any) -> list[str]:
-    """Differences between the tar files of a split and the samples."""
     found = []
     expected = [s for s in world.samples if s.split == folder.name]
     samples = tar_samples(folder)

@@ -17,21 +17,16 @@ from gen_data.exporters.yolo import Yolo, inner_rectangle
 from tests.exporters.label_readers import drawn
 from tests.exporters.test_labels import divided, truth_of
 
-# pycocotools' decoder predates numpy 2's __array__(copy=...).
-pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
-
 TASKS = ("detect", "segment", "pose", "obb")
 
 
 @pytest.fixture(scope="module")
 def samples(world: Any) -> list[Any]:
-    """The seven frames, and an object in two parts."""
     return [*world.samples, divided(world)]
 
 
 @pytest.fixture(scope="module")
 def dataset(world: Any, samples: list[Any], tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """All tasks."""
     return world.export(Yolo(tasks=TASKS), world.info(8), samples, tmp_path_factory.mktemp("yolo"))
 
 
@@ -41,13 +36,12 @@ def rows_of(task_folder: Path, split: str, stem: str) -> list[list[float]]:
 
 
 def objects_of(samples: list[Any], folder: Path) -> Iterator[tuple[list[float], Any]]:
-    """Row and truth of every object of the split train."""
     for sample in (s for s in samples if s.split == "train"):
         rows = rows_of(folder, "train", f"{sample.index:09d}_color")
         yield from zip(rows, truth_of(sample), strict=True)
 
 
-def test_a_segment_is_the_outline_of_the_mask(
+def test_segments_are_the_outline_of_the_mask(
     dataset: Path, samples: list[Any], world: Any
 ) -> None:
     """Drawn by pycocotools and OpenCV, every polygon gives the mask back, also of two parts."""
@@ -114,8 +108,7 @@ def test_pose_has_the_people_with_their_keypoints(dataset: Path, samples: list[A
     folder = dataset / "pose"
     data = yaml.safe_load((folder / "data.yaml").read_text())
 
-    assert data["names"] == {0: "pedestrian"}
-    assert data["kpt_shape"] == [17, 3]
+    assert (data["names"], data["kpt_shape"]) == ({0: "pedestrian"}, [17, 3])
     assert data["flip_idx"] == [0, 2, 1, 4, 3, 6, 5, 8, 7, 10, 9, 12, 11, 14, 13, 16, 15]
     count = 0
     for sample in (s for s in samples if s.split == "train"):
@@ -139,12 +132,10 @@ def test_pose_of_another_category(world: Any, tmp_path: Path) -> None:
         folder = world.export(exporter, world.info(7), world.samples, tmp_path / name)
         assert (folder / "pose/data.yaml").exists() is written
     data = yaml.safe_load((tmp_path / "car/dataset/pose/data.yaml").read_text())
-    assert data["names"] == {0: "car"}
-    assert data["flip_idx"] == [1, 0, 3, 2, 5, 4, 7, 6]
+    assert (data["names"], data["flip_idx"]) == ({0: "car"}, [1, 0, 3, 2, 5, 4, 7, 6])
 
 
 def test_a_missing_split_is_said_in_the_file(world: Any, tmp_path: Path) -> None:
-    """Ultralytics requires both."""
     folder = world.export(Yolo(tasks=("detect",)), world.info(2), world.samples[:2], tmp_path)
 
     text = (folder / "detect/data.yaml").read_text()

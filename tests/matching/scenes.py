@@ -67,7 +67,6 @@ def leaves(seed: int) -> Float32:
 
 
 def exposures(seeds: Iterable[int], pipeline: ImagePipeline) -> list[Exposure]:
-    """Scenes in front of a camera."""
     return [
         Exposure(leaves(seed), None, CAMERA, Weather(), pipeline, Streams(seed=seed, scene=0))
         for seed in seeds
@@ -75,7 +74,6 @@ def exposures(seeds: Iterable[int], pipeline: ImagePipeline) -> list[Exposure]:
 
 
 def scanner(**changes: Any) -> LidarSensor:
-    """A small laser scanner."""
     window = changes.pop("window", 1.0)
     sheet = {**SHEET, **changes}
     given = {"model": sheet, "window": window, "motion_distortion": "none"}

@@ -20,7 +20,6 @@ sensors: [{type: rgb_camera}]
 
 
 def double(value: float) -> float:
-    """Twice a number."""
     return 2.0 * value
 
 
@@ -42,7 +41,6 @@ def test_distributions_are_scaled_number_by_number(given: Any, expected: Any) ->
 
 
 def test_distributions_without_lengths_are_refused() -> None:
-    """A choice has weights too."""
     with pytest.raises(NoParameter, match="can be neither scaled nor shifted"):
         map_numbers({"choice": {"1": 2}}, double, double)
 
@@ -69,7 +67,6 @@ def test_cameras_that_frame_things_fill_more_of_the_image() -> None:
 
 
 def test_orbiting_cameras_have_no_pitch_to_fit() -> None:
-    """They aim at things."""
     config = parse_config(TABLETOP % "distance_m: 1", "x", "x")
 
     with pytest.raises(NoParameter, match="camera_pose aims at things"):
@@ -77,7 +74,6 @@ def test_orbiting_cameras_have_no_pitch_to_fit() -> None:
 
 
 def test_images_without_boxes_have_no_statistics() -> None:
-    """They are left out."""
     empty = ImageLabels(100, 100, ())
 
     assert box_sizes.measure(empty) != box_sizes.measure(empty)

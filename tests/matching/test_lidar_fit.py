@@ -31,9 +31,7 @@ def fitted() -> Part:
         ("range", 30.0, 0.5),
     ],
 )
-def test_known_parameters_are_recovered(
-    fitted: Part, name: str, truth: float, tolerance: float
-) -> None:
+def test_parameters_are_recovered(fitted: Part, name: str, truth: float, tolerance: float) -> None:
     """Within a tolerance, from a start at 0.4, 0.05, 1 and 100 m."""
     (found,) = (one for one in fitted.quantities if one.name == name)
 

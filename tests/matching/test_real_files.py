@@ -12,26 +12,18 @@ from PIL import Image
 from gen_data.core.capture import POINT
 from gen_data.core.errors import StorageError
 from gen_data.exporters.pointclouds import file_points, pcd_bytes, ply_bytes
+from gen_data.lab.matching import real_files
 from gen_data.lab.matching.inventory_table import inventory_rows
 from gen_data.lab.matching.point_files import read_point_file
-from gen_data.lab.matching.real_files import (
-    Inventory,
-    choose_evenly,
-    find_files,
-    read_labels,
-    read_photos,
-    read_scans,
-)
 
 
 def save(path: Path, width: int = 96, height: int = 80, mode: str = "RGB", **options: int) -> None:
-    """Write an image."""
     path.parent.mkdir(parents=True, exist_ok=True)
     Image.new(mode, (width, height), 100).save(path, **options)  # type: ignore[arg-type]
 
 
 @pytest.mark.slow
-def test_photographs_are_read_and_everything_else_is_counted_with_its_reason(
+def test_photographs_are_read_and_all_else_is_counted_with_reasons(
     tmp_path: Path,
 ) -> None:
     """Damaged, tiny, grey and label images; depth folders and second links are no photographs."""
@@ -43,9 +35,9 @@ def test_photographs_are_read_and_everything_else_is_counted_with_its_reason(
     save(tmp_path / "cam" / "depth" / "c.png")
     (tmp_path / "broken.jpg").write_bytes(b"\xff\xd8 no image")
     (tmp_path / "linked.png").hardlink_to(tmp_path / "a.png")
-    inventory = Inventory()
+    inventory = real_files.Inventory()
 
-    photos = list(read_photos(find_files(tmp_path), 100, inventory))
+    photos = list(real_files.read_photos(real_files.find_files(tmp_path), 100, inventory))
 
     assert [photo.name for photo in photos] == ["a.png", "deep/b.JPG"]
     assert photos[0].quantisation is None
@@ -66,7 +58,7 @@ def test_photographs_are_read_and_everything_else_is_counted_with_its_reason(
 def test_large_photographs_are_cropped_to_their_middle_on_the_grid_of_jpeg(tmp_path: Path) -> None:
     """Four megapixels remain; the size of the whole is kept."""
     save(tmp_path / "large.png", width=4000, height=3000)
-    (photo,) = read_photos(find_files(tmp_path), 1, Inventory())
+    (photo,) = real_files.read_photos(real_files.find_files(tmp_path), 1, real_files.Inventory())
 
     assert photo.size_px == (4000, 3000)
     assert 3.9e6 < photo.rgb.shape[0] * photo.rgb.shape[1] <= 4.0e6
@@ -77,23 +69,22 @@ def test_a_limit_chooses_files_evenly() -> None:
     """From the first on, at equal distances."""
     files = [Path(str(k)) for k in range(10)]
 
-    assert choose_evenly(files, 4) == [files[0], files[2], files[5], files[7]]
-    assert choose_evenly(files, 100) == files
+    assert real_files.choose_evenly(files, 4) == [files[0], files[2], files[5], files[7]]
+    assert real_files.choose_evenly(files, 100) == files
 
 
 def test_folders_without_recordings_are_refused(tmp_path: Path) -> None:
     """The message names what was expected."""
     with pytest.raises(StorageError, match="is no folder"):
-        find_files(tmp_path / "absent")
+        real_files.find_files(tmp_path / "absent")
     (tmp_path / "notes.txt").write_text("nothing")
     with pytest.raises(
         StorageError, match=r"holds no photographs \(.*\.png.*\) and no laser scans"
     ):
-        find_files(tmp_path)
+        real_files.find_files(tmp_path)
 
 
 def points(n: int = 200) -> np.ndarray:
-    """Records of a scan."""
     rng = np.random.default_rng(1)
     made = np.zeros(n, POINT)
     made["position_m"] = rng.normal(0.0, 10.0, (n, 3))
@@ -117,7 +108,7 @@ def test_scans_of_every_format_have_the_same_points(tmp_path: Path, name: str) -
         five = np.hstack([flat, ring]) if name == "scan.pcd.bin" else flat
         (tmp_path / name).write_bytes(five.astype("<f4").tobytes())
 
-    (scan,) = read_scans(find_files(tmp_path), 10, Inventory())
+    (scan,) = real_files.read_scans(real_files.find_files(tmp_path), 10, real_files.Inventory())
 
     np.testing.assert_allclose(scan.range_m, np.linalg.norm(flat[:, :3], axis=1), rtol=1e-5)
     np.testing.assert_allclose(scan.intensity, flat[:, 3], rtol=1e-5)
@@ -137,10 +128,7 @@ def test_scans_of_every_format_have_the_same_points(tmp_path: Path, name: str) -
          "shorter than its 9 points"),
     ],
 )  # fmt: skip
-def test_damaged_scans_state_the_fact(
-    tmp_path: Path, name: str, content: bytes, reason: str
-) -> None:
-    """One sentence for the table."""
+def test_damaged_scans_state_why(tmp_path: Path, name: str, content: bytes, reason: str) -> None:
     (tmp_path / name).write_bytes(content)
     with pytest.raises(ValueError, match=reason):
         read_point_file(tmp_path / name)
@@ -150,8 +138,8 @@ def test_bytes_of_intensity_become_shares(tmp_path: Path) -> None:
     """Devices report 0 to 255, KITTI's files 0 to 1."""
     flat = np.ones((200, 4), "<f4") * 51.0
     flat.tofile(tmp_path / "a.bin")
-    inventory = Inventory()
-    (scan,) = read_scans(find_files(tmp_path), 10, inventory)
+    inventory = real_files.Inventory()
+    (scan,) = real_files.read_scans(real_files.find_files(tmp_path), 10, inventory)
 
     np.testing.assert_allclose(scan.intensity, 0.2)
     assert inventory.notes["scans"] == "intensities of 1 divided by 255"
@@ -174,8 +162,10 @@ def test_boxes_of_coco_and_kitti_are_the_same(tmp_path: Path) -> None:
     (kitti / "label_2" / "a.txt").write_text(line)
     save(kitti / "a.png")
 
-    (one,) = read_labels(find_files(coco), {}, Inventory())
-    (two,) = read_labels(find_files(kitti), {"a.png": (96, 80)}, Inventory())
+    (one,) = real_files.read_labels(real_files.find_files(coco), {}, real_files.Inventory())
+    (two,) = real_files.read_labels(
+        real_files.find_files(kitti), {"a.png": (96, 80)}, real_files.Inventory()
+    )
 
     assert one == two
     assert one.boxes == (("Car", 10.0, 20.0, 31.0, 41.0),)

@@ -15,7 +15,6 @@ BOX = (
 
 
 def box(source: Path, target: Path) -> None:
-    """One object, ``box``."""
     shutil.copyfile(source / "data" / "box.obj", target / "box.obj")
     entry = {"id": "box", "file": "box.obj", "category": "box", "tags": ["household", "pack"],
              "licence": "CC-BY-3.0", "author": "A. Modeller", "source": "a test"}  # fmt: skip

@@ -71,7 +71,6 @@ URDF = """<robot name="mini"><link name="base_link"><visual><geometry>
 
 @pytest.fixture
 def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """An arm of one joint."""
     mini = example_robot_data.Arm("mini", {"turn": 0.5}, 0.2)
     monkeypatch.setattr(example_robot_data, "ARMS", (mini,))
     for name, text in (("urdf/mini_robot.urdf", URDF), ("meshes/mini/base.dae", DAE)):
@@ -110,7 +109,6 @@ def test_an_arm_gets_its_meshes_and_fingers(package: Path, tmp_path: Path) -> No
 
 
 def test_a_broken_mesh_is_refused_by_its_file(package: Path, tmp_path: Path) -> None:
-    """Not a traceback of the reader."""
     (package / ROOT / "meshes/mini/base.dae").write_text(DAE.replace("#v", "#w"), encoding="utf-8")
     (tmp_path / "out").mkdir()
     with pytest.raises(AssetError, match=r"base\.dae: malformed COLLADA"):
@@ -135,7 +133,6 @@ def flange_by_dh(name: str, positions: tuple[float, ...]) -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def arms(tmp_path_factory: pytest.TempPathFactory) -> Library:
-    """The installed pack."""
     return open_library(cache_dir=tmp_path_factory.mktemp("cache"), packs=PACKS)
 
 

@@ -15,7 +15,6 @@ from tests.end_to_end import running
 
 
 def gen_data(*arguments: str, home: Path) -> subprocess.CompletedProcess[str]:
-    """The program in a process of its own, with an asset folder of its own."""
     return running.gen_data(*arguments, cwd=home, GEN_DATA_ASSETS=str(home))
 
 
@@ -30,14 +29,12 @@ def test_list_names_every_pack_and_the_folder(tmp_path: Path) -> None:
 
 
 def test_show_tells_what_an_asset_is(tmp_path: Path) -> None:
-    """It works for any asset of the library."""
     done = gen_data("assets", "show", "pybullet/teddy", home=tmp_path)
     assert done.returncode == 0
     assert "teddy bear" in done.stdout and "zlib" in done.stdout and "triangles" in done.stdout
 
 
 def test_list_finds_assets_by_tags(tmp_path: Path) -> None:
-    """All tags must fit."""
     done = gen_data("assets", "list", "pybullet", "toy", home=tmp_path)
     assert "pybullet/teddy" in done.stdout and "franka" not in done.stdout
 

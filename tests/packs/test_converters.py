@@ -98,7 +98,6 @@ def test_sizes_and_creators_come_from_the_package(tmp_path: Path) -> None:
 
 
 def test_a_point_beside_the_middle_stands_for_two() -> None:
-    """Left first."""
     choice = ModelChoice(
         id="car", category="car", model="car.obj", keypoints={"wheel_front": (1.2, 0.7, 0.3)}
     )
@@ -224,7 +223,6 @@ def test_an_exr_in_a_script_is_read(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("script", [b"", b"export default 1", b"base64,@@@"])
 def test_a_script_without_an_image_is_an_error(script: bytes) -> None:
-    """Not an empty image."""
     with pytest.raises(AssetError, match="no base64"):
         panoramas.exr_bytes(script, "test")
 
@@ -247,7 +245,6 @@ HAND = """<mujoco model="hand"><worldbody><body name="gripper_base">
 
 @pytest.fixture
 def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """An arm of one joint, and the gripper."""
     monkeypatch.setattr(robosuite, "ARMS", (robosuite.Arm("mini", "nobody", {"elbow": 0.5}),))
     root = tmp_path / "robosuite" / "models" / "assets"
     for name, text in (
@@ -288,7 +285,6 @@ def test_an_mjcf_arm_becomes_a_robot(package: Path, tmp_path: Path) -> None:
 
 
 def test_a_body_with_two_joints_is_refused(package: Path, tmp_path: Path) -> None:
-    """URDF has one per link."""
     path = package / "robosuite/models/assets/robots/mini/robot.xml"
     text = path.read_text(encoding="utf-8")
     joint = '<joint name="elbow" axis="0 1 0" range="-1 2"/>'

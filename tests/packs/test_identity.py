@@ -49,9 +49,7 @@ def test_without_packs_a_plan_names_none(factory: PipelineFactory) -> None:
     assert not [name for name in make_plan(factory).versions if name.startswith("pack ")]
 
 
-def test_a_pack_that_fits_is_part_of_the_plan_and_of_the_licences(
-    factory: PipelineFactory, tmp_path: Path
-) -> None:
+def test_a_pack_is_part_of_the_plan_and_licences(factory: PipelineFactory, tmp_path: Path) -> None:
     """Its household object may lie on the table."""
     installed_box(tmp_path, "0.1")
     plan = make_plan(factory)
@@ -61,9 +59,7 @@ def test_a_pack_that_fits_is_part_of_the_plan_and_of_the_licences(
     assert "| a test | CC-BY-3.0 | A. Modeller | boxes/box |" in text
 
 
-def test_another_content_of_the_pack_is_another_data_set(
-    factory: PipelineFactory, tmp_path: Path
-) -> None:
+def test_another_pack_content_is_another_data_set(factory: PipelineFactory, tmp_path: Path) -> None:
     """Resuming is refused; the difference is named."""
     installed_box(tmp_path, "0.1")
     before = make_plan(factory)
@@ -73,9 +69,6 @@ def test_another_content_of_the_pack_is_another_data_set(
     assert compare_plans(before, before) == []
 
 
-def test_panoramas_that_may_light_a_scene_belong_to_the_data_set(
-    factory: PipelineFactory,
-) -> None:
-    """Light changes every byte."""
+def test_panoramas_that_may_light_a_scene_belong_to_the_data_set(factory: PipelineFactory) -> None:
     environments = [name for name in make_plan(factory).assets if name.startswith("environment/")]
     assert environments

@@ -23,7 +23,6 @@ from tests.packs.converters import BOX
 
 @pytest.fixture
 def archive(tmp_path: Path) -> Path:
-    """A package with one model and some code."""
     path = tmp_path / "package-1.0.zip"
     with zipfile.ZipFile(path, "w") as file:
         file.writestr("data/box.obj", BOX)
@@ -33,7 +32,6 @@ def archive(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def pack(archive: Path) -> Pack:
-    """The package in the table."""
     return Pack(
         name="boxes",
         summary="a box",
@@ -48,7 +46,6 @@ def pack(archive: Path) -> Pack:
 
 
 def fake_client(folder: Path, program: str, script: str) -> None:
-    """A program of that name, first and last on PATH."""
     folder.mkdir(exist_ok=True)
     path = folder / program
     path.write_text(f"#!/bin/sh\n{script}\n", encoding="utf-8")
@@ -56,12 +53,10 @@ def fake_client(folder: Path, program: str, script: str) -> None:
 
 
 def library_with(folder: Path, tmp_path: Path) -> Library:
-    """A library with the packs in a folder."""
     return open_library(cache_dir=tmp_path / "cache", packs=folder)
 
 
 def names_in(folder: Path) -> set[str]:
-    """Names in a folder, except for its lock."""
     return {path.name for path in folder.iterdir()} - {".lock"}
 
 
@@ -84,9 +79,7 @@ def test_without_packs_the_library_is_as_before(tmp_path: Path) -> None:
     assert not (tmp_path / "packs").exists()
 
 
-def test_another_archive_is_refused_and_nothing_installed(
-    pack: Pack, archive: Path, tmp_path: Path
-) -> None:
+def test_another_archive_is_refused_entirely(pack: Pack, archive: Path, tmp_path: Path) -> None:
     """One byte is enough; the message gives both sums."""
     archive.write_bytes(archive.read_bytes() + b"\0")
     with pytest.raises(AssetError, match=f"expected {pack.sha256}"):
@@ -111,10 +104,9 @@ def test_the_client_fetches_the_pinned_version(
     assert names_in(tmp_path / "packs") == {"boxes"}
 
 
-def test_a_missing_client_is_named(
+def test_missing_clients_are_named(
     pack: Pack, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The message gives an alternative."""
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(AssetError, match=r"'npm' is not on PATH.*--from FILE"):
         install(replace(pack, client="npm"), tmp_path / "packs")
@@ -141,14 +133,11 @@ def test_no_network_and_other_failures_are_told_apart(
 
 
 def test_an_archive_without_an_end_is_refused(pack: Pack, tmp_path: Path) -> None:
-    """A device is never read."""
     with pytest.raises(AssetError, match=r"/dev/zero: is not a regular file; expected the archive"):
         install(pack, tmp_path / "packs", Path("/dev/zero"))
 
 
-def test_a_killed_installation_leaves_nothing_behind(
-    pack: Pack, archive: Path, tmp_path: Path
-) -> None:
+def test_a_killed_installation_leaves_nothing(pack: Pack, archive: Path, tmp_path: Path) -> None:
     """No pack is seen, and the next installation sweeps up."""
     folder = tmp_path / "packs"
     dying = replace(pack, converter="tests.packs.converters:killed")
@@ -165,7 +154,6 @@ def test_a_killed_installation_leaves_nothing_behind(
 
 
 def test_a_failed_exchange_keeps_the_old_pack(pack: Pack, archive: Path, tmp_path: Path) -> None:
-    """A failing converter changes nothing."""
     folder = tmp_path / "packs"
     install(pack, folder, archive)
     with pytest.raises(AssetError, match="none of the wanted"):
@@ -173,10 +161,7 @@ def test_a_failed_exchange_keeps_the_old_pack(pack: Pack, archive: Path, tmp_pat
     verify("boxes", folder)
 
 
-def test_two_installations_at_once_are_kept_apart(
-    pack: Pack, archive: Path, tmp_path: Path
-) -> None:
-    """The second one is refused."""
+def test_two_installations_at_once_stay_apart(pack: Pack, archive: Path, tmp_path: Path) -> None:
     import fcntl
 
     folder = tmp_path / "packs"
@@ -188,9 +173,7 @@ def test_two_installations_at_once_are_kept_apart(
 
 
 @pytest.mark.parametrize("damage", ["changed", "missing", "was not installed"])
-def test_verify_finds_every_difference(
-    damage: str, pack: Pack, archive: Path, tmp_path: Path
-) -> None:
+def test_verify_finds_differences(damage: str, pack: Pack, archive: Path, tmp_path: Path) -> None:
     """One byte, one file less, one file more."""
     folder = tmp_path / "packs"
     install(pack, folder, archive)
@@ -207,7 +190,6 @@ def test_verify_finds_every_difference(
 
 
 def test_a_removed_pack_is_gone(pack: Pack, archive: Path, tmp_path: Path) -> None:
-    """With all of its files; a second removal is an error."""
     folder = tmp_path / "packs"
     install(pack, folder, archive)
     remove("boxes", folder)
@@ -216,7 +198,7 @@ def test_a_removed_pack_is_gone(pack: Pack, archive: Path, tmp_path: Path) -> No
         remove("boxes", folder)
 
 
-def test_a_new_revision_of_the_conversion_is_out_of_date(
+def test_a_new_conversion_makes_packs_out_of_date(
     pack: Pack, archive: Path, tmp_path: Path
 ) -> None:
     """An upgrade of gen-data then requires a new installation."""
@@ -228,21 +210,18 @@ def test_a_new_revision_of_the_conversion_is_out_of_date(
 
 
 def test_installing_twice_gives_the_same_digest(pack: Pack, archive: Path, tmp_path: Path) -> None:
-    """The digest names the pack in a data set's plan."""
     digests = {install(pack, tmp_path / name, archive).digest for name in ("one", "two")}
     assert len(digests) == 1
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
 def test_a_folder_without_rights_is_told(pack: Pack, archive: Path, tmp_path: Path) -> None:
-    """The message gives a remedy."""
     tmp_path.joinpath("packs").mkdir(mode=0o500)
     with pytest.raises(StorageError, match="GEN_DATA_ASSETS"):
         install(pack, tmp_path / "packs", archive)
 
 
 def test_a_damaged_record_says_what_to_do(pack: Pack, archive: Path, tmp_path: Path) -> None:
-    """Install again."""
     folder = tmp_path / "packs"
     install(pack, folder, archive)
     (folder / "boxes" / "pack.json").write_text("{", encoding="utf-8")
@@ -251,7 +230,6 @@ def test_a_damaged_record_says_what_to_do(pack: Pack, archive: Path, tmp_path: P
 
 
 def test_an_unknown_pack_is_answered_with_the_nearest() -> None:
-    """The message lists all names."""
     with pytest.raises(Exception, match="did you mean 'catalogue'"):
         find_pack("catalog")
 

@@ -80,7 +80,6 @@ def test_they_are_fetched_when_an_asset_is_wanted(
 
 @pytest.mark.usefixtures("index")
 def test_they_are_not_fetched_for_anything_else(tmp_path: Path) -> None:
-    """Nor by a library that may not."""
     library = open_assets()
 
     assert library.find(("car",)) and library.find((), "plate") and library.find((), "texture")
@@ -90,9 +89,7 @@ def test_they_are_not_fetched_for_anything_else(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("index")
-def test_nothing_is_fetched_where_the_user_forbids_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_nothing_is_fetched_if_forbidden(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """What needs none of these files works, and the others name the command."""
     monkeypatch.setenv("GEN_DATA_OFFLINE", "1")
     library = open_assets()
@@ -139,9 +136,7 @@ def test_processes_that_start_together_fetch_once(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("index", [("",)], indirect=True, ids=["all files"])
-def test_a_run_fetches_them_before_its_workers_start(
-    index: Callable[[str], None], tmp_path: Path
-) -> None:
+def test_a_run_fetches_them_before_workers(index: Callable[[str], None], tmp_path: Path) -> None:
     """The check of a configuration needs them already; arms and things on the table are there."""
     factory = PipelineFactory(load_config("tabletop.yaml"), n=1)
 

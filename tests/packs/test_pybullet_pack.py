@@ -23,7 +23,6 @@ KINDS = ("colors16.png", "franka_panda", "lego", "soccerball", "teddy")
 
 
 def folder() -> Path:
-    """Where pybullet installs its files."""
     return Path(pybullet_data.getDataPath())
 
 
@@ -49,7 +48,6 @@ def installed(tmp_path: Path) -> Path:
 
 
 def without_pybullet(patch: pytest.MonkeyPatch) -> None:
-    """Hide pybullet, as on a system for which it has no wheel."""
     find: Callable[[str], object] = importlib.util.find_spec
     patch.setattr(
         importlib.util, "find_spec", lambda name: None if "pybullet" in name else find(name)
@@ -57,12 +55,10 @@ def without_pybullet(patch: pytest.MonkeyPatch) -> None:
 
 
 def library(packs: Path, cache: Path) -> Library:
-    """A library with a cache of its own."""
     return open_library(cache_dir=cache, packs=packs)
 
 
 def test_the_pack_has_what_the_index_needs_and_nothing_else(installed: Path) -> None:
-    """Neither the simulator nor policies."""
     names = {path.name for path in (installed / "pybullet").iterdir()}
 
     assert {"franka_panda", "teddy_vhacd.urdf", "pack.json"} <= names
@@ -101,9 +97,7 @@ def test_without_pybullet_and_its_pack_everything_else_is_there(
         bare.get("pybullet/no")
 
 
-def test_the_tabletop_without_its_arm_names_the_pack(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_missing_arm_names_its_pack(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Where nothing may be fetched: before anything is generated, with the place of the name."""
     without_pybullet(monkeypatch)
     monkeypatch.setenv("GEN_DATA_OFFLINE", "1")

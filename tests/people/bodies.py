@@ -23,5 +23,4 @@ KINDS = [pytest.param("simple", id="simple"), pytest.param("pack", id="pack", ma
 
 
 def body_of(kind: str) -> BodyTemplate:
-    """The body of a kind."""
     return simple_body() if kind == "simple" else load(PACK_FILE)

@@ -26,7 +26,6 @@ def posed_joints(pose: str) -> dict[str, Array]:
 
 
 def angle_deg(a: Array, b: Array) -> float:
-    """Between two directions."""
     return float(np.degrees(np.arccos(a @ b / np.linalg.norm(a) / np.linalg.norm(b))))
 
 

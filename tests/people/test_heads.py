@@ -27,7 +27,6 @@ def texel(texture: TextureData, uv: np.ndarray) -> np.ndarray:
 
 
 def built(haircut: str, pose: str = "stand") -> MeshData:
-    """Somebody bare-headed with a haircut."""
     person = draw_person(3, pose)
     person = replace(person, haircut=haircut, outfit=replace(person.outfit, headwear=""))
     return build_person(person, dress_person(person, simple_body())).mesh

@@ -50,7 +50,6 @@ def test_phases_are_rounded_to_sixteenths() -> None:
 
 
 def test_a_pose_that_does_not_exist_is_refused_with_a_suggestion() -> None:
-    """The message names what there is."""
     with pytest.raises(
         ValueError, match=r"pose 'walks' is none of walk, walk_slow.*did you mean 'walk'"
     ):
@@ -77,7 +76,7 @@ def test_people_from_formulas_are_always_offered(tmp_path: Path) -> None:
     assert len(library.keypoints(asset.asset_id)) == 17
 
 
-def test_without_the_pack_only_people_from_formulas_exist(
+def test_without_the_pack_people_are_formulas(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The family of the pack is absent; with the file it is there and has the tag ``pack``."""
@@ -92,7 +91,7 @@ def test_without_the_pack_only_people_from_formulas_exist(
         importlib.reload(people)
 
 
-def test_packs_lie_in_the_folder_that_the_environment_names(
+def test_packs_lie_where_the_environment_says(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Else in the user's data folder."""
@@ -103,7 +102,6 @@ def test_packs_lie_in_the_folder_that_the_environment_names(
 
 
 def test_a_damaged_pack_is_refused_with_a_remedy(tmp_path: Path) -> None:
-    """Empty files and files of other data alike."""
     path = tmp_path / "body.npz"
     for content in (b"", b"no archive"):
         path.write_bytes(content)
@@ -117,7 +115,6 @@ def test_a_damaged_pack_is_refused_with_a_remedy(tmp_path: Path) -> None:
 
 
 def test_a_folder_without_body_data_cannot_be_converted(tmp_path: Path) -> None:
-    """And nothing is written."""
     with pytest.raises(AssetError, match="no body data"):
         convert(tmp_path, tmp_path / "people")
     assert not (tmp_path / "people").exists()

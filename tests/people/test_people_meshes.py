@@ -41,7 +41,6 @@ POSES = ("walk", "run", "stand", "phone", "carry", "sit", "crouch", "bend_deep",
 
 
 def made(person: Person, kind: str) -> Solid:
-    """A person with the body of a kind."""
     return build_person(person, dress_person(person, body_of(kind)))
 
 
@@ -186,7 +185,6 @@ def test_every_material_says_what_it_is(kind: str) -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_same_person_is_the_same_bytes(kind: str) -> None:
-    """Building twice gives equal arrays."""
     first, second = (made(draw_person(9, "walk", 0.25), kind) for _ in range(2))
     assert first.mesh.vertices_m.tobytes() == second.mesh.vertices_m.tobytes()
     assert first.mesh.normals.tobytes() == second.mesh.normals.tobytes()

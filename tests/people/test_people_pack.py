@@ -84,7 +84,6 @@ def write_targets(folder: Path, count: int) -> None:
 
 @pytest.fixture(scope="module")
 def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder of an unpacked wheel."""
     folder = tmp_path_factory.mktemp("wheel")
     write_source(folder)
     return folder

@@ -8,18 +8,8 @@ from collections import Counter
 import numpy as np
 import pytest
 
+from gen_data.content.people import posing
 from gen_data.content.people.person import draw_person
-from gen_data.content.people.posing import (
-    BEHAVIOURS,
-    MOVING_POSES,
-    PHASES,
-    POSES,
-    bone_rotations,
-    bone_transforms,
-    skin_points,
-    stance,
-    vertex_normals,
-)
 from tests.people.bodies import KINDS, body_of
 
 
@@ -28,7 +18,9 @@ def posed_heads(kind: str, pose: str, step: int) -> tuple[np.ndarray, np.ndarray
     body = body_of(kind)
     count = len(body.bones)
     heads = body.points_m[:count]
-    transforms = bone_transforms(body, heads, bone_rotations(body, heads, stance(pose, step)))
+    transforms = posing.bone_transforms(
+        body, heads, posing.bone_rotations(body, heads, posing.stance(pose, step))
+    )
     after = np.einsum("bij,bj->bi", transforms[:, :, :3], heads) + transforms[:, :, 3]
     return heads, after, body.parents
 
@@ -36,7 +28,7 @@ def posed_heads(kind: str, pose: str, step: int) -> tuple[np.ndarray, np.ndarray
 @pytest.mark.parametrize("kind", KINDS)
 def test_bones_keep_their_lengths_in_every_pose(kind: str) -> None:
     """Poses turn bones; they never stretch them."""
-    for pose, step in itertools.product(POSES, range(0, PHASES, 3)):
+    for pose, step in itertools.product(posing.POSES, range(0, posing.PHASES, 3)):
         before, after, parents = posed_heads(kind, pose, step)
         child = np.flatnonzero(parents >= 0)
         lengths = [np.linalg.norm(p[child] - p[parents[child]], axis=1) for p in (before, after)]
@@ -45,11 +37,10 @@ def test_bones_keep_their_lengths_in_every_pose(kind: str) -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_rotations_are_rotations(kind: str) -> None:
-    """Orthonormal, without reflection."""
     body = body_of(kind)
     heads = body.points_m[: len(body.bones)]
-    for pose in POSES:
-        for rotation in bone_rotations(body, heads, stance(pose, 5)).values():
+    for pose in posing.POSES:
+        for rotation in posing.bone_rotations(body, heads, posing.stance(pose, 5)).values():
             np.testing.assert_allclose(rotation @ rotation.T, np.eye(3), atol=1e-12)
             assert np.linalg.det(rotation) == pytest.approx(1.0)
 
@@ -61,7 +52,7 @@ def test_points_of_one_bone_move_rigidly() -> None:
     transforms = np.stack([np.eye(3, 4), quarter])
     bones = np.array([[1, 0, 0, 0], [0, 1, 0, 0]])
     weights = np.array([[1.0, 0.0, 0.0, 0.0], [0.5, 0.5, 0.0, 0.0]])
-    moved = skin_points(points, bones, weights, transforms)
+    moved = posing.skin_points(points, bones, weights, transforms)
     np.testing.assert_allclose(moved[0], [-2.0 + 5.0, 1.0 + 6.0, 10.0])
     np.testing.assert_allclose(moved[1], 0.5 * points[1] + 0.5 * np.array([6.0, 6.0, 7.5]))
 
@@ -69,38 +60,41 @@ def test_points_of_one_bone_move_rigidly() -> None:
 def test_normals_of_a_flat_sheet_are_its_own() -> None:
     """Counter-clockwise seen from above looks up; unused vertices get up, too."""
     points = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [9, 9, 9]], dtype=np.float64)
-    normals = vertex_normals(points, np.array([[0, 1, 2], [0, 2, 3]]))
+    normals = posing.vertex_normals(points, np.array([[0, 1, 2], [0, 2, 3]]))
     np.testing.assert_allclose(normals, np.tile([0.0, 0.0, 1.0], (5, 1)))
 
 
 def test_walking_is_periodic_and_opposite_legs_are_half_a_stride_apart() -> None:
     """The right leg does at step k what the left does eight steps later."""
     for pose in ("walk", "run"):
-        for step in range(PHASES):
-            assert stance(pose, step) == stance(pose, step + PHASES)
-            assert stance(pose, step).right_leg == stance(pose, step + PHASES // 2).left_leg
+        for step in range(posing.PHASES):
+            assert posing.stance(pose, step) == posing.stance(pose, step + posing.PHASES)
+            assert (
+                posing.stance(pose, step).right_leg
+                == posing.stance(pose, step + posing.PHASES // 2).left_leg
+            )
 
 
 def test_the_standing_foot_is_flat_while_the_other_swings() -> None:
     """From foot flat to heel rise, hip, knee and ankle leave the sole within 3 deg of level."""
     for step in range(2, 7):
-        leg = stance("walk", step).left_leg
+        leg = posing.stance("walk", step).left_leg
         assert abs(leg.hip - leg.knee + leg.ankle) <= 3.0
 
 
 def test_there_are_more_than_sixty_poses_and_two_of_three_people_walk() -> None:
     """Poses that nobody sits or leans in without furniture are drawn."""
     drawn = Counter(draw_person(seed).pose for seed in range(600))
-    assert len(POSES) > 60 and len(drawn) > 50
+    assert len(posing.POSES) > 60 and len(drawn) > 50
     assert not any(pose.startswith(("sit", "lean")) for pose in drawn)
-    assert 0.55 < sum(drawn[pose] for pose in MOVING_POSES) / 600 < 0.75
+    assert 0.55 < sum(drawn[pose] for pose in posing.MOVING_POSES) / 600 < 0.75
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_both_feet_of_people_who_stand_are_on_the_ground(kind: str) -> None:
     """Ankles are within 2 cm of each other's height, whichever leg carries the body."""
-    for pose in POSES:
-        if pose in MOVING_POSES or BEHAVIOURS[pose] == "sitting":
+    for pose in posing.POSES:
+        if pose in posing.MOVING_POSES or posing.BEHAVIOURS[pose] == "sitting":
             continue
         body = body_of(kind)
         _, after, _ = posed_heads(kind, pose, 0)
@@ -114,7 +108,8 @@ def test_heads_turn_without_the_trunk() -> None:
     heads = body.points_m[: len(body.bones)]
     ahead = np.array([1.0, 0.0, 0.0])
     look, walk = (
-        bone_rotations(body, heads, stance(pose, 4)) for pose in ("walk_look_left", "walk")
+        posing.bone_rotations(body, heads, posing.stance(pose, 4))
+        for pose in ("walk_look_left", "walk")
     )
     facing = look["head"] @ ahead
     assert np.degrees(np.arctan2(facing[1], facing[0])) == pytest.approx(42.0, abs=1.0)

@@ -51,9 +51,7 @@ def test_the_hue_is_the_direction(direction: tuple[float, float], hue_deg: float
 
 
 def test_the_saturation_is_the_length() -> None:
-    """Half as far is half as colourful; beyond the scale it is darker."""
-    assert color_of_flow(5.0, 0.0) == (255, 127, 127)
-    assert color_of_flow(20.0, 0.0) == (191, 0, 0)
+    assert (color_of_flow(5.0, 0.0), color_of_flow(20.0, 0.0)) == ((255, 127, 127), (191, 0, 0))
 
 
 @pytest.mark.parametrize(
@@ -61,15 +59,13 @@ def test_the_saturation_is_the_length() -> None:
     [(Channel.FLOW_BACKWARD, 2), (Channel.SCENE_FLOW, 3), (Channel.FLOW_OCCLUDED_FORWARD, 0)],
 )
 def test_every_channel_of_flow_can_be_looked_at(channel: Channel, depth: int) -> None:
-    """As an image of bytes in colour."""
     shape = (4, 6, depth) if depth else (4, 6)
     data = np.ones(shape, np.float32 if depth else np.uint8)
     camera = Camera("c", IDENTITY, Intrinsics(6, 4, 5.0, 5.0, 3.0, 2.0))
 
     image = channel_image(SensorReading("c", camera, {channel: data}), channel)
 
-    assert image.shape == (4, 6, 3)
-    assert image.dtype == np.uint8
+    assert (image.shape, image.dtype) == ((4, 6, 3), np.uint8)
     assert image.max() == 255
 
 
@@ -80,14 +76,12 @@ class _Stream:
         self.logged: dict[str, object] = {}
 
     def log(self, path: str, *what: object, static: bool = False) -> None:
-        """Remember it."""
         self.logged[path] = what
 
     def set_time(self, *what: object, **when: object) -> None:
         """Times do not matter here."""
 
     def send_blueprint(self, blueprint: object) -> None:
-        """Remember it."""
         self.blueprint = blueprint
 
 

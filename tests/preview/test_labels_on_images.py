@@ -68,7 +68,6 @@ def test_lines_and_names_grow_with_the_image_that_is_scaled_down() -> None:
 
 
 def test_names_of_neighbours_do_not_cover_one_another() -> None:
-    """The second moves down."""
     box = BoxPx(100, 100, 140, 140)
     one, both = drawn(("mug", box)), drawn(("mug", box), ("mug", BoxPx(102, 101, 142, 141)))
     name = (slice(86, 99), slice(100, 130))

@@ -85,12 +85,10 @@ class _Stream:
     def set_time(
         self, timeline: str, *, sequence: int | None = None, duration: float | None = None
     ) -> None:
-        """Only seconds are of interest here."""
         if timeline == "time":
             self._time_s = duration
 
     def send_blueprint(self, blueprint: Any) -> None:
-        """Keep the layout of the views."""
         self.blueprints.append(blueprint)
 
 
@@ -264,7 +262,6 @@ def test_sheet_places_tiles_row_by_row() -> None:
 
 
 def test_sheet_of_nothing_is_refused() -> None:
-    """No tile, no picture."""
     with pytest.raises(ConfigError):
         arrange_tiles([], columns=3)
 

@@ -41,7 +41,6 @@ def event_table() -> Measurements:
 
 
 def sample() -> Sample:
-    """Two cameras, a radar and an event camera."""
     lens = Intrinsics(32, 24, 30.0, 30.0, 16.0, 12.0)
     color, depth = Camera("color", SE3(), lens), Camera("depth", SE3(), lens)
     images = {
@@ -84,15 +83,12 @@ def test_the_last_event_of_a_pixel_decides_its_colour() -> None:
     view = event_view(event_table(), Scene("t"), 1.0)
 
     assert view.shape == (8, 10, 3)
-    assert tuple(view[7, 9]) == DARKER
-    assert tuple(view[2, 3]) == BRIGHTER
+    assert (tuple(view[7, 9]), tuple(view[2, 3])) == (DARKER, BRIGHTER)
     assert (view[0] == GREY).all()
 
 
 @pytest.mark.parametrize(("velocity", "channel"), [(-20.0, 2), (0.0, 1), (20.0, 0)])
-def test_detections_are_seen_from_above_in_the_colour_of_their_speed(
-    velocity: float, channel: int
-) -> None:
+def test_detections_are_seen_from_above_by_their_speed(velocity: float, channel: int) -> None:
     """10 m ahead and 10 m to the left: a fifth of 50 m right of and above the middle."""
     table = radar_table(
         range_m=10.0 * 2.0**0.5, azimuth_rad=np.pi / 4, velocity_compensated_m_s=velocity,

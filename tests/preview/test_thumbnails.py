@@ -8,7 +8,6 @@ from gen_data.renderers import TABLE
 
 
 def test_an_object_is_shown_in_the_middle_of_its_picture() -> None:
-    """A lit ball on black."""
     library = open_library(())
 
     renderer = TABLE.load("warp")().open(library)

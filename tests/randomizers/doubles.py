@@ -101,7 +101,6 @@ class FakeAssets:
     """An AssetIndex without files; the id of a piece of furniture gives its size."""
 
     def get(self, asset_id: str) -> Asset:
-        """Entry of any object, piece of furniture, robot, texture or environment above."""
         if asset_id in THINGS:
             thing = THINGS[asset_id]
             return _asset(
@@ -125,7 +124,6 @@ class FakeAssets:
         raise AssetError(f"unknown asset '{asset_id}'{did_you_mean(asset_id, THINGS)}")
 
     def find(self, tags: Iterable[str], kind: str = "object") -> tuple[Asset, ...]:
-        """All assets of the kind with all tags, sorted by id."""
         wanted = set(tags)
         if kind == "plate":
             return tuple(self.get(plate) for plate in PLATES if wanted <= {"rendered"})
@@ -208,7 +206,6 @@ def two_link_arm() -> RobotModel:
 
 
 def rng_of(name: str = "test", scene: int = 0, index: int = 0) -> Rng:
-    """Random stream of a name in a scene."""
     return Streams(seed=7, scene=scene, index=index).rng(name)
 
 

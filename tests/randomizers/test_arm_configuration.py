@@ -29,7 +29,6 @@ class NoGripper(FakeAssets):
 
 
 def goal(mode: str, *objects: str, scene_index: int = 0, **given: object) -> ArmGoal:
-    """The goal of the arm in a scene with these objects."""
     bodies = tuple(
         Body(f"clutter/{k}", asset, group="clutter", motion="dynamic")
         for k, asset in enumerate(objects)
@@ -126,6 +125,5 @@ def test_modes_come_as_often_as_their_weights_say() -> None:
 
 
 def test_unknown_mode_is_named() -> None:
-    """With what was probably meant."""
     with pytest.raises(ValidationError, match=r"there is no 'reech'.*did you mean 'reach'"):
         goal("reech")

@@ -23,7 +23,6 @@ CLUTTER = ObjectGroup("clutter", ("table",), (), 2, "drop")
 
 
 def scene(*objects: str, goal: ArmGoal | None = None) -> Scene:
-    """An arm at a table with these objects."""
     bodies = tuple(
         Body(f"clutter/{k}", asset, group="clutter", motion="dynamic")
         for k, asset in enumerate(objects)
@@ -33,7 +32,6 @@ def scene(*objects: str, goal: ArmGoal | None = None) -> Scene:
 
 
 def drawn(on: Scene, **given: object) -> tuple[ArmGoal, ...]:
-    """The way that is drawn for the arm."""
     motion = ArmMotion(name="motion", **given)  # type: ignore[arg-type]
     return motion(on, FakeAssets(), rng_of("motion")).articulations[0].task
 
@@ -107,13 +105,11 @@ def test_a_given_way_is_taken_as_it_stands() -> None:
     ],
 )
 def test_what_cannot_be_is_a_mistake_that_is_named(given: dict[str, object], message: str) -> None:
-    """Joints, surfaces and groups."""
     with pytest.raises(ConfigError, match=message):
         drawn(scene("brick"), **given)
 
 
 def test_a_stop_is_exactly_one_thing() -> None:
-    """Neither none nor two."""
     with pytest.raises(ValidationError, match="exactly one"):
         Stop()
     with pytest.raises(ValidationError, match="exactly one"):

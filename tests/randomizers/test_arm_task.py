@@ -56,7 +56,6 @@ def test_instructions_name_things_of_the_task(name: str) -> None:
 
 
 def test_a_task_that_refers_to_an_unknown_thing_is_refused() -> None:
-    """By the thing's name."""
     assert Task.model_validate_json(MINIMAL % "it")
     with pytest.raises(ValidationError, match="there is no object 'cup'"):
         Task.model_validate_json(MINIMAL % "cup")
@@ -64,20 +63,11 @@ def test_a_task_that_refers_to_an_unknown_thing_is_refused() -> None:
         Task.model_validate_json((MINIMAL % "it").replace("{it}.", "{lid}."))
 
 
-def test_more_failures_than_demonstrations_are_refused() -> None:
-    """0.7 + 0.4 > 1."""
+def test_a_task_that_cannot_be_is_refused_by_its_field() -> None:
     with pytest.raises(ValidationError, match="add up to more than 1"):
         Failures(slip=0.7, miss=0.4)
-
-
-def test_an_unknown_task_is_refused_by_its_field() -> None:
-    """Before any scene is drawn."""
     with pytest.raises(ConfigError, match=r"randomizers\.things\.task: unknown task"):
         ArmTask(name="things", task=Constant("dance")).possible_assets(FakeAssets())
-
-
-def test_a_template_without_the_group_is_refused() -> None:
-    """The group has the randomizer's name."""
     with pytest.raises(
         ConfigError, match=r"randomizers\.toys\.group: the template has no object group 'toys'"
     ):
@@ -111,13 +101,11 @@ TILT = FREE.model_copy(
 def drawn(
     task: ArmTask, scene: int = 0, attempt: int = 0, assets: FakeAssets | None = None
 ) -> Scene:
-    """The scene that an attempt draws."""
     rng = Streams(seed=7, scene=scene, attempt=attempt, index=scene).rng("things")
     return task(SCENE, assets or FakeAssets(), rng)
 
 
 def failure_of(task: ArmTask, scene: int, attempt: int = 0) -> str:
-    """The failure that an attempt asks for."""
     (arm,) = drawn(task, scene, attempt).articulations
     assert arm.assignment is not None
     return arm.assignment.failure

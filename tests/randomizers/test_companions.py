@@ -26,7 +26,6 @@ APART_M = 12.0
 
 @pytest.fixture(scope="module")
 def library(tmp_path_factory: pytest.TempPathFactory) -> AssetLibrary:
-    """People from formulas."""
     folder: Path = tmp_path_factory.mktemp("companions")
     return open_library(cache_dir=folder)
 
@@ -53,7 +52,6 @@ def companies(scene: Scene) -> list[list[np.ndarray]]:
 
 
 def poses(scene: Scene, library: AssetLibrary) -> list[str]:
-    """Pose of every person."""
     return [dict(library.get(body.asset).attributes)["pose"] for body in scene.bodies]
 
 
@@ -112,7 +110,6 @@ def test_nobody_stands_in_a_wall_or_has_a_name_twice(library: AssetLibrary) -> N
 
 
 def test_everybody_has_one_way_to_walk_in_company_and_one_to_talk(library: AssetLibrary) -> None:
-    """However often four people are drawn, at most eight meshes are needed."""
     draw = Companions(name="company", group="people", size=Constant(3))
     found: set[str] = set()
     for pose in ("walk", "stand"):

@@ -24,7 +24,6 @@ RISE_M = 0.3
 
 @pytest.fixture(scope="module")
 def library(tmp_path_factory: pytest.TempPathFactory) -> AssetLibrary:
-    """Houses and paths."""
     folder: Path = tmp_path_factory.mktemp("paths")
     return open_library(cache_dir=folder)
 
@@ -79,10 +78,7 @@ def test_a_path_leads_from_the_door_to_the_edge_of_the_street(library: AssetLibr
         pytest.param((garden(-20.0, 1.0),), id="behind the house"),
     ],
 )
-def test_houses_without_a_garden_before_them_get_none(
-    library: AssetLibrary, lanes: tuple[Lane, ...]
-) -> None:
-    """Nothing is added."""
+def test_houses_without_a_garden_get_none(library: AssetLibrary, lanes: tuple[Lane, ...]) -> None:
     assert laid(street(library, *lanes), library) == []
 
 

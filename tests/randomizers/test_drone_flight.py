@@ -33,13 +33,11 @@ class Nothing:
 
 
 def flown(seed: int = 0, scene: Scene = SCENE, **fields: Any) -> Scene:
-    """The scene with a flight."""
     rng = np.random.Generator(np.random.Philox(seed))
     return DroneFlight(name="flight", **fields)(scene, Nothing(), rng)  # type: ignore[arg-type]
 
 
 def poses(scene: Scene, body: str, times_s: Array) -> list[SE3]:
-    """Poses of a body."""
     track = scene.track(body)
     assert track is not None
     return [track.pose(float(t)) for t in times_s]
@@ -112,7 +110,6 @@ def test_the_airframe_leans_forward_with_speed_and_carries_the_gimbal() -> None:
 
 
 def test_flights_cover_the_sequence_and_the_exposures_around_it() -> None:
-    """A second before and after."""
     scene = flown(duration_s=4.0)
     for track in scene.tracks:
         assert track.start_s == -1.0

@@ -74,14 +74,12 @@ def seen_px(points_camera_m: Array, k: Intrinsics) -> Array:
 
 
 def framed(scene: Scene = SCENE, number: int = 0, **given: object) -> Camera:
-    """The scene's camera, where the randomizer puts it."""
     values: dict[str, object] = {"aim": Constant("clutter"), "fills": Constant(0.3), **given}
     pose = CameraPose(name="close", **values)  # type: ignore[arg-type]
     return pose(scene, FakeAssets(), rng_of("close", number, index=number)).cameras[0]
 
 
 def corners_m(body: Body) -> Array:
-    """Corners of a body's box, world, [8, 3]."""
     low, high = np.array(FakeAssets().bounds_m(body.asset))
     steps = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
     return body.T_world_body.apply(body.scale * (low + (high - low) * steps))
@@ -323,7 +321,6 @@ def test_contradictory_fields_are_refused(given: dict[str, object], fact: str) -
 
 
 def test_infinite_share_stands_for_points_without_an_image() -> None:
-    """A point behind a pinhole."""
     points = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]])
 
     assert long_side_share(points, LENSES["pinhole"]) == math.inf

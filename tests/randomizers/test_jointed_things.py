@@ -18,7 +18,6 @@ from tests.randomizers.doubles import rng_of
 
 
 def box(name: str, size: str, at: str) -> str:
-    """A link that is a box."""
     shape = f'<origin xyz="{at}"/><geometry><box size="{size}"/></geometry>'
     return f'<link name="{name}"><visual>{shape}</visual><collision>{shape}</collision></link>'
 
@@ -43,7 +42,6 @@ CABINET = f"""<robot name="cabinet">
 
 @pytest.fixture
 def library(tmp_path: Path) -> Library:
-    """A library whose ``user/cabinet`` has a drawer, a door and a knob."""
     (tmp_path / "cabinet.urdf").write_text(CABINET)
     (tmp_path / "assets.yaml").write_text(
         "robots: [{id: cabinet, file: cabinet.urdf, category: cabinet}]\n"

@@ -35,7 +35,6 @@ def street(**group: Any) -> Scene:
 
 
 def drawn(scene: Scene, stream: str = "stream", **fields: Any) -> Scene:
-    """After one draw."""
     return LaneObjects(name="things", **fields)(scene, FakeAssets(), rng_of(stream))
 
 
@@ -75,7 +74,6 @@ def test_share_of_used_places_is_that_of_the_distribution() -> None:
 
 
 def test_count_is_a_choice_of_all_places_and_ids_are_unique() -> None:
-    """Ten of about forty."""
     scene = drawn(street(), gap_m=Constant(1.94), count=Constant(10))
     ids = [i.instance_id for i in scene.instances]
 
@@ -168,12 +166,8 @@ def test_hidden_shares_are_those_of_boxes_seen_in_perspective() -> None:
         board = Body("board", "ball", SE3((ahead_m, y_m, 1.0)), scale=100.0, instance_id=1)
         return hidden_share(camera, Scene("test", bodies=(board,)), FakeAssets(), near_m)
 
-    assert share(10.0) == 0.5
-    assert share(-10.0) == 0.5
-    assert share(0.0) == 1.0
-    assert share(0.0, near_m=1.9) == 0.0
-    assert share(0.0, ahead_m=-12.0) == 0.0
-    assert share(0.0, ahead_m=0.0) == 1.0
+    assert (share(10.0), share(-10.0), share(0.0), share(0.0, near_m=1.9)) == (0.5, 0.5, 1.0, 0.0)
+    assert (share(0.0, ahead_m=-12.0), share(0.0, ahead_m=0.0)) == (0.0, 1.0)
 
 
 def test_a_camera_on_a_pole_does_not_look_out_of_a_tree() -> None:
@@ -195,7 +189,6 @@ def test_a_camera_on_a_pole_does_not_look_out_of_a_tree() -> None:
 
 
 def test_a_street_without_such_a_lane_is_one_clear_error() -> None:
-    """It tells which there are."""
     with pytest.raises(ConfigError, match="no lane of kind sidewalk; there is driving"):
         CameraOnLane(name="walk", lanes=("sidewalk",))(street(), FakeAssets(), rng_of())
 

@@ -60,7 +60,6 @@ def test_the_field_of_view_is_drawn_through_the_lens() -> None:
 
 
 def test_only_the_named_camera_is_drawn() -> None:
-    """The other one keeps its lens."""
     lens = CameraIntrinsics(name="lens", camera="straight", hfov_deg=Constant(50.0))
 
     scene = lens(SCENE, FakeAssets(), rng_of())
@@ -70,7 +69,6 @@ def test_only_the_named_camera_is_drawn() -> None:
 
 
 def test_a_lens_that_folds_over_is_drawn_again() -> None:
-    """As a layout that is not valid."""
     with pytest.raises(LayoutRejected, match="folds over"):
         drawn(lens=Coefficients(k1=Constant(-0.9), k2=Constant(0.0)))
 
@@ -90,7 +88,6 @@ def test_a_lens_that_folds_over_is_drawn_again() -> None:
     ],
 )
 def test_what_no_camera_has_is_refused(given: dict[str, Any], message: str) -> None:
-    """One message, naming the field."""
     with pytest.raises(ConfigError, match=message):
         drawn(**given)
 
@@ -107,10 +104,7 @@ def test_the_principal_point_is_offset_along_each_axis_by_its_own() -> None:
 
 @pytest.mark.parametrize(
     ("value", "found"),
-    [
-        (3.3, Constant(3.3)),
-        ([-1.3, {"uniform": [3, 4]}], (Constant(-1.3), Uniform(3.0, 4.0))),
-    ],
+    [(3.3, Constant(3.3)), ([-1.3, {"uniform": [3, 4]}], (Constant(-1.3), Uniform(3.0, 4.0)))],
 )
 def test_offsets_are_read_as_one_or_as_two(value: Any, found: Any) -> None:
     given = {"name": "lens", "principal_offset_px": value}

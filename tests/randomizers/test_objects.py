@@ -34,14 +34,12 @@ KEEP_OUT: tuple[Vec3, ...] = ((0.0, 0.0, 0.15),)
 def drawn(
     scene: Scene, count: Count, scene_index: int = 0, *, upright: Flag | None = None
 ) -> Scene:
-    """The scene with that many objects in its group ``clutter``."""
     given = {} if upright is None else {"upright": upright}
     objects = Objects(name="clutter", count=count, **given)  # type: ignore[arg-type]
     return objects(scene, FakeAssets(), rng_of("objects", scene_index, index=scene_index))
 
 
 def bodies_of(scene: Scene) -> list[Body]:
-    """The objects of the group."""
     return [body for body in scene.bodies if body.group == "clutter"]
 
 
@@ -249,7 +247,6 @@ def test_distractors_have_ids_but_no_annotations() -> None:
 
 
 def test_unknown_group_and_category_are_named_with_the_nearest_that_exist() -> None:
-    """Typing errors in names are answered with what was probably meant."""
     with pytest.raises(ConfigError, match=r"no object group 'cluter'.*did you mean 'clutter'"):
         Objects(name="cluter")(surface_scene(), FakeAssets(), rng_of())
     with pytest.raises(ConfigError, match=r"no category 'botle'.*did you mean 'bottle'"):

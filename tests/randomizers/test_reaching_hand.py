@@ -26,7 +26,6 @@ HELD = ("can?seed=9", "jar?seed=18", "cup?seed=9", "mug?seed=27")
 
 @pytest.fixture(scope="module")
 def library(tmp_path_factory: pytest.TempPathFactory) -> Library:
-    """The procedural library."""
     folder: Path = tmp_path_factory.mktemp("hands")
     return open_library(cache_dir=folder)
 
@@ -41,7 +40,6 @@ def table(things: tuple[str, ...]) -> Scene:
 
 
 def reaching(*, holding: bool) -> ReachingHand:
-    """A randomizer that always draws a hand."""
     return ReachingHand(
         name="hands",
         probability=Probability(1.0),
@@ -52,9 +50,7 @@ def reaching(*, holding: bool) -> ReachingHand:
 
 @pytest.mark.parametrize("radius_m", [0.018, 0.026, 0.033, 0.04, 0.046])
 @pytest.mark.parametrize("seed", [2, 9])
-def test_a_grasping_hand_touches_a_cylinder_and_hardly_enters_it(
-    radius_m: float, seed: int
-) -> None:
+def test_a_grasping_hand_touches_and_hardly_enters_a_cylinder(radius_m: float, seed: int) -> None:
     """The nearest of all vertices of skin lies within 3 mm of the cylinder; it is a hand's."""
     radii_mm = (1e3 * radius_m,) * 4
     solid = FAMILIES["hand"].build(seed=seed, pose="grasp", radii_mm=radii_mm)
@@ -117,12 +113,10 @@ def test_hands_are_labelled(library: Library) -> None:
     assert (hand.category, asset.subcategory) == ("hand", "grasp")
     assert dict(asset.attributes).keys() == {"monk_skin_tone", "side"}
     assert [p.name for p in library.keypoints(hand.asset)] == list(JOINTS)
-    assert len(skeleton.names) == 21
-    assert len(skeleton.bones) == 20
+    assert (len(skeleton.names), len(skeleton.bones)) == (21, 20)
 
 
 def test_nothing_is_held_that_is_too_wide(library: Library) -> None:
-    """The hand rests instead."""
     scene = reaching(holding=True)(table(("vase?seed=5",)), library, rng_of())
     (hand,) = scene.bodies
 
@@ -140,7 +134,6 @@ def test_radii_leave_out_handles_and_contents(library: Library) -> None:
 
 
 def test_unknown_poses_and_radii_are_refused() -> None:
-    """With the possible ones."""
     with pytest.raises(AssetError, match="hand: pose=wave is unknown; expected one of any, relax"):
         FAMILIES["hand"].build(seed=0, pose="wave")
     with pytest.raises(ValueError, match="are not all from 15 to 46"):

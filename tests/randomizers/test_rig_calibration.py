@@ -35,7 +35,6 @@ SCENE = place_sensors(
 
 
 def drawn(scene_index: int = 0, **given: object) -> Scene:
-    """The scene after one draw."""
     randomizer = RigCalibration(name="calibration", **given)  # type: ignore[arg-type]
     return randomizer(SCENE, FakeAssets(), rng_of("calibration", scene_index))
 
@@ -83,8 +82,7 @@ def test_only_the_named_rig_is_changed_and_free_cameras_never() -> None:
     """By name, or all of them."""
     one, every = drawn(rig="wrist"), drawn()
 
-    assert one.lidars == SCENE.lidars
-    assert one.devices == SCENE.devices
+    assert (one.lidars, one.devices) == (SCENE.lidars, SCENE.devices)
     assert one.camera("front") == SCENE.camera("front")
     assert one.camera("eye") != SCENE.camera("eye")
     assert every.lidars != SCENE.lidars

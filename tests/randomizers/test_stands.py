@@ -38,7 +38,6 @@ def pair(**stand: Any) -> Scene:
 
 
 def posed(scene: Scene, k: int = 0, **given: Any) -> Scene:
-    """The scene after one draw of the pose."""
     given = {"rig": "pair", **given}
     return CameraPose(name="orbit", **given)(scene, FakeAssets(), rng_of("orbit", k, index=k))
 

@@ -20,7 +20,6 @@ COUNT = 60
 
 @pytest.fixture(scope="module")
 def library() -> Library:
-    """People from formulas; only their ids are used."""
     return open_library(())
 
 
@@ -66,7 +65,6 @@ def test_light_rain_opens_fewer_and_dry_weather_none(library: Library) -> None:
 
 
 def test_unknown_groups_are_refused(library: Library) -> None:
-    """The error names the field and the groups."""
     wrong = Umbrellas(name="umbrellas", targets=("persons",))
     with pytest.raises(ConfigError, match=r"randomizers.umbrellas.targets.*'persons'.*people"):
         wrong.check(replace(street(library, 0.0)), library)

@@ -41,12 +41,10 @@ def road(count: int = 1, dark: bool = False) -> Scene:
 
 
 def slots(body: Body) -> dict[str, Material]:
-    """Materials by role."""
     return {material.role: material for material in body.materials}
 
 
 def lit(scene: Scene, **fields: Any) -> Scene:
-    """After the lights were drawn."""
     return VehicleLights(name="lights", **fields)(scene, FakeAssets(), rng_of())
 
 
@@ -123,7 +121,6 @@ def test_a_coat_lies_over_paint_alone_and_dust_dulls_it() -> None:
 
 
 def test_a_colour_that_does_not_exist_is_refused() -> None:
-    """The error names those that do."""
     with pytest.raises(ValueError, match="unknown colour 'pink'; expected white, black"):
         VehiclePaint(name="paint", weights={"pink": 1.0})
 

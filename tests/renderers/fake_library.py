@@ -7,16 +7,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from gen_data.core.asset_types import (
-    Asset,
-    ConvexParts,
-    Float32,
-    Keypoint,
-    Material,
-    MeshData,
-    RobotModel,
-    TextureData,
-)
+from gen_data.core import asset_types
 from gen_data.core.errors import AssetError
 from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.scene import Camera, Environment
@@ -24,8 +15,9 @@ from gen_data.core.se3 import SE3, Vec3, look_at
 
 
 def box_mesh(
-    size_m: Vec3 = (1.0, 1.0, 1.0), materials: tuple[Material, ...] = (Material(),)
-) -> MeshData:
+    size_m: Vec3 = (1.0, 1.0, 1.0),
+    materials: tuple[asset_types.Material, ...] = (asset_types.Material(),),
+) -> asset_types.MeshData:
     """A box around the origin with split edges, 12 triangles."""
     corners, normals, uvs, faces = [], [], [], []
     for axis in range(3):
@@ -46,19 +38,22 @@ def box_mesh(
 
 
 def room_mesh(
-    size_m: Vec3 = (6.0, 6.0, 3.0), materials: tuple[Material, ...] = (Material(),)
-) -> MeshData:
+    size_m: Vec3 = (6.0, 6.0, 3.0),
+    materials: tuple[asset_types.Material, ...] = (asset_types.Material(),),
+) -> asset_types.MeshData:
     """A box seen from inside, floor at z = 0."""
     box = box_mesh(size_m, materials)
     vertices = box.vertices_m + np.array([0, 0, 0.5 * size_m[2]], np.float32)
-    return MeshData(
+    return asset_types.MeshData(
         vertices, box.faces[:, ::-1].copy(), -box.normals, box.uvs, box.face_slots, materials
     )
 
 
 def sphere_mesh(
-    radius_m: float = 0.5, rings: int = 32, materials: tuple[Material, ...] = (Material(),)
-) -> MeshData:
+    radius_m: float = 0.5,
+    rings: int = 32,
+    materials: tuple[asset_types.Material, ...] = (asset_types.Material(),),
+) -> asset_types.MeshData:
     """A UV sphere with smooth normals."""
     polar = np.linspace(0.0, np.pi, rings + 1)
     azimuth = np.linspace(0.0, 2 * np.pi, 2 * rings + 1)
@@ -78,7 +73,9 @@ def sphere_mesh(
     return _mesh(unit * radius_m, faces, unit, uvs.reshape(-1, 2), materials)
 
 
-def plane_mesh(size_m: float = 10.0, materials: tuple[Material, ...] = (Material(),)) -> MeshData:
+def plane_mesh(
+    size_m: float = 10.0, materials: tuple[asset_types.Material, ...] = (asset_types.Material(),)
+) -> asset_types.MeshData:
     """A square in the XY plane, facing +Z."""
     h = 0.5 * size_m
     corners = [(-h, -h, 0), (h, -h, 0), (h, h, 0), (-h, h, 0)]
@@ -86,8 +83,8 @@ def plane_mesh(size_m: float = 10.0, materials: tuple[Material, ...] = (Material
     return _mesh(corners, [(0, 1, 2), (0, 2, 3)], [(0, 0, 1)] * 4, uvs, materials)
 
 
-def _mesh(vertices, faces, normals, uvs, materials) -> MeshData:  # noqa: ANN001
-    return MeshData(
+def _mesh(vertices, faces, normals, uvs, materials) -> asset_types.MeshData:  # noqa: ANN001
+    return asset_types.MeshData(
         np.asarray(vertices, np.float32),
         np.asarray(faces, np.int32),
         np.asarray(normals, np.float32),
@@ -97,7 +94,7 @@ def _mesh(vertices, faces, normals, uvs, materials) -> MeshData:  # noqa: ANN001
     )
 
 
-def uniform_sky(height: int = 16) -> Float32:
+def uniform_sky(height: int = 16) -> asset_types.Float32:
     """Radiance 1 everywhere."""
     return np.ones((height, 2 * height, 3), np.float32)
 
@@ -107,21 +104,21 @@ class FakeLibrary:
 
     def __init__(
         self,
-        meshes: dict[str, MeshData],
-        textures: dict[str, TextureData] | None = None,
-        environments: dict[str, Float32] | None = None,
+        meshes: dict[str, asset_types.MeshData],
+        textures: dict[str, asset_types.TextureData] | None = None,
+        environments: dict[str, asset_types.Float32] | None = None,
     ) -> None:
         self.meshes = meshes
         self.textures = textures or {}
         self.environments = {"environment/neutral?seed=0": uniform_sky(), **(environments or {})}
 
-    def get(self, asset_id: str) -> Asset:
+    def get(self, asset_id: str) -> asset_types.Asset:
         raise AssetError(f"unknown asset '{asset_id}'")
 
-    def find(self, tags: Iterable[str], kind: str = "object") -> tuple[Asset, ...]:
+    def find(self, tags: Iterable[str], kind: str = "object") -> tuple[asset_types.Asset, ...]:
         return ()
 
-    def materials(self, asset_id: str) -> tuple[Material, ...]:
+    def materials(self, asset_id: str) -> tuple[asset_types.Material, ...]:
         return self.meshes[asset_id].materials
 
     def body_bounds_m(self, asset_id: str) -> None:
@@ -130,25 +127,25 @@ class FakeLibrary:
     def bounds_m(self, asset_id: str) -> tuple[Vec3, Vec3]:
         return self.meshes[asset_id].bounds_m()
 
-    def vertices_m(self, asset_id: str) -> Float32:
+    def vertices_m(self, asset_id: str) -> asset_types.Float32:
         return self.meshes[asset_id].vertices_m
 
-    def keypoints(self, asset_id: str) -> tuple[Keypoint, ...]:
+    def keypoints(self, asset_id: str) -> tuple[asset_types.Keypoint, ...]:
         return ()
 
-    def robot(self, asset_id: str) -> RobotModel:
+    def robot(self, asset_id: str) -> asset_types.RobotModel:
         raise AssetError(f"'{asset_id}' is no robot")
 
-    def mesh(self, asset_id: str) -> MeshData:
+    def mesh(self, asset_id: str) -> asset_types.MeshData:
         return self.meshes[asset_id]
 
-    def convex_parts(self, asset_id: str) -> ConvexParts:
-        return ConvexParts((self.meshes[asset_id].vertices_m.astype(np.float64),))
+    def convex_parts(self, asset_id: str) -> asset_types.ConvexParts:
+        return asset_types.ConvexParts((self.meshes[asset_id].vertices_m.astype(np.float64),))
 
-    def texture(self, texture_id: str) -> TextureData:
+    def texture(self, texture_id: str) -> asset_types.TextureData:
         return self.textures[texture_id]
 
-    def environment(self, environment_id: str) -> Float32:
+    def environment(self, environment_id: str) -> asset_types.Float32:
         return self.environments[environment_id]
 
 
@@ -174,4 +171,4 @@ def forward_camera(size_px: tuple[int, int] = (64, 48), focal_px: float = 50.0) 
 
 
 DARK = Environment(luminance_cd_m2=0.0, visible=False)
-MATTE = Material(base_color=(0.5, 0.5, 0.5), roughness=1.0, specular=0.0)
+MATTE = asset_types.Material(base_color=(0.5, 0.5, 0.5), roughness=1.0, specular=0.0)

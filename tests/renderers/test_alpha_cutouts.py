@@ -102,7 +102,7 @@ def test_labels_behind_holes_are_those_of_what_is_behind(method: str) -> None:
 
 
 @pytest.mark.parametrize("camera", [PINHOLE, FISHEYE])
-def test_shadows_light_and_silhouettes_are_those_of_stripes_that_are_cut_out(
+def test_shadows_light_and_silhouettes_are_those_of_cut_stripes(
     camera: Camera,
 ) -> None:
     """The same image except single pixels on edges; mean light within half a percent."""

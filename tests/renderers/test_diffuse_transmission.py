@@ -36,7 +36,6 @@ def sheet(material: Material = LEAF, normal: Vec3 = (0.0, 0.0, 1.0)) -> MeshData
 
 
 def over(leaf: MeshData, *others: Body) -> tuple[Scene, FakeLibrary]:
-    """A sheet and other bodies in the dark."""
     scene = Scene("t", (Body("leaf", "leaf"), *others), environment=DARK)
     return scene, FakeLibrary({"leaf": leaf, "box": box_mesh((6.0, 6.0, 0.1))})
 

@@ -37,12 +37,10 @@ POINTS = {
 
 
 def headlight(beam_cd: float, T_world_lens: SE3 | None = None) -> Light:
-    """At the origin, towards +X."""
     return dipped_beam("beam", T_world_lens or SE3(), beam_cd)
 
 
 def lamp_records(lights: list[Light]) -> np.ndarray:
-    """Spot lamp as the renderer sees it."""
     values = np.zeros(len(lights), dtype=records.LightRecord.numpy_dtype())
     for value, light in zip(values, lights, strict=True):
         value["kind"], value["cutoff"] = 1, light.cutoff

@@ -22,15 +22,7 @@ from gen_data.renderers.warp.scene.environment_maps import (
 )
 from gen_data.renderers.warp.settings import RenderSettings
 from tests.embree import RayCaster, placed
-from tests.renderers.fake_library import (
-    MATTE,
-    FakeLibrary,
-    box_mesh,
-    camera_at,
-    plane_mesh,
-    room_mesh,
-    sphere_mesh,
-)
+from tests.renderers import fake_library
 from tests.tiers import sampled
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
@@ -159,13 +151,13 @@ def test_even_and_cloudy_skies_stay_as_they_are() -> None:
 
 def scene_under(
     environment: Environment, *bodies: Body, lights: tuple[Light, ...] = ()
-) -> tuple[Scene, FakeLibrary]:
-    library = FakeLibrary(
+) -> tuple[Scene, fake_library.FakeLibrary]:
+    library = fake_library.FakeLibrary(
         {
-            "plane": plane_mesh(20.0, (MATTE,)),
-            "box": box_mesh((1.0, 1.0, 1.0), (MATTE,)),
-            "ball": sphere_mesh(0.5, 24, (MATTE,)),
-            "room": room_mesh((6.0, 6.0, 3.0), (MATTE,)),
+            "plane": fake_library.plane_mesh(20.0, (fake_library.MATTE,)),
+            "box": fake_library.box_mesh((1.0, 1.0, 1.0), (fake_library.MATTE,)),
+            "ball": fake_library.sphere_mesh(0.5, 24, (fake_library.MATTE,)),
+            "room": fake_library.room_mesh((6.0, 6.0, 3.0), (fake_library.MATTE,)),
         },
         environments={name: panorama(*lights, height=128) for name, lights in SKIES.items()},
     )
@@ -175,10 +167,10 @@ def scene_under(
 
 
 def luminance_of(
-    scene: Scene, library: FakeLibrary, settings: RenderSettings = PLAIN
+    scene: Scene, library: fake_library.FakeLibrary, settings: RenderSettings = PLAIN
 ) -> tuple[np.ndarray, np.ndarray]:
     """Luminance on the ground seen from above, linear RGB, and where that is."""
-    camera = camera_at((0.0, -0.01, 6.0), (0.0, 0.0, 0.0), (320, 240), hfov_deg=20.0)
+    camera = fake_library.camera_at((0.0, -0.01, 6.0), (0.0, 0.0, 0.0), (320, 240), hfov_deg=20.0)
     scene = replace(scene, cameras=(camera,))
     reading = WarpRenderer(library, "cpu", settings).render(
         scene, camera, frozenset({Channel.RADIANCE, Channel.Z_DEPTH})
@@ -267,7 +259,7 @@ def test_nothing_changes_where_no_shadow_would_be_seen(what: str) -> None:
         scene = replace(scene, lights=(lamp,))
     else:
         scene = replace(scene, environment=replace(environment, image="environment/neutral?seed=0"))
-    camera = camera_at((1.5, -1.0, 1.2), (0.0, 0.0, 0.1), (64, 48), hfov_deg=50.0)
+    camera = fake_library.camera_at((1.5, -1.0, 1.2), (0.0, 0.0, 0.1), (64, 48), hfov_deg=50.0)
     images = [
         WarpRenderer(library, "cpu", settings)
         .render(replace(scene, cameras=(camera,)), camera, frozenset({Channel.RADIANCE}))
@@ -282,7 +274,9 @@ def test_the_sun_of_a_panorama_is_seen_where_it_is() -> None:
     """Background pixels show the image itself, with the sun in it."""
     scene, library = scene_under(Environment("sun", MEAN_CD_M2))
     towards = 10.0 * np.array((0.6, 0.3, 0.7))
-    camera = camera_at((0.0, 0.0, 0.5), tuple(towards.tolist()), (33, 25), hfov_deg=20.0, ev100=8.0)
+    camera = fake_library.camera_at(
+        (0.0, 0.0, 0.5), tuple(towards.tolist()), (33, 25), hfov_deg=20.0, ev100=8.0
+    )
     images = [
         WarpRenderer(library, "cpu", settings)
         .render(replace(scene, cameras=(camera,)), camera, frozenset({Channel.RADIANCE}))
@@ -298,9 +292,11 @@ def test_the_sun_of_a_panorama_is_seen_through_a_pane() -> None:
     """Clear glass transmits 0.92 of it; the part that a lamp represents stays visible."""
     pane = Material((1.0, 1.0, 1.0), 0.0, transmission=1.0)
     scene, library = scene_under(Environment("sun", MEAN_CD_M2))
-    library.meshes["sheet"] = plane_mesh(6.0, (pane,))
+    library.meshes["sheet"] = fake_library.plane_mesh(6.0, (pane,))
     towards = 10.0 * np.array((0.6, 0.3, 0.7))
-    camera = camera_at((0.0, 0.0, 0.5), tuple(towards.tolist()), (33, 25), hfov_deg=20.0, ev100=8.0)
+    camera = fake_library.camera_at(
+        (0.0, 0.0, 0.5), tuple(towards.tolist()), (33, 25), hfov_deg=20.0, ev100=8.0
+    )
     behind = replace(scene, bodies=(*scene.bodies, Body("s", "sheet", SE3((0.0, 0.0, 2.0)))))
     open_air, through = (
         WarpRenderer(library, "cpu", PLAIN)

@@ -37,7 +37,6 @@ WALL = Body("wall", "wall", replace(FACING, translation_m=(0.0, 0.0, 6.0)))
 
 @pytest.fixture(scope="module")
 def renderer() -> WarpRenderer:
-    """On the CPU."""
     return WarpRenderer(MESHES, "cpu")
 
 
@@ -64,9 +63,7 @@ def camera_motion(scene: Scene, step_s: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize("step_s", [STEP_S, -STEP_S])
-def test_a_plane_before_a_moving_camera_flows_by_its_homography(
-    renderer: WarpRenderer, step_s: float
-) -> None:
+def test_a_plane_flows_by_its_homography(renderer: WarpRenderer, step_s: float) -> None:
     """K (R + t n^T / d) K^-1 for the plane n . x = d, forward and backward."""
     scene = world(WALL, camera_velocity_m_s=(0.8, -0.3, 1.1), camera_turn_rad_s=0.4)
     seen = images(renderer, scene)
@@ -104,9 +101,7 @@ def test_the_sky_is_at_infinity_and_flows_by_rotation_alone(renderer: WarpRender
         Lens("kannala_brandt", (-0.02, 0.01, -0.004, 0.0005), 1.4),
     ],
 )
-def test_a_moving_box_flows_through_a_lens_as_opencv_projects_it(
-    renderer: WarpRenderer, lens: Lens
-) -> None:
+def test_a_moving_box_flows_through_a_lens_as_in_opencv(renderer: WarpRenderer, lens: Lens) -> None:
     """Points of a face, located by OpenCV's undistortion, moved and projected by OpenCV."""
     intrinsics = replace(LENS, lens=lens)
     start = SE3((0.0, 0.0, 3.0))
@@ -167,7 +162,7 @@ def test_going_there_and_back_leads_to_the_same_pixel(renderer: WarpRenderer) ->
     assert np.abs(flow + back)[seen].max() < 0.01
 
 
-def test_points_are_occluded_where_a_ray_to_them_meets_something_before(
+def test_points_are_occluded_where_a_ray_meets_something(
     renderer: WarpRenderer,
 ) -> None:
     """Every pixel's point, traced by a ray of its own a step later; edges are a pixel wide."""
@@ -252,9 +247,7 @@ def test_there_is_nothing_to_look_back_on_in_the_first_step(renderer: WarpRender
 
 
 @pytest.mark.parametrize("readout_s", [0.08, -0.08])
-def test_a_rolling_shutter_makes_flow_longer_or_shorter(
-    renderer: WarpRenderer, readout_s: float
-) -> None:
+def test_a_rolling_shutter_changes_the_flow(renderer: WarpRenderer, readout_s: float) -> None:
     """A wall that sinks by c px/s: v' - v = c (step + (v' - v) readout / height)."""
     start = WALL.T_world_body
     speed_px_s = 80.0 * 3.0 / 6.0

@@ -34,7 +34,6 @@ def object_file(code: bytes) -> bytes:
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """A cache of two modules."""
     for name in MODULES:
         (tmp_path / name).mkdir()
         (tmp_path / name / "m.cpu27.o").write_bytes(object_file(name.encode()))
@@ -58,9 +57,7 @@ def empty(path: Path) -> None:
 
 
 @pytest.mark.parametrize("damage", [flip_bit, cut_off, empty])
-def test_a_damaged_module_is_removed_once_and_alone(
-    folder: Path, damage: Callable[[Path], None]
-) -> None:
+def test_a_damaged_module_is_removed_alone(folder: Path, damage: Callable[[Path], None]) -> None:
     """Its next user compiles it again; a module of the same name with other bytes is then right."""
     assert remove_damaged_modules(folder) == ()
     damage(folder / MODULES[0] / "m.cpu27.o")
@@ -101,7 +98,6 @@ STAMP = "gen-data-0123-cpu"
 
 @pytest.fixture
 def temporary(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The folder of temporary files of this test alone."""
     folder = tmp_path_factory.mktemp("temporary")
     monkeypatch.setattr(tempfile, "tempdir", str(folder))
     return folder
@@ -154,16 +150,12 @@ def test_missing_and_damaged_kernels_of_such_a_cache_are_compiled_elsewhere(
     assert fill_cache(folder, STAMP, refusing(folder)) == used
 
 
-def test_a_filled_cache_suffices_where_nothing_can_be_written(
-    folder: Path, temporary: Path
-) -> None:
+def test_a_filled_cache_suffices_if_nothing_is_written(folder: Path, temporary: Path) -> None:
     (folder / STAMP).touch()
     assert fill_cache(folder, STAMP, refusing(folder, temporary)) == folder
 
 
-def test_kernels_that_can_be_kept_nowhere_are_an_error_with_the_remedy(
-    folder: Path, temporary: Path
-) -> None:
+def test_unkeepable_kernels_are_an_error_with_the_remedy(folder: Path, temporary: Path) -> None:
     with pytest.warns(CacheWarning), pytest.raises(StorageError) as caught:
         fill_cache(folder, STAMP, refusing(folder, temporary, number=errno.ENOSPC))
     assert "No space left" in str(caught.value) and "\n" not in str(caught.value)

@@ -31,11 +31,7 @@ BARREL = Lens(
     "brown_conrady", (-0.3691481, 0.1968681, 1.353473e-3, 5.677587e-4, -0.06770705, 0.0, 0.0, 0.0)
 )
 FISHEYE = Lens("kannala_brandt", (0.0034824, 0.00071503, -0.0020532, 0.00020294))
-MESHES = {
-    "room": room_mesh((8.0, 8.0, 4.0)),
-    "box": box_mesh(),
-    "ball": sphere_mesh(0.5, rings=96),
-}
+MESHES = {"room": room_mesh((8.0, 8.0, 4.0)), "box": box_mesh(), "ball": sphere_mesh(0.5, rings=96)}
 LIBRARY = FakeLibrary(MESHES)
 LABELS = frozenset(
     {Channel.Z_DEPTH, Channel.RANGE, Channel.INSTANCE, Channel.OBJECT_COORDINATES, Channel.AMODAL}

@@ -45,7 +45,6 @@ def random_scene(seed: int) -> tuple[Scene, Lidar]:
 
 
 def directions(count: int, seed: int) -> np.ndarray:
-    """Unit vectors all around."""
     v = np.random.default_rng(seed).normal(size=(count, 3))
     return (v / np.linalg.norm(v, axis=1, keepdims=True)).astype(np.float32)
 

@@ -31,7 +31,6 @@ def seen_at(material: Material, angles_deg: list[float]) -> LidarHits:
 
 
 def test_a_matte_surface_falls_with_the_cosine_of_incidence() -> None:
-    """Lambert's law, whatever the range."""
     angles_deg = [0.0, 20.0, 45.0, 60.0, 75.0, 85.0]
     echoes = seen_at(MATTE, angles_deg)
 

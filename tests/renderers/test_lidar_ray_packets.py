@@ -30,14 +30,12 @@ LIDAR = Lidar("top", "color")
 
 
 def drawn(count: int, seed: int, spread: float) -> NDArray[np.float32]:
-    """Unit vectors around +X."""
     rng = Streams(seed=seed, scene=0).rng("rays")
     v = np.concatenate([np.ones((count, 1)), rng.uniform(-spread, spread, (count, 2))], axis=1)
     return (v / np.linalg.norm(v, axis=1, keepdims=True)).astype(np.float32)
 
 
 def cubes(count: int, seed: int, asset: str = "cube") -> tuple[Body, ...]:
-    """Scattered before the scanner, upright and unturned."""
     places = Streams(seed=seed, scene=0).rng("cubes").uniform([4, -8, -4], [60, 8, 4], (count, 3))
     return tuple(
         Body(f"{asset}{k}", asset, SE3((x, y, z))) for k, (x, y, z) in enumerate(places.tolist())

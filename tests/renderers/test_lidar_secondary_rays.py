@@ -69,7 +69,6 @@ def test_behind_a_pane_a_wall_is_seen_dimmed_on_both_ways() -> None:
 
 
 def test_two_panes_dim_twice() -> None:
-    """Four passages in all."""
     bodies = tuple(Body(f"p{k}", "pane", SE3((5.0 + k, 0.0, 0.0))) for k in range(2))
     wall = Body("wall", "wall", SE3((15.1, 0.0, 0.0)))
 
@@ -105,7 +104,6 @@ def test_a_window_mirrors_a_wall_to_a_place_behind_itself() -> None:
 
 
 def test_where_nothing_is_of_glass_there_are_no_detours() -> None:
-    """Dry asphalt reflects nothing either."""
     bodies = (Body("road", "road"), Body("wall", "wall", SE3((10.0, 0.0, 0.0))))
 
     assert scan(Scene("street", bodies), AHEAD, 1.0).detours is None

@@ -54,7 +54,7 @@ def machine(monkeypatch: pytest.MonkeyPatch) -> Any:
         ),
     ],
 )
-def test_a_machine_without_a_usable_gpu_is_told_why(
+def test_an_unusable_gpu_is_told_with_why(
     machine: Any, toolkit: Any, driver: Any, text: str
 ) -> None:
     """In the error of a configuration that asks for a GPU, on one line."""
@@ -97,6 +97,5 @@ def test_a_full_gpu_is_an_error_that_names_workers_and_device(text: str) -> None
 
 
 def test_memory_that_the_system_refuses_is_not_taken_for_that_of_a_gpu() -> None:
-    """Warp words both alike."""
     with pytest.raises(SampleError, match="the system refused more memory"), explain_errors("x"):
         raise RuntimeError("Failed to allocate 4915200 bytes on device 'cpu'")

@@ -27,7 +27,6 @@ using namespace wp;
 
 
 def functions() -> Iterator[wp.Function]:
-    """Native functions of all kernel modules."""
     for path in sorted(ROOT.glob("*/kernels/[!_]*.py")):
         name = ".".join(path.relative_to(ROOT).with_suffix("").parts)
         module = importlib.import_module(f"gen_data.renderers.warp.{name}")

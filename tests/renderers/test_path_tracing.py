@@ -168,10 +168,7 @@ def test_opaque_things_throw_shadows_and_veils_thin_ones() -> None:
     sun = Light("sun", "sun", direction=(0.0, 0.0, -1.0), illuminance_lux=1000.0)
     veil = replace(MATTE, base_color=(0.0, 0.0, 0.0), opacity=0.25)
     library = FakeLibrary({"plane": plane_mesh(4.0), "veil": plane_mesh(4.0, (veil,))})
-    bodies = (
-        Body("p", "plane", materials=(MATTE,)),
-        Body("veil", "veil", SE3((0.0, 0.0, 2.5))),
-    )
+    bodies = (Body("p", "plane", materials=(MATTE,)), Body("veil", "veil", SE3((0.0, 0.0, 2.5))))
     camera = camera_at((0.0, 0.0, 2.0), (0.0, 0.0, 0.0), (8, 8), hfov_deg=2.0)
 
     image = radiance_of(Scene("t", bodies, lights=(sun,), environment=DARK), camera, library, 64)

@@ -22,15 +22,7 @@ from gen_data.core.se3 import SE3
 from gen_data.renderers.warp.scene.environment_maps import texel_directions
 from gen_data.sensors.camera.exposure import meter_ev100, saturation_cd_m2
 from gen_data.sensors.camera.isp import display_values
-from tests.renderers.fake_library import (
-    DARK,
-    FakeLibrary,
-    box_mesh,
-    camera_at,
-    plane_mesh,
-    room_mesh,
-    sphere_mesh,
-)
+from tests.renderers import fake_library
 from tests.renderers.mitsuba_scene import mitsuba, mitsuba_images, mitsuba_scene
 from tests.renderers.paths import replicates_of
 
@@ -61,7 +53,7 @@ class Picture:
 
     scene: Scene
     camera: Camera
-    library: FakeLibrary
+    library: fake_library.FakeLibrary
     bsdfs: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     environment: Callable[[], dict[str, Any]] | None = None
     exact: bool = True
@@ -69,13 +61,13 @@ class Picture:
 
 def cornell() -> Picture:
     """A closed box: diffuse surfaces, many bounces, one rectangle."""
-    library = FakeLibrary(
+    library = fake_library.FakeLibrary(
         {
-            "room": room_mesh((2, 2, 2), matte(0.7)),
-            "wall": box_mesh((0.02, 2, 2), matte(0.6, 0.05, 0.05)),
-            "shade": plane_mesh(0.6, matte(0.0)),
-            "box": box_mesh((0.5, 0.5, 1.0), matte(0.3, 0.6, 0.2)),
-            "ball": sphere_mesh(0.35, 32, matte(0.7)),
+            "room": fake_library.room_mesh((2, 2, 2), matte(0.7)),
+            "wall": fake_library.box_mesh((0.02, 2, 2), matte(0.6, 0.05, 0.05)),
+            "shade": fake_library.plane_mesh(0.6, matte(0.0)),
+            "box": fake_library.box_mesh((0.5, 0.5, 1.0), matte(0.3, 0.6, 0.2)),
+            "ball": fake_library.sphere_mesh(0.35, 32, matte(0.7)),
         }
     )
     bodies = (
@@ -90,8 +82,10 @@ def cornell() -> Picture:
         "lamp", "rectangle", (0.0, 0.0, 1.95), size_m=(0.6, 0.6), side=(1.0, 0.0, 0.0),
         intensity_cd=360.0,
     )  # fmt: skip
-    scene = Scene("cornell", bodies, lights=(lamp,), environment=DARK)
-    return Picture(scene, camera_at((0, -0.95, 1.0), (0, 1, 0.9), SIZE_PX, 80.0), library)
+    scene = Scene("cornell", bodies, lights=(lamp,), environment=fake_library.DARK)
+    return Picture(
+        scene, fake_library.camera_at((0, -0.95, 1.0), (0, 1, 0.9), SIZE_PX, 80.0), library
+    )
 
 
 PANEL = Light(
@@ -116,13 +110,12 @@ def still_life(
     exact: bool = True,
     sky: float = 60.0,
 ) -> Picture:
-    """A ball on the ground."""
-    library = FakeLibrary(
+    library = fake_library.FakeLibrary(
         {
-            "ground": plane_mesh(6.0, matte(0.4, 0.35, 0.3)),
-            "ball": sphere_mesh(0.5, 64, (material,)),
-            "box": box_mesh((0.3, 0.3, 0.6), matte(0.1, 0.2, 0.6)),
-            "back": box_mesh((*PANEL.size_m, 1e-3), matte(0.0)),
+            "ground": fake_library.plane_mesh(6.0, matte(0.4, 0.35, 0.3)),
+            "ball": fake_library.sphere_mesh(0.5, 64, (material,)),
+            "box": fake_library.box_mesh((0.3, 0.3, 0.6), matte(0.1, 0.2, 0.6)),
+            "back": fake_library.box_mesh((*PANEL.size_m, 1e-3), matte(0.0)),
         }
     )
     bodies = (
@@ -134,7 +127,7 @@ def still_life(
     )
     environment = Environment(luminance_cd_m2=sky)
     scene = Scene("still life", bodies, lights=lights, environment=environment)
-    camera = camera_at((0.2, -2.6, 1.3), (0.0, 0.0, 0.4), SIZE_PX, 45.0)
+    camera = fake_library.camera_at((0.2, -2.6, 1.3), (0.0, 0.0, 0.4), SIZE_PX, 45.0)
     return Picture(scene, camera, library, {"ball": bsdf}, exact=exact)
 
 
@@ -232,8 +225,8 @@ def textured() -> Picture:
     albedo = np.repeat(np.repeat(colors, 256, axis=0), 256, axis=1)
     picture = lamps()
     cloth = (replace(matte(1.0)[0], texture="cloth"),)
-    meshes = {**picture.library.meshes, "ground": plane_mesh(4.0, cloth)}
-    library = FakeLibrary(meshes, {"cloth": TextureData(albedo)})
+    meshes = {**picture.library.meshes, "ground": fake_library.plane_mesh(4.0, cloth)}
+    library = fake_library.FakeLibrary(meshes, {"cloth": TextureData(albedo)})
     image = mitsuba().Bitmap(albedo[::-1].copy())
     bitmap = {"type": "bitmap", "bitmap": image, "filter_type": "bilinear"}
     lambert = {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": bitmap}}
@@ -269,7 +262,7 @@ def environment_lit() -> Picture:
         }  # fmt: skip
 
     picture = lamps()
-    library = FakeLibrary(picture.library.meshes, None, {"patch": own})
+    library = fake_library.FakeLibrary(picture.library.meshes, None, {"patch": own})
     environment = Environment("patch", luminance_cd_m2=100.0)
     scene = replace(picture.scene, lights=(), environment=environment)
     return replace(picture, scene=scene, library=library, environment=emitter)

@@ -37,7 +37,7 @@ def halves(tier: Literal["realtime", "pathtraced"], role: str, eye_z_m: float) -
 
 @pytest.mark.parametrize("tier", ["realtime", "pathtraced"])
 @pytest.mark.parametrize("role", ["paint", "plate", "sign"])
-def test_the_back_of_a_print_has_its_mean_colour(
+def test_the_back_of_a_print_is_its_mean(
     tier: Literal["realtime", "pathtraced"], role: str
 ) -> None:
     """In uniform light: sRGB 90 is linear 0.1022 (IEC 61966-2-1), the mean with white 0.5511."""

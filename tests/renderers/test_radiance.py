@@ -94,6 +94,27 @@ def test_nothing_shows_the_environment_or_black() -> None:
 
     np.testing.assert_allclose(radiance_of(seen, forward_camera()), 300.0, rtol=1e-5)
     assert not radiance_of(unseen, forward_camera()).any()
+    assert not radiance_of(Scene("t", environment=DARK), forward_camera()).any()
+
+
+def test_radiance_grows_with_the_light() -> None:
+    """Ten times the light gives ten times the radiance, on edges too."""
+    bodies = (Body("plane", "plane"), Body("ball", "ball", SE3((0.2, 0.1, 0.5))))
+    camera = camera_at((0.0, 0.0, 3.0), (0.0, 0.0, 0.0), (64, 48))
+    one, ten = (
+        radiance_of(
+            Scene(
+                "t",
+                bodies,
+                lights=(Light("lamp", "sphere", (1.0, 1.0, 3.0), intensity_cd=400.0 * k),),
+                environment=Environment(luminance_cd_m2=20.0 * k),
+            ),
+            camera,
+        )
+        for k in (1.0, 10.0)
+    )
+    np.testing.assert_allclose(ten, 10.0 * one, rtol=1e-3)
+    assert one.min() > 0.0
 
 
 def test_a_corner_is_darker_than_the_open_floor() -> None:

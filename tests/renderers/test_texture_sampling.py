@@ -8,11 +8,7 @@ import warp as wp
 from gen_data.renderers.warp.device import open_device
 from gen_data.renderers.warp.native_code import native
 from gen_data.renderers.warp.scene.kernels.records import TextureRecord, World
-from gen_data.renderers.warp.scene.kernels.texture_sampling import (
-    Sampler,
-    make_sampler,
-    texel_at,
-)
+from gen_data.renderers.warp.scene.kernels.texture_sampling import Sampler, make_sampler, texel_at
 
 Values = wp.types.vector(length=7, dtype=wp.float32)
 """Albedo, roughness and tangent-space normal."""

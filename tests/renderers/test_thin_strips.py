@@ -24,7 +24,6 @@ CHANNELS = frozenset({Channel.RADIANCE, Channel.Z_DEPTH, Channel.NORMALS, Channe
 
 
 def render(scene: Scene, camera: Camera, library: FakeLibrary, radius_m: float) -> Images:
-    """Images of pixel centres, without anti-aliasing."""
     settings = RenderSettings(ambient_occlusion_radius_m=radius_m, antialias=1)
     return WarpRenderer(library, "cpu", settings).render(scene, camera, CHANNELS).channels
 
@@ -116,10 +115,7 @@ def rim_library() -> FakeLibrary:
     """A glowing rim of RIM_PX pixels, as ``rim_camera`` sees it, and a board."""
     glow = Material((0.0, 0.0, 0.0), 1.0, specular=0.0, emission_cd_m2=(100.0,) * 3)
     return FakeLibrary(
-        {
-            "rim": box_mesh((0.1, 9.0, RIM_M), (glow,)),
-            "board": box_mesh((0.1, 9.0, 0.4), (MATTE,)),
-        }
+        {"rim": box_mesh((0.1, 9.0, RIM_M), (glow,)), "board": box_mesh((0.1, 9.0, 0.4), (MATTE,))}
     )
 
 
@@ -139,7 +135,6 @@ def test_the_rim_of_a_board_is_seen_between_pixel_centres_by_cameras_with_many_p
     renderer = WarpRenderer(rim_library(), "cpu", RenderSettings(antialias=8))
 
     def columns(find_tones: FindTones | None) -> np.ndarray:
-        """Share of the rim's light in each column."""
         reading = renderer.render(scene, rim_camera(), RADIANCE, find_tones)
         return reading.channels[Channel.RADIANCE][..., 1].sum(axis=0)[20:-20] / 100.0
 
@@ -158,7 +153,6 @@ def test_a_gap_between_boards_does_not_show_what_an_earlier_picture_had_there() 
     used, fresh = (WarpRenderer(rim_library(), "cpu", RenderSettings(antialias=8)) for _ in "ab")
 
     def radiance(renderer: WarpRenderer, scene: Scene) -> np.ndarray:
-        """Radiance, averaged by tones."""
         reading = renderer.render(scene, rim_camera(), RADIANCE, lambda _: Tones(1e6, 1e6))
         return reading.channels[Channel.RADIANCE]
 

@@ -14,20 +14,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from gen_data.core import plates
 from gen_data.core.asset_types import Asset, Material, TextureData
 from gen_data.core.capture import Channel, SensorReading
 from gen_data.core.colorimetry import srgb_encode
 from gen_data.core.errors import SampleError
 from gen_data.core.motion import Trajectory
-from gen_data.core.plates import (
-    CATCHER,
-    EV100,
-    WHITE_CD_M2,
-    Plate,
-    PlateSun,
-    fit_camera,
-    show_plate,
-)
 from gen_data.core.scene import Body, Camera, Instance, Scene, Weather
 from gen_data.core.se3 import SE3, look_at
 from gen_data.renderers.warp.renderer import WarpRenderer
@@ -42,13 +34,15 @@ LABELS = frozenset({Channel.INSTANCE, Channel.Z_DEPTH, Channel.RANGE, Channel.NO
 SEEN = LABELS | {Channel.RADIANCE}
 
 
-def plate(mask: str = "") -> Plate:
+def plate(mask: str = "") -> plates.Plate:
     """A camera that looks down by 12 degrees, under a sun and an even sky."""
     down = (1.0, 0.0, 1.6 - math.tan(math.radians(12.0)))
     pose = look_at((0.0, 0.0, 1.6), down, math.radians(1.0)).rounded(9)
     sky = (1.0 - SHARE) * GREY / ALBEDO
-    sun = PlateSun(math.radians(60.0), math.radians(50.0), SHARE)
-    return Plate(SIZE_PX, 110.0, pose, CORNERS, (), (GREY, GREY, GREY), ALBEDO, 1.0, sky, sun, mask)
+    sun = plates.PlateSun(math.radians(60.0), math.radians(50.0), SHARE)
+    return plates.Plate(
+        SIZE_PX, 110.0, pose, CORNERS, (), (GREY, GREY, GREY), ALBEDO, 1.0, sky, sun, mask
+    )
 
 
 class PlateLibrary(FakeLibrary):
@@ -68,7 +62,7 @@ class PlateLibrary(FakeLibrary):
         kind = "plate" if asset_id == "plate/a" else "environment"
         return Asset(asset_id, kind, "", (), "CC0-1.0", "test", "test", "0")
 
-    def plate(self, asset_id: str) -> Plate:
+    def plate(self, asset_id: str) -> plates.Plate:
         assert asset_id == "plate/a"
         return self._plate
 
@@ -76,10 +70,10 @@ class PlateLibrary(FakeLibrary):
 def world(*, cube: bool, photo: bool) -> Scene:
     """The ground, as a photograph's or with stones, with or without a cube on it."""
     stones = Material((0.5, 0.5, 0.5), roughness=1.0, texture="stones", texture_scale_m=3.0)
-    ground = Body("plate", "ground", materials=(Material(role=CATCHER),))
-    camera = fit_camera(Camera("color", SE3(), plate().intrinsics, EV100), plate())
+    ground = Body("plate", "ground", materials=(Material(role=plates.CATCHER),))
+    camera = plates.fit_camera(Camera("color", SE3(), plate().intrinsics, plates.EV100), plate())
     scene = Scene("test", (ground,), cameras=(camera,))
-    scene = show_plate(scene, "plate", "plate/a", plate())
+    scene = plates.show_plate(scene, "plate", "plate/a", plate())
     if not photo:
         scene = replace(scene, bodies=(replace(ground, materials=(stones,)),))
     if not cube:
@@ -95,14 +89,15 @@ def world(*, cube: bool, photo: bool) -> Scene:
 def seen(
     library: FakeLibrary, scene: Scene, channels: frozenset[Channel] = SEEN, **settings: Any
 ) -> SensorReading:
-    """The reading of its camera."""
     renderer = WarpRenderer(library, "cpu", RenderSettings(**settings))
     return renderer.render(scene, scene.cameras[0], channels)
 
 
 def photographed(reading: SensorReading) -> NDArray[np.uint8]:
     """A photograph by a camera with nothing but sRGB's curve."""
-    linear = np.clip(reading.channels[Channel.RADIANCE].astype(np.float64) / WHITE_CD_M2, 0.0, 1.0)
+    linear = np.clip(
+        reading.channels[Channel.RADIANCE].astype(np.float64) / plates.WHITE_CD_M2, 0.0, 1.0
+    )
     return np.asarray((255.0 * srgb_encode(linear)).round(), np.uint8)
 
 
@@ -115,7 +110,6 @@ def empty_photo() -> NDArray[np.uint8]:
 
 @cache
 def composite() -> SensorReading:
-    """The cube on the photograph."""
     return seen(PlateLibrary(empty_photo()), world(cube=True, photo=True))
 
 
@@ -191,8 +185,10 @@ def test_images_of_another_size_show_the_same_part() -> None:
     scene = world(cube=False, photo=True)
     camera = scene.cameras[0]
     smaller = replace(camera.intrinsics, width_px=40, height_px=40)
-    scene = replace(scene, cameras=(fit_camera(replace(camera, intrinsics=smaller), plate()),))
-    shown = seen(PlateLibrary(empty_photo()), scene).channels[Channel.RADIANCE] / WHITE_CD_M2
+    scene = replace(
+        scene, cameras=(plates.fit_camera(replace(camera, intrinsics=smaller), plate()),)
+    )
+    shown = seen(PlateLibrary(empty_photo()), scene).channels[Channel.RADIANCE] / plates.WHITE_CD_M2
     part = ((empty_photo()[:, 20:100] / 255.0 + 0.055) / 1.055) ** 2.4
     means = part.reshape(40, 2, 40, 2, 3).mean(axis=(1, 3))
     np.testing.assert_allclose(shown, means, atol=2e-3)

@@ -10,13 +10,10 @@ import numpy as np
 import psutil
 import pytest
 
-from gen_data.core.asset_types import Material
-from gen_data.core.bounded_cache import ByteCache
 from gen_data.core.capture import Channel, SensorReading
 from gen_data.core.errors import ConfigError
 from gen_data.core.scene import Body, Camera, Light, Scene
 from gen_data.core.se3 import SE3
-from gen_data.renderers import TABLE
 from gen_data.renderers.warp.renderer import WarpRenderer
 from gen_data.renderers.warp.scene.device_assets import is_convex_solid
 from gen_data.renderers.warp.settings import RenderSettings
@@ -73,45 +70,6 @@ def test_the_same_scene_gives_the_same_bytes_whatever_was_rendered_before() -> N
     assert_same(first, renderer.render(scene_of(0), camera(), EVERYTHING))
 
 
-def test_a_reading_is_not_changed_by_the_next_one() -> None:
-    """Returned arrays share no memory with the renderer."""
-    renderer = WarpRenderer(library(), "cpu")
-    reading = renderer.render(scene_of(0), camera(), EVERYTHING)
-    copies = {channel: image.copy() for channel, image in reading.channels.items()}
-
-    renderer.render(scene_of(1), camera(), EVERYTHING)
-
-    for channel, image in reading.channels.items():
-        np.testing.assert_array_equal(image, copies[channel])
-
-
-def test_materials_and_lights_may_change_from_view_to_view() -> None:
-    """No state of a scene persists: a new colour on the same bodies is visible at once."""
-    renderer = WarpRenderer(library(), "cpu")
-    scene = scene_of(0)
-    before = renderer.render(scene, camera(), EVERYTHING).channels
-    red = Material((0.9, 0.05, 0.05))
-    repainted = replace(
-        scene, bodies=tuple(replace(body, materials=(red,)) for body in scene.bodies)
-    )
-
-    after = renderer.render(repainted, camera(), EVERYTHING).channels
-
-    assert (after[Channel.RADIANCE][..., 0] > after[Channel.RADIANCE][..., 1]).mean() > 0.95
-    np.testing.assert_array_equal(before[Channel.Z_DEPTH], after[Channel.Z_DEPTH])
-
-
-def test_only_what_is_asked_for_is_returned() -> None:
-    """Exactly the requested channels; silhouettes only on request."""
-    wanted = frozenset({Channel.Z_DEPTH, Channel.CATEGORY})
-
-    reading = WarpRenderer(library(), "cpu").render(scene_of(0), camera(), wanted)
-
-    assert reading.channels.keys() == wanted
-    assert not reading.silhouettes
-    assert reading.sensor == "camera"
-
-
 @pytest.mark.slow
 def test_memory_stays_flat_over_many_scenes() -> None:
     """After a warm-up, sixty scenes add less than 8 MB."""
@@ -126,43 +84,9 @@ def test_memory_stays_flat_over_many_scenes() -> None:
     assert process.memory_info().rss - before < 8 << 20
 
 
-class Weight:
-    """A value of a given size."""
-
-    def __init__(self, nbytes: int) -> None:
-        self.nbytes = nbytes
-
-
-def test_a_cache_drops_what_was_used_longest_ago() -> None:
-    """Bounded in bytes, evicting the least recently used."""
-    cache: ByteCache[Weight] = ByteCache(10)
-    made: list[str] = []
-
-    def get(name: str, nbytes: int) -> None:
-        def make() -> Weight:
-            made.append(name)
-            return Weight(nbytes)
-
-        cache.get(name, make)
-
-    get("a", 4)
-    get("b", 4)
-    get("a", 4)
-    get("c", 4)
-    get("a", 4)
-    get("b", 4)
-
-    assert made == ["a", "b", "c", "b"]
-
-
 @pytest.mark.parametrize(
     ("mesh", "convex"),
-    [
-        (box_mesh(), True),
-        (sphere_mesh(0.3, 12), True),
-        (plane_mesh(), True),
-        (room_mesh(), False),
-    ],
+    [(box_mesh(), True), (sphere_mesh(0.3, 12), True), (plane_mesh(), True), (room_mesh(), False)],
 )
 def test_a_solid_is_convex_if_no_vertex_lies_outside_a_face(mesh: object, convex: bool) -> None:
     """A room seen from inside is a cavity, not a solid."""
@@ -173,13 +97,6 @@ def test_a_device_that_is_not_there_is_an_error_that_names_the_remedy() -> None:
     """The error lists the existing devices and the alternatives."""
     with pytest.raises(ConfigError, match=r"'cuda:7' does not exist .* Choose 'auto' or 'cpu'"):
         WarpRenderer(library(), "cuda:7")
-
-
-def test_the_table_loads_the_renderer() -> None:
-    """By its name in YAML."""
-    renderer = TABLE.load("warp")(device="cpu").open(FakeLibrary({}))  # type: ignore[call-arg]
-
-    assert isinstance(renderer, WarpRenderer)
 
 
 def test_settings_refuse_what_they_do_not_know() -> None:

@@ -62,7 +62,6 @@ STORM = Weather(0.02, 20.0, 30.0, 2.0, 0.9, 0.4, 0.4, 0.05, seed=5)
 
 @pytest.fixture(scope="module")
 def library() -> FakeLibrary:
-    """Asphalt, black walls, a lid."""
     return FakeLibrary(
         {
             "road": plane_mesh(60.0, ASPHALT),
@@ -75,12 +74,10 @@ def library() -> FakeLibrary:
 
 @pytest.fixture(scope="module")
 def renderer(library: FakeLibrary) -> WarpRenderer:
-    """Settings without ambient occlusion: closed forms apply."""
     return WarpRenderer(library, "cpu", PLAIN)
 
 
 def street(weather: Weather, environment: Environment = DARK, *lights: Light) -> Scene:
-    """A road with a box in front of a black wall, labelled by instances."""
     bodies = (
         Body("road", "road"),
         Body("wall", "black", SE3((25.0, 0.0, 0.0)), instance_id=1),
@@ -91,7 +88,6 @@ def street(weather: Weather, environment: Environment = DARK, *lights: Light) ->
 
 
 def flat(weather: Weather, *bodies: Body) -> Scene:
-    """A road in the sun, seen from above."""
     return Scene("t", (Body("road", "road"), *bodies), lights=(SUN,), environment=DARK,
                  weather=weather)  # fmt: skip
 
@@ -113,7 +109,6 @@ def test_no_weather_changes_no_byte(renderer: WarpRenderer) -> None:
 
 @pytest.mark.slow
 def test_labels_do_not_see_the_weather(renderer: WarpRenderer) -> None:
-    """Ids, depth, normals and silhouettes equal those of a clear day, bit by bit."""
     channels = frozenset(Channel)
     light = (Environment(luminance_cd_m2=60.0), SUN)
     clear = renderer.render(street(Weather(), *light), AHEAD, channels)

@@ -12,17 +12,9 @@ from click.testing import CliRunner
 
 from gen_data.cli.report_command import report
 from gen_data.core.errors import StorageError
+from gen_data.report import report_tables
 from gen_data.report.label_files import SCANS_MAX, Label, Picture, Points, read_records, read_scans
 from gen_data.report.label_statistics import Survey, collect_statistics
-from gen_data.report.report_tables import (
-    DIFFICULTIES,
-    TYPES,
-    Table,
-    counts_at,
-    make_histograms,
-    make_scan_tables,
-    make_tables,
-)
 
 
 def annotation(number: int, image_id: int, category_id: int, **keys: Any) -> dict[str, Any]:
@@ -42,7 +34,6 @@ def annotation(number: int, image_id: int, category_id: int, **keys: Any) -> dic
 
 
 def write_coco(folder: Path, split: str, stem: str, n: int, rows: list[dict[str, Any]]) -> None:
-    """A file as the exporter lays it out: a line per image and per annotation."""
     head = {"categories": [{"id": 1, "name": "car"}, {"id": 2, "name": "person"}]}
     images = ",\n".join(json.dumps({"id": k}) for k in range(1, n + 1))
     lines = ",\n".join(map(json.dumps, rows))
@@ -67,7 +58,7 @@ def street(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def row_of(made: tuple[Table, ...], title: str, name: str) -> dict[str, str]:
+def row_of(made: tuple[report_tables.Table, ...], title: str, name: str) -> dict[str, str]:
     """The cells of a row by their columns; KITTI's own columns are numbered."""
     (table,) = (t for t in made if t.title == title)
     (row,) = (r for r in table.rows if r[0] == name)
@@ -95,7 +86,7 @@ def test_diversity_counts_variants_by_category_and_family() -> None:
     labels = [Label(("train", "1"), "car", "Car", 9, 9, asset=asset) for asset in ids]
     survey = collect_statistics([*labels, Label(("train", "1"), "dog", "Misc", 9, 9)])
 
-    (table,) = (one for one in make_tables(survey) if one.title == "Diversity")
+    (table,) = (one for one in report_tables.make_tables(survey) if one.title == "Diversity")
 
     assert table.header == ("category", "family", "objects", "variants", "entropy bits")
     # All: 2/6, 1/6, 1/6, 2/6, so 2/3 log2 3 + 1/3 log2 6 = 1.9183 bits.
@@ -103,10 +94,9 @@ def test_diversity_counts_variants_by_category_and_family() -> None:
 
 
 def test_labels_without_assets_have_no_table_of_diversity() -> None:
-    """KITTI's files name none."""
     survey = collect_statistics([Label(("train", "1"), "Car", "Car", 9, 9)])
 
-    assert "Diversity" not in {one.title for one in make_tables(survey)}
+    assert "Diversity" not in {one.title for one in report_tables.make_tables(survey)}
 
 
 def test_kittis_files_are_read_where_there_is_no_coco(tmp_path: Path) -> None:
@@ -129,14 +119,12 @@ def test_kittis_files_are_read_where_there_is_no_coco(tmp_path: Path) -> None:
 
 
 def test_a_folder_without_labels_is_refused(tmp_path: Path) -> None:
-    """With the remedy."""
     with pytest.raises(StorageError, match=r"there are no labels.*exported as coco or kitti"):
         list(read_records(tmp_path))
 
 
 @pytest.mark.parametrize("text", ["Car 0 0 0\n", "Car a 0 0 1 1 2 2 1 1 1 1 1 1 1\n"])
 def test_a_damaged_label_is_named_with_its_line(tmp_path: Path, text: str) -> None:
-    """Too few columns, or no number."""
     test_kittis_files_are_read_where_there_is_no_coco(tmp_path)
     path = tmp_path / "kitti/training/label_2/000007.txt"
     path.write_text(text)
@@ -157,7 +145,7 @@ def test_a_coco_file_of_another_layout_is_refused(tmp_path: Path) -> None:
 
 def test_tables_count_what_was_written(street: Path) -> None:
     """Two of four objects in each of two images, one image empty."""
-    made = make_tables(collect_statistics(read_records(street)))
+    made = report_tables.make_tables(collect_statistics(read_records(street)))
 
     images = row_of(made, "Images", "all")
     assert (images["images"], images["objects"], images["empty"]) == ("3", "4", "33.3 %")
@@ -167,7 +155,7 @@ def test_tables_count_what_was_written(street: Path) -> None:
     assert [hidden[k] for k in ("occluded 0", "1", "2")] == ["66.7 %", "33.3 %", "0.0 %"]
     assert hidden["truncated"] == "33.3 %"
     # The first is too small for all three, the second hidden, the third cut off.
-    assert [hidden[d.name] for d in DIFFICULTIES] == ["0.0 %", "66.7 %", "66.7 %"]
+    assert [hidden[d.name] for d in report_tables.DIFFICULTIES] == ["0.0 %", "66.7 %", "66.7 %"]
     assert row_of(made, "Distance and size", "person")["distance m"] == "13.0 / 13.0 / 13.0"
     points = row_of(made, "Keypoints", "person")
     assert (points["visible"], points["hidden"]) == ("50.0 %", "25.0 %")
@@ -179,7 +167,7 @@ def test_tables_count_what_was_written(street: Path) -> None:
 
 def test_labels_that_were_not_annotated_are_left_blank() -> None:
     """A data set of boxes only has sizes still; without its types KITTI is no match."""
-    made = make_tables(
+    made = report_tables.make_tables(
         collect_statistics([Picture("train", "1"), Label(("train", "1"), "mug", "Misc", 10, 20)])
     )
 
@@ -190,11 +178,10 @@ def test_labels_that_were_not_annotated_are_left_blank() -> None:
 
 
 def test_a_data_set_without_objects_has_a_report() -> None:
-    """Only negatives."""
     found = collect_statistics([Picture("train", "1")])
 
-    assert row_of(make_tables(found), "Images", "train")["empty"] == "100.0 %"
-    assert make_histograms(found)[0].counts["images"].sum() == 1
+    assert row_of(report_tables.make_tables(found), "Images", "train")["empty"] == "100.0 %"
+    assert report_tables.make_histograms(found)[0].counts["images"].sum() == 1
 
 
 def test_the_difficulties_are_those_of_the_devkit() -> None:
@@ -205,7 +192,9 @@ def test_the_difficulties_are_those_of_the_devkit() -> None:
         "truncation": np.array([0.15, 0.0, 0.3, 0.0, 0.5]),
     }
 
-    counted = [counts_at(columns, level).tolist() for level in DIFFICULTIES]
+    counted = [
+        report_tables.counts_at(columns, level).tolist() for level in report_tables.DIFFICULTIES
+    ]
 
     assert counted == [
         [True, False, False, False, False],
@@ -216,7 +205,7 @@ def test_the_difficulties_are_those_of_the_devkit() -> None:
 
 def test_kittis_counts_add_up() -> None:
     """51,865 labelled objects in all, 11,295 of which are DontCare regions."""
-    assert sum(kind.objects for kind in TYPES.values()) == 51_865 - 11_295
+    assert sum(kind.objects for kind in report_tables.TYPES.values()) == 51_865 - 11_295
 
 
 def test_histograms_lose_nothing(street: Path) -> None:
@@ -224,7 +213,7 @@ def test_histograms_lose_nothing(street: Path) -> None:
     found = collect_statistics(read_records(street))
     found.numbers[("car", "Car")].extend([5000.0, 4000.0, 0, 0, 1, 999.0, 4, 2, 1])
 
-    made = make_histograms(found)
+    made = report_tables.make_histograms(found)
 
     for histogram in made[1:]:
         assert histogram.counts["car"].sum() == 4
@@ -233,7 +222,6 @@ def test_histograms_lose_nothing(street: Path) -> None:
 
 
 def test_the_command_prints_tables_and_writes_a_page(street: Path, tmp_path: Path) -> None:
-    """From one pass over the files."""
     html = tmp_path / "out/report.html"
 
     done = CliRunner().invoke(report, [str(street), "--html", str(html)])
@@ -278,19 +266,18 @@ def test_points_on_cars_are_counted_by_distance(tmp_path: Path) -> None:
     write_scan(tmp_path / "kitti", "000000", [1, 1, 1, 2, 3, 0], CAR_ROWS)
 
     (scan,) = read_scans(tmp_path)
-    whole, cars = make_scan_tables([scan])
+    whole, cars = report_tables.make_scan_tables([scan])
 
     assert (scan.points, scan.dark) == (6, 3)
     assert scan.cars == ((5.0, 3), (20.0, 0))
-    assert whole.rows[0][1:4] == ("6", "120000", "104450")
-    assert whole.rows[0][-1] == "50.00 %"
+    assert (whole.rows[0][1:4], whole.rows[0][-1]) == (("6", "120000", "104450"), "50.00 %")
     assert [row[1] for row in cars.rows] == ["1", "0", "1", "0", "0", "0", "0", "0"]
     assert cars.rows[0][2] == "3.0" and cars.rows[2][4] == "100.0 %"
 
 
 def test_of_many_scans_some_are_read(tmp_path: Path) -> None:
     """Evenly chosen, from the first on; none of a data set without a scanner."""
-    assert list(read_scans(tmp_path)) == [] and make_scan_tables([]) == ()
+    assert list(read_scans(tmp_path)) == [] and report_tables.make_scan_tables([]) == ()
     for k in range(SCANS_MAX + 1):
         write_scan(tmp_path, f"{k:06d}", [0] * (k + 1), "")
 
@@ -300,7 +287,6 @@ def test_of_many_scans_some_are_read(tmp_path: Path) -> None:
 
 
 def test_a_scan_whose_labels_do_not_fit_is_refused(tmp_path: Path) -> None:
-    """The message names the file."""
     write_scan(tmp_path, "000007", [0, 0], "")
     (tmp_path / "training/velodyne/000007.bin").write_bytes(b"1234")
 

@@ -32,7 +32,6 @@ class Opened:
 
     @property
     def shown(self) -> str:
-        """The line about the image that is shown."""
         return self.page.inner_text("#shown")
 
     def pixels(self) -> str:

@@ -51,7 +51,6 @@ def hand(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def described(hand: Path) -> Json:
-    """Its report."""
     return describe_dataset(hand, scenes_max=0)
 
 

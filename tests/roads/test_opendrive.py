@@ -99,7 +99,6 @@ def test_a_wrong_file_is_refused_with_its_road(old: str, new: str, message: str)
 
 
 def test_a_file_with_more_lanes_than_a_city_is_refused_at_once() -> None:
-    """Three hundred roads, each as long as a road may be, would take minutes."""
     lanes = LANES.replace("<link>", "<!--").replace("</link>", "-->")
     roads = "".join(
         f'<road id="{k}" length="50000"><planView>'
@@ -114,7 +113,6 @@ def test_a_file_with_more_lanes_than_a_city_is_refused_at_once() -> None:
 
 
 def test_a_gap_between_pieces_is_refused() -> None:
-    """Two centimetres are too much."""
     whole = '<geometry s="0" x="1000" y="2000" hdg="0" length="100"><line/></geometry>'
     halves = (
         '<geometry s="0" x="1000" y="2000" hdg="0" length="50"><line/></geometry>'

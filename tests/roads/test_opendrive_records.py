@@ -21,7 +21,6 @@ SOLID = '<roadMark sOffset="0" type="solid" width="0.12"/>'
 
 
 def lane(number: int, inner: str = WIDTH, more: str = "", kind: str = "driving") -> str:
-    """A lane of one section."""
     return f'<lane id="{number}" type="{kind}" {more}>{inner}</lane>'
 
 
@@ -51,7 +50,6 @@ def text(*roads: str, more: str = "") -> bytes:
 
 
 def lanes(*roads: str, more: str = "") -> dict[str, Lane]:
-    """Lanes by name."""
     return {x.name: x for x in network_lanes(read_opendrive(text(*roads, more=more), "a.xodr"))}
 
 
@@ -281,7 +279,6 @@ DIRECT = (
 
 
 def test_a_direct_junction_joins_roads_both_ways() -> None:
-    """Without a road in between."""
     roads = (
         road(lane(1), lane(-1), link='<successor elementType="junction" elementId="9"/>'),
         road(lane(1), lane(-1), number=2, x=100,
@@ -295,7 +292,6 @@ def test_a_direct_junction_joins_roads_both_ways() -> None:
 
 
 def test_a_virtual_junction_is_left_out_and_named() -> None:
-    """Lanes do not lead into the middle of a road here."""
     virtual = '<junction id="9" type="virtual"><connection id="0" incomingRoad="1"/></junction>'
     link = '<predecessor elementType="road" elementId="2" elementS="30" elementDir="+"/>'
     network = read_opendrive(text(road(right=lane(-1), link=link), more=virtual), "a.xodr")
@@ -323,7 +319,6 @@ OBJECTS = (
 
 @pytest.mark.slow
 def test_what_has_no_effect_is_named_and_counted(tmp_path: Path) -> None:
-    """By the check of a folder."""
     inner = (
         WIDTH + '<height sOffset="0" inner="0" outer="0"/><height sOffset="9" inner="0" outer="0"/>'
     )

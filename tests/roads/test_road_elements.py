@@ -24,12 +24,10 @@ ROAD = {"type": "road", "name": "main", "length_m": 100.0}
 
 @pytest.fixture(scope="module")
 def library(tmp_path_factory: pytest.TempPathFactory) -> Library:
-    """Generated assets, cached in a folder of these tests."""
     return open_library((), Path(tmp_path_factory.mktemp("cache")))
 
 
 def built(library: Library, *lines: dict[str, Any]) -> Scene:
-    """The nominal scene of some elements."""
     elements: list[Element] = [
         TABLE.load(line["type"]).model_validate(line, strict=False) for line in lines
     ]
@@ -37,7 +35,6 @@ def built(library: Library, *lines: dict[str, Any]) -> Scene:
 
 
 def by_name(scene: Scene) -> dict[str, Lane]:
-    """The scene's lanes."""
     return {lane.name: lane for lane in scene.lanes}
 
 
@@ -153,8 +150,7 @@ def test_kerbed_median_has_a_lane_for_plants(library: Library) -> None:
     median = {"median_m": 3.0, "median_kerb_m": 0.12}
     lane = by_name(built(library, {**ROAD, **median}))["main/verge_median"]
 
-    assert lane.kind == "verge"
-    assert lane.width_m == pytest.approx(2.7)
+    assert (lane.kind, lane.width_m) == ("verge", pytest.approx(2.7))
     assert lane.center_m[0] == pytest.approx((0.0, 0.0, 0.02 * 3.5 + 0.12))
     assert "main/verge_median" not in by_name(built(library, {**ROAD, "median_m": 3.0}))
 
@@ -178,9 +174,7 @@ def test_roads_one_after_the_other_are_one_path(
 @pytest.mark.parametrize(
     "arms", [[0, 90, 180, 270], [0, 180, 270], [0, 70, 180, 300], [0, 140, 220], [0, 140, 180]]
 )
-def test_every_way_into_a_junction_leads_out_again(
-    library: Library, arms: list[float], lanes: int
-) -> None:
+def test_every_way_into_a_junction_leaves(library: Library, arms: list[float], lanes: int) -> None:
     """Each lane that comes in has a successor through the junction onto each road it may take."""
     roads = [
         {"type": "road", "name": f"arm{k}", "after": f"cross/{k}", "lanes": [lanes, lanes],
@@ -247,9 +241,7 @@ def test_car_park_has_a_lane_per_bay(library: Library) -> None:
         ({"type": "road_marking", "name": "m", "road": "main"}, "there is no road 'main'"),
     ],
 )
-def test_what_makes_no_street_is_refused(
-    library: Library, line: dict[str, Any], message: str
-) -> None:
+def test_what_is_no_street_is_refused(library: Library, line: dict[str, Any], message: str) -> None:
     """One message that names field and remedy."""
     with pytest.raises(ConfigError, match=message):
         built(library, line)
@@ -308,7 +300,7 @@ def test_roundabout_meets_the_road_before_it(library: Library) -> None:
         ({"arms_deg": [0, 180, 90]}, "ascending"),
     ],
 )
-def test_impossible_roundabouts_are_refused(
+def test_wrong_roundabouts_are_refused(
     library: Library, changed: dict[str, Any], message: str
 ) -> None:
     """One message that names field and remedy."""
@@ -350,9 +342,7 @@ def test_painted_signs_lie_in_their_lane(
         ({"station_m": 98}, "elements.m.station_m"),
     ],
 )
-def test_impossible_signs_are_refused(
-    library: Library, changed: dict[str, Any], message: str
-) -> None:
+def test_wrong_signs_are_refused(library: Library, changed: dict[str, Any], message: str) -> None:
     """One message that names field and remedy."""
     with pytest.raises(ConfigError, match=message):
         built(library, ROAD, {"type": "road_marking", "name": "m", "road": "main", **changed})

@@ -11,17 +11,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 from scipy.special import fresnel
 
-from gen_data.roads.reference_line import (
-    Arc,
-    Curve,
-    Line,
-    ParamPoly3,
-    Placed,
-    Poly3,
-    ReferenceLine,
-    Spiral,
-    bend_line,
-)
+from gen_data.roads import reference_line
 
 CURVATURES = st.floats(-0.2, 0.2, allow_nan=False)
 
@@ -30,7 +20,7 @@ CURVATURES = st.floats(-0.2, 0.2, allow_nan=False)
 @given(CURVATURES, st.floats(1.0, 300.0))
 def test_arc_keeps_its_distance_from_the_centre(curvature: float, length: float) -> None:
     """Every point lies on the circle; nearly straight arcs are as exact as strong ones."""
-    poses = Arc(length, curvature).local(np.linspace(0.0, length, 9))
+    poses = reference_line.Arc(length, curvature).local(np.linspace(0.0, length, 9))
     if abs(curvature) > 1e-6:
         radius = 1.0 / curvature
         away = np.hypot(poses[:, 0], poses[:, 1] - radius)
@@ -43,9 +33,8 @@ def test_arc_keeps_its_distance_from_the_centre(curvature: float, length: float)
 @settings(max_examples=60, deadline=None)
 @given(CURVATURES, CURVATURES, st.floats(5.0, 120.0))
 def test_spiral_is_the_integral_of_its_heading(start: float, end: float, length: float) -> None:
-    """Against adaptive quadrature."""
     s = np.array([0.0, 0.3 * length, length])
-    poses = Spiral(length, start, end).local(s)
+    poses = reference_line.Spiral(length, start, end).local(s)
 
     def heading(u: float) -> float:
         return start * u + 0.5 * (end - start) / length * u * u
@@ -65,21 +54,21 @@ def test_clothoid_from_a_straight_line_is_fresnels() -> None:
     a = math.sqrt(math.pi * length / end)
     sine, cosine = fresnel(length / a)
 
-    assert Spiral(length, 0.0, end).local(np.array([length]))[0, :2] == pytest.approx(
-        (a * cosine, a * sine), abs=1e-9
-    )
+    assert reference_line.Spiral(length, 0.0, end).local(np.array([length]))[
+        0, :2
+    ] == pytest.approx((a * cosine, a * sine), abs=1e-9)
 
 
 @pytest.mark.parametrize(
     "curve",
     [
-        Line(40.0),
-        Arc(40.0, -0.03),
-        Spiral(40.0, 0.05, -0.02),
-        Poly3(40.0, (0.0, 0.0, 0.01, -0.0001)),
+        reference_line.Line(40.0),
+        reference_line.Arc(40.0, -0.03),
+        reference_line.Spiral(40.0, 0.05, -0.02),
+        reference_line.Poly3(40.0, (0.0, 0.0, 0.01, -0.0001)),
     ],
 )
-def test_parameter_is_arc_length_and_heading_is_the_tangent(curve: Curve) -> None:
+def test_parameter_is_arc_length_and_heading_is_the_tangent(curve: reference_line.Curve) -> None:
     """Steps along the curve are as long as the parameter's, and point along the heading."""
     s = np.linspace(0.0, 40.0, 4001)
     poses = curve.local(s)
@@ -94,7 +83,7 @@ def test_parametric_cubic_runs_through_its_ends() -> None:
     """P is normalised or arc length; the heading never jumps."""
     for end in (1.0, 25.0):
         scale = 1.0 / end
-        curve = ParamPoly3(
+        curve = reference_line.ParamPoly3(
             25.0, (0.0, 24.0 * scale, 0.0, 0.0), (0.0, 0.0, 6.0 * scale**2, 0.0), end
         )
         poses = curve.local(np.linspace(0.0, 25.0, 50))
@@ -105,9 +94,10 @@ def test_parametric_cubic_runs_through_its_ends() -> None:
 
 def test_pieces_follow_one_another() -> None:
     """A line, then an arc from where and as the line ends."""
-    line = ReferenceLine(
-        (Placed(0.0, 1.0, 2.0, 0.5, Line(10.0)),
-         Placed(10.0, 1.0 + 10 * math.cos(0.5), 2.0 + 10 * math.sin(0.5), 0.5, Arc(20.0, 0.05)))
+    line = reference_line.ReferenceLine(
+        (reference_line.Placed(0.0, 1.0, 2.0, 0.5, reference_line.Line(10.0)),
+         reference_line.Placed(10.0, 1.0 + 10 * math.cos(0.5), 2.0 + 10 * math.sin(0.5), 0.5,
+                               reference_line.Arc(20.0, 0.05)))
     )  # fmt: skip
     before, after = line.poses(np.array([10.0 - 1e-7, 10.0 + 1e-7]))
 
@@ -119,7 +109,7 @@ def test_pieces_follow_one_another() -> None:
 @given(st.floats(-0.05, 0.05), st.floats(-8.0, 8.0))
 def test_offset_is_measured_at_right_angles(curvature: float, t: float) -> None:
     """Points beside the line are |t| away from it, on the side of t's sign."""
-    line = bend_line(30.0, curvature)
+    line = reference_line.bend_line(30.0, curvature)
     s = np.array([12.0])
     x, y, heading = line.poses(s)[0]
     px, py = line.points(s, np.array([t]))[0]

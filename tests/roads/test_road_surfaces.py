@@ -22,7 +22,6 @@ SLOTS = ("asphalt", "asphalt_new", "marking", "kerb", "pavement", "verge", "grou
 
 
 def mesh_of(name: str, **parameters: object) -> MeshData:
-    """The mesh of a family with some of its parameters changed."""
     family = FAMILIES[name]
     mesh: MeshData = family.build(**{**family.parameters, **parameters}).mesh
     return mesh
@@ -140,9 +139,7 @@ def test_junction_has_the_area_of_its_plan() -> None:
         ("road", {"curvature_per_m": -0.03, "traffic": "left", "rails": (0.0, 1.0)}),
     ],
 )
-def test_surfaces_are_the_same_every_time_and_face_up(
-    name: str, changed: dict[str, object]
-) -> None:
+def test_surfaces_are_always_the_same_and_face_up(name: str, changed: dict[str, object]) -> None:
     """Equal bytes; no slot is seen from below. Wires are closed tubes, no surfaces."""
     a, b = mesh_of(name, **changed), mesh_of(name, **changed)
 
@@ -261,8 +258,7 @@ def test_kerbed_median_stands_above_the_lanes() -> None:
     heights = height_m(shape, np.array([0.0, 1.3, 1.5, 5.0]))
 
     assert heights[0] == heights[1] == pytest.approx(heights[2] + 0.12)
-    assert heights[2] == pytest.approx(0.02 * 3.5)
-    assert heights[3] == pytest.approx(0.0)
+    assert (heights[2], heights[3]) == (pytest.approx(0.02 * 3.5), pytest.approx(0.0))
 
 
 def test_roundabout_has_the_area_of_its_plan() -> None:

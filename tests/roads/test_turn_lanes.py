@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from functools import cache
-
 import numpy as np
 import pytest
 
-from gen_data.assets.library import Library, open_library
 from gen_data.content.roads import FAMILIES
 from gen_data.core.asset_types import MeshData
 from gen_data.core.errors import ConfigError
@@ -19,18 +16,12 @@ from gen_data.scene_templates.element import Element
 from gen_data.scene_templates.junction import Junction
 from gen_data.scene_templates.road import Road
 from gen_data.scene_templates.signals import Signals
+from tests.libraries import library
 
 MEDIAN = {"median_m": 3.0, "length_m": 60.0}
 
 
-@cache
-def library() -> Library:
-    """Procedural assets."""
-    return open_library(())
-
-
 def built(*elements: Element) -> Scene:
-    """The nominal scene of some elements."""
     return build_scene("test", elements, library())
 
 
@@ -113,7 +104,6 @@ def test_impossible_turn_lanes_are_refused(changed: dict[str, float], field: str
 
 
 def junction_mesh(**changed: object) -> MeshData:
-    """The mesh of a junction with some of its parameters changed."""
     family = FAMILIES["junction"]
     mesh: MeshData = family.build(**{**family.parameters, **changed}).mesh
     return mesh

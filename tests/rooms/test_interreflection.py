@@ -22,12 +22,10 @@ WHITE: Vec3 = (1.0, 1.0, 1.0)
 
 
 def grey(value: float) -> tuple[Vec3, ...]:
-    """Reflectances of six equal sides."""
     return ((value, value, value),) * 6
 
 
 def lamp(at_m: Vec3, lumen: float) -> Light:
-    """A bulb of so much flux."""
     return Light("lamp", "sphere", at_m, intensity_cd=lumen / (4.0 * math.pi))
 
 

@@ -18,12 +18,10 @@ ROOMS = 24
 
 @cache
 def rooms(kind: str) -> tuple[Scene, ...]:
-    """Furnished rooms of a type."""
     return tuple(furnished(kind, seed) for seed in range(ROOMS))
 
 
 def walls(scene: Scene) -> list[Body]:
-    """The walls of a room."""
     return [body for body in scene.bodies if family(body) == "wall"]
 
 
@@ -34,7 +32,6 @@ def saturation_and_value(material: Material) -> tuple[float, float]:
 
 
 def is_painted(material: Material) -> bool:
-    """Whether a material is wall paint."""
     return material.texture.startswith("texture/paint?")
 
 

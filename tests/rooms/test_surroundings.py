@@ -20,7 +20,6 @@ ON, OFF = dist.Constant(True), dist.Constant(False)
 
 
 def outside(scene: Scene) -> list[Body]:
-    """Ground, houses and trees."""
     return [b for b in scene.bodies if b.name.startswith("room/outside")]
 
 

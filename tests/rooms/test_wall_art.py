@@ -18,7 +18,6 @@ VARIANTS = 84
 
 @cache
 def picture(seed: int) -> UInt8:
-    """A motif."""
     return wall_art(seed).albedo
 
 

@@ -73,7 +73,6 @@ class LinesExporter:
     needs: frozenset[str] = frozenset()
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
-        """Write the shard's lines."""
         del info
         lines = [
             {"image": s.image_id(sensor), "category": o.instance.category, "px": o.visible_px}
@@ -86,7 +85,6 @@ class LinesExporter:
         (folder / "part.jsonl").write_text("".join(f"{canonical_json(line)}\n" for line in lines))
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
-        """Join the lines and link the images."""
         parts = [(d / "lines" / "part.jsonl").read_text() for d in shard_dirs]
         (dataset_dir / "all.jsonl").write_text("".join(parts))
         (dataset_dir / "images").mkdir()
@@ -107,7 +105,6 @@ class FakePipeline:
 
     @property
     def info(self) -> DatasetInfo:
-        """Two views per scene, one camera."""
         color = SensorInfo("color", Modality.CAMERA, channels=(Channel.RGB,))
         return DatasetInfo("fake", 7, self.n, 2, CATEGORIES, (color,))
 
@@ -210,7 +207,6 @@ def write_raw_images(info: DatasetInfo, sample: Sample, shard_dir: Path) -> None
 
 
 def fake_plan(n: int = 10, shard_size: int = 4, **changes: object) -> Plan:
-    """A plan for the fake pipeline."""
     config = {"camera": {"fov_deg": 50}, "objects": [{"count": 3}], **changes}
     return Plan(
         config, "fake", 7, n, shard_size, versions={"gen-data": "0"}, assets={"asset": "00" * 32}
@@ -226,7 +222,6 @@ def make(
     trouble: Trouble | None = None,
     settings: Settings | None = None,
 ) -> Summary:
-    """A fake data set, or the rest of one."""
     return run(
         fake_plan(n, shard_size),
         FakeFactory(n, trouble or Trouble()),

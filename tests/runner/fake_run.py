@@ -18,7 +18,6 @@ DELAY_S = 0.04
 
 
 def main() -> int:
-    """Run, and report like the command line does."""
     out, workers, delay_s = sys.argv[1], int(sys.argv[2]), float(sys.argv[3])
     # Random bytes do not compress: the job is at least as large as they are.
     ballast = os.urandom(int(sys.argv[4])) if len(sys.argv) > 4 else b""

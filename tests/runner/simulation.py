@@ -21,22 +21,8 @@ from collections import Counter
 from dataclasses import dataclass, field, replace
 
 from gen_data.core.errors import GenDataError, Interrupted, StorageError, WorkerLost
+from gen_data.runner import worker_events
 from gen_data.runner.supervisor import Limits, Supervisor
-from gen_data.runner.worker_events import (
-    Abort,
-    Action,
-    Assign,
-    Dismiss,
-    Event,
-    Exited,
-    Failed,
-    Kill,
-    Ready,
-    SampleDone,
-    ShardDone,
-    Spawn,
-    Tick,
-)
 
 SHARD_SIZE = 3
 TICK_S = 0.5
@@ -194,13 +180,13 @@ class Run:
             took_s = process.killed_s - heard_s
             self._expect(took_s <= patience_s + 5.0, f"hung for {took_s:.1f} s")
 
-    def _carry_out(self, actions: list[Action]) -> None:
+    def _carry_out(self, actions: list[worker_events.Action]) -> None:
         for action in actions:
-            if isinstance(action, Spawn):
+            if isinstance(action, worker_events.Spawn):
                 self._spawn(action.worker)
-            elif isinstance(action, (Assign, Dismiss)):
+            elif isinstance(action, (worker_events.Assign, worker_events.Dismiss)):
                 self._send_command(action)
-            elif isinstance(action, Kill):
+            elif isinstance(action, worker_events.Kill):
                 process = self.processes[action.worker]
                 process.killed_s = process.killed_s or self.now_s
                 self._later(0.2, "end", action.worker, -9)
@@ -217,12 +203,12 @@ class Run:
         self.processes[number] = Process()
         self._later(3.0, "started", number)
 
-    def _send_command(self, action: Assign | Dismiss) -> None:
+    def _send_command(self, action: worker_events.Assign | worker_events.Dismiss) -> None:
         process = self.processes[action.worker]
-        process.leaves = isinstance(action, Dismiss)
-        if isinstance(action, Assign):
+        process.leaves = isinstance(action, worker_events.Dismiss)
+        if isinstance(action, worker_events.Assign):
             self.attempts[action.shard] += 1
-        if isinstance(action, Assign) and not self.size:
+        if isinstance(action, worker_events.Assign) and not self.size:
             holders = [
                 n
                 for n, p in self.processes.items()
@@ -239,12 +225,12 @@ class Run:
         elif self._happens(self.faults.stops_at_start):
             self.processes[number].stopped_s = self.now_s
         else:
-            self._send(number, Ready(number))
+            self._send(number, worker_events.Ready(number))
 
     def _on_command(self, number: int, action: object) -> None:
         if self._is_dead_or_stopped(number):
             return
-        if isinstance(action, Assign):
+        if isinstance(action, worker_events.Assign):
             self.processes[number].shard = action.shard
             self.processes[number].began_s = self.now_s
             self._later(self.sample_s, "sample", number, 0)
@@ -266,10 +252,10 @@ class Run:
         elif self._happens(self.faults.stops):
             self.processes[number].stopped_s = self.now_s
         elif index == self.faults.fails_at:
-            self._send(number, Failed(number, StorageError("the disk is full")))
+            self._send(number, worker_events.Failed(number, StorageError("the disk is full")))
             self._on_end(number, 1)
         else:
-            self._send(number, SampleDone(number, shard, index))
+            self._send(number, worker_events.SampleDone(number, shard, index))
             last = done + 1 == SHARD_SIZE
             self._later(self.sample_s, "commit" if last else "sample", number, done + 1)
 
@@ -284,7 +270,9 @@ class Run:
             self._on_end(number, -9)
             return
         rss_bytes = self.rng.choice((0, 2000))
-        self._send(number, ShardDone(number, process.shard, SHARD_SIZE, 1, 0, rss_bytes))
+        self._send(
+            number, worker_events.ShardDone(number, process.shard, SHARD_SIZE, 1, 0, rss_bytes)
+        )
         process.shard = -1
 
     def _on_end(self, number: int, code: object, machine_lost: bool = False) -> None:
@@ -294,7 +282,9 @@ class Run:
         assert isinstance(code, int)
         process.ended, process.shard = True, -1
         out_of_memory = code == -9 and not self.size and self.rng.random() < 0.2
-        self._send(number, Exited(number, code, out_of_memory, machine_lost=machine_lost))
+        self._send(
+            number, worker_events.Exited(number, code, out_of_memory, machine_lost=machine_lost)
+        )
 
     def _on_event(self, number: int, event: object) -> None:
         del number
@@ -302,21 +292,21 @@ class Run:
 
     def _on_tick(self, number: int, detail: object) -> None:
         del number, detail
-        self._tell(Tick())
+        self._tell(worker_events.Tick())
         self._at(self.now_s + TICK_S, "tick")
 
     def _on_abort(self, number: int, detail: object) -> None:
         del number, detail
-        self._tell(Abort(Interrupted("stop")))
+        self._tell(worker_events.Abort(Interrupted("stop")))
 
-    def _tell(self, event: Event) -> None:
+    def _tell(self, event: worker_events.Event) -> None:
         self.handling_s -= time.perf_counter()
         actions = self.supervisor.handle(event, self.now_s)
         self.handling_s += time.perf_counter()
         self.events += 1
         self._carry_out(actions)
 
-    def _send(self, number: int, event: Event) -> None:
+    def _send(self, number: int, event: worker_events.Event) -> None:
         """Put a message into the pipe; it arrives after those before it."""
         process = self.processes[number]
         process.delivered_s = max(process.delivered_s, self.now_s + self._delay())

@@ -36,7 +36,6 @@ LICENCES += "| here | MIT | me | mug |\n| there | CC0-1.0 | you | bowl |\n"
 
 
 def facts(publication: Publication = PUBLICATION) -> DatasetFacts:
-    """Facts of the fake data set of ten samples."""
     info: DatasetInfo = FakePipeline(10, Trouble()).info
     counts = (SplitCount("train", 8, {"mug": 8}), SplitCount("val", 2, {"bowl": 1}))
     info = replace(info, publication=publication)
@@ -93,9 +92,7 @@ def test_texts_of_users_are_no_html_in_the_card_and_the_table_of_licences() -> N
         ({"map": {"min_box_px": 20, "ignore": ["bowl"]}}, ["`min_box_px: 20, ignore: [bowl]`"]),
     ],
 )  # fmt: skip
-def test_the_card_states_what_has_no_labels(
-    labels: dict[str, Any] | None, words: list[str]
-) -> None:
+def test_a_card_states_what_has_no_labels(labels: dict[str, Any] | None, words: list[str]) -> None:
     """The configuration's limits, or the default ones."""
     given = {} if labels is None else {"labels": labels}
     plan = replace(fake_plan(), config={**fake_plan().config, **given})
@@ -107,24 +104,20 @@ def test_the_card_states_what_has_no_labels(
 
 
 def test_without_a_publication_only_licences_of_assets_are_stated() -> None:
-    """No licence is invented."""
     bare = facts(Publication())
 
     assert "The publisher has stated no licence of its own." in data_card(bare)
     assert "## Publication" not in data_card(bare)
     metadata = json.loads(croissant_json(bare))
-    assert metadata["license"] == ["CC0-1.0", "MIT"]
-    assert metadata["name"] == "fake"
+    assert (metadata["license"], metadata["name"]) == (["CC0-1.0", "MIT"], "fake")
 
 
 def test_texts_without_a_table_have_no_licences() -> None:
-    """The header is no licence."""
     assert licences_in("# Assets\n\nnone\n") == []
     assert licences_in(LICENCES.rpartition("|---")[0]) == []
 
 
 def test_size_does_not_depend_on_the_number_of_samples() -> None:
-    """Files are listed as sets."""
     few = facts()
     many = replace(few, plan=replace(few.plan, n=90), info=replace(few.info, n=90))
 

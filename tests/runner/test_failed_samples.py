@@ -31,13 +31,11 @@ BUG = FailedSample(5, "sample", "ValueError")
 
 
 def manifest_of(folder: Path) -> Mapping[str, Any]:
-    """The manifest of a data set."""
     manifest: Mapping[str, Any] = json.loads((folder / "manifest.json").read_text())
     return manifest
 
 
 def files_of(folder: Path) -> dict[str, bytes]:
-    """Contents of the files of all shards."""
     paths = (path for path in (folder / "shards").rglob("*") if path.is_file())
     return {path.relative_to(folder).as_posix(): path.read_bytes() for path in paths}
 
@@ -74,9 +72,7 @@ def test_the_manifest_of_a_whole_data_set_names_no_failures(tmp_path: Path) -> N
 @pytest.mark.parametrize(
     "trouble", [Trouble(bug_at=5), Trouble(nan_at=5)], ids=["raises", "fails while written"]
 )
-def test_a_failed_sample_leaves_no_file_and_changes_no_other(
-    tmp_path: Path, trouble: Trouble
-) -> None:
+def test_a_failed_sample_leaves_no_file_and_no_change(tmp_path: Path, trouble: Trouble) -> None:
     """Against the data set with that sample, only its image and its lines are missing."""
     make(tmp_path / "whole")
     make(tmp_path / "lacking", trouble=trouble, settings=SKIP)
@@ -97,9 +93,7 @@ def test_a_failed_sample_leaves_no_file_and_changes_no_other(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("index", [0, 3, 4, 9])
-def test_the_bytes_depend_on_the_plan_and_the_failed_samples_alone(
-    tmp_path: Path, index: int
-) -> None:
+def test_the_bytes_depend_on_the_plan_and_failed_samples(tmp_path: Path, index: int) -> None:
     """Where it fails, and how many workers there are, makes no difference to any data file."""
     make(tmp_path / "early", trouble=Trouble(bug_at=index), settings=SKIP)
     late = Trouble(errors={index: ValueError("another text")})
@@ -124,9 +118,7 @@ def test_whatever_a_plug_in_raises_fails_its_sample_alone(
 
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt(), SystemExit(3)])
-def test_what_would_end_a_process_is_an_error_of_its_sample(
-    tmp_path: Path, error: BaseException
-) -> None:
+def test_what_would_end_a_process_is_a_samples_error(tmp_path: Path, error: BaseException) -> None:
     """Without the option, the run ends with the sample, the class and a command."""
     with pytest.raises(SampleError, match=rf"sample 5: {type(error).__name__}: ") as caught:
         make(tmp_path, trouble=Trouble(errors={5: error}), workers=1)
@@ -146,8 +138,7 @@ def test_a_sample_that_hangs_is_killed_after_its_limit_and_skipped(tmp_path: Pat
     settings = replace(SKIP, limits=Limits(sample_s=1.5))
     summary = make(tmp_path, trouble=Trouble(hangs_at=5), settings=settings, workers=1)
 
-    assert summary.failed == (FailedSample(5, "process", "hang"),)
-    assert summary.worker_deaths == 1
+    assert (summary.failed, summary.worker_deaths) == ((FailedSample(5, "process", "hang"),), 1)
     assert summary.samples == 9
 
 
@@ -168,8 +159,7 @@ def test_a_sample_that_crashes_its_worker_every_time_is_skipped(tmp_path: Path) 
     """After as many tries as without the option, because a worker may die for other reasons."""
     summary = make(tmp_path, trouble=Trouble(killed_at=5), settings=SKIP, workers=1)
 
-    assert summary.failed[0].index == 5
-    assert summary.failed[0].stage == "process"
+    assert (summary.failed[0].index, summary.failed[0].stage) == (5, "process")
     assert summary.worker_deaths == 3
 
 
@@ -184,9 +174,7 @@ def test_a_worker_that_is_killed_once_loses_no_sample(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("error", [OutOfMemory("no memory"), StorageError("disk full")])
-def test_errors_of_the_machine_are_no_failures_of_samples(
-    tmp_path: Path, error: BaseException
-) -> None:
+def test_errors_of_the_machine_fail_no_samples(tmp_path: Path, error: BaseException) -> None:
     """They would make a data set that depends on the machine."""
     with pytest.raises(type(error)):
         make(tmp_path, trouble=Trouble(errors={5: error}), settings=SKIP)
@@ -210,7 +198,7 @@ def test_a_shard_in_which_every_sample_fails_is_a_valid_part(tmp_path: Path) -> 
     assert StoredSamples(tmp_path).sample(8).index == 8
 
 
-def test_an_unfinished_data_set_is_resumed_without_trying_failed_samples_again(
+def test_an_unfinished_data_set_is_resumed_without_its_failed_samples(
     tmp_path: Path,
 ) -> None:
     """What was committed stays; the second run makes the shard that was missing."""
@@ -230,8 +218,7 @@ def test_a_finished_data_set_is_not_made_again_for_its_failed_samples(tmp_path: 
     again = make(tmp_path, settings=SKIP)
 
     assert again.already_complete
-    assert again.failed == (BUG,)
-    assert again.samples == 9
+    assert (again.failed, again.samples) == ((BUG,), 9)
 
 
 def test_repair_tries_failed_samples_again(tmp_path: Path) -> None:

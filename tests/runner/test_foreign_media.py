@@ -20,7 +20,6 @@ HEIGHT_PX, WIDTH_PX = 48, 64
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A table with a camera and its laser points."""
     out = tmp_path_factory.mktemp("media") / "table"
     gen_data.generate(
         "tabletop.yaml", 1, out=out, workers=0, overrides=["sensors.color.size_px=[64,48]"]

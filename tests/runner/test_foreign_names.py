@@ -44,7 +44,6 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def memory() -> Iterator[str]:
-    """A URL of storage in this process."""
     system = fsspec.filesystem("memory")
     yield "memory://bucket/set"
     system.store.clear()
@@ -52,7 +51,6 @@ def memory() -> Iterator[str]:
 
 
 def edit_record(data: bytes, edit: Callable[[dict[str, Any]], None]) -> bytes:
-    """A record with other contents and a right checksum."""
     plain = json.loads(data)
     plain.pop("sha256")
     edit(plain)
@@ -118,9 +116,7 @@ def test_a_record_with_a_path_outside_is_no_record(tmp_path: Path, key: str) -> 
     assert parse_unchecked_record(data) is None
 
 
-def test_opening_a_data_set_at_a_url_writes_nothing_outside_its_cache(
-    tmp_path: Path, memory: str
-) -> None:
+def test_opening_a_url_writes_nothing_outside_its_cache(tmp_path: Path, memory: str) -> None:
     make(tmp_path / "set")
     plant(tmp_path / "set")
     publish(tmp_path / "set", memory)
@@ -170,7 +166,6 @@ def test_an_empty_folder_of_a_manifest_cannot_lie_outside(tmp_path: Path, memory
 
 
 def test_merging_a_part_whose_record_leads_out_takes_nothing_of_it(tmp_path: Path) -> None:
-    """Its shard counts as missing."""
     part = tmp_path / "parts/one"
     make(part, 4, 2, settings=Settings(shards=range(1), write_media=write_raw_images))
     path = part / "shards/000000.json"
@@ -185,7 +180,6 @@ def test_merging_a_part_whose_record_leads_out_takes_nothing_of_it(tmp_path: Pat
 
 @pytest.mark.parametrize("key", ["categories", "sensors", "name"])
 def test_names_in_a_manifest_cannot_be_paths(tmp_path: Path, key: str) -> None:
-    """Exporters name files by them."""
     make(tmp_path / "set")
     manifest_path = tmp_path / "set/manifest.json"
     manifest = json.loads(manifest_path.read_bytes())

@@ -67,7 +67,7 @@ def test_what_is_there_already_needs_no_estimate(tmp_path: Path) -> None:
     assert make(tmp_path / "out", settings=estimated(1e12)).already_complete
 
 
-def test_a_run_ends_before_the_last_byte_of_the_disk(
+def test_a_run_ends_before_the_disk_is_full(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Even with --force: the log of the run needs space."""
@@ -107,5 +107,4 @@ def test_a_merge_that_will_not_fit_is_refused_before_anything_is_written(
 
 
 def fail() -> NoReturn:
-    """A record is missing."""
     raise AssertionError

@@ -20,7 +20,6 @@ N, SHARD_SIZE = 11, 2
 
 
 def make_part(out: Path, shards: range) -> Path:
-    """A part of the data set."""
     make(out, N, SHARD_SIZE, settings=Settings(shards=shards, write_media=write_raw_images))
     return out
 
@@ -90,7 +89,6 @@ def test_merging_again_after_a_crash_goes_on(tmp_path: Path) -> None:
 
 
 def test_damage_in_a_part_is_not_sealed(tmp_path: Path) -> None:
-    """The shard is generated again."""
     part = make_part(tmp_path / "a", range(6))
     make(tmp_path / "whole", N, SHARD_SIZE)
     victim = next(p for p in sorted((part / "shards/000001").rglob("*")) if p.is_file())

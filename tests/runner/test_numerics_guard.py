@@ -30,7 +30,6 @@ class Machine(FakePipeline):
 
 
 def make_job(out: Path, allow: bool = False) -> Job:
-    """A job in a prepared folder."""
     store = LocalStore(out)
     if not out.exists():
         with store.locked():

@@ -49,7 +49,6 @@ def memory() -> Iterator[str]:
 def make_at(
     url: str, n: int = 10, progress: Callable[[RunProgress], None] | None = None, **changes: object
 ) -> Summary:
-    """A fake data set at a URL, made in this process."""
     return run(
         replace(fake_plan(n), **changes),
         FakeFactory(n),
@@ -63,7 +62,6 @@ def make_at(
 
 
 def download(url: str, folder: Path) -> Path:
-    """A data set at a URL as a folder."""
     objects = ObjectFolder(url)
     objects.download({name: folder / name for name in objects.tree()})
     return folder
@@ -157,8 +155,7 @@ def test_damage_at_a_url_is_found_and_made_again(tmp_path: Path, memory: str) ->
 
     copy_outline(ObjectFolder(memory), tmp_path / "outline")
     [finding] = find_deviations(tmp_path / "outline")
-    assert finding.path == "shards/000001/color/rgb/000000005.png"
-    assert finding.samples == "sample 5"
+    assert (finding.path, finding.samples) == ("shards/000001/color/rgb/000000005.png", "sample 5")
 
     assert not make_at(memory).already_complete
     assert tree_digest(download(memory, tmp_path / "copy")) == tree_digest(tmp_path / "here")
@@ -274,9 +271,7 @@ def test_the_command_that_made_a_data_set_repairs_an_object_of_equal_size(
 
 
 @pytest.mark.parametrize("lost", ["shards/000000/labels.jsonl", "manifest.json", "plan.json"])
-def test_damage_and_a_missing_object_are_repaired_by_one_command(
-    lost: str, tmp_path: Path, memory: str
-) -> None:
+def test_damage_and_missing_objects_are_repaired(lost: str, tmp_path: Path, memory: str) -> None:
     make(tmp_path / "here")
     make_at(memory)
     exchange(f"{memory}/shards/000001/color/rgb/000000005.png")

@@ -45,7 +45,6 @@ def test_a_plan_comes_back_from_its_file(tmp_path: Path) -> None:
 
 
 def test_equal_plans_are_equal_bytes_whatever_the_order_of_keys() -> None:
-    """Reordering keys is a formatting edit."""
     first = replace(fake_plan(), config={"a": 1, "b": [2.5, None]})
     second = replace(fake_plan(), config={"b": [2.5, None], "a": 1})
 
@@ -81,7 +80,6 @@ def test_a_seed_that_differs_is_named_once() -> None:
 
 @pytest.mark.parametrize("text", ["", "[]", "{}", '{"n": 1}', "not json", '{"config": 1, "q": 2}'])
 def test_what_is_no_plan_is_refused_by_name(tmp_path: Path, text: str) -> None:
-    """Any damage to plan.json is one StorageError that names the file."""
     (tmp_path / "plan.json").write_text(text)
 
     with pytest.raises(StorageError, match=r"plan\.json: damaged"):

@@ -27,7 +27,6 @@ HANG_S = 120.0
 
 @pytest.fixture(scope="module")
 def reference_digest(tmp_path_factory: pytest.TempPathFactory) -> str:
-    """Digest of the ten-sample data set, made in this process."""
     out = tmp_path_factory.mktemp("reference") / "out"
     make(out)
     return tree_digest(out)
@@ -44,7 +43,6 @@ def start_fake_run(
     ballast_bytes: int = 0,
     environment: Mapping[str, str] | None = None,
 ) -> subprocess.Popen[str]:
-    """A run in a process group of its own."""
     arguments = [str(out), str(workers), str(delay_s), str(ballast_bytes)]
     return subprocess.Popen(
         [sys.executable, "-m", "tests.runner.fake_run", *arguments],
@@ -57,7 +55,6 @@ def start_fake_run(
 
 
 def wait_for(condition: Callable[[], bool]) -> None:
-    """Poll until ``condition()`` holds."""
     deadline_s = time.monotonic() + HANG_S
     while time.monotonic() < deadline_s:
         if condition():
@@ -84,9 +81,7 @@ def committed(out: Path) -> int:
 
 
 @pytest.mark.slow
-def test_a_killed_worker_is_replaced_and_its_shard_made_again(
-    tmp_path: Path, reference_digest: str
-) -> None:
+def test_a_killed_workers_shard_is_made_again(tmp_path: Path, reference_digest: str) -> None:
     """One SIGKILL at sample 5: the same bytes, and the log says what happened."""
     trouble = Trouble(killed_once_at=5, marker=str(tmp_path / "marker"))
 
@@ -113,9 +108,7 @@ def test_a_poisoned_sample_is_named_and_all_other_shards_are_made(tmp_path: Path
 
 
 @pytest.mark.slow
-def test_a_healed_run_completes_what_a_poisoned_one_left(
-    tmp_path: Path, reference_digest: str
-) -> None:
+def test_a_healed_run_completes_a_poisoned_one(tmp_path: Path, reference_digest: str) -> None:
     """After the cause is gone, the same command makes the one missing shard."""
     with pytest.raises(WorkerLost):
         make(tmp_path / "out", workers=1, trouble=Trouble(killed_at=6))
@@ -127,9 +120,7 @@ def test_a_healed_run_completes_what_a_poisoned_one_left(
 
 
 @pytest.mark.slow
-def test_a_hanging_worker_is_killed_and_its_shard_made_by_another(
-    tmp_path: Path, reference_digest: str
-) -> None:
+def test_a_hanging_worker_is_killed_and_replaced(tmp_path: Path, reference_digest: str) -> None:
     """Silence over the limit counts as death."""
     trouble = Trouble(hangs_once_at=5, marker=str(tmp_path / "marker"))
 
@@ -140,9 +131,7 @@ def test_a_hanging_worker_is_killed_and_its_shard_made_by_another(
 
 
 @pytest.mark.slow
-def test_killed_workers_leave_no_temporary_files(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_killed_workers_leave_no_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """What engines put into temporary folders goes with the run, under a name of any length."""
     elsewhere = tmp_path / "temporary"
     elsewhere.mkdir()
@@ -189,7 +178,6 @@ def test_a_wrong_sample_is_named_with_the_command_that_makes_it(tmp_path: Path) 
 
 @pytest.mark.slow
 def test_workers_that_cannot_start_end_the_run(tmp_path: Path) -> None:
-    """Not an endless loop of processes."""
     with pytest.raises(WorkerLost, match="while they start: killed by signal 9"):
         make(tmp_path / "out", workers=1, trouble=Trouble(start_fails=True))
 
@@ -204,7 +192,7 @@ def test_what_workers_print_and_how_they_crash_is_kept_in_the_run_folder(tmp_pat
 
 @pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_ctrl_c_stops_quickly_keeps_shards_and_tells_how_to_go_on(
+def test_ctrl_c_stops_quickly_and_tells_how_to_go_on(
     tmp_path: Path, number: signal.Signals
 ) -> None:
     """Exit code 130, the resume command, nobody left running."""
@@ -286,7 +274,6 @@ def test_lack_of_memory_in_a_worker_is_one_line() -> None:
 
 
 def test_an_error_that_cannot_travel_arrives_as_its_nearest_relative() -> None:
-    """Kind and text survive; only the class of the plug-in is lost."""
     arrived = make_sendable(Stubborn())
 
     assert type(arrived) is SampleError
@@ -311,9 +298,7 @@ def test_a_worker_that_stood_by_makes_the_same_files(tmp_path: Path, reference_d
     assert notes_of(tmp_path / "out") == []
 
 
-def test_a_worker_that_died_while_it_stood_by_is_replaced(
-    tmp_path: Path, reference_digest: str
-) -> None:
+def test_a_worker_that_died_standing_by_is_replaced(tmp_path: Path, reference_digest: str) -> None:
     """The run starts another process in its place."""
     with StandbyWorker() as standby:
         standby.process.kill()

@@ -16,14 +16,7 @@ import pytest
 from gen_data.core.errors import ConfigError, Interrupted
 from gen_data.runner.ray_cluster import RayCluster
 from gen_data.runner.run import Settings, Summary, run
-from tests.runner.doubles import (
-    FakeFactory,
-    Trouble,
-    fake_plan,
-    notes_of,
-    tree_digest,
-    write_raw_images,
-)
+from tests.runner import doubles
 
 N, SHARD_SIZE = 40, 2
 
@@ -42,16 +35,16 @@ def cluster() -> Iterator[Any]:
     made.shutdown()
 
 
-def make(out: Path, trouble: Trouble, workers: int = 0) -> Summary:
+def make(out: Path, trouble: doubles.Trouble, workers: int = 0) -> Summary:
     """A data set, made in this process or by workers on the cluster."""
     cluster = RayCluster(cpus=1.0)
     return run(
-        replace(fake_plan(N, SHARD_SIZE), versions={}),
-        FakeFactory(N, trouble),
+        replace(doubles.fake_plan(N, SHARD_SIZE), versions={}),
+        doubles.FakeFactory(N, trouble),
         out,
         workers=workers,
         resume_command="",
-        settings=Settings(write_media=write_raw_images, open_pool=cluster.open_pool),
+        settings=Settings(write_media=doubles.write_raw_images, open_pool=cluster.open_pool),
     )
 
 
@@ -76,9 +69,9 @@ def test_lost_machines_and_workers_change_no_byte(tmp_path: Path, cluster: Any) 
     cluster.wait_for_nodes()
     assert RayCluster(cpus=1.0).worker_count() == 3
     assert RayCluster(cpus=0.5, gpus=0.25).worker_count() == 1
-    make(tmp_path / "here", Trouble())
+    make(tmp_path / "here", doubles.Trouble())
     out = tmp_path / "ray"
-    trouble = Trouble(delay_s=0.15, killed_once_at=31, marker=str(tmp_path / "marker"))
+    trouble = doubles.Trouble(delay_s=0.15, killed_once_at=31, marker=str(tmp_path / "marker"))
 
     interrupting = after_shards(out, 3, lambda: os.kill(os.getpid(), signal.SIGINT))
     with pytest.raises(Interrupted):
@@ -88,12 +81,12 @@ def test_lost_machines_and_workers_change_no_byte(tmp_path: Path, cluster: Any) 
     losing = after_shards(out, 8, lambda: cluster.remove_node(lost, allow_graceful=False))
     summary = make(out, trouble, workers=3)
     losing.join()
-    notes = notes_of(out)
+    notes = doubles.notes_of(out)
     assert any("lost with machine" in note for note in notes)
     assert any("ended: " in note for note in notes)
     assert summary.worker_deaths == 2
     assert summary.cpu_s["render"] == pytest.approx(0.25)
-    assert tree_digest(out) == tree_digest(tmp_path / "here")
+    assert doubles.tree_digest(out) == doubles.tree_digest(tmp_path / "here")
 
 
 def test_wrong_resources_and_addresses_are_refused() -> None:

@@ -21,7 +21,6 @@ REPAIR = Settings(repair=True, write_media=write_raw_images)
 
 @pytest.fixture(scope="module")
 def pristine(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A finished data set of three shards; tests work on copies."""
     out = tmp_path_factory.mktemp("pristine") / "out"
     make(out, N, SHARD_SIZE)
     return out
@@ -29,12 +28,10 @@ def pristine(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def dataset(pristine: Path, tmp_path: Path) -> Path:
-    """A copy that a test may damage."""
     return Path(shutil.copytree(pristine, tmp_path / "out"))
 
 
 def files_of(root: Path) -> list[Path]:
-    """All files of the data set, sorted."""
     return sorted(
         p for p in root.rglob("*") if p.is_file() and p.relative_to(root).parts[0] != "run"
     )
@@ -179,7 +176,6 @@ def test_a_damaged_plan_needs_its_own_configuration(dataset: Path) -> None:
 
 
 def test_other_bytes_than_the_sealed_ones_are_never_sealed(dataset: Path) -> None:
-    """A program that generates other samples cannot repair: exit 5, and no manifest."""
     (dataset / "shards/000001/color/rgb/000000003.png").unlink()
 
     def write_others(info: object, sample: object, shard_dir: Path) -> None:

@@ -25,7 +25,6 @@ INDEX = 3
 
 
 def make_sample() -> Sample:
-    """A fake sample with a depth image."""
     sample = fake_sample(INDEX)
     reading = sample.capture.readings["color"]
     depth_m = np.full((HEIGHT_PX, WIDTH_PX), 1.5, np.float32)
@@ -44,13 +43,11 @@ class OneSample:
 
     @property
     def info(self) -> DatasetInfo:
-        """Of the fake pipeline, with depth."""
         info = FakePipeline(10, Trouble()).info
         color = replace(info.sensors[0], channels=(Channel.RGB, Channel.Z_DEPTH))
         return replace(info, sensors=(color,))
 
     def sample(self, index: int) -> Sample:
-        """The sample."""
         assert index == INDEX
         return self._sample
 

@@ -69,7 +69,6 @@ CLEANS_UP_FOR_LONG = """
 
 
 def start(body: str, folder: Path) -> subprocess.Popen[str]:
-    """Start the command and wait until it has begun."""
     marker = folder / "begun"
     process = subprocess.Popen(
         [sys.executable, "-c", START.format(body=body), str(marker)],
@@ -95,9 +94,7 @@ def test_a_signal_lets_a_command_clean_up(tmp_path: Path, number: signal.Signals
 
 
 @pytest.mark.parametrize("body", [SWALLOWS, COMPUTES], ids=["swallowed", "native code"])
-def test_a_signal_that_has_no_effect_ends_the_process_all_the_same(
-    tmp_path: Path, body: str
-) -> None:
+def test_a_signal_without_effect_ends_the_process_all_the_same(tmp_path: Path, body: str) -> None:
     """Code that drops KeyboardInterrupt, or computes for hours, is ended after the patience."""
     process = start(body, tmp_path)
 
@@ -118,8 +115,7 @@ def test_an_error_that_an_interruption_caused_is_no_traceback(tmp_path: Path) ->
 
 
 @pytest.mark.parametrize(
-    "error",
-    ["MemoryError", "ImportError('x.so: failed to map segment from shared object')"],
+    "error", ["MemoryError", "ImportError('x.so: failed to map segment from shared object')"]
 )
 def test_lack_of_memory_is_one_line(tmp_path: Path, error: str) -> None:
     """Under ``ulimit -v``, libraries cannot even be loaded; a traceback tells nothing."""

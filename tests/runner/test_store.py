@@ -28,25 +28,15 @@ from gen_data.runner.run import run
 from gen_data.runner.shard import Job, make_shard
 from gen_data.runner.store import FolderState, LocalStore
 from gen_data.runner.verify import verify
-from tests.runner.doubles import (
-    RESUME,
-    FakeFactory,
-    FakePipeline,
-    Trouble,
-    fake_plan,
-    make,
-    tree_digest,
-    write_raw_images,
-)
+from tests.runner import doubles
 from tests.runner.fragile_disk import ERRNOS, FragileDisk, Killed
 
 
 @pytest.fixture(scope="module")
 def reference_digest(tmp_path_factory: pytest.TempPathFactory) -> str:
-    """Digest of the ten-sample data set, made without interruption."""
     out = tmp_path_factory.mktemp("reference") / "out"
-    make(out)
-    return tree_digest(out)
+    doubles.make(out)
+    return doubles.tree_digest(out)
 
 
 def names_in(folder: Path) -> set[str]:
@@ -55,7 +45,7 @@ def names_in(folder: Path) -> set[str]:
 
 def test_a_finished_folder_holds_what_the_layout_says(tmp_path: Path) -> None:
     """Plan, shards with records, exporter's folder, licences, sums, manifest, run."""
-    make(tmp_path / "out")
+    doubles.make(tmp_path / "out")
 
     assert names_in(tmp_path / "out") == {
         "plan.json",
@@ -75,7 +65,7 @@ def test_a_finished_folder_holds_what_the_layout_says(tmp_path: Path) -> None:
 
 def test_sums_are_those_of_sha256sum(tmp_path: Path) -> None:
     """The tool everybody has accepts the data set and covers every file of it."""
-    make(tmp_path / "out")
+    doubles.make(tmp_path / "out")
 
     done = subprocess.run(
         ["sha256sum", "--check", "--strict", "--quiet", "SHA256SUMS"],
@@ -96,7 +86,7 @@ def test_sums_are_those_of_sha256sum(tmp_path: Path) -> None:
 
 def test_the_id_is_what_grep_and_sha256sum_print(tmp_path: Path) -> None:
     """The documented shell line computes dataset_id."""
-    summary = make(tmp_path / "out")
+    summary = doubles.make(tmp_path / "out")
 
     line = "grep -v '  manifest.json$' SHA256SUMS | sha256sum"
     printed = subprocess.run(
@@ -109,7 +99,7 @@ def test_the_id_is_what_grep_and_sha256sum_print(tmp_path: Path) -> None:
 
 def test_the_manifest_counts_samples_and_objects_by_split(tmp_path: Path) -> None:
     """Ten samples of five scenes, two views each; scene 3 is validation, one object per image."""
-    make(tmp_path / "out")
+    doubles.make(tmp_path / "out")
 
     manifest = json.loads((tmp_path / "out" / "manifest.json").read_text())
 
@@ -117,13 +107,12 @@ def test_the_manifest_counts_samples_and_objects_by_split(tmp_path: Path) -> Non
         {"split": "train", "samples": 8, "objects": {"bowl": 4, "mug": 4}},
         {"split": "val", "samples": 2, "objects": {"bowl": 1, "mug": 1}},
     ]
-    assert manifest["scenes"] == 5
-    assert manifest["rejections"] == 0 + 1 + 2 + 0 + 1
+    assert (manifest["scenes"], manifest["rejections"]) == (5, 0 + 1 + 2 + 0 + 1)
 
 
 def test_provenance_has_one_line_per_sample_in_order(tmp_path: Path) -> None:
     """scenes.jsonl: index, scene, view, split, attempts and the scene itself."""
-    make(tmp_path / "out")
+    doubles.make(tmp_path / "out")
 
     lines = (tmp_path / "out" / "shards" / "000001" / "scenes.jsonl").read_text().splitlines()
     rows = [json.loads(line) for line in lines]
@@ -172,11 +161,16 @@ def test_exporters_see_no_pixels(tmp_path: Path) -> None:
             """Nothing to merge."""
 
     store = LocalStore(tmp_path / "out")
-    plan = fake_plan()
-    job = Job(plan, store, FakeFactory(10), write_raw_images)
+    plan = doubles.fake_plan()
+    job = Job(plan, store, doubles.FakeFactory(10), doubles.write_raw_images)
     with store.locked():
         store.prepare(plan)
-        make_shard(job, FakePipeline(10, Trouble(), {"watching": Watching()}), 0, lambda _: None)
+        make_shard(
+            job,
+            doubles.FakePipeline(10, doubles.Trouble(), {"watching": Watching()}),
+            0,
+            lambda _: None,
+        )
 
     assert [sample.index for sample in seen] == [0, 1, 2, 3]
     assert all(s.capture.readings["color"].channels == {} for s in seen)
@@ -185,10 +179,10 @@ def test_exporters_see_no_pixels(tmp_path: Path) -> None:
 
 def test_a_finished_data_set_is_left_alone(tmp_path: Path) -> None:
     """The same command again makes nothing, changes nothing, and says so."""
-    make(tmp_path / "out")
+    doubles.make(tmp_path / "out")
     before = {p: p.stat().st_mtime_ns for p in (tmp_path / "out").rglob("*") if "run" not in str(p)}
 
-    summary = make(tmp_path / "out")
+    summary = doubles.make(tmp_path / "out")
 
     assert summary.already_complete
     assert summary.made == 0
@@ -199,32 +193,32 @@ def test_a_finished_data_set_is_left_alone(tmp_path: Path) -> None:
 
 def test_another_plan_is_refused_naming_the_field(tmp_path: Path) -> None:
     """Nothing is written; the message has the dotted field and both values."""
-    make(tmp_path / "out")
-    before = tree_digest(tmp_path / "out")
+    doubles.make(tmp_path / "out")
+    before = doubles.tree_digest(tmp_path / "out")
 
     with pytest.raises(StorageError, match=r"camera\.fov_deg: was 50, now 60"):
         run(
-            fake_plan(camera={"fov_deg": 60}),
-            FakeFactory(10),
+            doubles.fake_plan(camera={"fov_deg": 60}),
+            doubles.FakeFactory(10),
             tmp_path / "out",
             workers=0,
-            resume_command=RESUME,
+            resume_command=doubles.RESUME,
         )
 
-    assert tree_digest(tmp_path / "out") == before
+    assert doubles.tree_digest(tmp_path / "out") == before
 
 
 @pytest.mark.parametrize(("first", "more"), [(10, 11), (8, 17), (10, 30)])
 def test_a_larger_n_extends_a_finished_data_set(tmp_path: Path, first: int, more: int) -> None:
     """It equals a new data set of that size; whole shards of the old one are kept."""
-    make(tmp_path / "out", first)
+    doubles.make(tmp_path / "out", first)
     whole = [f"shards/{k:06d}" for k in range(first // 4)]
     before = {p: p.stat().st_mtime_ns for k in whole for p in (tmp_path / "out" / k).rglob("*")}
 
-    summary = make(tmp_path / "out", more)
-    make(tmp_path / "new", more)
+    summary = doubles.make(tmp_path / "out", more)
+    doubles.make(tmp_path / "new", more)
 
-    assert tree_digest(tmp_path / "out") == tree_digest(tmp_path / "new")
+    assert doubles.tree_digest(tmp_path / "out") == doubles.tree_digest(tmp_path / "new")
     assert summary.made == more - 4 * (first // 4)
     assert before == {path: path.stat().st_mtime_ns for path in before}
     verify(tmp_path / "out", full=True)
@@ -232,26 +226,25 @@ def test_a_larger_n_extends_a_finished_data_set(tmp_path: Path, first: int, more
 
 def test_an_extension_can_be_interrupted(tmp_path: Path) -> None:
     """The plan is renewed first: the same command goes on."""
-    make(tmp_path / "out", 10)
+    doubles.make(tmp_path / "out", 10)
     with pytest.raises(SampleError):
-        make(tmp_path / "out", 20, trouble=Trouble(wrong_at=14))
-    make(tmp_path / "out", 20)
-    make(tmp_path / "new", 20)
+        doubles.make(tmp_path / "out", 20, trouble=doubles.Trouble(wrong_at=14))
+    doubles.make(tmp_path / "out", 20)
+    doubles.make(tmp_path / "new", 20)
 
-    assert tree_digest(tmp_path / "out") == tree_digest(tmp_path / "new")
+    assert doubles.tree_digest(tmp_path / "out") == doubles.tree_digest(tmp_path / "new")
 
 
 def test_a_smaller_n_is_refused(tmp_path: Path) -> None:
-    """Nothing is removed."""
-    make(tmp_path / "out", 10)
-    before = tree_digest(tmp_path / "out")
+    doubles.make(tmp_path / "out", 10)
+    before = doubles.tree_digest(tmp_path / "out")
 
     with pytest.raises(
         StorageError, match=r"holds 10 samples; nothing was changed\. Expected --n 10"
     ):
-        make(tmp_path / "out", 9)
+        doubles.make(tmp_path / "out", 9)
 
-    assert tree_digest(tmp_path / "out") == before
+    assert doubles.tree_digest(tmp_path / "out") == before
 
 
 @pytest.mark.parametrize("name", ["holiday.jpg", "run/holiday.jpg", "manifest.json", "shards/x"])
@@ -262,17 +255,16 @@ def test_a_foreign_folder_is_refused_and_not_touched(tmp_path: Path, name: str) 
     foreign.write_text("mine")
 
     with pytest.raises(StorageError, match="not empty and not a gen-data data set"):
-        make(tmp_path / "out")
+        doubles.make(tmp_path / "out")
 
     assert [p for p in (tmp_path / "out").rglob("*") if p.is_file()] == [foreign]
 
 
 def test_a_file_in_place_of_the_folder_is_refused(tmp_path: Path) -> None:
-    """One message with the path."""
     (tmp_path / "out").write_text("a file")
 
     with pytest.raises(StorageError, match=r"out: is not a folder"):
-        make(tmp_path / "out")
+        doubles.make(tmp_path / "out")
 
 
 def test_an_empty_folder_and_a_killed_start_are_new(tmp_path: Path) -> None:
@@ -281,8 +273,8 @@ def test_an_empty_folder_and_a_killed_start_are_new(tmp_path: Path) -> None:
     (tmp_path / "out" / "run" / "lock").write_text("")
     store = LocalStore(tmp_path / "out")
 
-    assert store.state(fake_plan()) is FolderState.NEW
-    assert LocalStore(tmp_path / "absent").state(fake_plan()) is FolderState.NEW
+    assert store.state(doubles.fake_plan()) is FolderState.NEW
+    assert LocalStore(tmp_path / "absent").state(doubles.fake_plan()) is FolderState.NEW
 
 
 def test_a_second_run_on_the_folder_is_refused(tmp_path: Path) -> None:
@@ -293,27 +285,25 @@ def test_a_second_run_on_the_folder_is_refused(tmp_path: Path) -> None:
         store.locked(),
         pytest.raises(ConfigError, match=rf"another run.*process {os.getpid()} on host") as caught,
     ):
-        make(tmp_path / "out")
+        doubles.make(tmp_path / "out")
     assert caught.value.exit_code == 2
 
-    assert make(tmp_path / "out").made == 10
+    assert doubles.make(tmp_path / "out").made == 10
 
 
-def test_a_folder_without_record_is_quarantined_and_made_again(
-    tmp_path: Path, reference_digest: str
-) -> None:
+def test_a_folder_without_record_is_made_again(tmp_path: Path, reference_digest: str) -> None:
     """What a kill between folder and record leaves is no shard."""
     out = tmp_path / "out"
-    make(out)
+    doubles.make(out)
     (out / "manifest.json").unlink()
     (out / "shards" / "000001.json").unlink()
     (out / "shards" / "000001" / "scenes.jsonl").write_text("half")
 
-    summary = make(out)
+    summary = doubles.make(out)
 
     assert summary.made == 4
     assert names_in(out / "run" / "quarantine") == {"0-000001"}
-    assert tree_digest(out) == reference_digest
+    assert doubles.tree_digest(out) == reference_digest
 
 
 def damage_size(out: Path) -> None:
@@ -347,30 +337,28 @@ def test_a_damaged_shard_of_a_finished_data_set_is_made_again(
 ) -> None:
     """The same command repairs it; the other shards are kept."""
     out = tmp_path / "out"
-    make(out)
+    doubles.make(out)
     damage(out)  # type: ignore[operator]
 
     extra_only = damage is add_file
     if extra_only:
         (out / "manifest.json").unlink()
-    summary = make(out)
+    summary = doubles.make(out)
 
     assert summary.made == 2
-    assert tree_digest(out) == reference_digest
+    assert doubles.tree_digest(out) == reference_digest
 
 
-def test_a_flipped_bit_of_a_finished_data_set_is_repaired(
-    tmp_path: Path, reference_digest: str
-) -> None:
+def test_a_flipped_bit_of_a_data_set_is_repaired(tmp_path: Path, reference_digest: str) -> None:
     """Equal sizes hide nothing: the same command hashes what it finds."""
     out = tmp_path / "out"
-    make(out)
+    doubles.make(out)
     path = out / "shards/000000/color/rgb/000000002.png"
     data = path.read_bytes()
     path.write_bytes(bytes([data[0] ^ 1]) + data[1:])
 
-    assert make(out).made == 4
-    assert tree_digest(out) == reference_digest
+    assert doubles.make(out).made == 4
+    assert doubles.tree_digest(out) == reference_digest
 
 
 @pytest.mark.parametrize(
@@ -380,12 +368,10 @@ def test_a_flipped_bit_of_a_finished_data_set_is_repaired(
         ({"extra": {"mine": {"x": [float("nan")]}}}, r"sample 5: .*extra\.mine\.x\[0\]: is NaN"),
     ],
 )
-def test_an_invalid_sample_is_never_written(
-    tmp_path: Path, change: dict[str, object], message: str
-) -> None:
+def test_no_invalid_sample_is_left(tmp_path: Path, change: dict[str, object], message: str) -> None:
     """The run stops with exit code 6, sample and field; the shards before it stay."""
 
-    class Invalid(FakePipeline):
+    class Invalid(doubles.FakePipeline):
         def sample(self, index: int) -> Sample:
             sample = super().sample(index)
             if index != 5:
@@ -396,11 +382,11 @@ def test_an_invalid_sample_is_never_written(
 
     with pytest.raises(SampleError, match=message) as caught:
         run(
-            fake_plan(),
-            lambda: Invalid(10, Trouble()),
+            doubles.fake_plan(),
+            lambda: Invalid(10, doubles.Trouble()),
             tmp_path / "out",
             workers=0,
-            resume_command=RESUME,
+            resume_command=doubles.RESUME,
         )
 
     assert caught.value.exit_code == 6
@@ -409,29 +395,29 @@ def test_an_invalid_sample_is_never_written(
 
 def test_publishing_the_same_shard_twice_changes_nothing(tmp_path: Path) -> None:
     """A worker that died after its commit is repeated harmlessly."""
-    store, plan = LocalStore(tmp_path / "out"), fake_plan()
-    job = Job(plan, store, FakeFactory(10), write_raw_images)
+    store, plan = LocalStore(tmp_path / "out"), doubles.fake_plan()
+    job = Job(plan, store, doubles.FakeFactory(10), doubles.write_raw_images)
     with store.locked():
         store.prepare(plan)
         first = make_shard(job, job.make_pipeline(), 1, lambda _: None).record
-        before = tree_digest(tmp_path / "out")
+        before = doubles.tree_digest(tmp_path / "out")
 
         assert make_shard(job, job.make_pipeline(), 1, lambda _: None).record == first
 
-    assert tree_digest(tmp_path / "out") == before
+    assert doubles.tree_digest(tmp_path / "out") == before
 
 
 def test_publishing_other_bytes_is_a_determinism_error_and_keeps_both(tmp_path: Path) -> None:
     """The message names the file; the second version lies in quarantine."""
-    store, plan = LocalStore(tmp_path / "out"), fake_plan()
+    store, plan = LocalStore(tmp_path / "out"), doubles.fake_plan()
 
     def write_other_images(info: object, sample: object, shard_dir: Path) -> None:
-        write_raw_images(info, sample, shard_dir)  # type: ignore[arg-type]
+        doubles.write_raw_images(info, sample, shard_dir)  # type: ignore[arg-type]
         path = shard_dir / "color/rgb/000000005.png"
         if path.exists():
             path.write_bytes(b"other")
 
-    job = Job(plan, store, FakeFactory(10), write_raw_images)
+    job = Job(plan, store, doubles.FakeFactory(10), doubles.write_raw_images)
     with store.locked():
         store.prepare(plan)
         make_shard(job, job.make_pipeline(), 1, lambda _: None)
@@ -446,7 +432,7 @@ def test_publishing_other_bytes_is_a_determinism_error_and_keeps_both(tmp_path: 
 
 def test_planning_a_billion_samples_takes_no_memory(tmp_path: Path) -> None:
     """Shards of a new data set are a range, not a list."""
-    plan = fake_plan(n=1_000_000_000, shard_size=64)
+    plan = doubles.fake_plan(n=1_000_000_000, shard_size=64)
     store = LocalStore(tmp_path / "out")
     with store.locked():
         store.prepare(plan)
@@ -458,7 +444,7 @@ def count_operations(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> int:
     disk = FragileDisk(tmp_path / "count", tmp_path / "attic")
     with monkeypatch.context() as patch:
         disk.install(patch)
-        make(tmp_path / "count")
+        doubles.make(tmp_path / "count")
     return disk.count
 
 
@@ -480,14 +466,14 @@ def test_a_kill_at_every_operation_is_resumed_to_the_same_bytes(
     disk = FragileDisk(running, tmp_path / "attic", before=copy_folder)
     with monkeypatch.context() as patch:
         disk.install(patch)
-        make(running)
+        doubles.make(running)
     assert disk.count > 80
 
     for k in range(1, disk.count + 1):
         out = killed / str(k)
         if not (out / "manifest.json").exists():
-            make(out)
-        assert tree_digest(out) == reference_digest, f"killed at operation {k}"
+            doubles.make(out)
+        assert doubles.tree_digest(out) == reference_digest, f"killed at operation {k}"
 
 
 @pytest.mark.parametrize("step", [7, pytest.param(1, marks=pytest.mark.slow)])
@@ -506,13 +492,15 @@ def test_every_errno_at_every_operation_is_one_message_and_resumable(
         with monkeypatch.context() as patch:
             FragileDisk(out, tmp_path / f"attic{k}", fail_at=k, errno=number).install(patch)
             try:
-                make(out)
+                doubles.make(out)
             except StorageError as error:
                 message = str(error)
-        facts = (f"({errno.errorcode[number]})", str(out), RESUME)
+        facts = (f"({errno.errorcode[number]})", str(out), doubles.RESUME)
         assert all(fact in message for fact in facts) or (out / "manifest.json").exists()
-        make(out)
-        assert tree_digest(out) == reference_digest, f"{errno.errorcode[number]} at operation {k}"
+        doubles.make(out)
+        assert doubles.tree_digest(out) == reference_digest, (
+            f"{errno.errorcode[number]} at operation {k}"
+        )
         shutil.rmtree(out)
 
 
@@ -537,13 +525,13 @@ def survives_power_cut(
     with monkeypatch.context() as patch:
         disk.install(patch)
         with suppress(Killed):
-            make(out)
+            doubles.make(out)
         disk.cut_power(seed)
     try:
         if not (out / "manifest.json").exists():
             assert fail_at, "the data set was finished before the cut"
-            make(out)
-        return tree_digest(out) == digest
+            doubles.make(out)
+        return doubles.tree_digest(out) == digest
     except (AssertionError, StorageError):
         return False
     finally:
@@ -619,12 +607,12 @@ def test_a_full_disk_is_one_message_and_resumable_after_making_room(
     ballast.write_bytes(b"\0" * (990 << 10))
 
     with pytest.raises(StorageError, match=r"ENOSPC|stopped before the disk is full") as caught:
-        make(out)
-    assert RESUME in str(caught.value)
+        doubles.make(out)
+    assert doubles.RESUME in str(caught.value)
 
     ballast.unlink()
-    make(out)
-    assert tree_digest(out) == reference_digest
+    doubles.make(out)
+    assert doubles.tree_digest(out) == reference_digest
 
 
 def test_a_run_that_will_not_fit_stops_after_its_first_shard(
@@ -634,22 +622,20 @@ def test_a_run_that_will_not_fit_stops_after_its_first_shard(
     monkeypatch.setattr("gen_data.runner.store.free_bytes", lambda path: 2_000)
 
     with pytest.raises(StorageError, match="other 6 samples need about") as caught:
-        make(tmp_path / "out")
+        doubles.make(tmp_path / "out")
 
-    assert RESUME in str(caught.value)
+    assert doubles.RESUME in str(caught.value)
     assert names_in(tmp_path / "out" / "shards") == {"000000", "000000.json"}
 
 
-def test_a_plan_is_the_first_file_in_the_folder(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_plan_is_the_first_file_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Wherever a run stops, a folder with shards has a plan."""
     monkeypatch.setattr(LocalStore, "scan", lambda *_, **__: (_ for _ in ()).throw(Killed()))
 
     with pytest.raises(Killed):
-        make(tmp_path / "out")
+        doubles.make(tmp_path / "out")
 
-    assert load_plan(tmp_path / "out") == fake_plan()
+    assert load_plan(tmp_path / "out") == doubles.fake_plan()
 
 
 def test_tree_sizes_reports_links_as_irregular(tmp_path: Path) -> None:
@@ -681,7 +667,7 @@ def test_a_place_where_no_folder_can_be_is_named(tmp_path: Path, place: str, fac
     (tmp_path / "link").symlink_to("nowhere")
 
     with pytest.raises(StorageError, match=fact) as caught:
-        make(tmp_path / place)
+        doubles.make(tmp_path / place)
 
     assert "choose another folder with --out" in str(caught.value).lower()
     assert "finished" not in str(caught.value)

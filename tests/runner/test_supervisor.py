@@ -2,47 +2,18 @@
 
 from __future__ import annotations
 
-import random
-from collections import Counter
-from dataclasses import dataclass, field
-
-import pytest
-
-from gen_data.core.errors import (
-    AssetError,
-    GenDataError,
-    Interrupted,
-    SceneRejected,
-    StorageError,
-    WorkerLost,
-)
+from gen_data.core import errors
+from gen_data.runner import worker_events
 from gen_data.runner.supervisor import Limits, Supervisor
-from gen_data.runner.worker_events import (
-    Abort,
-    Action,
-    Assign,
-    Dismiss,
-    Event,
-    Exited,
-    Failed,
-    Kill,
-    Ready,
-    SampleDone,
-    ShardDone,
-    Spawn,
-    Tick,
-)
 
 SHARD_SIZE = 4
 
 
 def samples_of(shard: int) -> range:
-    """Four samples per shard."""
     return range(shard * SHARD_SIZE, (shard + 1) * SHARD_SIZE)
 
 
 def make_supervisor(shards: int, workers: int, **limits: float) -> Supervisor:
-    """One that makes ``shards`` shards of four samples."""
     return Supervisor(
         shards=range(shards),
         samples_of=samples_of,
@@ -54,7 +25,10 @@ def make_supervisor(shards: int, workers: int, **limits: float) -> Supervisor:
 
 def test_no_more_processes_than_shards_are_started() -> None:
     """Two shards need two of eight workers."""
-    assert make_supervisor(shards=2, workers=8).start(0.0) == [Spawn(0), Spawn(1)]
+    assert make_supervisor(shards=2, workers=8).start(0.0) == [
+        worker_events.Spawn(0),
+        worker_events.Spawn(1),
+    ]
 
 
 def test_a_ready_worker_gets_the_first_shard_and_goes_home_after_the_last() -> None:
@@ -63,10 +37,12 @@ def test_a_ready_worker_gets_the_first_shard_and_goes_home_after_the_last() -> N
 
     supervisor.start(0.0)
 
-    assert supervisor.handle(Ready(0), 1.0) == [Assign(0, 0)]
-    assert supervisor.handle(ShardDone(0, 0, 4, 100, 0), 2.0) == [Dismiss(0)]
+    assert supervisor.handle(worker_events.Ready(0), 1.0) == [worker_events.Assign(0, 0)]
+    assert supervisor.handle(worker_events.ShardDone(0, 0, 4, 100, 0), 2.0) == [
+        worker_events.Dismiss(0)
+    ]
     assert not supervisor.finished
-    assert supervisor.handle(Exited(0, 0), 3.0) == []
+    assert supervisor.handle(worker_events.Exited(0, 0), 3.0) == []
     assert supervisor.finished
     assert supervisor.error is None
 
@@ -75,12 +51,12 @@ def test_a_dead_workers_shard_goes_to_the_next_one() -> None:
     """The replacement gets the same shard, before any new one."""
     supervisor = make_supervisor(shards=3, workers=1)
     supervisor.start(0.0)
-    supervisor.handle(Ready(0), 1.0)
+    supervisor.handle(worker_events.Ready(0), 1.0)
 
-    after_death = supervisor.handle(Exited(0, -9), 2.0)
+    after_death = supervisor.handle(worker_events.Exited(0, -9), 2.0)
 
-    assert Spawn(1) in after_death
-    assert supervisor.handle(Ready(1), 3.0) == [Assign(1, 0)]
+    assert worker_events.Spawn(1) in after_death
+    assert supervisor.handle(worker_events.Ready(1), 3.0) == [worker_events.Assign(1, 0)]
 
 
 def test_a_shard_that_kills_three_workers_is_given_up_and_named() -> None:
@@ -88,12 +64,12 @@ def test_a_shard_that_kills_three_workers_is_given_up_and_named() -> None:
     supervisor = make_supervisor(shards=1, workers=1)
     supervisor.start(0.0)
     for number in range(3):
-        supervisor.handle(Ready(number), 1.0)
-        supervisor.handle(SampleDone(number, 0, 0), 1.5)
-        supervisor.handle(Exited(number, -11), 2.0)
+        supervisor.handle(worker_events.Ready(number), 1.0)
+        supervisor.handle(worker_events.SampleDone(number, 0, 0), 1.5)
+        supervisor.handle(worker_events.Exited(number, -11), 2.0)
 
     assert supervisor.finished
-    assert isinstance(supervisor.error, WorkerLost)
+    assert isinstance(supervisor.error, errors.WorkerLost)
     assert str(supervisor.error) == (
         "shard 0: its worker process died 3 times, at last in sample 1: "
         "killed by signal 11 (SIGSEGV).\n  Reproduce: make-alone 1"
@@ -104,40 +80,41 @@ def test_a_silent_worker_is_killed_and_its_shard_made_by_another() -> None:
     """After the limit and not before; waiting for work is no silence."""
     supervisor = make_supervisor(shards=1, workers=1, silence_s=30.0)
     supervisor.start(0.0)
-    supervisor.handle(Ready(0), 10.0)
+    supervisor.handle(worker_events.Ready(0), 10.0)
 
-    assert supervisor.handle(Tick(), 40.0) == []
-    assert Kill(0) in supervisor.handle(Tick(), 40.1)
-    assert Kill(0) not in supervisor.handle(Tick(), 50.0)
-    assert Spawn(1) in supervisor.handle(Exited(0, -9), 51.0)
+    assert supervisor.handle(worker_events.Tick(), 40.0) == []
+    assert worker_events.Kill(0) in supervisor.handle(worker_events.Tick(), 40.1)
+    assert worker_events.Kill(0) not in supervisor.handle(worker_events.Tick(), 50.0)
+    assert worker_events.Spawn(1) in supervisor.handle(worker_events.Exited(0, -9), 51.0)
 
 
 def test_a_shard_finished_just_before_the_kill_is_not_made_again() -> None:
     """The commit counts, and the doomed worker gets no new shard."""
     supervisor = make_supervisor(shards=2, workers=1, silence_s=30.0)
     supervisor.start(0.0)
-    supervisor.handle(Ready(0), 0.0)
-    supervisor.handle(Tick(), 31.0)
+    supervisor.handle(worker_events.Ready(0), 0.0)
+    supervisor.handle(worker_events.Tick(), 31.0)
 
-    late = supervisor.handle(ShardDone(0, 0, 4, 100, 0), 31.1)
+    late = supervisor.handle(worker_events.ShardDone(0, 0, 4, 100, 0), 31.1)
 
-    assert [a for a in late if isinstance(a, Assign)] == []
-    supervisor.handle(Exited(0, -9), 31.2)
-    assert supervisor.handle(Ready(1), 32.0) == [Assign(1, 1)]
+    assert [a for a in late if isinstance(a, worker_events.Assign)] == []
+    supervisor.handle(worker_events.Exited(0, -9), 31.2)
+    assert supervisor.handle(worker_events.Ready(1), 32.0) == [worker_events.Assign(1, 1)]
 
 
 def test_a_rejected_scene_lets_the_others_finish_their_shard() -> None:
-    """No new shard is handed out; the error is kept; committed work is not thrown away."""
     supervisor = make_supervisor(shards=9, workers=2)
     supervisor.start(0.0)
-    supervisor.handle(Ready(0), 1.0)
-    supervisor.handle(Ready(1), 1.0)
-    error = SceneRejected(3, ())
+    supervisor.handle(worker_events.Ready(0), 1.0)
+    supervisor.handle(worker_events.Ready(1), 1.0)
+    error = errors.SceneRejected(3, ())
 
-    assert supervisor.handle(Failed(0, error), 2.0) == []
-    assert supervisor.handle(Exited(0, 1), 2.1) == []
-    assert supervisor.handle(ShardDone(1, 1, 4, 100, 0), 3.0) == [Dismiss(1)]
-    supervisor.handle(Exited(1, 0), 3.1)
+    assert supervisor.handle(worker_events.Failed(0, error), 2.0) == []
+    assert supervisor.handle(worker_events.Exited(0, 1), 2.1) == []
+    assert supervisor.handle(worker_events.ShardDone(1, 1, 4, 100, 0), 3.0) == [
+        worker_events.Dismiss(1)
+    ]
+    supervisor.handle(worker_events.Exited(1, 0), 3.1)
     assert supervisor.finished
     assert supervisor.error is error
 
@@ -146,10 +123,12 @@ def test_a_storage_fault_stops_all_at_once() -> None:
     """The others would only meet the same full disk."""
     supervisor = make_supervisor(shards=9, workers=2)
     supervisor.start(0.0)
-    supervisor.handle(Ready(0), 1.0)
-    supervisor.handle(Ready(1), 1.0)
+    supervisor.handle(worker_events.Ready(0), 1.0)
+    supervisor.handle(worker_events.Ready(1), 1.0)
 
-    assert Kill(1) in supervisor.handle(Failed(0, StorageError("disk full")), 2.0)
+    assert worker_events.Kill(1) in supervisor.handle(
+        worker_events.Failed(0, errors.StorageError("disk full")), 2.0
+    )
 
 
 def test_processes_that_never_start_end_the_run() -> None:
@@ -158,10 +137,10 @@ def test_processes_that_never_start_end_the_run() -> None:
     supervisor.start(0.0)
 
     for number in range(3):
-        supervisor.handle(Exited(number, 1), 1.0)
+        supervisor.handle(worker_events.Exited(number, 1), 1.0)
 
     assert supervisor.finished
-    assert isinstance(supervisor.error, WorkerLost)
+    assert isinstance(supervisor.error, errors.WorkerLost)
     assert "while they start: exited with status 1" in str(supervisor.error)
 
 
@@ -169,211 +148,61 @@ def test_out_of_memory_continues_with_fewer_workers() -> None:
     """Two workers, one killed by the kernel: one goes on alone."""
     supervisor = make_supervisor(shards=9, workers=2)
     supervisor.start(0.0)
-    supervisor.handle(Ready(0), 1.0)
-    supervisor.handle(Ready(1), 1.0)
+    supervisor.handle(worker_events.Ready(0), 1.0)
+    supervisor.handle(worker_events.Ready(1), 1.0)
 
-    actions = supervisor.handle(Exited(0, -9, out_of_memory=True), 2.0)
+    actions = supervisor.handle(worker_events.Exited(0, -9, out_of_memory=True), 2.0)
 
-    assert not any(isinstance(a, Spawn) for a in actions)
+    assert not any(isinstance(a, worker_events.Spawn) for a in actions)
 
 
 def test_a_worker_that_grew_too_large_is_replaced_between_shards() -> None:
     """Dismissed after its shard, and a new one is started."""
     supervisor = make_supervisor(shards=9, workers=1, rss_bytes=1000)
     supervisor.start(0.0)
-    supervisor.handle(Ready(0), 1.0)
-    assert supervisor.handle(ShardDone(0, 0, 4, 100, 0, rss_bytes=600), 2.0) == [Assign(0, 1)]
+    supervisor.handle(worker_events.Ready(0), 1.0)
+    assert supervisor.handle(worker_events.ShardDone(0, 0, 4, 100, 0, rss_bytes=600), 2.0) == [
+        worker_events.Assign(0, 1)
+    ]
 
-    actions = supervisor.handle(ShardDone(0, 1, 4, 100, 0, rss_bytes=1001), 2.0)
+    actions = supervisor.handle(worker_events.ShardDone(0, 1, 4, 100, 0, rss_bytes=1001), 2.0)
 
-    assert Dismiss(0) in actions
-    assert Spawn(1) in actions
+    assert worker_events.Dismiss(0) in actions
+    assert worker_events.Spawn(1) in actions
 
 
 def test_a_worker_that_was_as_large_from_the_start_is_kept() -> None:
     """Its scenes need the memory: a new worker would need it again."""
     supervisor = make_supervisor(shards=9, workers=1, rss_bytes=1000)
     supervisor.start(0.0)
-    supervisor.handle(Ready(0), 1.0)
+    supervisor.handle(worker_events.Ready(0), 1.0)
 
     for shard, rss_bytes in enumerate((1200, 1790)):
-        event = ShardDone(0, shard, 4, 100, 0, rss_bytes=rss_bytes)
-        assert supervisor.handle(event, 2.0) == [Assign(0, shard + 1)]
+        event = worker_events.ShardDone(0, shard, 4, 100, 0, rss_bytes=rss_bytes)
+        assert supervisor.handle(event, 2.0) == [worker_events.Assign(0, shard + 1)]
 
 
 def test_an_abort_kills_every_process() -> None:
     """Ctrl-C: busy, idle and starting workers alike."""
     supervisor = make_supervisor(shards=9, workers=3)
     supervisor.start(0.0)
-    supervisor.handle(Ready(0), 1.0)
+    supervisor.handle(worker_events.Ready(0), 1.0)
 
-    actions = supervisor.handle(Abort(Interrupted("stop")), 2.0)
+    actions = supervisor.handle(worker_events.Abort(errors.Interrupted("stop")), 2.0)
 
-    assert actions == [Kill(0), Kill(1), Kill(2)]
+    assert actions == [worker_events.Kill(0), worker_events.Kill(1), worker_events.Kill(2)]
     assert not supervisor.finished
-
-
-@dataclass
-class VirtualWorker:
-    """A process of the simulation; what it does next is drawn when it is due."""
-
-    due_s: float
-    shard: int | None = None
-    done: int = 0
-    ready: bool = False
-    hangs: bool = False
-    ends_with: int | None = None
-
-
-@dataclass
-class Simulation:
-    """Drives a supervisor with seeded faults on a virtual clock, and checks every step."""
-
-    seed: int
-    shards: int = 12
-    workers: int = 3
-    death_rate: float = 0.05
-    poisoned: frozenset[int] = frozenset()
-    abort_at_s: float = float("inf")
-    fail_at_sample: int = -1
-    committed: Counter[int] = field(default_factory=Counter)
-    attempts: Counter[int] = field(default_factory=Counter)
-
-    def __post_init__(self) -> None:
-        """Begin at time 0 with no process."""
-        self.rng = random.Random(self.seed)
-        self.now_s = 0.0
-        self.alive: dict[int, VirtualWorker] = {}
-        self.supervisor = make_supervisor(
-            self.shards, self.workers, silence_s=60.0, shard_attempts=3, lost_shards=99
-        )
-
-    def run(self, steps_max: int = 20_000) -> GenDataError | None:
-        """Until the supervisor is finished; the bound makes a livelock a failure."""
-        self._carry_out(self.supervisor.start(self.now_s))
-        for _ in range(steps_max):
-            if self.supervisor.finished:
-                assert not self.alive
-                return self.supervisor.error
-            self._step()
-        raise AssertionError(f"seed {self.seed}: not finished after {steps_max} steps")
-
-    def _step(self) -> None:
-        due = [n for n, w in sorted(self.alive.items()) if w.due_s <= self.now_s and not w.hangs]
-        if not due:
-            self.now_s += 1.0
-            self._tell(Tick())
-            if self.now_s > self.abort_at_s:
-                self.abort_at_s = float("inf")
-                self._tell(Abort(Interrupted("stop")))
-            return
-        number = self.rng.choice(due)
-        worker = self.alive[number]
-        worker.due_s = self.now_s + self.rng.choice([0.0, 0.5, 2.0])
-        self._tell(self._next_event(number, worker))
-
-    def _next_event(self, number: int, worker: VirtualWorker) -> Event:
-        if worker.ends_with is not None:
-            del self.alive[number]
-            return Exited(number, worker.ends_with)
-        if self.rng.random() < self.death_rate:
-            if self.rng.random() < 0.3:
-                worker.hangs = True
-                return Tick()
-            del self.alive[number]
-            return Exited(number, self.rng.choice([-9, -11, 1]))
-        if not worker.ready:
-            worker.ready = True
-            return Ready(number)
-        return self._work(number, worker)
-
-    def _work(self, number: int, worker: VirtualWorker) -> Event:
-        if worker.shard is None:
-            return Tick()
-        index = worker.shard * SHARD_SIZE + worker.done
-        if worker.shard in self.poisoned and worker.done == 2:
-            del self.alive[number]
-            return Exited(number, -11)
-        if index == self.fail_at_sample:
-            worker.shard, worker.ends_with = None, 1
-            return Failed(number, AssetError("a mesh is missing"))
-        if worker.done < SHARD_SIZE:
-            worker.done += 1
-            return SampleDone(number, worker.shard, index)
-        shard, worker.shard = worker.shard, None
-        self.committed[shard] += 1
-        return ShardDone(number, shard, SHARD_SIZE, 100, 0)
-
-    def _tell(self, event: Event) -> None:
-        self._carry_out(self.supervisor.handle(event, self.now_s))
-
-    def _carry_out(self, actions: list[Action]) -> None:
-        for action in actions:
-            if isinstance(action, Spawn):
-                self.alive[action.worker] = VirtualWorker(self.now_s + 1.0)
-            elif isinstance(action, Assign):
-                self._assign(action)
-            elif isinstance(action, Dismiss) and action.worker in self.alive:
-                self.alive[action.worker].ends_with = 0
-            elif isinstance(action, Kill) and action.worker in self.alive:
-                worker = self.alive[action.worker]
-                worker.hangs, worker.ends_with = False, -9
-        running = [w for w in self.alive.values() if w.ends_with is None]
-        assert len(running) <= self.workers
-
-    def _assign(self, action: Assign) -> None:
-        holders = [n for n, w in self.alive.items() if w.shard == action.shard]
-        assert holders == [], f"seed {self.seed}: shard {action.shard} given to two workers"
-        self.attempts[action.shard] += 1
-        if action.worker in self.alive:
-            worker = self.alive[action.worker]
-            worker.shard, worker.done = action.shard, 0
-
-
-@pytest.mark.parametrize("first_seed", range(0, 400, 100))
-def test_random_deaths_and_hangs_lose_no_shard(first_seed: int) -> None:
-    """400 seeds: the run ends, each shard is committed or was given up after three deaths."""
-    for seed in range(first_seed, first_seed + 100):
-        simulation = Simulation(seed, workers=1 + seed % 4)
-
-        error = simulation.run()
-
-        if simulation.supervisor.given_up or error is None:
-            missing = set(range(simulation.shards)) - set(simulation.committed)
-            assert missing == set(simulation.supervisor.given_up) - set(simulation.committed)
-        assert max(simulation.attempts.values()) <= 3
-
-
-def test_poisoned_shards_are_given_up_after_three_attempts_and_all_others_made() -> None:
-    """100 seeds with two poisoned shards and no other fault."""
-    for seed in range(100):
-        simulation = Simulation(seed, death_rate=0.0, poisoned=frozenset({0, 7}))
-
-        error = simulation.run()
-
-        assert isinstance(error, WorkerLost)
-        assert {s: simulation.attempts[s] for s in (0, 7)} == {0: 3, 7: 3}
-        assert simulation.committed == Counter(set(range(12)) - {0, 7})
-
-
-def test_an_error_or_an_abort_at_any_time_ends_the_run() -> None:
-    """200 seeds: nobody is left running, and the cause comes first."""
-    for seed in range(100):
-        failing = Simulation(seed, fail_at_sample=seed % 48, death_rate=0.0)
-        assert isinstance(failing.run(), AssetError)
-        stopped = Simulation(seed, abort_at_s=seed % 20, death_rate=0.0)
-        assert stopped.run() is None or isinstance(stopped.supervisor.error, Interrupted)
 
 
 def test_a_failed_start_is_survived_when_the_next_succeeds() -> None:
     """Only deaths in a row count."""
     supervisor = make_supervisor(shards=9, workers=1)
     supervisor.start(0.0)
-    supervisor.handle(Exited(0, 1), 1.0)
-    supervisor.handle(Exited(1, 1), 1.0)
-    supervisor.handle(Ready(2), 1.0)
-    supervisor.handle(Exited(2, 1), 1.0)
-    supervisor.handle(Exited(3, 1), 1.0)
+    supervisor.handle(worker_events.Exited(0, 1), 1.0)
+    supervisor.handle(worker_events.Exited(1, 1), 1.0)
+    supervisor.handle(worker_events.Ready(2), 1.0)
+    supervisor.handle(worker_events.Exited(2, 1), 1.0)
+    supervisor.handle(worker_events.Exited(3, 1), 1.0)
 
     assert supervisor.error is None
     assert not supervisor.finished

@@ -83,9 +83,7 @@ def test_a_worker_killed_at_birth_is_replaced_however_large_the_job_is(tmp_path:
         *(pytest.param(action, 3 * PIPE_BYTES, id=k) for k, action in SIGNALS_AT_BIRTH.items()),
     ],
 )
-def test_a_signal_while_a_worker_starts_ends_the_run(
-    tmp_path: Path, action: str, ballast_bytes: int
-) -> None:
+def test_a_signal_at_a_start_ends_the_run(tmp_path: Path, action: str, ballast_bytes: int) -> None:
     """Exit code 130, the command to go on with and no traceback; no process is left."""
     environment = with_action_at_birth(tmp_path, action)
 

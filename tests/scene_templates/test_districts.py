@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from gen_data.assemble.config import Config, load_config
-from gen_data.assets.library import Library, open_library
 from gen_data.config.distributions import Constant
 from gen_data.config.problems import Problems
 from gen_data.config.shared_values import resolve_shared
@@ -27,31 +26,20 @@ from gen_data.scene_templates.lane_objects import LaneObjects
 from gen_data.scene_templates.objects import AssetChoice
 from gen_data.scene_templates.road import Road
 from gen_data.scene_templates.signals import Signals
+from tests.libraries import library
 from tests.randomizers.doubles import rng_of
 
 BENCHES = LaneObjects(
-    name="benches",
-    lanes=("furniture",),
-    count=4,
-    assets=AssetChoice(ids=("bench",)),
-    present=False,
+    name="benches", lanes=("furniture",), count=4, assets=AssetChoice(ids=("bench",)), present=False
 )
 
 
 @cache
-def library() -> Library:
-    """Procedural assets."""
-    return open_library(())
-
-
-@cache
 def street() -> Config:
-    """The shipped street."""
     return load_config("street")
 
 
 def built(*elements: Element) -> Scene:
-    """The nominal scene of some elements."""
     return build_scene("test", elements, library())
 
 

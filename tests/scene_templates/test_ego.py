@@ -17,12 +17,10 @@ from gen_data.scene_templates.road import Road
 
 @pytest.fixture(scope="module")
 def library() -> Library:
-    """Procedural assets."""
     return open_library(())
 
 
 def street(library: Library, ego: Ego) -> Scene:
-    """A road with an ego vehicle on it."""
     return build_scene("test", [Road(name="main", length_m=80.0), ego], library)
 
 
@@ -41,7 +39,6 @@ def test_rig_is_on_the_ground_below_the_rear_axle(library: Library) -> None:
 
 
 def test_it_has_an_instance_but_no_label(library: Library) -> None:
-    """Its pixels have an instance id; no category that labels know."""
     scene = street(library, Ego(name="ego", tags=("van",)))
     instance = scene.instance(scene.body("ego").instance_id)
 
@@ -51,7 +48,6 @@ def test_it_has_an_instance_but_no_label(library: Library) -> None:
 
 
 def test_what_is_not_there_is_told(library: Library) -> None:
-    """No such lane, no such tag."""
     with pytest.raises(ConfigError, match="there is no driving lane 'main/sidewalk_left'"):
         street(library, Ego(name="ego", lane="main/sidewalk_left"))
     with pytest.raises(ConfigError, match="no asset is tagged spaceship"):

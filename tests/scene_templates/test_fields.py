@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from functools import cache
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
-from gen_data.assets.library import Library, open_library
 from gen_data.content.roads import FAMILIES
 from gen_data.content.scenery.farmland_things import power_pylon
 from gen_data.core.errors import AssetError, ConfigError
@@ -19,19 +17,13 @@ from gen_data.scene_templates.element import Element
 from gen_data.scene_templates.fields import Fields
 from gen_data.scene_templates.power_line import PowerLine
 from gen_data.scene_templates.road import Road
+from tests.libraries import library
 
 ROAD = Road(name="main", length_m=150.0, kerb_m=0.0, sidewalk_m=(0.0, 0.0), verge_m=(1.5, 1.5))
 BENT = ROAD.model_copy(update={"curvature_per_m": 0.005})
 
 
-@cache
-def library() -> Library:
-    """Procedural assets."""
-    return open_library(())
-
-
 def built(*elements: Element) -> Scene:
-    """The nominal scene of some elements."""
     return build_scene("test", elements, library())
 
 

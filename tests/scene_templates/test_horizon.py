@@ -17,13 +17,11 @@ from gen_data.scene_templates.road import Road
 
 @pytest.fixture(scope="module")
 def library() -> Library:
-    """The library without folders."""
     return open_library(())
 
 
 @pytest.fixture(scope="module")
 def street(library: Library) -> Scene:
-    """Two roads that meet at an angle."""
     scene = Road(name="main", length_m=120.0).add(Scene(template="test"), library)
     return Road(name="side", at_m=(60.0, 10.0), yaw_deg=70.0, length_m=80.0).add(scene, library)
 
@@ -79,7 +77,6 @@ def test_arcs_limit_the_ring_and_the_seed_moves_pieces(street: Scene, library: L
 
 
 def test_a_scene_without_roads_is_refused(library: Library) -> None:
-    """There is nothing to surround."""
     with pytest.raises(ConfigError, match="no lane to surround"):
         Horizon().add(Scene(template="test"), library)
     with pytest.raises(ValidationError, match="distance_m"):

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import pytest
 
-from gen_data.assets.library import Library, open_library
 from gen_data.content.scenery.shelters import pump_islands_m
 from gen_data.core.errors import ConfigError
 from gen_data.core.scene import Scene
@@ -20,6 +18,7 @@ from gen_data.scene_templates.petrol_station import PetrolStation
 from gen_data.scene_templates.road import Road
 from gen_data.scene_templates.square import Square
 from gen_data.scene_templates.tram_line import TramLine
+from tests.libraries import library
 from tests.scenery.rays import cast
 
 TOWN = Road(name="main", length_m=150.0, verge_m=(1.5, 1.5), setback_m=(5.0, 5.0), parking=True)
@@ -38,14 +37,7 @@ VEHICLE_M = 4.4
 """Height that stays free: vehicles are at most 4 m high (Directive 96/53/EC)."""
 
 
-@cache
-def library() -> Library:
-    """Procedural assets."""
-    return open_library(())
-
-
 def built(*elements: Element) -> Scene:
-    """The nominal scene of some elements."""
     return build_scene("test", elements, library())
 
 
@@ -55,7 +47,6 @@ def built(*elements: Element) -> Scene:
     scope="module",
 )
 def scene(request: pytest.FixtureRequest) -> Scene:
-    """A road with one place."""
     return built(*request.param)
 
 

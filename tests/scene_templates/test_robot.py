@@ -25,7 +25,6 @@ def test_of_several_robots_the_first_that_is_installed_stands_there() -> None:
 
 @pytest.mark.parametrize("asset", ["two_lnk", ("two_lnk", "robots/ur5e")])
 def test_a_robot_that_is_not_there_is_a_mistake(asset: str | tuple[str, ...]) -> None:
-    """The message is about the first that was asked for."""
     with pytest.raises(AssetError, match=r"two_lnk.*did you mean 'two_link'"):
         scene(asset)
 

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import math
-from functools import cache
 
 import numpy as np
 import pytest
 
-from gen_data.assets.library import Library, open_library
 from gen_data.core.errors import ConfigError
 from gen_data.core.scene import Body, Scene
 from gen_data.scene_templates.builder import build_scene
@@ -17,12 +15,7 @@ from gen_data.scene_templates.lane_objects import LaneObjects
 from gen_data.scene_templates.objects import AssetChoice
 from gen_data.scene_templates.road import Road
 from gen_data.scene_templates.signals import Signals
-
-
-@cache
-def library() -> Library:
-    """Procedural assets."""
-    return open_library(())
+from tests.libraries import library
 
 
 def crossing() -> list[object]:
@@ -35,12 +28,10 @@ def crossing() -> list[object]:
 
 
 def built(*elements: object) -> Scene:
-    """The scene of a crossing and more elements."""
     return build_scene("test", [*crossing(), *elements], library())  # type: ignore[list-item]
 
 
 def yaw_of(body: Body) -> float:
-    """Direction of a body's front [rad]."""
     ahead = body.T_world_body.rotation()[:, 0]
     return math.atan2(ahead[1], ahead[0])
 
@@ -109,7 +100,6 @@ def test_every_road_that_comes_to_a_junction_has_a_signal_that_faces_it() -> Non
     ],
 )
 def test_what_has_no_place_is_one_clear_error(element: object, fact: str) -> None:
-    """The element is named, and what was expected."""
     with pytest.raises(ConfigError, match=fact):
         built(element)
 

@@ -27,7 +27,6 @@ SEEDS = (0, 1, 5)
 
 @cache
 def built_of(key: tuple[str, int]) -> tuple[str, int, Solid]:
-    """A building of a style and a seed, made once for all tests."""
     style, seed = key
     return style, seed, building(seed, style)
 
@@ -36,7 +35,6 @@ for_some_of_every_style = for_every([(s, k) for s in STYLES for k in SEEDS], bui
 
 
 def window_faces(solid: Solid) -> np.ndarray:
-    """Whether each face is glass."""
     slots = [k for k, m in enumerate(solid.mesh.materials) if m.role == "window"]
     return np.isin(solid.mesh.face_slots, slots)
 

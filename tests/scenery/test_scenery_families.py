@@ -80,7 +80,6 @@ ROLES = {
 
 
 def build(name: str, seed: int) -> Solid:
-    """Build a variant, with the other parameters at their defaults."""
     return FAMILIES[name].build(seed=seed, **FAMILIES[name].parameters)
 
 
@@ -101,9 +100,7 @@ def test_every_family_has_a_stated_height_and_budget() -> None:
 
 @first_and_all
 @pytest.mark.parametrize("name", FAMILIES)
-def test_every_variant_is_as_high_as_real_ones_and_within_its_budget(
-    name: str, how_many: str
-) -> None:
+def test_every_variant_is_as_high_as_real_ones_and_in_budget(name: str, how_many: str) -> None:
     """The first two, or all seeds that are offered for selection; a dozen of large families."""
     low, high, triangles = LIMITS[name]
     count = FAMILIES[name].variants
@@ -144,7 +141,6 @@ def test_arrays_are_finite_typed_and_normals_unit(built: tuple[str, Solid]) -> N
 
 @for_every_variant
 def test_no_triangle_is_degenerate(built: tuple[str, Solid]) -> None:
-    """Every face has an area."""
     corners = built[1].mesh.vertices_m[built[1].mesh.faces].astype(np.float64)
     cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
 
@@ -167,7 +163,6 @@ def test_materials_have_known_roles_and_textures_that_exist(built: tuple[str, So
 
 @for_every_variant
 def test_collision_lies_within_the_mesh_bounds(built: tuple[str, Solid]) -> None:
-    """Nothing collides that is not there."""
     name, solid = built
     low, high = solid.mesh.bounds_m()
     points = np.concatenate(solid.collision.parts_m)
@@ -209,7 +204,6 @@ def test_facts_are_known_without_building(name: str) -> None:
     ],
 )
 def test_unknown_parameters_are_refused_by_name(name: str, parameters: dict[str, object]) -> None:
-    """The message says what was given."""
     wrong = next(str(v) for v in parameters.values() if v not in ("birch", "house", 1.0))
     with pytest.raises(AssetError, match=wrong):
         FAMILIES[name].build(seed=0, **parameters)
@@ -221,8 +215,7 @@ def test_textures_are_repeatable_images(name: str) -> None:
     family = TEXTURES[name]
     first, second = (family.build(seed=0, **family.parameters) for _ in range(2))
 
-    assert first.albedo.dtype == np.uint8
-    assert first.albedo.ndim == 3
+    assert (first.albedo.dtype, first.albedo.ndim) == (np.uint8, 3)
     assert (first.albedo == second.albedo).all()
     assert first.albedo.std() > 3.0
     if first.normal is not None:
@@ -230,7 +223,6 @@ def test_textures_are_repeatable_images(name: str) -> None:
 
 
 def digest(solid: Solid) -> str:
-    """Hash of everything a solid holds."""
     mesh = solid.mesh
     sha = hashlib.sha256()
     for array in (mesh.vertices_m, mesh.faces, mesh.normals, mesh.uvs, mesh.face_slots):

@@ -90,7 +90,6 @@ def test_cables_of_different_poles_meet_at_mid_span() -> None:
 
 @pytest.mark.parametrize("span_m", [-1.0, 81.0])
 def test_spans_that_no_pole_carries_are_refused(span_m: float) -> None:
-    """The message says what was given."""
     with pytest.raises(AssetError, match="span_m"):
         utility_pole(0, span_m)
 
@@ -133,9 +132,7 @@ class VehicleAssets(PoleAssets):
 
 
 @pytest.mark.parametrize(("assets", "is_free"), [(PoleAssets(), True), (VehicleAssets(), False)])
-def test_things_may_stand_and_cameras_be_below_the_cables_of_poles(
-    assets: PoleAssets, is_free: bool
-) -> None:
+def test_things_may_stand_below_the_cables_of_poles(assets: PoleAssets, is_free: bool) -> None:
     """Only the pole itself takes room, of the ground and of views."""
     body = Body("pole", "pole", SE3(), instance_id=1)
     ground = make_ground((body,), assets)

@@ -27,14 +27,11 @@ WEIGHTS = {"red": 0.46, "green": 0.44, "yellow": 0.06, "red_yellow": 0.04}
 
 @pytest.fixture(scope="module")
 def library(tmp_path_factory: pytest.TempPathFactory) -> Library:
-    """All assets, with a cache of its own."""
     return open_library(cache_dir=tmp_path_factory.mktemp("cache"))
 
 
 @pytest.fixture
 def draw(library: Library) -> Draw:
-    """The scene after one draw of a randomizer with the given fields."""
-
     def drawn(scene: Scene, index: int, **fields: object) -> Scene:
         made = TrafficLights.model_validate({"name": "lights", **fields})
         return made(scene, library, rng(index))
@@ -43,12 +40,10 @@ def draw(library: Library) -> Draw:
 
 
 def rng(scene: int) -> Rng:
-    """The stream of one scene."""
     return Streams(seed=5, scene=scene).rng("lights")
 
 
 def scene_of(*signals: tuple[str, float, float, float]) -> Scene:
-    """Signals of (asset, x, y, yaw in degrees), one instance each."""
     bodies, instances = [], []
     for k, (asset, x, y, yaw_deg) in enumerate(signals, 1):
         kind = "pedestrian" if asset.startswith("pedestrian") else "vehicle"
@@ -59,7 +54,6 @@ def scene_of(*signals: tuple[str, float, float, float]) -> Scene:
 
 
 def states(scene: Scene) -> list[str]:
-    """What each signal shows, by its label."""
     return [dict(instance.attributes)["state"] for instance in scene.instances]
 
 
@@ -135,7 +129,6 @@ def test_people_walk_along_with_green_traffic_and_stop_otherwise(draw: Draw) -> 
 
 
 def test_an_unknown_state_is_refused_with_the_nearest_one() -> None:
-    """Before any scene is drawn."""
     with pytest.raises(ValidationError, match=r"there is no 'gren'.*did you mean 'green'"):
         TrafficLights.model_validate({"name": "lights", "state": "gren"})
 
@@ -155,7 +148,6 @@ def test_red_is_above_yellow_is_above_green_and_all_face_plus_x(seed: int) -> No
 
 
 def test_signals_for_people_have_a_stop_and_a_walk_lens() -> None:
-    """And none of the others."""
     roles = {m.role for m in pedestrian_signal(1).mesh.materials}
 
     assert set(PEDESTRIAN_LENSES) <= roles

@@ -28,8 +28,6 @@ Box = tuple[Vec3, Vec3]
 
 
 def straight(start: tuple[float, float], velocity: tuple[float, float], yaw: float = 0.0) -> Way:
-    """A way at constant velocity."""
-
     def pose(t: float) -> SE3:
         return SE3.about_z(yaw, (start[0] + velocity[0] * t, start[1] + velocity[1] * t, 0.0))
 
@@ -55,7 +53,6 @@ def track_of(body: str, pose: Way, seconds: float = 4.0) -> Trajectory:
 def thing(
     number: int, name: str, category: str, pose: SE3, box_m: Box = CAR_M, **facts: str
 ) -> tuple[Body, Instance]:
-    """A labelled box that stands somewhere."""
     body = Body(name, f"{category}?", pose, instance_id=number)
     instance = Instance(
         number,
@@ -147,10 +144,8 @@ class BoxRays:
         )
 
     def render(self, scene: Scene, camera: Camera, channels: frozenset[Channel]) -> SensorReading:
-        """Pictures are made by other doubles."""
         raise AssertionError("this device does not look at pictures")
 
 
 def moved(scene: Scene, **changes: object) -> Scene:
-    """The scene with other fields."""
     return replace(scene, **changes)  # type: ignore[arg-type]

@@ -34,7 +34,6 @@ sensors:
 
 
 def sensor(folder: Path, text: str, name: str = "camera.yaml", **files: str) -> Any:
-    """The camera of a configuration beside a file; ``FILE`` in its line is the file's name."""
     if files.get("content"):
         (folder / name).write_text(files["content"], encoding="utf-8")
     (folder / "mine.yaml").write_text(CONFIG % text.replace("FILE", name), encoding="utf-8")
@@ -64,7 +63,6 @@ def assert_projects(found: Intrinsics, expected_px: Array) -> None:
 
 
 def opencv_text(D: Array, ending: str, folder: Path, **more: Any) -> str:
-    """A file as OpenCV writes it."""
     path = folder / f"written{ending}"
     storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_WRITE)
     for key, value in {"image_width": 640, "image_height": 512, "camera_matrix": K,
@@ -216,9 +214,7 @@ def test_zeros_of_a_thin_prism_are_no_obstacle(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_coefficients_without_a_lens_are_refused_at_their_line(
-    tmp_path: Path, D: Array, fact: str
-) -> None:
+def test_coefficients_without_a_lens_are_refused(tmp_path: Path, D: Array, fact: str) -> None:
     text = told(tmp_path, LENS, content=opencv_text(D, ".yml", tmp_path))
     assert text.startswith(fact)
 
@@ -227,9 +223,7 @@ def test_coefficients_without_a_lens_are_refused_at_their_line(
     ("model", "D", "fisheye"),
     [("plumb_bob", D5, False), ("rational_polynomial", D8, False), ("equidistant", D4, True)],
 )
-def test_a_camera_info_of_ros_projects_as_opencv_does(
-    tmp_path: Path, model: str, D: Array, fisheye: bool
-) -> None:
+def test_a_camera_info_of_ros_projects(tmp_path: Path, model: str, D: Array, fisheye: bool) -> None:
     content = ROS % (model, len(D), D.tolist())
     found = sensor(tmp_path, LENS, content=content).nominal_intrinsics()
     assert_projects(found, project_cv(D, fisheye=fisheye))
@@ -275,9 +269,7 @@ def test_cameras_of_a_kalibr_chain_project_as_opencv_does(tmp_path: Path) -> Non
         ("[812.4, 811.9, 318.7, 259.3]", "[812.4, one, 1, 2]", "expected a number, got 'one'"),
     ],
 )
-def test_a_kalibr_chain_with_another_model_is_refused(
-    tmp_path: Path, old: str, new: str, fact: str
-) -> None:
+def test_another_model_in_kalibr_is_refused(tmp_path: Path, old: str, new: str, fact: str) -> None:
     text = told(tmp_path, LENS.replace("}", ", camera: cam0}"), content=KALIBR.replace(old, new, 1))
     assert text.startswith("camera.yaml:")
     assert fact in text
@@ -301,9 +293,7 @@ def test_a_camera_must_be_named_where_there_are_several(tmp_path: Path) -> None:
         ("1 OPENCV_FISHEYE 640 512 812.4 811.9 319.2 259.8 " + " ".join(map(str, D4)), D4, True),
     ],
 )
-def test_a_camera_of_colmap_projects_as_opencv_does(
-    tmp_path: Path, line: str, D: Array, fisheye: bool
-) -> None:
+def test_a_camera_of_colmap_projects(tmp_path: Path, line: str, D: Array, fisheye: bool) -> None:
     """COLMAP's pixel centres are at halves: its principal point is OpenCV's plus a half."""
     found = sensor(tmp_path, LENS, "cameras.txt", content=f"# cameras\n{line}\n")
     assert_projects(found.nominal_intrinsics(), project_cv(D, fisheye=fisheye))
@@ -538,7 +528,7 @@ Tr_velo_to_cam: 0 -1 0 -0.004 0 0 -1 -0.076 1 0 0 -0.27
         ),
     ],
 )
-def test_a_calibration_of_kitti_places_cameras_from_the_scanner(
+def test_a_kitti_calibration_places_from_the_scanner(
     tmp_path: Path, name: str, content: str
 ) -> None:
     """Points of the scanner through Tr, R0_rect and P2 are where the placed camera sees them.
@@ -555,9 +545,7 @@ def test_a_calibration_of_kitti_places_cameras_from_the_scanner(
     image = points @ (P.reshape(3, 4) @ Tr.reshape(4, 4)).T
     eye = np.linalg.inv(rig_pose(found)) @ points.T
     np.testing.assert_allclose(
-        found.nominal_intrinsics().project(eye[:3].T),
-        image[:, :2] / image[:, 2:] + 0.5,
-        atol=0.01,
+        found.nominal_intrinsics().project(eye[:3].T), image[:, :2] / image[:, 2:] + 0.5, atol=0.01
     )
 
 
@@ -573,7 +561,7 @@ def test_a_calibration_of_kitti_places_cameras_from_the_scanner(
         ("frame: a", "r.urdf", "<sdf/>", "its root element is <sdf>, not <opencv_storage>"),
     ],
 )
-def test_a_bad_place_is_refused(
+def test_bad_places_are_refused(
     tmp_path: Path, text: str, name: str, content: str, fact: str
 ) -> None:
     message = told(tmp_path, f"rig: r, mounting: {{file: FILE, {text}}}", name, content=content)

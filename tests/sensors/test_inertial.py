@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 import pytest
-from pydantic import ValidationError
 from scipy.special import fresnel
 
 from gen_data.core.errors import ConfigError
@@ -120,16 +119,6 @@ def test_walk_grows_with_the_root_of_time() -> None:
     assert abs(ends.std() / math.hypot(math.sqrt(2) * white, 10.0 * walk) - 1.0) < 0.1
 
 
-def test_a_step_made_alone_has_the_same_bytes() -> None:
-    """Whatever was made before it, in this process or another."""
-    sensor, scene = Imu(), world(circle(20.0, 8.0))
-    alone = reading(sensor, scene, 7).rows.tobytes()
-    for k in range(7):
-        reading(sensor, scene, k)
-
-    assert reading(sensor, scene, 7).rows.tobytes() == alone
-
-
 def test_white_noise_has_the_density_of_the_data_sheet() -> None:
     """0.2 degrees per root hour at 100 Hz: 5.8e-4 rad/s; 0.005 m/s per root hour: 8.3e-4 m/s^2."""
     still = world(straight((0.0, 0.0), (0.0, 0.0)))
@@ -149,26 +138,8 @@ def test_white_noise_has_the_density_of_the_data_sheet() -> None:
     ],
 )
 def test_what_does_not_fit_the_scene_is_told(fields: dict, words: str) -> None:
-    """When it is mounted, before anything is made."""
     with pytest.raises(ConfigError, match=words):
         Imu(**fields).mount(world())
-
-
-@pytest.mark.parametrize(
-    ("kind", "fields"),
-    [
-        (Imu, {"noise": -1.0}),
-        (Imu, {"model": "RT3004"}),
-        (Gnss, {"noise": -0.1}),
-        (Gnss, {"origin_deg": (91.0, 0.0)}),
-        (Odometer, {"scale_error": -0.1}),
-        (Odometer, {"speed_noise_m_s": -0.1}),
-    ],
-)
-def test_impossible_values_are_refused(kind: type, fields: dict) -> None:
-    """When they are read."""
-    with pytest.raises(ValidationError):
-        kind(**fields)
 
 
 def test_geodetic_coordinates_of_known_places() -> None:

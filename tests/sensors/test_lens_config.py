@@ -105,10 +105,7 @@ def test_a_published_camera_is_scaled_to_the_width_and_cut_to_the_height() -> No
         ),
     ],
 )
-def test_what_is_no_lens_is_refused_before_anything_is_made(
-    given: dict[str, Any], message: str
-) -> None:
-    """Telling what is wrong."""
+def test_what_is_no_lens_is_refused_before_anything(given: dict[str, Any], message: str) -> None:
     with pytest.raises(ValidationError, match=message):
         RgbCamera.model_validate(given)
 
@@ -141,7 +138,6 @@ class Rendering:
         self.asked: frozenset[Channel] = frozenset()
 
     def render(self, scene: Scene, camera: Camera, channels: frozenset[Channel]) -> SensorReading:
-        """Whatever there is."""
         del scene
         self.asked = channels
         shape = (camera.intrinsics.height_px, camera.intrinsics.width_px)
@@ -154,8 +150,7 @@ class Rendering:
 
 
 @pytest.mark.parametrize(
-    ("lens", "depth"),
-    [("pinhole", Channel.Z_DEPTH), ("kannala_brandt", Channel.RANGE)],
+    ("lens", "depth"), [("pinhole", Channel.Z_DEPTH), ("kannala_brandt", Channel.RANGE)]
 )
 def test_photographs_are_focused_along_the_axis_or_at_a_distance(lens: str, depth: Channel) -> None:
     """What lies beside a fisheye has no depth along its axis."""

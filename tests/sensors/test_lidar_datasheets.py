@@ -42,7 +42,6 @@ sensors:
 
 
 def spec(folder: Path, line: str, **files: str) -> Config:
-    """The configuration with one line of the scanner's, beside some files."""
     for name, text in files.items():
         (folder / name.replace("_", ".", 1)).write_text(text, encoding="utf-8")
     (folder / "mine.yaml").write_text(CONFIG % line, encoding="utf-8")
@@ -50,7 +49,6 @@ def spec(folder: Path, line: str, **files: str) -> Config:
 
 
 def told(folder: Path, line: str, **files: str) -> str:
-    """What a user is told, without folders."""
     with pytest.raises(ConfigError) as refused:
         spec(folder, line, **files)
     return str(refused.value).replace(f"{folder}/", "")
@@ -106,10 +104,7 @@ def test_a_table_of_beams_replaces_the_lasers_of_a_model(tmp_path: Path) -> None
         ("", "table.csv:1:1: expected columns"),
     ],
 )
-def test_what_is_wrong_in_a_table_is_told_with_its_place(
-    table: str, message: str, tmp_path: Path
-) -> None:
-    """File, line and column."""
+def test_a_wrong_table_is_told_with_its_place(table: str, message: str, tmp_path: Path) -> None:
     assert message in told(tmp_path, "beams: table.csv", table_csv=table)
 
 
@@ -127,7 +122,6 @@ def test_what_is_wrong_in_a_table_is_told_with_its_place(
 def test_what_is_wrong_with_a_model_is_told_with_its_place(
     line: str, sheet: str, message: str, tmp_path: Path
 ) -> None:
-    """In the sheet, or where the configuration names it."""
     assert message in told(tmp_path, line, sheet_yaml=sheet)
 
 
@@ -206,7 +200,7 @@ def test_a_step_in_azimuth_gives_the_pulses_of_a_turn(tmp_path: Path) -> None:
         ("like: VLP-16\nrate_hz: 9\n", "unknown key 'rate_hz'"),
     ],
 )  # fmt: skip
-def test_a_short_sheet_with_a_fault_is_refused_in_one_message(
+def test_a_short_faulty_sheet_is_refused_in_one_message(
     tmp_path: Path, text: str, fact: str
 ) -> None:
     message = told(tmp_path, "model: s.yaml", s_yaml=text)

@@ -37,7 +37,6 @@ def moving(body: str, start: tuple[float, float, float], turning: bool = True) -
 
 
 def scene_of(bodies: list[Body], *tracks: Trajectory) -> Scene:
-    """Bodies about a scanner on a cart at the origin."""
     cart = Body("cart", "cart", SE3((0.0, 0.0, -3.0)))
     rig = Rig("rig", "cart", SE3((0.0, 0.0, 3.0)))
     lidar = Lidar("velodyne", "", SE3((0.5, 0.0, 0.0)), rig="rig", sweep_s=PERIOD_S)
@@ -46,7 +45,6 @@ def scene_of(bodies: list[Body], *tracks: Trajectory) -> Scene:
 
 
 def sweep(scene: Scene, motion: str, **fields: object) -> PointCloud:
-    """A sweep without noise."""
     sensor = LidarSensor(
         name="velodyne", model="VLP-16", ideal=True, motion_distortion=motion, **fields
     )  # type: ignore[arg-type]
@@ -78,8 +76,7 @@ def test_the_scene_s_instant_is_the_middle_of_the_sweep() -> None:
         scene_of([Body("hall", "hall", SE3((0, 0, -5.0)))], moving("cart", (0, 0, -3))), "raw"
     )
 
-    assert cloud.time_s == 0.2
-    assert cloud.start_s == pytest.approx(0.15)
+    assert (cloud.time_s, cloud.start_s) == (0.2, pytest.approx(0.15))
     x, y, _ = cloud.points["position_m"].T
     ahead = np.abs(np.arctan2(y, x)) < 0.01
     np.testing.assert_allclose(times_s(cloud)[ahead], 0.2, atol=2e-4)

@@ -15,21 +15,12 @@ from gen_data.core.scene import Camera, Lidar, Scene, Weather
 from gen_data.core.se3 import SE3
 from gen_data.core.streams import Rng, Streams
 from gen_data.sensors.camera.rgb_camera import RgbCamera
+from gen_data.sensors.lidar import lidar_detection
 from gen_data.sensors.lidar.lidar_atmosphere import (
     add_atmosphere,
     fog_peak,
     optical_depth,
     rain_extinction_per_m,
-)
-from gen_data.sensors.lidar.lidar_detection import (
-    Kept,
-    is_detected,
-    laser_gains,
-    make_pulses,
-    measure_intensity,
-    received_light,
-    report_intensity,
-    select_returns,
 )
 from gen_data.sensors.lidar.lidar_sensor import LidarSensor
 from gen_data.sensors.lidar.scan_pattern import lidar_model
@@ -83,7 +74,7 @@ def scan(sensor: LidarSensor, wall: Wall, weather: Weather | None = None, seed: 
 def test_light_falls_with_the_square_of_range() -> None:
     """Twice as far is a quarter; the unit is the model's own sensitivity."""
     r = np.array([10.0, 20.0, MODEL.seen.range_m], np.float32)
-    light = received_light(np.full(3, MODEL.seen.reflectance, np.float32), r, MODEL)
+    light = lidar_detection.received_light(np.full(3, MODEL.seen.reflectance, np.float32), r, MODEL)
 
     assert light[0] / light[1] == pytest.approx(4.0, rel=1e-5)
     assert light[2] == pytest.approx(1.0, rel=1e-5)
@@ -114,7 +105,7 @@ class Mirrors(Wall):
 
 
 @pytest.mark.parametrize("returns", ["strongest", "last", "dual"])
-def test_an_ideal_scan_has_nothing_behind_mirrors(returns: Kept) -> None:
+def test_an_ideal_scan_has_nothing_behind_mirrors(returns: lidar_detection.Kept) -> None:
     """What is behind glass is there, and stays."""
     seen = Mirrors(30.0, reflectance=0.01)
     real = scan(LidarSensor(model="VLP-16", divergence=False, returns=returns), seen)
@@ -150,11 +141,9 @@ def test_range_noise_is_that_of_the_data_sheet_on_steps_of_the_device() -> None:
 
 
 def test_nothing_nearer_or_farther_than_the_device_reports() -> None:
-    """Its range is 0.5 to 100 m."""
     sensor = LidarSensor(model="VLP-16", ideal=True)
 
-    assert len(scan(sensor, Wall(0.4))) == 0
-    assert len(scan(sensor, Wall(100.5))) == 0
+    assert (len(scan(sensor, Wall(0.4))), len(scan(sensor, Wall(100.5)))) == (0, 0)
     assert len(scan(sensor, Wall(99.5))) == 1808 * 16
 
 
@@ -221,7 +210,7 @@ def test_the_air_has_a_sensitivity_of_its_own() -> None:
     model = lidar_model("HDL-64E")
     one, two = (
         add_atmosphere(
-            make_pulses(echoes(np.full((500, 1), 90.0)), device),
+            lidar_detection.make_pulses(echoes(np.full((500, 1), 90.0)), device),
             Weather(fog_extinction_per_m=0.06, rain_mm_h=20.0, snow_mm_h=2.0),
             device,
             1.7,
@@ -240,7 +229,6 @@ def test_the_air_has_a_sensitivity_of_its_own() -> None:
 
 
 def test_thicker_fog_answers_more() -> None:
-    """Its strength rises with extinction."""
     strengths = [fog_peak(a)[1] for a in (0.005, 0.01, 0.02, 0.06)]
 
     assert strengths == sorted(strengths)
@@ -264,26 +252,28 @@ def test_snow_sends_back_more_than_rain() -> None:
 def test_a_beam_that_meets_two_things_can_return_both() -> None:
     """Strongest and last; nearest first; rays that end close to each other are one return."""
     near_and_far = np.array([[10.0, 10.1, 10.2, 10.1, 30.0, 30.1, np.inf]])
-    pulses = make_pulses(echoes(near_and_far), MODEL)
+    pulses = lidar_detection.make_pulses(echoes(near_and_far), MODEL)
     noticed = pulses.light > 0.0
 
-    rows, picks = select_returns(pulses, noticed, "dual")
+    rows, picks = lidar_detection.select_returns(pulses, noticed, "dual")
     np.testing.assert_allclose(pulses.range_m[rows, picks], [10.0, 30.0])
     assert pulses.reflectance[rows, picks] == pytest.approx([0.5 * 4 / 7, 0.5 * 2 / 7])
-    rows, picks = select_returns(pulses, noticed, "strongest")
+    rows, picks = lidar_detection.select_returns(pulses, noticed, "strongest")
     np.testing.assert_allclose(pulses.range_m[rows, picks], [10.0])
-    rows, picks = select_returns(pulses, noticed, "last")
+    rows, picks = lidar_detection.select_returns(pulses, noticed, "last")
     np.testing.assert_allclose(pulses.range_m[rows, picks], [30.0])
 
 
 def test_the_detector_notices_by_light() -> None:
     """L^6 / (1 + L^6), within four standard deviations."""
     for light in (0.7, 1.0, 1.3):
-        pulses = make_pulses(echoes(np.full((20_000, 1), 10.0)), MODEL)
+        pulses = lidar_detection.make_pulses(echoes(np.full((20_000, 1), 10.0)), MODEL)
         pulses = replace(pulses, light=np.full((20_000, 1), light, np.float32))
         expected = light**6 / (1.0 + light**6)
         spread = math.sqrt(expected * (1 - expected) / 20_000)
-        assert is_detected(pulses, rng()).mean() == pytest.approx(expected, abs=4 * spread)
+        assert lidar_detection.is_detected(pulses, rng()).mean() == pytest.approx(
+            expected, abs=4 * spread
+        )
 
 
 def test_a_soiled_window_takes_light_both_ways() -> None:
@@ -316,7 +306,7 @@ def test_a_window_passes_some_light_and_at_most_all() -> None:
 
 def test_retro_reflectors_are_told_from_white() -> None:
     """White matte is 100 of 255 on a Velodyne, the brightest sign 255."""
-    told = report_intensity(np.float32([0.0, 0.5, 1.0, 800.0, 1e5]), MODEL)
+    told = lidar_detection.report_intensity(np.float32([0.0, 0.5, 1.0, 800.0, 1e5]), MODEL)
 
     np.testing.assert_allclose(told, [0.0, 0.196, 0.392, 1.0, 1.0], atol=1e-6)
 
@@ -329,14 +319,16 @@ def measured(reflectance: list[float], range_m: float, **changes: float) -> np.n
     model = model.model_copy(update={"response": model.response.model_copy(update=exact)})
     light = np.asarray(reflectance, np.float32)
     ring = (np.arange(len(light)) % 64).astype(np.uint16)
-    return measure_intensity(light, np.full(len(light), range_m, np.float32), ring, model, rng())
+    return lidar_detection.measure_intensity(
+        light, np.full(len(light), range_m, np.float32), ring, model, rng()
+    )
 
 
 def test_a_receiver_focused_at_a_distance_collects_less_nearby() -> None:
     """1 / (range^2 + near^2), and 1 at the sensitivity's own range."""
     model = lidar_model("HDL-64E").model_copy(update={"near_m": 12.0, "seen_far": None})
     r = np.array([2.0, 12.0, 50.0, 120.0], np.float32)
-    light = received_light(np.full(4, model.seen.reflectance, np.float32), r, model)
+    light = lidar_detection.received_light(np.full(4, model.seen.reflectance, np.float32), r, model)
 
     expected = [(50.0**2 + 12.0**2) / (v * v + 12.0**2) for v in r.tolist()]
     np.testing.assert_allclose(light, expected, rtol=1e-5)
@@ -345,13 +337,15 @@ def test_a_receiver_focused_at_a_distance_collects_less_nearby() -> None:
 def test_the_range_of_an_hdl64_follows_the_reflectance() -> None:
     """As its manual says: 10 % at 50 m, 80 % at 120 m. Without a loss it would be 151 m."""
     model = lidar_model("HDL-64E")
-    light = received_light(np.float32([0.1, 0.8]), np.float32([50.0, 120.0]), model)
+    light = lidar_detection.received_light(np.float32([0.1, 0.8]), np.float32([50.0, 120.0]), model)
     np.testing.assert_allclose(light, 1.0, rtol=1e-5)
 
     plain = model.model_copy(update={"seen_far": None})
     reach = math.sqrt(0.8 / 0.1 * (50.0**2 + 20.0**2) - 20.0**2)
     assert reach == pytest.approx(151.0, abs=0.1)
-    assert received_light(np.float32([0.8]), np.float32([reach]), plain)[0] == pytest.approx(1.0)
+    assert lidar_detection.received_light(np.float32([0.8]), np.float32([reach]), plain)[
+        0
+    ] == pytest.approx(1.0)
 
 
 def test_a_far_sensitivity_adds_an_exponential_loss() -> None:
@@ -361,7 +355,7 @@ def test_a_far_sensitivity_adds_an_exponential_loss() -> None:
     r = np.array([0.0, 50.0, 60.0, 70.0, np.inf], np.float32)
     seen = np.full(5, 0.3, np.float32)
 
-    lossy, full = (received_light(seen, r, device) for device in (model, plain))
+    lossy, full = (lidar_detection.received_light(seen, r, device) for device in (model, plain))
 
     ratio = lossy[:4] / full[:4]
     assert ratio[1] == pytest.approx(1.0) and ratio[0] > 1.0
@@ -400,7 +394,7 @@ def test_noise_spread_and_steps_of_intensities() -> None:
     plain = measured(grey, 10.0)
     noisy = measured(grey, 10.0, noise=0.02)
     steps = measured(grey, 10.0, noise=0.02, step=0.01) / 0.01
-    gains = laser_gains(64, 0.1)
+    gains = lidar_detection.laser_gains(64, 0.1)
 
     assert np.ptp(plain) == 0.0
     assert noisy.std() == pytest.approx(0.02, rel=0.03)
@@ -408,7 +402,7 @@ def test_noise_spread_and_steps_of_intensities() -> None:
     assert np.abs(steps - np.rint(steps)).max() < 1e-3
     assert gains.mean() == pytest.approx(1.0, abs=0.01)
     assert gains.std() == pytest.approx(0.1, rel=0.1)
-    assert (laser_gains(16, 0.0) == 1.0).all()
+    assert (lidar_detection.laser_gains(16, 0.0) == 1.0).all()
 
 
 def test_an_ideal_scanner_reports_intensity_in_proportion() -> None:
@@ -457,8 +451,8 @@ def test_the_strongest_return_is_the_strongest_of_all_that_detours_add() -> None
     )
     seen = replace(first, detours=detours)
 
-    strongest = make_pulses(seen, MODEL, "strongest")
-    every = make_pulses(seen, MODEL, "dual")
+    strongest = lidar_detection.make_pulses(seen, MODEL, "strongest")
+    every = lidar_detection.make_pulses(seen, MODEL, "dual")
 
     best = every.light.argmax(axis=1)[:, None]
     assert 0.05 < (strongest.instance_id == 9).mean() < 0.5

@@ -20,13 +20,11 @@ from tests.randomizers.doubles import PLATE, FakeAssets
 
 
 def made(**fields: Any) -> PlateCamera:
-    """The sensor, as from YAML."""
     plain = {"type": "plate_camera", "size_px": [320, 200], **fields}
     return PlateCamera.model_validate_json(json.dumps(plain))
 
 
 def on_a_plate() -> Scene:
-    """The ground of a photograph and its camera."""
     return build_scene("test", (PlateElement(name="plate"),), FakeAssets())
 
 
@@ -36,8 +34,7 @@ def test_it_looks_as_the_photograph() -> None:
     assert camera.T_world_camera == PLATE.T_world_camera
     assert camera.intrinsics == fitted_intrinsics(PLATE.intrinsics, 320, 200)
     assert camera.ev100 == EV100
-    assert made().image_pipeline.preset == "photograph"
-    assert made().image_pipeline.tone == "srgb"
+    assert (made().image_pipeline.preset, made().image_pipeline.tone) == ("photograph", "srgb")
 
 
 def test_mounting_twice_changes_nothing() -> None:
@@ -58,7 +55,6 @@ def test_a_plate_has_no_lamps_but_its_sun() -> None:
     [("hfov_deg", 70.0), ("rig", "ego"), ("lens", {"model": "pinhole"}), ("yaw_deg", 3.0)],
 )
 def test_geometry_of_its_own_is_refused(field: str, value: Any) -> None:
-    """The photograph gives it."""
     with pytest.raises(ValidationError, match=f"{field}: the photograph gives it"):
         made(**{field: value})
 
@@ -84,7 +80,6 @@ def test_it_needs_a_plate_with_its_name() -> None:
     "sensor", ["{type: rgb_camera, name: other}", "{type: lidar, name: roof, model: VLP-16}"]
 )
 def test_other_sensors_are_refused(sensor: str) -> None:
-    """With the place in the configuration."""
     color = "{type: plate_camera, name: color}"
     text = f"sensors=[{color}, {sensor}]"
     config = load_config("photo_plates", overrides=[text, "exporters=[]"])

@@ -27,7 +27,6 @@ FISHEYE = Lens("kannala_brandt", (0.02, -0.01, 0.0, 0.0), math.radians(80.0))
 
 @cache
 def renderer() -> WarpRenderer:
-    """The renderer of the project."""
     return WarpRenderer(FakeLibrary({"box": box_mesh(BOX_M), "ground": plane_mesh(40.0)}), "cpu")
 
 
@@ -47,7 +46,6 @@ def scene(lens: Intrinsics) -> Scene:
 
 
 def cloud_of(sensor: PseudoLidar, world: Scene) -> PointCloud:
-    """What it returns."""
     rng = Streams(0, scene=0, view=0, step=0).rng("sensor")
     mounted = place_sensors(sensor.mount(world))
     return sensor.capture(mounted, renderer(), frozenset(), rng)
@@ -100,7 +98,6 @@ def test_the_frame_is_above_the_camera_and_looks_along_its_axis() -> None:
 
 
 def test_what_is_too_far_away_has_no_point() -> None:
-    """Distances count from the camera."""
     world = scene(Intrinsics.from_hfov(64, 48, 1.2))
     near = cloud_of(PseudoLidar(stride_px=2, range_max_m=7.0), world)
     every = cloud_of(PseudoLidar(stride_px=2), world)
@@ -121,7 +118,6 @@ def test_pixel_centres_of_the_coarse_camera_are_those_of_the_fine_one() -> None:
 
 
 def test_a_camera_that_does_not_fit_is_refused() -> None:
-    """None of that name, or with an image that is smaller than the stride."""
     world = scene(Intrinsics.from_hfov(64, 48, 1.2))
 
     with pytest.raises(ConfigError, match=r"no camera 'colour' .*listed so far: color"):

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from pydantic import ValidationError
 
 from gen_data.core.asset_types import SURFACES
 from gen_data.core.scene import Body, Instance, Scene, Weather
@@ -74,9 +73,7 @@ def test_radial_velocity_is_the_relative_velocity_along_the_ray() -> None:
 def test_what_recedes_is_positive() -> None:
     """A car that drives away from one that stands."""
     scene = world(
-        STILL,
-        others=[car_at(30.0)],
-        tracks=[track_of("car/2", straight((30.0, 0.0), (7.0, 0.0)))],
+        STILL, others=[car_at(30.0)], tracks=[track_of("car/2", straight((30.0, 0.0), (7.0, 0.0)))]
     )
     rows = reading(ideal(), scene, 0).rows
 
@@ -176,7 +173,6 @@ def test_rain_takes_what_itu_says() -> None:
 
 
 def test_a_car_behind_a_wall_gives_no_detection() -> None:
-    """The wall does."""
     wall = thing(3, "wall", "building", SE3((20.0, 0.0, 0.0)), WALL_M)
     scene = world(STILL, others=[car_at(35.0), wall])
     for seed in range(10):
@@ -248,14 +244,10 @@ def test_false_alarms_come_at_the_given_rate_and_belong_to_nothing() -> None:
     assert np.degrees(np.abs(rows["azimuth_rad"])).max() > 45.0
 
 
-def test_nothing_is_seen_outside_the_field_of_view_or_beyond_the_range() -> None:
+def test_neither_its_carrier_nor_what_is_outside_its_field_is_seen() -> None:
     """Behind it, aside of it, and at 260 m."""
     for pose in ((-30.0, 0.0), (0.0, 30.0), (270.0, 0.0)):
         assert len(reading(ideal(), world(STILL, others=[car_at(*pose)]), 0).rows) == 0
-
-
-def test_radar_does_not_see_the_car_that_carries_it() -> None:
-    """Even from inside its box."""
     sensor = Radar(noise=0.0, offset_m=(0.0, 0.0, 0.5))
 
     assert len(reading(sensor, world(STILL), 0).rows) == 0
@@ -273,15 +265,6 @@ def test_strongest_are_kept_and_the_nearest_comes_first() -> None:
     assert (np.diff(rows["range_m"]) >= 0.0).all()
 
 
-def test_a_reading_made_again_has_the_same_bytes() -> None:
-    """And another stream makes another one."""
-    scene = world(others=[car_at(30.0)])
-    rows = reading(Radar(**AHEAD), scene, 3).rows  # type: ignore[arg-type]
-
-    assert reading(Radar(**AHEAD), scene, 3).rows.tobytes() == rows.tobytes()  # type: ignore[arg-type]
-    assert reading(Radar(**AHEAD), scene, 3, 1).rows.tobytes() != rows.tobytes()  # type: ignore[arg-type]
-
-
 @pytest.mark.parametrize("name", preset_names(PRESETS))
 def test_every_make_is_complete(name: str) -> None:
     """Its looks cover what they say, and reach where they report."""
@@ -289,15 +272,6 @@ def test_every_make_is_complete(name: str) -> None:
     for look in make.looks:
         assert 0.0 < look.range_m[0] < look.range_m[1] <= max(r for _, r in look.reach_m)
         assert look.spacing_deg[0] < min(size for _, size in look.resolution.azimuth_deg)
-
-
-@pytest.mark.parametrize(
-    "fields", [{"noise": -1.0}, {"false_alarms": -1.0}, {"model": "ARS408"}, {"rate_hz": 0.0}]
-)
-def test_impossible_values_are_refused(fields: dict) -> None:
-    """When they are read."""
-    with pytest.raises(ValidationError):
-        Radar(**fields)
 
 
 def test_unlabelled_motion_does_not_matter() -> None:

@@ -17,7 +17,6 @@ NEAR = load_preset(PRESETS, "ARS408-21", RadarModel).looks[0]
 def rays(
     range_m: list[float], azimuth_deg: list[float], rcs_m2: list[float], ids: list[int]
 ) -> Echo:
-    """Echoes of single rays that stand still."""
     zeros = np.zeros(len(range_m))
     return Echo(
         np.array(range_m),
@@ -32,7 +31,6 @@ def rays(
 
 
 def keyed(keys: list[tuple[int, int, int, int]]) -> Cells:
-    """Cells by their numbers, in order."""
     empty = rays([], [], [], [])
     return Cells(empty, np.array(keys))
 
@@ -83,7 +81,6 @@ def test_cells_apart_are_peaks_of_their_own() -> None:
 
 
 def test_nothing_has_no_peaks() -> None:
-    """An empty world."""
     empty = rays([], [], [], [])
 
     assert len(find_peaks(make_cells(empty, NEAR), np.zeros(0))) == 0

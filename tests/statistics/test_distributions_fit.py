@@ -31,12 +31,10 @@ DRAWS = 20_000
 
 
 def stream(name: str) -> Rng:
-    """A fixed stream per test."""
     return Streams(seed=20_240_229, scene=0).rng(name)
 
 
 def drawn(distribution: Distribution[Any], n: int = DRAWS) -> list[Any]:
-    """Many values from one stream."""
     rng = stream(repr(distribution))
     return [distribution.draw(rng) for _ in range(n)]
 
@@ -148,7 +146,6 @@ def test_each_value_costs_exactly_one_random_number(distribution: Distribution[A
 
 @pytest.mark.parametrize("distribution", [Constant(1.0), Sequence((1.0, 2.0))])
 def test_constants_and_sequences_cost_no_random_number(distribution: Distribution[Any]) -> None:
-    """They are not random."""
     rng, reference = stream("cost"), stream("cost")
 
     distribution.draw(rng)

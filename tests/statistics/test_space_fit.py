@@ -38,12 +38,10 @@ GOLDEN_POSITION = (-0.4086242206357593, 0.01761914689249309, 2.1250523386837967)
 
 
 def stream(name: str) -> Rng:
-    """A fixed stream per test."""
     return Streams(seed=20_240_229, scene=1).rng(name)
 
 
 def drawn(distribution: Distribution[Any], n: int = DRAWS) -> Array:
-    """Many values from one stream, shape [n, 3 or 4]."""
     rng = stream(repr(distribution))
     return np.array([distribution.draw(rng) for _ in range(n)])
 
@@ -106,7 +104,6 @@ def test_about_z_turns_uniformly_about_the_vertical(yaw_deg: tuple[float, float]
 
 
 def test_sphere_has_no_preferred_direction() -> None:
-    """About all three axes."""
     assert_uniform_on_sphere(drawn(Sphere()))
 
 
@@ -129,7 +126,6 @@ def test_cap_is_uniform_by_area(axis: tuple[float, float, float], half_angle_deg
 
 
 def test_box_is_uniform_by_volume() -> None:
-    """Each coordinate is uniform, independently."""
     points = drawn(Box((-1, 0, 2), (1, 5, 2.5)))
 
     unit = (points - [-1, 0, 2]) / [2, 5, 0.5]
@@ -143,7 +139,7 @@ def test_box_is_uniform_by_volume() -> None:
     ("radius_m", "elevation_deg"),
     [((0.6, 1.2), (15.0, 75.0)), ((0.0, 2.0), (-90.0, 90.0)), ((3.0, 3.5), (-20.0, 0.0))],
 )
-def test_shell_is_uniform_by_volume(
+def test_shells_are_by_volume(
     radius_m: tuple[float, float], elevation_deg: tuple[float, float]
 ) -> None:
     """Radius cubed, sine of elevation and azimuth are uniform and independent."""
@@ -190,7 +186,6 @@ def test_euler_angles_turn_about_fixed_axes(
 
 
 def test_a_quaternion_is_normalised() -> None:
-    """Its length means nothing."""
     assert QuaternionWxyz((0, 0, 0, 5)).draw(stream("")) == (0, 0, 0, 1)
 
 

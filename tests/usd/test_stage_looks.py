@@ -19,7 +19,6 @@ RED, BLUE = Gf.Vec3f(1, 0, 0), Gf.Vec3f(0, 0, 1)
 
 
 def new_stage(folder: Path) -> Usd.Stage:
-    """An empty stage in metres, Z up, with a root /W."""
     stage = Usd.Stage.CreateNew(str(folder / "a.usda"))
     UsdGeom.SetStageUpAxis(stage, "Z")
     UsdGeom.SetStageMetersPerUnit(stage, 1.0)

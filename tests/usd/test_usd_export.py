@@ -37,7 +37,6 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> Library:
 
 @pytest.fixture(scope="module")
 def sequence(library: Library, tmp_path_factory: pytest.TempPathFactory) -> Any:
-    """The stage of three steps."""
     path = exported(table_world(library), library, tmp_path_factory.mktemp("out"), steps=STEPS)
     return Usd.Stage.Open(str(path))
 
@@ -69,9 +68,7 @@ def labelled_boxes(stage: Any, camera_path: str, code: int, width_px: int, heigh
 
 
 @pytest.mark.parametrize("step", range(STEPS))
-def test_the_stages_camera_reproduces_the_label_boxes(
-    sequence: Any, library: Library, step: int
-) -> None:
+def test_the_stages_camera_has_the_label_boxes(sequence: Any, library: Library, step: int) -> None:
     """Points seen through the stage's camera span the rendered silhouettes within half a pixel."""
     camera = off_centre_camera()
     scene = scene_at(table_world(library), step * STEP_S)
@@ -201,7 +198,6 @@ def test_other_processes_write_the_same_bytes(kind: str, library: Library, tmp_p
 
 
 def test_a_scene_without_motion_has_no_time_codes(library: Library, tmp_path: Path) -> None:
-    """One step: nothing varies, and no range is claimed."""
     scene: Scene = table_world(library)
     stage = Usd.Stage.Open(str(exported(scene, library, tmp_path, format="usda")))
     assert not stage.HasAuthoredTimeCodeRange()
@@ -210,7 +206,7 @@ def test_a_scene_without_motion_has_no_time_codes(library: Library, tmp_path: Pa
 
 
 @pytest.mark.parametrize("steps", [1, STEPS])
-def test_a_camera_with_an_offset_has_the_poses_of_its_images(
+def test_a_camera_with_an_offset_has_its_poses(
     library: Library, tmp_path: Path, steps: int
 ) -> None:
     """It rides on the thing that moves by 0.2 m/s along X; so do the poses of all other things."""
@@ -243,9 +239,7 @@ LENSES = {
 
 
 @pytest.mark.parametrize("model", LENSES)
-def test_every_lens_is_stated_beside_the_pinhole(
-    library: Library, tmp_path: Path, model: str
-) -> None:
+def test_every_lens_is_beside_the_pinhole(library: Library, tmp_path: Path, model: str) -> None:
     """The four coefficients of a fisheye, which look like a vector, too."""
     camera = off_centre_camera()
     bent = replace(camera, intrinsics=replace(camera.intrinsics, lens=LENSES[model]))

@@ -26,7 +26,6 @@ def opened_library(folder: Path, *roots: Path) -> Library:
 
 
 def new_stage(path: Path, up: str = "Y", metres: float = 0.01) -> Usd.Stage:
-    """A stage in centimetres, Y up, as most tools write it."""
     path.parent.mkdir(parents=True, exist_ok=True)
     stage = Usd.Stage.CreateNew(str(path))
     UsdGeom.SetStageUpAxis(stage, up)
@@ -279,7 +278,7 @@ def broken(folder: Path, kind: str) -> None:
         "compressed",
     ],
 )
-def test_a_bad_stage_is_one_clear_error(
+def test_bad_stages_are_one_error(
     fault: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     """The file is named, the fault and the remedy; the library behind prints nothing."""
@@ -297,7 +296,6 @@ def test_a_bad_stage_is_one_clear_error(
 
 
 def test_bytes_that_are_no_crate_file_are_refused(tmp_path: Path) -> None:
-    """Truncated and scrambled binary layers."""
     stage = new_stage(tmp_path / "whole.usdc")
     add_quad(stage, "/Quad")
     stage.Save()
@@ -349,7 +347,6 @@ def test_what_a_stage_refers_to_belongs_to_its_content(tmp_path: Path) -> None:
 def test_an_impossible_light_of_a_stage_is_refused(
     tmp_path: Path, attribute: str, value: object, said: str
 ) -> None:
-    """One error names the file and the light; nothing is imported."""
     (tmp_path / "props").mkdir()
     stage = new_stage(tmp_path / "props/s.usda")
     add_quad(stage, "/Quad")
@@ -390,7 +387,6 @@ def test_a_scaled_stage_keeps_its_light(tmp_path: Path) -> None:
     index = "assets:\n  - {id: s, file: s.usda, category: room, scale: 0.02}\n"
     (tmp_path / "props/assets.yaml").write_text(index)
     (light,) = opened_library(tmp_path, tmp_path / "props").stage("user/s").lights
-    assert light.kind == "sphere"
-    assert light.position_m == pytest.approx((0.0, 0.0, 0.06))
+    assert (light.kind, light.position_m) == ("sphere", pytest.approx((0.0, 0.0, 0.06)))
     # 1000 nits of a disc of 0.1 m, at 1 / 50 of the distance.
     assert light.intensity_cd == pytest.approx(1000.0 * np.pi * 0.01 / 2500.0)

@@ -14,7 +14,6 @@ VARIANTS = [cyclist(seed).mesh for seed in range(FAMILIES["cyclist"].variants)]
 
 
 def with_role(mesh: MeshData, role: str) -> np.ndarray:
-    """Corners of the triangles of a role, metres [n, 3]."""
     slots = [k for k, material in enumerate(mesh.materials) if material.role == role]
     faces = mesh.faces[np.isin(mesh.face_slots, slots)]
     return np.asarray(mesh.vertices_m[faces.ravel()], np.float64)

@@ -24,7 +24,6 @@ from tests.vehicles.test_vehicle_families import variant
 
 
 def face(seed: int, rows: int = 1, country: str = "gb") -> np.ndarray:
-    """Whether each pixel is ink."""
     build = TEXTURES["licence_plate"].build
     image = build(seed=seed, rows=rows, country=country, rear=0).albedo.astype(float)
     ground = image[image.shape[0] // 2, 6 * image.shape[1] // 256 + 8]
@@ -88,7 +87,6 @@ def test_text_on_plates_runs_from_left_to_right_for_who_looks_at_them(name: str)
 
 
 def test_motorcycles_have_plates_of_two_rows() -> None:
-    """Square ones, behind."""
     materials = variant("motorcycle", 0).mesh.materials
 
     assert any("rear=1&rows=2" in m.texture for m in materials)

@@ -23,12 +23,10 @@ SOILED = sorted(name for name, family in FAMILIES.items() if isinstance(family.b
 
 
 def build(name: str, seed: int) -> Solid:
-    """A variant with straight wheels."""
     return FAMILIES[name].build(seed=seed, **FAMILIES[name].parameters)
 
 
 def shares(solid: Solid, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """Random places on paint [n, 3], and how far their colour is from black paint to dust."""
     mesh, rng = solid.mesh, np.random.default_rng(0)
     painted = [k for k, m in enumerate(mesh.materials) if m.role == "paint" and is_soiled(m)]
     faces = mesh.faces[np.isin(mesh.face_slots, painted)]
@@ -100,7 +98,6 @@ def test_older_vehicles_are_dirtier() -> None:
 
 @pytest.mark.slow
 def test_brake_dust_darkens_and_dulls_rims() -> None:
-    """On every car."""
     worn = FAMILIES["car"].build
     assert isinstance(worn, Worn)
     for seed in range(4):
@@ -114,7 +111,7 @@ def test_brake_dust_darkens_and_dulls_rims() -> None:
 
 @pytest.mark.slow
 @for_every([(0.012, 0.011, 0.014), (0.8, 0.8, 0.78), (0.25, 0.01, 0.012)])
-def test_a_clean_texture_is_the_paint_and_a_dirty_one_nears_dust(
+def test_a_clean_texture_is_paint_and_a_dirty_one_nears_dust(
     color: tuple[float, float, float],
 ) -> None:
     """Within a step of 8 bits; the dirtiest place is mostly dust."""

@@ -17,12 +17,10 @@ SEEDS = range(FAMILIES["tram"].variants)
 
 @cache
 def built(seed: int) -> Solid:
-    """A variant."""
     return tram(seed)
 
 
 def with_role(solid: Solid, role: str) -> np.ndarray:
-    """Corners of the triangles of a role [n, 3, 3]."""
     slots = [k for k, material in enumerate(solid.mesh.materials) if material.role == role]
     faces = solid.mesh.faces[np.isin(solid.mesh.face_slots, slots)]
     return np.asarray(solid.mesh.vertices_m[faces], np.float64)

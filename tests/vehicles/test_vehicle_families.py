@@ -52,7 +52,6 @@ ROLES = {
 
 
 def build(name: str, seed: int, **parameters: object) -> Solid:
-    """Build a variant, with the other parameters at their defaults."""
     return FAMILIES[name].build(seed=seed, **{**FAMILIES[name].parameters, **parameters})
 
 
@@ -81,9 +80,7 @@ for_every_variant = for_every(
 
 @first_and_all
 @pytest.mark.parametrize("name", FAMILIES)
-def test_every_variant_is_as_big_as_real_ones_and_within_its_budget(
-    name: str, how_many: str
-) -> None:
+def test_every_variant_is_as_big_as_real_ones_and_in_budget(name: str, how_many: str) -> None:
     """The first two, or a dozen of the seeds that are offered for selection."""
     lengths, widths, heights, triangles = LIMITS[name]
     variants = FAMILIES[name].variants
@@ -117,7 +114,6 @@ def test_tyres_touch_the_ground_and_nothing_reaches_below(built: tuple[str, Soli
 
 @for_every_variant
 def test_the_origin_is_the_middle_of_the_footprint(built: tuple[str, Solid]) -> None:
-    """Mirrors and baskets aside."""
     low, high = built[1].mesh.bounds_m()
 
     assert abs(low[0] + high[0]) < 0.2
@@ -312,7 +308,6 @@ def test_steering_turns_the_front_wheels_alone(name: str) -> None:
 @pytest.mark.slow
 @for_every_variant
 def test_same_seed_makes_the_same_bytes_and_others_do_not(built: tuple[str, Solid]) -> None:
-    """Pure functions of the seed."""
     name, solid = built
     seed = _seed_of(built)
 
@@ -325,7 +320,6 @@ def test_same_seed_makes_the_same_bytes_and_others_do_not(built: tuple[str, Soli
 
 
 def test_body_styles_are_all_offered_and_told_without_building() -> None:
-    """Subcategories of the first variants."""
     facts = FAMILIES["car"].facts
     assert facts is not None
     told = {facts(seed=seed, steer_deg=0.0).subcategory for seed in range(FAMILIES["car"].variants)}

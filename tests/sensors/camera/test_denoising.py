@@ -27,7 +27,6 @@ def noisy(image: Float32) -> Float32:
 
 
 def grey(level: float) -> Float32:
-    """An even image."""
     return np.full((96, 96, 3), level, np.float32)
 
 

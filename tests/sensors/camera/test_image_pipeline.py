@@ -35,7 +35,6 @@ WHITE_CD_M2 = 1.2 * 2.0**8
 
 
 def rng() -> Rng:
-    """A stream."""
     return Streams(seed=5, scene=0).rng("test")
 
 
@@ -52,7 +51,6 @@ class Rendering:
         self.radiance, self.asked = radiance, frozenset[Channel]()
 
     def render(self, scene: Scene, camera: Camera, channels: frozenset[Channel]) -> SensorReading:
-        """All channels are that image."""
         self.asked = channels
         return SensorReading(camera.name, camera, dict.fromkeys(channels, self.radiance))
 
@@ -164,7 +162,6 @@ def test_renderers_are_asked_for_radiance_and_only_for_the_depth_that_is_needed(
 
 
 def test_radiance_is_left_as_it_was() -> None:
-    """Whatever the chain does, the reading's radiance is no part of it."""
     radiance = speckled()
     kept = radiance.copy()
     pipeline = ImagePipeline.model_validate_json('{"preset": "webcam", "focus": null}')
@@ -173,7 +170,6 @@ def test_radiance_is_left_as_it_was() -> None:
 
 
 def written(tmp_path: Path, text: str) -> str:
-    """A configuration with that text in it."""
     path = tmp_path / "own.yaml"
     path.write_text(f"template: tabletop\n{text}")
     return str(path)

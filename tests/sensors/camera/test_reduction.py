@@ -25,7 +25,6 @@ SENSOR = ImageSensor(full_well_e=1000.0, prnu=0.02, dsnu_e=4.0, bits=10)
 
 
 def rng(name: str = "noise") -> Any:
-    """A stream."""
     return Streams(seed=8, scene=0).rng(name)
 
 
@@ -100,7 +99,6 @@ WINDOW_CD_M2, WALL_CD_M2 = 3000.0, 20.0
 
 
 def emitting(luminance_cd_m2: float) -> Material:
-    """A black material that glows."""
     return Material((0.0, 0.0, 0.0), 1.0, specular=0.0, emission_cd_m2=(luminance_cd_m2,) * 3)
 
 
@@ -115,7 +113,6 @@ def window_in_a_wall() -> tuple[Scene, FakeLibrary]:
 
 
 def looking_along_z(width_px: int, height_px: int) -> Camera:
-    """A camera at the origin; its exposure saturates at 307 cd/m^2."""
     return Camera("eye", SE3(), Intrinsics.from_hfov(width_px, height_px, 1.0), ev100=8.0)
 
 

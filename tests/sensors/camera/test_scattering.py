@@ -19,7 +19,6 @@ CAMERA = Camera("front", SE3(), Intrinsics(960, 640, 800.0, 800.0, 480.0, 320.0)
 
 
 def test_drops_hide_their_share_of_the_lens() -> None:
-    """Discs thrown at random overlap: 1 - exp(-sum of areas / image)."""
     shares = []
     for seed in range(60):
         drops = lens_drops(Weather(lens_drops=0.05, seed=seed), CAMERA)
@@ -84,7 +83,6 @@ def test_glare_is_enlarged_bilinearly() -> None:
 
 
 def test_glare_leaves_its_input_as_it_is() -> None:
-    """Radiance belongs to the reading."""
     image = np.full((40, 40, 3), 3.0, np.float32)
     add_glare(image, 0.5)
     assert (image == 3.0).all()

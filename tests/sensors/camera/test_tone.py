@@ -9,17 +9,9 @@ import numpy as np
 import pytest
 
 from gen_data.core.streams import Streams
-from gen_data.sensors.camera.isp import (
-    Tone,
-    display_values,
-    filmic,
-    knee,
-    log,
-    to_bytes,
-    tone_to_bytes,
-)
+from gen_data.sensors.camera import isp
 
-TONES: tuple[Tone, ...] = get_args(Tone)
+TONES: tuple[isp.Tone, ...] = get_args(isp.Tone)
 
 
 @pytest.mark.parametrize(
@@ -38,29 +30,23 @@ TONES: tuple[Tone, ...] = get_args(Tone)
 )
 def test_filmic_is_uchimuras_curve(value: float, expected: float) -> None:
     """Uchimura 2017, worked by hand for his parameters."""
-    assert float(filmic(np.array(value))) == pytest.approx(expected, abs=1e-12)
+    assert float(isp.filmic(np.array(value))) == pytest.approx(expected, abs=1e-12)
 
 
 @pytest.mark.parametrize(
     ("value", "expected"),
-    [
-        (0.0, 0.0),
-        (0.3, 0.3),
-        (0.5, 0.5),
-        (1.0, 1.0 - 0.5 / math.e),
-        (2.0, 1.0 - 0.5 / math.e**3),
-    ],
+    [(0.0, 0.0), (0.3, 0.3), (0.5, 0.5), (1.0, 1.0 - 0.5 / math.e), (2.0, 1.0 - 0.5 / math.e**3)],
 )
 def test_knee_is_straight_and_then_an_exponential(value: float, expected: float) -> None:
     """The identity to a half; above it half the room is left every ln(2) / 2."""
-    assert float(knee(np.array(value))) == pytest.approx(expected, abs=1e-12)
+    assert float(isp.knee(np.array(value))) == pytest.approx(expected, abs=1e-12)
 
 
 @pytest.mark.parametrize("contrast", [0.5, 1.0, 1.3, 2.0])
 def test_contrast_is_the_slope_at_middle_grey(contrast: float) -> None:
     """A stop above middle grey is ``contrast`` stops above it; without a curve, up to white."""
     stops = np.linspace(-2.0, 1.0, 7)
-    shown = display_values(0.18 * 2.0**stops, "linear", contrast=contrast)
+    shown = isp.display_values(0.18 * 2.0**stops, "linear", contrast=contrast)
 
     lit = 0.18 * 2.0 ** (contrast * stops) <= 1.0
     assert np.log2(shown[lit] / 0.18) == pytest.approx(contrast * stops[lit], abs=1e-12)
@@ -73,7 +59,7 @@ def test_log_is_the_mu_law(white: float) -> None:
     mu = 8.0 * white
     for x in (0.0, 0.01, 0.5, 1.0):
         expected = math.log(1.0 + mu * x) / math.log(1.0 + mu)
-        assert float(log(np.array(x * white), white)) == pytest.approx(expected, abs=1e-12)
+        assert float(isp.log(np.array(x * white), white)) == pytest.approx(expected, abs=1e-12)
 
 
 @pytest.mark.parametrize("value", [0.002, 0.01, 0.18, 0.5, 1.0, 3.0])
@@ -81,41 +67,41 @@ def test_srgb_is_the_standard_and_clips_at_white(value: float) -> None:
     """IEC 61966-2-1: 12.92 v below 0.0031308, else 1.055 v^(1/2.4) - 0.055; white beyond 1."""
     v = min(value, 1.0)
     expected = 12.92 * v if v <= 0.0031308 else 1.055 * v ** (1 / 2.4) - 0.055
-    assert float(display_values(np.array(value), "srgb")) == pytest.approx(expected, abs=1e-12)
+    assert float(isp.display_values(np.array(value), "srgb")) == pytest.approx(expected, abs=1e-12)
 
 
 def test_linear_is_written_without_a_transfer_function() -> None:
     """Half of white is half of the range."""
-    values = display_values(np.array([-1.0, 0.0, 0.5, 2.0]), "linear")
+    values = isp.display_values(np.array([-1.0, 0.0, 0.5, 2.0]), "linear")
     assert values.tolist() == [0.0, 0.0, 0.5, 1.0]
 
 
 def test_filmic_keeps_middle_grey_and_tells_lights_beyond_white_apart() -> None:
     """Near the identity in the mid-tones, with a shoulder between 1 and 4."""
-    assert abs(float(filmic(np.array(0.18))) - 0.18) < 0.02
-    assert float(filmic(np.array(1.0))) < 0.9 < float(filmic(np.array(4.0))) <= 1.0
+    assert abs(float(isp.filmic(np.array(0.18))) - 0.18) < 0.02
+    assert float(isp.filmic(np.array(1.0))) < 0.9 < float(isp.filmic(np.array(4.0))) <= 1.0
 
 
 @pytest.mark.parametrize("tone", TONES)
-def test_every_curve_rises_from_black_to_white(tone: Tone) -> None:
+def test_every_curve_rises_from_black_to_white(tone: isp.Tone) -> None:
     """Monotonic; darkness, and what is negative by noise, is 0; what is endless is 255."""
     values = np.concatenate([[-1.0, 0.0], np.geomspace(1e-6, 1e6, 2000), [np.inf]])
     image = np.repeat(values.astype(np.float32)[:, None, None], 3, axis=2)
 
-    levels = tone_to_bytes(image, 1.0, tone)[:, 0, 1].astype(int)
+    levels = isp.tone_to_bytes(image, 1.0, tone)[:, 0, 1].astype(int)
 
     assert (levels[0], levels[1], levels[-1]) == (0, 0, 255)
     assert (np.diff(levels) >= 0).all()
 
 
 @pytest.mark.parametrize("tone", TONES)
-def test_bytes_by_table_are_those_of_the_formula(tone: Tone) -> None:
+def test_bytes_by_table_are_those_of_the_formula(tone: isp.Tone) -> None:
     """For values over fourteen stops: at most one of 255 apart, and hardly ever."""
     stream = Streams(seed=3, scene=0).rng("values")
     image = (2.0 ** stream.uniform(-10.0, 4.0, (101, 64, 3))).astype(np.float32)
 
-    table = tone_to_bytes(image, 0.5, tone, white=4.0).astype(int)
-    formula = to_bytes(display_values(0.5 * image.astype(np.float64), tone, white=4.0))
+    table = isp.tone_to_bytes(image, 0.5, tone, white=4.0).astype(int)
+    formula = isp.to_bytes(isp.display_values(0.5 * image.astype(np.float64), tone, white=4.0))
 
     assert np.abs(table - formula).max() <= 1
     assert (table != formula).mean() < 0.06
@@ -124,5 +110,5 @@ def test_bytes_by_table_are_those_of_the_formula(tone: Tone) -> None:
 def test_white_is_the_luminance_that_saturates() -> None:
     """A scale of 1 / 300 makes 300 cd/m^2 white, and 0.21404 of it half of sRGB's range."""
     image = np.array([300.0, 300.0 * 0.21404, 0.0], np.float32).reshape(1, 1, 3)
-    levels = tone_to_bytes(image, 1.0 / 300.0, "srgb").ravel()
+    levels = isp.tone_to_bytes(image, 1.0 / 300.0, "srgb").ravel()
     np.testing.assert_allclose(levels, [255, 127.5, 0], atol=0.6)
