@@ -6,8 +6,6 @@ Samples of 8 x 6 pixels, each of which sleeps for 50 ms, so that two workers do 
 with anything else that matters. One shard per sample: the time beyond the sleep is overhead.
 """
 
-from __future__ import annotations
-
 import sys
 import tempfile
 from dataclasses import replace

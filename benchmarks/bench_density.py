@@ -5,8 +5,6 @@ roads, on both sides together, over the length of all roads of the scene; traffi
 left out, because configurations draw their number.
 """
 
-from __future__ import annotations
-
 import argparse
 import statistics
 import time

@@ -6,8 +6,6 @@ data is counted as if it crossed. Visibility is found by rays, as on a GPU. Argu
 (less than 1 kB each) are not counted.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from collections import Counter

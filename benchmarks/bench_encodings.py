@@ -5,8 +5,6 @@ photographs are encoded and decoded again in every encoding. Prints kilobytes, C
 both, and the peak signal-to-noise ratio (PSNR) of the result.
 """
 
-from __future__ import annotations
-
 import argparse
 import tempfile
 import time

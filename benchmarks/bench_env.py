@@ -6,8 +6,6 @@ milliseconds, once caches are warm, the shares of physics and of the camera, and
 reset.
 """
 
-from __future__ import annotations
-
 import argparse
 import time
 from collections.abc import Callable

@@ -6,8 +6,6 @@ in. Formats with options are written as YAML, such as ``'{type: voc, images: png
 read before the measurement, and each format is measured ``--repeat`` times; the least counts.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import tempfile

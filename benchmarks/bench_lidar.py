@@ -7,8 +7,6 @@ assets are cached. "Moving" is the same street with the scanner and all vehicles
 motion.
 """
 
-from __future__ import annotations
-
 import argparse
 import time
 from collections.abc import Callable

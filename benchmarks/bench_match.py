@@ -6,8 +6,6 @@ standard deviation of the fits over repetitions with new scenes, and how many 95
 the truth.
 """
 
-from __future__ import annotations
-
 import argparse
 import time
 from collections.abc import Iterable

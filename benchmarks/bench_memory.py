@@ -8,8 +8,6 @@ the slopes between all pairs of readings (Theil-Sen) in the second half of the r
 a renderer, ``--passes`` times in another order: the memory of a worker that has seen everything.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import tempfile

@@ -9,8 +9,6 @@ of Mitsuba runs on GPUs of one vendor only. Each renderer has a process of its o
 time of one image with compiled kernels.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import math

@@ -5,8 +5,6 @@ environment light; RGB, depth, instance and category, then amodal silhouettes to
 one core; scenes are drawn and settled before the clock starts.
 """
 
-from __future__ import annotations
-
 import argparse
 import time
 from collections import defaultdict

@@ -5,8 +5,6 @@ COCO, KITTI, KITTI raw, SemanticKITTI and tables on disk. nuScenes' rig: six cam
 HDL-32E and five radars, with COCO, point clouds, bird's-eye maps and tables. All weathers.
 """
 
-from __future__ import annotations
-
 import argparse
 
 from benchmarks.runs import format_summary, machine, measure_run

@@ -9,8 +9,6 @@ so many different ones through the caches of a renderer.
     python -m benchmarks.bench_scaling --only pixels lamps
 """
 
-from __future__ import annotations
-
 import argparse
 import math
 import os

@@ -6,8 +6,6 @@ at least 0.2 m above the ground, as ``bench_scans`` counts points, and those of 
 rays does, that is, which touch it with at least a part of their divergence.
 """
 
-from __future__ import annotations
-
 import argparse
 import math
 

@@ -4,8 +4,6 @@
 depth, instance and category PNGs, COCO and KITTI labels on disk; all weathers of the configuration.
 """
 
-from __future__ import annotations
-
 import argparse
 
 from benchmarks.runs import format_summary, machine, measure_run

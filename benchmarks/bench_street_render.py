@@ -7,8 +7,6 @@ for real assets of the same size: they are computed, so that the benchmark needs
 and its scenes never change. One process, one core.
 """
 
-from __future__ import annotations
-
 import argparse
 import resource
 from dataclasses import dataclass

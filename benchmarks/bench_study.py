@@ -7,8 +7,6 @@ has to raise average precision there. Both print their tables, whether the answe
 seconds of all processes. An interrupted experiment in ``--out`` goes on.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 import time

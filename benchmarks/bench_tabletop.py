@@ -5,8 +5,6 @@ environment light; RGB, depth, instance and category PNGs and COCO and KITTI lab
 PyBullet's TinyRenderer draws the same scenes for comparison.
 """
 
-from __future__ import annotations
-
 import argparse
 import tempfile
 import time

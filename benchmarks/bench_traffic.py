@@ -5,8 +5,6 @@ simulation of 100 steps, trajectories of 51 knots each, and the test for overlap
 core; the best of several runs. Scenes of ``street_sequence.yaml``, reduced to these numbers.
 """
 
-from __future__ import annotations
-
 import argparse
 import time
 from collections.abc import Iterator

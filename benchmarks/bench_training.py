@@ -6,8 +6,6 @@ encoding of photographs, and of rendering while training. Each figure includes t
 worker processes. CPU time depends less on other work on the machine.
 """
 
-from __future__ import annotations
-
 import argparse
 import resource
 import tempfile

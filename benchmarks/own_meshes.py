@@ -9,8 +9,6 @@ give folders of any package or repository with meshes, such as trimesh's ``model
 ``test/models``, usd-wg's ``assets`` or pybullet's data.
 """
 
-from __future__ import annotations
-
 import argparse
 import subprocess
 import sys

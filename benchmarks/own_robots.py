@@ -11,8 +11,6 @@ zero position agree. ``--python`` runs the independent readers in another enviro
 yourdfpy, mujoco or drake and trimesh, and numpy.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import re

@@ -1,7 +1,5 @@
 """Helpers of the benchmarks that measure whole runs."""
 
-from __future__ import annotations
-
 import platform
 import tempfile
 from functools import partial

@@ -3,8 +3,6 @@
 The core imports none of its modules; it reads the tables below.
 """
 
-from __future__ import annotations
-
 FAMILIES = (
     "gen_data.content.procedural",
     "gen_data.content.roads",

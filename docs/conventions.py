@@ -3,8 +3,6 @@
 ``python docs/conventions.py`` writes it again.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from gen_data.exporters import TABLE

@@ -10,8 +10,6 @@ A strip shows one scene three times, with a low, a middle and a high value of on
 distributions are histograms of drawn values.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import os

@@ -1,7 +1,5 @@
 """Generate one sample and draw its boxes: ``python examples/first_dataset.py``."""
 
-from __future__ import annotations
-
 import cv2
 
 import gen_data

@@ -11,8 +11,6 @@ anywhere below it. Classes are matched by name. The result is COCO's AP with a 9
 interval from bootstrapping over images.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import time

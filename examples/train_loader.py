@@ -4,8 +4,6 @@ The first loader reads a finished data set, the second one renders while trainin
 same batches. With PyTorch, ``gen_data.torch.loader`` gives them as tensors.
 """
 
-from __future__ import annotations
-
 import tempfile
 
 import gen_data

@@ -4,8 +4,6 @@ An exporter adds labels to shards, after ``gen_data.exporters.image_files`` has 
 images. At the end it merges all shards into the layout of its format; images are hard links.
 """
 
-from __future__ import annotations
-
 from gen_data.core.interfaces import Exporter
 from gen_data.core.plugins import PluginTable
 

@@ -27,8 +27,6 @@ References: the map expansion of nuScenes (Caesar et al., CVPR 2020); Philion an
 Splat, Shoot", ECCV 2020; TuSimple lane detection benchmark, 2017.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import fields
 from pathlib import Path

@@ -20,8 +20,6 @@
 ``gen_data.sensors.calibration`` reads these files.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path

@@ -4,8 +4,6 @@ Kalibr: https://github.com/ethz-asl/kalibr/wiki/yaml-formats
 COLMAP: https://colmap.github.io/format.html and https://colmap.github.io/cameras.html
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from gen_data.core.intrinsics import Intrinsics

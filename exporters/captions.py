@@ -4,8 +4,6 @@ Every word is a function of the scene and its labels: equal scenes have equal ca
 object counts if it is visible in the image.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections import Counter

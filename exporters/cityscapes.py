@@ -32,8 +32,6 @@ Reference: Cordts et al., "The Cityscapes Dataset for Semantic Urban Scene Under
 2016; cityscapesscripts.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence

@@ -4,8 +4,6 @@ Reference: Cordts et al., "The Cityscapes Dataset for Semantic Urban Scene Under
 2016; names, ids and colours come from cityscapesscripts.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache

@@ -74,8 +74,6 @@ References: https://cocodataset.org/#format-data and pycocotools. Its COCOeval t
 id 0 as "no match", so ids start at 1.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields

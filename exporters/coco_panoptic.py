@@ -23,8 +23,6 @@ References: https://cocodataset.org/#format-data; Kirillov et al., "Panoptic Seg
 2019; panopticapi.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path

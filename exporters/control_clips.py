@@ -29,8 +29,6 @@ computational approach to edge detection", 1986; Ranftl et al., "Towards robust 
 estimation", 2020 (normalised inverse depth).
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path

@@ -4,8 +4,6 @@ The table in docs/formats.md, and the statements in the files of formats with ro
 made from these records.
 """
 
-from __future__ import annotations
-
 from dataclasses import asdict, dataclass
 
 NONE = ""

@@ -3,8 +3,6 @@
 Reference: https://docs.mlcommons.org/croissant/docs/croissant-spec.html.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib.resources import files

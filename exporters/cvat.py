@@ -16,8 +16,6 @@ possible values of each in advance.
 Reference: https://docs.cvat.ai, "CVAT for images 1.1".
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, ClassVar, Literal

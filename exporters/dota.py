@@ -15,8 +15,6 @@ the image.
 Reference: https://captain-whu.github.io/DOTA/dataset.html, and its development kit.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, ClassVar, Literal

@@ -4,8 +4,6 @@ A fragment is a file ``<shard>/<exporter>/<name>.jsonl``. Shards are merged in t
 samples: the merged data set does not depend on the size of shards.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path

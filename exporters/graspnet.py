@@ -16,8 +16,6 @@ distance of the contacts, with ``clearance_m`` on both sides. Fingers so far apa
 everything, as the fingers of graspnetAPI's collision test must be.
 """
 
-from __future__ import annotations
-
 import io
 from collections.abc import Sequence
 from pathlib import Path

@@ -38,8 +38,6 @@ numbers, as BlenderProc's do: the principal point is ours minus 0.5. Instances w
 Reference: the writer and the documentation of BlenderProc 2, https://dlr-rm.github.io/BlenderProc.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Colours of ids in segmentation images."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

@@ -4,8 +4,6 @@ Readers compare a region with the detections of its own class only. A region who
 out by the label map is therefore listed under every class.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 

@@ -26,8 +26,6 @@ Filters predict from the left pixel, for ids from the pixel above. Compression u
 level that still reduces the size noticeably for its time.
 """
 
-from __future__ import annotations
-
 import os
 import shutil
 from collections.abc import Callable, Mapping

@@ -1,7 +1,5 @@
 """Base of exporters that keep a JSON line per photograph until their data set is merged."""
 
-from __future__ import annotations
-
 from abc import abstractmethod
 from collections.abc import Iterable, Mapping
 from pathlib import Path

@@ -40,8 +40,6 @@ Where KITTI's conventions differ from ours (https://www.cvlibs.net/datasets/kitt
 Readers index ``calib`` by line number and need all printed digits of a rotation.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Boxes that rotate about a camera's y axis only, and the laser points in them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -22,8 +22,6 @@
 Reference: Geiger et al., "Vision meets Robotics: The KITTI Dataset", IJRR 2013.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from datetime import datetime, timedelta
 from pathlib import Path

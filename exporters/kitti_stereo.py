@@ -22,8 +22,6 @@
 Reference: Menze and Geiger, "Object Scene Flow for Autonomous Vehicles", CVPR 2015; its devkit.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import ClassVar, Literal

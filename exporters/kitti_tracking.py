@@ -19,8 +19,6 @@ Reference: Geiger et al., "Are we ready for Autonomous Driving?", CVPR 2012, and
 tracking development kit; TrackEval reads the folder ``training`` as it is.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar, Literal

@@ -1,7 +1,5 @@
 """Colours of label images."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

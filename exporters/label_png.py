@@ -7,8 +7,6 @@ Deutsch, RFC 1951, 1996, sections 3.2.2 (codes by their lengths), 3.2.5 (lengths
 codes), and RFC 1950; Huffman, "A method for the construction of minimum-redundancy codes", 1952.
 """
 
-from __future__ import annotations
-
 import heapq
 from collections.abc import Sequence
 from dataclasses import dataclass

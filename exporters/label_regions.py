@@ -1,7 +1,5 @@
 """Areas and boxes of all labels of an image, and their parts, from its horizontal runs."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -20,8 +20,6 @@ Reference: https://labelstud.io/guide/tasks and https://labelstud.io/tags; for r
 format of the package rle-pack of thi.ng/umbrella.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path

@@ -20,8 +20,6 @@ A line of ``<split>_images.jsonl`` has ``image_id``, ``file_name``, ``width``, `
 Visual Genome (Krishna et al., 2017); they are there with the annotation ``relations``.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Lenses in exports: the fields that make a K complete for other lenses than a pinhole."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from gen_data.core.interfaces import DatasetInfo

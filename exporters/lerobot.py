@@ -29,8 +29,6 @@ set. The task is a sentence made of the arm's goals and the objects that move.
 Bytes of Parquet files depend on the release of pyarrow.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from itertools import groupby
 from pathlib import Path

@@ -8,8 +8,6 @@ side.
 Reference: https://github.com/huggingface/lerobot, release 0.4.4, lerobot/datasets/compute_stats.py.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path

@@ -5,8 +5,6 @@ each run becomes a literal and copies of it: the cost grows with the runs. Sourc
 RFC 1951, 1996, sections 3.2.5 (lengths) and 3.2.6 (fixed Huffman codes), and RFC 1950.
 """
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

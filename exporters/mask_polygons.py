@@ -16,8 +16,6 @@ Reference for the pairing of corners: O'Rourke, "Uniqueness of orthogonal connec
 vertices of a rectilinear polygon, sorted along each line, are joined in pairs.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache

@@ -12,8 +12,6 @@ Every row starts with the index of its sample; ``columns.json`` describes the ot
 are the ends of the names. ``nan`` is "nothing".
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Sequence
 from io import BytesIO
 from pathlib import Path

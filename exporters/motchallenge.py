@@ -17,8 +17,6 @@ its static person (7) sits or lies. Vans, trucks and buses are cars here; catego
 have no rows.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, ClassVar, Literal

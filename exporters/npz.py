@@ -4,8 +4,6 @@
 APPNOTE.TXT 6.3.10, sections 4.3.7, 4.3.12 and 4.3.16; ``numpy.lib.format``.
 """
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Mapping
 from io import BytesIO

@@ -31,8 +31,6 @@ Reference: Caesar et al., "nuScenes: A multimodal dataset for autonomous driving
 the schema of nuscenes-devkit.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import groupby
 from pathlib import Path

@@ -4,8 +4,6 @@ Reference: Caesar et al., "nuScenes", CVPR 2020, and Fong et al., "Panoptic nuSc
 names and indices come from the devkit's ``category.json`` with lidarseg.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass

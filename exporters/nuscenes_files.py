@@ -13,8 +13,6 @@ Reference: nuscenes-devkit (``data_classes.py``, ``map_mask.py``), and Continent
 ARS 408-21: technical documentation" (values of ``dyn_prop``, ``ambig_state``, ``pdh0``).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Scenes of nuScenes: key frames of a sequence, and the rows of its readings and objects."""
 
-from __future__ import annotations
-
 import math
 from bisect import bisect_left
 from collections.abc import Iterator, Sequence

@@ -1,7 +1,5 @@
 """Shards of nuScenes: files of scans, detections, point labels and maps, and a line per sample."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path

@@ -11,8 +11,6 @@ wu pos_accuracy vel_accuracy navstat numsats posmode velmode orimode``.
   Accelerations are specific forces: a sensor at rest measures gravity, upwards.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -5,8 +5,6 @@ the level, never on the processor. Source: W3C, "Portable Network Graphics (PNG)
 Specification (Third Edition)", 2025, sections 5 (chunks) and 9 (filters).
 """
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Sequence
 from enum import IntEnum

@@ -4,8 +4,6 @@
 Exporters make their own files from these.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Literal
 

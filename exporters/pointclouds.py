@@ -17,8 +17,6 @@ both formats and skip unknown fields.
 References: Turk, "The PLY Polygon File Format", 1994; PCL, "The PCD file format".
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar, Literal

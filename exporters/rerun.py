@@ -24,8 +24,6 @@ channels and devices are not in it; ``gen-data preview`` shows meshes.
 Reference: https://rerun.io/docs/reference/types.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import islice
 from pathlib import Path

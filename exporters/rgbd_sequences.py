@@ -1,7 +1,5 @@
 """Base of formats with colour and depth images of one moving pinhole camera."""
 
-from __future__ import annotations
-
 from abc import abstractmethod
 from collections.abc import Iterable
 from pathlib import Path

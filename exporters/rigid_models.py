@@ -8,8 +8,6 @@ Sources: Turk, "The PLY Polygon File Format", 1994; ``models_info.json`` of Hoda
 Benchmark for 6D Object Pose Estimation", ECCV 2018.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -21,8 +21,6 @@ learning, 2021 (names and meaning of the keys of a step). Reading takes ``tf.io.
 files of TensorFlow Datasets that describe a builder are not written.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path

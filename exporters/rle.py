@@ -4,8 +4,6 @@ The encoding lists the lengths of the column-major runs of the whole image, star
 pycocotools' compressed text form. The cost is proportional to the mask's crop, not to the image.
 """
 
-from __future__ import annotations
-
 from typing import TypedDict
 
 import numpy as np

@@ -9,8 +9,6 @@ Sources: ``re_log_encoding`` and ``rerun/log_msg/v1alpha1`` of rerun-sdk 0.41; C
 digest algorithm", 2023 (XXH32); Google, "Protocol Buffers: Encoding".
 """
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Iterator, Sequence
 from pathlib import Path

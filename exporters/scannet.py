@@ -22,8 +22,6 @@ Reference: Dai et al., "ScanNet: Richly-annotated 3D Reconstructions of Indoor S
 its SensReader and its benchmark's scripts.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path

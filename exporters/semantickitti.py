@@ -23,8 +23,6 @@ Reference: Behley et al., "SemanticKITTI", ICCV 2019, and semantic-kitti-api, wh
 and numbers. Vans are cars there; masts are poles, also of signs and lights.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path

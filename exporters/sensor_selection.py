@@ -1,7 +1,5 @@
 """Selection of the sensors that a format exports."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 

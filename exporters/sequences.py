@@ -7,8 +7,6 @@ merging the shards numbers the frames. In formats that state no times, a frame t
 a sequence (``even_sequences``).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta

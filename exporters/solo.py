@@ -24,8 +24,6 @@ A sequence is a view with its steps. Where SOLO's conventions differ from ours:
 References: SOLO's schema in the documentation of Unity's Perception package 1.0; pysolotools.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path

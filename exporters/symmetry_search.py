@@ -9,8 +9,6 @@ Two sets of points sample the surface: their distance without a turn is the erro
 sampling and the noise of textures, which a turn may add little to.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Iterator, Sequence

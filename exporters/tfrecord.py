@@ -29,8 +29,6 @@ tensorflow/core/example/{example,feature}.proto; https://protobuf.dev/programmin
 tensorflow/models, research/object_detection/core/standard_fields.py (TfExampleFields).
 """
 
-from __future__ import annotations
-
 import json
 import math
 import struct

@@ -9,8 +9,6 @@ Reference: element names and states follow KITTI's raw data development kit (``t
 reads the file with Boost.Serialization.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any

@@ -18,8 +18,6 @@ Reference: Sturm et al., "A Benchmark for the Evaluation of RGB-D SLAM Systems",
 benchmark's page on file formats; DROID-SLAM and DPVO read ``calibration.txt``.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar, Literal

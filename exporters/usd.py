@@ -17,8 +17,6 @@ has no counterpart. Lenses other than pinholes have none either: their cameras a
 same focal length, with the model and its coefficients in ``genData:lens:*``.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import astuple

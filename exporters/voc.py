@@ -25,8 +25,6 @@ References: Everingham and Winn, "The PASCAL Visual Object Classes Challenge 201
 VOC2011 annotation guidelines.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
 from functools import lru_cache

@@ -25,8 +25,6 @@ shards' PNG files, ``gen_data.exporters.image_files`` states their units.
 Reference: https://github.com/webdataset/webdataset, ``WebDataset`` and ``base_plus_ext``.
 """
 
-from __future__ import annotations
-
 import io
 import math
 import tarfile

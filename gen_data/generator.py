@@ -1,7 +1,5 @@
 """Former names of modules, ``gen_data.generator.core`` for ``gen_data.core``, until release 1.0."""
 
-from __future__ import annotations
-
 import re
 import sys
 import warnings

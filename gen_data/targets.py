@@ -8,8 +8,6 @@ training: boxes are ``x_min, y_min, x_max, y_max`` in pixels, half-open; label 0
 label ``k`` the ``k``-th category.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any

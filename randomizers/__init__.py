@@ -1,7 +1,5 @@
 """Randomizers: plug-ins that vary a scene from index to index, per scene or per view."""
 
-from __future__ import annotations
-
 from gen_data.core.interfaces import Randomizer
 from gen_data.core.plugins import PluginTable
 

@@ -1,7 +1,5 @@
 """Initial goals of robot arms: joint positions, a pose to reach, or an object to hold."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Annotated, Literal

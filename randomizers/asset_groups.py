@@ -1,7 +1,5 @@
 """Draws of assets for the object groups of a template."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from pydantic import Field

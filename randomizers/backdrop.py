@@ -1,7 +1,5 @@
 """Surfaces of the background: floors, walls, ground and studio backdrops."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Literal
 

@@ -1,7 +1,5 @@
 """Base classes of randomizers, and helpers for materials and textures."""
 
-from __future__ import annotations
-
 from abc import abstractmethod
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Field of view, principal point and distortion of cameras."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Annotated, Literal

@@ -1,7 +1,5 @@
 """Cameras on lanes: dash cameras, cameras of pedestrians, cameras on poles."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Annotated, Literal

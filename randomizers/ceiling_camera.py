@@ -1,7 +1,5 @@
 """Cameras below the ceilings of rooms, looking down."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Annotated, Literal

@@ -1,7 +1,5 @@
 """Light panels on the ceiling of a room."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Annotated, Literal
 

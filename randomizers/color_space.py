@@ -1,7 +1,5 @@
 """Conversion of HSV colours and colour temperatures to linear RGB."""
 
-from __future__ import annotations
-
 import colorsys
 from typing import Annotated
 

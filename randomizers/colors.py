@@ -1,7 +1,5 @@
 """Colours of objects."""
 
-from __future__ import annotations
-
 from typing import Any, Literal
 
 from gen_data.config import distributions as dist

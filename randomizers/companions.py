@@ -1,7 +1,5 @@
 """Company for people who stand or walk along lanes: couples, families, talking circles."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection, Sequence
 from typing import Annotated, Literal

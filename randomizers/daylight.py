@@ -1,7 +1,5 @@
 """Sun and sky that match each other."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

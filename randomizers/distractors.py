@@ -1,7 +1,5 @@
 """Unlabelled objects that occlude others."""
 
-from __future__ import annotations
-
 from typing import Annotated, Literal
 
 from pydantic import Field

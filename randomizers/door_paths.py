@@ -1,7 +1,5 @@
 """Paths from streets to the doors of houses."""
 
-from __future__ import annotations
-
 import math
 from typing import Literal
 

@@ -1,7 +1,5 @@
 """Environment maps."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Literal

@@ -1,7 +1,5 @@
 """Fixed exposure of cameras."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Literal
 

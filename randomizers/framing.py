@@ -5,8 +5,6 @@ also outside the image. For a pinhole that is the box of its silhouette; a lens 
 straight edges adds less than the length of an edge bends.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass

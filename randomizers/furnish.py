@@ -1,7 +1,5 @@
 """Furnished rooms: sizes, openings, surfaces and furniture by the rules of their type."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Objects along lanes: which, how densely, and where."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Reflection and transmission of object surfaces."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any, Literal
 
 from gen_data.config import distributions as dist

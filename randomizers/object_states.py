@@ -1,7 +1,5 @@
 """States of objects: doors, drawers and lids that are open, screens and taps that are on."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace

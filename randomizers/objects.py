@@ -1,7 +1,5 @@
 """Objects of a group: which, how many, and where."""
 
-from __future__ import annotations
-
 from typing import Annotated, Literal
 
 from gen_data.config import distributions as dist

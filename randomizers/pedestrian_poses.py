@@ -1,7 +1,5 @@
 """Poses of people, as their family declares them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import cache
 

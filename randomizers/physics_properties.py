@@ -1,7 +1,5 @@
 """Mass, friction and restitution of dynamic objects."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Literal
 

@@ -1,7 +1,5 @@
 """Start poses of objects: layouts on surfaces, before physics settles them."""
 
-from __future__ import annotations
-
 import math
 from bisect import insort
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Photographs as backdrops."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 from pydantic import Field

@@ -1,7 +1,5 @@
 """Hands that reach over the edge of a table, and hold, touch or point at something."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

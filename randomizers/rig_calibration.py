@@ -1,7 +1,5 @@
 """Mounting errors of the sensors on a rig."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Cameras in rooms: where a person or a robot can stand, looking at furniture."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Annotated, Literal

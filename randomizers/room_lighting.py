@@ -1,7 +1,5 @@
 """Light in rooms: lamps that are on or off, daylight and sun through windows."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Walks through rooms: paths over free floor, at the speed of a person or a robot."""
 
-from __future__ import annotations
-
 import heapq
 import math
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Street lamps and lit windows at night."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Annotated, Literal

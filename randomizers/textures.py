@@ -1,7 +1,5 @@
 """Textures of objects and furniture."""
 
-from __future__ import annotations
-
 from typing import Any, Literal
 
 from pydantic import Field

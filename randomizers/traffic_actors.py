@@ -1,7 +1,5 @@
 """Vehicles, pedestrians, obstacles and signals that a traffic simulation reads from a scene."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """States of traffic lights."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass

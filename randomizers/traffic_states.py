@@ -1,7 +1,5 @@
 """State changes of bodies in traffic: vehicle lamps, signals and the gait of pedestrians."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import TypeVar

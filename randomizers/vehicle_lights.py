@@ -1,7 +1,5 @@
 """Head, tail, brake and indicator lights of vehicles."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Annotated, Literal
 

@@ -1,7 +1,5 @@
 """Paint, dirt and licence plates of vehicles."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Annotated, Any, Literal

@@ -3,8 +3,6 @@
 A preset is a condition and a time of day in one name, as in ``HardRainSunset``.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 

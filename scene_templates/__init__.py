@@ -1,7 +1,5 @@
 """Scene templates: YAML files, and the element types that they consist of."""
 
-from __future__ import annotations
-
 from gen_data.core.interfaces import Element
 from gen_data.core.plugins import PluginTable
 

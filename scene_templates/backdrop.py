@@ -1,7 +1,5 @@
 """Backgrounds of scenes without a room."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 from gen_data.core.interfaces import AssetIndex

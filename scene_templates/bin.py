@@ -1,7 +1,5 @@
 """Open containers."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 from gen_data.assets.families import declared

@@ -1,7 +1,5 @@
 """Builds the nominal Scene of a template's elements."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Sequence
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Carriers of sensors in rooms: the base of a robot, or a hand."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Literal
 

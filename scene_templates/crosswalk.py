@@ -1,7 +1,5 @@
 """Pedestrian crossings."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, Literal
 

@@ -1,7 +1,5 @@
 """Drones, which carry a camera on a gimbal."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Literal
 

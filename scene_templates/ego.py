@@ -1,7 +1,5 @@
 """Ego vehicles, which carry the sensors."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Literal

@@ -1,7 +1,5 @@
 """Base classes of elements, and functions that add bodies and surfaces to a Scene."""
 
-from __future__ import annotations
-
 import math
 from abc import abstractmethod
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """Fields next to a road."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Terrain around a street."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 from pydantic import Field

@@ -1,7 +1,5 @@
 """The end of the view around a street: tree lines, forests, hills, towns and skylines."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Literal

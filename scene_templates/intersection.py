@@ -1,7 +1,5 @@
 """Intersections: the common part of junctions and roundabouts."""
 
-from __future__ import annotations
-
 from abc import abstractmethod
 from collections.abc import Mapping
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """Groups of objects along lanes: traffic, people, houses, trees, lamps."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Literal
 

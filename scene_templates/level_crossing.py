@@ -1,7 +1,5 @@
 """Level crossings of roads and railways."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Any, Literal

@@ -1,7 +1,5 @@
 """Bridges over roads."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Literal

@@ -1,7 +1,5 @@
 """Petrol stations next to roads."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import replace

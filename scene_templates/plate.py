@@ -1,7 +1,5 @@
 """Photographs as backdrops: ground and light as in the photograph, and its camera."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Literal
 

@@ -1,7 +1,5 @@
 """Power lines across the land."""
 
-from __future__ import annotations
-
 import math
 from typing import Literal
 

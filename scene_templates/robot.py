@@ -1,7 +1,5 @@
 """Robot arms."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Annotated, Literal

@@ -1,7 +1,5 @@
 """A furnished room's shell."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Literal
 

@@ -1,7 +1,5 @@
 """Rooms by rules: shells, which the randomizer ``furnish`` redraws and fills."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Literal
 

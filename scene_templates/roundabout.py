@@ -1,7 +1,5 @@
 """Roundabouts."""
 
-from __future__ import annotations
-
 import math
 from typing import ClassVar, Literal
 

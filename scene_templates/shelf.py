@@ -1,7 +1,5 @@
 """Shelves with several boards."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 from pydantic import Field

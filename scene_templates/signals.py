@@ -1,7 +1,5 @@
 """Traffic lights of a junction."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Literal

@@ -1,7 +1,5 @@
 """Squares next to roads."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace

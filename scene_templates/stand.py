@@ -1,7 +1,5 @@
 """Stands that hold sensors: frames in the world without a body."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Literal

@@ -1,7 +1,5 @@
 """Tables and other supports."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 from pydantic import Field

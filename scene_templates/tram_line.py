@@ -1,7 +1,5 @@
 """Overhead lines of tramways along roads."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Literal

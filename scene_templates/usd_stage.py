@@ -1,7 +1,5 @@
 """OpenUSD stages."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Literal
 

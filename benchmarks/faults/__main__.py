@@ -1,7 +1,5 @@
 """Run campaigns: ``python -m benchmarks.faults --full``; see the package."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import platform

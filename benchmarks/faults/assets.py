@@ -1,7 +1,5 @@
 """Hostile files: meshes, robots, images, panoramas, archives, roads and stages."""
 
-from __future__ import annotations
-
 import resource
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Single flipped bits of a finished data set: each is found, named and repaired."""
 
-from __future__ import annotations
-
 import random
 import shutil
 from pathlib import Path

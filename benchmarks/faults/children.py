@@ -1,7 +1,5 @@
 """Forked children that make the tiny data set, and system calls at which they fail."""
 
-from __future__ import annotations
-
 import os
 import pickle
 import re

@@ -1,7 +1,5 @@
 """Damaged configurations: each is read, or refused with file, line and column, and no traceback."""
 
-from __future__ import annotations
-
 import copy
 import os
 import random

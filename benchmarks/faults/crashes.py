@@ -1,7 +1,5 @@
 """Crashes and errors of the disk during a run; afterwards the same command goes on."""
 
-from __future__ import annotations
-
 import errno
 import os
 import random

@@ -1,7 +1,5 @@
 """Faults outside a data set's own folder: at URLs, in caches, in foreign and derived data sets."""
 
-from __future__ import annotations
-
 import errno
 import hashlib
 import os

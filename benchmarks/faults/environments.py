@@ -1,7 +1,5 @@
 """The same command in environments that a user may have."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

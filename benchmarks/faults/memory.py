@@ -1,7 +1,5 @@
 """The kernel kills a worker that exceeds its memory; the run goes on, or says so."""
 
-from __future__ import annotations
-
 import os
 import sys
 import time

@@ -1,7 +1,5 @@
 """Equal bytes whatever the number of processes and the order of work."""
 
-from __future__ import annotations
-
 import random
 import subprocess
 import sys

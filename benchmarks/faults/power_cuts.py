@@ -1,7 +1,5 @@
 """Power cuts of real file systems: a loop device is shut down without writing its log."""
 
-from __future__ import annotations
-
 import fcntl
 import os
 import random

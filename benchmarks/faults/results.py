@@ -1,7 +1,5 @@
 """Results of campaigns, and their table."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field

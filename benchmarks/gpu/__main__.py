@@ -8,8 +8,6 @@ part has a process and a limit of time; what fails or takes too long is named at
 ``--device cpu`` takes the same path with tiny sizes.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

@@ -5,8 +5,6 @@ of its own; lists that a GPU fills in any order are shuffled. Threads still run 
 and arithmetic is the CPU's.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable
 from functools import partial

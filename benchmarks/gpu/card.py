@@ -1,7 +1,5 @@
 """Facts about the device, and the compilation of its kernels."""
 
-from __future__ import annotations
-
 import sys
 import time
 from datetime import date

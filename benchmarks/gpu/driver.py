@@ -1,7 +1,5 @@
 """Questions to the driver of the GPU."""
 
-from __future__ import annotations
-
 import subprocess
 
 

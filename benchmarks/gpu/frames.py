@@ -1,7 +1,5 @@
 """Time by kernel and copy, rays per second of laser scanners, and the path-traced tier."""
 
-from __future__ import annotations
-
 import time
 from collections import Counter
 from collections.abc import Callable

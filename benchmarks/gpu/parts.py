@@ -4,8 +4,6 @@ A part that fails, hangs or kills its process costs its own figures only. Functi
 ``module:function`` below this package; arguments and results are JSON.
 """
 
-from __future__ import annotations
-
 import faulthandler
 import json
 import subprocess

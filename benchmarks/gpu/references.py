@@ -5,8 +5,6 @@ part in the comparison. Visibility is found by rays, as on a GPU; the rasteriser
 edges to a grid and differs from rays in single pixels.
 """
 
-from __future__ import annotations
-
 import lzma
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The table of docs/performance.md from the figures, and what falls short of the goals."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """PyBullet's renderers: one light without size, its shadows from a shadow map."""
 
-from __future__ import annotations
-
 import importlib.util
 from collections.abc import Callable, Sequence
 

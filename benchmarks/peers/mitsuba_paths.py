@@ -1,7 +1,5 @@
 """Mitsuba 3: balls of light, sampled with few paths; ``llvm_ad_rgb`` with an LLVM of the system."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import drjit as dr

@@ -1,7 +1,5 @@
 """MuJoCo's OpenGL renderer: two lights without size, shadows from shadow maps."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Sequence
 

@@ -1,7 +1,5 @@
 """This project's renderer, without and with everything else that a sample takes."""
 
-from __future__ import annotations
-
 import pickle
 import shutil
 from pathlib import Path

@@ -4,8 +4,6 @@ Answers every line on standard input by writing all samples of FOLDER once, and 
 with the CPU seconds that took (of all threads, with system time).
 """
 
-from __future__ import annotations
-
 import json
 import os
 import sys

@@ -3,8 +3,6 @@
 Everything is made here, from formulas, so that the workload is the same wherever it runs.
 """
 
-from __future__ import annotations
-
 import pickle
 from pathlib import Path
 

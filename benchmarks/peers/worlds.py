@@ -3,8 +3,6 @@
 Renderers run in interpreters of their own, so that this module needs NumPy and OpenCV only.
 """
 
-from __future__ import annotations
-
 import json
 import pickle
 from collections.abc import Sequence

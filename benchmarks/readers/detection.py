@@ -1,7 +1,5 @@
 """Readers of labelled images: each opens the folder of an export and yields its views."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

@@ -1,7 +1,5 @@
 """Comparison of what readers find with what data sets state, in a process of its own."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import logging

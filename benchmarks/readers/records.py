@@ -1,7 +1,5 @@
 """Readers of records: tables and containers with images, labels and lenses."""
 
-from __future__ import annotations
-
 import io
 import json
 import os

@@ -1,7 +1,5 @@
 """Readers of drives: boxes in space, scans, poses and calibrations."""
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path

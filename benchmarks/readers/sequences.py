@@ -1,7 +1,5 @@
 """Readers of arms, clips, pairs of images, grasps, labelled scans and tables."""
 
-from __future__ import annotations
-
 import sys
 import tempfile
 from collections.abc import Iterator

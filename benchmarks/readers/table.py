@@ -1,7 +1,5 @@
 """The readers: one line each, with the tolerance that its format or its reader allows."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What the data set itself states, read by ``gen_data.open``: expected values for readers."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Views: what an image, a scan or a trajectory holds, as read by anybody; and their comparison."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 

@@ -4,8 +4,6 @@ Front +X; origin on the floor at the centre of the footprint. Things that hang h
 the lowest point, in the middle of the back for those on walls.
 """
 
-from __future__ import annotations
-
 from gen_data.assets.family import load_families
 
 FAMILIES, TEXTURES, _ = load_families(__name__)

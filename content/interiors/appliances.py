@@ -1,7 +1,5 @@
 """Small appliances and utensils of homes, offices and workshops. Sizes are assumed, as sold."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 

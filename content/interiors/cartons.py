@@ -1,7 +1,5 @@
 """Cartons with what makes them real: joints, tape, labels with bar codes, printed arrows."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from gen_data.content.procedural import surface_shapes as shapes

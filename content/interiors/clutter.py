@@ -1,7 +1,5 @@
 """Small things that lie about in homes, offices and workshops. Sizes are assumed: usual ones."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from itertools import pairwise

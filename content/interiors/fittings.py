@@ -1,7 +1,5 @@
 """What hangs, lies and shines in rooms: lamps, curtains, rugs, pictures, mirrors, screens."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

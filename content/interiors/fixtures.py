@@ -1,7 +1,5 @@
 """Kitchens and bathrooms: sinks, hobs, sanitary ware."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What is seen through windows: sky, roofs or trees, and the ground, as emitted light."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from gen_data.content.procedural.textures.texture_images import quantize

@@ -1,7 +1,5 @@
 """Parts of furniture: boards, cushions, legs and rods, and the materials they are made of."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

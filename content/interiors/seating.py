@@ -1,7 +1,5 @@
 """Seats, beds and tables. Sizes are assumed: those that furniture is usually sold in."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

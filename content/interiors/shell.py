@@ -1,7 +1,5 @@
 """Shells of rooms: floors, ceilings, walls with openings, doors, windows, the view outside."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """Cloth in rooms: beds, cushions, blankets, towels, clothes. Sizes are assumed: usual ones."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

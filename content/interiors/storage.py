@@ -4,8 +4,6 @@ A part hangs at its origin: the hinge of a door, the closed place of a drawer. T
 ``hinge`` and ``slide`` of the piece say where.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from gen_data.assets.family import Solid

@@ -1,7 +1,5 @@
 """What stands behind doors, on racks and in workshops. Sizes are assumed: usual ones."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 

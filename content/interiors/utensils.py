@@ -1,7 +1,5 @@
 """Things of workshops, stores and cupboards: containers, tools and transport. Sizes are assumed."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 

@@ -3,8 +3,6 @@
 All motifs are made of noise and of a few curves; nothing shows a work or a place that exists.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from itertools import pairwise

@@ -3,8 +3,6 @@
 Origin at the lowest point, in the middle of the back.
 """
 
-from __future__ import annotations
-
 import math
 
 from gen_data.assets.family import Solid

@@ -4,8 +4,6 @@ Their visible meshes are COLLADA files, which become OBJ. The arms end at the fl
 ``robot_tools`` makes fingers.
 """
 
-from __future__ import annotations
-
 import shutil
 import warnings
 from dataclasses import dataclass

@@ -5,8 +5,6 @@ each, hinge or slide, through their own origin; geoms of type mesh, box, cylinde
 material colours; and defaults of geoms by class. Quaternions are w x y z; sizes are half-extents.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field

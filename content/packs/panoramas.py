@@ -4,8 +4,6 @@ Radiance (Ward, "Real pixels", Graphics Gems II, 1991) keeps the full range at 1
 the usual format of user panoramas.
 """
 
-from __future__ import annotations
-
 import base64
 import binascii
 import re

@@ -3,8 +3,6 @@
 The index of these assets belongs to the library, because pybullet itself has the same files.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 _DATA = "pybullet_data"

@@ -1,7 +1,5 @@
 """Converter of the robots pack: robosuite's arms with a parallel gripper, from MJCF to URDF."""
 
-from __future__ import annotations
-
 import shutil
 from dataclasses import dataclass
 from pathlib import Path

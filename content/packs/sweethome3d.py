@@ -4,8 +4,6 @@ The package holds one zip per author or licence, each with OBJ models and a prop
 their sizes [cm] and creators.
 """
 
-from __future__ import annotations
-
 import re
 import shutil
 from collections.abc import Mapping

@@ -4,8 +4,6 @@
 needs no file.
 """
 
-from __future__ import annotations
-
 import zlib
 from collections.abc import Mapping
 

@@ -8,8 +8,6 @@ University 1966, as drawn in Winter, "Biomechanics and motor control of human mo
 breadths are those of Gordon et al., "2012 anthropometric survey of U.S. Army personnel", 2014.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from functools import lru_cache

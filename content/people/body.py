@@ -5,8 +5,6 @@ upright with its arms held away from it. All that moves with the body is a *poin
 bone heads first, then landmarks, then the vertices of skin, clothes and hair.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path

@@ -5,8 +5,6 @@ weights are cut along with it. Coordinates are those of the people pack's base s
 frame [m]; they were read off its joints and its outline. Both halves are cut alike, by ``|y|``.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 

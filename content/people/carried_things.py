@@ -4,8 +4,6 @@ Sizes are of common products: a phone of 150 x 75 mm, a cabin suitcase of 55 x 4
 umbrella of 1 m across, a pram of 0.8 x 0.5 m; assumed, +/- 15 %.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace

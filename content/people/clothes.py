@@ -1,7 +1,5 @@
 """Layers over a body: visible skin, eyes and garments."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from functools import lru_cache, partial

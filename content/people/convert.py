@@ -4,8 +4,6 @@ Only plain text and JSON files are read: a base mesh with helper geometry for cl
 shape targets, a rig and its weights. The result is one small file of arrays in the template frame.
 """
 
-from __future__ import annotations
-
 import gzip
 import json
 from collections.abc import Iterator, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Edges of sheets before any pose: tufts of hair and collars that grow out of them, calm hems."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

@@ -4,8 +4,6 @@ A face is drawn on a light ground, so that the material's colour is that of the 
 lie where the template body has them, in the coordinates of ``head_layout`` [m].
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -7,8 +7,6 @@ there. Both sleeves and both legs share the limb's field. Coordinates are those 
 the template frame [m].
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -5,8 +5,6 @@ cloth has its own colours. Folds are drawn where cloth is compressed or pulled: 
 at waist, elbows, crotch and knees, and above the shoes. ``garment_layout`` maps them to bodies.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from gen_data.config.data_files import load_table

@@ -1,7 +1,5 @@
 """Layers of hair: shells over the scalp, long hair, locks along the hairline."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 

@@ -4,8 +4,6 @@ Heads are unrolled about an upright axis, and both halves share one field: no se
 Heights run along the texture, because faces are higher than half of one is wide.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from gen_data.content.people.body import Array

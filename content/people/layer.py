@@ -1,7 +1,5 @@
 """A layer over a body: zones of the template that form one sheet, and how it lies on them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Properties of a person and their outfit, drawn from a seed before any mesh is built."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Meshes of people: shaped, dressed, posed, with all they carry, and placed on the ground."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path

@@ -8,8 +8,6 @@ Thalmann, "Joint-dependent local deformations for hand animation and object gras
 Interface 1988.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace

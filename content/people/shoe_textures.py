@@ -5,8 +5,6 @@ are the way along the foot, rows the angle from straight up (the texture's lower
 then the way down its rim. Both sides share one field, so that there is no seam.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal
 

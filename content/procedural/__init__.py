@@ -4,8 +4,6 @@ A new generator is one function and one line of ``families.yaml``; it is importe
 Its colours, words, measures and designs are rows of YAML files beside it (``data_tables``).
 """
 
-from __future__ import annotations
-
 from gen_data.assets.family import load_families
 
 FAMILIES, TEXTURES, ENVIRONMENTS = load_families(__name__)

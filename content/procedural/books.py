@@ -1,7 +1,5 @@
 """Books, lying flat with the front cover up; the spine is at -Y and the title reads from +X."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

@@ -3,8 +3,6 @@
 Kinds of bottles are rows of ``bottles.yaml``.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

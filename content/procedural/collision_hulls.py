@@ -3,8 +3,6 @@
 Every function returns float64 [n, 3] arrays of hull vertices [m], at most 48 per part.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence, Set
 from itertools import pairwise, product

@@ -4,8 +4,6 @@ Each is a thin sheet: for every station along X, how far it reaches to both side
 middle lies, how thick it is, and how deep it is hollowed.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise

@@ -3,8 +3,6 @@
 Sizes are those of common devices (assumed, within 8 %).
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 

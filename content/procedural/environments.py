@@ -5,8 +5,6 @@ column 0 is the direction -X, the centre column +X, and columns grow clockwise s
 (towards -Y).
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

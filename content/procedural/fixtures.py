@@ -4,8 +4,6 @@ Origin on the floor, Z up. Parts that move have their handles towards -X; the jo
 tasks that use them. All builders raise AssetError for an unknown colour.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from gen_data.assets.family import Solid, check_option

@@ -3,8 +3,6 @@
 Sizes are in metres. Every shape is closed, so that it may lie on, or reach into, another one.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 

@@ -3,8 +3,6 @@
 Round fruit are rows of ``fruits.yaml``.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

@@ -4,8 +4,6 @@ Origin on the floor at the centre of the footprint, Z up; ``size_m`` is the exte
 All builders raise AssetError if a size, a style, a shape or a colour is not usable.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

@@ -9,8 +9,6 @@ that of Gordon et al., "2012 anthropometric survey of U.S. Army personnel", 2014
 women, 88 mm of men). Thickness of fingers and places of the knuckles are assumed, within 10 %.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

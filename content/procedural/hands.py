@@ -4,8 +4,6 @@ The forearm runs towards -X. Hands that grasp have their thumb above, so that wh
 upright; the others have their palm below.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

@@ -4,8 +4,6 @@ Distances are negative inside. Round cones: Quilez, "Distance functions", 2008 o
 vertices as in Gibson, "Constrained elastic surface nets", MICCAI 1998.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -1,7 +1,5 @@
 """Machine parts for bin picking; sizes follow metric standard parts."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -5,8 +5,6 @@ the field (Karis, "Real shading in Unreal Engine 4", 2013; Hoffman, "Background:
 of shading", 2015).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from gen_data.config.data_files import load_table

@@ -1,7 +1,5 @@
 """Packaging: drink and food cans, folding boxes and milk cartons."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import NamedTuple

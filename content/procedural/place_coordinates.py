@@ -1,7 +1,5 @@
 """Texture coordinates by place, for layers such as dirt that belong to a whole object."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 

@@ -3,8 +3,6 @@
 Sizes of portions are assumed from cookbooks, within 25 %; a meal is scaled to its plate.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Grapes, broccoli and mushrooms: many berries, florets and caps that grow on one stalk."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The inside of a room: floor, ceiling, walls, skirting, a door and a window with depth."""
 
-from __future__ import annotations
-
 from gen_data.assets.family import Solid
 from gen_data.content.procedural import collision_hulls as hulls
 from gen_data.content.procedural import material_presets as presets

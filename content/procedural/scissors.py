@@ -1,7 +1,5 @@
 """Scissors, lying flat along X with the tips at +X."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

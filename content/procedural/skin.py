@@ -1,7 +1,5 @@
 """Skin in the ten tones of Monk's scale."""
 
-from __future__ import annotations
-
 from gen_data.config.data_files import load_table
 from gen_data.content.procedural.material_presets import hex_to_linear, jitter_color
 from gen_data.core.se3 import Vec3

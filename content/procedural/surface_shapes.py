@@ -3,8 +3,6 @@
 All of them return ``Patch`` objects in metres, wound counter-clockwise seen from outside.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace

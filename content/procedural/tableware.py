@@ -3,8 +3,6 @@
 Kinds and their measures are rows of ``vessels.yaml``, handles of ``handles.yaml``.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 

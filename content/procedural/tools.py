@@ -1,7 +1,5 @@
 """Hand tools, lying on a table along X with the handle at -X."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

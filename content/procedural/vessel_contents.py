@@ -1,7 +1,5 @@
 """Contents of vessels: drinks with froth and ice, and heaps of small pieces of food."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

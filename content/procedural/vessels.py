@@ -3,8 +3,6 @@
 Kinds of mugs, cups, glasses, bowls and vases are rows of ``vessels.yaml``.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Sequence

@@ -5,8 +5,6 @@ shares; ``lay_films`` lays them over an image. They work on bytes: a variant cos
 milliseconds, and every processor makes the same.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from functools import lru_cache

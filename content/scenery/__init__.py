@@ -1,7 +1,5 @@
 """Scenery of streets: buildings, plants, street furniture, traffic lights and signs."""
 
-from __future__ import annotations
-
 from gen_data.assets.family import load_families
 
 FAMILIES, TEXTURES, _ = load_families(__name__)

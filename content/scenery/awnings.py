@@ -1,7 +1,5 @@
 """Cloth: roofs over shop windows and stalls that sag between their bars, hangings with folds."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from itertools import pairwise

@@ -4,8 +4,6 @@ Pieces run along Y, so that they line a street whose traffic they face with +X; 
 length join end to end.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from gen_data.assets.family import Facts, Solid, choose_option

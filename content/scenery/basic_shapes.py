@@ -3,8 +3,6 @@
 Frame of everything here: metres, Z up, front +X, origin on the ground.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 

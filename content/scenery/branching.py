@@ -5,8 +5,6 @@ algorithm", Eurographics Workshop on Natural Phenomena, 2007. Branch radii follo
 Shinozaki et al., "A quantitative analysis of plant form", Japanese Journal of Ecology 14, 1964.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

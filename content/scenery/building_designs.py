@@ -4,8 +4,6 @@ Sizes follow German practice: storeys of 2.7-3.0 m in post-war and 3.4-3.8 m in 
 houses, windows of 1.0-1.5 m by 1.2-1.9 m, sills 0.8-0.95 m above the floor.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal

@@ -6,8 +6,6 @@ footprint on the ground; the front wall lies at x = depth / 2 and faces +X. Wing
 sills, balconies and awnings reach beyond it, fences to a neighbour beyond the side walls.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

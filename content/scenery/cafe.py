@@ -3,8 +3,6 @@
 Sizes: assumed from makers' catalogues, 10 %.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

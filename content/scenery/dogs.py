@@ -5,8 +5,6 @@ beagle 33-38, French bulldog 28-30 cm (heightandsize.com, "Average dog height ch
 dachshund assumed, 10 %. Proportions as shares of that height are drawn by eye.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -3,8 +3,6 @@
 Frame: metres, X forward, Z up, origin on the ground below.
 """
 
-from __future__ import annotations
-
 import math
 
 from gen_data.assets.family import Solid

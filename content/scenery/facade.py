@@ -4,8 +4,6 @@ A wall's own frame: its outer plane is x = 0, +X points outward, y to the right 
 in front of it, z up. Recesses lie at negative x.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

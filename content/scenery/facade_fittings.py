@@ -1,7 +1,5 @@
 """Things fixed to walls, on balconies and on roofs, and traces of age; in a wall's frame."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

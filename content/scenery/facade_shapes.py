@@ -1,7 +1,5 @@
 """Many flat pieces of a wall at once, in a wall's frame; see ``facade``."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -3,8 +3,6 @@
 Frame: metres, Z up, front +X, origin on the ground.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from itertools import pairwise

@@ -4,8 +4,6 @@ Panels run along Y and have one post, at -Y: panels of one variant join end to e
 fence makers' catalogues (assumed, 10 %), where no source is named.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 

@@ -4,8 +4,6 @@ Every triangle stands for a spray of leaves. Its front faces outward and its nor
 the middle of its crown, so that a crown is lit as a whole and not glittering leaf by leaf.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -4,8 +4,6 @@ Pieces run along Y and face +X, the side from which they are seen; their origin 
 middle. They are meant for distances from 40 m on; ``townscapes`` has towns.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

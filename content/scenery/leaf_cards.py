@@ -4,8 +4,6 @@ A card's front faces outward and its normals lean away from the middle of its cr
 is lit as a whole. Its texture has ``TILES`` by ``TILES`` tiles (``textures.leaves``).
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 

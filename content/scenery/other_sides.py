@@ -1,7 +1,5 @@
 """Side walls and backs of buildings; in a wall's frame, see ``facade``."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from gen_data.content.procedural.patches import Patch, join_patches

@@ -1,7 +1,5 @@
 """Garages, rows of garages and sheds. Origin: the centre of the footprint; doors face +X."""
 
-from __future__ import annotations
-
 import math
 
 from gen_data.assets.family import Solid

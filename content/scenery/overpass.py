@@ -4,8 +4,6 @@ Clearance 4.5 m and 0.2 m of reserve, parapets of 1.0 m: usual in Germany (assum
 ZTV-ING); other sizes are assumed, 20 %.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -3,8 +3,6 @@
 Sizes: assumed from pictures, 20 %. Frame: metres, Z up, front +X, origin on the ground.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

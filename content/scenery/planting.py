@@ -3,8 +3,6 @@
 Pieces run along Y and face a street with +X, as fences do; their origin is on the ground.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

@@ -3,8 +3,6 @@
 Frame: along X, origin on the ground below its middle.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from gen_data.assets.family import Solid

@@ -5,8 +5,6 @@ whose walls end at height 0. Tiles follow texture coordinates: u along the eaves
 one repeat per ``TILE_REPEAT_M``.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from itertools import pairwise

@@ -3,8 +3,6 @@
 Sizes: assumed from makers' catalogues and pictures, 10 %, where no source is named.
 """
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 

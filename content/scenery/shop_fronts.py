@@ -1,7 +1,5 @@
 """Ground floors of shops: display windows, boards, awnings, shutters; in a wall's frame."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 from gen_data.content.procedural.patches import Patch, join_patches

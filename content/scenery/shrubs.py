@@ -1,7 +1,5 @@
 """Bushes and planters: a dense dark core under a skin of leaves."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

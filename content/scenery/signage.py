@@ -3,8 +3,6 @@
 Everything faces +X. Sizes: assumed from makers' catalogues, 10 %, where no source is named.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

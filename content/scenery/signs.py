@@ -4,8 +4,6 @@ Shapes and meanings: Vienna Convention on Road Signs and Signals, 1968. Sizes: G
 size 2 (discs of 600 mm, triangles with sides of 900 mm). Faces point to +X.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from typing import Any, Literal

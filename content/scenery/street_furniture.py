@@ -3,8 +3,6 @@
 Everything stands on the origin; fronts face +X.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from itertools import pairwise

@@ -4,8 +4,6 @@ The image multiplies a material's own colour. Its coordinates depend on the plac
 ground to the top, u along X plus Y, once per ``_REPEAT_M``. Shares are assumed, within a half.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

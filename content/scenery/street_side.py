@@ -3,8 +3,6 @@
 Everything is in the wall's frame; see ``facade``.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

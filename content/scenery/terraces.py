@@ -3,8 +3,6 @@
 Pieces run along Y, paths to doors along X; their origin is on the ground.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """Towns at the end of a view: roofs of old quarters, skylines; frame as in ``horizons``."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace

@@ -4,8 +4,6 @@ Lenses face +X, towards the traffic that they control. Lens diameters of 200 and
 heights above the road follow EN 12368 and the German RiLSA.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

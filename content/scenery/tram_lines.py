@@ -1,7 +1,5 @@
 """Poles of tramways; heights and thicknesses are assumed, 10 %."""
 
-from __future__ import annotations
-
 from gen_data.assets.family import Solid
 from gen_data.content.procedural import collision_hulls as hulls
 from gen_data.content.procedural.material_presets import painted_material

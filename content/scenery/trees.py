@@ -4,8 +4,6 @@ Each spray is a card that shows some hundred leaves of their true size (``leaf_c
 between them: light falls through a crown in spots, and the sky shows through.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """Utility poles with their cables, and cabinets of networks at the street."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from gen_data.assets.family import Facts, Solid

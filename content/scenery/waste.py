@@ -1,7 +1,5 @@
 """Refuse: bins on wheels, bags put out for collection, skips."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 

@@ -3,8 +3,6 @@
 Barriers, fences and scaffolds run along Y and face +X.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

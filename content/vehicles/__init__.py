@@ -1,7 +1,5 @@
 """Cars, vans, trucks, buses, motorcycles and bicycles."""
 
-from __future__ import annotations
-
 from gen_data.assets.family import load_families
 
 FAMILIES, TEXTURES, _ = load_families(__name__)

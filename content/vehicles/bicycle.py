@@ -1,7 +1,5 @@
 """Bicycles, alone and ridden; frames after the usual geometry charts of 28 inch bicycles."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from itertools import pairwise

@@ -7,8 +7,6 @@ decides how early the side turns in, q how much the front bows. Patches made her
 by them; ``mirror_half`` drops them and adds the right half.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 

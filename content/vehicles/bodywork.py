@@ -1,7 +1,5 @@
 """Cars and vans: lower body with hood, glass house, and fittings."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -4,8 +4,6 @@ At most 2.55 m wide (Directive 96/53/EC as amended by 2002/7/EC, by Parliament's
 and doors of common low-floor models, assumed, 10 %.
 """
 
-from __future__ import annotations
-
 from gen_data.assets.family import Solid
 from gen_data.content.procedural import collision_hulls as hulls
 from gen_data.content.procedural.material_presets import hex_to_linear

@@ -1,7 +1,5 @@
 """Designs of cars and vans, and where their surfaces are."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal

@@ -1,7 +1,5 @@
 """Fronts and rears of cars: lamps, grilles, intakes, bumpers, licence plates."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 

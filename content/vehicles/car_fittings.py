@@ -1,7 +1,5 @@
 """Fittings of cars: mirrors, handles, wipers, antennas, roof boxes, exhausts, tow bars."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Mapping
 

@@ -1,7 +1,5 @@
 """What is seen through the windows of cars: floor, dashboard, steering wheel, seats."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from itertools import pairwise

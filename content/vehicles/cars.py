@@ -1,7 +1,5 @@
 """Private cars of twenty kinds and five decades, delivery vans and minibuses."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from gen_data.assets.family import Facts, Solid

@@ -1,7 +1,5 @@
 """Luggage of cyclists: bags beside the rear wheel and on the back."""
 
-from __future__ import annotations
-
 from gen_data.content.procedural.material_presets import hex_to_linear
 from gen_data.content.procedural.patches import Patch
 from gen_data.content.procedural.surface_shapes import block

@@ -1,7 +1,5 @@
 """Motorcycles and scooters, with or without a rider."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

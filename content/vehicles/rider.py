@@ -3,8 +3,6 @@
 Lengths are shares of stature from Drillis and Contini, "Body segment parameters", 1966.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

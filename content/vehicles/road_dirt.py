@@ -9,8 +9,6 @@ colour, and the material is white. Texture coordinates depend on the place alone
 middle of the front over the side to the middle of the rear, on both sides; v from the ground up.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import lru_cache
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Taxis, police cars, ambulances, vans of post and parcel services, food trucks."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from gen_data.assets.family import Facts, Solid

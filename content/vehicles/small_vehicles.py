@@ -1,7 +1,5 @@
 """Bicycles left at the street, kick scooters, trailers."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -5,8 +5,6 @@ of 1.65 to 1.9 m; assumed, 10 %. At most 2.55 m wide (Directive 96/53/EC for tru
 tractors).
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

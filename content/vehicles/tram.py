@@ -4,8 +4,6 @@ Sizes: 2.30 m wide and 30 m long (Ruhrbahn's tender of 2019 for Essen and Krefel
 29 m long (GT6-70D/N, Karlsruhe), floors 0.35 m above the rails; other measures assumed, 10 %.
 """
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

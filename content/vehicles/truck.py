@@ -4,8 +4,6 @@ At most 2.55 m wide, 2.60 m with insulated walls, 4.00 m high and 12.00 m long (
 by transportxxl.eu); other measures assumed, 10 %.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Material slots that all vehicles share, and their materials."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import Any

@@ -1,7 +1,5 @@
 """Wheels of all vehicles, and their wheel wells."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Reference page of families of assets: parameters of their ids, with ranges and options."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from docs.hooks.plugin_reference import as_fields

@@ -1,7 +1,5 @@
 """Reference pages of plug-ins, distributions and templates, from the sources of ``describe``."""
 
-from __future__ import annotations
-
 import inspect
 import re
 from collections.abc import Iterator, Mapping

@@ -1,7 +1,5 @@
 """Reference page of the Python API, as directives of mkdocstrings, which reads sources only."""
 
-from __future__ import annotations
-
 import gen_data
 
 MODULES = {

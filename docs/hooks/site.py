@@ -4,8 +4,6 @@ Files outside of docs/ become pages, so that links in Markdown work in the repos
 site alike. Linked files of other types are shown as source pages.
 """
 
-from __future__ import annotations
-
 import posixpath
 import re
 import sys

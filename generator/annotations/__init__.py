@@ -4,8 +4,6 @@ Each annotator is one file and one line in this table; ``annotate`` runs them. T
 determine what they annotate, see ``gen_data.core.interfaces``.
 """
 
-from __future__ import annotations
-
 from gen_data.core.interfaces import Annotator, AnyAnnotator, FrameAnnotator, ImageAnnotator
 from gen_data.core.plugins import PluginTable
 

@@ -1,7 +1,5 @@
 """Amodal masks: whole silhouettes."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import ClassVar, Literal
 

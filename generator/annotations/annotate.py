@@ -1,7 +1,5 @@
 """Runs the annotators on the objects of an image, on images and on samples."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 from pydantic import Field

@@ -1,7 +1,5 @@
 """Bird's-eye-view maps: masks of the ground around the ego vehicle."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import replace

@@ -3,8 +3,6 @@
 A cell is covered if its centre is, as for label pixels of images.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache

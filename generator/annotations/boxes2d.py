@@ -1,7 +1,5 @@
 """Image boxes of visible pixels and of whole silhouettes."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import ClassVar, Literal
 

@@ -1,7 +1,5 @@
 """Oriented 3D boxes."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import ClassVar, Literal

@@ -10,8 +10,6 @@ maximum contrast of Kelly, 1965, and further reds, pinks and brilliant colours);
 (CIELAB). The limits are assumed.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import cache, lru_cache
 

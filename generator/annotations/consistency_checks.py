@@ -1,7 +1,5 @@
 """Consistency checks of labels, which also run in production: contradictions are never written."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 

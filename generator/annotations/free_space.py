@@ -1,7 +1,5 @@
 """Where one may drive, in images."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import lru_cache
 from typing import ClassVar, Literal

@@ -1,7 +1,5 @@
 """Grasps of loose objects, by parallel grippers and suction cups, from meshes and final poses."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

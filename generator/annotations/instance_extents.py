@@ -1,7 +1,5 @@
 """Extents of instances in images: one pass over the id image, then crops."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Masks of visible pixels."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import ClassVar, Literal
 

@@ -1,7 +1,5 @@
 """Keypoints of objects: positions and visibility."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

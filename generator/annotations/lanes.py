@@ -1,7 +1,5 @@
 """Lane borders, in the world and in images."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import ClassVar, Literal

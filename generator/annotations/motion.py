@@ -1,7 +1,5 @@
 """Motion of objects."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import ClassVar, Literal
 

@@ -1,7 +1,5 @@
 """Boxes in images along the headings of objects."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import ClassVar, Literal
 

@@ -1,7 +1,5 @@
 """Visible pixels of the parts of articulated objects."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import ClassVar, Literal
 

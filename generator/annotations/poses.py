@@ -1,7 +1,5 @@
 """Six-degree-of-freedom poses of objects."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import ClassVar, Literal
 

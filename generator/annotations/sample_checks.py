@@ -4,8 +4,6 @@
 the finished sample: pixel values, ids, poses, frames, points and rows, whoever made them.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Container, Iterable, Iterator, Mapping
 

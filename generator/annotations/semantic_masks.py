@@ -1,7 +1,5 @@
 """Category images."""
 
-from __future__ import annotations
-
 from typing import ClassVar, Literal
 
 from gen_data.annotations.instance_extents import crop, instance_error, visible_mask

@@ -1,7 +1,5 @@
 """Visible, occluded and truncated fractions of instances."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import ClassVar, Literal
 

@@ -5,8 +5,6 @@ work, because the views of a scene share their physics; the samples of ``mixed_s
 shuffled together.
 """
 
-from __future__ import annotations
-
 import multiprocessing
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence

@@ -1,7 +1,5 @@
 """Samples of the Python API: images, boxes and points by sensor name."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,7 +1,5 @@
 """One sample on disk: the function behind ``gen-data sample``."""
 
-from __future__ import annotations
-
 import shutil
 import tempfile
 from collections.abc import Sequence

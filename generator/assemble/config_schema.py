@@ -1,7 +1,5 @@
 """JSON Schema of configurations, for completion and checks in editors."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from gen_data.assemble.config import (

@@ -1,7 +1,5 @@
 """Descriptions of everything that a configuration can contain, by name."""
 
-from __future__ import annotations
-
 import textwrap
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, get_args

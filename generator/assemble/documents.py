@@ -3,8 +3,6 @@
 A configuration extends others, and overrides elements of its template.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from importlib.resources import files

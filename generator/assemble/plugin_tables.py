@@ -1,7 +1,5 @@
 """Tables of all kinds of plug-ins."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from typing import Any, TypeVar
 

@@ -1,7 +1,5 @@
 """Checks of nominal scenes before a run: what would stop it later, or give no labels."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator
 

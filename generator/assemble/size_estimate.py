@@ -1,7 +1,5 @@
 """Size of a data set on disk, estimated from its configuration."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from gen_data.assemble.config import Config

@@ -1,7 +1,5 @@
 """Lossless conversion of meshes, collision parts and images to plain arrays and back."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from functools import lru_cache

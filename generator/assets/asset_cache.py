@@ -11,8 +11,6 @@ Arrays of large files are views of the mapped file: processes share its pages, a
 are read occupy memory. Entries are replaced or removed, never changed in place.
 """
 
-from __future__ import annotations
-
 import contextlib
 import json
 import math

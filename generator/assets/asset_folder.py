@@ -5,8 +5,6 @@ must stay inside the folder. Only regular files of bounded size are read. The di
 read is recorded, to detect files that change between hashing and parsing.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import stat

@@ -4,8 +4,6 @@ Values are numbers, comma-separated lists of numbers, or words. The canonical fo
 and numbers in their shortest form, so that equal assets have equal ids.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Mapping

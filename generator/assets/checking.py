@@ -1,7 +1,5 @@
 """Checks of the assets in a user's folder: usability, size, unit and orientation."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The seam between the core and its content: the tables of ``content``."""
 
-from __future__ import annotations
-
 import importlib
 from types import ModuleType
 

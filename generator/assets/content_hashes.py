@@ -3,8 +3,6 @@
 Hashes are cached until a file may have changed.
 """
 
-from __future__ import annotations
-
 import contextlib
 import json
 import os

@@ -4,8 +4,6 @@
 entry-point group ``gen_data.asset_family``.
 """
 
-from __future__ import annotations
-
 import importlib
 from collections.abc import Iterator, Mapping
 from functools import cache

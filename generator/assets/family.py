@@ -1,7 +1,5 @@
 """Families: named generators of objects, textures and environments, and their tables."""
 
-from __future__ import annotations
-
 import importlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Parameters of a family that its asset ids may set: the named draws of its variants."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 

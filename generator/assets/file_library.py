@@ -1,7 +1,5 @@
 """Assets from files: pybullet's, those of installed packs, and the user's."""
 
-from __future__ import annotations
-
 import importlib.util
 import math
 from collections import Counter

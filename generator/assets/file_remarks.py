@@ -1,7 +1,5 @@
 """Remarks on a user's files, once per file."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Iterable, Iterator, Set
 

@@ -1,7 +1,5 @@
 """Decoding of image files; size limits are checked before decoding."""
 
-from __future__ import annotations
-
 import io
 import math
 import re

@@ -5,8 +5,6 @@ to the centre of mass, because physics uses the origin as such. Links keep the f
 Mesh and collision parts always share one frame.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence

@@ -5,8 +5,6 @@ id, an index: the content of ``assets.yaml`` as JSON, which loads a hundred time
 ``gen_data.packs`` installs packs.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator
 from dataclasses import dataclass

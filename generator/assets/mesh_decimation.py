@@ -1,7 +1,5 @@
 """Mesh decimation by quadric edge collapse."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

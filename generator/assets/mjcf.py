@@ -5,8 +5,6 @@ read here: MuJoCo compiles a box for each mesh, and shapes refer to the files. I
 defaults, frames, units of angles and all ways to state a direction.
 """
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Iterator

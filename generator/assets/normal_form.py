@@ -5,8 +5,6 @@ only; degenerate and duplicate triangles are removed. All steps are stable sorts
 arithmetic, so that a file yields the same bytes on every processor.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from typing import Any

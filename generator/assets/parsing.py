@@ -3,8 +3,6 @@
 Each checks that the bytes it parsed have the digests under which its result is stored.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from pathlib import Path

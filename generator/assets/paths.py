@@ -1,7 +1,5 @@
 """Location of installed asset packs, and whether one may be fetched without being asked for."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Procedural assets: families of objects, textures and environments."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Iterator, Mapping
 from functools import partial
 from typing import Any, TypeVar

@@ -1,7 +1,5 @@
 """Files that descriptions of robots refer to by the names of packages or models."""
 
-from __future__ import annotations
-
 import re
 from pathlib import PurePosixPath
 

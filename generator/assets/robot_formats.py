@@ -1,7 +1,5 @@
 """Formats of descriptions of robots and other things with joints, by suffix."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import PurePosixPath
 

@@ -1,7 +1,5 @@
 """Robot models from a description and its index entry."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import combinations
 

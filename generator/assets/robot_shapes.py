@@ -1,7 +1,5 @@
 """Triangles of the shapes of a description, with its materials."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

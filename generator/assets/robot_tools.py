@@ -4,8 +4,6 @@ A tool is a few links of boxes and cylinders, joined to the flange; the arm with
 from then on like any other robot. Its frame is that of the flange, with Z out of the arm.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

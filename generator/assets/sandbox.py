@@ -4,8 +4,6 @@ Parsers of meshes, images and stages partly consist of native code. In a child o
 processor time, without rights to write or to connect, a crash or an endless loop ends in one error.
 """
 
-from __future__ import annotations
-
 import atexit
 import io
 import json

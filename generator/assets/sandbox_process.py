@@ -1,7 +1,5 @@
 """The child process of ``sandbox.Sandbox``."""
 
-from __future__ import annotations
-
 import ctypes
 import json
 import os

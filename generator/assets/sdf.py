@@ -4,8 +4,6 @@ Source: sdformat.org, specification 1.6 to 1.12, and "Pose semantics". The model
 world is not used: elements place it.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections import Counter

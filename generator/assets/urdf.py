@@ -4,8 +4,6 @@ Source: ROS wiki, urdf/XML. Document type declarations are refused, so that no e
 expanded. Inertia is not used: arms move as planned, and masses of objects have their own field.
 """
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Iterator

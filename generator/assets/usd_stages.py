@@ -1,7 +1,5 @@
 """Content of an OpenUSD stage: placement of its meshes, lights and cameras."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import PurePosixPath
 

@@ -4,8 +4,6 @@ A material whose corners all have one colour takes it as its base colour, a few 
 faces become materials of their own, and gradients an image with a small cell per triangle.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

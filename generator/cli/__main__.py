@@ -1,7 +1,5 @@
 """``gen-data``, also as ``python -m gen_data.cli``; Ctrl-C is handled from here on."""
 
-from __future__ import annotations
-
 import gc
 import os
 import signal

@@ -4,8 +4,6 @@ Nothing in a cache is needed: it is computed or fetched again. Staged shards of 
 storage lie next to the caches, but are results, and are never removed here.
 """
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Callable
 from contextlib import suppress

@@ -1,7 +1,5 @@
 """Time, size and money of a run, extrapolated from a few measured samples."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 

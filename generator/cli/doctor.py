@@ -4,8 +4,6 @@ Each check loads a library and uses it once, in a separate process: a crash, as 
 unsupported processor, is one failed check.
 """
 
-from __future__ import annotations
-
 import hashlib
 import multiprocessing
 import os

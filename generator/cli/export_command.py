@@ -1,7 +1,5 @@
 """``gen-data export``: a finished data set in other formats."""
 
-from __future__ import annotations
-
 import re
 import shlex
 import sys

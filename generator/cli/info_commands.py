@@ -1,7 +1,5 @@
 """Commands that print information: ``describe``, ``formats``, ``schema``."""
 
-from __future__ import annotations
-
 import inspect
 import json
 import textwrap

@@ -3,8 +3,6 @@
 Imports are few here: each command imports its modules when it runs.
 """
 
-from __future__ import annotations
-
 import os
 import shlex
 import sys

@@ -1,7 +1,5 @@
 """The command ``merge``."""
 
-from __future__ import annotations
-
 import shlex
 import sys
 from pathlib import Path

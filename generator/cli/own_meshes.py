@@ -1,7 +1,5 @@
 """Meshes of the user for ``gen-data init``: found, copied with the files they refer to, indexed."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from collections.abc import Iterator, Mapping, Sequence

@@ -1,7 +1,5 @@
 """``gen-data rerender``: the scenes of a finished data set, rendered again."""
 
-from __future__ import annotations
-
 import shlex
 import sys
 from pathlib import Path

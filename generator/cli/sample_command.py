@@ -1,7 +1,5 @@
 """``gen-data sample``: one sample on disk."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import click

@@ -6,8 +6,6 @@ code only, and drops it in some places, such as destructors. Therefore a thread 
 ends ``PATIENCE_S`` after the first request, or at the second one.
 """
 
-from __future__ import annotations
-
 import os
 import select
 import signal

@@ -1,7 +1,5 @@
 """Base class of all models that are read from YAML."""
 
-from __future__ import annotations
-
 from pydantic import BaseModel, ConfigDict
 
 NAME_PATTERN = r"^[A-Za-z][A-Za-z0-9_-]{0,63}$"

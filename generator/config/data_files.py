@@ -1,7 +1,5 @@
 """Tables in YAML files next to the modules that use them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from importlib.resources import files
 from typing import Any, TypeVar

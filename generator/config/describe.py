@@ -1,7 +1,5 @@
 """Descriptions and examples of plug-ins for ``gen-data describe``."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

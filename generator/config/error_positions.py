@@ -1,7 +1,5 @@
 """Positions for errors of plug-ins, which know their name but no document."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -9,8 +9,6 @@
 5. Elements, randomizers and sensors merge item by item, see ``merge_named``.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 

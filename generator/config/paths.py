@@ -6,8 +6,6 @@ used. A finished data set remembers where its folders were (``LOCATIONS``) and c
 from anywhere.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path

@@ -4,8 +4,6 @@ Deprecated words are accepted for one release, each with a ``FutureWarning`` tha
 and the current word. All of them are in ``renamed_keys.yaml``; plug-ins know only the current ones.
 """
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace

@@ -14,8 +14,6 @@ Global choices condition local ones, and these condition objects: structured dom
 (Prakash et al., ICRA 2019). The functions here rewrite documents, which are validated afterwards.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from graphlib import CycleError, TopologicalSorter

@@ -4,8 +4,6 @@ Source: YAML 1.2.2, section 10.3.2. ``no`` and ``1:30`` are strings, ``010`` is 
 float. NaN and infinity, which the schema allows, are refused.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import re

@@ -1,7 +1,5 @@
 """Types of assets: materials, meshes, textures, collision geometry, robots."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, fields
 from typing import Literal
 

@@ -1,7 +1,5 @@
 """Caches bounded by bytes and by number of values."""
 
-from __future__ import annotations
-
 from collections import OrderedDict
 from collections.abc import Callable
 from typing import Generic, Protocol, TypeVar

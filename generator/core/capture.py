@@ -1,7 +1,5 @@
 """Readings of sensors: images, point clouds and measurements."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum

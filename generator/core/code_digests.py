@@ -1,7 +1,5 @@
 """Digests of code, for stored results that depend on it."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 from hashlib import sha256
 from pathlib import Path

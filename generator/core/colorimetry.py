@@ -5,8 +5,6 @@ function; both matrices with the four digits that it prints, so that they undo o
 within 1e-3).
 """
 
-from __future__ import annotations
-
 from typing import Any, TypeVar, overload
 
 import numpy as np

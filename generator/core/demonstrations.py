@@ -1,7 +1,5 @@
 """Steps of demonstrations: what imitation learning reads of an arm at one instant."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeVar

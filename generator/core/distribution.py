@@ -1,7 +1,5 @@
 """The distribution on package indices: its name, and the command that installs its extras."""
 
-from __future__ import annotations
-
 import json
 import shlex
 from functools import cache

@@ -1,7 +1,5 @@
 """English words for things and numbers."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 

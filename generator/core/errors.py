@@ -1,7 +1,5 @@
 """Every error a user can meet, each with the exit code of the process."""
 
-from __future__ import annotations
-
 import difflib
 import errno
 import math

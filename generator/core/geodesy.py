@@ -5,8 +5,6 @@ up. Geodetic coordinates by Bowring, "Transformation from spatial to geographica
 Survey Review 23, 1976, iterated; exact to far below a micrometre near the surface.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Names of keypoints of assets that are conditions of placing things on or at them."""
 
-from __future__ import annotations
-
 SUPPORT = "support"
 """Keypoints at two opposite corners of a level surface that carries things and is not a top."""
 INSIDE = "inside"

@@ -3,8 +3,6 @@
 Uses only ``+ - * / sqrt`` and the C library's sine and cosine, on plain floats.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 

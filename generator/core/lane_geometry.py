@@ -1,7 +1,5 @@
 """Geometry of lanes: poses along the centre line, and borders."""
 
-from __future__ import annotations
-
 import math
 from bisect import bisect_right
 from dataclasses import dataclass, field

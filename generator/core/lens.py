@@ -19,8 +19,6 @@ fish-eye lenses", PAMI 28, 2006; the equations of OpenCV's calib3d module (``pro
 ``fisheye::projectPoints``).
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from functools import lru_cache

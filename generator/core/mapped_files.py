@@ -4,8 +4,6 @@
 the 1,024 descriptors that most systems allow a process. Maps made here keep none.
 """
 
-from __future__ import annotations
-
 import ctypes
 import mmap
 import weakref

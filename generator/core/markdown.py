@@ -1,7 +1,5 @@
 """Names and texts of users in Markdown, as plain text."""
 
-from __future__ import annotations
-
 import html
 
 

@@ -4,8 +4,6 @@ Every device declares its columns in its own file. Every table has a ``time_s``,
 beginning of the sequence. Axes are the device's, X forward, Y left, Z up, unless the name differs.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Members of object groups: adding them to a scene, removing them, and their instance ids."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 

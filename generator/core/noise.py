@@ -4,8 +4,6 @@ Perlin, "Improving noise", SIGGRAPH 2002; Worley, "A cellular texture basis func
 1996; both on a torus. ``cells`` are lattice cells per image as (down, across).
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any, TypeVar

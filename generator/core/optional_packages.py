@@ -1,7 +1,5 @@
 """Packages that only some features need: extras of the distribution."""
 
-from __future__ import annotations
-
 from importlib.util import find_spec
 
 from gen_data.core.distribution import install_command

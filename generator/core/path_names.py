@@ -4,8 +4,6 @@ Records, manifests and asset indexes may come from somebody else: a name with ``
 a drive would lead out of the folder that it is joined to. Names are checked where they are parsed.
 """
 
-from __future__ import annotations
-
 import ntpath
 import re
 

@@ -1,7 +1,5 @@
 """Photometry of lights: flux, intensity, illuminance; panels and the visible fixtures they have."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

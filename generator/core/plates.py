@@ -5,8 +5,6 @@ viewing direction, levelled. Photographs are taken for images of a pinhole with 
 point. Linear values of a photograph are relative to its white: 1 is ``WHITE_CD_M2``.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Plug-in tables: a name in YAML -> ``module:Class``, imported on first use."""
 
-from __future__ import annotations
-
 import importlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass

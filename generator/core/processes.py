@@ -1,7 +1,5 @@
 """Settings of processes: one thread for sums, no child outlives its parent, no stray output."""
 
-from __future__ import annotations
-
 import ctypes
 import os
 import signal

@@ -1,7 +1,5 @@
 """Projection with a rolling shutter: every point at the instant of the row that shows it."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -1,7 +1,5 @@
 """Safe parsing of untrusted XML: bounded in size, without document types or entities."""
 
-from __future__ import annotations
-
 import re
 from typing import Any
 from xml.etree.ElementTree import Element, TreeBuilder

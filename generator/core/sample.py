@@ -1,7 +1,5 @@
 """Samples of a data set: readings, their annotations, and the scene they come from."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field

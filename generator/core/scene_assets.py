@@ -1,7 +1,5 @@
 """Assets that a scene consists of."""
 
-from __future__ import annotations
-
 from gen_data.core.scene import Scene
 
 

@@ -1,7 +1,5 @@
 """Scenes at other instants."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 

@@ -5,8 +5,6 @@ A binary mask becomes ``{"size": [height, width], "runs": [...]}``: lengths of i
 beginning with the unset pixels.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import json
 import math

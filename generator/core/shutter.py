@@ -1,7 +1,5 @@
 """Exposure time and rolling shutter: exposure intervals of the rows of an image."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Skeletons: order of keypoints, and the bones between them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 

@@ -4,8 +4,6 @@ Both look the same way through the same pinhole, the second to the right of the 
 are rectified. What the left one shows in column ``x`` the right one shows in ``x - disparity``.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

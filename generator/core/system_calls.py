@@ -4,8 +4,6 @@ POSIX systems lack some calls of Linux, Windows lacks most of them. Each functio
 call itself, not for the name of the system.
 """
 
-from __future__ import annotations
-
 import ctypes
 import os
 import signal

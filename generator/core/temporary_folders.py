@@ -5,8 +5,6 @@ any way. Folders without a holder are removed when the next one is made. Windows
 folders: there, a file in it that is open cannot be removed.
 """
 
-from __future__ import annotations
-
 import os
 import shutil
 import stat

@@ -1,7 +1,5 @@
 """URLs of object storage, as opposed to paths."""
 
-from __future__ import annotations
-
 import re
 from os import PathLike, fspath
 

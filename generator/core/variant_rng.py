@@ -7,8 +7,6 @@ A draw with a name is a parameter of the family: an asset id may ask for its val
 (``desk?width_m=1.6``). The number is drawn in any case, so all other draws stay as they are.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager

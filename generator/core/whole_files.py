@@ -1,7 +1,5 @@
 """Files that appear with all their bytes, or not at all: a full disk leaves no half of one."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress

@@ -6,8 +6,6 @@ wanted member is a link or a device, or leaves the folder, or if the archive exc
 leading slashes silently.
 """
 
-from __future__ import annotations
-
 import gzip
 import io
 import lzma

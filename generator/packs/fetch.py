@@ -1,7 +1,5 @@
 """Download of pack archives with the ordinary client of each registry."""
 
-from __future__ import annotations
-
 import importlib.util
 import shutil
 import subprocess

@@ -4,8 +4,6 @@ All work happens in a scratch folder beside the installed packs and ends with on
 prevents concurrent installations; the next one removes scratch folders of killed processes.
 """
 
-from __future__ import annotations
-
 import contextlib
 import os
 import shutil

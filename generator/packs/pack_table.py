@@ -1,7 +1,5 @@
 """Table of the available asset packs."""
 
-from __future__ import annotations
-
 import importlib
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The asset library of a run, with files that it fetches when they are first needed."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Sequence
 from pathlib import Path

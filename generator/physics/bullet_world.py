@@ -4,8 +4,6 @@ The only module that imports pybullet. It hides pybullet's conventions: quaterni
 last, body numbers, and poses of the centre of mass.
 """
 
-from __future__ import annotations
-
 import math
 import weakref
 from collections.abc import Iterable

@@ -8,8 +8,6 @@ two coefficients of friction the larger one counts instead of their product, so 
 given, with which equal surfaces agree.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """The simulator of a configuration."""
 
-from __future__ import annotations
-
 from gen_data.core.errors import ConfigError
 from gen_data.physics.physics_config import PhysicsConfig, missing_engine
 from gen_data.physics.world import World

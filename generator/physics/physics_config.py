@@ -1,7 +1,5 @@
 """The section ``physics:`` of a configuration."""
 
-from __future__ import annotations
-
 from importlib.util import find_spec
 from typing import Literal, get_args
 

@@ -1,7 +1,5 @@
 """Settling: lets bodies fall on their surfaces until they rest, or rejects the layout."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The seam to rigid-body simulators: what settling and planning ask of a simulated world."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 from typing import NamedTuple, Protocol

@@ -4,8 +4,6 @@ A NaN does not survive processing: Warp's ``clamp`` and ``min`` make a bound of 
 bytes makes it black, and a scanner takes it for no hit. A finished reading does not show it.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

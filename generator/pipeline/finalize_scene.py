@@ -1,7 +1,5 @@
 """Scenes as labels refer to them: category ids, instance frames, boxes, rounding."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any

@@ -4,8 +4,6 @@ Two machines with equal digests generate equal bytes as far as 64 x 64 pixels ca
 processor, driver or device (CPU or GPU) whose rounding reaches a data file shows up here first.
 """
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Mapping
 

@@ -9,8 +9,6 @@ follows from label images is computed again from the rectified ones, by the anno
 Image coordinates are ours: pixel ``i`` covers ``[i, i + 1)``. OpenCV's are smaller by 0.5.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

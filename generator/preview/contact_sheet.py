@@ -1,7 +1,5 @@
 """Contact sheets: tiles of samples and sensors on one PNG."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Drawing of labels on images: tinted or outlined masks, boxes, skeletons and names."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
 from typing import Any

@@ -1,7 +1,5 @@
 """Colour maps for ids, depth, flow and fractions; ids have the same colour in every image."""
 
-from __future__ import annotations
-
 import colorsys
 
 import numpy as np

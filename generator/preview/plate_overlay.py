@@ -1,7 +1,5 @@
 """Photographs with their horizon, the corners of their ground, and a grid on it."""
 
-from __future__ import annotations
-
 import math
 
 import cv2

@@ -5,8 +5,6 @@ sequence after the other. Unchanged values are not sent again. Rerun's quaternio
 boxes have half sizes; a pinhole's principal point is as in this project (pixel centres at i + 0.5).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path

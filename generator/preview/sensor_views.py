@@ -1,7 +1,5 @@
 """Views of laser scans, radars and event cameras."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Literal, get_args

@@ -1,7 +1,5 @@
 """Thumbnails of assets."""
 
-from __future__ import annotations
-
 import math
 
 import cv2

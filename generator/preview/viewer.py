@@ -4,8 +4,6 @@ Rerun's Python functions for both listen on all network interfaces and cannot be
 its command line can.
 """
 
-from __future__ import annotations
-
 import errno
 import socket
 import subprocess

@@ -1,7 +1,5 @@
 """Renderers: from a Scene and a Camera to a SensorReading."""
 
-from __future__ import annotations
-
 from gen_data.core.interfaces import RendererSettings
 from gen_data.core.plugins import PluginTable
 

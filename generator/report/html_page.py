@@ -4,8 +4,6 @@ The page holds the data as JSON, and one script that draws it. A content securit
 only this script and style sheet, by their digests, and images in ``data:`` URLs.
 """
 
-from __future__ import annotations
-
 import base64
 import hashlib
 import json

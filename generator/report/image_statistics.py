@@ -5,8 +5,6 @@ cosine transform of a small grey image (C. Zauner, "Implementation and benchmark
 image hash functions", 2010).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Checks that labels of one image agree with each other and with the image's size."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any

@@ -4,8 +4,6 @@ COCO files are read line by line, with an image or annotation per line as
 ``gen_data.exporters.coco`` writes them, so that memory does not grow with the data set.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Sensors and classes of a finished data set that have no label at all."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The content of a report as plain JSON values: ``report.json``, and the data of the HTML page."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence

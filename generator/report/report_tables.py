@@ -1,7 +1,5 @@
 """Tables and histograms of a report, for the terminal and the HTML page."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Images of the sample browser: small JPEGs, with overlays as data that the page draws."""
 
-from __future__ import annotations
-
 import base64
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Rooms: rules, floor plans, layouts, and the bodies of their shells and furniture."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from gen_data.core.plugins import PluginTable

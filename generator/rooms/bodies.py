@@ -1,7 +1,5 @@
 """Bodies of rooms in a scene: shells, pieces and their moving parts."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

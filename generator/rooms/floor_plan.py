@@ -5,8 +5,6 @@ its back to it faces ``90 k`` degrees. Places along a wall count from its middle
 what faces into the room.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass

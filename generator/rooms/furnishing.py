@@ -1,7 +1,5 @@
 """Furnishing of rooms: pieces placed one after the other, by rejection from their rules."""
 
-from __future__ import annotations
-
 from collections import Counter
 
 from gen_data.core.errors import ConfigError

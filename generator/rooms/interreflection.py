@@ -6,8 +6,6 @@ is in the way of a share of all exchange and reflects what it receives evenly. O
 what arrives at their other side. Values are irradiance over pi, linear RGB [cd/m^2].
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Rooms of a scene as boxes that reflect light."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

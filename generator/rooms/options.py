@@ -1,7 +1,5 @@
 """Assets that the rules of rooms may draw: own families, and furniture of installed packs."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 
 from gen_data.assets.families import declared

@@ -1,7 +1,5 @@
 """What windows show: ground, houses, trees and hedges around a building, in true size."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

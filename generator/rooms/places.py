@@ -1,7 +1,5 @@
 """Places of pieces: at walls, near other pieces, on them, at windows and doors, below ceilings."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Callable, Sequence

@@ -1,7 +1,5 @@
 """Reachability: whether a person can walk from the doors of a room to its pieces."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection, Sequence
 

@@ -5,8 +5,6 @@ et al., "Part pose statistics", IEEE Transactions on Robotics and Automation 15,
 if a line from the centre along the facet's normal leaves the hull through that facet.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Rules of rooms: what belongs into a room of a type, where, and how much space it needs."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache
 

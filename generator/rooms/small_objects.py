@@ -1,7 +1,5 @@
 """Small objects on the level surfaces and boards of pieces."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

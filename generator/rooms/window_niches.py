@@ -1,7 +1,5 @@
 """Ambient light of window niches: part of it comes from outdoors."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

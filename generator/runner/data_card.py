@@ -4,8 +4,6 @@ Both depend on the plan and on the records of shards only. They describe images 
 so that their size does not grow with the number of samples.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections.abc import Iterator, Mapping, Sequence

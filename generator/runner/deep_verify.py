@@ -4,8 +4,6 @@ Checksums find what changed after a data set was sealed. These checks find what 
 invalid labels, and samples that this installation would generate differently.
 """
 
-from __future__ import annotations
-
 import json
 import secrets
 from collections.abc import Iterator, Sequence

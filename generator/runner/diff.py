@@ -1,7 +1,5 @@
 """Comparison of two data sets, or of two folders of one shard."""
 
-from __future__ import annotations
-
 import filecmp
 import json
 from collections.abc import Iterator

@@ -4,8 +4,6 @@ Every change is followed by an fsync. POSIX guarantees nothing about a rename wi
 its folder (Pillai et al., "All file systems are not created equal", OSDI 2014).
 """
 
-from __future__ import annotations
-
 import errno
 import hashlib
 import os

@@ -1,7 +1,5 @@
 """Messages for unexpected errors: place, fact, end of the traceback, command to reproduce."""
 
-from __future__ import annotations
-
 import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -1,7 +1,5 @@
 """Samples that could not be made, and that a run goes on without."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any

@@ -3,8 +3,6 @@
 Done again after a kill it gives the same bytes: nothing here is taken from an earlier attempt.
 """
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 

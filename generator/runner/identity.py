@@ -1,7 +1,5 @@
 """Identity of a data set: its plan and the licences of its assets."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
 

@@ -6,8 +6,6 @@ line has the ``instances`` of its objects, to which the objects refer by id. An 
 of another instant has its whole instance instead.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields

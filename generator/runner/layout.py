@@ -12,8 +12,6 @@ run/                    lock, log, a copy of the plan, unfinished and quarantine
                         of the data set
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 PLAN_NAME = "plan.json"

@@ -1,7 +1,5 @@
 """``LICENSES-ASSETS.md``: a Markdown table of the assets in a data set, grouped by source."""
 
-from __future__ import annotations
-
 import html
 import re
 from collections.abc import Iterable

@@ -1,7 +1,5 @@
 """Parts of one data set that different machines generated, gathered in one folder."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

@@ -8,8 +8,6 @@ Runs on several machines may write to one URL at the same time: a shard that two
 the same bytes.
 """
 
-from __future__ import annotations
-
 import hashlib
 import shutil
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping

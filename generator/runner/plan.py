@@ -1,7 +1,5 @@
 """Plans: everything that the bytes of a data set depend on."""
 
-from __future__ import annotations
-
 import json
 import shlex
 from collections.abc import Iterator, Mapping

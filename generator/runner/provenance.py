@@ -4,8 +4,6 @@ Further views of a scene have only those fields of the Scene that differ from th
 scene in the shard, whose sample index is ``base``: views share most of their scene.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import json
 from collections.abc import Callable, Mapping, Sequence

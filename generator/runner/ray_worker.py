@@ -4,8 +4,6 @@ Its tasks are streams of batches of events, so that the driver sees progress and
 before a shard is finished.
 """
 
-from __future__ import annotations
-
 import faulthandler
 import gc
 import os

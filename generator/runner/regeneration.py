@@ -1,7 +1,5 @@
 """Pipelines that make the samples of an existing data set again: by generation or rendering."""
 
-from __future__ import annotations
-
 import ast
 import json
 import tempfile

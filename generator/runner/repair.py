@@ -3,8 +3,6 @@
 Damaged shards need nothing special: a run generates all shards that do not match their records.
 """
 
-from __future__ import annotations
-
 import hashlib
 import os
 

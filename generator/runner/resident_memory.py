@@ -4,8 +4,6 @@ The module imports nothing heavy, because workers import it first. Without Linux
 nothing.
 """
 
-from __future__ import annotations
-
 import ctypes
 import gc
 from collections.abc import Iterator

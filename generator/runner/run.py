@@ -1,7 +1,5 @@
 """Runs: from a plan to a finished data set, or to an error that says how to resume."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections.abc import Callable, Sequence

@@ -13,8 +13,6 @@ encode     bytes of these files, which may differ although their contents are eq
 A stage uses the results of the stages before, so that the first one that differs has the cause.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections.abc import Callable, Iterator, Mapping

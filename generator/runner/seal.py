@@ -1,7 +1,5 @@
 """The seal of a data set: ``SHA256SUMS`` names every file, the manifest's id names the sums."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import re

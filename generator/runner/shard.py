@@ -1,7 +1,5 @@
 """Generation of one shard: samples, images, labels, provenance, commit."""
 
-from __future__ import annotations
-
 import shutil
 import time
 from collections.abc import Callable, Mapping, Sequence

@@ -4,8 +4,6 @@ A record ends in a checksum of itself: its digests decide whether files are dama
 damaged record must be found before anything is compared with it.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections import Counter

@@ -1,7 +1,5 @@
 """Samples of a finished data set at a URL; shards are copied to a cache when they are read."""
 
-from __future__ import annotations
-
 import hashlib
 import os
 import shutil

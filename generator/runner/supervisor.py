@@ -4,8 +4,6 @@ It starts no process, reads no clock and accesses no file, so that a simulation 
 clock and seeded faults exercises exactly the production code.
 """
 
-from __future__ import annotations
-
 import signal
 from collections import deque
 from collections.abc import Callable, Sequence

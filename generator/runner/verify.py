@@ -1,7 +1,5 @@
 """Verification of a finished data set against its manifest."""
 
-from __future__ import annotations
-
 import hashlib
 import re
 import shlex

@@ -1,7 +1,5 @@
 """Events from workers to the supervisor and actions of the supervisor: plain, picklable data."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TypeAlias

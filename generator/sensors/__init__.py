@@ -1,7 +1,5 @@
 """Sensors: cameras, laser scanners, radars and other devices that read a scene."""
 
-from __future__ import annotations
-
 from gen_data.core.interfaces import Sensor
 from gen_data.core.plugins import PluginTable
 

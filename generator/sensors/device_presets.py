@@ -1,7 +1,5 @@
 """Device presets: one YAML file per make, with its sources."""
 
-from __future__ import annotations
-
 from functools import cache
 from importlib.resources import files
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Mounting of sensors on rigs and cameras, their rates, and their motion with their carrier."""
 
-from __future__ import annotations
-
 import math
 import warnings
 from collections.abc import Iterable

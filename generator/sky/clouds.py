@@ -4,8 +4,6 @@ The layer is a square that repeats. Pixels near the horizon average over many ki
 layer is kept as a mip chain, each level half as fine as the one before.
 """
 
-from __future__ import annotations
-
 import math
 from functools import lru_cache
 

@@ -11,8 +11,6 @@ in urban ecosystems", PLoS ONE 6, 2011 (nights of a city); Kasten and Young, App
 (extinction by colour).
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Equirectangular images of the light from all directions."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

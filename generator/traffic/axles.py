@@ -1,7 +1,5 @@
 """Axles of vehicles."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from gen_data.core.interfaces import AssetIndex

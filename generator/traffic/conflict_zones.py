@@ -1,7 +1,5 @@
 """Conflict zones: where lanes cross, diverge and merge, and where crosswalks cross them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass

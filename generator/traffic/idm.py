@@ -4,8 +4,6 @@ Treiber, Hennecke, Helbing, "Congested traffic states in empirical observations 
 simulations", Physical Review E 62(2), 2000.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

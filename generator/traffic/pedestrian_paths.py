@@ -1,7 +1,5 @@
 """Paths of pedestrians: along sidewalks, over crosswalks and around obstacles."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

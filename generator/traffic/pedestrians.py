@@ -1,7 +1,5 @@
 """Motion of pedestrians: along paths, around each other, and over crosswalks."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 

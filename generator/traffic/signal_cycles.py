@@ -4,8 +4,6 @@ Amber lasts 3 s, red with amber 1 s (RiLSA, at 50 km/h). Amber and an all-red ti
 greens of two axes.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Literal

@@ -1,7 +1,5 @@
 """Simulation of all vehicles and pedestrians: their motion, trajectories and first overlap."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

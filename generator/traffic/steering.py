@@ -6,8 +6,6 @@ line ahead. A kinematic bicycle's path does not depend on its speed, so it is co
 distance.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

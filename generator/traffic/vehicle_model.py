@@ -1,7 +1,5 @@
 """Longitudinal motion of vehicles: following, signals, right of way and pedestrians."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """Constant properties of simulated vehicles: courses, speed limits and conflicts."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -5,8 +5,6 @@ USD's camera is a pinhole; lens distortion is written as additional attributes
 delay of a camera's images after their steps as ``genData:timeOffset`` in time codes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

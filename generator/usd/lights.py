@@ -1,7 +1,5 @@
 """Import and export of lights (UsdLux: radiance in nits, linear colours)."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

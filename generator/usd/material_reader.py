@@ -1,7 +1,5 @@
 """Import of UsdPreviewSurface networks."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field, replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Import of mesh prims: triangulated polygons and their materials."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Any
 

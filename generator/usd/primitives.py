@@ -3,8 +3,6 @@
 Their surfaces are as the schemas define them; round ones have ``SEGMENTS`` sides.
 """
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 from typing import Any

@@ -1,7 +1,5 @@
 """Helpers for writing stages: files, prim names, values and transforms over time."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from itertools import chain, count

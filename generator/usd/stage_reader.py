@@ -5,8 +5,6 @@ subdivision scheme, and primitive shapes and copies of instancers as meshes; inv
 guides and proxies are skipped.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager

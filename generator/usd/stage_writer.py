@@ -15,8 +15,6 @@ visible at a time. Step ``k`` of a sequence is time code ``k``; images of a came
 ``genData:timeOffset`` were taken that many time codes later.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path

@@ -4,8 +4,6 @@ It binds photographs, which no independent program could make, to the plan: an e
 picture is not the one of its scene.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from gen_data.core.errors import GenDataError, is_refused

@@ -3,8 +3,6 @@
 pycocotools decodes the runs and measures them: nothing here uses the code that made the labels.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from typing import Any
 

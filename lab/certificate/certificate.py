@@ -1,7 +1,5 @@
 """Certificates of finished data sets: made, stored beside the manifest, and made again."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import platform

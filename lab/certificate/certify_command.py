@@ -1,7 +1,5 @@
 """``gen-data certify``: check all claims about a data set, and write its certificate."""
 
-from __future__ import annotations
-
 import os
 from datetime import datetime, timezone
 from pathlib import Path

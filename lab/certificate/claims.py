@@ -1,7 +1,5 @@
 """All claims of a certificate: one file and one line in this table each."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from importlib import import_module

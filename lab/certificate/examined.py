@@ -1,7 +1,5 @@
 """The data set under examination, and how much of it is sampled."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property

@@ -4,8 +4,6 @@ Pictures, boxes, categories, splits and masks must be equal; and the labels, sco
 against the export by COCO's evaluation, must have an average precision of 1.
 """
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Iterator, Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Claim: the files are those that the manifest names."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator
 

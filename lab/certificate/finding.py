@@ -1,7 +1,5 @@
 """What checking a claim found: one finding per export, sensor or data set."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum

@@ -1,7 +1,5 @@
 """Labelled images, as labels state them and as readers of exports find them, compared."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field

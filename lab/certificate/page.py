@@ -1,7 +1,5 @@
 """A certificate as one HTML page without scripts, which requests nothing."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from html import escape
 

@@ -5,8 +5,6 @@ must be the stored ones. The second judges these values. Tests are Kolmogorov an
 uniform scores; Holm's procedure bounds the probability that a correct data set fails any of them.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass

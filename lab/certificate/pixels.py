@@ -1,7 +1,5 @@
 """Claim: an independent ray caster meets the same things at the same depths in sampled pixels."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

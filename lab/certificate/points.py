@@ -4,8 +4,6 @@ A ray goes from the laser's place at the instant of the pulse towards the point,
 point's thing at its distance: within the noise of the device, and without a solid thing before it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 

@@ -6,8 +6,6 @@ so that holes in textures and panes of glass need no textures here: a surface th
 hides nothing behind it.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field

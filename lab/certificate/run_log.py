@@ -6,8 +6,6 @@ not change it in passing: pictures that are exchanged in shards and exports alik
 samples, without generating any.
 """
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Iterator, Mapping
 from typing import Any

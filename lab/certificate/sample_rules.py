@@ -1,7 +1,5 @@
 """Claim: every sample obeys the rules that samples are checked by before they are written."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from gen_data.lab.certificate.examined import Examined

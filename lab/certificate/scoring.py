@@ -1,7 +1,5 @@
 """Average precision of the labels of a data set as predictions for an export, by pycocotools."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,5 @@
 """Claim: no scene is in two splits."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections.abc import Iterator, Mapping

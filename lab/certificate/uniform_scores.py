@@ -11,8 +11,6 @@ Formulas are those of the cumulative distributions, not of the code that draws: 
 ``draw``.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from types import SimpleNamespace

@@ -1,7 +1,5 @@
 """The check of a data set's certificate by ``gen-data verify``."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from gen_data.core.errors import VerificationError

@@ -3,8 +3,6 @@
 It also covers formats for which no official reader is known, and files that no reader looks at.
 """
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Iterator
 

@@ -1,7 +1,5 @@
 """The arm and the camera of a configuration that an environment uses."""
 
-from __future__ import annotations
-
 from gen_data.assemble.pipeline_factory import PipelineFactory
 from gen_data.config.yaml_tree import Node
 from gen_data.core.capture import Channel

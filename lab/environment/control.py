@@ -3,8 +3,6 @@
 The last number of every action is the opening of the gripper, from -1 closed to 1 open.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The Gymnasium environment, over the scenes, randomizers and renderer of a configuration."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """One episode: an arm that is controlled in a drawn scene."""
 
-from __future__ import annotations
-
 from collections import deque
 from dataclasses import replace
 

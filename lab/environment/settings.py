@@ -1,7 +1,5 @@
 """Settings of an environment: control, observations, length of episodes and dynamics."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Literal, NoReturn
 

@@ -1,7 +1,5 @@
 """Fit of a camera's image pipeline to photographs."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial

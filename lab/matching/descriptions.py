@@ -1,7 +1,5 @@
 """Further statistics that are compared and not fitted: what a fit leaves different."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import cv2

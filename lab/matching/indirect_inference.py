@@ -14,8 +14,6 @@ the parameters between recordings. Statistics are no linear functions of paramet
 shifts their means: parameters are estimated again from simulated recordings with this spread.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace

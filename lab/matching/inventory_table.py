@@ -1,7 +1,5 @@
 """What was read of a folder, and what was skipped for which reason, as rows of text."""
 
-from __future__ import annotations
-
 from gen_data.lab.matching.real_files import Inventory
 
 KINDS = ("photographs", "scans", "label files")

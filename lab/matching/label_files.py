@@ -1,7 +1,5 @@
 """Boxes in label files of users, in the layouts of COCO and KITTI."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass

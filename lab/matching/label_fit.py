@@ -1,7 +1,5 @@
 """Fit of where a camera is to the boxes of labels."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Fit of a laser scanner to scans."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

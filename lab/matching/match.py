@@ -1,7 +1,5 @@
 """Fit of a configuration to a folder of recordings."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """``gen-data match``: a configuration fitted to recordings."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import click

@@ -1,7 +1,5 @@
 """Report of a fit: tables for the terminal, figures for programs, and a page."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict

@@ -1,7 +1,5 @@
 """The configuration that a fit writes: it extends the fitted one by what was fitted."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path

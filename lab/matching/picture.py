@@ -1,7 +1,5 @@
 """A photograph as statistics see it, and the local measures that several of them share."""
 
-from __future__ import annotations
-
 from functools import cached_property
 
 import cv2

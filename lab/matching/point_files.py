@@ -5,8 +5,6 @@ KITTI's ``.bin`` has four float32 a point (x, y, z, intensity), nuScenes' ``.pcd
 endian and uncompressed.
 """
 
-from __future__ import annotations
-
 import io
 from pathlib import Path
 

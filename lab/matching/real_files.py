@@ -4,8 +4,6 @@ Anything else is skipped, and counted with the reason. Folders of label images, 
 of a camera (``depth``, ``instance``), are left out, and so are further links to the same file.
 """
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Recordings as statistics take them, real or simulated."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Results of a fit: fitted quantities, compared statistics, changed fields of a configuration."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass

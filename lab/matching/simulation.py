@@ -5,8 +5,6 @@ What candidates change comes after: photographs are developed and returns detect
 same random streams for all candidates.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor

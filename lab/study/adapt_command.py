@@ -1,7 +1,5 @@
 """``gen-data adapt``: the next round of a curriculum, with more of the missed objects."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import click

@@ -4,8 +4,6 @@ A folder holds one experiment. Each run writes its detections last and in one st
 is either done or repeated: data sets resume by themselves, and trainings take minutes.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import shutil

@@ -1,7 +1,5 @@
 """What a detector misses, by size, occlusion, brightness and class, and where it fails most."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Findings of a study: average precision and what is missed, as data and tables."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A study as one HTML page without scripts, which requests nothing."""
 
-from __future__ import annotations
-
 import base64
 from collections.abc import Mapping, Sequence
 from html import escape

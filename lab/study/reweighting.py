@@ -9,8 +9,6 @@ Automatic domain randomisation by failures: OpenAI et al., "Solving Rubik's Cube
 2019, widens ranges; this moves weight within them, as importance sampling does.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass

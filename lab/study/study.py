@@ -1,7 +1,5 @@
 """A study from input to page: perform or read runs, compare them, write the findings."""
 
-from __future__ import annotations
-
 import json
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Surfaces of prepared food: crumb, crust, icing, melted cheese, sauces. They tile."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 

@@ -3,8 +3,6 @@
 Skins: u runs around the fruit, v from blossom to stalk. Cut faces: v from the rim to the middle.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -5,8 +5,6 @@ fingers; its right half is a finger, v from its foot (0) over its joints (1/3, 2
 Kind ``arm`` tiles.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from gen_data.assets.family import check_option

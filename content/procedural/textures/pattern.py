@@ -1,7 +1,5 @@
 """Abstract patterns for domain randomization."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

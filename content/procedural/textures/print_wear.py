@@ -5,8 +5,6 @@ ink is rubbed off first and the board shows. Lengths are in metres on the object
 shares are assumed, within a half.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass

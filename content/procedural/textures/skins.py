@@ -1,7 +1,5 @@
 """Covers of balls as functions of the direction: no distortion at the poles."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Floors and walls: natural and cast stone, plaster and paint, brick, tiles."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from gen_data.content.procedural.material_presets import PALETTES

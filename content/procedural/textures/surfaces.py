@@ -1,7 +1,5 @@
 """Surfaces: textiles, leather, cardboard; metal."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from gen_data.content.procedural.material_presets import PALETTES

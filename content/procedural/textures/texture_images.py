@@ -1,7 +1,5 @@
 """Conversion of floating-point colours and heights to the 8-bit images of a texture."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

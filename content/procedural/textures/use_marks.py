@@ -5,8 +5,6 @@ The image multiplies a material's own colour, so that one serves things of every
 assumed, within a half.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace

@@ -6,8 +6,6 @@ pith is beside it (Hoadley, "Understanding wood", 2000). Rings of timber from te
 are 1 to 5 mm wide.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

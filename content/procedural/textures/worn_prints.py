@@ -1,7 +1,5 @@
 """Printed matter as it looks in use: the prints of ``printed_matter`` with their wear."""
 
-from __future__ import annotations
-
 import math
 
 from gen_data.content.procedural import books, packaging

@@ -1,7 +1,5 @@
 """Surfaces of walls and roofs that carry their age: plaster, panels, boards, sheets, slates."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from gen_data.content.procedural.textures.texture_images import color, mix_colors, texture

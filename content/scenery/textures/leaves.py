@@ -4,8 +4,6 @@ Each image has four tiles, each a spray or a clump of its own within its borders
 show one tile.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

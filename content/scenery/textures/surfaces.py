@@ -1,7 +1,5 @@
 """Surfaces of houses and plants. All are near-white: the material's colour tints them."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from gen_data.content.procedural.textures.texture_images import texture

@@ -8,8 +8,6 @@ Emission shows the same rooms with their lamps on: some panes are dark, and thos
 differ in brightness and colour.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

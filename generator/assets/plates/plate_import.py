@@ -1,7 +1,5 @@
 """From a photograph and its entry in ``assets.yaml`` to a Plate and its surroundings."""
 
-from __future__ import annotations
-
 import io
 import itertools
 import math

@@ -7,8 +7,6 @@ that it lights level ground as brightly as the photograph shows it: skies are br
 white of a photograph.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

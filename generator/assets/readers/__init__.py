@@ -1,7 +1,5 @@
 """Readers of mesh files, one per format; all return triangle soup."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import PurePosixPath
 

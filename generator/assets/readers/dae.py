@@ -4,8 +4,6 @@ Geometry of the scene's nodes in metres, in the axes of the file; ``MeshSource.u
 axis that it states as up. Animations, skins, lights and cameras are not read.
 """
 
-from __future__ import annotations
-
 import io
 import warnings
 from collections.abc import Iterator

@@ -4,8 +4,6 @@ Triangles are read with colours, instances, skins and morph targets at rest, and
 ``gltf_materials``). Animations, cameras and lights are ignored; compressed geometry is refused.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Parsed glTF 2.0 files: their JSON tree, buffers and accessors."""
 
-from __future__ import annotations
-
 import base64
 import binascii
 import json

@@ -7,8 +7,6 @@ An extension's factor is multiplied by the mean of its image, if it has one. Uni
 number.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

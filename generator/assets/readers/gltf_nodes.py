@@ -1,7 +1,5 @@
 """Placed meshes of a glTF scene: transforms, instances and skins."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Result type of mesh readers, and conversions that formats share."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field

@@ -4,8 +4,6 @@ Read are polygons and triangle strips, colours of vertices or faces, and the ima
 ``TextureFile`` name, with texture coordinates per vertex or per corner.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """STEP (ISO 10303-21), meshed by OpenCASCADE through the package cascadio; in metres, Z up."""
 
-from __future__ import annotations
-
 import os
 
 from gen_data.assets.asset_folder import Folder

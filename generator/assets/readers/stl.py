@@ -1,7 +1,5 @@
 """STL, binary and ASCII (3D Systems, "StereoLithography Interface Specification", 1989)."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from gen_data.assets.asset_folder import Folder

@@ -4,8 +4,6 @@ Read are meshes, components and build items with their transforms, and colours o
 and of colour groups; images, slices and beams are not.
 """
 
-from __future__ import annotations
-
 import io
 import zipfile
 from collections.abc import Mapping

@@ -5,8 +5,6 @@ transforms, instances, unit and up axis. Nothing outside the asset folder is ope
 layers are checked beforehand.
 """
 
-from __future__ import annotations
-
 import io
 import zipfile
 from collections.abc import Iterator

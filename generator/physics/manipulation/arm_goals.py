@@ -1,7 +1,5 @@
 """Goals of arms: the first candidate that is reachable and free of collision."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import Enum

@@ -5,8 +5,6 @@ their targets whatever they push, fixed bodies stop the arm, and fingers that to
 from both sides hold it until they open.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 

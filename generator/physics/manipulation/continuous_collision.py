@@ -4,8 +4,6 @@ Between two checks no point moves farther than the smallest measured gap, so tha
 skipped (Mirtich, Impulse-based dynamic simulation of rigid body systems, 1996, chapter 2).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 

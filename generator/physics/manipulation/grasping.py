@@ -1,7 +1,5 @@
 """Grasps: the pose of an object between the fingers of a gripper, and their opening."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property

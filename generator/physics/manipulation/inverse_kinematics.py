@@ -6,8 +6,6 @@ quasirandom sequences", 2018, for the starts. Plain floats: numpy is slower on m
 seven, and a fixed order of summation gives the same bits on every processor.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

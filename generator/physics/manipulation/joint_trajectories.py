@@ -6,8 +6,6 @@ of ``(end - start) / T^2`` (Biagiotti & Melchiorri, Trajectory Planning for Auto
 Robots, 2008, section 2.1.7).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Task planning of one arm: from its goals to legs that are reachable and free of collision."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace

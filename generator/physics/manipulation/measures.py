@@ -1,7 +1,5 @@
 """Measures of simulated bodies, which decide whether a task has succeeded."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 

@@ -1,7 +1,5 @@
 """Motion planning: configurations that reach a pose, and collision-free paths between them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from itertools import islice, pairwise

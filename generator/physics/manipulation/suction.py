@@ -5,8 +5,6 @@ measure distance and slope of the surface below it. A gap anywhere lets air in. 
 Dex-Net 3.0 (2018), section IV, likewise require contact at every vertex of the rim.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -6,8 +6,6 @@ Warp's cache if it brings them, and else separate processes compile them side by
 harmless: a module that is missing from the cache is compiled on first use.
 """
 
-from __future__ import annotations
-
 import hashlib
 import os
 import platform

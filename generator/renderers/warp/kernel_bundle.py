@@ -6,8 +6,6 @@ The machine code fits every processor on which Warp compiles CPU kernels, becaus
 flags name none; Warp's own names of the files contain its LLVM and the target triple.
 """
 
-from __future__ import annotations
-
 import shutil
 import sys
 from collections.abc import Sequence

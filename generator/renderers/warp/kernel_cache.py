@@ -11,8 +11,6 @@ A cache that cannot be written, of an image or of another user, is used through 
 that links its modules and takes those that are missing.
 """
 
-from __future__ import annotations
-
 import errno
 import json
 import os

@@ -4,8 +4,6 @@ A header is the body of one function, named like it, or a part that bodies inclu
 are the Python function's.
 """
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The Warp renderer as a plug-in."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 from pydantic import Field

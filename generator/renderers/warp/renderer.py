@@ -1,7 +1,5 @@
 """The Warp renderer: from a Scene and a Camera to a SensorReading."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any

@@ -6,8 +6,6 @@ rendered at its middle for the rows exposed then, and each row is the weighted m
 Both use no more instants than the motion in the image requires.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Content of a calibration file, in one form for all formats, and the reading of numbers in it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NoReturn

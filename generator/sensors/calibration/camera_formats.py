@@ -9,8 +9,6 @@
 Pixel centres are at integers in all but COLMAP's, where they are at halves, as in this project.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

@@ -9,8 +9,6 @@
   ``camera_2`` (0 to 3), ``velodyne`` and ``imu``; X forward but for cameras.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Mapping

@@ -3,8 +3,6 @@
 Plans are therefore self-contained, and errors name the file and line that they come from.
 """
 
-from __future__ import annotations
-
 import math
 import warnings
 from collections.abc import Mapping

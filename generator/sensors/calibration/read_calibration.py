@@ -1,7 +1,5 @@
 """Reads calibration files, whose format follows from their content."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

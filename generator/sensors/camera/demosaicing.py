@@ -8,8 +8,6 @@ lines thinner than a pixel (Freeman, "Median filter for reconstructing missing c
 patent 4,724,395, 1988).
 """
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 

@@ -8,8 +8,6 @@ is filtered at half the resolution and more strongly than luma: blotches of colo
 than grain, and eyes resolve less colour.
 """
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 from numpy.typing import NDArray

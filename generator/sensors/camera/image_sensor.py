@@ -4,8 +4,6 @@ The model is that of EMVA standard 1288: electrons are Poisson around light time
 current times time; a gain, read noise and a converter of so many bits follow.
 """
 
-from __future__ import annotations
-
 import math
 from functools import lru_cache
 from typing import Annotated, Literal

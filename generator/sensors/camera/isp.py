@@ -20,8 +20,6 @@ film; the contrast of ACES looks has the same pivot). Pictures of cameras are mo
 their scenes, with powers of 1.1 to 1.6 (Poynton, "Digital Video and HD", 2012, chapter 11).
 """
 
-from __future__ import annotations
-
 import math
 from functools import cache, lru_cache
 from typing import Any, Literal, TypeVar

@@ -1,7 +1,5 @@
 """Water drops on the lens, each with a small, inverted, blurred image of the scene."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -8,8 +8,6 @@ Asia 2016, section 6). Curves are read from tables, and pyramids use only sums a
 all processors round alike.
 """
 
-from __future__ import annotations
-
 import math
 from functools import lru_cache
 

@@ -5,8 +5,6 @@ scatters a share of all light around its source. Image pyramids use only sums an
 all processors round alike, so that results do not depend on the machine.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -7,8 +7,6 @@ implemented in OpenCV, with a left-right check. Design of devices: Keselman et a
 Stereoscopic Depth Cameras", CVPR Workshops 2017.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Literal
 

@@ -12,8 +12,6 @@
 * **Holes** where too little light returns, where glints saturate the camera, and at grazing angles.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, Literal
 

@@ -14,8 +14,6 @@
 * **Holes** where too little light returns and where pixels overflow.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Annotated, Any, Literal
 

@@ -1,7 +1,5 @@
 """Views of a scene by a depth camera: from its own position and from beside it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import cv2

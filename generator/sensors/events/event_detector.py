@@ -4,8 +4,6 @@ The events are those of CARLA's collision, lane invasion and obstacle detectors 
 proximity sensors. They are computed from boxes and lanes, without noise.
 """
 
-from __future__ import annotations
-
 import math
 from typing import ClassVar, Literal, get_args
 

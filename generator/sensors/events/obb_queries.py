@@ -1,7 +1,5 @@
 """Queries of moving oriented boxes: contact, gap ahead, distance; lane borders and lights."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

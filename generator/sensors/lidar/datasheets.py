@@ -4,8 +4,6 @@ The content of a file replaces its name in the configuration, so that plans are 
 errors name the file, line and column they come from.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 

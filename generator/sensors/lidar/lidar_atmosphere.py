@@ -15,8 +15,6 @@
   of ten, the ratio of the densities of water and snow.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from functools import lru_cache

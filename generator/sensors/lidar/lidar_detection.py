@@ -8,8 +8,6 @@ far away, also loses light exponentially (``LidarModel.loss_per_m``). The scanne
 the unit: light of 1 is detected half of the time.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace

@@ -4,8 +4,6 @@ The name and the idea are those of Wang et al., "Pseudo-LiDAR from visual depth 
 2019; the depth here is the true one. Formats that hold laser scans take it like any other cloud.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any, Literal
 

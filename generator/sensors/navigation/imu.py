@@ -19,8 +19,6 @@ of data sheets and calibrations (IEEE Std 952; Woodman, "An introduction to iner
 random walk of density ``w`` has increments of ``w / sqrt(f)``.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Annotated, ClassVar, Literal
 

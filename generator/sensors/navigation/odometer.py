@@ -16,8 +16,6 @@ Wheels roll without slip, with Ackermann geometry at the front; the steering ang
 bicycle model, ``atan(wheelbase * yaw rate / speed)``.
 """
 
-from __future__ import annotations
-
 from typing import ClassVar, Literal
 
 import numpy as np

@@ -11,8 +11,6 @@ detection is a signal above ``-ln(p)`` for a probability ``p`` of false alarm, s
 fog is negligible at 77 GHz (ITU-R P.840). Multipath and velocity ambiguity are not modelled.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from typing import Annotated, ClassVar, Literal

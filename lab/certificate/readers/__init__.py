@@ -4,8 +4,6 @@ A reader opens an export with the package that the format's users have, never wi
 tells what it found. A format without a line here is not checked, which the certificate says.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import import_module

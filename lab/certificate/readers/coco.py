@@ -1,7 +1,5 @@
 """COCO, read by pycocotools."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 from pathlib import Path

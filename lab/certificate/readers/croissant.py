@@ -1,7 +1,5 @@
 """Croissant tables, read by mlcroissant."""
 
-from __future__ import annotations
-
 import logging
 from collections import defaultdict
 from collections.abc import Iterator, Mapping

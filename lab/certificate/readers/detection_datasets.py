@@ -1,7 +1,5 @@
 """YOLO and Pascal VOC, read by supervision."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """HDF5 containers in BlenderProc's layout, read by h5py."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Hugging Face data sets, read by the package datasets."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """MCAP, read by the package mcap with Foxglove's messages."""
 
-from __future__ import annotations
-
 from collections import Counter
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """PLY and PCD files, read by Open3D."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """TFRecord, read by the package tfrecord and protobuf."""
 
-from __future__ import annotations
-
 import io
 from collections.abc import Mapping
 from pathlib import Path

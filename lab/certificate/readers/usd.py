@@ -1,7 +1,5 @@
 """OpenUSD stages, read by usd-core."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from gen_data.lab.certificate.labelled_images import Loaded

@@ -1,7 +1,5 @@
 """WebDataset, read by the package of that name."""
 
-from __future__ import annotations
-
 import gc
 from collections.abc import Iterator, Mapping
 from pathlib import Path

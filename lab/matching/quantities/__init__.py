@@ -4,8 +4,6 @@ A quantity has a statistic of one recording that mainly its parameter changes, t
 in a configuration, and the coordinate in which the statistic is about linear in the parameter.
 """
 
-from __future__ import annotations
-
 from gen_data.lab.matching.quantities.base import CameraQuantity, LabelQuantity, LidarQuantity
 from gen_data.lab.matching.quantities.blur import BLUR
 from gen_data.lab.matching.quantities.box_positions import BOX_POSITIONS

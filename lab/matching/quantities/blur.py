@@ -6,8 +6,6 @@ with a Gaussian of ``a`` has its peak gradient in proportion to ``1 / sqrt(s^2 +
 at two scales gives ``s``. Blurs add in quadrature, so that the coordinate is the square.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Any

@@ -4,8 +4,6 @@ Statistic: the mean height of the centres of the boxes of an image. A camera tha
 small angle moves its image down by that angle times its focal length.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -4,8 +4,6 @@ Statistic: the mean size of the boxes of an image, relative to the image. For a 
 inversely proportional to distances.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

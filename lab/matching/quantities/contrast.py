@@ -4,8 +4,6 @@ Statistic: the distance of the 10th and 90th percentiles of logarithmic luminanc
 multiplies.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -3,8 +3,6 @@
 Statistic: the share of the points of a sweep whose intensity is 0.
 """
 
-from __future__ import annotations
-
 from gen_data.lab.matching.indirect_inference import Axis
 from gen_data.lab.matching.quantities.base import LidarQuantity, identity, round_digits, with_model
 from gen_data.lab.matching.recordings import Scan

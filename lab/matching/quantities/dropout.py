@@ -4,8 +4,6 @@ Statistic: the number of points of a sweep. Light passes the window twice: dista
 are lost first.
 """
 
-from __future__ import annotations
-
 import math
 
 from gen_data.lab.matching.indirect_inference import Axis

@@ -4,8 +4,6 @@ Statistic: the mean logarithm of luminance, which automatic exposure keeps about
 to scene (Reinhard et al., "Photographic tone reproduction for digital images", 2002).
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

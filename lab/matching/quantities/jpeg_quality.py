@@ -9,8 +9,6 @@ cropping off the grid of blocks and strong processing after compression hide it.
 Tables are those of ITU-T T.81, annex K.1, scaled as libjpeg does.
 """
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 

@@ -3,8 +3,6 @@
 Statistic: the range of 99.9 % of the points of a sweep.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

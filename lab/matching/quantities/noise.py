@@ -7,8 +7,6 @@ Transactions on Image Processing 17, 2008), which the tone curve bends. Variance
 ``Picture.noise_blocks``.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from typing import Any

@@ -7,8 +7,6 @@ Contrast bends that function: an error of 0.1 in contrast is one of a factor of 
 So both kinds of noise are ``late``, after contrast, which hardly depends on them.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Any

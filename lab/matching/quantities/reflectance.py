@@ -4,8 +4,6 @@ Statistic: mean of the middle half of the intensities above 0, which neither mis
 retro-reflectors move.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -4,8 +4,6 @@ Statistic: mean distance of colours from grey of their luminance, over mean lumi
 scaling of the channels to equal means: the tint of the light is the white balance's matter.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -4,8 +4,6 @@ Statistic: mean red over mean blue, in linear light, of pixels that are not clip
 Buchsbaum, "A spatial processor model for object colour perception", 1980).
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A third-party randomizer: switches lamps off."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Literal
 

@@ -9,8 +9,6 @@ Srivastava, "Snow size spectra and radar reflectivity", J. Atmospheric Sciences 
 Nayar, "Vision and rain", IJCV 75, 2007 (opacity of streaks).
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -3,8 +3,6 @@
 Every function returns at once if the scene's weather does not concern it.
 """
 
-from __future__ import annotations
-
 import math
 from statistics import NormalDist
 from typing import Any

@@ -4,8 +4,6 @@ Visible colour says little about the near infrared, so a material's role on its 
 precedence, and colour decides for all others. Sources and values are in ``infrared.yaml``.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Any

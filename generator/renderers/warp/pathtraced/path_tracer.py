@@ -3,8 +3,6 @@
 The denoiser is Intel's Open Image Denoise (package ``pyoidn``).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import cv2

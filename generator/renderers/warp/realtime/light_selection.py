@@ -3,8 +3,6 @@
 The brightest parts of a panorama become lamps where their shadows would be visible.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """Lookup tables of the directional albedo of GGX lobes."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

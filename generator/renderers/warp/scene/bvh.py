@@ -9,8 +9,6 @@ A tree is one array of floats, in groups of eight; integers are stored by their 
   likewise; and the numbers of the faces.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Meshes on the device, each with its hierarchy, and textures with mip chains."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache

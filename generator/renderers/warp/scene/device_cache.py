@@ -1,7 +1,5 @@
 """Cache of a renderer between frames: assets, lenses, scratch memory and the latest scene."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any

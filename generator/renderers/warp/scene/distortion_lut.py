@@ -1,7 +1,5 @@
 """Lookup tables of directions through the pixels of a camera with lens distortion."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -9,8 +9,6 @@ Source of the idea: Debevec, "A median cut algorithm for light probe sampling", 
 posters; here only outstanding parts are extracted, and the rest remains an image.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass

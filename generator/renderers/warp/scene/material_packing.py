@@ -1,7 +1,5 @@
 """Materials of bodies as the records that kernels read."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial

@@ -1,7 +1,5 @@
 """Packing of a Scene and a Camera into the records that kernels read."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Conversion between Warp structs and NumPy records."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import cache
 from typing import Any

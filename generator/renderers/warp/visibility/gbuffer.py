@@ -1,7 +1,5 @@
 """G-buffer: the visible surface at every pixel centre."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal
 

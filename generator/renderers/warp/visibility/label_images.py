@@ -1,7 +1,5 @@
 """Label images, which the ray through each pixel's centre decides."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any

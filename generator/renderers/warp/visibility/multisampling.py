@@ -1,7 +1,5 @@
 """Samples of pixels on edges: what the rasteriser sees there."""
 
-from __future__ import annotations
-
 import numpy as np
 import warp as wp
 

@@ -3,8 +3,6 @@
 Only occlusion requires an image of that instant.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

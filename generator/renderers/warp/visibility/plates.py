@@ -8,8 +8,6 @@ Source: Debevec, "Rendering synthetic objects into real scenes", SIGGRAPH 1998; 
 place of his difference, so that the texture of the ground is kept in shadows.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

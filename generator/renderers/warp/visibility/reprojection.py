@@ -4,8 +4,6 @@ Every point is expressed in the frame of its carrier, a body or the world: no se
 motion of points determines the number of instants that an image requires.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -6,8 +6,6 @@ Fajardo, "Importance sampling techniques for path tracing in participating media
 (equiangular points on a ray that passes a lamp).
 """
 
-from __future__ import annotations
-
 import warp as wp
 
 from gen_data.renderers.warp.scene.kernels.analytic_lights import SUN, beam_from

@@ -4,8 +4,6 @@ Source: Lagarde, "Water drop: physically based wet surfaces", 2013 (albedo and g
 surfaces).
 """
 
-from __future__ import annotations
-
 import warp as wp
 
 from gen_data.renderers.warp.scene.kernels.material_eval import SurfaceMaterial

@@ -1,7 +1,5 @@
 """Falling rain and snow."""
 
-from __future__ import annotations
-
 import warp as wp
 
 from gen_data.renderers.warp.atmosphere.kernels.fog import phase_function

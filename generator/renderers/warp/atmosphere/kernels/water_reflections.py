@@ -4,8 +4,6 @@ Films vary slowly over the image: their reflections are traced from lattice poin
 around each. Puddles are traced pixel by pixel.
 """
 
-from __future__ import annotations
-
 import warp as wp
 
 from gen_data.renderers.warp.atmosphere.kernels.ground_weathering import (

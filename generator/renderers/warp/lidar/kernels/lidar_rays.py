@@ -1,7 +1,5 @@
 """Rays of laser scanners: first hits, reflectance, and secondary hits behind panes and mirrors."""
 
-from __future__ import annotations
-
 import warp as wp
 
 from gen_data.renderers.warp.atmosphere.kernels.ground_weathering import (

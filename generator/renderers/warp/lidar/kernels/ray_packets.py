@@ -5,8 +5,6 @@ neighbours queries once, with interval arithmetic (Boulos, Wald and Shirley, "Ge
 arithmetic culling methods for entire ray packets", 2006).
 """
 
-from __future__ import annotations
-
 import warp as wp
 
 from gen_data.renderers.warp.native_code import native

@@ -13,8 +13,6 @@ distribution with fewer operations); Heitz, "Understanding the masking-shadowing
 microfacet-based BRDFs", JCGT 3(2), 2014; Walter et al. 2007 (refraction).
 """
 
-from __future__ import annotations
-
 import warp as wp
 
 from gen_data.renderers.warp.scene.kernels.brdf import (

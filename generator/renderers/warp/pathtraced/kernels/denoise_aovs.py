@@ -1,7 +1,5 @@
 """Auxiliary images for the denoiser: albedo and normals of the first visible surfaces."""
 
-from __future__ import annotations
-
 import warp as wp
 
 from gen_data.renderers.warp.pathtraced.kernels.emitters import AT_INFINITY

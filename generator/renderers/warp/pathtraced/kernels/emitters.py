@@ -7,8 +7,6 @@ Zimmerman, "Monte Carlo techniques for direct lighting calculations", ACM TOG 15
 by solid angle, panels by area).
 """
 
-from __future__ import annotations
-
 import warp as wp
 
 from gen_data.renderers.warp.realtime.kernels.soft_shadows import make_frame

@@ -9,8 +9,6 @@ and paint, are chosen between at random, so that a vertex has a single BSDF. Cle
 refract nothing: paths and shadow rays pass straight through them.
 """
 
-from __future__ import annotations
-
 import warp as wp
 
 from gen_data.renderers.warp.atmosphere.kernels.ground_weathering import apply_coat, coat_at

@@ -14,8 +14,6 @@ Monte Carlo sampling error via hierarchical ordering of pixels", SIGGRAPH Asia 2
 Olano, "Hash functions for GPU rendering", JCGT 9(3), 2020 (pcg).
 """
 
-from __future__ import annotations
-
 import warp as wp
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})

@@ -16,8 +16,6 @@ reflections and what lies behind.
   that surface show the environment. Rougher ones reflect the environment alone.
 """
 
-from __future__ import annotations
-
 import warp as wp
 
 from gen_data.renderers.warp.atmosphere.kernels.ground_weathering import (

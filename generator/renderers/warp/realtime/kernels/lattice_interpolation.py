@@ -5,8 +5,6 @@ the lattice points whose light they blend, and a texture's mapping and mip level
 shaded at once.
 """
 
-from __future__ import annotations
-
 import warp as wp
 
 from gen_data.renderers.warp.atmosphere.kernels.ground_weathering import (

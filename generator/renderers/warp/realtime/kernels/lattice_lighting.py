@@ -1,7 +1,5 @@
 """Lighting of lattice points, and of single pixels that cannot be interpolated from them."""
 
-from __future__ import annotations
-
 import warp as wp
 
 from gen_data.renderers.warp.atmosphere.kernels.ground_weathering import (

@@ -3,8 +3,6 @@
 Source: Haines and Wallace, "Shaft culling for efficient ray-traced radiosity", 1991.
 """
 
-from __future__ import annotations
-
 import warp as wp
 
 from gen_data.renderers.warp.scene.kernels.analytic_lights import SUN, SUN_DISTANCE_M

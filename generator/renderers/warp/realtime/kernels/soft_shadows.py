@@ -11,8 +11,6 @@
    the lamp from every position, so that no pattern remains.
 """
 
-from __future__ import annotations
-
 import warp as wp
 
 from gen_data.renderers.warp.native_code import LANES, native

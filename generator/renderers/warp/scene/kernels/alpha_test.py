@@ -5,8 +5,6 @@ below one half. The mip level does not depend on distance, so labels, shadows an
 everywhere.
 """
 
-from __future__ import annotations
-
 import inspect
 
 import warp as wp

@@ -3,8 +3,6 @@
 Source: McTaggart, "Half-Life 2 / Valve Source shading", GDC 2004 (ambient cubes).
 """
 
-from __future__ import annotations
-
 import warp as wp
 
 from gen_data.core.scene import VOLUME_REACH_M

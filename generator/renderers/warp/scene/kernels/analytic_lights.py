@@ -8,8 +8,6 @@ perpendicular to them); Karis, "Real shading in Unreal Engine 4", 2013, and Drob
 based area lights", GPU Pro 5, 2014 (specular reflection by one representative point).
 """
 
-from __future__ import annotations
-
 import warp as wp
 
 from gen_data.core.scene import LIGHT_KINDS

@@ -3,8 +3,6 @@
 Boxes keep their order; the last group is filled with boxes that nothing touches.
 """
 
-from __future__ import annotations
-
 import warp as wp
 
 from gen_data.renderers.warp.native_code import native

@@ -13,8 +13,6 @@ in Pharr, Jakob and Humphreys, "Physically Based Rendering", 4th ed., 9.3. Weigh
 those of ``gen_data.core.colorimetry``.
 """
 
-from __future__ import annotations
-
 import warp as wp
 
 from gen_data.core.colorimetry import REC709_LUMINANCE

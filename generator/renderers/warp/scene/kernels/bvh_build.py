@@ -5,8 +5,6 @@ nodes of eight as in Wald, Benthin and Boulos 2008: the largest part of a node i
 are eight.
 """
 
-from __future__ import annotations
-
 import warp as wp
 
 from gen_data.renderers.warp.native_code import native

@@ -10,8 +10,6 @@ using multi-branching BVHs", 2008; Woop, Benthin and Wald, "Watertight ray/trian
 JCGT 2(1), 2013; Ize, "Robust BVH ray traversal", JCGT 2(2), 2013 (FARTHER).
 """
 
-from __future__ import annotations
-
 import warp as wp
 
 from gen_data.renderers.warp.native_code import native

@@ -3,8 +3,6 @@
 The equations and their sources are those of gen_data.core.lens, in single precision.
 """
 
-from __future__ import annotations
-
 import warp as wp
 
 from gen_data.renderers.warp.scene.kernels.records import (

@@ -5,8 +5,6 @@ SIGGRAPH 2001; Karis, "Real shading in Unreal Engine 4", 2013 (prefiltered refle
 al., "A survey of efficient representations for independent unit vectors", JCGT 2014 (octahedral).
 """
 
-from __future__ import annotations
-
 import warp as wp
 
 from gen_data.renderers.warp.native_code import native

@@ -4,8 +4,6 @@ Light varies slowly along a surface. Shadows, ambient occlusion and shading are 
 lattice, and all other pixels interpolate between lattice points on the same stretch of surface.
 """
 
-from __future__ import annotations
-
 import warp as wp
 
 from gen_data.renderers.warp.scene.kernels.material_eval import is_translucent

@@ -1,7 +1,5 @@
 """Material evaluation: colour, roughness and normal of a surface from its textures."""
 
-from __future__ import annotations
-
 import warp as wp
 
 from gen_data.renderers.warp.scene.kernels.alpha_test import project_uv

@@ -8,8 +8,6 @@ thin panes. Source: Waechter and Binder, "A fast and robust method for avoiding 
 Ray Tracing Gems, 2019, here in its plain form.
 """
 
-from __future__ import annotations
-
 import warp as wp
 
 from gen_data.renderers.warp.scene.kernels.alpha_test import (

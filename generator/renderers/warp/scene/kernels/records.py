@@ -1,7 +1,5 @@
 """Records that the host passes to kernels, and functions on them."""
 
-from __future__ import annotations
-
 import warp as wp
 
 NOTHING = wp.constant(-1)

@@ -3,8 +3,6 @@
 Patches are flat faces whose texture coordinates are linear in space, for fast lookups.
 """
 
-from __future__ import annotations
-
 import warp as wp
 
 from gen_data.renderers.warp.scene.kernels.records import (

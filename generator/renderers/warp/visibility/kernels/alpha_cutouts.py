@@ -4,8 +4,6 @@ Texture coordinates are linear on a triangle, so over 1/z they are linear in the
 Source: Heckbert and Moreton, "Interpolation for polygon texture mapping and shading", 1991.
 """
 
-from __future__ import annotations
-
 import warp as wp
 
 from gen_data.renderers.warp.scene.kernels.alpha_test import dominant_axis, project_uv

@@ -1,7 +1,5 @@
 """Amodal silhouettes for a pinhole: each instance as if nothing else were there."""
 
-from __future__ import annotations
-
 import warp as wp
 
 from gen_data.renderers.warp.scene.kernels.records import View, World

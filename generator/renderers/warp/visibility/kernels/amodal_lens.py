@@ -1,7 +1,5 @@
 """Amodal silhouettes for lenses with distortion, by rays instead of rasterisation."""
 
-from __future__ import annotations
-
 import warp as wp
 
 from gen_data.renderers.warp.scene.kernels.alpha_test import is_mesh_intersected

@@ -6,8 +6,6 @@ show the same surface, so that nothing is shaded twice.
 Source: Chajdas, McGuire and Luebke, "Subpixel reconstruction antialiasing", I3D 2011.
 """
 
-from __future__ import annotations
-
 import warp as wp
 
 from gen_data.renderers.warp.scene.kernels.alpha_test import closest_solid_hit, is_hole

@@ -3,8 +3,6 @@
 Source: Chajdas, McGuire and Luebke, "Subpixel reconstruction antialiasing", I3D 2011.
 """
 
-from __future__ import annotations
-
 import warp as wp
 
 from gen_data.renderers.warp.native_code import native

@@ -1,7 +1,5 @@
 """Mean of an image over the time slices of its exposure."""
 
-from __future__ import annotations
-
 import warp as wp
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})

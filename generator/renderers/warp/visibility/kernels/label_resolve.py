@@ -1,7 +1,5 @@
 """Attributes of the visible (body, face) at each pixel, and label images."""
 
-from __future__ import annotations
-
 import warp as wp
 
 from gen_data.renderers.warp.scene.kernels.records import (

@@ -5,8 +5,6 @@ pixel centres that show the same surface, as in
 gen_data.renderers.warp.visibility.kernels.edge_antialiasing.
 """
 
-from __future__ import annotations
-
 import warp as wp
 
 from gen_data.renderers.warp.native_code import native

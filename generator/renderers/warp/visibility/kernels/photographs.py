@@ -1,7 +1,5 @@
 """Photographs behind rendered things, at pixel centres."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import warp as wp

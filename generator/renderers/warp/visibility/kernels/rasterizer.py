@@ -6,8 +6,6 @@ triangles that share an edge neither overlap nor leave a gap. Pixels are sampled
 Source: Pineda, "A parallel algorithm for polygon rasterization", SIGGRAPH 1988.
 """
 
-from __future__ import annotations
-
 import warp as wp
 
 from gen_data.renderers.warp.native_code import native
