@@ -15,8 +15,7 @@ from gen_data.assemble.config import Config, load_config
 from gen_data.assemble.pipeline_factory import scene_source
 from gen_data.assets.library import Library, open_library
 from gen_data.config.shared_values import probe_values
-from gen_data.core.errors import LayoutRejected
-from gen_data.core.interfaces import Stage
+from gen_data.core import errors, interfaces
 from gen_data.core.lane_geometry import LaneLine
 from gen_data.core.scene import Scene
 from gen_data.core.streams import Streams
@@ -39,9 +38,9 @@ def draw_scenes(config: Config, library: Library, count: int) -> Iterator[Scene]
         scene, randomizers, _ = source(streams)
         try:
             for randomizer in randomizers:
-                if randomizer.stage != Stage.VIEW.value:
+                if randomizer.stage != interfaces.Stage.VIEW.value:
                     scene = randomizer(scene, library, streams.rng(f"randomizer/{randomizer.name}"))
-        except LayoutRejected:
+        except errors.LayoutRejected:
             continue
         yield scene
 

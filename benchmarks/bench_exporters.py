@@ -21,8 +21,7 @@ from gen_data.assets.library import open_library
 from gen_data.core.errors import ConfigError
 from gen_data.core.sample import Sample
 from gen_data.exporters import TABLE
-from gen_data.runner.exports import LinkedFiles, StoredPipeline
-from gen_data.runner.shard import drop_pixels
+from gen_data.runner import exports, shard
 from gen_data.runner.stored import CheckedSamples, StoredSamples
 
 
@@ -39,15 +38,15 @@ def measure(folder: Path, entry: dict[str, Any], n: int) -> tuple[float, float]:
     missing = exporter.needs - frozenset(config.annotations)
     if missing:
         raise ConfigError(f"the data set lacks annotations: {', '.join(sorted(missing))}")
-    pipeline = StoredPipeline(stored, exporters, config.asset_folders)
-    files = LinkedFiles(stored)
+    pipeline = exports.StoredPipeline(stored, exporters, config.asset_folders)
+    files = exports.LinkedFiles(stored)
     with tempfile.TemporaryDirectory(dir=folder.parent) as scratch:
         shard_dir, merged = Path(scratch) / "shard", Path(scratch) / name
         samples: list[Sample] = []
         for index in range(n):
             sample = pipeline.sample(index)
             files.link_media(stored.info, sample, shard_dir)
-            samples.append(drop_pixels(sample))
+            samples.append(shard.drop_pixels(sample))
         started_s = time.process_time()
         exporter.write_shard(stored.info, samples, shard_dir)
         written_s = time.process_time()

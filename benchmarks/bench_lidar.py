@@ -16,11 +16,9 @@ from benchmarks.bench_render import timed_launches
 from benchmarks.runs import machine
 from gen_data.assemble.config import load_config
 from gen_data.assemble.pipeline_factory import open_pipeline
+from gen_data.core import motion, se3, streams
 from gen_data.core.capture import LidarRays, PointCloud
-from gen_data.core.motion import Trajectory
 from gen_data.core.scene import Body, Rig, Scene
-from gen_data.core.se3 import SE3
-from gen_data.core.streams import Streams
 from gen_data.sensors.lidar.lidar_sensor import LidarSensor
 from gen_data.sensors.lidar.scan_pattern import lidar_model, make_sweep
 
@@ -37,7 +35,7 @@ def best_s(work: Callable[[], object], repeats: int) -> float:
 
 def set_in_motion(scene: Scene) -> Scene:
     """Return the scene with scanner, vehicles and people in motion; each turns slightly."""
-    cart = Body("cart", scene.bodies[0].asset, SE3((0.0, 0.0, -1000.0)))
+    cart = Body("cart", scene.bodies[0].asset, se3.SE3((0.0, 0.0, -1000.0)))
     T_cart_lidar = cart.T_world_body.inverse() @ scene.lidar("velodyne").T_world_lidar
     lidar = replace(scene.lidar("velodyne"), rig="rig", T_rig_lidar=T_cart_lidar)
     people = {"pedestrian", "person", "cyclist"}
@@ -52,10 +50,10 @@ def set_in_motion(scene: Scene) -> Scene:
                    lidars=(lidar,), tracks=tuple(tracks))  # fmt: skip
 
 
-def _straight(body: Body, speed_m_s: float, start_s: float) -> Trajectory:
+def _straight(body: Body, speed_m_s: float, start_s: float) -> motion.Trajectory:
     pose = body.T_world_body
-    steps = [SE3.about_z(0.02 * k, (0.1 * speed_m_s * k, 0.0, 0.0)) for k in range(-10, 11)]
-    return Trajectory(body.name, 0.1, tuple(pose @ step for step in steps), start_s)
+    steps = [se3.SE3.about_z(0.02 * k, (0.1 * speed_m_s * k, 0.0, 0.0)) for k in range(-10, 11)]
+    return motion.Trajectory(body.name, 0.1, tuple(pose @ step for step in steps), start_s)
 
 
 def main() -> None:
@@ -82,7 +80,7 @@ def main() -> None:
             ):
 
                 def capture(sensor: LidarSensor = sensor) -> PointCloud:
-                    rng = Streams(0, 0).rng("sensor/velodyne")
+                    rng = streams.Streams(0, 0).rng("sensor/velodyne")
                     anew = replace(scene)  # noqa: B023
                     return sensor.capture(anew, renderer, frozenset(), rng)  # noqa: B023
 
@@ -94,7 +92,7 @@ def main() -> None:
             sensor = LidarSensor(name="velodyne", model=arguments.model)
 
             def capture_moving(sensor: LidarSensor = sensor) -> PointCloud:
-                rng = Streams(0, 0).rng("sensor/velodyne")
+                rng = streams.Streams(0, 0).rng("sensor/velodyne")
                 return sensor.capture(replace(moving), renderer, frozenset(), rng)  # noqa: B023
 
             spent = best_s(capture_moving, arguments.repeats)

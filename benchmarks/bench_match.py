@@ -14,9 +14,8 @@ import numpy as np
 
 from benchmarks.runs import machine
 from gen_data.config.distributions import Constant, Distribution, Normal
+from gen_data.lab.matching import lidar_fit, recordings
 from gen_data.lab.matching.camera_fit import fit_camera, measure_photo
-from gen_data.lab.matching.lidar_fit import fit_lidar
-from gen_data.lab.matching.recordings import Photo
 from gen_data.lab.matching.results import FittedQuantity
 from gen_data.lab.matching.simulation import photograph, rescan
 from gen_data.sensors.camera.image_pipeline import ImagePipeline
@@ -58,7 +57,7 @@ def fit_photographs(first: int, pictures: int, scenes: int, spread_ev: float) ->
         "jpeg_quality": CAMERA["JPEG quality"],
     }).model_copy(update={"exposure_compensation_ev": exposure})  # fmt: skip
     photos = [
-        measure_photo(Photo(f"{k}.png", photograph(one, real).rgb, (320, 240), None))
+        measure_photo(recordings.Photo(f"{k}.png", photograph(one, real).rgb, (320, 240), None))
         for k, one in enumerate(exposures(range(first, first + pictures), real))
     ]
     seeds = range(first + STRIDE // 2, first + STRIDE // 2 + scenes)
@@ -75,7 +74,7 @@ def fit_scans(first: int, scans: int, scenes: int) -> FittedRows:
     )
     made = [rescan(one, real) for one in illuminations(range(first, first + scans), real)]
     seeds = range(first + STRIDE // 2, first + STRIDE // 2 + scenes)
-    return fit_lidar(illuminations(seeds, scanner(response=RESPONSE)), made, 0).quantities
+    return lidar_fit.fit_lidar(illuminations(seeds, scanner(response=RESPONSE)), made, 0).quantities
 
 
 def main() -> None:

@@ -25,8 +25,7 @@ from gen_data.assemble.pipeline_factory import PipelineFactory
 from gen_data.assets.library import open_library
 from gen_data.renderers.warp.device import open_device
 from gen_data.renderers.warp.scene.device_cache import DeviceCache
-from gen_data.runner.identity import format_licences, make_plan
-from gen_data.runner.resident_memory import release_memory
+from gen_data.runner import identity, resident_memory
 from gen_data.runner.run import RunProgress, run
 
 SMALL_PX = {"tabletop": (96, 72), "street": (124, 38)}
@@ -108,8 +107,8 @@ def pass_all_assets(passes: int) -> None:
                 library.materials(asset_id)
                 library.convex_parts(asset_id)
             if count % 100 == 0:
-                release_memory()
-        release_memory(file_bytes_kept=0)
+                resident_memory.release_memory()
+        resident_memory.release_memory(file_bytes_kept=0)
         listed = "  ".join(f"{k} {v:6.1f}" for k, v in read_rollup(os.getpid()).items())
         print(f"pass {number}: {listed}", flush=True)
 
@@ -138,13 +137,13 @@ def main() -> None:
     print(f"{machine()}, {arguments.workers} worker(s), {arguments.scene}, {' '.join(overrides)}")
     with tempfile.TemporaryDirectory() as folder:
         summary = run(
-            make_plan(factory),
+            identity.make_plan(factory),
             factory,
             Path(folder) / "out",
             workers=arguments.workers,
             resume_command="",
             progress=recorder.observe,
-            licences=partial(format_licences, factory),
+            licences=partial(identity.format_licences, factory),
         )
     print(format_summary(summary))
     for name in ("Rss", "Pss"):

@@ -31,9 +31,8 @@ from typing import Any
 import cv2
 import numpy as np
 
+from benchmarks.peers import workload, worlds
 from benchmarks.peers.worker import RENDERERS, output_folder
-from benchmarks.peers.workload import prepare
-from benchmarks.peers.worlds import mask_agreement, plane_path
 from benchmarks.runs import machine
 
 OWN, REFERENCE = "ours", "TinyRenderer"
@@ -111,7 +110,7 @@ def compare(
 ) -> dict[str, Figures | str]:
     """Figures by renderer, or why it cannot run here."""
     core = max(os.sched_getaffinity(0))
-    prepare(folder, count)
+    workload.prepare(folder, count)
     found: dict[str, Figures | str] = {}
     with ExitStack() as stack:
         ready: dict[Renderer, float] = {}
@@ -140,8 +139,8 @@ def measure_agreement(folder: Path, name: str, count: int) -> float:
     own, theirs = output_folder(folder, OWN), output_folder(folder, name)
     if not own.exists():
         return float("nan")
-    pairs = [[plane_path(out, "instance", k) for out in (theirs, own)] for k in range(count)]
-    return statistics.mean(mask_agreement(*map(_read, pair)) for pair in pairs)
+    pairs = [[worlds.plane_path(out, "instance", k) for out in (theirs, own)] for k in range(count)]
+    return statistics.mean(worlds.mask_agreement(*map(_read, pair)) for pair in pairs)
 
 
 def _read(path: Path) -> np.ndarray:

@@ -16,17 +16,16 @@ import numpy as np
 
 from benchmarks.bench_tabletop import make_config
 from gen_data.assemble.pipeline_factory import open_pipeline
+from gen_data.core import interfaces, streams
 from gen_data.core.capture import Channel, SensorReading
-from gen_data.core.interfaces import AssetLibrary
 from gen_data.core.scene import Scene
-from gen_data.core.streams import Streams
 from gen_data.renderers.warp.renderer import WarpRenderer
 from gen_data.sensors.camera.image_pipeline import ImagePipeline, capture_photograph
 
 LABELLED = frozenset({Channel.RGB, Channel.Z_DEPTH, Channel.INSTANCE, Channel.CATEGORY})
 
 
-def settle_tabletops(count: int) -> tuple[list[Scene], AssetLibrary]:
+def settle_tabletops(count: int) -> tuple[list[Scene], interfaces.AssetLibrary]:
     """Settled scenes and the library of their assets."""
     with open_pipeline(make_config(1)) as pipeline:
         return [pipeline.sample(i).scene for i in range(count)], pipeline.assets
@@ -48,7 +47,7 @@ def frame_ms(
 
 def photograph(renderer: WarpRenderer, scene: Scene, channels: frozenset[Channel]) -> SensorReading:
     """Render a scene and develop it with an ideal camera."""
-    rng = Streams(seed=0, scene=0).rng("camera")
+    rng = streams.Streams(seed=0, scene=0).rng("camera")
     return capture_photograph(scene, renderer, scene.cameras[0], channels, ImagePipeline(), rng)
 
 

@@ -19,19 +19,14 @@ from functools import cache
 
 import numpy as np
 
-from benchmarks.bench_memory import read_rollup
+from benchmarks import bench_memory, bench_tabletop
 from benchmarks.bench_render import frame_ms, photograph
 from benchmarks.bench_street_render import CHANNELS, Street, grid_mesh
-from benchmarks.bench_tabletop import make_config
 from benchmarks.runs import machine, measure_run
 from gen_data.assemble.pipeline_factory import PipelineFactory
 from gen_data.assets.library import open_library
-from gen_data.core.asset_types import Material, MeshData
-from gen_data.core.intrinsics import Intrinsics
+from gen_data.core import asset_types, intrinsics, se3, streams, system_calls
 from gen_data.core.scene import Body, Camera, Environment, Instance, Light, Scene
-from gen_data.core.se3 import SE3, look_at
-from gen_data.core.streams import Streams
-from gen_data.core.system_calls import usable_cores
 from gen_data.renderers.warp.device import open_device
 from gen_data.renderers.warp.renderer import WarpRenderer
 from gen_data.renderers.warp.scene.device_cache import DeviceCache
@@ -71,18 +66,18 @@ def fit_line(points: Points) -> Line:
 class Bumps(Street):
     """An AssetLibrary of bumps, ``bump/<rows>``, which have twice the square of that triangles."""
 
-    def mesh(self, asset_id: str) -> MeshData:
+    def mesh(self, asset_id: str) -> asset_types.MeshData:
         """Raised square of 1 m, or the plane ``bump/1`` beneath all of them."""
         return bump_mesh(int(asset_id.partition("/")[2]))
 
 
 @cache
-def bump_mesh(rows: int) -> MeshData:
+def bump_mesh(rows: int) -> asset_types.MeshData:
     """See Bumps."""
     ticks = np.linspace(-0.5, 0.5, rows + 1)
     x, y = np.meshgrid(ticks, -ticks, indexing="ij")
     z = 0.3 * np.cos(np.pi * x) * np.cos(np.pi * y) * (1.0 + 0.2 * np.cos(9.0 * x + 5.0 * y))
-    paint = Material((0.4, 0.35, 0.3), 0.6)
+    paint = asset_types.Material((0.4, 0.35, 0.3), 0.6)
     return grid_mesh(np.stack([x, y, z], axis=-1).reshape(-1, 3), rows, rows, (paint,))
 
 
@@ -91,12 +86,12 @@ def bumps_scene(
 ) -> Scene:
     """Bumps on a plane, ``side`` along both axes of the same square, and small lamps above."""
     step_m = FIELD_M / side
-    bodies = [Body("plane", "bump/1", SE3((0.0, 0.0, 0.0)), scale=3.0 * FIELD_M)]
+    bodies = [Body("plane", "bump/1", se3.SE3((0.0, 0.0, 0.0)), scale=3.0 * FIELD_M)]
     instances = []
     for k in range(side * side):
         at = [(index + 0.5) * step_m - 0.5 * FIELD_M for index in divmod(k, side)]
         name, asset = f"bump{k}", f"bump/{rows}"
-        pose = SE3((at[0], at[1], 0.01))
+        pose = se3.SE3((at[0], at[1], 0.01))
         bodies.append(Body(name, asset, pose, scale=0.8 * step_m, instance_id=k + 1))
         instances.append(Instance(k + 1, name, "bump", 1, asset))
     turns = [2.0 * math.pi * k / lamps for k in range(lamps)]
@@ -111,14 +106,14 @@ def bumps_scene(
     )
     width, height = size_px
     focal_px = 1.1 * width
-    lens = Intrinsics(width, height, focal_px, focal_px, 0.5 * width, 0.5 * height)
+    lens = intrinsics.Intrinsics(width, height, focal_px, focal_px, 0.5 * width, 0.5 * height)
     return Scene(
         template="bumps",
         bodies=tuple(bodies),
         instances=tuple(instances),
         lights=lights,
         environment=Environment("sky", 100.0),
-        cameras=(Camera("front", look_at((0.0, -5.0, 3.5), (0.0, 0.0, 0.0)), lens),),
+        cameras=(Camera("front", se3.look_at((0.0, -5.0, 3.5), (0.0, 0.0, 0.0)), lens),),
     )
 
 
@@ -164,7 +159,7 @@ def by_views(repeats: int) -> Points:
 
 def _tabletop_ms(views: int, n: int = 20) -> float:
     """CPU time per sample of the tabletop, after the first scene [ms]."""
-    with PipelineFactory(make_config(views), n + views)() as pipeline:
+    with PipelineFactory(bench_tabletop.make_config(views), n + views)() as pipeline:
         for index in range(views):
             pipeline.sample(index)
         started_s = time.process_time()
@@ -176,8 +171,8 @@ def _tabletop_ms(views: int, n: int = 20) -> float:
 def by_workers(repeats: int) -> Points:
     """Workers, up to one per core; samples per second to disk, with the start of the workers."""
     n = 100 * repeats
-    counts = range(1, usable_cores() + 1)
-    return [(k, measure_run(make_config(5), n, k).samples_per_s) for k in counts]
+    counts = range(1, system_calls.usable_cores() + 1)
+    return [(k, measure_run(bench_tabletop.make_config(5), n, k).samples_per_s) for k in counts]
 
 
 def by_assets(repeats: int) -> Points:
@@ -186,12 +181,12 @@ def by_assets(repeats: int) -> Points:
     cached = DeviceCache(library, open_device("cpu"))
     upload = {"object": cached.mesh, "texture": cached.texture, "environment": cached.environment}
     seen = [(kind, one.asset_id) for kind in upload for one in library.find((), kind)]
-    Streams(0, 0).rng("assets").shuffle(seen)
+    streams.Streams(0, 0).rng("assets").shuffle(seen)
     step = 50 * repeats
     points = []
     for first in range(0, min(8 * step, len(seen)), step):
         release_memory(file_bytes_kept=0)
-        points.append((first, read_rollup(os.getpid())["Pss_Anon"]))
+        points.append((first, bench_memory.read_rollup(os.getpid())["Pss_Anon"]))
         for kind, asset_id in seen[first : first + step]:
             upload[kind](asset_id)
     return points
@@ -223,7 +218,7 @@ def main() -> None:
     parser.add_argument("--only", nargs="+", choices=LAWS, default=list(LAWS))
     parser.add_argument("--repeats", type=int, default=3)
     arguments = parser.parse_args()
-    print(f"{machine()}, {usable_cores()} cores, load {os.getloadavg()[0]:.1f}\n")
+    print(f"{machine()}, {system_calls.usable_cores()} cores, load {os.getloadavg()[0]:.1f}\n")
     print("| law | measured | slope | intercept | r2 |\n|---|---|---|---|---|", flush=True)
     for name in arguments.only:
         points = LAWS[name](arguments.repeats)

@@ -15,6 +15,7 @@ from functools import cache
 import numpy as np
 
 from benchmarks.bench_render import frame_ms, photograph, timed_launches
+from gen_data.core import errors, intrinsics
 from gen_data.core.asset_types import (
     Asset,
     ConvexParts,
@@ -26,8 +27,6 @@ from gen_data.core.asset_types import (
     TextureData,
 )
 from gen_data.core.capture import Channel
-from gen_data.core.errors import AssetError
-from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.scene import Body, Camera, Environment, Instance, Light, Scene
 from gen_data.core.se3 import SE3, Array, Vec3, look_at
 from gen_data.core.streams import Rng, Streams
@@ -36,7 +35,7 @@ from gen_data.renderers.warp.renderer import WarpRenderer
 CHANNELS = frozenset(
     {Channel.RGB, Channel.Z_DEPTH, Channel.INSTANCE, Channel.CATEGORY, Channel.AMODAL}
 )
-KITTI = Intrinsics(1242, 375, 721.5, 721.5, 621.0, 187.5)
+KITTI = intrinsics.Intrinsics(1242, 375, 721.5, 721.5, 621.0, 187.5)
 STREET_LENGTH_M = 100.0
 
 
@@ -74,7 +73,7 @@ class Street:
 
     def get(self, asset_id: str) -> Asset:
         """Raise: no asset has an entry."""
-        raise AssetError(f"unknown asset '{asset_id}'")
+        raise errors.AssetError(f"unknown asset '{asset_id}'")
 
     def find(self, tags: object, kind: str = "object") -> tuple[Asset, ...]:  # noqa: ARG002
         """Return nothing: no asset has tags."""
@@ -97,7 +96,7 @@ class Street:
 
     def robot(self, asset_id: str) -> RobotModel:
         """Raise: there is no robot."""
-        raise AssetError(f"'{asset_id}' is no robot")
+        raise errors.AssetError(f"'{asset_id}' is no robot")
 
     def convex_parts(self, asset_id: str) -> ConvexParts:
         """One part with all vertices."""

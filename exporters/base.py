@@ -9,16 +9,14 @@ from typing import ClassVar, TypeVar, get_args
 from pydantic import Field, PrivateAttr, model_validator
 
 from gen_data.config.base_model import Strict
-from gen_data.core.capture import Channel, ImageFormat
-from gen_data.core.errors import ConfigError, did_you_mean, list_names
+from gen_data.core import capture, errors, optional_packages
 from gen_data.core.interfaces import AssetLibrary, DatasetInfo, Exporter
-from gen_data.core.optional_packages import missing_packages
 from gen_data.core.scene import Scene
 from gen_data.exporters.conventions import Conventions
 
 PNG_ONLY = frozenset({"png"})
 PNG_OR_JPEG = frozenset({"png", "jpeg"})
-ANY_FORMAT: frozenset[str] = frozenset(get_args(ImageFormat))
+ANY_FORMAT: frozenset[str] = frozenset(get_args(capture.ImageFormat))
 
 E = TypeVar("E", bound="ExporterBase")
 A = TypeVar("A", bound="AssetExporter")
@@ -133,9 +131,9 @@ def check_image_formats(exporter: Exporter, info: DatasetInfo) -> None:
     """
     known: frozenset[str] = getattr(exporter, "image_formats", PNG_ONLY)
     for camera in info.cameras:
-        used = info.encoding(camera, Channel.RGB).format
-        if Channel.RGB in info.media[camera] and used not in known:
-            raise ConfigError(
+        used = info.encoding(camera, capture.Channel.RGB).format
+        if capture.Channel.RGB in info.media[camera] and used not in known:
+            raise errors.ConfigError(
                 f"exporter '{exporter.type}': camera '{camera}' writes {used} files, but the "
                 f"exporter takes {', '.join(sorted(known))} only; change rgb_encoding of the "
                 "sensor, or export in a format that takes them, such as coco, yolo or huggingface"
@@ -157,9 +155,9 @@ def select_names(patterns: Sequence[str], known: Sequence[str], place: str) -> t
     for pattern in patterns:
         fitting = [name for name in known if fnmatchcase(name, pattern)]
         if not fitting:
-            raise ConfigError(
+            raise errors.ConfigError(
                 f"{place}: '{pattern}' fits no sensor of the data set; expected some of: "
-                f"{list_names(known) or 'none'}{did_you_mean(pattern, known)}"
+                f"{errors.list_names(known) or 'none'}{errors.did_you_mean(pattern, known)}"
             )
         found |= dict.fromkeys(fitting)
     return tuple(found if patterns else known)
@@ -175,6 +173,6 @@ def check_installed(exporter: str, *modules: str) -> None:
     Raises:
         ConfigError: a module is missing; the text names the remedy.
     """
-    missing = missing_packages(*modules)
+    missing = optional_packages.missing_packages(*modules)
     if missing:
-        raise ConfigError(f"exporter '{exporter}' {missing}")
+        raise errors.ConfigError(f"exporter '{exporter}' {missing}")

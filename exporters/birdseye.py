@@ -34,16 +34,12 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from gen_data.core.capture import Channel
+from gen_data.core import capture, lane_geometry, motion
 from gen_data.core.interfaces import DatasetInfo
-from gen_data.core.lane_geometry import LaneBorder
-from gen_data.core.motion import Twist
 from gen_data.core.sample import BirdseyeMap, BorderTruth, EgoTruth, Sample
 from gen_data.core.serialization import canonical_json
-from gen_data.exporters.base import ANY_FORMAT, ExporterBase
+from gen_data.exporters import base, image_files, png
 from gen_data.exporters.conventions import ANY_LENS, SAMPLE, Conventions
-from gen_data.exporters.image_files import link_or_copy
-from gen_data.exporters.png import RowFilter, encode_png
 from gen_data.exporters.sequences import write_text
 
 FRAMES, LANES = "frames.jsonl", "lanes"
@@ -55,7 +51,7 @@ MARGIN = 1.2
 DECIMALS = 4
 
 
-class Birdseye(ExporterBase):
+class Birdseye(base.ExporterBase):
     """Bird's-eye layers, lanes and boxes around the ego, for map and BEV perception."""
 
     type: Literal["birdseye"] = "birdseye"
@@ -64,7 +60,7 @@ class Birdseye(ExporterBase):
     )
     annotators: ClassVar[frozenset[str]] = frozenset({"bev_map", "boxes3d", "lanes"})
 
-    image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
+    image_formats: ClassVar[frozenset[str]] = base.ANY_FORMAT
 
     def check(self, info: DatasetInfo) -> None:
         """Accept any data set; the annotator ``bev_map`` rejects scenes without a rig."""
@@ -81,7 +77,7 @@ class Birdseye(ExporterBase):
             for name, mask in truth.birdseye.layers.items():
                 path = folder / "layers" / name / f"{sample.index:09d}.png"
                 path.parent.mkdir(parents=True, exist_ok=True)
-                path.write_bytes(encode_png(mask * np.uint8(255), RowFilter.UP, 2))
+                path.write_bytes(png.encode_png(mask * np.uint8(255), png.RowFilter.UP, 2))
             frames.append(canonical_json(_frame(sample, truth, truth.birdseye)) + "\n")
             for sensor in (s for s in info.cameras if s in sample.truth):
                 images[sensor].append(canonical_json(_image(info, sample, sensor)) + "\n")
@@ -95,7 +91,7 @@ class Birdseye(ExporterBase):
         for folder in folders:
             for layer in sorted((folder / "layers").iterdir()):
                 for path in sorted(layer.iterdir()):
-                    link_or_copy(path, dataset_dir / layer.name / path.name)
+                    image_files.link_or_copy(path, dataset_dir / layer.name / path.name)
         for name in (FRAMES, *(f"{LANES}/{sensor}.jsonl" for sensor in info.cameras)):
             lines = "".join((folder / name).read_text("utf-8") for folder in folders)
             write_text(dataset_dir / name, lines)
@@ -115,7 +111,7 @@ def _frame(sample: Sample, truth: EgoTruth, birdseye: BirdseyeMap) -> dict[str, 
         "T_world_map": birdseye.T_world_map.matrix().tolist(),
         "ego": {
             "T_world_ego": truth.T_world_ego.matrix().tolist(),
-            **{f.name: getattr(truth.twist, f.name) for f in fields(Twist)},
+            **{f.name: getattr(truth.twist, f.name) for f in fields(motion.Twist)},
         },
         "borders": list(_borders(truth.borders or (), birdseye, 0.5 * size_px * birdseye.px_m)),
         "boxes3d": _boxes(sample, truth),
@@ -123,7 +119,7 @@ def _frame(sample: Sample, truth: EgoTruth, birdseye: BirdseyeMap) -> dict[str, 
 
 
 def _borders(
-    borders: Iterable[LaneBorder], birdseye: BirdseyeMap, reach_m: float
+    borders: Iterable[lane_geometry.LaneBorder], birdseye: BirdseyeMap, reach_m: float
 ) -> Iterator[dict[str, Any]]:
     """Sections of borders on or near the map, in its frame."""
     T_map_world = birdseye.T_world_map.inverse()
@@ -155,12 +151,12 @@ def _boxes(sample: Sample, truth: EgoTruth) -> dict[str, list[dict[str, Any]]]:
 
 def _image(info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
     truth = sample.truth[sensor]
-    suffix = info.encoding(sensor, Channel.RGB).suffix
+    suffix = info.encoding(sensor, capture.Channel.RGB).suffix
     rows = list(range(0, truth.camera.intrinsics.height_px, ROWS_PX))
     borders = truth.borders or ()
     return {
         "index": sample.index,
-        "raw_file": f"{sensor}/{Channel.RGB.value}/{sample.index:09d}{suffix}",
+        "raw_file": f"{sensor}/{capture.Channel.RGB.value}/{sample.index:09d}{suffix}",
         "h_samples": rows,
         "lanes": [columns_at(border, rows) for border in borders],
         "borders": [

@@ -46,30 +46,16 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import PrivateAttr
 
+from gen_data.core import boxes, se3
 from gen_data.core.bounded_cache import ByteCache
-from gen_data.core.boxes import BoxPx
 from gen_data.core.capture import Channel
 from gen_data.core.interfaces import AssetLibrary, DatasetInfo, media_path
 from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.sample import MaskPx, ObjectTruth, Sample
-from gen_data.core.se3 import SE3
 from gen_data.core.serialization import canonical_json
-from gen_data.exporters.base import PNG_OR_JPEG, AssetExporter
+from gen_data.exporters import base, fragments, mask_png, rigid_models, rle, sensor_selection
 from gen_data.exporters.conventions import PINHOLE, Conventions
-from gen_data.exporters.fragments import fragment_lines, fragment_rows, write_fragment
 from gen_data.exporters.image_files import link_or_copy, read_pixels
-from gen_data.exporters.mask_png import encode_mask
-from gen_data.exporters.rigid_models import (
-    MM_PER_M,
-    Model,
-    Piece,
-    build_model,
-    model_key,
-    ply_bytes,
-    rigid_pieces,
-)
-from gen_data.exporters.rle import run_lengths
-from gen_data.exporters.sensor_selection import pinhole_camera
 from gen_data.exporters.sequences import check_frame_names, write_bytes, write_text
 
 TARGET_VISIBILITY = 0.1
@@ -86,7 +72,7 @@ IMAGES, MODELS = "images", "models"
 MASKS = ("mask", "mask_visib")
 
 
-class Bop(AssetExporter):
+class Bop(base.AssetExporter):
     """BOP: poses of rigid objects in the images of one camera, with their models.
 
     Attributes:
@@ -104,11 +90,13 @@ class Bop(AssetExporter):
         {"instance_masks", "amodal_masks", "boxes2d", "visibility", "poses"}
     )
 
-    image_formats: ClassVar[frozenset[str]] = PNG_OR_JPEG
+    image_formats: ClassVar[frozenset[str]] = base.PNG_OR_JPEG
     camera: str = ""
     folders: Literal["scene", "thousand"] = "scene"
 
-    _built: ByteCache[Model] = PrivateAttr(default_factory=lambda: ByteCache(MODEL_CACHE_BYTES))
+    _built: ByteCache[rigid_models.Model] = PrivateAttr(
+        default_factory=lambda: ByteCache(MODEL_CACHE_BYTES)
+    )
 
     def check(self, info: DatasetInfo) -> None:
         """Reject a data set that this format cannot represent.
@@ -117,7 +105,7 @@ class Bop(AssetExporter):
             ConfigError: no such camera, it is not a pinhole or does not write the rgb channel, or
                 too many samples for six digits.
         """
-        pinhole_camera(info, self.camera, self.type)
+        sensor_selection.pinhole_camera(info, self.camera, self.type)
         check_frame_names(info, self.type)
 
     def with_assets(self, assets: AssetLibrary) -> Bop:
@@ -134,14 +122,14 @@ class Bop(AssetExporter):
             AssetError: an asset's symmetries are not a finite group.
         """
         self.check(info)
-        camera = pinhole_camera(info, self.camera, self.type)
+        camera = sensor_selection.pinhole_camera(info, self.camera, self.type)
         folder = shard_dir / self.type
         models = _ModelFiles(folder / MODELS, self.library, self._built)
         rows = []
         for sample in samples:
             if camera not in sample.truth:
                 continue
-            pieces = rigid_pieces(sample.scene_of(camera))
+            pieces = rigid_models.rigid_pieces(sample.scene_of(camera))
             things = [
                 thing
                 for thing in sample.truth[camera].objects
@@ -158,16 +146,16 @@ class Bop(AssetExporter):
                 }
             )
             _write_masks(folder, sample, camera, things)
-        write_fragment(folder, IMAGES, rows)
-        write_fragment(folder, MODELS, models.rows())
+        fragments.write_fragment(folder, IMAGES, rows)
+        fragments.write_fragment(folder, MODELS, models.rows())
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Number the models, link models and images, and write the JSON files of each folder."""
-        camera = pinhole_camera(info, self.camera, self.type)
+        camera = sensor_selection.pinhole_camera(info, self.camera, self.type)
         ids = _write_models([d / self.type for d in shard_dirs], dataset_dir)
         write_text(dataset_dir / "dataset_info.md", _dataset_info(info, camera, len(ids)))
         targets: list[dict[str, int]] = []
-        rows = fragment_rows(shard_dirs, self.type, IMAGES)
+        rows = fragments.fragment_rows(shard_dirs, self.type, IMAGES)
         size = self._folder_size(info)
         # Rows come in the order of samples, so that one folder after the other is complete.
         for number, members in groupby(rows, lambda item: int(item[1]["index"]) // size):
@@ -214,19 +202,21 @@ class Bop(AssetExporter):
 class _ModelFiles:
     """Models of a shard; each is built and written at its first use."""
 
-    def __init__(self, folder: Path, assets: AssetLibrary, built: ByteCache[Model]) -> None:
+    def __init__(
+        self, folder: Path, assets: AssetLibrary, built: ByteCache[rigid_models.Model]
+    ) -> None:
         self._folder, self.library, self._built = folder, assets, built
         self._rows: dict[str, dict[str, Any]] = {}
-        self._keys: dict[tuple[Piece, ...], str] = {}
+        self._keys: dict[tuple[rigid_models.Piece, ...], str] = {}
 
-    def add(self, pieces: tuple[Piece, ...], thing: ObjectTruth) -> str:
+    def add(self, pieces: tuple[rigid_models.Piece, ...], thing: ObjectTruth) -> str:
         """Write the model if it is new, and return its key."""
         if pieces not in self._keys:
-            self._keys[pieces] = model_key(pieces)
+            self._keys[pieces] = rigid_models.model_key(pieces)
         key = self._keys[pieces]
         if key not in self._rows:
-            model = self._built.get(key, lambda: build_model(pieces, self.library))
-            write_bytes(self._folder / f"{key}.ply", ply_bytes(model))
+            model = self._built.get(key, lambda: rigid_models.build_model(pieces, self.library))
+            write_bytes(self._folder / f"{key}.ply", rigid_models.ply_bytes(model))
             self._rows[key] = _model_facts(key, pieces, thing, model)
         return key
 
@@ -241,7 +231,7 @@ class _ModelFiles:
 
 
 def _model_facts(
-    key: str, pieces: Sequence[Piece], thing: ObjectTruth, model: Model
+    key: str, pieces: Sequence[rigid_models.Piece], thing: ObjectTruth, model: rigid_models.Model
 ) -> dict[str, Any]:
     instance = thing.instance
     return {
@@ -264,7 +254,7 @@ def _image_facts(info: DatasetInfo, sample: Sample, camera: str) -> dict[str, An
         "size": [seen.intrinsics.width_px, seen.intrinsics.height_px],
         "camera": {
             "cam_K": _K(seen.intrinsics),
-            "depth_scale": round(info.depth_scale_m * MM_PER_M, 9),
+            "depth_scale": round(info.depth_scale_m * rigid_models.MM_PER_M, 9),
             "cam_R_w2c": _rotation(T_camera_world),
             "cam_t_w2c": _millimetres(T_camera_world.translation_m),
         },
@@ -276,18 +266,18 @@ def _K(intrinsics: Intrinsics) -> list[float]:  # noqa: N802
     return values
 
 
-def _rotation(pose: SE3) -> list[float]:
+def _rotation(pose: se3.SE3) -> list[float]:
     values: list[float] = (np.round(pose.rotation(), 12) + 0.0).ravel().tolist()
     return values
 
 
 def _millimetres(position_m: Iterable[float]) -> list[float]:
-    return [round(value * MM_PER_M, 6) + 0.0 for value in position_m]
+    return [round(value * rigid_models.MM_PER_M, 6) + 0.0 for value in position_m]
 
 
 def _pose(key: str, thing: ObjectTruth, models: _ModelFiles) -> dict[str, Any]:
     assert thing.T_camera_object is not None, "the annotation poses is in `needs`"
-    T_camera_model = thing.T_camera_object @ SE3(models.center_m(key))
+    T_camera_model = thing.T_camera_object @ se3.SE3(models.center_m(key))
     return {
         "key": key,
         "cam_R_m2c": _rotation(T_camera_model),
@@ -327,7 +317,7 @@ def _gt_info(thing: ObjectTruth, depth: NDArray[np.uint16] | None) -> dict[str, 
     }
 
 
-def _box(box: BoxPx | None) -> list[int]:
+def _box(box: boxes.BoxPx | None) -> list[int]:
     if box is None:
         return NO_BOX
     return [box.x_min, box.y_min, box.width_px - 1, box.height_px - 1]
@@ -339,7 +329,7 @@ def _coco_mask(thing: ObjectTruth, sample: Sample, camera: str) -> dict[str, Any
         return {}
     assert thing.mask is not None, "the annotation instance_masks is in `needs`"
     size = sample.truth[camera].camera.intrinsics
-    counts = run_lengths(thing.mask, size.height_px, size.width_px)
+    counts = rle.run_lengths(thing.mask, size.height_px, size.width_px)
     return {
         "area": thing.visible_px,
         "bbox": [thing.box.x_min, thing.box.y_min, thing.box.width_px, thing.box.height_px],
@@ -353,10 +343,10 @@ def _write_masks(folder: Path, sample: Sample, camera: str, things: Sequence[Obj
         (folder / kind).mkdir(parents=True, exist_ok=True)
     for k, thing in enumerate(things):
         name = f"{sample.index:09d}_{k:06d}.png"
-        whole = encode_mask(thing.amodal_mask, size.height_px, size.width_px)
+        whole = mask_png.encode_mask(thing.amodal_mask, size.height_px, size.width_px)
         # Both masks of an object that nothing hides are the same.
         same = _are_equal(thing.amodal_mask, thing.mask)
-        visible = whole if same else encode_mask(thing.mask, size.height_px, size.width_px)
+        visible = whole if same else mask_png.encode_mask(thing.mask, size.height_px, size.width_px)
         for kind, png in zip(MASKS, (whole, visible), strict=True):
             (folder / kind / name).write_bytes(png)
 
@@ -372,7 +362,7 @@ def _write_models(folders: Sequence[Path], dataset_dir: Path) -> dict[str, int]:
     """Link the models of all shards and describe them; return object ids by key."""
     found: dict[str, tuple[Path, dict[str, Any]]] = {}
     for folder in folders:
-        for line in fragment_lines([folder], MODELS):
+        for line in fragments.fragment_lines([folder], MODELS):
             row = json.loads(line)
             found.setdefault(row["key"], (folder, row))
     order = sorted(found, key=lambda k: (found[k][1]["asset"], found[k][1]["scale"], k))

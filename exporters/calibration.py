@@ -25,13 +25,11 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
-from gen_data.core.capture import Channel
-from gen_data.core.errors import ConfigError
+from gen_data.core import capture, errors, serialization
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.sample import Sample
 from gen_data.core.scene import Scene
-from gen_data.core.serialization import canonical_json
-from gen_data.exporters.base import ANY_FORMAT, ExporterBase
+from gen_data.exporters import base, image_files, sensor_selection
 from gen_data.exporters.calibration_texts import (
     camera_info_text,
     colmap_camera,
@@ -39,8 +37,6 @@ from gen_data.exporters.calibration_texts import (
     opencv_text,
 )
 from gen_data.exporters.conventions import Conventions
-from gen_data.exporters.image_files import link_or_copy
-from gen_data.exporters.sensor_selection import rgb_cameras
 from gen_data.exporters.sequences import (
     camera_mount,
     device_mount,
@@ -54,14 +50,14 @@ from gen_data.exporters.sequences import (
 PANORAMA = "equirectangular"
 
 
-class CalibrationFiles(ExporterBase):
+class CalibrationFiles(base.ExporterBase):
     """Calibration of every camera for OpenCV, ROS, Kalibr and COLMAP; poses for COLMAP."""
 
     type: Literal["calibration"] = "calibration"
     conventions: ClassVar[Conventions] = Conventions(
         pixel_centre="i; i + 0.5 in `colmap`", lens="any except panoramas"
     )
-    image_formats = ANY_FORMAT
+    image_formats = base.ANY_FORMAT
 
     def check(self, info: DatasetInfo) -> None:
         """Reject a data set without a camera that has a calibration.
@@ -70,7 +66,7 @@ class CalibrationFiles(ExporterBase):
             ConfigError: there is no camera, or only panoramas.
         """
         if not _cameras(info):
-            raise ConfigError(
+            raise errors.ConfigError(
                 f"exporter '{self.type}': no camera has a calibration; add an rgb_camera whose "
                 "lens is no panorama"
             )
@@ -88,7 +84,7 @@ class CalibrationFiles(ExporterBase):
         for frames in read_sequences(shard_dirs, self.type).values():
             for frame in frames:
                 row = frame.row
-                key = canonical_json(row["texts"])
+                key = serialization.canonical_json(row["texts"])
                 if key not in numbers:
                     numbers[key] = len(numbers)
                     for name, text in row["texts"].items():
@@ -97,10 +93,10 @@ class CalibrationFiles(ExporterBase):
                 models.setdefault(row["scene"], _Model()).add(row["images"])
                 for image in row["images"]:
                     source = info.media_path(
-                        frame.shard_dir, image["eye"], Channel.RGB, frame.index
+                        frame.shard_dir, image["eye"], capture.Channel.RGB, frame.index
                     )
                     folder = dataset_dir / f"colmap/{row['scene']:06d}/images"
-                    link_or_copy(source, folder / image["name"])
+                    image_files.link_or_copy(source, folder / image["name"])
         write_text(dataset_dir / "samples.csv", "".join(table))
         for scene, model in models.items():
             model.write(dataset_dir / f"colmap/{scene:06d}")
@@ -136,7 +132,7 @@ def _cameras(info: DatasetInfo) -> tuple[str, ...]:
 
 def _row(info: DatasetInfo, sample: Sample) -> dict[str, Any]:
     """Texts of the files by name, and photographs with their poses."""
-    images, photographed = [], rgb_cameras(info)
+    images, photographed = [], sensor_selection.rgb_cameras(info)
     for name in _cameras(info):
         if name in sample.truth and name in photographed:
             camera = sample.scene_of(name).camera(name)
@@ -144,7 +140,7 @@ def _row(info: DatasetInfo, sample: Sample) -> dict[str, Any]:
             pose = " ".join(
                 repr(round(v, 12) + 0.0) for v in (*eye.quaternion_wxyz, *eye.translation_m)
             )
-            file = f"{name}/{info.media_path(Path(), name, Channel.RGB, sample.index).name}"
+            file = f"{name}/{info.media_path(Path(), name, capture.Channel.RGB, sample.index).name}"
             text = colmap_camera(camera.intrinsics)
             images.append({"eye": name, "camera": text, "pose": pose, "name": file})
     texts = calibration_texts(sample.scene, _cameras(info))

@@ -43,24 +43,16 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.core.boxes import BoxPx
+from gen_data.core import boxes, scene_time, serialization, stereo
 from gen_data.core.capture import Channel
 from gen_data.core.errors import ConfigError, StorageError
 from gen_data.core.interfaces import AssetLibrary, DatasetInfo, media_path
 from gen_data.core.sample import Sample
 from gen_data.core.scene import Camera, Scene
-from gen_data.core.scene_time import RIG_AXES
-from gen_data.core.serialization import canonical_json
-from gen_data.core.stereo import baseline_m
+from gen_data.exporters import base, fragments, image_files, label_png, label_regions, png
 from gen_data.exporters.background_surfaces import SURFACES, UInt16, read_surfaces
-from gen_data.exporters.base import AssetExporter
 from gen_data.exporters.cityscapes_classes import city_classes
 from gen_data.exporters.conventions import PINHOLE, Conventions
-from gen_data.exporters.fragments import fragment_rows, write_fragment
-from gen_data.exporters.image_files import link_or_copy
-from gen_data.exporters.label_png import encode_label_png
-from gen_data.exporters.label_regions import find_parts
-from gen_data.exporters.png import RowFilter, encode_png
 from gen_data.exporters.sensor_selection import pinhole_camera, rgb_cameras
 from gen_data.exporters.sequences import (
     camera_mount,
@@ -76,7 +68,7 @@ UNLABELED, EGO_VEHICLE = "unlabeled", "ego vehicle"
 IMAGES = ("labelIds", "instanceIds", "color")
 
 
-class Cityscapes(AssetExporter):
+class Cityscapes(base.AssetExporter):
     """Cityscapes' fine annotations of one camera."""
 
     type: Literal["cityscapes"] = "cityscapes"
@@ -126,7 +118,9 @@ class Cityscapes(AssetExporter):
             instances = find_instances(info, sample, camera, shard_dir, self.library)
             stem = shard_dir / self.type / f"{sample.index:09d}"
             for name, values in _values_of_codes().items():
-                write_bytes(_beside(stem, f"{name}.png"), encode_label_png(instances, values))
+                write_bytes(
+                    _beside(stem, f"{name}.png"), label_png.encode_label_png(instances, values)
+                )
             polygons = {
                 "imgHeight": instances.shape[0],
                 "imgWidth": instances.shape[1],
@@ -136,18 +130,18 @@ class Cityscapes(AssetExporter):
             text = json.dumps(polygons, sort_keys=True, separators=(",", ":"))
             write_text(_beside(stem, "polygons.json"), text + "\n")
             facts = camera_facts(sample.scene_of(camera), camera, self.right)
-            write_text(_beside(stem, "camera.json"), canonical_json(facts) + "\n")
+            write_text(_beside(stem, "camera.json"), serialization.canonical_json(facts) + "\n")
             if self.right:
                 source = media_path(shard_dir, camera, Channel.DISPARITY, sample.index)
                 write_bytes(_beside(stem, "disparity.png"), disparity_png(source))
             rows.append(frame_facts(info, sample))
-        write_fragment(shard_dir / self.type, "frames", rows)
+        fragments.write_fragment(shard_dir / self.type, "frames", rows)
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Link the files of all shards under Cityscapes' names."""
         camera = pinhole_camera(info, self.camera, self.type)
         city = "".join(c for c in info.name if c.isalnum() and c.isascii()).lower() or "city"
-        for shard_dir, row in fragment_rows(shard_dirs, self.type, "frames"):
+        for shard_dir, row in fragments.fragment_rows(shard_dirs, self.type, "frames"):
             index = row["index"]
             name = f"{city}_{row['sequence']:06d}_{row['step']:06d}"
             stem = shard_dir / self.type / f"{index:09d}"
@@ -162,7 +156,7 @@ class Cityscapes(AssetExporter):
             for source, suffix in links:
                 kind = suffix.split("_")[0].split(".")[0]
                 folder = dataset_dir / kind / row["split"] / city
-                link_or_copy(source, folder / f"{name}_{suffix}")
+                image_files.link_or_copy(source, folder / f"{name}_{suffix}")
 
 
 @cache
@@ -217,7 +211,7 @@ def polygons_of(instances: UInt16) -> Iterator[dict[str, Any]]:
     outlines: list[tuple[float, str, list[list[int]]]] = []
     # Pixels of one part have common edges: what a part surrounds, also by pixels that only touch at
     # corners, then consists of other parts.
-    parts, found = find_parts(instances)
+    parts, found = label_regions.find_parts(instances)
     for part, (code, box) in enumerate(found):
         kind = classes[code // PER_CLASS if code >= PER_CLASS else code]
         name = kind.name + ("group" if kind.counted and code < PER_CLASS else "")
@@ -227,7 +221,9 @@ def polygons_of(instances: UInt16) -> Iterator[dict[str, Any]]:
         yield {"label": name, "polygon": points}
 
 
-def _outline(parts: NDArray[np.int32], part: int, box: BoxPx) -> tuple[float, list[list[int]]]:
+def _outline(
+    parts: NDArray[np.int32], part: int, box: boxes.BoxPx
+) -> tuple[float, list[list[int]]]:
     """Area [px] and outline of a part, at least three points."""
     first, last = [box.x_min, box.y_min], [box.x_max - 1, box.y_max - 1]
     if box.width_px == 1 or box.height_px == 1:
@@ -247,7 +243,7 @@ def camera_facts(scene: Scene, camera: str, right: str) -> dict[str, Any]:
         ConfigError: the cameras are not a rectified pair.
     """
     view = scene.camera(camera)
-    pose = camera_mount(scene, camera).T_rig_sensor @ RIG_AXES
+    pose = camera_mount(scene, camera).T_rig_sensor @ scene_time.RIG_AXES
     r = pose.rotation()
     x, y, z = pose.translation_m if view.rig else (0.0, 0.0, 0.0)
     extrinsic = {
@@ -274,7 +270,7 @@ def disparity_png(source: Path) -> bytes:
     if image is None:
         raise StorageError(f"{source}: missing or no PNG")
     units = np.where(image > 0, np.minimum(image.astype(np.uint32) + 1, 65_535), 0)
-    return encode_png(units.astype(np.uint16), RowFilter.SUB, 1)
+    return png.encode_png(units.astype(np.uint16), png.RowFilter.SUB, 1)
 
 
 def _carrier(scene: Scene, camera: str) -> int:
@@ -285,7 +281,7 @@ def _carrier(scene: Scene, camera: str) -> int:
 
 def _baseline(left: Camera, right: Camera) -> float:
     try:
-        return baseline_m(left, right)
+        return stereo.baseline_m(left, right)
     except ValueError as error:
         raise ConfigError(
             f"exporter 'cityscapes': cameras '{left.name}' and '{right.name}' are not a rectified "

@@ -81,10 +81,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
-from gen_data.core.boxes import BoxPx, OrientedBox
+from gen_data.core import boxes, intrinsics, se3, serialization
 from gen_data.core.capture import Channel
 from gen_data.core.interfaces import DatasetInfo
-from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.motion import Twist
 from gen_data.core.sample import (
     ANNOTATION_STRIDE,
@@ -96,26 +95,19 @@ from gen_data.core.sample import (
     both_ways,
 )
 from gen_data.core.scene import Instance, Scene, Weather
-from gen_data.core.se3 import Array
-from gen_data.core.serialization import canonical_json
 from gen_data.core.shutter import Shutter
 from gen_data.core.skeletons import Skeleton, find_skeleton
-from gen_data.exporters.base import ANY_FORMAT, ExporterBase
+from gen_data.exporters import base, ignored_regions, image_files, mask_polygons, rle, sequences
 from gen_data.exporters.conventions import EDGES, READING, Conventions
 from gen_data.exporters.fragments import fragment_lines, fragment_rows, image_splits, write_fragment
-from gen_data.exporters.ignored_regions import numbered
-from gen_data.exporters.image_files import link_or_copy
 from gen_data.exporters.lens_fields import lens_fields
-from gen_data.exporters.mask_polygons import drawable_polygons
-from gen_data.exporters.rle import encode_rle
 from gen_data.exporters.sensor_selection import check_channels, instant_s, rgb_cameras
-from gen_data.exporters.sequences import sequence_number
 
 DECIMALS = 9
 """Decimals of metres, matrices and fractions: far below any measurement error."""
 
 
-class Coco(ExporterBase):
+class Coco(base.ExporterBase):
     """COCO instances, one JSON file per split; images of all sensors with the rgb channel."""
 
     type: Literal["coco"] = "coco"
@@ -123,7 +115,7 @@ class Coco(ExporterBase):
         pixel_centre="i + 0.5", box=EDGES, lens="any; `images[].lens`", time=READING
     )
 
-    image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
+    image_formats: ClassVar[frozenset[str]] = base.ANY_FORMAT
     segmentation: Literal["polygon", "rle", "none"] = "polygon"
     """Visible masks as polygons, of which readers draw exactly the mask, as run lengths, which are
     shorter and which some trainers do not read, or none."""
@@ -163,7 +155,7 @@ class Coco(ExporterBase):
                 annotations = rows.setdefault(f"{sample.split}.annotations", [])
                 images.append(_image(info, sample, sensor))
                 visible = [thing for thing in truth.objects if thing.box is not None]
-                for thing, number in numbered(info, visible):
+                for thing, number in ignored_regions.numbered(info, visible):
                     row = self._annotation(info, sample, sensor, thing)
                     row["id"] = sample.annotation_id(sensor, number)
                     annotations.append(row)
@@ -215,23 +207,25 @@ class Coco(ExporterBase):
             "attributes": _facts(instance),
         }
         if info.steps_per_scene > 1:
-            sequence = sequence_number(info, sample.index)
+            sequence = sequences.sequence_number(info, sample.index)
             row["track_id"] = sequence * ANNOTATION_STRIDE + instance.instance_id
         if self.segmentation != "none":
             assert thing.mask is not None, "the annotation instance_masks is in `needs`"
             # COCO's crowds have run lengths in either case.
             if self.segmentation == "polygon" and not thing.ignored:
-                row["segmentation"] = [p.ravel().tolist() for p in drawable_polygons(thing.mask)]
+                row["segmentation"] = [
+                    p.ravel().tolist() for p in mask_polygons.drawable_polygons(thing.mask)
+                ]
             else:
-                row["segmentation"] = encode_rle(thing.mask, camera.height_px, camera.width_px)
+                row["segmentation"] = rle.encode_rle(thing.mask, camera.height_px, camera.width_px)
         if self.amodal and thing.amodal_box is not None:
             row["amodal_bbox"] = box_xywh(thing.amodal_box)
         if self.amodal and thing.amodal_mask is not None:
             mask = thing.amodal_mask
-            row["amodal_segmentation"] = encode_rle(mask, camera.height_px, camera.width_px)
+            row["amodal_segmentation"] = rle.encode_rle(mask, camera.height_px, camera.width_px)
         return row | _optional_keys(thing)
 
-    def _box(self, thing: ObjectTruth, camera: Intrinsics) -> BoxPx | None:
+    def _box(self, thing: ObjectTruth, camera: intrinsics.Intrinsics) -> boxes.BoxPx | None:
         """Content of ``bbox``; None if its silhouette is unknown."""
         if self.bbox == "visible" or thing.amodal_box is None:
             return thing.box
@@ -250,7 +244,7 @@ def image_labels(info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, An
     annotations = [
         style._annotation(info, sample, sensor, thing)
         | {"id": sample.annotation_id(sensor, number), "category": thing.instance.category}
-        for thing, number in numbered(info, visible)
+        for thing, number in ignored_regions.numbered(info, visible)
     ]
     without_paths = {k: v for k, v in row.items() if k not in ("file_name", "files")}
     return without_paths | {"annotations": annotations}
@@ -298,7 +292,7 @@ def scene_graph(scene: Scene, truth: ImageTruth) -> dict[str, Any]:
     }
 
 
-def _image_keys(scene: Scene, truth: ImageTruth, camera: Intrinsics) -> dict[str, Any]:
+def _image_keys(scene: Scene, truth: ImageTruth, camera: intrinsics.Intrinsics) -> dict[str, Any]:
     """Keys of the enabled annotations of the whole image."""
     keys: dict[str, Any] = {}
     if truth.borders is not None:
@@ -312,7 +306,7 @@ def _image_keys(scene: Scene, truth: ImageTruth, camera: Intrinsics) -> dict[str
             for b in truth.borders
         ]
     if truth.free_space is not None:
-        keys["free_space"] = encode_rle(truth.free_space, camera.height_px, camera.width_px)
+        keys["free_space"] = rle.encode_rle(truth.free_space, camera.height_px, camera.width_px)
     if truth.relations is not None:
         keys |= scene_graph(scene, truth)
     return keys
@@ -345,7 +339,7 @@ def _image(info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
         "weather": _weather(sample.scene.weather),
     } | _image_keys(sample.scene_of(sensor), sample.truth[sensor], camera.intrinsics)
     if info.steps_per_scene > 1:
-        row["sequence_id"] = sequence_number(info, sample.index)
+        row["sequence_id"] = sequences.sequence_number(info, sample.index)
         row["frame_id"] = sample.index % info.steps_per_scene
         row["time_s"] = round(instant_s(sample, sensor), DECIMALS)
     return row
@@ -401,7 +395,7 @@ def _keypoint_rows(lines: Iterable[str], skeleton: Skeleton) -> Iterator[str]:
         row["keypoints"] = [value for u, v, seen, _ in found for value in (u, v, seen)]
         row["num_keypoints"] = sum(seen > 0 for _, _, seen, _ in found)
         row["keypoints_camera_m"] = {name: place for name, (*_, place) in points.items()}
-        yield canonical_json(row)
+        yield serialization.canonical_json(row)
 
 
 def _categories(info: DatasetInfo) -> list[dict[str, Any]]:
@@ -445,7 +439,7 @@ def write_dataset(
 ) -> None:
     """One JSON document, streamed: annotations of all images are never in memory together."""
     with path.open("w", encoding="utf-8", newline="\n") as file:
-        file.write(canonical_json(header)[:-1])
+        file.write(serialization.canonical_json(header)[:-1])
         for section, lines in (("images", images), ("annotations", annotations)):
             file.write(f',\n"{section}":[')
             separator = "\n"
@@ -462,15 +456,15 @@ def _link_images(
     targets = {Channel.RGB.value: f"{split}/{image['file_name']}", **image["files"]}
     for channel, target in targets.items():
         source = info.media_path(shard_dir, image["sensor"], Channel(channel), image["sample"])
-        link_or_copy(source, dataset_dir / target)
+        image_files.link_or_copy(source, dataset_dir / target)
 
 
-def box_xywh(box: BoxPx) -> list[float]:
+def box_xywh(box: boxes.BoxPx) -> list[float]:
     """COCO's box: left, top, width, height [px]; floats in JSON, see the top of this module."""
     return [float(box.x_min), float(box.y_min), float(box.width_px), float(box.height_px)]
 
 
-def _box3d(box: OrientedBox) -> dict[str, list[float]]:
+def _box3d(box: boxes.OrientedBox) -> dict[str, list[float]]:
     return {
         "center_m": _round_values(box.T_frame_box.translation_m),
         "size_m": _round_values(box.size_m),
@@ -478,7 +472,7 @@ def _box3d(box: OrientedBox) -> dict[str, list[float]]:
     }
 
 
-def _rows(matrix: Array) -> list[list[float]]:
+def _rows(matrix: se3.Array) -> list[list[float]]:
     return [_round_values(row) for row in matrix.tolist()]
 
 

@@ -35,15 +35,12 @@ from gen_data.core.capture import Channel
 from gen_data.core.interfaces import AssetLibrary, DatasetInfo
 from gen_data.core.sample import Sample
 from gen_data.core.serialization import canonical_json
+from gen_data.exporters import base, label_colors, label_png, label_regions
 from gen_data.exporters.background_surfaces import SURFACES, UInt16, read_surfaces
-from gen_data.exporters.base import ANY_FORMAT, AssetExporter
 from gen_data.exporters.coco import box_xywh, dataset_header, image_name, write_dataset
 from gen_data.exporters.conventions import ANY_LENS, EDGES, Conventions
 from gen_data.exporters.fragments import fragment_lines, fragment_rows, image_splits, write_fragment
 from gen_data.exporters.image_files import link_or_copy, link_photograph
-from gen_data.exporters.label_colors import voc_palette
-from gen_data.exporters.label_png import encode_label_png
-from gen_data.exporters.label_regions import find_regions
 from gen_data.exporters.sensor_selection import check_channels, photographs
 from gen_data.exporters.sequences import write_bytes
 
@@ -64,7 +61,7 @@ _SCATTER = 0x9E3779B1
 """Odd: multiplication modulo 2^24 gives every number one id, and only 0 the id 0."""
 
 
-class CocoPanoptic(AssetExporter):
+class CocoPanoptic(base.AssetExporter):
     """COCO panoptic segmentation of all cameras with the channels rgb and instance."""
 
     type: Literal["coco_panoptic"] = "coco_panoptic"
@@ -72,7 +69,7 @@ class CocoPanoptic(AssetExporter):
         pixel_centre="i + 0.5", box=EDGES, lens=ANY_LENS
     )
 
-    image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
+    image_formats: ClassVar[frozenset[str]] = base.ANY_FORMAT
 
     def check(self, info: DatasetInfo) -> None:
         """Reject a data set that this format cannot represent.
@@ -132,7 +129,7 @@ def _write_segments(
     name = image_name(sample.index, sensor)
     # The bytes of a little-endian id are red, green, blue and 0.
     colors = ids.astype("<u4").view(np.uint8).reshape(-1, 4)[:, :3]
-    write_bytes(shard_dir / f"coco_panoptic/{name}", encode_label_png(labels, colors))
+    write_bytes(shard_dir / f"coco_panoptic/{name}", label_png.encode_label_png(labels, colors))
     return {
         "id": sample.image_id(sensor),
         "file_name": name,
@@ -207,7 +204,7 @@ def _stuff_facts(labels: UInt16, ids: UInt32, names: Sequence[str]) -> list[dict
     """Facts of the segments of stuff; their categories have ids when all names are known."""
     numbers = {segment_id(FIRST_STUFF + k): k + 1 for k in range(len(names))}
     number_of = np.array([numbers.get(i, 0) for i in ids.tolist()], np.uint16)
-    regions = find_regions(number_of[labels])
+    regions = label_regions.find_regions(number_of[labels])
     return [
         {
             "id": segment_id(FIRST_STUFF + k),
@@ -221,7 +218,7 @@ def _stuff_facts(labels: UInt16, ids: UInt32, names: Sequence[str]) -> list[dict
 
 
 def _categories(things: Sequence[str], stuff: Sequence[str]) -> list[dict[str, Any]]:
-    colors = voc_palette()
+    colors = label_colors.voc_palette()
     return [
         {
             "id": k,

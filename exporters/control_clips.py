@@ -44,17 +44,10 @@ from gen_data.core.errors import ConfigError, StorageError
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.sample import Sample
 from gen_data.core.serialization import canonical_json
-from gen_data.exporters.base import ANY_FORMAT, ExporterBase
+from gen_data.exporters import base, image_files, label_png
 from gen_data.exporters.captions import caption
 from gen_data.exporters.conventions import ANY_LENS, Conventions
 from gen_data.exporters.id_colors import id_colors
-from gen_data.exporters.image_files import (
-    DEPTH_UNITS_MAX,
-    depths_of_units,
-    link_or_copy,
-    read_pixels,
-)
-from gen_data.exporters.label_png import encode_label_png
 from gen_data.exporters.png import RowFilter, encode_png
 from gen_data.exporters.sensor_selection import rgb_camera
 from gen_data.exporters.sequences import (
@@ -80,7 +73,7 @@ NO_RANGE = (0.0, 0.0)
 """Range of an image of nothing."""
 
 
-class ControlClips(ExporterBase):
+class ControlClips(base.ExporterBase):
     """Images of one camera with depth, segmentation, edges and captions.
 
     Attributes:
@@ -99,7 +92,7 @@ class ControlClips(ExporterBase):
     type: Literal["control_clips"] = "control_clips"
     conventions: ClassVar[Conventions] = Conventions(lens=ANY_LENS)
 
-    image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
+    image_formats: ClassVar[frozenset[str]] = base.ANY_FORMAT
     camera: str = ""
     segmentation: Literal["instance", "category"] = "instance"
     near_m: float | None = Field(None, gt=0)
@@ -153,14 +146,16 @@ class ControlClips(ExporterBase):
             if camera not in sample.truth:
                 continue
             read = {
-                channel: read_pixels(info.media_path(shard_dir, camera, channel, sample.index))
+                channel: image_files.read_pixels(
+                    info.media_path(shard_dir, camera, channel, sample.index)
+                )
                 for channel in (Channel.RGB, Channel.Z_DEPTH, self._ids)
             }
             depth, (near_m, far_m) = self._depth(read[Channel.Z_DEPTH], info.depth_scale_m)
             edges = self._edges(read[Channel.RGB])
             files = {
                 "depth": encode_png(depth, RowFilter.UP, 1),
-                "segmentation": encode_label_png(read[self._ids], id_colors()),
+                "segmentation": label_png.encode_label_png(read[self._ids], id_colors()),
                 # Edges are mostly borders, which the encoder of labels is slow for.
                 "edges": encode_png(edges, RowFilter.UP, 1),
             }
@@ -186,7 +181,7 @@ class ControlClips(ExporterBase):
             for k, frame in enumerate(frames):
                 for kind in IMAGES:
                     source = self._source(info, frame, kind, camera)
-                    link_or_copy(source, folder / kind / f"{k:06d}{source.suffix}")
+                    image_files.link_or_copy(source, folder / kind / f"{k:06d}{source.suffix}")
             with (split / "metadata.jsonl").open("a", encoding="utf-8", newline="\n") as file:
                 suffix = info.encoding(camera, Channel.RGB).suffix
                 file.writelines(_metadata_lines(folder.name, frames, suffix))
@@ -204,8 +199,8 @@ class ControlClips(ExporterBase):
         """Inverse depth of an image of depth units, and its range; see ``inverse_depth``."""
         # Fewer depths than pixels are possible: an image is a look-up of its units.
         present = np.flatnonzero(np.bincount(units.ravel()))
-        values, span_m = inverse_depth(depths_of_units(scale_m)[present], self._range())
-        table = np.zeros(DEPTH_UNITS_MAX + 1, np.uint8)
+        values, span_m = inverse_depth(image_files.depths_of_units(scale_m)[present], self._range())
+        table = np.zeros(image_files.DEPTH_UNITS_MAX + 1, np.uint8)
         table[present] = values
         return table[units], span_m
 

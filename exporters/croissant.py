@@ -28,11 +28,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
+from gen_data.core import errors, scene_assets
 from gen_data.core.capture import Channel
-from gen_data.core.errors import ConfigError
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.sample import Sample
-from gen_data.core.scene_assets import assets_in
 from gen_data.exporters.base import ANY_FORMAT, AssetExporter
 from gen_data.exporters.coco import image_name
 from gen_data.exporters.conventions import EDGES, Conventions
@@ -108,7 +107,7 @@ class Croissant(AssetExporter):
         rgb_camera(info, "", self.type)
         suffixes = {info.encoding(name, Channel.RGB).suffix for name in rgb_cameras(info)}
         if len(suffixes) > 1:
-            raise ConfigError(
+            raise errors.ConfigError(
                 f"exporter '{self.type}': cameras write {' and '.join(sorted(suffixes))} files; "
                 "expected one format, so change rgb_encoding of a sensor"
             )
@@ -118,7 +117,7 @@ class Croissant(AssetExporter):
         self.check(info)
         rows, assets = [], set()
         for sample in samples:
-            assets |= assets_in(sample.scene)
+            assets |= scene_assets.assets_in(sample.scene)
             rows += [_row(info, sample, s) for s in rgb_cameras(info) if s in sample.truth]
         folder = shard_dir / self.type
         write_fragment(folder, IMAGES, rows)

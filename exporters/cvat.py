@@ -26,19 +26,16 @@ import numpy as np
 from gen_data.core.capture import Channel
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.sample import MaskPx, ObjectTruth, Sample
-from gen_data.exporters.coco import image_name
+from gen_data.exporters import coco, image_files, image_rows, label_colors
 from gen_data.exporters.conventions import ANY_LENS, Conventions
 from gen_data.exporters.fragments import fragment_rows, image_splits
-from gen_data.exporters.image_files import link_photograph
-from gen_data.exporters.image_rows import ImageRowsExporter
-from gen_data.exporters.label_colors import voc_palette
 from gen_data.exporters.mask_polygons import drawable_polygons
 
 OCCLUDED = 0.05
 """Hidden share of the silhouette in the image above which ``occluded`` is 1."""
 
 
-class Cvat(ImageRowsExporter):
+class Cvat(image_rows.ImageRowsExporter):
     """CVAT for images: objects of all cameras with the rgb channel, as shapes to be edited."""
 
     type: Literal["cvat"] = "cvat"
@@ -69,7 +66,7 @@ class Cvat(ImageRowsExporter):
                         f'width="{row["width"]}" height="{row["height"]}">\n'
                         f"{row['shapes']}  </image>\n"
                     )
-                    link_photograph(info, shard_dir, row, path.parent / "images" / name)
+                    image_files.link_photograph(info, shard_dir, row, path.parent / "images" / name)
                 file.write("</annotations>\n")
 
     def image_row(self, info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
@@ -83,7 +80,7 @@ class Cvat(ImageRowsExporter):
             for line in shape_elements(thing, info, self.shapes)
         ]
         return {
-            "file_name": image_name(sample.index, sensor, suffix),
+            "file_name": coco.image_name(sample.index, sensor, suffix),
             "width": camera.width_px,
             "height": camera.height_px,
             "shapes": "".join(f"    {line}\n" for line in elements),
@@ -140,5 +137,5 @@ def _head(info: DatasetInfo, split: str) -> str:
 
 
 def _colors(count: int) -> list[list[int]]:
-    colors: list[list[int]] = voc_palette()[1 + np.arange(count) % 255].tolist()
+    colors: list[list[int]] = label_colors.voc_palette()[1 + np.arange(count) % 255].tolist()
     return colors

@@ -24,17 +24,14 @@ from pydantic import Field
 from gen_data.core.capture import Channel
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.sample import ObjectTruth, Sample
-from gen_data.exporters.coco import image_name
+from gen_data.exporters import coco, fragments, image_files, image_rows
 from gen_data.exporters.conventions import ANY_LENS, Conventions
-from gen_data.exporters.fragments import fragment_rows, image_splits
-from gen_data.exporters.image_files import link_photograph
-from gen_data.exporters.image_rows import ImageRowsExporter
 from gen_data.exporters.sequences import write_text
 
 HEADER = ("imagesource:gen-data", "gsd:null")
 
 
-class Dota(ImageRowsExporter):
+class Dota(image_rows.ImageRowsExporter):
     """DOTA labels of all cameras with the rgb channel.
 
     Attributes:
@@ -61,19 +58,19 @@ class Dota(ImageRowsExporter):
         suffix = info.encoding(sensor, Channel.RGB).suffix
         things = sample.truth[sensor].objects
         return {
-            "file_name": image_name(sample.index, sensor, suffix),
+            "file_name": coco.image_name(sample.index, sensor, suffix),
             "lines": [self._line(t) for t in things if t.oriented_box and not t.ignored],
         }
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Write the label files and link the images."""
-        for split in image_splits([shard_dir / self.type for shard_dir in shard_dirs]):
+        for split in fragments.image_splits([shard_dir / self.type for shard_dir in shard_dirs]):
             folder = dataset_dir / split
-            for shard_dir, row in fragment_rows(shard_dirs, self.type, f"{split}.images"):
+            for shard_dir, row in fragments.fragment_rows(shard_dirs, self.type, f"{split}.images"):
                 name = Path(row["file_name"])
                 text = "".join(f"{line}\n" for line in (*HEADER, *row["lines"]))
                 write_text(folder / f"labelTxt/{name.stem}.txt", text)
-                link_photograph(info, shard_dir, row, folder / "images" / name)
+                image_files.link_photograph(info, shard_dir, row, folder / "images" / name)
 
     def _line(self, thing: ObjectTruth) -> str:
         assert thing.oriented_box is not None, "filtered by the caller"

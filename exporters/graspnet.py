@@ -27,15 +27,12 @@ from pydantic import Field
 from gen_data.core.capture import Channel
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.sample import Sample
-from gen_data.exporters.coco import image_name
+from gen_data.exporters import coco, fragments, image_files, image_rows
 from gen_data.exporters.conventions import ANY_LENS, Conventions
-from gen_data.exporters.fragments import fragment_rows, image_splits
-from gen_data.exporters.image_files import link_photograph
-from gen_data.exporters.image_rows import ImageRowsExporter
 from gen_data.exporters.sequences import write_bytes
 
 
-class GraspNet(ImageRowsExporter):
+class GraspNet(image_rows.ImageRowsExporter):
     """Grasps and suctions of the objects in every photograph.
 
     Attributes:
@@ -57,21 +54,21 @@ class GraspNet(ImageRowsExporter):
         """The rows of its arrays."""
         suffix = info.encoding(sensor, Channel.RGB).suffix
         return {
-            "file_name": image_name(sample.index, sensor, suffix),
+            "file_name": coco.image_name(sample.index, sensor, suffix),
             "grasps": self._grasps(sample, sensor),
             "suctions": _suctions(sample, sensor),
         }
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Write the arrays and link the images."""
-        for split in image_splits([shard_dir / self.type for shard_dir in shard_dirs]):
-            for shard_dir, row in fragment_rows(shard_dirs, self.type, f"{split}.images"):
+        for split in fragments.image_splits([shard_dir / self.type for shard_dir in shard_dirs]):
+            for shard_dir, row in fragments.fragment_rows(shard_dirs, self.type, f"{split}.images"):
                 image = dataset_dir / split / row["file_name"]
                 for name, columns in (("grasps", 17), ("suctions", 8)):
                     file = io.BytesIO()
                     np.save(file, np.array(row[name], np.float32).reshape(-1, columns))
                     write_bytes(image.with_name(f"{image.stem}_{name}.npy"), file.getvalue())
-                link_photograph(info, shard_dir, row, image)
+                image_files.link_photograph(info, shard_dir, row, image)
 
     def _grasps(self, sample: Sample, sensor: str) -> list[list[float]]:
         frame, truth = sample.frame, sample.truth[sensor]

@@ -47,20 +47,13 @@ import deflate
 import numpy as np
 from numpy.typing import NDArray
 
+from gen_data.core import errors, intrinsics, optional_packages, se3, serialization
 from gen_data.core.capture import Channel
-from gen_data.core.errors import ConfigError
 from gen_data.core.interfaces import DatasetInfo
-from gen_data.core.intrinsics import Intrinsics
-from gen_data.core.optional_packages import missing_packages
 from gen_data.core.sample import ImageTruth, ObjectTruth, Sample
-from gen_data.core.se3 import Array
-from gen_data.core.serialization import canonical_json
-from gen_data.exporters.base import ANY_FORMAT, ExporterBase
+from gen_data.exporters import base, fragments, image_files, npz
 from gen_data.exporters.conventions import Conventions
-from gen_data.exporters.fragments import fragment_rows, write_fragment
-from gen_data.exporters.image_files import link_or_copy, read_image
 from gen_data.exporters.lens_fields import lens_fields
-from gen_data.exporters.npz import npz_bytes
 from gen_data.exporters.sequences import write_text
 
 KEYS = {
@@ -85,7 +78,7 @@ LEVEL = 1
 FILES = "files"
 
 
-class Hdf5(ExporterBase):
+class Hdf5(base.ExporterBase):
     """A container per image, with the keys of BlenderProc.
 
     Attributes:
@@ -97,7 +90,7 @@ class Hdf5(ExporterBase):
     type: Literal["hdf5"] = "hdf5"
     conventions: ClassVar[Conventions] = Conventions(pixel_centre="i", lens="any; `lens`")
 
-    image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
+    image_formats: ClassVar[frozenset[str]] = base.ANY_FORMAT
     container: Literal["hdf5", "npz"] = "hdf5"
     compression: Literal["gzip", "none"] = "gzip"
 
@@ -108,12 +101,12 @@ class Hdf5(ExporterBase):
             ConfigError: no camera writes a channel, or the package is missing.
         """
         if not any(info.media.values()):
-            raise ConfigError(
+            raise errors.ConfigError(
                 f"exporter '{self.type}': no camera writes a channel; add an rgb_camera"
             )
-        missing = missing_packages("h5py")
+        missing = optional_packages.missing_packages("h5py")
         if self.container == "hdf5" and missing:
-            raise ConfigError(f"exporter 'hdf5' {missing}, or set container: npz")
+            raise errors.ConfigError(f"exporter 'hdf5' {missing}, or set container: npz")
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
         """Write one container per image.
@@ -137,19 +130,19 @@ class Hdf5(ExporterBase):
                 name = f"{sample.split}/{sample.index:09d}_{camera}.{self.container}"
                 self._write(folder / name, arrays)
                 rows.append({"file": name})
-        write_fragment(folder, FILES, rows)
+        fragments.write_fragment(folder, FILES, rows)
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Link the containers of all shards into one tree."""
         categories = {str(k): name for k, name in enumerate(info.categories, 1)}
-        write_text(dataset_dir / "categories.json", canonical_json(categories) + "\n")
-        for shard_dir, row in fragment_rows(shard_dirs, self.type, FILES):
-            link_or_copy(shard_dir / self.type / row["file"], dataset_dir / row["file"])
+        write_text(dataset_dir / "categories.json", serialization.canonical_json(categories) + "\n")
+        for shard_dir, row in fragments.fragment_rows(shard_dirs, self.type, FILES):
+            image_files.link_or_copy(shard_dir / self.type / row["file"], dataset_dir / row["file"])
 
     def _write(self, path: Path, arrays: Mapping[str, NDArray[Any]]) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         if self.container == "npz":
-            path.write_bytes(npz_bytes(arrays, LEVEL if self.compression == "gzip" else 0))
+            path.write_bytes(npz.npz_bytes(arrays, LEVEL if self.compression == "gzip" else 0))
         else:
             compressed = self.compression == "gzip"
             write_hdf5(path, arrays, self.conventions.facts(), compressed=compressed)
@@ -202,7 +195,7 @@ def _read(
     info: DatasetInfo, shard_dir: Path, camera: str, channel: Channel, index: int
 ) -> NDArray[Any]:
     path = info.media_path(shard_dir, camera, channel, index)
-    pixels = read_image(path, channel, info.depth_scale_m)
+    pixels = image_files.read_image(path, channel, info.depth_scale_m)
     if channel is Channel.NORMALS:
         pixels = ((pixels * BLENDER_AXES + 1.0) * 0.5).astype(np.float32)
     return pixels
@@ -238,14 +231,14 @@ def _attributes(thing: ObjectTruth) -> dict[str, Any]:
     return {**dict(instance.attributes), **facts}
 
 
-def _intrinsics(truth: ImageTruth) -> Array:
+def _intrinsics(truth: ImageTruth) -> se3.Array:
     """K for pixel centres at whole numbers, [3, 3]."""
     k = np.round(truth.camera.intrinsics.matrix(), 9)
     k[:2, 2] -= 0.5
     return k
 
 
-def _camera_pose(truth: ImageTruth, T_world_camera: Array) -> dict[str, Any]:
+def _camera_pose(truth: ImageTruth, T_world_camera: se3.Array) -> dict[str, Any]:
     """Pose with Blender's camera axes, and the field of view."""
     camera = truth.camera.intrinsics
     pose = T_world_camera.copy()
@@ -260,7 +253,7 @@ def _camera_pose(truth: ImageTruth, T_world_camera: Array) -> dict[str, Any]:
     }
 
 
-def fields_rad(camera: Intrinsics) -> tuple[float, float]:
+def fields_rad(camera: intrinsics.Intrinsics) -> tuple[float, float]:
     """Horizontal and vertical field of view.
 
     For a pinhole as BlenderProc has them, as if its principal point were centred. For other lenses
@@ -280,4 +273,4 @@ def fields_rad(camera: Intrinsics) -> tuple[float, float]:
 
 def _text(value: Any) -> NDArray[np.bytes_]:
     """JSON as a byte string, [] (a scalar)."""
-    return np.array(canonical_json(value).encode("utf-8"))
+    return np.array(serialization.canonical_json(value).encode("utf-8"))

@@ -46,10 +46,8 @@ from gen_data.core.capture import Channel
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.lens import Lens
 from gen_data.core.sample import ObjectTruth, Sample
-from gen_data.exporters.base import ANY_FORMAT, ExporterBase, check_installed
+from gen_data.exporters import base, fragments, ignored_regions, rle
 from gen_data.exporters.conventions import EDGES, READING, Conventions
-from gen_data.exporters.fragments import fragment_rows, numbered_stem, write_fragment
-from gen_data.exporters.ignored_regions import numbered
 from gen_data.exporters.lens_fields import has_bent_camera, lens_fields
 from gen_data.exporters.parquet_tables import (
     GROUP_ROWS,
@@ -59,7 +57,6 @@ from gen_data.exporters.parquet_tables import (
     table_schema,
     value_feature,
 )
-from gen_data.exporters.rle import encode_rle
 from gen_data.exporters.sensor_selection import instant_s, photographs, rgb_camera, rgb_cameras
 from gen_data.exporters.sequences import write_text
 
@@ -82,7 +79,7 @@ WIDE = frozenset(
 """Channels with three 16-bit components, which Pillow cannot decode."""
 
 
-class HuggingFace(ExporterBase):
+class HuggingFace(base.ExporterBase):
     """Parquet files with embedded images, for ``datasets.load_dataset``.
 
     Attributes:
@@ -96,7 +93,7 @@ class HuggingFace(ExporterBase):
     )
     annotators: ClassVar[frozenset[str]] = frozenset({"instance_masks"})
 
-    image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
+    image_formats: ClassVar[frozenset[str]] = base.ANY_FORMAT
     rows_per_file: int = Field(1000, ge=1, le=1_000_000)
     license: str = Field("other", pattern=r"^[a-z0-9.-]+$")
 
@@ -106,7 +103,7 @@ class HuggingFace(ExporterBase):
         Raises:
             ConfigError: no sensor writes the rgb channel, or a library is missing.
         """
-        check_installed(self.type, "pyarrow")
+        base.check_installed(self.type, "pyarrow")
         rgb_camera(info, "", self.type)
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
@@ -116,18 +113,18 @@ class HuggingFace(ExporterBase):
             {"split": sample.split, "row": _row(info, sample, sensor)}
             for sample, sensor in photographs(info, samples)
         )
-        write_fragment(shard_dir / self.type, IMAGES, rows)
+        fragments.write_fragment(shard_dir / self.type, IMAGES, rows)
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Write the Parquet files of each split, and the card."""
-        lines = fragment_rows(shard_dirs, self.type, IMAGES)
+        lines = fragments.fragment_rows(shard_dirs, self.type, IMAGES)
         totals = Counter(line["split"] for _, line in lines)
         schema = table_schema(table_features(info))
         splits = {
             split: _SplitFiles(dataset_dir / "data", split, totals[split], schema, self)
             for split in sorted(totals)
         }
-        for shard_dir, line in fragment_rows(shard_dirs, self.type, IMAGES):
+        for shard_dir, line in fragments.fragment_rows(shard_dirs, self.type, IMAGES):
             row = line["row"] | _images(info, shard_dir, line["row"])
             splits[line["split"]].add(row)
         for files in splits.values():
@@ -223,7 +220,7 @@ class _SplitFiles:
     def _open(self) -> ParquetWriter:
         if self._writer is None:
             per_file = self.style.rows_per_file
-            name = numbered_stem(self.split, self._written, self.total, per_file)
+            name = fragments.numbered_stem(self.split, self._written, self.total, per_file)
             path = self.folder / f"{name}.parquet"
             self._writer = open_parquet(path, self.schema)
         return self._writer
@@ -287,7 +284,7 @@ def _row(info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
     visible = [thing for thing in sample.truth[sensor].objects if thing.box is not None]
     objects = [
         _object(sample, sensor, thing) | {"id": sample.annotation_id(sensor, number)}
-        for thing, number in numbered(info, visible)
+        for thing, number in ignored_regions.numbered(info, visible)
     ]
     return {
         "image_id": sample.image_id(sensor),
@@ -323,7 +320,7 @@ def _object(sample: Sample, sensor: str, thing: ObjectTruth) -> dict[str, Any]:
         "bbox": [box.x_min, box.y_min, box.width_px, box.height_px],
         "area": thing.visible_px,
         "iscrowd": thing.ignored,
-        "rle": encode_rle(thing.mask, camera.height_px, camera.width_px)["counts"],
+        "rle": rle.encode_rle(thing.mask, camera.height_px, camera.width_px)["counts"],
         "visible_fraction": thing.visible_fraction,
         "occlusion": thing.occlusion,
         "truncation": thing.truncation,

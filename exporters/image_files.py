@@ -41,9 +41,8 @@ from gen_data.core.capture import PNG, Channel, ImageEncoding
 from gen_data.core.errors import ConfigError, SampleError, StorageError
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.sample import Sample
-from gen_data.exporters.measurement_tables import write_table
+from gen_data.exporters import measurement_tables, point_cloud_io
 from gen_data.exporters.png import RowFilter, decode_png, encode_png
-from gen_data.exporters.point_cloud_io import write_cloud
 
 UInt16 = NDArray[np.uint16]
 
@@ -102,10 +101,10 @@ def write_media(info: DatasetInfo, sample: Sample, shard_dir: Path) -> None:
             path.write_bytes(encode_channel(channel, image, info.depth_scale_m, encoding))
     for lidar in info.lidars:
         if lidar in sample.capture.clouds:
-            write_cloud(sample.capture.clouds[lidar], shard_dir, sample.index)
+            point_cloud_io.write_cloud(sample.capture.clouds[lidar], shard_dir, sample.index)
     for device in info.devices:
         if device in sample.capture.tables:
-            write_table(sample.capture.tables[device], shard_dir, sample.index)
+            measurement_tables.write_table(sample.capture.tables[device], shard_dir, sample.index)
 
 
 def encode_channel(

@@ -7,16 +7,15 @@ from typing import Any, ClassVar
 
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.sample import Sample
-from gen_data.exporters.base import ANY_FORMAT, ExporterBase
-from gen_data.exporters.fragments import write_fragment
+from gen_data.exporters import base, fragments
 from gen_data.exporters.sensor_selection import check_channels, photographs
 
 
-class ImageRowsExporter(ExporterBase):
+class ImageRowsExporter(base.ExporterBase):
     """An exporter of all cameras with the rgb channel, whose images it links."""
 
     type: str
-    image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
+    image_formats: ClassVar[frozenset[str]] = base.ANY_FORMAT
 
     def check(self, info: DatasetInfo) -> None:
         """Reject a data set without photographs.
@@ -41,7 +40,7 @@ class ImageRowsExporter(ExporterBase):
         folder = shard_dir / self.type
         folder.mkdir(parents=True, exist_ok=True)
         for name, lines in rows.items():
-            write_fragment(folder, name, lines)
+            fragments.write_fragment(folder, name, lines)
 
     @abstractmethod
     def image_row(self, info: DatasetInfo, sample: Sample, sensor: str) -> Mapping[str, Any]:

@@ -49,19 +49,14 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from gen_data.core import capture, intrinsics, scene
 from gen_data.core.boxes import BoxPx
-from gen_data.core.capture import Channel
 from gen_data.core.interfaces import DatasetInfo, media_path
-from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.sample import ImageTruth, ObjectTruth, Sample
-from gen_data.core.scene import Instance
 from gen_data.core.se3 import Array
-from gen_data.exporters.base import ExporterBase
+from gen_data.exporters import base, image_files, point_cloud_io, sensor_selection
 from gen_data.exporters.conventions import PINHOLE, Conventions
-from gen_data.exporters.image_files import link_or_copy
 from gen_data.exporters.kitti_boxes import UprightBox, members_in_box, upright_box
-from gen_data.exporters.point_cloud_io import T_camera_lidar, read_points, xyzi_bytes
-from gen_data.exporters.sensor_selection import has_scans, laser_scanner, pinhole_camera
 from gen_data.exporters.sequences import check_frame_names, write_bytes, write_text
 
 OFFICIAL_TYPES = {
@@ -100,7 +95,7 @@ limits of 0.05 to 0.2 and of 0.4 to 0.6 would be as plausible.
 """
 
 
-class Kitti(ExporterBase):
+class Kitti(base.ExporterBase):
     """KITTI object detection: the images of one camera, with labels in its frame."""
 
     type: Literal["kitti"] = "kitti"
@@ -160,9 +155,9 @@ class Kitti(ExporterBase):
             calib = calib_text(truth.camera.intrinsics, T_camera_velo)
             write_text(folder / f"calib/{frame}.txt", calib)
             lidar = self._lidar(info)
-            if has_scans(shard_dir, lidar, sample.index):
-                points = read_points(shard_dir, lidar, sample.index)
-                write_bytes(folder / f"velodyne/{frame}.bin", xyzi_bytes(points))
+            if sensor_selection.has_scans(shard_dir, lidar, sample.index):
+                points = point_cloud_io.read_points(shard_dir, lidar, sample.index)
+                write_bytes(folder / f"velodyne/{frame}.bin", point_cloud_io.xyzi_bytes(points))
                 members, unseen = point_members(points, truth, rows, T_camera_velo)
                 rows = without_returns(rows, unseen, truth)
                 labels = point_labels(points, members, rows)
@@ -180,23 +175,23 @@ class Kitti(ExporterBase):
                 index, split = line.split(" ", 1)
                 frames_of.setdefault(split, []).append(_frame_name(int(index)))
                 for source, target in self._links(info, camera, shard_dir, int(index)):
-                    link_or_copy(source, dataset_dir / f"training/{target}")
+                    image_files.link_or_copy(source, dataset_dir / f"training/{target}")
         for split, frames in frames_of.items():
             listing = "".join(f"{frame}\n" for frame in frames)
             write_text(dataset_dir / "ImageSets" / f"{split}.txt", listing)
         write_text(dataset_dir / "README.txt", self._readme(info, camera))
 
     def _camera(self, info: DatasetInfo) -> str:
-        return pinhole_camera(info, self.camera, self.type)
+        return sensor_selection.pinhole_camera(info, self.camera, self.type)
 
     def _lidar(self, info: DatasetInfo) -> str:
-        return laser_scanner(info, self.lidar, self.type)
+        return sensor_selection.laser_scanner(info, self.lidar, self.type)
 
     def _velodyne_pose(self, info: DatasetInfo, sample: Sample) -> Array:
         """``T_camera_velo`` of the velodyne folder's points, [3, 4]."""
         lidar = self._lidar(info)
         if lidar:
-            return T_camera_lidar(sample, self._camera(info), lidar)[:3]
+            return point_cloud_io.T_camera_lidar(sample, self._camera(info), lidar)[:3]
         return T_CAMERA_FORWARD
 
     def _links(
@@ -205,13 +200,13 @@ class Kitti(ExporterBase):
         """Files of one frame, each with its path below ``training``."""
         frame = _frame_name(index)
         names = [f"label_2/{frame}.txt", f"calib/{frame}.txt"]
-        if has_scans(shard_dir, self._lidar(info), index):
+        if sensor_selection.has_scans(shard_dir, self._lidar(info), index):
             names += [f"velodyne/{frame}.bin", f"velodyne_labels/{frame}.label"]
         links = [(shard_dir / f"{self.type}/{name}", name) for name in names]
-        rgb = media_path(shard_dir, camera, Channel.RGB, index)
+        rgb = media_path(shard_dir, camera, capture.Channel.RGB, index)
         links.append((rgb, f"image_2/{frame}.png"))
-        if Channel.Z_DEPTH in info.media[camera]:
-            depth = media_path(shard_dir, camera, Channel.Z_DEPTH, index)
+        if capture.Channel.Z_DEPTH in info.media[camera]:
+            depth = media_path(shard_dir, camera, capture.Channel.Z_DEPTH, index)
             links.append((depth, f"depth_2/{frame}.png"))
         return links
 
@@ -369,13 +364,13 @@ def label_row(thing: ObjectTruth, truth: ImageTruth, style: LabelStyle) -> str:
     )
 
 
-def dont_care(box: BoxPx, camera: Intrinsics) -> str:
+def dont_care(box: BoxPx, camera: intrinsics.Intrinsics) -> str:
     """Format the row of an unlabelled region."""
     corners = _format_corners(_widen(box, camera))
     return f"{DONT_CARE} -1 -1 -10 {corners} -1 -1 -1 -1000 -1000 -1000 -10"
 
 
-def projected_box(box: UprightBox, camera: Intrinsics) -> tuple[float, str]:
+def projected_box(box: UprightBox, camera: intrinsics.Intrinsics) -> tuple[float, str]:
     """Truncation of a box's projection, and the columns of the part inside the image.
 
     The latter as left, top, right and bottom, with pixel centres at whole numbers.
@@ -388,7 +383,7 @@ def projected_box(box: UprightBox, camera: Intrinsics) -> tuple[float, str]:
     return max(1.0 - float(inside), 0.0), f"{x[0]:.2f} {y[0]:.2f} {x[1]:.2f} {y[1]:.2f}"
 
 
-def official_type(instance: Instance) -> str:
+def official_type(instance: scene.Instance) -> str:
     """KITTI's type of an object, one of eight."""
     kind = OFFICIAL_TYPES.get(_join_words(instance.category.lower()), "Misc")
     sits = kind == "Pedestrian" and dict(instance.attributes).get("pose") in SITTING
@@ -400,12 +395,12 @@ def occlusion_level(occlusion: float) -> int:
     return int(occlusion > PARTLY_OCCLUDED) + int(occlusion > LARGELY_OCCLUDED)
 
 
-def calib_text(camera: Intrinsics, T_camera_velo: Array = T_CAMERA_FORWARD) -> str:
+def calib_text(camera: intrinsics.Intrinsics, T_camera_velo: Array = T_CAMERA_FORWARD) -> str:
     """Format the seven lines of a calibration file, in the order that readers expect."""
     return matrix_lines(calib_matrices(camera, T_camera_velo))
 
 
-def calib_matrices(camera: Intrinsics, T_camera_velo: Array) -> dict[str, Array]:
+def calib_matrices(camera: intrinsics.Intrinsics, T_camera_velo: Array) -> dict[str, Array]:
     """Matrices of a calibration file by name; pixel centres are integers."""
     projection = np.zeros((3, 4))
     projection[:, :3] = camera.matrix()
@@ -425,7 +420,7 @@ def matrix_lines(rows: dict[str, Array]) -> str:
     )
 
 
-def _widen(box: BoxPx, camera: Intrinsics) -> BoxPx:
+def _widen(box: BoxPx, camera: intrinsics.Intrinsics) -> BoxPx:
     """Widen a box to at least two pixels in each direction, inside the image."""
     x_min = max(min(box.x_min, camera.width_px - 2), 0)
     y_min = max(min(box.y_min, camera.height_px - 2), 0)

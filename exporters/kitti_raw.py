@@ -39,19 +39,9 @@ from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.sample import Sample
 from gen_data.core.scene import Scene
 from gen_data.core.se3 import SE3, Array, Vec3
-from gen_data.exporters.base import ExporterBase
+from gen_data.exporters import base, image_files, png, point_cloud_io, sensor_selection, tracklets
 from gen_data.exporters.conventions import PINHOLE, Conventions
-from gen_data.exporters.image_files import link_or_copy
 from gen_data.exporters.oxts import COLUMNS, navigation_mount, oxts_row, rig_motion
-from gen_data.exporters.png import RowFilter, encode_png
-from gen_data.exporters.point_cloud_io import read_points, xyzi_bytes
-from gen_data.exporters.sensor_selection import (
-    has_scans,
-    instant_s,
-    laser_scanner,
-    pinhole_camera,
-    rgb_cameras,
-)
 from gen_data.exporters.sequences import (
     Frame,
     Mount,
@@ -67,7 +57,6 @@ from gen_data.exporters.sequences import (
     write_frames,
     write_text,
 )
-from gen_data.exporters.tracklets import frame_boxes, tracklets_text
 
 DRIVES_MAX = 10_000
 """Drive numbers have four digits."""
@@ -92,7 +81,7 @@ def _check_date(text: str) -> str:
     return text
 
 
-class KittiRaw(ExporterBase):
+class KittiRaw(base.ExporterBase):
     """KITTI raw data: cameras, laser scanner, navigation and tracklets of every sequence."""
 
     type: Literal["kitti_raw"] = "kitti_raw"
@@ -129,7 +118,7 @@ class KittiRaw(ExporterBase):
                 sequences.
         """
         self._cameras(info)
-        if not laser_scanner(info, self.lidar, self.type):
+        if not sensor_selection.laser_scanner(info, self.lidar, self.type):
             raise ConfigError(
                 f"exporter '{self.type}': there is no lidar; add a sensor of that type"
             )
@@ -174,40 +163,43 @@ class KittiRaw(ExporterBase):
 
     def _cameras(self, info: DatasetInfo) -> dict[str, str]:
         """Existing sensors by KITTI's number."""
-        known = rgb_cameras(info)
+        known = sensor_selection.rgb_cameras(info)
         asked = {
             number: getattr(self, f"image_{number}") or _if_known(known, f"image_{number}")
             for number in ("00", "01", "02", "03")
         }
-        first = pinhole_camera(info, asked["02"], self.type)
+        first = sensor_selection.pinhole_camera(info, asked["02"], self.type)
         rest = {
-            number: pinhole_camera(info, name, self.type)
+            number: sensor_selection.pinhole_camera(info, name, self.type)
             for number, name in asked.items()
             if name and number != "02"
         }
         return {"02": first, **rest}
 
     def _row(self, info: DatasetInfo, sample: Sample, shard_dir: Path) -> dict[str, Any]:
-        cameras, lidar = self._cameras(info), laser_scanner(info, self.lidar, self.type)
+        cameras, lidar = (
+            self._cameras(info),
+            sensor_selection.laser_scanner(info, self.lidar, self.type),
+        )
         carrier = camera_mount(sample.scene, cameras["02"]).rig
         unit = navigation_mount(sample.scene, self.oxts, carrier, self.type)
         row = frame_facts(info, sample) | {
             "time_s": sample.scene.time_s,
             "cameras": {
-                number: instant_s(sample, name)
+                number: sensor_selection.instant_s(sample, name)
                 for number, name in cameras.items()
                 if name in sample.truth
             },
             "scan": None,
             "oxts": oxts_row(rig_motion(sample.scene, unit), self.origin_deg),
-            "boxes": frame_boxes(sample, cameras["02"], lidar),
+            "boxes": tracklets.frame_boxes(sample, cameras["02"], lidar),
             "calibration": calibration_texts(sample, cameras, lidar, unit),
         }
-        if has_scans(shard_dir, lidar, sample.index):
-            points = read_points(shard_dir, lidar, sample.index)
+        if sensor_selection.has_scans(shard_dir, lidar, sample.index):
+            points = point_cloud_io.read_points(shard_dir, lidar, sample.index)
             path = shard_dir / self.type / f"velodyne/{sample.index:09d}.bin"
-            write_bytes(path, xyzi_bytes(points))
-            row["scan"] = sweep_times_s(points, instant_s(sample, lidar))
+            write_bytes(path, point_cloud_io.xyzi_bytes(points))
+            row["scan"] = sweep_times_s(points, sensor_selection.instant_s(sample, lidar))
         return row
 
     def _write_grey(self, cameras: Mapping[str, str], sample: Sample, shard_dir: Path) -> None:
@@ -217,7 +209,7 @@ class KittiRaw(ExporterBase):
                 image = cv2.imread(str(media_path(shard_dir, name, Channel.RGB, sample.index)))
                 path = shard_dir / self.type / f"image_{number}/{sample.index:09d}.png"
                 assert image is not None, "images are written before labels"
-                write_bytes(path, encode_png(luma(image[..., ::-1]), RowFilter.SUB, 1))
+                write_bytes(path, png.encode_png(luma(image[..., ::-1]), png.RowFilter.SUB, 1))
 
     def _write_drive(
         self, info: DatasetInfo, frames: Sequence[Frame], folder: Path, date: str
@@ -233,7 +225,7 @@ class KittiRaw(ExporterBase):
             for k, frame in enumerate(frames):
                 if number in frame.row["cameras"]:
                     target = folder / f"image_{number}/data/{k:010d}.png"
-                    link_or_copy(self._image(frame, number, camera), target)
+                    image_files.link_or_copy(self._image(frame, number, camera), target)
         scans = [frame.row["scan"] for frame in frames if frame.row["scan"]]
         for i, name in enumerate(("timestamps_start.txt", "timestamps.txt", "timestamps_end.txt")):
             write_times(f"velodyne_points/{name}", (scan[i] for scan in scans))
@@ -243,8 +235,8 @@ class KittiRaw(ExporterBase):
             write_text(folder / f"oxts/data/{k:010d}.txt", frame.row["oxts"] + "\n")
             if frame.row["scan"]:
                 source = frame.shard_dir / self.type / f"velodyne/{frame.index:09d}.bin"
-                link_or_copy(source, folder / f"velodyne_points/data/{k:010d}.bin")
-        boxes = tracklets_text([frame.row["boxes"] for frame in frames])
+                image_files.link_or_copy(source, folder / f"velodyne_points/data/{k:010d}.bin")
+        boxes = tracklets.tracklets_text([frame.row["boxes"] for frame in frames])
         write_text(folder / "tracklet_labels.xml", boxes)
 
     def _image(self, frame: Frame, number: str, camera: str) -> Path:

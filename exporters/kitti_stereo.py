@@ -29,17 +29,12 @@ from typing import ClassVar, Literal
 import cv2
 import numpy as np
 
+from gen_data.core import errors, stereo
 from gen_data.core.capture import Channel
-from gen_data.core.errors import ConfigError
 from gen_data.core.interfaces import DatasetInfo, media_path
 from gen_data.core.sample import Sample
-from gen_data.core.stereo import baseline_m
-from gen_data.exporters.base import ExporterBase
+from gen_data.exporters import base, image_files, kitti_raw, png, sensor_selection
 from gen_data.exporters.conventions import PINHOLE, Conventions
-from gen_data.exporters.image_files import link_or_copy
-from gen_data.exporters.kitti_raw import cameras_text
-from gen_data.exporters.png import RowFilter, encode_png
-from gen_data.exporters.sensor_selection import pinhole_camera, rgb_cameras
 from gen_data.exporters.sequences import (
     Frame,
     camera_mount,
@@ -57,7 +52,7 @@ LABELS = {Channel.DISPARITY: "disp_occ_0", Channel.DISPARITY_VISIBLE: "disp_noc_
 FLOWS = (Channel.FLOW_FORWARD, Channel.FLOW_OCCLUDED_FORWARD)
 
 
-class KittiStereo(ExporterBase):
+class KittiStereo(base.ExporterBase):
     """KITTI's stereo benchmark: pairs of colour images, and the left one's disparities."""
 
     type: Literal["kitti_stereo"] = "kitti_stereo"
@@ -111,7 +106,7 @@ class KittiStereo(ExporterBase):
                 frames_of.setdefault(frame.row["split"], []).append(f"{frame.index:06d}\n")
                 links = self._links(info, pair, frame, followers.get(frame.index))
                 for source, target in links:
-                    link_or_copy(source, dataset_dir / "training" / target)
+                    image_files.link_or_copy(source, dataset_dir / "training" / target)
         for split, names in frames_of.items():
             write_text(dataset_dir / f"ImageSets/{split}.txt", "".join(names))
         readme = _README.format(name=info.name, left=pair["02"], right=pair["03"])
@@ -119,38 +114,38 @@ class KittiStereo(ExporterBase):
 
     def _pair(self, info: DatasetInfo) -> dict[str, str]:
         """Sensors by KITTI's numbers."""
-        known = rgb_cameras(info)
+        known = sensor_selection.rgb_cameras(info)
         matched = [name for name in known if Channel.DISPARITY in info.media[name]]
         left = self.left or (matched[0] if matched else "")
         if left not in matched:
             camera = f"camera '{left}' does not write" if left else "no camera writes"
-            raise ConfigError(
+            raise errors.ConfigError(
                 f"exporter '{self.type}': {camera} the channels rgb and disparity; add both to its "
                 "channels and name its partner with stereo_with"
             )
         others = [name for name in known if name != left]
         right = self.right or (others[0] if len(others) == 1 else "")
         if right not in others:
-            raise ConfigError(
+            raise errors.ConfigError(
                 f"exporter '{self.type}': right: '{right}' is not another camera that writes the "
                 f"rgb channel; expected one of: {', '.join(others) or 'none'}"
             )
         return {
-            "02": pinhole_camera(info, left, self.type),
-            "03": pinhole_camera(info, right, self.type),
+            "02": sensor_selection.pinhole_camera(info, left, self.type),
+            "03": sensor_selection.pinhole_camera(info, right, self.type),
         }
 
     def _calibration(self, sample: Sample, pair: Mapping[str, str]) -> str:
         left, right = (sample.scene.camera(pair[number]) for number in ("02", "03"))
         try:
-            baseline_m(left, right)
+            stereo.baseline_m(left, right)
         except ValueError as error:
-            raise ConfigError(
+            raise errors.ConfigError(
                 f"exporter '{self.type}': cameras '{left.name}' and '{right.name}' are not a "
                 f"rectified pair: {error}"
             ) from error
         reference = camera_mount(sample.scene, left.name)
-        return cameras_text(sample.scene, pair, reference, self.type)
+        return kitti_raw.cameras_text(sample.scene, pair, reference, self.type)
 
     def _links(
         self, info: DatasetInfo, pair: Mapping[str, str], frame: Frame, follower: Frame | None
@@ -195,7 +190,7 @@ def visible_flow(shard_dir: Path, camera: str, index: int) -> bytes:
     assert flow is not None, "images are written before labels"
     assert hidden is not None, "images are written before labels"
     kept = np.where(hidden[..., None] > 0, 0, flow[..., ::-1]).astype(np.uint16)
-    return encode_png(kept, RowFilter.SUB, 1)
+    return png.encode_png(kept, png.RowFilter.SUB, 1)
 
 
 _README = """\

@@ -30,10 +30,8 @@ from gen_data.core.capture import Channel
 from gen_data.core.interfaces import DatasetInfo, media_path
 from gen_data.core.sample import ObjectTruth, Sample
 from gen_data.core.scene import Scene
-from gen_data.exporters.base import ExporterBase
+from gen_data.exporters import base, image_files, kitti
 from gen_data.exporters.conventions import PINHOLE, Conventions
-from gen_data.exporters.image_files import link_or_copy
-from gen_data.exporters.kitti import label_rows
 from gen_data.exporters.kitti_raw import Latitude, Longitude, projection
 from gen_data.exporters.oxts import navigation_mount, oxts_row, rig_motion
 from gen_data.exporters.point_cloud_io import read_points, xyzi_bytes
@@ -59,7 +57,7 @@ SLIGHTLY_TRUNCATED, LARGELY_TRUNCATED = 0.15, 0.5
 """Fractions outside above which ``truncated`` is 1 and 2: KITTI's easy and hard limits."""
 
 
-class KittiTracking(ExporterBase):
+class KittiTracking(base.ExporterBase):
     """KITTI tracking: images, labels, scans and navigation of every sequence."""
 
     type: Literal["kitti_tracking"] = "kitti_tracking"
@@ -152,7 +150,7 @@ class KittiTracking(ExporterBase):
             "calib": calib_text(scene, cameras, laser_scanner(info, self.lidar, self.type), unit),
             "labels": [
                 tracking_label(row, things[instance_id])
-                for row, instance_id in label_rows(truth, self)
+                for row, instance_id in kitti.label_rows(truth, self)
             ],
         }
 
@@ -167,10 +165,10 @@ class KittiTracking(ExporterBase):
             for number, camera in self._cameras(info).items():
                 if number in frame.row["cameras"]:
                     source = media_path(frame.shard_dir, camera, Channel.RGB, frame.index)
-                    link_or_copy(source, folder / f"image_{number}/{name}/{k:06d}.png")
+                    image_files.link_or_copy(source, folder / f"image_{number}/{name}/{k:06d}.png")
             scan = frame.shard_dir / self.type / f"velodyne/{frame.index:09d}.bin"
             if scan.exists():
-                link_or_copy(scan, folder / f"velodyne/{name}/{k:06d}.bin")
+                image_files.link_or_copy(scan, folder / f"velodyne/{name}/{k:06d}.bin")
 
 
 def tracking_label(row: str, thing: ObjectTruth) -> str:

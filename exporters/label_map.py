@@ -19,10 +19,9 @@ import yaml
 from pydantic import Field, field_validator, model_validator
 
 from gen_data.config.base_model import Strict
-from gen_data.core.capture import Channel
+from gen_data.core import capture, path_names
 from gen_data.core.errors import ConfigError, ConfigWarning, did_you_mean, list_names
 from gen_data.core.interfaces import AssetLibrary, DatasetInfo, Exporter
-from gen_data.core.path_names import CATEGORY_MAX, check_name
 from gen_data.core.sample import ImageTruth, ObjectTruth, Sample
 from gen_data.core.scene import Instance, Scene
 
@@ -76,7 +75,7 @@ class LabelMap(Strict):
         seen: dict[str, str] = {}
         for name, categories in self.classes_of.items():
             try:
-                check_name(name, CATEGORY_MAX)
+                path_names.check_name(name, path_names.CATEGORY_MAX)
             except ValueError as error:
                 raise ValueError(f"class {error}") from None
             for category in categories:
@@ -232,7 +231,7 @@ class AppliedLabelMap:
         if not self._has_classes:
             return self.dataset
         sensors = tuple(
-            replace(s, channels=tuple(c for c in s.channels if c is not Channel.CATEGORY))
+            replace(s, channels=tuple(c for c in s.channels if c is not capture.Channel.CATEGORY))
             for s in self.dataset.sensors
         )
         return replace(self.dataset, categories=tuple(self.label_map.classes_of), sensors=sensors)

@@ -34,12 +34,9 @@ from gen_data.core.capture import Channel
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.sample import MaskPx, ObjectTruth, Sample
-from gen_data.exporters.coco import image_name
+from gen_data.exporters import coco, image_files, image_rows, label_colors
 from gen_data.exporters.conventions import ANY_LENS, Conventions
 from gen_data.exporters.fragments import fragment_rows, image_splits
-from gen_data.exporters.image_files import link_photograph
-from gen_data.exporters.image_rows import ImageRowsExporter
-from gen_data.exporters.label_colors import voc_palette
 from gen_data.exporters.mask_polygons import drawable_polygons, join_polygons
 from gen_data.exporters.sequences import write_text
 
@@ -61,7 +58,7 @@ CONTROLS = {"mask": "BrushLabels", "polygon": "PolygonLabels", "box": "Rectangle
 Shape = Literal["mask", "polygon", "box"]
 
 
-class LabelStudio(ImageRowsExporter):
+class LabelStudio(image_rows.ImageRowsExporter):
     """Label Studio: objects of all cameras with the rgb channel, as regions to be edited."""
 
     type: Literal["label_studio"] = "label_studio"
@@ -94,7 +91,7 @@ class LabelStudio(ImageRowsExporter):
                     separator = ",\n"
                     keypoints.update(row["keypoints"])
                     target = path.parent / "images" / row["file_name"]
-                    link_photograph(info, shard_dir, row, target)
+                    image_files.link_photograph(info, shard_dir, row, target)
                 file.write("\n]\n")
         config = label_config(info.categories, self.shapes, sorted(keypoints))
         write_text(dataset_dir / "label_config.xml", config)
@@ -108,7 +105,7 @@ class LabelStudio(ImageRowsExporter):
             if thing.box is not None and not thing.ignored
             for region in object_regions(thing, info, camera, self.shapes)
         ]
-        name = image_name(sample.index, sensor, info.encoding(sensor, Channel.RGB).suffix)
+        name = coco.image_name(sample.index, sensor, info.encoding(sensor, Channel.RGB).suffix)
         path = f"{self.type}/{sample.split}/images/{name}"
         data = {
             "image": self.url_prefix + quote(path),
@@ -231,7 +228,7 @@ def label_config(categories: Sequence[str], shapes: Shape, keypoints: Sequence[s
     lines = ["<View>", '  <Image name="image" value="$image" zoom="true"/>']
     for control, names in controls:
         lines.append(f'  <{control} name="{control.lower()}" toName="image">')
-        colors = voc_palette()[1 + np.arange(len(names)) % 255].tolist()
+        colors = label_colors.voc_palette()[1 + np.arange(len(names)) % 255].tolist()
         lines += [
             f'    <Label value={quoteattr(name)} background="#{bytes(color).hex()}"/>'
             for name, color in zip(names, colors, strict=True)

@@ -18,9 +18,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from gen_data.core.capture import Channel
-from gen_data.core.interfaces import DatasetInfo
-from gen_data.core.serialization import canonical_json
+from gen_data.core import capture, interfaces, serialization
 from gen_data.exporters.lerobot_statistics import (
     image_statistics,
     merge_statistics,
@@ -88,7 +86,7 @@ class RobotFiles(ABC):
 
     version: ClassVar[str]
 
-    info: DatasetInfo
+    info: interfaces.DatasetInfo
     folder: Path
     first: Mapping[str, Any]
     _episodes: int = 0
@@ -199,7 +197,7 @@ class RobotFiles(ABC):
         }
 
     def _write_json(self, name: str, value: Any) -> None:
-        write_text(self.folder / name, canonical_json(value) + "\n")
+        write_text(self.folder / name, serialization.canonical_json(value) + "\n")
 
 
 @dataclass(eq=False)
@@ -235,7 +233,7 @@ class FilesV21(RobotFiles):
         path = self.folder / f"meta/{name}.jsonl"
         path.parent.mkdir(parents=True, exist_ok=True)
         with path.open("a", encoding="utf-8", newline="\n") as file:
-            file.write(canonical_json(row) + "\n")
+            file.write(serialization.canonical_json(row) + "\n")
 
 
 @dataclass(eq=False)
@@ -369,20 +367,20 @@ def _image_key(camera: str) -> str:
     return f"observation.images.{camera}"
 
 
-def _image_paths(info: DatasetInfo, frame: Frame) -> dict[str, Path]:
+def _image_paths(info: interfaces.DatasetInfo, frame: Frame) -> dict[str, Path]:
     return {
-        camera: info.media_path(frame.shard_dir, camera, Channel.RGB, frame.index)
+        camera: info.media_path(frame.shard_dir, camera, capture.Channel.RGB, frame.index)
         for camera in frame.row["images"]
     }
 
 
-def _image_bytes(info: DatasetInfo, frames: Sequence[Frame]) -> int:
+def _image_bytes(info: interfaces.DatasetInfo, frames: Sequence[Frame]) -> int:
     """Size of the image files of an episode."""
     paths = (path for frame in frames for path in _image_paths(info, frame).values())
     return sum(path.stat().st_size for path in paths)
 
 
-def _embedded(info: DatasetInfo, frame: Frame, frame_index: int) -> dict[str, Any]:
+def _embedded(info: interfaces.DatasetInfo, frame: Frame, frame_index: int) -> dict[str, Any]:
     """Images of a frame by feature."""
     return {
         _image_key(camera): {

@@ -42,18 +42,14 @@ from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
+from gen_data.core import errors, intrinsics, se3, serialization
 from gen_data.core.boxes import OrientedBox
 from gen_data.core.capture import POINT, Channel
-from gen_data.core.errors import ConfigError
 from gen_data.core.interfaces import DatasetInfo
-from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.sample import ImageTruth, Sample
 from gen_data.core.scene import Camera, Instance, Lidar
-from gen_data.core.se3 import SE3
-from gen_data.core.serialization import canonical_json
-from gen_data.exporters.base import ANY_FORMAT, ExporterBase, check_installed
+from gen_data.exporters import base, fragments
 from gen_data.exporters.conventions import POINT_TIME, Conventions
-from gen_data.exporters.fragments import fragment_rows
 from gen_data.exporters.point_cloud_io import PointTime, count_times_from, read_points
 from gen_data.exporters.sequences import FRAMES, Frame, frame_facts, write_frames
 
@@ -81,7 +77,7 @@ LINE_PX = 2.0
 TEXT_PX = 12.0
 
 
-class Mcap(ExporterBase):
+class Mcap(base.ExporterBase):
     """MCAP files of sequences: images, calibrations, scans, transforms and boxes.
 
     Attributes:
@@ -102,7 +98,7 @@ class Mcap(ExporterBase):
     )
     annotators: ClassVar[frozenset[str]] = frozenset({"boxes3d"})
 
-    image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
+    image_formats: ClassVar[frozenset[str]] = base.ANY_FORMAT
     compression: Literal["none", "zstd"] = "none"
     point_time: PointTime = "sweep_middle"
 
@@ -112,9 +108,9 @@ class Mcap(ExporterBase):
         Raises:
             ConfigError: there is neither camera nor laser scanner, or a library is missing.
         """
-        check_installed(self.type, "mcap", "mcap_protobuf", "foxglove_schemas_protobuf")
+        base.check_installed(self.type, "mcap", "mcap_protobuf", "foxglove_schemas_protobuf")
         if not info.cameras and not info.lidars:
-            raise ConfigError(
+            raise errors.ConfigError(
                 f"exporter '{self.type}': there is neither camera nor lidar; add such a sensor"
             )
 
@@ -127,7 +123,7 @@ class Mcap(ExporterBase):
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Write the file of each sequence."""
         stem = "_".join(info.name.split())
-        lines = fragment_rows(shard_dirs, self.type, FRAMES)
+        lines = fragments.fragment_rows(shard_dirs, self.type, FRAMES)
         frames = (Frame(shard_dir, row) for shard_dir, row in lines)
         for number, group in groupby(frames, key=lambda frame: frame.row["sequence"]):
             sequence = list(group)
@@ -140,7 +136,7 @@ def _frame_row(sample: Sample) -> dict[str, Any]:
     """Times, poses, calibrations and boxes of a sample."""
     readings, clouds = sample.capture.readings, sample.capture.clouds
     cameras = {name: readings[name].time_s for name in sorted(sample.truth)}
-    transforms: list[tuple[float, str, str, SE3]] = []
+    transforms: list[tuple[float, str, str, se3.SE3]] = []
     for name, time_s in cameras.items():
         transforms += _camera_transforms(sample.truth[name].camera, time_s)
     for cloud in clouds.values():
@@ -169,7 +165,7 @@ def _by_time_and_frame(item: tuple[tuple[int, str], Any]) -> tuple[int, str]:
     return item[0]
 
 
-def _camera_transforms(camera: Camera, time_s: float) -> list[tuple[float, str, str, SE3]]:
+def _camera_transforms(camera: Camera, time_s: float) -> list[tuple[float, str, str, se3.SE3]]:
     frame = f"camera/{camera.name}"
     if not camera.rig:
         return [(time_s, WORLD, frame, camera.T_world_camera)]
@@ -178,7 +174,7 @@ def _camera_transforms(camera: Camera, time_s: float) -> list[tuple[float, str, 
     return [(time_s, WORLD, rig, T_world_rig), (time_s, rig, frame, T_rig_camera)]
 
 
-def _lidar_transforms(lidar: Lidar, time_s: float) -> list[tuple[float, str, str, SE3]]:
+def _lidar_transforms(lidar: Lidar, time_s: float) -> list[tuple[float, str, str, se3.SE3]]:
     frame = f"lidar/{lidar.name}"
     if not lidar.rig:
         return [(time_s, WORLD, frame, lidar.T_world_lidar)]
@@ -217,7 +213,7 @@ def _camera_row(truth: ImageTruth, time_s: float) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _opencv_matrix(camera: Intrinsics) -> list[float]:
+def _opencv_matrix(camera: intrinsics.Intrinsics) -> list[float]:
     """K row by row for pixel centres at integers."""
     matrix = camera.matrix()
     matrix[:2, 2] -= 0.5
@@ -234,7 +230,7 @@ def _object_row(thing: Instance, box: OrientedBox) -> dict[str, Any]:
     }
 
 
-def _pose_numbers(pose: SE3) -> list[float]:
+def _pose_numbers(pose: se3.SE3) -> list[float]:
     """Translation and quaternion x y z w."""
     w, x, y, z = pose.quaternion_wxyz
     return [round(v, DECIMALS) + 0.0 for v in (*pose.translation_m, x, y, z, w)]
@@ -281,7 +277,7 @@ def _write_file(info: DatasetInfo, path: Path, sequence: Sequence[Frame], export
         writer = Writer(file, compression=CompressionType[exporter.compression.upper()])
         writer.start(profile="", library="gen-data")
         facts = {"name": info.name, "seed": str(info.seed)}
-        facts["categories"] = canonical_json(info.categories)
+        facts["categories"] = serialization.canonical_json(info.categories)
         facts["depth_scale_m"] = repr(info.depth_scale_m)
         facts |= {**exporter.conventions.facts(), "point_time": exporter.point_time}
         writer.add_metadata("gen-data", facts)

@@ -20,10 +20,9 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.core.capture import Measurements
+from gen_data.core import capture, measurement_dtypes
 from gen_data.core.errors import ConfigError, StorageError
 from gen_data.core.interfaces import DatasetInfo, SensorInfo, table_path
-from gen_data.core.measurement_dtypes import columns_dtype
 from gen_data.core.sample import Sample
 from gen_data.core.serialization import canonical_json
 from gen_data.exporters.base import ANY_FORMAT, ExporterBase
@@ -78,7 +77,7 @@ class Tables(ExporterBase):
                 path.write_bytes({"csv": csv_bytes, "npy": npy_bytes}[self.format](rows))
 
 
-def write_table(table: Measurements, shard_dir: Path, index: int) -> None:
+def write_table(table: capture.Measurements, shard_dir: Path, index: int) -> None:
     """Write the rows of one reading to their ``table_path``."""
     path = table_path(shard_dir, table.sensor, index)
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -97,7 +96,7 @@ def read_rows(path: Path, device: SensorInfo) -> NDArray[np.void]:
         raise StorageError(
             f"{path}: cannot be read ({error}); generate the data set again"
         ) from error
-    if rows.dtype != columns_dtype(device.columns):
+    if rows.dtype != measurement_dtypes.columns_dtype(device.columns):
         raise StorageError(
             f"{path}: contains no rows of kind '{device.kind}'; generate the data set again"
         )

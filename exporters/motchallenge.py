@@ -21,14 +21,11 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
-from gen_data.core.capture import Channel
-from gen_data.core.errors import ConfigError
+from gen_data.core import capture, errors, scene
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.sample import ImageTruth, ObjectTruth, Sample
-from gen_data.core.scene import Instance
-from gen_data.exporters.base import ANY_FORMAT, ExporterBase
+from gen_data.exporters import base, image_files
 from gen_data.exporters.conventions import ANY_LENS, Conventions
-from gen_data.exporters.image_files import link_or_copy
 from gen_data.exporters.sensor_selection import rgb_camera
 from gen_data.exporters.sequences import (
     Frame,
@@ -62,7 +59,7 @@ SEQUENCES_MAX = 10_000
 """Names of sequences have four digits."""
 
 
-class MotChallenge(ExporterBase):
+class MotChallenge(base.ExporterBase):
     """MOTChallenge: images and tracks of every sequence of one camera."""
 
     type: Literal["motchallenge"] = "motchallenge"
@@ -72,7 +69,7 @@ class MotChallenge(ExporterBase):
     annotators: ClassVar[frozenset[str]] = frozenset({"boxes2d", "visibility"})
     own_classes: ClassVar[bool] = True
 
-    image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
+    image_formats: ClassVar[frozenset[str]] = base.ANY_FORMAT
     camera: str = ""
     """Sensor of the images; empty = the first one, by name, with the rgb channel."""
     boxes: Literal["visible", "whole"] = "visible"
@@ -88,7 +85,7 @@ class MotChallenge(ExporterBase):
         """
         rgb_camera(info, self.camera, self.type)
         if not any(_class_of(category) for category in info.categories):
-            raise ConfigError(
+            raise errors.ConfigError(
                 f"exporter '{self.type}': no category of the data set has a class in this format; "
                 f"expected at least one of: {', '.join(CLASSES)}. Use coco for other categories"
             )
@@ -131,7 +128,7 @@ class MotChallenge(ExporterBase):
         width_px, height_px = frames[0].row["size_px"]
         lines = [f"{k},{row}\n" for k, frame in enumerate(frames, 1) for row in frame.row["gt"]]
         write_text(folder / "gt/gt.txt", "".join(lines))
-        suffix = info.encoding(camera, Channel.RGB).suffix
+        suffix = info.encoding(camera, capture.Channel.RGB).suffix
         write_text(
             folder / "seqinfo.ini",
             f"[Sequence]\nname={folder.name}\nimDir=img1\n"
@@ -139,8 +136,8 @@ class MotChallenge(ExporterBase):
             f"imWidth={width_px}\nimHeight={height_px}\nimExt={suffix}\n",
         )
         for k, frame in enumerate(frames, 1):
-            source = info.media_path(frame.shard_dir, camera, Channel.RGB, frame.index)
-            link_or_copy(source, folder / f"img1/{k:06d}{suffix}")
+            source = info.media_path(frame.shard_dir, camera, capture.Channel.RGB, frame.index)
+            image_files.link_or_copy(source, folder / f"img1/{k:06d}{suffix}")
 
 
 def gt_columns(thing: ObjectTruth, boxes: Literal["visible", "whole"]) -> str:
@@ -160,7 +157,7 @@ def _class_of(category: str) -> int:
     return CLASSES.get("_".join(category.lower().split()), 0)
 
 
-def mot_class(instance: Instance) -> int:
+def mot_class(instance: scene.Instance) -> int:
     """MOT16's class number of an object; 0 = none."""
     number = _class_of(instance.category)
     facts = dict(instance.attributes)

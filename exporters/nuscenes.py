@@ -41,28 +41,18 @@ from pydantic import Field
 from gen_data.core.errors import ConfigError
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.sample import Sample
-from gen_data.exporters.base import PNG_OR_JPEG, ExporterBase
+from gen_data.exporters import base, fragments, image_files, nuscenes_classes, nuscenes_tables
 from gen_data.exporters.conventions import PINHOLE, Conventions
-from gen_data.exporters.fragments import fragment_rows
-from gen_data.exporters.image_files import link_or_copy
-from gen_data.exporters.nuscenes_classes import detectable_categories
 from gen_data.exporters.nuscenes_frames import Channel
 from gen_data.exporters.nuscenes_recording import LIDAR_TOP, Recording, key_frames
 from gen_data.exporters.nuscenes_shard import ShardWriter, label_path, map_file, reading_path
-from gen_data.exporters.nuscenes_tables import (
-    TableFiles,
-    Tokens,
-    constant_rows,
-    world_rows,
-    write_splits,
-)
 from gen_data.exporters.sensor_selection import check_pinholes, laser_scanner, rgb_cameras
 from gen_data.exporters.sequences import FRAMES, Frame, write_frames
 
 SPLITS = ("train", "val", "test")
 
 
-class NuScenes(ExporterBase):
+class NuScenes(base.ExporterBase):
     """nuScenes with lidarseg and panoptic labels: all cameras, laser scanners and radars."""
 
     type: Literal["nuscenes"] = "nuscenes"
@@ -76,7 +66,7 @@ class NuScenes(ExporterBase):
     annotators: ClassVar[frozenset[str]] = frozenset({"visibility"})
     own_classes: ClassVar[bool] = True
 
-    image_formats: ClassVar[frozenset[str]] = PNG_OR_JPEG
+    image_formats: ClassVar[frozenset[str]] = base.PNG_OR_JPEG
     version: str = Field("v1.0-mini", pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$")
     """Folder of the tables."""
     lidar: str = ""
@@ -97,7 +87,7 @@ class NuScenes(ExporterBase):
                 same channel, or no category has a class in this format.
         """
         self._channels(info)
-        known = detectable_categories()
+        known = nuscenes_classes.detectable_categories()
         if not set(known) & set(info.categories):
             raise ConfigError(
                 f"exporter '{self.type}': no category of the data set has a class in this format; "
@@ -119,12 +109,12 @@ class NuScenes(ExporterBase):
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Write the tables, sequence by sequence, and link all files."""
-        token = Tokens(info)
+        token = nuscenes_tables.Tokens(info)
         channels = {c.name: c.modality for c in self._channels(info)}
         names: dict[str, list[str]] = {"all": [], **{f"gen_{split}": [] for split in SPLITS}}
         worlds: set[int] = set()
-        with TableFiles(dataset_dir / self.version) as tables:
-            for table, row in constant_rows(token, channels):
+        with nuscenes_tables.TableFiles(dataset_dir / self.version) as tables:
+            for table, row in nuscenes_tables.constant_rows(token, channels):
                 tables.add(table, row)
             for recording in self._recordings(token, shard_dirs):
                 first = recording.frames[0]
@@ -137,7 +127,7 @@ class NuScenes(ExporterBase):
                 self._link_files(info, recording, dataset_dir)
                 names["all"].append(recording.name)
                 names.setdefault(f"gen_{split}", []).append(recording.name)
-        write_splits(dataset_dir / self.version, names)
+        nuscenes_tables.write_splits(dataset_dir / self.version, names)
 
     def top(self, info: DatasetInfo) -> str:
         """Sensor that becomes LIDAR_TOP.
@@ -176,21 +166,27 @@ class NuScenes(ExporterBase):
             sensors[channel.name] = channel.sensor
         return tuple(channels)
 
-    def _recordings(self, token: Tokens, shard_dirs: Sequence[Path]) -> Iterator[Recording]:
+    def _recordings(
+        self, token: nuscenes_tables.Tokens, shard_dirs: Sequence[Path]
+    ) -> Iterator[Recording]:
         """Yield the sequences that have key frames; one at a time is in memory."""
-        rows = fragment_rows(shard_dirs, self.type, FRAMES)
+        rows = fragments.fragment_rows(shard_dirs, self.type, FRAMES)
         for _, group in groupby(rows, key=lambda item: item[1]["sequence"]):
             frames = [Frame(shard_dir, row) for shard_dir, row in group]
             if keys := key_frames(frames, self.key_frame_s):
                 yield Recording(token, self.version, frames, keys)
 
     def _add_world(
-        self, tables: TableFiles, token: Tokens, frame: Frame, dataset_dir: Path
+        self,
+        tables: nuscenes_tables.TableFiles,
+        token: nuscenes_tables.Tokens,
+        frame: Frame,
+        dataset_dir: Path,
     ) -> None:
         """Add the log and the map of a world."""
         file = map_file(frame.row["scene"])
-        link_or_copy(frame.shard_dir / self.type / file, dataset_dir / file)
-        for table, row in world_rows(token, frame, file):
+        image_files.link_or_copy(frame.shard_dir / self.type / file, dataset_dir / file)
+        for table, row in nuscenes_tables.world_rows(token, frame, file):
             tables.add(table, row)
 
     def _link_files(self, info: DatasetInfo, recording: Recording, dataset_dir: Path) -> None:
@@ -198,10 +194,10 @@ class NuScenes(ExporterBase):
             reading = frame.row["readings"][channel]
             one = Channel(reading["sensor"], channel, reading["modality"])
             source = reading_path(info, frame.shard_dir, one, frame.index)
-            link_or_copy(source, dataset_dir / target)
+            image_files.link_or_copy(source, dataset_dir / target)
         for frame, table, target in recording.point_label_files():
             source = label_path(frame.shard_dir, table, frame.index)
-            link_or_copy(source, dataset_dir / target)
+            image_files.link_or_copy(source, dataset_dir / target)
 
 
 def _channel_name(prefix: str, sensor: str) -> str:

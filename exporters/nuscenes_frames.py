@@ -9,13 +9,10 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from gen_data.core import errors, intrinsics, motion, scene_time
 from gen_data.core.boxes import OrientedBox
-from gen_data.core.errors import ConfigError
-from gen_data.core.intrinsics import Intrinsics
-from gen_data.core.motion import Trajectory
 from gen_data.core.sample import ObjectTruth, Sample
 from gen_data.core.scene import Body, Instance, Scene
-from gen_data.core.scene_time import RIG_AXES
 from gen_data.core.se3 import SE3, Vec3
 from gen_data.exporters.nuscenes_classes import category_of
 from gen_data.exporters.nuscenes_files import quarter_turns, turned_pose
@@ -55,7 +52,7 @@ def channel_mount(scene: Scene, channel: Channel) -> Mount:
 def rig_pose_at(scene: Scene, rig: str, time_s: float) -> SE3:
     """``T_world_rig`` at an instant, by the trajectory of the body that carries the rig."""
     if rig.startswith("/"):
-        return scene.camera(rig[1:]).T_world_camera @ RIG_AXES
+        return scene.camera(rig[1:]).T_world_camera @ scene_time.RIG_AXES
     track = scene.track(scene.rig(rig).body)
     if track is None or time_s == scene.time_s:
         return scene.rig_pose(rig)
@@ -100,7 +97,7 @@ def pose_row(pose: SE3) -> dict[str, list[float]]:
     return {"translation": list(pose.translation_m), "rotation": list(pose.quaternion_wxyz)}
 
 
-def intrinsic_rows(camera: Intrinsics) -> list[list[float]]:
+def intrinsic_rows(camera: intrinsics.Intrinsics) -> list[list[float]]:
     """``camera_intrinsic``, 3 x 3; pixel centres are whole numbers."""
     K = camera.matrix()
     K[:2, 2] -= 0.5
@@ -123,7 +120,7 @@ class Thing:
     category: str
     number: int
     body: Body | None
-    track: Trajectory | None
+    track: motion.Trajectory | None
 
     def box(self, time_s: float | None, margin_m: float) -> OrientedBox:
         """Its box in the world at an instant (None = the sample's), with a margin on all sides."""
@@ -160,7 +157,7 @@ def annotated_things(sample: Sample) -> dict[int, Thing]:
         category, key = category_of(instance), instance.instance_id
         numbers[category] = numbers.get(category, 0) + 1
         if numbers[category] > INSTANCES_MAX:
-            raise ConfigError(
+            raise errors.ConfigError(
                 f"exporter 'nuscenes': sample {sample.index} has more than {INSTANCES_MAX} objects "
                 f"of the category {category}; place fewer objects"
             )

@@ -10,31 +10,8 @@ from gen_data.core.capture import Channel as ImageChannel
 from gen_data.core.interfaces import DatasetInfo, table_path
 from gen_data.core.sample import Sample
 from gen_data.core.se3 import SE3
-from gen_data.exporters.measurement_tables import read_rows
+from gen_data.exporters import measurement_tables, nuscenes_files, nuscenes_frames
 from gen_data.exporters.nuscenes_classes import attribute_of, point_classes
-from gen_data.exporters.nuscenes_files import (
-    MapArea,
-    lidar_bytes,
-    map_area,
-    map_bytes,
-    panoptic_bytes,
-    panoptic_labels,
-    points_in_boxes,
-    quarter_turns,
-    radar_bytes,
-)
-from gen_data.exporters.nuscenes_frames import (
-    Channel,
-    Points,
-    PulseTimes,
-    Thing,
-    annotated_things,
-    box_row,
-    channel_mount,
-    reading_row,
-    reading_time_s,
-    views_by_instance,
-)
 from gen_data.exporters.nuscenes_recording import LIDAR_TOP
 from gen_data.exporters.point_cloud_io import read_points, scanner_at_sweep
 from gen_data.exporters.sensor_selection import has_scans, instant_s
@@ -44,7 +21,9 @@ FOLDER = "nuscenes"
 _LABEL_SUFFIXES = {"lidarseg": ".bin", "panoptic": ".npz"}
 
 
-def reading_path(info: DatasetInfo, shard_dir: Path, channel: Channel, index: int) -> Path:
+def reading_path(
+    info: DatasetInfo, shard_dir: Path, channel: nuscenes_frames.Channel, index: int
+) -> Path:
     """File of a reading in a shard; images are the ones that all formats share."""
     if channel.modality == "camera":
         return info.media_path(shard_dir, channel.sensor, ImageChannel.RGB, index)
@@ -52,7 +31,7 @@ def reading_path(info: DatasetInfo, shard_dir: Path, channel: Channel, index: in
     return shard_dir / FOLDER / channel.name / f"{index:09d}{suffix}"
 
 
-def reading_suffix(info: DatasetInfo, channel: Channel) -> str:
+def reading_suffix(info: DatasetInfo, channel: nuscenes_frames.Channel) -> str:
     """Ending of the files of a channel."""
     if channel.modality == "camera":
         return info.encoding(channel.sensor, ImageChannel.RGB).suffix
@@ -79,24 +58,24 @@ class ShardWriter:
     """
 
     info: DatasetInfo
-    channels: Sequence[Channel]
+    channels: Sequence[nuscenes_frames.Channel]
     shard_dir: Path
     boxes_at: Literal["pulse", "step"]
     box_margin_m: float
-    _areas: dict[int, MapArea] = field(default_factory=dict)
+    _areas: dict[int, nuscenes_files.MapArea] = field(default_factory=dict)
 
     def write(self, sample: Sample) -> dict[str, Any]:
         """Write the files of a sample and return its line."""
         top = self.channels[0]
         T_global_world = self._write_map(sample).T_global_world
-        ego = channel_mount(sample.scene, top).rig
+        ego = nuscenes_frames.channel_mount(sample.scene, top).rig
         readings: dict[str, Any] = {}
         detections: dict[int, int] = {}
         for channel in self.channels:
             if self._has_reading(sample, channel):
                 offset_s = self.info.sensor(channel.sensor).time_offset_s
-                time_s = reading_time_s(sample, channel, offset_s)
-                row = reading_row(sample, channel, ego, time_s, T_global_world)
+                time_s = nuscenes_frames.reading_time_s(sample, channel, offset_s)
+                row = nuscenes_frames.reading_row(sample, channel, ego, time_s, T_global_world)
                 readings[channel.name] = row | {"suffix": reading_suffix(self.info, channel)}
                 if channel.modality == "radar":
                     self._write_radar(sample, channel, detections)
@@ -113,38 +92,41 @@ class ShardWriter:
             "boxes": boxes,
         }
 
-    def _has_reading(self, sample: Sample, channel: Channel) -> bool:
+    def _has_reading(self, sample: Sample, channel: nuscenes_frames.Channel) -> bool:
         if channel.modality == "camera":
             return channel.sensor in sample.truth
         if channel.modality == "lidar":
             return has_scans(self.shard_dir, channel.sensor, sample.index)
         return table_path(self.shard_dir, channel.sensor, sample.index).exists()
 
-    def _write_map(self, sample: Sample) -> MapArea:
+    def _write_map(self, sample: Sample) -> nuscenes_files.MapArea:
         """Write the map of a sample's world, once per shard, and return its area."""
         world = sample.scene_index
         if world not in self._areas:
-            area = self._areas[world] = map_area(sample.scene.lanes)
+            area = self._areas[world] = nuscenes_files.map_area(sample.scene.lanes)
             path = self.shard_dir / FOLDER / map_file(world)
-            write_bytes(path, map_bytes(sample.scene.lanes, area))
+            write_bytes(path, nuscenes_files.map_bytes(sample.scene.lanes, area))
         return self._areas[world]
 
-    def _write_radar(self, sample: Sample, channel: Channel, detections: dict[int, int]) -> None:
+    def _write_radar(
+        self, sample: Sample, channel: nuscenes_frames.Channel, detections: dict[int, int]
+    ) -> None:
         """Write a radar's detections, and add them to the number of each instance."""
         path = table_path(self.shard_dir, channel.sensor, sample.index)
-        rows = read_rows(path, self.info.sensor(channel.sensor))
+        rows = measurement_tables.read_rows(path, self.info.sensor(channel.sensor))
         write_bytes(
-            reading_path(self.info, self.shard_dir, channel, sample.index), radar_bytes(rows)
+            reading_path(self.info, self.shard_dir, channel, sample.index),
+            nuscenes_files.radar_bytes(rows),
         )
         for instance_id in rows["instance_id"].tolist():
             detections[instance_id] = detections.get(instance_id, 0) + 1
 
-    def _write_lidar(self, sample: Sample, channel: Channel, ego: str) -> None:
+    def _write_lidar(self, sample: Sample, channel: nuscenes_frames.Channel, ego: str) -> None:
         points = read_points(self.shard_dir, channel.sensor, sample.index)
-        mount = channel_mount(sample.scene, channel)
-        turns = quarter_turns(relative_pose(sample.scene, Mount(ego, SE3()), mount))
+        mount = nuscenes_frames.channel_mount(sample.scene, channel)
+        turns = nuscenes_files.quarter_turns(relative_pose(sample.scene, Mount(ego, SE3()), mount))
         path = reading_path(self.info, self.shard_dir, channel, sample.index)
-        write_bytes(path, lidar_bytes(points, turns))
+        write_bytes(path, nuscenes_files.lidar_bytes(points, turns))
 
     def _write_labels(
         self, sample: Sample, ego: str, detections: Mapping[int, int], T_global_world: SE3
@@ -152,28 +134,38 @@ class ShardWriter:
         """Write the point labels of LIDAR_TOP and return the rows of boxes."""
         top = self.channels[0].sensor
         points = read_points(self.shard_dir, top, sample.index)
-        things = annotated_things(sample)
+        things = nuscenes_frames.annotated_things(sample)
         scanner, time_s = scanner_at_sweep(sample, top), instant_s(sample, top)
         pulses = None
         if self.boxes_at == "pulse":
-            pulses = PulseTimes.measure(points, time_s, scanner.sweep_s)
+            pulses = nuscenes_frames.PulseTimes.measure(points, time_s, scanner.sweep_s)
         boxes = {k: self._box(thing, pulses, scanner.T_world_lidar) for k, thing in things.items()}
-        found = points_in_boxes(points, scanner.T_world_lidar, boxes)
+        found = nuscenes_files.points_in_boxes(points, scanner.T_world_lidar, boxes)
         labels = point_classes(points, found.members, sample.scene, _ego_instance(sample, ego))
         numbers = {k: thing.number for k, thing in things.items()}
-        panoptic = panoptic_labels(labels, found.members, numbers)
+        panoptic = nuscenes_files.panoptic_labels(labels, found.members, numbers)
         write_bytes(label_path(self.shard_dir, "lidarseg", sample.index), labels.tobytes())
-        write_bytes(label_path(self.shard_dir, "panoptic", sample.index), panoptic_bytes(panoptic))
-        views = views_by_instance(sample)
+        write_bytes(
+            label_path(self.shard_dir, "panoptic", sample.index),
+            nuscenes_files.panoptic_bytes(panoptic),
+        )
+        views = nuscenes_frames.views_by_instance(sample)
         rows = []
         for number, thing in things.items():
             attribute = attribute_of(thing.category, thing.instance, thing.body, sample.scene)
-            counts = Points(found.counts[number], detections.get(number, 0))
+            counts = nuscenes_frames.Points(found.counts[number], detections.get(number, 0))
             box = boxes[number].seen_from(T_global_world)
-            rows.append(box_row(thing, box, attribute, views.get(number, ()), counts))
+            rows.append(
+                nuscenes_frames.box_row(thing, box, attribute, views.get(number, ()), counts)
+            )
         return rows
 
-    def _box(self, thing: Thing, pulses: PulseTimes | None, T_world_lidar: SE3) -> OrientedBox:
+    def _box(
+        self,
+        thing: nuscenes_frames.Thing,
+        pulses: nuscenes_frames.PulseTimes | None,
+        T_world_lidar: SE3,
+    ) -> OrientedBox:
         """Box of an object in the world, at the instant that the exporter's fields select."""
         box = thing.box(None, self.box_margin_m)
         if pulses is None or thing.track is None:

@@ -10,12 +10,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from gen_data.core import errors, interfaces, scene, se3
 from gen_data.core.capture import POINT, PointCloud
-from gen_data.core.errors import StorageError
-from gen_data.core.interfaces import cloud_path
 from gen_data.core.sample import Sample
-from gen_data.core.scene import Lidar
-from gen_data.core.se3 import Array
 
 PointTime = Literal["sweep_middle", "sweep_start"]
 """Instant from which times of points count."""
@@ -23,13 +20,13 @@ PointTime = Literal["sweep_middle", "sweep_start"]
 
 def write_cloud(cloud: PointCloud, shard_dir: Path, index: int) -> None:
     """Write one sweep to its ``cloud_path``."""
-    path = cloud_path(shard_dir, cloud.sensor, index)
+    path = interfaces.cloud_path(shard_dir, cloud.sensor, index)
     path.parent.mkdir(parents=True, exist_ok=True)
     with path.open("wb") as file:
         np.lib.format.write_array(file, cloud.points, version=(1, 0), allow_pickle=False)
 
 
-def scanner_at_sweep(sample: Sample, lidar: str) -> Lidar:
+def scanner_at_sweep(sample: Sample, lidar: str) -> scene.Lidar:
     """Laser scanner at the instant of its sweep; the scene's if it has no reading."""
     cloud = sample.capture.clouds.get(lidar)
     return cloud.lidar if cloud is not None else sample.scene.lidar(lidar)
@@ -41,15 +38,15 @@ def read_points(shard_dir: Path, sensor: str, index: int) -> NDArray[np.void]:
     Raises:
         StorageError: the file is missing or damaged.
     """
-    path = cloud_path(shard_dir, sensor, index)
+    path = interfaces.cloud_path(shard_dir, sensor, index)
     try:
         points: NDArray[np.void] = np.load(path, allow_pickle=False)
     except (OSError, ValueError) as error:
-        raise StorageError(
+        raise errors.StorageError(
             f"{path}: cannot be read ({error}); generate the data set again"
         ) from error
     if points.dtype != POINT:
-        raise StorageError(f"{path}: contains no laser points; generate the data set again")
+        raise errors.StorageError(f"{path}: contains no laser points; generate the data set again")
     return points
 
 
@@ -71,7 +68,7 @@ def xyzi_bytes(points: NDArray[np.void]) -> bytes:
     return np.column_stack([points["position_m"], points["intensity"]]).astype("<f4").tobytes()
 
 
-def T_camera_lidar(sample: Sample, camera: str, lidar: str) -> Array:  # noqa: N802
+def T_camera_lidar(sample: Sample, camera: str, lidar: str) -> se3.Array:  # noqa: N802
     """Transform from lidar to camera coordinates, 4 x 4.
 
     On a common rig it is the rig's calibration, at whatever instants the two read.

@@ -24,21 +24,13 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.core.boxes import OrientedBox
-from gen_data.core.errors import ConfigError
+from gen_data.core import boxes, errors
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.sample import Sample
 from gen_data.core.scene import Instance
 from gen_data.core.serialization import canonical_json
-from gen_data.exporters.base import ANY_FORMAT, ExporterBase
+from gen_data.exporters import base, image_files, point_cloud_io
 from gen_data.exporters.conventions import POINT_TIME, READING, Conventions
-from gen_data.exporters.image_files import link_or_copy
-from gen_data.exporters.point_cloud_io import (
-    PointTime,
-    count_times_from,
-    read_points,
-    scanner_at_sweep,
-)
 from gen_data.exporters.sensor_selection import has_scans, instant_s
 
 FILE_POINT = np.dtype(
@@ -60,7 +52,7 @@ PLY_TYPES = {"<f4": "float", "<u2": "uint16", "|u1": "uint8"}
 PCD_TYPES = {"<f4": ("4", "F"), "<u2": ("2", "U"), "|u1": ("1", "U")}
 
 
-class PointClouds(ExporterBase):
+class PointClouds(base.ExporterBase):
     """PLY or PCD files of every laser scan.
 
     Attributes:
@@ -77,9 +69,9 @@ class PointClouds(ExporterBase):
     )
     own_classes: ClassVar[bool] = True
 
-    image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
+    image_formats: ClassVar[frozenset[str]] = base.ANY_FORMAT
     format: Literal["ply", "pcd"] = "ply"
-    point_time: PointTime = "sweep_middle"
+    point_time: point_cloud_io.PointTime = "sweep_middle"
 
     def check(self, info: DatasetInfo) -> None:
         """Reject a data set without a laser scanner.
@@ -88,7 +80,7 @@ class PointClouds(ExporterBase):
             ConfigError: there is none.
         """
         if not info.lidars:
-            raise ConfigError(
+            raise errors.ConfigError(
                 "exporter 'pointclouds': there is no lidar; add a sensor of that type"
             )
 
@@ -102,9 +94,11 @@ class PointClouds(ExporterBase):
             folder.mkdir(parents=True, exist_ok=True)
             mine = [sample for sample in kept if has_scans(shard_dir, lidar, sample.index)]
             for sample in mine:
-                stored = read_points(shard_dir, lidar, sample.index)
-                sweep_s = scanner_at_sweep(sample, lidar).sweep_s
-                points = file_points(count_times_from(self.point_time, stored, sweep_s))
+                stored = point_cloud_io.read_points(shard_dir, lidar, sample.index)
+                sweep_s = point_cloud_io.scanner_at_sweep(sample, lidar).sweep_s
+                points = file_points(
+                    point_cloud_io.count_times_from(self.point_time, stored, sweep_s)
+                )
                 path = folder / f"{sample.index:09d}.{self.format}"
                 path.write_bytes(encoded(points, self._statements()))
             lines = "".join(canonical_json(self._pose(sample, lidar)) + "\n" for sample in mine)
@@ -115,7 +109,7 @@ class PointClouds(ExporterBase):
         return {**self.conventions.facts(), "point_time": self.point_time}
 
     def _pose(self, sample: Sample, lidar: str) -> dict[str, Any]:
-        scanner = scanner_at_sweep(sample, lidar)
+        scanner = point_cloud_io.scanner_at_sweep(sample, lidar)
         return {
             "index": sample.index,
             "time_s": instant_s(sample, lidar),
@@ -143,7 +137,7 @@ class PointClouds(ExporterBase):
             target.mkdir(parents=True, exist_ok=True)
             for folder in folders:
                 for path in sorted(folder.glob(f"*.{self.format}")):
-                    link_or_copy(path, target / path.name)
+                    image_files.link_or_copy(path, target / path.name)
             lines = "".join((folder / "poses.jsonl").read_text("utf-8") for folder in folders)
             (target / "poses.jsonl").write_text(lines, encoding="utf-8", newline="\n")
 
@@ -194,10 +188,10 @@ def pcd_bytes(points: NDArray[np.void], statements: Mapping[str, str]) -> bytes:
     return ("\n".join(header) + "\n").encode("ascii") + points.tobytes()
 
 
-def lidar_boxes(sample: Sample, lidar: str) -> list[tuple[Instance, OrientedBox]]:
+def lidar_boxes(sample: Sample, lidar: str) -> list[tuple[Instance, boxes.OrientedBox]]:
     """Boxes of all annotated instances in a laser scanner's frame at its sweep, by id."""
     scene = sample.scene_of(lidar)
-    T_lidar_world = scanner_at_sweep(sample, lidar).T_world_lidar.inverse()
+    T_lidar_world = point_cloud_io.scanner_at_sweep(sample, lidar).T_world_lidar.inverse()
     things = sorted((i for i in scene.instances if i.annotated), key=lambda i: i.instance_id)
     return [(thing, thing.box3d.seen_from(T_lidar_world)) for thing in things]
 

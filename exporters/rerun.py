@@ -38,20 +38,16 @@ from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.sample import ObjectTruth, Sample
 from gen_data.core.se3 import SE3
 from gen_data.core.skeletons import Skeleton, find_skeleton
-from gen_data.exporters.base import PNG_OR_JPEG, ExporterBase, check_installed
+from gen_data.exporters import base, image_files, label_colors, point_cloud_io, rrd_container
 from gen_data.exporters.conventions import READING, Conventions
 from gen_data.exporters.fragments import fragment_rows, write_fragment
-from gen_data.exporters.image_files import read_pixels
-from gen_data.exporters.label_colors import voc_palette
-from gen_data.exporters.point_cloud_io import read_points
-from gen_data.exporters.rrd_container import write_recording
 
 DEPTHS = (Channel.Z_DEPTH, Channel.MEASURED_DEPTH)
 Row = Mapping[str, Any]
 """Facts about one sample, as ``_sample_row`` makes them, with the folder of its shard."""
 
 
-class Rerun(ExporterBase):
+class Rerun(base.ExporterBase):
     """Rerun recordings of all cameras and laser scanners.
 
     Attributes:
@@ -67,7 +63,7 @@ class Rerun(ExporterBase):
     )
     annotators: ClassVar[frozenset[str]] = frozenset({"boxes2d", "boxes3d"})
 
-    image_formats: ClassVar[frozenset[str]] = PNG_OR_JPEG
+    image_formats: ClassVar[frozenset[str]] = base.PNG_OR_JPEG
     samples_per_file: int = Field(100, ge=1, le=10_000)
 
     def check(self, info: DatasetInfo) -> None:
@@ -77,7 +73,7 @@ class Rerun(ExporterBase):
             ConfigError: it is not installed.
         """
         del info
-        check_installed(self.type, "rerun")
+        base.check_installed(self.type, "rerun")
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
         """Write a JSON line per sample; images and points are read when files are merged."""
@@ -100,7 +96,7 @@ class Rerun(ExporterBase):
                 path = dataset_dir / split / f"{number:06d}.rrd"
                 listed = [{**row, "shard": shard_dir} for shard_dir, row in members]
                 name = f"{info.name}-{info.seed}-{split}-{number:06d}"
-                write_recording(path, list(_chunks(info, listed, keypoints)), name)
+                rrd_container.write_recording(path, list(_chunks(info, listed, keypoints)), name)
                 number += 1
 
 
@@ -236,7 +232,7 @@ def _describe_classes(info: DatasetInfo, skeletons: Mapping[int, Skeleton]) -> l
     """Names, colours and skeletons of the categories."""
     import rerun as rr
 
-    palette = voc_palette()
+    palette = label_colors.voc_palette()
     described = [rr.ClassDescription(info=rr.AnnotationInfo(id=0, label="background"))]
     for number, name in enumerate(info.categories, 1):
         color = palette[1 + (number - 1) % 255].tolist()
@@ -315,7 +311,7 @@ def _channel_columns(
 
 def _read_ids(path: Path) -> NDArray[np.uint16]:
     """Category ids, uint16 [h, w]."""
-    return np.asarray(read_pixels(path), np.uint16)
+    return np.asarray(image_files.read_pixels(path), np.uint16)
 
 
 def _blobs(paths: Iterable[Path]) -> list[np.ndarray]:
@@ -341,7 +337,7 @@ def _lidar_chunks(info: DatasetInfo, name: str, rows: Sequence[Row]) -> Iterator
 
     path = f"world/lidars/{name}"
     yield _poses(info, path, rows)
-    points = [read_points(row["shard"], name, row["index"]) for row in rows]
+    points = [point_cloud_io.read_points(row["shard"], name, row["index"]) for row in rows]
     joined = np.concatenate(points)
     if len(joined):
         columns = rr.Points3D.columns(

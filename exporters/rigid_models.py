@@ -17,13 +17,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gen_data.core import colorimetry, errors, serialization
 from gen_data.core.asset_types import Material, MeshData, Symmetry
-from gen_data.core.colorimetry import srgb_decode, srgb_encode
-from gen_data.core.errors import AssetError
 from gen_data.core.interfaces import AssetLibrary, FileFrames
 from gen_data.core.scene import Body, Instance, Scene
 from gen_data.core.se3 import IDENTITY, SE3, Array, Vec3
-from gen_data.core.serialization import canonical_json
 from gen_data.exporters.symmetry_search import (
     POINTS,
     PROBES,
@@ -95,7 +93,7 @@ def rigid_pieces(scene: Scene) -> dict[int, tuple[Piece, ...]]:
 
 def model_key(pieces: Sequence[Piece]) -> str:
     """Digest of a geometry; equal for equal pieces."""
-    return sha256(canonical_json(pieces).encode("utf-8")).hexdigest()[:16]
+    return sha256(serialization.canonical_json(pieces).encode("utf-8")).hexdigest()[:16]
 
 
 def build_model(pieces: Sequence[Piece], assets: AssetLibrary) -> Model:
@@ -240,8 +238,8 @@ def _colors(material: Material, uvs: NDArray[np.float32], assets: AssetLibrary) 
                 np.floor((1.0 - v) * height).astype(int) % height,
                 np.floor(u * width).astype(int) % width,
             ]
-        linear = linear * srgb_decode(texels / 255.0)
-    return np.rint(255.0 * srgb_encode(np.clip(linear, 0.0, 1.0)))
+        linear = linear * colorimetry.srgb_decode(texels / 255.0)
+    return np.rint(255.0 * colorimetry.srgb_encode(np.clip(linear, 0.0, 1.0)))
 
 
 def _size_info(vertices: NDArray[np.void]) -> dict[str, float]:
@@ -317,7 +315,7 @@ def _closure(generators: Sequence[Array], asset: str) -> list[Array]:
                 # The list grows while it is read, until no product is new.
                 found.append(product)
         if len(found) > SYMMETRIES_MAX:
-            raise AssetError(
+            raise errors.AssetError(
                 f"asset '{asset}': its symmetries generate more than {SYMMETRIES_MAX} poses; "
                 "expected axes through one point, at the angles of a prism or a regular solid"
             )

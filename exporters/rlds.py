@@ -31,10 +31,8 @@ from pydantic import Field
 from gen_data.core.capture import Channel
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.serialization import canonical_json
-from gen_data.exporters.base import check_installed
+from gen_data.exporters import base, fragments, lerobot
 from gen_data.exporters.conventions import ANY_LENS, Conventions
-from gen_data.exporters.fragments import fragment_rows, numbered_stem
-from gen_data.exporters.lerobot import LeRobot
 from gen_data.exporters.sequences import FRAMES, Frame, unbroken_episodes, write_text
 from gen_data.exporters.tfrecord import Feature, encode_example, encode_features, frame_record
 
@@ -63,7 +61,7 @@ _INTEGERS = (
 )
 
 
-class Rlds(LeRobot):
+class Rlds(lerobot.LeRobot):
     """RLDS-style TFRecord files of the episodes of one arm.
 
     Attributes:
@@ -80,7 +78,7 @@ class Rlds(LeRobot):
         Raises:
             ConfigError: as there, or the CRC library is missing.
         """
-        check_installed(self.type, "google_crc32c")
+        base.check_installed(self.type, "google_crc32c")
         super().check(info)
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
@@ -96,7 +94,7 @@ class Rlds(LeRobot):
                 facts = _describe(features, len(episode))
                 write_text(folder / "features.json", canonical_json(facts) + "\n")
             number = (written[key], totals[key], self.episodes_per_file)
-            stem = numbered_stem("episodes", *number)
+            stem = fragments.numbered_stem("episodes", *number)
             floats = {*FLOATS, *_REWARDS}
             record = frame_record(encode_example(encode_features(features, floats, _INTEGERS)))
             with (folder / f"{stem}.tfrecord").open("ab") as file:
@@ -104,7 +102,7 @@ class Rlds(LeRobot):
             written[key] += 1
 
     def _episodes(self, shard_dirs: Sequence[Path]) -> Iterator[list[Frame]]:
-        rows = fragment_rows(shard_dirs, self.type, FRAMES)
+        rows = fragments.fragment_rows(shard_dirs, self.type, FRAMES)
         return unbroken_episodes(Frame(shard_dir, row) for shard_dir, row in rows)
 
 

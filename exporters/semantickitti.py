@@ -38,12 +38,8 @@ from gen_data.core.sample import Sample
 from gen_data.core.scene import Scene
 from gen_data.core.se3 import SE3
 from gen_data.core.serialization import from_plain
-from gen_data.exporters.base import ANY_FORMAT, ExporterBase
+from gen_data.exporters import base, image_files, kitti, point_cloud_io, sensor_selection
 from gen_data.exporters.conventions import PINHOLE, Conventions
-from gen_data.exporters.image_files import link_or_copy
-from gen_data.exporters.kitti import calib_matrices, matrix_lines
-from gen_data.exporters.point_cloud_io import read_points, xyzi_bytes
-from gen_data.exporters.sensor_selection import check_pinholes, has_scans, instant_s
 from gen_data.exporters.sequences import (
     Frame,
     camera_mount,
@@ -111,7 +107,7 @@ SWEEP_S = 0.1
 INSTANCES_MAX = 65_535
 
 
-class SemanticKitti(ExporterBase):
+class SemanticKitti(base.ExporterBase):
     """SemanticKITTI: the scans of one laser scanner with a label per point."""
 
     type: Literal["semantickitti"] = "semantickitti"
@@ -120,7 +116,7 @@ class SemanticKitti(ExporterBase):
     )
     own_classes: ClassVar[bool] = True
 
-    image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
+    image_formats: ClassVar[frozenset[str]] = base.ANY_FORMAT
     lidar: str = ""
     """Sensor of the scans; empty = the first one by name."""
     camera: str = ""
@@ -145,7 +141,7 @@ class SemanticKitti(ExporterBase):
                     f"exporter '{self.type}': there is no {field} '{name}'; expected one of: "
                     f"{', '.join(known)}{did_you_mean(name, known)}"
                 )
-        check_pinholes(info, [self.camera or info.cameras[0]], self.type)
+        sensor_selection.check_pinholes(info, [self.camera or info.cameras[0]], self.type)
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
         """Write points and labels of each sample, and a line for its scan."""
@@ -154,15 +150,15 @@ class SemanticKitti(ExporterBase):
         folder = shard_dir / self.type
         rows = []
         for sample in samples:
-            if not has_scans(shard_dir, lidar, sample.index):
+            if not sensor_selection.has_scans(shard_dir, lidar, sample.index):
                 continue
-            points = read_points(shard_dir, lidar, sample.index)
+            points = point_cloud_io.read_points(shard_dir, lidar, sample.index)
             stem = folder / f"{sample.index:09d}"
-            write_bytes(stem.with_suffix(".bin"), xyzi_bytes(points))
+            write_bytes(stem.with_suffix(".bin"), point_cloud_io.xyzi_bytes(points))
             write_bytes(stem.with_suffix(".label"), point_labels(points, sample.scene).tobytes())
             row = {
                 "scene": sample.scene_index,
-                "time_s": instant_s(sample, lidar),
+                "time_s": sensor_selection.instant_s(sample, lidar),
                 "T_world_camera": mounted_pose(sample.scene, camera_mount(sample.scene, camera)),
                 "calib": _calib(sample.scene, camera, lidar),
             }
@@ -211,9 +207,9 @@ def point_labels(points: NDArray[np.void], scene: Scene) -> NDArray[np.uint32]:
 
 def _calib(scene: Scene, camera: str, lidar: str) -> str:
     T_camera_lidar = relative_pose(scene, camera_mount(scene, camera), lidar_mount(scene, lidar))
-    calib = calib_matrices(scene.camera(camera).intrinsics, T_camera_lidar.matrix()[:3])
+    calib = kitti.calib_matrices(scene.camera(camera).intrinsics, T_camera_lidar.matrix()[:3])
     projections = {k: calib[k] for k in ("P0", "P1", "P2", "P3")}
-    return matrix_lines(projections | {"Tr": calib["Tr_velo_to_cam"]})
+    return kitti.matrix_lines(projections | {"Tr": calib["Tr_velo_to_cam"]})
 
 
 def _group_by_split(sequences: Mapping[int, Sequence[Frame]]) -> dict[int, list[Frame]]:
@@ -233,13 +229,13 @@ def _write_sequence(info: DatasetInfo, scans: Sequence[Frame], folder: Path) -> 
     poses = []
     for k, scan in enumerate(scans):
         stem = scan.shard_dir / "semantickitti" / f"{scan.index:09d}"
-        link_or_copy(stem.with_suffix(".bin"), folder / f"velodyne/{k:06d}.bin")
+        image_files.link_or_copy(stem.with_suffix(".bin"), folder / f"velodyne/{k:06d}.bin")
         target = folder / f"labels/{k:06d}.label"
         if single:
             labels = np.frombuffer(stem.with_suffix(".label").read_bytes(), "<u4")
             write_bytes(target, _renumber(labels, scan.row["scene"], numbers).tobytes())
         else:
-            link_or_copy(stem.with_suffix(".label"), target)
+            image_files.link_or_copy(stem.with_suffix(".label"), target)
         pose = (T_first_world @ from_plain(SE3, scan.row["T_world_camera"])).rounded(9)
         poses.append(matrix_numbers(pose.matrix()[:3]) + "\n")
     times_s = [SWEEP_S * k if single else scan.row["time_s"] for k, scan in enumerate(scans)]

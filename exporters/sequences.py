@@ -14,11 +14,10 @@ from itertools import chain, count, groupby, pairwise
 from pathlib import Path
 from typing import Any
 
-from gen_data.core.errors import ConfigError
+from gen_data.core import errors, scene_time
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.sample import Sample
 from gen_data.core.scene import Scene
-from gen_data.core.scene_time import RIG_AXES
 from gen_data.core.se3 import SE3, Array
 from gen_data.exporters.fragments import fragment_rows, write_fragment
 
@@ -61,7 +60,7 @@ def check_frame_names(info: DatasetInfo, exporter: str) -> None:
         ConfigError: there are too many samples.
     """
     if info.n > _FRAMES_MAX:
-        raise ConfigError(
+        raise errors.ConfigError(
             f"exporter '{exporter}': frame names have six digits, but there are {info.n} samples; "
             f"expected at most {_FRAMES_MAX}"
         )
@@ -74,7 +73,7 @@ def check_sequence_count(info: DatasetInfo, limit: int, exporter: str) -> None:
         ConfigError: there are too many; the text gives the largest number of samples.
     """
     if sequence_count(info) > limit:
-        raise ConfigError(
+        raise errors.ConfigError(
             f"exporter '{exporter}': the format has names for {limit} sequences, but there are "
             f"{sequence_count(info)}; expected at most {limit * info.steps_per_scene} samples"
         )
@@ -167,7 +166,7 @@ def camera_mount(scene: Scene, name: str) -> Mount:
     camera = scene.camera(name)
     if camera.rig:
         return Mount(camera.rig, camera.T_rig_camera)
-    return Mount(f"/{name}", RIG_AXES.inverse())
+    return Mount(f"/{name}", scene_time.RIG_AXES.inverse())
 
 
 def lidar_mount(scene: Scene, name: str) -> Mount:
@@ -187,7 +186,7 @@ def _carried_mount(scene: Scene, rig: str, camera: str, T_rig_sensor: SE3) -> Mo
     if rig:
         return Mount(rig, T_rig_sensor)
     carrier = camera_mount(scene, camera)
-    return Mount(carrier.rig, carrier.T_rig_sensor @ RIG_AXES @ T_rig_sensor)
+    return Mount(carrier.rig, carrier.T_rig_sensor @ scene_time.RIG_AXES @ T_rig_sensor)
 
 
 def mounted_pose(scene: Scene, mount: Mount) -> SE3:
@@ -223,5 +222,5 @@ def write_bytes(path: Path, data: bytes) -> None:
 
 def _rig_pose(scene: Scene, rig: str) -> SE3:
     if rig.startswith("/"):
-        return scene.camera(rig[1:]).T_world_camera @ RIG_AXES
+        return scene.camera(rig[1:]).T_world_camera @ scene_time.RIG_AXES
     return scene.rig_pose(rig)

@@ -31,22 +31,18 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
+from gen_data.core import errors, intrinsics
 from gen_data.core.capture import Channel
-from gen_data.core.errors import ConfigError
 from gen_data.core.interfaces import DatasetInfo
-from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.motion import STILL, Twist
 from gen_data.core.sample import ObjectTruth, Sample
 from gen_data.core.scene import Camera, Scene
 from gen_data.core.scene_time import rig_twist
 from gen_data.core.se3 import SE3, Array, Vec3, rotation_to_quaternion
 from gen_data.core.serialization import canonical_json
-from gen_data.exporters.base import PNG_OR_JPEG, ExporterBase
+from gen_data.exporters import base, fragments, image_files, label_png
 from gen_data.exporters.conventions import EDGES, PINHOLE, READING, Conventions
-from gen_data.exporters.fragments import fragment_rows, write_fragment
 from gen_data.exporters.id_colors import id_color, id_colors
-from gen_data.exporters.image_files import link_or_copy
-from gen_data.exporters.label_png import encode_label_png, number_masks
 from gen_data.exporters.sensor_selection import check_pinholes, instant_s, rgb_camera, rgb_cameras
 from gen_data.exporters.sequences import frame_facts, write_bytes, write_text
 
@@ -81,7 +77,7 @@ UNITY_OBJECT = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
 FRAMES = "frames"
 
 
-class Solo(ExporterBase):
+class Solo(base.ExporterBase):
     """Unity SOLO: images of all cameras with boxes and segmentation, one data set per split."""
 
     type: Literal["solo"] = "solo"
@@ -90,7 +86,7 @@ class Solo(ExporterBase):
     )
     annotators: ClassVar[frozenset[str]] = frozenset({"instance_masks", "boxes3d"})
 
-    image_formats: ClassVar[frozenset[str]] = PNG_OR_JPEG
+    image_formats: ClassVar[frozenset[str]] = base.PNG_OR_JPEG
 
     def check(self, info: DatasetInfo) -> None:
         """Reject a data set that this format cannot represent.
@@ -102,7 +98,7 @@ class Solo(ExporterBase):
         rgb_camera(info, "", self.type)
         check_pinholes(info, rgb_cameras(info), self.type)
         if info.n % info.steps_per_scene:
-            raise ConfigError(
+            raise errors.ConfigError(
                 f"exporter '{self.type}': all sequences must have the same length; expected a "
                 f"multiple of {info.steps_per_scene} samples, not {info.n}"
             )
@@ -124,12 +120,12 @@ class Solo(ExporterBase):
                 captures = [_capture(info, sample, name) for name in cameras]
                 time_s = round(instant_s(sample, cameras[0]), 9)
                 rows.append({**frame_facts(info, sample), "time_s": time_s, "captures": captures})
-        write_fragment(folder, FRAMES, rows)
+        fragments.write_fragment(folder, FRAMES, rows)
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Number sequences and frames of each split, and link their images."""
         counts: dict[str, _Counter] = {}
-        for shard_dir, row in fragment_rows(shard_dirs, self.type, FRAMES):
+        for shard_dir, row in fragments.fragment_rows(shard_dirs, self.type, FRAMES):
             counter = counts.setdefault(row["split"], _Counter())
             counter.advance(row["sequence"])
             folder = dataset_dir / row["split"] / f"sequence.{counter.sequence}"
@@ -285,7 +281,7 @@ def _camera_twist(scene: Scene, camera: Camera) -> Twist:
     return STILL
 
 
-def _projection(camera: Intrinsics) -> list[float]:
+def _projection(camera: intrinsics.Intrinsics) -> list[float]:
     """Upper left part of the projection matrix, row by row; the far plane is at infinity."""
     width, height = camera.width_px, camera.height_px
     shift_x, shift_y = 1.0 - 2.0 * camera.cx_px / width, 2.0 * camera.cy_px / height - 1.0
@@ -312,13 +308,13 @@ def _write_segmentation(folder: Path, sample: Sample, name: str) -> None:
     truth = sample.truth[name]
     camera = truth.camera.intrinsics
     seen = [thing for thing in truth.objects if thing.box is not None and not thing.ignored]
-    numbers = number_masks(seen, camera.height_px, camera.width_px)
+    numbers = label_png.number_masks(seen, camera.height_px, camera.width_px)
     for kind, ids in (
         (INSTANCES, [0, *(thing.instance.instance_id for thing in seen)]),
         (LABELS, [0, *(thing.instance.category_id for thing in seen)]),
     ):
         path = folder / _shard_name(sample.index, name, kind)
-        write_bytes(path, encode_label_png(numbers, id_colors()[ids]))
+        write_bytes(path, label_png.encode_label_png(numbers, id_colors()[ids]))
 
 
 def _shard_name(index: int, sensor: str, kind: str) -> str:
@@ -341,11 +337,11 @@ def _link_images(
 ) -> None:
     sensor = capture["id"]
     rgb = info.media_path(shard_dir, sensor, Channel.RGB, index)
-    link_or_copy(rgb, folder / capture["filename"])
+    image_files.link_or_copy(rgb, folder / capture["filename"])
     for annotation in capture["annotations"]:
         if "filename" in annotation:
             source = shard_dir / "solo" / _shard_name(index, sensor, annotation["id"])
-            link_or_copy(source, folder / annotation["filename"])
+            image_files.link_or_copy(source, folder / annotation["filename"])
 
 
 def _write_definitions(info: DatasetInfo, folder: Path, counter: _Counter) -> None:

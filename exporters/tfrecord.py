@@ -41,17 +41,14 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from gen_data.core.capture import Channel
+from gen_data.core import capture, serialization
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.lens import Lens
 from gen_data.core.sample import ImageTruth, ObjectTruth, Sample
-from gen_data.core.serialization import canonical_json
-from gen_data.exporters.base import PNG_OR_JPEG, ExporterBase, check_installed
+from gen_data.exporters import base, ignored_regions, png
 from gen_data.exporters.conventions import Conventions
 from gen_data.exporters.fragments import fragment_rows, numbered_stem, write_fragment
-from gen_data.exporters.ignored_regions import each_class
 from gen_data.exporters.lens_fields import lens_fields
-from gen_data.exporters.png import RowFilter, encode_png
 from gen_data.exporters.sensor_selection import photographs, rgb_camera
 from gen_data.exporters.sequences import write_bytes, write_text
 
@@ -86,7 +83,7 @@ INTEGERS = frozenset(
 Feature = Sequence[bytes] | Sequence[int] | Sequence[float]
 
 
-class TfRecord(ExporterBase):
+class TfRecord(base.ExporterBase):
     """TFRecord files with the keys of the Object Detection API.
 
     Attributes:
@@ -101,7 +98,7 @@ class TfRecord(ExporterBase):
         lens="any; `image/lens/*`",
     )
 
-    image_formats: ClassVar[frozenset[str]] = PNG_OR_JPEG
+    image_formats: ClassVar[frozenset[str]] = base.PNG_OR_JPEG
     rows_per_file: int = Field(1000, ge=1)
     masks: Literal["png", "none"] = "none"
 
@@ -116,7 +113,7 @@ class TfRecord(ExporterBase):
         Raises:
             ConfigError: no sensor writes the rgb channel, or the CRC library is missing.
         """
-        check_installed(self.type, "google_crc32c")
+        base.check_installed(self.type, "google_crc32c")
         rgb_camera(info, "", self.type)
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
@@ -156,7 +153,7 @@ class TfRecord(ExporterBase):
         """Labels of one image by key, without its pixels."""
         truth = sample.truth[sensor]
         visible = [thing for thing in truth.objects if thing.box is not None]
-        things = list(each_class(info, visible))
+        things = list(ignored_regions.each_class(info, visible))
         labels = _image_labels(info, sample, sensor) | _object_labels(truth, things)
         if self.masks == "png":
             labels["image/object/mask"] = [_mask_png(truth, thing) for thing in things]
@@ -169,7 +166,7 @@ class TfRecord(ExporterBase):
 
 
 def _image_labels(info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Feature]:
-    camera, encoding = sample.truth[sensor].camera, info.encoding(sensor, Channel.RGB)
+    camera, encoding = sample.truth[sensor].camera, info.encoding(sensor, capture.Channel.RGB)
     return {
         "image/filename": [f"{sample.index:09d}_{sensor}{encoding.suffix}".encode()],
         "image/source_id": [str(sample.image_id(sensor)).encode()],
@@ -182,7 +179,7 @@ def _image_labels(info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, F
         **_lens_labels(camera.intrinsics.lens),
         "image/intrinsics": camera.intrinsics.matrix().ravel().tolist(),
         "image/T_world_camera": camera.T_world_camera.matrix().ravel().tolist(),
-        "image/conventions": [canonical_json(TfRecord.conventions.facts()).encode()],
+        "image/conventions": [serialization.canonical_json(TfRecord.conventions.facts()).encode()],
     }
 
 
@@ -229,7 +226,7 @@ def _mask_png(truth: ImageTruth, thing: ObjectTruth) -> bytes:
     pixels = np.zeros((camera.height_px, camera.width_px), np.uint8)
     rows, columns = mask.pixels.shape
     pixels[mask.y_px : mask.y_px + rows, mask.x_px : mask.x_px + columns] = mask.pixels
-    return encode_png(pixels, RowFilter.UP, 1)
+    return png.encode_png(pixels, png.RowFilter.UP, 1)
 
 
 def _images(info: DatasetInfo, shard_dir: Path, sensor: str, index: int) -> dict[str, Feature]:
@@ -237,7 +234,7 @@ def _images(info: DatasetInfo, shard_dir: Path, sensor: str, index: int) -> dict
     images: dict[str, Feature] = {}
     for channel in info.media[sensor]:
         data = info.media_path(shard_dir, sensor, channel, index).read_bytes()
-        if channel is Channel.RGB:
+        if channel is capture.Channel.RGB:
             images["image/encoded"] = [data]
             images["image/key/sha256"] = [sha256(data).hexdigest().encode()]
         else:

@@ -22,22 +22,18 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
-from gen_data.core.capture import Channel
-from gen_data.core.errors import ConfigError, did_you_mean
+from gen_data.core import capture, errors
 from gen_data.core.interfaces import DatasetInfo, media_path
 from gen_data.core.sample import Sample
+from gen_data.exporters import image_files, measurement_tables, rgbd_sequences, sensor_selection
 from gen_data.exporters.conventions import PINHOLE, READING, Conventions
-from gen_data.exporters.image_files import link_or_copy
-from gen_data.exporters.measurement_tables import sequence_rows
-from gen_data.exporters.rgbd_sequences import RgbdExporter, depth_png, opencv_pinhole
-from gen_data.exporters.sensor_selection import instant_s
 from gen_data.exporters.sequences import Frame, read_sequences, write_bytes, write_text
 
 UNITS_PER_M = 5000
 FORCES = ("force_x_m_s2", "force_y_m_s2", "force_z_m_s2")
 
 
-class TumRgbd(RgbdExporter):
+class TumRgbd(rgbd_sequences.RgbdExporter):
     """TUM's RGB-D benchmark: a folder per sequence of one camera.
 
     Attributes:
@@ -63,14 +59,14 @@ class TumRgbd(RgbdExporter):
         self, info: DatasetInfo, sample: Sample, camera: str, shard_dir: Path
     ) -> dict[str, Any]:
         """Write depth in the format's units; return time, pose and calibration."""
-        data = depth_png(info, shard_dir, camera, sample.index, UNITS_PER_M)
+        data = rgbd_sequences.depth_png(info, shard_dir, camera, sample.index, UNITS_PER_M)
         write_bytes(shard_dir / self.type / f"{sample.index:09d}.png", data)
         view = sample.truth[camera].camera
         w, *xyz = view.T_world_camera.quaternion_wxyz
         return {
-            "time_s": instant_s(sample, camera),
+            "time_s": sensor_selection.instant_s(sample, camera),
             "pose": [*view.T_world_camera.translation_m, *xyz, w],
-            "calibration": opencv_pinhole(view.intrinsics),
+            "calibration": rgbd_sequences.opencv_pinhole(view.intrinsics),
         }
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
@@ -81,13 +77,13 @@ class TumRgbd(RgbdExporter):
             folder = folders[number] = dataset_dir / frames[0].row["split"] / f"{number:06d}"
             for frame in frames:
                 name = f"{_time(frame.row['time_s'])}.png"
-                rgb = media_path(frame.shard_dir, camera, Channel.RGB, frame.index)
-                link_or_copy(rgb, folder / "rgb" / name)
+                rgb = media_path(frame.shard_dir, camera, capture.Channel.RGB, frame.index)
+                image_files.link_or_copy(rgb, folder / "rgb" / name)
                 depth = frame.shard_dir / self.type / f"{frame.index:09d}.png"
-                link_or_copy(depth, folder / "depth" / name)
+                image_files.link_or_copy(depth, folder / "depth" / name)
             for name, text in sequence_texts(frames).items():
                 write_text(folder / name, text)
-        for number, rows in sequence_rows(info, shard_dirs, imu) if imu else ():
+        for number, rows in measurement_tables.sequence_rows(info, shard_dirs, imu) if imu else ():
             if number in folders:
                 lines = (_line(row["time_s"], [row[name] for name in FORCES]) for row in rows)
                 text = "# specific forces\n# file: accelerometer\n# timestamp ax ay az\n"
@@ -96,9 +92,9 @@ class TumRgbd(RgbdExporter):
     def _imu(self, info: DatasetInfo) -> str:
         known = [name for name, kind in info.devices.items() if kind == "imu"]
         if self.imu and self.imu not in known:
-            raise ConfigError(
+            raise errors.ConfigError(
                 f"exporter '{self.type}': there is no IMU '{self.imu}'; expected one of: "
-                f"{', '.join(known) or 'none'}{did_you_mean(self.imu, known)}"
+                f"{', '.join(known) or 'none'}{errors.did_you_mean(self.imu, known)}"
             )
         return self.imu or next(iter(known), "")
 

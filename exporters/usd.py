@@ -28,15 +28,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.core.asset_types import TextureData
+from gen_data.core import asset_types, scene_time
 from gen_data.core.interfaces import AssetLibrary, DatasetInfo
 from gen_data.core.sample import Sample
-from gen_data.core.scene_time import scene_at
 from gen_data.core.serialization import canonical_json
-from gen_data.exporters.base import ANY_FORMAT, AssetExporter, check_installed
+from gen_data.exporters import base, image_files, png
 from gen_data.exporters.conventions import Conventions
-from gen_data.exporters.image_files import link_or_copy
-from gen_data.exporters.png import RowFilter, encode_png
 from gen_data.exporters.sequences import write_bytes, write_text
 from gen_data.usd.asset_layer import TextureFiles, write_asset_layer
 from gen_data.usd.stage_writer import StageFiles, write_stage
@@ -44,7 +41,7 @@ from gen_data.usd.stage_writer import StageFiles, write_stage
 STAGES = "stages.jsonl"
 
 
-class Usd(AssetExporter):
+class Usd(base.AssetExporter):
     """One OpenUSD stage per view, with meshes, materials, lights, cameras and labels.
 
     Attributes:
@@ -58,7 +55,7 @@ class Usd(AssetExporter):
         time="time code = step; s between steps in `stages.jsonl`",
     )
 
-    image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
+    image_formats: ClassVar[frozenset[str]] = base.ANY_FORMAT
     format: Literal["usdc", "usda"] = "usdc"
 
     def check(self, info: DatasetInfo) -> None:
@@ -68,7 +65,7 @@ class Usd(AssetExporter):
             ConfigError: it is not installed.
         """
         del info
-        check_installed(self.type, "pxr")
+        base.check_installed(self.type, "pxr")
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
         """Write a stage for every sequence that starts in the shard, and its shared files."""
@@ -85,7 +82,7 @@ class Usd(AssetExporter):
                 for k in range(count)
                 for offset_s in (0.0, *offsets_s.values())
             }
-            instants = [scene_at(sample.scene, time_s) for time_s in sorted(times_s)]
+            instants = [scene_time.scene_at(sample.scene, time_s) for time_s in sorted(times_s)]
             path = folder / f"{sample.index:09d}.{self.format}"
             write_stage(path, instants, info.step_s, shared.files(), offsets_s)
             rows.append(_row(sample, path.name, count))
@@ -100,7 +97,7 @@ class Usd(AssetExporter):
                 target = dataset_dir / path.relative_to(folder)
                 # A shared file has the same bytes in all shards.
                 if not target.exists():
-                    link_or_copy(path, target)
+                    image_files.link_or_copy(path, target)
         lines = "".join((folder / STAGES).read_text("utf-8") for folder in folders)
         write_text(dataset_dir / STAGES, lines)
 
@@ -116,7 +113,7 @@ def _row(sample: Sample, name: str, steps: int) -> dict[str, Any]:
     }
 
 
-def _pack_shares(images: TextureData) -> NDArray[np.uint8] | None:
+def _pack_shares(images: asset_types.TextureData) -> NDArray[np.uint8] | None:
     """Pack occlusion in red and metallic in blue, as glTF does; None without either."""
     if images.occlusion is None and images.metallic is None:
         return None
@@ -167,7 +164,7 @@ class _SharedFiles:
         """Write an image and return its name; empty if there is none."""
         if pixels is None:
             return ""
-        write_bytes(self._folder / name, encode_png(pixels, RowFilter.SUB, 2))
+        write_bytes(self._folder / name, png.encode_png(pixels, png.RowFilter.SUB, 2))
         return name
 
     def _panorama(self, sky: str) -> str:

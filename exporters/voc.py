@@ -39,10 +39,8 @@ from gen_data.core.capture import Channel
 from gen_data.core.errors import ConfigError
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.sample import ImageTruth, ObjectTruth, Sample
-from gen_data.exporters.base import ANY_FORMAT, ExporterBase
-from gen_data.exporters.coco import image_name
+from gen_data.exporters import base, coco, fragments
 from gen_data.exporters.conventions import ANY_LENS, Conventions
-from gen_data.exporters.fragments import fragment_rows, write_fragment
 from gen_data.exporters.ignored_regions import each_class
 from gen_data.exporters.image_files import link_or_copy, read_pixels
 from gen_data.exporters.label_colors import voc_palette
@@ -68,7 +66,7 @@ FOLDERS = {
 }
 
 
-class Voc(ExporterBase):
+class Voc(base.ExporterBase):
     """Pascal VOC boxes and label images of all cameras with the rgb channel."""
 
     type: Literal["voc"] = "voc"
@@ -77,7 +75,7 @@ class Voc(ExporterBase):
     )
     annotators: ClassVar[frozenset[str]] = frozenset({"instance_masks", "visibility"})
 
-    image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
+    image_formats: ClassVar[frozenset[str]] = base.ANY_FORMAT
     images: Literal["jpeg", "png"] = "jpeg"
     """JPEG files, which all readers take: of quality 95, or links if the camera writes JPEG; or
     links to the files as they are."""
@@ -108,7 +106,7 @@ class Voc(ExporterBase):
             for sensor in rgb_cameras(info):
                 if sensor in sample.truth:
                     rows.append(self._write_image(info, sample, sensor, shard_dir))
-        write_fragment(shard_dir / self.type, "images", rows)
+        fragments.write_fragment(shard_dir / self.type, "images", rows)
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Link the files of all shards, and list the images of every set and class."""
@@ -118,7 +116,7 @@ class Voc(ExporterBase):
         write_text(root / "labelmap.txt", labelmap_text(info.categories))
         with ExitStack() as stack:
             files: dict[str, Any] = {}
-            for shard_dir, row in fragment_rows(shard_dirs, self.type, "images"):
+            for shard_dir, row in fragments.fragment_rows(shard_dirs, self.type, "images"):
                 stem = row["stem"]
                 for suffix, folder in FOLDERS.items():
                     source = shard_dir / f"{self.type}/{stem}{suffix}"
@@ -139,7 +137,7 @@ class Voc(ExporterBase):
         listed = [thing for thing in truth.objects if thing.box is not None]
         # VOC's files name objects by their order; ignored ones have no number in label images.
         listed.sort(key=lambda thing: thing.ignored)
-        stem = Path(image_name(sample.index, sensor)).stem
+        stem = Path(coco.image_name(sample.index, sensor)).stem
         file_name = f"{stem}{self._suffix(info, sensor)}"
         row = {
             "stem": stem,

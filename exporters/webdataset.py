@@ -36,22 +36,16 @@ import numpy as np
 from numpy.lib.recfunctions import structured_to_unstructured
 from pydantic import Field
 
-from gen_data.core.errors import ConfigError
+from gen_data.core import errors, serialization
 from gen_data.core.interfaces import DatasetInfo, cloud_path, table_path
 from gen_data.core.sample import Sample
-from gen_data.core.serialization import canonical_json
-from gen_data.exporters.base import ANY_FORMAT, ExporterBase
-from gen_data.exporters.coco import image_labels
+from gen_data.exporters import base, coco, fragments, point_cloud_io, sensor_selection, sequences
 from gen_data.exporters.conventions import EDGES, READING, Conventions
-from gen_data.exporters.fragments import fragment_rows, write_fragment
-from gen_data.exporters.point_cloud_io import scanner_at_sweep
-from gen_data.exporters.sensor_selection import has_scans
-from gen_data.exporters.sequences import sequence_number
 
 SAMPLES = "samples"
 
 
-class WebDataset(ExporterBase):
+class WebDataset(base.ExporterBase):
     """Tar files of samples: images, scans, rows and labels of all sensors.
 
     Attributes:
@@ -69,7 +63,7 @@ class WebDataset(ExporterBase):
     )
     annotators: ClassVar[frozenset[str]] = frozenset({"instance_masks", "boxes2d"})
 
-    image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
+    image_formats: ClassVar[frozenset[str]] = base.ANY_FORMAT
     samples_per_tar: int = Field(500, ge=1)
 
     def check(self, info: DatasetInfo) -> None:
@@ -82,7 +76,7 @@ class WebDataset(ExporterBase):
         for name in (sensor.name for sensor in info.sensors):
             other = seen.setdefault(name.lower(), name)
             if other != name:
-                raise ConfigError(
+                raise errors.ConfigError(
                     f"exporter '{self.type}': sensors '{other}' and '{name}' differ in case only, "
                     "but fields have lower-case names; rename one of them"
                 )
@@ -91,13 +85,13 @@ class WebDataset(ExporterBase):
         """Write one JSON line per sample: its labels."""
         self.check(info)
         rows = ({"split": s.split, "labels": sample_labels(info, s)} for s in samples)
-        write_fragment(shard_dir / self.type, SAMPLES, rows)
+        fragments.write_fragment(shard_dir / self.type, SAMPLES, rows)
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Pack the samples of each split, in order."""
         tars: dict[str, _TarFiles] = {}
         try:
-            for shard_dir, row in fragment_rows(shard_dirs, self.type, SAMPLES):
+            for shard_dir, row in fragments.fragment_rows(shard_dirs, self.type, SAMPLES):
                 split, labels = row["split"], row["labels"]
                 if split not in tars:
                     stem = "_".join(info.name.split())
@@ -116,17 +110,19 @@ def sample_labels(info: DatasetInfo, sample: Sample) -> dict[str, Any]:
         "scene": sample.scene_index,
         "view": sample.view_index,
         "step": sample.step_index,
-        "sequence": sequence_number(info, sample.index),
+        "sequence": sequences.sequence_number(info, sample.index),
         "split": sample.split,
         "time_s": sample.scene.time_s,
         "categories": info.categories,
         "depth_scale_m": info.depth_scale_m,
         "conventions": WebDataset.conventions.facts(),
-        "cameras": {name: image_labels(info, sample, name) for name in sorted(sample.truth)},
+        "cameras": {name: coco.image_labels(info, sample, name) for name in sorted(sample.truth)},
         "lidars": {
             name: {
                 "time_s": cloud.time_s,
-                "T_world_lidar": scanner_at_sweep(sample, name).T_world_lidar.matrix().tolist(),
+                "T_world_lidar": point_cloud_io.scanner_at_sweep(sample, name)
+                .T_world_lidar.matrix()
+                .tolist(),
             }
             for name, cloud in sorted(sample.capture.clouds.items())
         },
@@ -146,7 +142,7 @@ def _fields(
         for channel in info.media[camera]
     }
     for lidar in info.lidars:
-        if has_scans(shard_dir, lidar, index):
+        if sensor_selection.has_scans(shard_dir, lidar, index):
             paths[f"{lidar}.points.npy"] = cloud_path(shard_dir, lidar, index)
     for device in info.devices:
         path = table_path(shard_dir, device, index)
@@ -159,7 +155,7 @@ def _fields(
             columns[name.lower()], fields[name] = _plain_npy(path)
         else:
             fields[name] = path.read_bytes()
-    fields["json"] = canonical_json({**labels, "columns": columns}).encode()
+    fields["json"] = serialization.canonical_json({**labels, "columns": columns}).encode()
     for name in sorted(fields):
         yield name.lower(), fields[name]
 

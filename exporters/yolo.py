@@ -37,25 +37,20 @@ import cv2
 import numpy as np
 from pydantic import Field
 
-from gen_data.core.boxes import BoxPx
+from gen_data.core import boxes, skeletons
 from gen_data.core.capture import Channel
 from gen_data.core.errors import ConfigError, did_you_mean
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.sample import KeypointTruth, ObjectTruth, Sample
 from gen_data.core.se3 import Array
-from gen_data.core.skeletons import find_skeleton
-from gen_data.exporters.base import ANY_FORMAT, ExporterBase
-from gen_data.exporters.coco import image_name
+from gen_data.exporters import base, coco, fragments, image_files, sensor_selection
 from gen_data.exporters.conventions import ANY_LENS, Conventions
-from gen_data.exporters.fragments import fragment_lines, fragment_rows, write_fragment
-from gen_data.exporters.image_files import link_or_copy
 from gen_data.exporters.mask_polygons import (
     Polygon,
     drawable_polygons,
     join_polygons,
     mask_polygons,
 )
-from gen_data.exporters.sensor_selection import check_channels, rgb_cameras
 from gen_data.exporters.sequences import write_text
 
 Task = Literal["detect", "segment", "pose", "obb"]
@@ -64,7 +59,7 @@ PEOPLE = ("person", "pedestrian")
 """Categories whose keypoints are preferred if none is named."""
 
 
-class Yolo(ExporterBase):
+class Yolo(base.ExporterBase):
     """YOLO data sets of all cameras with the rgb channel, one per task."""
 
     type: Literal["yolo"] = "yolo"
@@ -74,7 +69,7 @@ class Yolo(ExporterBase):
         lens=ANY_LENS,
     )
 
-    image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
+    image_formats: ClassVar[frozenset[str]] = base.ANY_FORMAT
     tasks: tuple[Task, ...] = Field(("detect", "segment"), min_length=1)
     """Tasks to write: ``detect``, ``segment``, ``pose`` (keypoints) and ``obb`` (rotated boxes)."""
     pose_category: str = ""
@@ -92,7 +87,7 @@ class Yolo(ExporterBase):
         Raises:
             ConfigError: no sensor writes the rgb channel, or there is no such category.
         """
-        check_channels(info, (), self.type)
+        sensor_selection.check_channels(info, (), self.type)
         if self.pose_category and self.pose_category not in info.categories:
             raise ConfigError(
                 f"exporter '{self.type}': pose_category: there is no category "
@@ -109,7 +104,7 @@ class Yolo(ExporterBase):
         rows: dict[str, list[dict[str, Any]]] = {}
         names: dict[int, dict[str, None]] = {}
         for sample in samples:
-            for sensor in rgb_cameras(info):
+            for sensor in sensor_selection.rgb_cameras(info):
                 if sensor not in sample.truth:
                     continue
                 row = self._image_row(info, sample, sensor)
@@ -119,9 +114,9 @@ class Yolo(ExporterBase):
                     listed.update((p.name, None) for p in thing.keypoints or ())
         folder = shard_dir / self.type
         for stem, lines in rows.items():
-            write_fragment(folder, stem, lines)
+            fragments.write_fragment(folder, stem, lines)
         points = [{"category_id": k, "names": list(names[k])} for k in sorted(names) if names[k]]
-        write_fragment(folder, "keypoints", points)
+        fragments.write_fragment(folder, "keypoints", points)
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Write the labels of each image and task, and link the images."""
@@ -130,14 +125,14 @@ class Yolo(ExporterBase):
         tasks = [task for task in dict.fromkeys(self.tasks) if task != "pose" or pose]
         written = [s for s in SPLITS if any((f / f"{s}.images.jsonl").exists() for f in folders)]
         for split in written:
-            for shard_dir, row in fragment_rows(shard_dirs, self.type, f"{split}.images"):
+            for shard_dir, row in fragments.fragment_rows(shard_dirs, self.type, f"{split}.images"):
                 source = info.media_path(shard_dir, row["sensor"], Channel.RGB, row["sample"])
                 for task in tasks:
                     rows = pose.rows(row["pose"]) if task == "pose" and pose else row[task]
                     name = str(row["file_name"])
                     label = dataset_dir / f"{task}/labels/{split}/{name.rpartition('.')[0]}.txt"
                     write_text(label, "".join(f"{line}\n" for line in dict.fromkeys(rows)))
-                    link_or_copy(source, dataset_dir / f"{task}/images/{split}/{name}")
+                    image_files.link_or_copy(source, dataset_dir / f"{task}/images/{split}/{name}")
         for task in tasks:
             text = data_text(info, task, written, pose if task == "pose" else None)
             write_text(dataset_dir / task / "data.yaml", text)
@@ -153,7 +148,7 @@ class Yolo(ExporterBase):
             "obb": partial(_obb_row, size),
         }
         return {
-            "file_name": image_name(
+            "file_name": coco.image_name(
                 sample.index, sensor, info.encoding(sensor, Channel.RGB).suffix
             ),
             "sensor": sensor,
@@ -164,7 +159,7 @@ class Yolo(ExporterBase):
     def _pose(self, info: DatasetInfo, folders: Sequence[Path]) -> _Pose | None:
         """Category and keypoints of the task pose; None if no object has keypoints."""
         names: dict[int, dict[str, None]] = {}
-        for line in fragment_lines(folders, "keypoints"):
+        for line in fragments.fragment_lines(folders, "keypoints"):
             row = json.loads(line)
             names.setdefault(row["category_id"], {}).update(dict.fromkeys(row["names"]))
         by_name = {info.categories[k - 1]: k for k in sorted(names)}
@@ -173,7 +168,7 @@ class Yolo(ExporterBase):
         if chosen is None:
             return None
         number = by_name[chosen]
-        return _Pose(chosen, number, find_skeleton(names[number]).names)
+        return _Pose(chosen, number, skeletons.find_skeleton(names[number]).names)
 
 
 class _Pose:
@@ -297,7 +292,7 @@ def _keypoint(size: Array, point: KeypointTruth) -> str:
     return f"{_coordinates(np.array(point.image_px) / size)} {point.visibility}"
 
 
-def _box(size: Array, box: BoxPx | None) -> str:
+def _box(size: Array, box: boxes.BoxPx | None) -> str:
     assert box is not None, "invisible objects are not listed"
     corners = np.array([[box.x_min, box.y_min], [box.x_max, box.y_max]]) / size
     return _coordinates(np.stack([0.5 * (corners[0] + corners[1]), corners[1] - corners[0]]))

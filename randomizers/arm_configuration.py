@@ -12,8 +12,7 @@ from gen_data.core.interfaces import AssetIndex
 from gen_data.core.scene import ArmGoal, Articulation, Body, Scene
 from gen_data.core.se3 import SE3, Vec3
 from gen_data.core.streams import Rng
-from gen_data.randomizers.base import RandomizerBase
-from gen_data.randomizers.placement import half_extents_m
+from gen_data.randomizers import base, placement
 
 MODES = ("joints", "reach", "hold")
 GRASP_MARGIN = 0.9
@@ -22,7 +21,7 @@ FLIP = SE3(quaternion_wxyz=(0.0, 1.0, 0.0, 0.0))
 """Half a turn about X: the hand points down."""
 
 
-class ArmConfiguration(RandomizerBase):
+class ArmConfiguration(base.RandomizerBase):
     """Draws a goal for every arm; physics takes the first collision-free candidate.
 
     Attributes:
@@ -121,4 +120,4 @@ def _draw_graspable(scene: Scene, robot: RobotModel, assets: AssetIndex, rng: Rn
 
 def _width_m(body: Body, assets: AssetIndex) -> float:
     """Smaller horizontal extent of an upright object."""
-    return 2.0 * min(half_extents_m(*assets.bounds_m(body.asset), body.scale)[:2])
+    return 2.0 * min(placement.half_extents_m(*assets.bounds_m(body.asset), body.scale)[:2])

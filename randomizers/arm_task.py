@@ -12,10 +12,7 @@ from pydantic.config import JsonDict
 
 from gen_data.config import distributions as dist
 from gen_data.config.base_model import Strict
-from gen_data.core.asset_types import WORKSPACE_FROM_M
-from gen_data.core.errors import ConfigError
-from gen_data.core.interfaces import AssetIndex
-from gen_data.core.kinematics import arm_joints
+from gen_data.core import asset_types, errors, interfaces, kinematics, streams
 from gen_data.core.members import Member, add_members, remove_members
 from gen_data.core.scene import (
     HAND,
@@ -29,11 +26,9 @@ from gen_data.core.scene import (
     Scene,
 )
 from gen_data.core.se3 import IDENTITY, SE3, Vec3
-from gen_data.core.streams import Rng
-from gen_data.randomizers.arm_configuration import hand_pose
+from gen_data.randomizers import arm_configuration, placement
 from gen_data.randomizers.arm_task_table import Step, Success, Task, Thing, tasks
 from gen_data.randomizers.base import RandomizerBase, check_known
-from gen_data.randomizers.placement import half_extents_m
 
 SEEDS = 16
 """Variants to draw from where the table names a family."""
@@ -96,7 +91,7 @@ class ArmTask(RandomizerBase):
     failures: Failures = Failures()
     speed: Annotated[dist.Scalar, dist.Bounds(0.01, 1.0)] = dist.Uniform(0.4, 0.7)
 
-    def possible_assets(self, assets: AssetIndex) -> tuple[str, ...]:
+    def possible_assets(self, assets: interfaces.AssetIndex) -> tuple[str, ...]:
         """Ids of the assets of all tasks that it can draw."""
         del assets
         table = self._table()
@@ -109,21 +104,21 @@ class ArmTask(RandomizerBase):
         }
         return tuple(sorted(found))
 
-    def check(self, scene: Scene, assets: AssetIndex) -> None:
+    def check(self, scene: Scene, assets: interfaces.AssetIndex) -> None:
         """Check the names of tasks, of the group and of the arm, and that it has a gripper."""
         group = self._find_group(scene)
         known = {assets.get(asset).category for asset in group.assets}
         for asset in self.possible_assets(assets):
             if assets.get(asset).category not in known:
-                raise ConfigError(
+                raise errors.ConfigError(
                     f"randomizers.{self.name}.task: the object group '{group.name}' lacks "
                     f"'{asset.partition('?')[0]}'; expected it among its assets (ids)"
                 )
         arm = self._find_arm(scene)
         robot = assets.robot(arm.asset)
-        gripper, joints = robot.gripper, len(arm_joints(robot))
+        gripper, joints = robot.gripper, len(kinematics.arm_joints(robot))
         if gripper is None:
-            raise ConfigError(
+            raise errors.ConfigError(
                 f"randomizers.{self.name}: arm '{arm.name}' ({arm.asset}) has no gripper; expected "
                 "a robot with one, such as franka_panda, robots/ur5e or robots/sawyer"
             )
@@ -131,19 +126,19 @@ class ArmTask(RandomizerBase):
         for name in self._possible_tasks():
             task = self._table()[name]
             if task.hand not in (hand, None):
-                raise ConfigError(
+                raise errors.ConfigError(
                     f"randomizers.{self.name}.task: '{name}' needs {task.hand}, but arm "
                     f"'{arm.name}' ({arm.asset}) has {hand}; expected another robot, such as "
                     f"{_EXAMPLES[str(task.hand)]}"
                 )
             if joints < task.joints_min:
-                raise ConfigError(
+                raise errors.ConfigError(
                     f"randomizers.{self.name}.task: '{name}' needs {task.joints_min} joints to "
                     f"place {_FREEDOM[task.joints_min]}, but arm '{arm.name}' ({arm.asset}) has "
                     f"{joints}; expected another robot, or another task"
                 )
 
-    def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
+    def __call__(self, scene: Scene, assets: interfaces.AssetIndex, rng: streams.Rng) -> Scene:
         """Return the scene with the objects of a task, and an arm that has to perform it."""
         name = self.task.draw(rng)
         table, arm = self._table(), self._find_arm(scene)
@@ -195,9 +190,9 @@ class ArmTask(RandomizerBase):
             if self.arm in ("", arm.name):
                 return arm
         known = ", ".join(arm.name for arm in scene.articulations) or "none: add a robot"
-        raise ConfigError(f"randomizers.{self.name}.arm: there is no arm; expected {known}")
+        raise errors.ConfigError(f"randomizers.{self.name}.arm: there is no arm; expected {known}")
 
-    def _draw_failure(self, task: Task, rng: Rng) -> FailureKind:
+    def _draw_failure(self, task: Task, rng: streams.Rng) -> FailureKind:
         """Draw a kind of failure once per scene: all attempts at a layout are to fail alike.
 
         Else a kind that physics refuses more often than others would be rarer than its share.
@@ -214,7 +209,7 @@ class ArmTask(RandomizerBase):
         return ""
 
     def _place_things(
-        self, task: Task, arm: Articulation, assets: AssetIndex, rng: Rng
+        self, task: Task, arm: Articulation, assets: interfaces.AssetIndex, rng: streams.Rng
     ) -> dict[str, _Placed]:
         """Draw asset and pose of every object, apart from the ones before it."""
         placed: dict[str, _Placed] = {}
@@ -259,8 +254,8 @@ def _draw_place(
     asset: str,
     arm: Articulation,
     placed: Mapping[str, _Placed],
-    assets: AssetIndex,
-    rng: Rng,
+    assets: interfaces.AssetIndex,
+    rng: streams.Rng,
 ) -> _Placed:
     x, y = float(rng.uniform(*thing.x_m)), float(rng.uniform(*thing.y_m))
     yaw_rad = math.radians(float(rng.uniform(*thing.yaw_deg)))
@@ -270,10 +265,10 @@ def _draw_place(
         base = SE3.about_z(near.yaw_rad, (near.middle_m[0], near.middle_m[1], foot))
         yaw_rad += near.yaw_rad
     else:
-        ahead_m = assets.robot(arm.asset).workspace_from_m - WORKSPACE_FROM_M
+        ahead_m = assets.robot(arm.asset).workspace_from_m - asset_types.WORKSPACE_FROM_M
         base = arm.T_world_base @ SE3((ahead_m, 0.0, 0.0))
     low, high = assets.bounds_m(asset)
-    half = half_extents_m(low, high, 1.0)
+    half = placement.half_extents_m(low, high, 1.0)
     fixed = thing.mass_kg == 0.0 or thing.joint is not None
     lift = 0.0 if fixed else _LIFT_M
     stand = (base @ SE3((x, y, thing.z_m + lift))).translation_m
@@ -343,7 +338,7 @@ def _goals(
         if carried:
             poses = tuple(SE3.about_z(turn, latest_m).rounded() for turn in turns)
         else:
-            poses = tuple(hand_pose(latest_m, turn) for turn in turns)
+            poses = tuple(arm_configuration.hand_pose(latest_m, turn) for turn in turns)
         yield ArmGoal(
             "place" if step.verb == "place" else "reach",
             pose_candidates=poses,

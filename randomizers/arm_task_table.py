@@ -15,17 +15,14 @@ from typing import Literal
 
 from pydantic import Field, model_validator
 
-from gen_data.config.base_model import Strict
-from gen_data.config.data_files import load_data
-from gen_data.config.paths import find_path
-from gen_data.config.yaml_tree import Node, load_yaml
+from gen_data.config import base_model, data_files, paths, yaml_tree
 from gen_data.core.scene import HAND, Measure
 from gen_data.core.se3 import Vec3
 
 Span = tuple[float, float]
 
 
-class Thing(Strict):
+class Thing(base_model.Strict):
     """An object of a task.
 
     Attributes:
@@ -50,7 +47,7 @@ class Thing(Strict):
     joint: Joint | None = None
 
 
-class Joint(Strict):
+class Joint(base_model.Strict):
     """A joint of an object; see ``BodyJoint``.
 
     Attributes:
@@ -70,7 +67,7 @@ class Joint(Strict):
     stiffness: float = 0.0
 
 
-class Step(Strict):
+class Step(base_model.Strict):
     """One step of a program: a verb and its objects.
 
     Attributes:
@@ -118,7 +115,7 @@ class Step(Strict):
     pace: float = Field(1.0, gt=0, le=1)
 
 
-class Success(Strict):
+class Success(base_model.Strict):
     """A condition of success; see ``Condition``.
 
     Attributes:
@@ -139,7 +136,7 @@ class Success(Strict):
     at_most: float | None = None
 
 
-class Task(Strict):
+class Task(base_model.Strict):
     """An entry of the table.
 
     Attributes:
@@ -180,12 +177,12 @@ class Task(Strict):
 @cache
 def tasks() -> Mapping[str, Task]:
     """The shipped tasks, by name."""
-    plain = load_data(__package__, "arm_tasks")
+    plain = data_files.load_data(__package__, "arm_tasks")
     # Strict models take lists for tuples from JSON only.
     return {name: Task.model_validate_json(json.dumps(entry)) for name, entry in plain.items()}
 
 
-def load_tasks(randomizer: Node) -> Node:
+def load_tasks(randomizer: yaml_tree.Node) -> yaml_tree.Node:
     """Replace the name of a file of tasks, in the document of a randomizer, by its content.
 
     Raises:
@@ -196,6 +193,6 @@ def load_tasks(randomizer: Node) -> Node:
         return randomizer
     if not isinstance(own.content, str):
         return randomizer
-    path = find_path(own.text, own.position, "tasks", "file of tasks")
-    content = {**randomizer.entries, "tasks": load_yaml(path)}
-    return Node(randomizer.position, content, randomizer.key_positions)
+    path = paths.find_path(own.text, own.position, "tasks", "file of tasks")
+    content = {**randomizer.entries, "tasks": yaml_tree.load_yaml(path)}
+    return yaml_tree.Node(randomizer.position, content, randomizer.key_positions)

@@ -4,10 +4,9 @@ from typing import Annotated
 
 from pydantic import Field
 
-from gen_data.core.errors import ConfigError
+from gen_data.core import errors, streams
 from gen_data.core.interfaces import AssetIndex
 from gen_data.core.scene import ObjectGroup, Scene
-from gen_data.core.streams import Rng
 from gen_data.randomizers.base import RandomizerBase, check_known, choose, pick_by_weight
 
 CategoryWeights = tuple[tuple[float, tuple[str, ...]], ...]
@@ -48,11 +47,11 @@ class GroupRandomizer(RandomizerBase):
         weighted = ((self.weights.get(key, 1.0), tuple(members[key])) for key in sorted(members))
         kept = tuple((weight, ids) for weight, ids in weighted if weight > 0.0)
         if not kept:
-            raise ConfigError(f"{field}.weights: every weight is 0; expected one above 0")
+            raise errors.ConfigError(f"{field}.weights: every weight is 0; expected one above 0")
         return groups[name], kept
 
 
-def draw_asset(weights: CategoryWeights, rng: Rng) -> str:
+def draw_asset(weights: CategoryWeights, rng: streams.Rng) -> str:
     """Draw a category in proportion to its weight, then one of its assets uniformly."""
     index = pick_by_weight([weight for weight, _ in weights], float(rng.uniform()))
     return choose(weights[index][1], rng)

@@ -7,24 +7,16 @@ from pydantic import Field
 
 from gen_data.assets.families import declared
 from gen_data.config import distributions as dist
-from gen_data.core.asset_types import Material
+from gen_data.core import asset_types, plates, streams
 from gen_data.core.interfaces import AssetIndex
-from gen_data.core.plates import is_catcher
 from gen_data.core.scene import Body, Scene
-from gen_data.core.streams import Rng
-from gen_data.randomizers.base import (
-    RandomizerBase,
-    body_materials,
-    choose,
-    find_texture_files,
-    find_textures,
-)
+from gen_data.randomizers import base
 from gen_data.randomizers.color_space import hsv_to_linear
 
 PAINT_ROUGHNESS = 0.85
 
 
-class Backdrop(RandomizerBase):
+class Backdrop(base.RandomizerBase):
     """Draws the surfaces of the background: floor and walls of a room, ground, or a backdrop.
 
     Attributes:
@@ -49,12 +41,12 @@ class Backdrop(RandomizerBase):
     def possible_assets(self, assets: AssetIndex) -> tuple[str, ...]:
         """Ids of the texture files to draw from."""
         floors, walls = self._find_options(assets)
-        return find_texture_files(assets, (*floors, *walls))
+        return base.find_texture_files(assets, (*floors, *walls))
 
-    def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
+    def __call__(self, scene: Scene, assets: AssetIndex, rng: streams.Rng) -> Scene:
         """Return the scene with new materials on every background body."""
         floors, walls = self._find_options(assets)
-        background = [b for b in scene.bodies if b.instance_id == 0 and not is_catcher(b)]
+        background = [b for b in scene.bodies if b.instance_id == 0 and not plates.is_catcher(b)]
         return scene.with_bodies(
             *(self._redecorate(b, assets, floors, walls, rng) for b in background)
         )
@@ -63,8 +55,8 @@ class Backdrop(RandomizerBase):
         """Ids of the textures for floors and for walls."""
         field = f"randomizers.{self.name}"
         return (
-            find_textures(assets, self.floor, f"{field}.floor"),
-            find_textures(assets, self.walls, f"{field}.walls"),
+            base.find_textures(assets, self.floor, f"{field}.floor"),
+            base.find_textures(assets, self.walls, f"{field}.walls"),
         )
 
     def _redecorate(
@@ -73,23 +65,23 @@ class Backdrop(RandomizerBase):
         assets: AssetIndex,
         floors: tuple[str, ...],
         walls: tuple[str, ...],
-        rng: Rng,
+        rng: streams.Rng,
     ) -> Body:
-        ground = _textured_material(choose(floors, rng), self.floor_scale_m.draw(rng))
-        textured = _textured_material(choose(walls, rng), self.wall_scale_m.draw(rng))
+        ground = _textured_material(base.choose(floors, rng), self.floor_scale_m.draw(rng))
+        textured = _textured_material(base.choose(walls, rng), self.wall_scale_m.draw(rng))
         color = hsv_to_linear(self.hue.draw(rng), self.saturation.draw(rng), self.value.draw(rng))
-        paint = Material(base_color=color, roughness=PAINT_ROUGHNESS)
+        paint = asset_types.Material(base_color=color, roughness=PAINT_ROUGHNESS)
         wall = paint if self.painted.draw(rng) else textured
         looks = {"floor": ground, "ground": ground, "paper": paint, "walls": wall}
         slots = declared(body.asset, "slots", ())
-        materials = list(body_materials(body, assets))
+        materials = list(base.body_materials(body, assets))
         for number, slot in enumerate(slots[: len(materials)]):
             materials[number] = looks.get(slot, materials[number])
         return replace(body, materials=tuple(materials))
 
 
-def _textured_material(texture: str, scale_m: float) -> Material:
+def _textured_material(texture: str, scale_m: float) -> asset_types.Material:
     white = (1.0, 1.0, 1.0)
-    return Material(
+    return asset_types.Material(
         base_color=white, roughness=1.0, texture=texture, texture_scale_m=round(scale_m, 4)
     )

@@ -8,15 +8,12 @@ from typing import Any, Literal
 from pydantic import Field
 
 from gen_data.config.base_model import NAME_PATTERN, Strict
-from gen_data.core.asset_types import Asset, Material
-from gen_data.core.bounded_cache import ObjectCache
+from gen_data.core import asset_types, bounded_cache, se3, streams
 from gen_data.core.errors import ConfigError, LayoutRejected, Rejection, one_of
 from gen_data.core.interfaces import AssetIndex
 from gen_data.core.scene import Body, Scene
-from gen_data.core.se3 import Vec3
-from gen_data.core.streams import Rng
 
-_BY_WORD: ObjectCache[Mapping[str, tuple[str, ...]]] = ObjectCache(2)
+_BY_WORD: bounded_cache.ObjectCache[Mapping[str, tuple[str, ...]]] = bounded_cache.ObjectCache(2)
 
 
 class RandomizerBase(Strict):
@@ -60,7 +57,7 @@ class RandomizerBase(Strict):
         self.possible_assets(assets)
 
     @abstractmethod
-    def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
+    def __call__(self, scene: Scene, assets: AssetIndex, rng: streams.Rng) -> Scene:
         """Return a new scene; the one passed in is unchanged.
 
         Raises:
@@ -123,7 +120,7 @@ def check_known(name: str, known: Collection[str], fault: str) -> None:
         raise ConfigError(f"{fault} '{name}'; {one_of(name, known)}")
 
 
-def body_materials(body: Body, assets: AssetIndex) -> tuple[Material, ...]:
+def body_materials(body: Body, assets: AssetIndex) -> tuple[asset_types.Material, ...]:
     """Materials of a body: its overrides if it has any, else its asset's."""
     return body.materials or assets.materials(body.asset)
 
@@ -161,7 +158,7 @@ def find_texture_files(assets: AssetIndex, textures: tuple[str, ...]) -> tuple[s
     return tuple(texture for texture in textures if texture in files)
 
 
-def _by_word(textures: tuple[Asset, ...]) -> Mapping[str, tuple[str, ...]]:
+def _by_word(textures: tuple[asset_types.Asset, ...]) -> Mapping[str, tuple[str, ...]]:
     """Ids of textures by id, tag and family."""
     by_word: dict[str, list[str]] = {}
     for texture in textures:
@@ -170,7 +167,7 @@ def _by_word(textures: tuple[Asset, ...]) -> Mapping[str, tuple[str, ...]]:
     return {word: tuple(ids) for word, ids in by_word.items()}
 
 
-def set_emission(body: Body, assets: AssetIndex, emission_cd_m2: Mapping[str, Vec3]) -> Body:
+def set_emission(body: Body, assets: AssetIndex, emission_cd_m2: Mapping[str, se3.Vec3]) -> Body:
     """Return the body with the emission of some roles replaced."""
     slots = body_materials(body, assets)
     return replace(
@@ -192,7 +189,7 @@ def add_attributes(scene: Scene, attributes: Mapping[int, Iterable[tuple[str, st
     return replace(scene, instances=tuple(instances))
 
 
-def scale_emission(color: Vec3, luminance_cd_m2: float) -> Vec3:
+def scale_emission(color: se3.Vec3, luminance_cd_m2: float) -> se3.Vec3:
     """Emission [cd/m^2] of a colour of luminance 1, rounded to three decimals."""
     red, green, blue = (round(part * luminance_cd_m2, 3) for part in color)
     return (red, green, blue)
@@ -208,7 +205,7 @@ def pick_by_weight(weights: Sequence[float], draw: float) -> int:
     return len(weights) - 1
 
 
-def choose(options: tuple[str, ...], rng: Rng) -> str:
+def choose(options: tuple[str, ...], rng: streams.Rng) -> str:
     """Draw one option uniformly."""
     return options[int(rng.integers(len(options)))]
 

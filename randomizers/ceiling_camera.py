@@ -7,18 +7,14 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from gen_data.config import distributions as dist
-from gen_data.core.errors import ConfigError
-from gen_data.core.interfaces import AssetIndex
+from gen_data.core import errors, interfaces, se3, streams
 from gen_data.core.scene import Scene
-from gen_data.core.se3 import SE3, look_at
-from gen_data.core.streams import Rng
-from gen_data.randomizers.base import RandomizerBase
-from gen_data.randomizers.free_space import is_clear
+from gen_data.randomizers import base, free_space
 
 TRIES = 48
 
 
-class CeilingCamera(RandomizerBase):
+class CeilingCamera(base.RandomizerBase):
     """Places every camera without a rig below the ceiling of a room, looking down.
 
     Attributes:
@@ -38,7 +34,7 @@ class CeilingCamera(RandomizerBase):
     tilt_deg: Annotated[dist.NonNegative, dist.Bounds(0.0, 60.0)] = dist.Uniform(0.0, 4.0)
     clearance_m: float = Field(0.05, ge=0)
 
-    def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
+    def __call__(self, scene: Scene, assets: interfaces.AssetIndex, rng: streams.Rng) -> Scene:
         """Return the scene with its cameras moved.
 
         Raises:
@@ -53,14 +49,14 @@ class CeilingCamera(RandomizerBase):
         )
         return replace(scene, cameras=cameras)
 
-    def _draw_pose(self, scene: Scene, assets: AssetIndex, rng: Rng) -> SE3:
+    def _draw_pose(self, scene: Scene, assets: interfaces.AssetIndex, rng: streams.Rng) -> se3.SE3:
         ceilings = [
             body
             for body in scene.bodies
             if body.name.startswith(f"{self.room}/") and body.name.endswith("/ceiling")
         ]
         if not ceilings:
-            raise ConfigError(
+            raise errors.ConfigError(
                 f"randomizers.{self.name}.room: the template has no element '{self.room}' of type "
                 "room_layout"
             )
@@ -73,10 +69,10 @@ class CeilingCamera(RandomizerBase):
             z -= self.below_m.draw(rng)
             tilt = math.radians(self.tilt_deg.draw(rng))
             side, roll = (2.0 * math.pi * float(rng.random()) for _ in range(2))
-            if is_clear((x, y, z), scene, assets, self.clearance_m):
+            if free_space.is_clear((x, y, z), scene, assets, self.clearance_m):
                 across, down = math.sin(tilt), math.cos(tilt)
                 target = (x + across * math.cos(side), y + across * math.sin(side), z - down)
-                return look_at((x, y, z), target, roll).rounded()
+                return se3.look_at((x, y, z), target, roll).rounded()
         raise self.reject(
             "no free place for a camera below the ceiling",
             "a smaller clearance_m, or a larger below_m",

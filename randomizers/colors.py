@@ -3,14 +3,12 @@
 from typing import Any, Literal
 
 from gen_data.config import distributions as dist
-from gen_data.core.interfaces import AssetIndex
+from gen_data.core import interfaces, streams
 from gen_data.core.scene import Scene
-from gen_data.core.streams import Rng
-from gen_data.randomizers.base import SurfaceRandomizer
-from gen_data.randomizers.color_space import hsv_to_linear
+from gen_data.randomizers import base, color_space
 
 
-class Colors(SurfaceRandomizer):
+class Colors(base.SurfaceRandomizer):
     """Paints each object in one drawn colour; printed materials are unchanged.
 
     Attributes:
@@ -24,13 +22,13 @@ class Colors(SurfaceRandomizer):
     saturation: dist.UnitInterval = dist.Uniform(0.1, 0.9)
     value: dist.UnitInterval = dist.Uniform(0.25, 0.95)
 
-    def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
+    def __call__(self, scene: Scene, assets: interfaces.AssetIndex, rng: streams.Rng) -> Scene:
         """Return the scene with one colour per object, in every material slot."""
 
         def draw() -> dict[str, Any] | None:
             if not self.probability.draw(rng):
                 return None
             hsv = (self.hue.draw(rng), self.saturation.draw(rng), self.value.draw(rng))
-            return {"base_color": hsv_to_linear(*hsv), "texture": ""}
+            return {"base_color": color_space.hsv_to_linear(*hsv), "texture": ""}
 
         return self.change_targets(scene, assets, draw)

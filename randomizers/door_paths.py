@@ -7,13 +7,11 @@ import numpy as np
 from pydantic import Field
 
 from gen_data.assets.asset_ids import AssetId, parse_asset_id
-from gen_data.core.interfaces import AssetIndex
+from gen_data.core import interfaces, streams
 from gen_data.core.members import Member, add_members, remove_members
 from gen_data.core.scene import Body, Lane, Scene
 from gen_data.core.se3 import SE3, Array, Vec3
-from gen_data.core.streams import Rng
-from gen_data.randomizers.asset_groups import GroupRandomizer, draw_asset
-from gen_data.randomizers.free_space import Footprint, make_ground, standing_bodies
+from gen_data.randomizers import asset_groups, free_space
 
 DOOR = "door"
 """Keypoint of a building where its door meets the ground."""
@@ -22,7 +20,7 @@ _STEP_M = 0.25
 _SUNK_M = 0.03
 
 
-class DoorPaths(GroupRandomizer):
+class DoorPaths(asset_groups.GroupRandomizer):
     """Lays a path from the street to the door of every house behind a garden.
 
     The members of the group are assets with a parameter ``length_m``. List this randomizer after
@@ -39,7 +37,7 @@ class DoorPaths(GroupRandomizer):
     houses: str = "buildings"
     reach_m: float = Field(16.0, gt=0, le=60)
 
-    def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
+    def __call__(self, scene: Scene, assets: interfaces.AssetIndex, rng: streams.Rng) -> Scene:
         """Return the scene with the group's members replaced."""
         group, weights = self.find_group(scene, assets)
         if not weights:
@@ -47,8 +45,8 @@ class DoorPaths(GroupRandomizer):
         scene = remove_members(scene, group.name)
         gardens = [lane for lane in scene.lanes if lane.kind == "garden"]
         # Porches and steps reach over the paths of their houses, which are in nobody else's way.
-        others = (body for body in standing_bodies(scene) if body.group != self.houses)
-        ground = make_ground(others, assets)
+        others = (body for body in free_space.standing_bodies(scene) if body.group != self.houses)
+        ground = free_space.make_ground(others, assets)
         members = []
         for body in scene.bodies:
             if body.group != self.houses:
@@ -60,8 +58,8 @@ class DoorPaths(GroupRandomizer):
                 end_m = self._street_edge(body, door_m, gardens)
                 if end_m is None:
                     continue
-                asset, pose = _lay(draw_asset(weights, rng), door_m, end_m)
-                footprint = Footprint.of(pose, assets.bounds_m(asset))
+                asset, pose = _lay(asset_groups.draw_asset(weights, rng), door_m, end_m)
+                footprint = free_space.Footprint.of(pose, assets.bounds_m(asset))
                 if ground.is_free(footprint):
                     ground.add(footprint)
                     members.append(Member(asset, pose.rounded(), collides=False))

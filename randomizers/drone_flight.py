@@ -10,14 +10,9 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from gen_data.config import distributions as dist
-from gen_data.core.errors import ConfigError, did_you_mean
-from gen_data.core.interfaces import AssetIndex
-from gen_data.core.lane_geometry import LaneLine
-from gen_data.core.motion import Trajectory
+from gen_data.core import errors, interfaces, lane_geometry, motion, scene_time, streams
 from gen_data.core.scene import Scene
-from gen_data.core.scene_time import place_sensors
 from gen_data.core.se3 import SE3, Vec3
-from gen_data.core.streams import Rng
 from gen_data.randomizers.base import RandomizerBase, pick_by_weight
 from gen_data.randomizers.free_space import is_clear
 
@@ -81,14 +76,14 @@ class DroneFlight(RandomizerBase):
         """End of the flight [s]."""
         return self.duration_s
 
-    def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
+    def __call__(self, scene: Scene, assets: interfaces.AssetIndex, rng: streams.Rng) -> Scene:
         """Return the scene with the drone at time 0 of its flight, and its trajectories."""
         known = [rig.name for rig in scene.rigs]
         if self.drone not in known or f"{self.drone}_gimbal" not in known:
-            raise ConfigError(
+            raise errors.ConfigError(
                 f"randomizers.{self.name}.drone: the template has no drone '{self.drone}'; there "
                 f"is {', '.join(known) or 'none: list an element of type drone'}"
-                f"{did_you_mean(self.drone, known)}"
+                f"{errors.did_you_mean(self.drone, known)}"
             )
         stretches = self._select_stretches(scene)
         hanging, frame = (
@@ -111,13 +106,13 @@ class DroneFlight(RandomizerBase):
         chosen = [lane for lane in lanes if not self.roads or lane.road in self.roads]
         if not chosen:
             known = sorted({lane.road for lane in lanes})
-            raise ConfigError(
+            raise errors.ConfigError(
                 f"randomizers.{self.name}.roads: the scene has no driving lane on "
                 f"{' or '.join(self.roads) or 'any road'}; there is {', '.join(known) or 'none'}"
             )
         entered = {name for lane in scene.lanes for name in lane.successors}
         stretches = []
-        for line in map(LaneLine, chosen):
+        for line in map(lane_geometry.LaneLine, chosen):
             first_m = 0.0 if line.lane.name in entered else self.from_end_m
             last_m = line.length_m - (0.0 if line.lane.successors else self.from_end_m)
             if last_m > first_m:
@@ -127,7 +122,7 @@ class DroneFlight(RandomizerBase):
         return stretches
 
     def _draw_flight(
-        self, stretches: Sequence[Stretch], T_gimbal_drone: SE3, rng: Rng
+        self, stretches: Sequence[Stretch], T_gimbal_drone: SE3, rng: streams.Rng
     ) -> list[tuple[SE3, SE3]]:
         """Draw poses of the rigs of airframe and gimbal at all knots.
 
@@ -171,7 +166,7 @@ class DroneFlight(RandomizerBase):
     def _fly(self, scene: Scene, poses: Sequence[tuple[SE3, SE3]]) -> Scene:
         names = (self.drone, f"{self.drone}_gimbal")
         tracks = tuple(
-            Trajectory(
+            motion.Trajectory(
                 scene.rig(name).body,
                 STEP_S,
                 tuple((pair[k] @ scene.rig(name).T_body_rig.inverse()).rounded() for pair in poses),
@@ -184,14 +179,16 @@ class DroneFlight(RandomizerBase):
             for track in tracks
         ]
         others = tuple(track for track in scene.tracks if track.body not in names)
-        return place_sensors(replace(scene.with_bodies(*bodies), tracks=(*others, *tracks)))
+        return scene_time.place_sensors(
+            replace(scene.with_bodies(*bodies), tracks=(*others, *tracks))
+        )
 
 
 @dataclass(frozen=True, slots=True)
 class Stretch:
     """A part of a lane, by arc length."""
 
-    line: LaneLine
+    line: lane_geometry.LaneLine
     first_m: float
     last_m: float
 

@@ -8,10 +8,8 @@ from pydantic import Field
 
 from gen_data.config import distributions as dist
 from gen_data.config.yaml_scalars import quote_value
-from gen_data.core.errors import ConfigError, did_you_mean
-from gen_data.core.interfaces import AssetIndex
+from gen_data.core import errors, interfaces, streams
 from gen_data.core.scene import Environment, Scene
-from gen_data.core.streams import Rng
 from gen_data.randomizers.base import RandomizerBase, choose
 
 
@@ -31,7 +29,7 @@ class EnvironmentLight(RandomizerBase):
     yaw_deg: dist.Scalar = dist.Uniform(0.0, 360.0)
     visible: bool = Field(True)
 
-    def possible_assets(self, assets: AssetIndex) -> tuple[str, ...]:
+    def possible_assets(self, assets: interfaces.AssetIndex) -> tuple[str, ...]:
         """Ids of the environment maps to draw from."""
         every = assets.find((), kind="environment")
         if not self.images:
@@ -43,13 +41,13 @@ class EnvironmentLight(RandomizerBase):
         known = sorted({tag for a in every for tag in a.tags})
         for name, found in fitting.items():
             if not found:
-                raise ConfigError(
+                raise errors.ConfigError(
                     f"randomizers.{self.name}.images: no environment is {quote_value(name)}; "
-                    f"expected some of {', '.join(known)}{did_you_mean(name, known)}"
+                    f"expected some of {', '.join(known)}{errors.did_you_mean(name, known)}"
                 )
         return tuple(a.asset_id for a in every if any(a.asset_id in f for f in fitting.values()))
 
-    def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
+    def __call__(self, scene: Scene, assets: interfaces.AssetIndex, rng: streams.Rng) -> Scene:
         """Return the scene with a drawn environment map."""
         environment = Environment(
             image=choose(self.possible_assets(assets), rng),

@@ -4,9 +4,8 @@ from dataclasses import replace
 from typing import Literal
 
 from gen_data.config import distributions as dist
-from gen_data.core.interfaces import AssetIndex
+from gen_data.core import interfaces, streams
 from gen_data.core.scene import Scene
-from gen_data.core.streams import Rng
 from gen_data.randomizers.base import RandomizerBase
 
 
@@ -21,7 +20,7 @@ class Exposure(RandomizerBase):
     stage: Literal["scene", "view"] = "view"
     ev100: dist.Scalar = dist.Uniform(6.0, 8.5)
 
-    def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
+    def __call__(self, scene: Scene, assets: interfaces.AssetIndex, rng: streams.Rng) -> Scene:
         """Return the scene with drawn exposures."""
         del assets
         cameras = tuple(replace(c, ev100=round(self.ev100.draw(rng), 4)) for c in scene.cameras)

@@ -15,12 +15,10 @@ from gen_data.core.se3 import Vec3
 from gen_data.core.streams import Rng
 from gen_data.randomizers.base import RandomizerBase, choose, find_texture_files, find_textures
 from gen_data.randomizers.color_space import hsv_to_linear
-from gen_data.rooms.bodies import JOINTS, Builder, Looks, remove_room
+from gen_data.rooms import bodies, layout, outlook
 from gen_data.rooms.floor_plan import Room, between, draw_plan
 from gen_data.rooms.furnishing import furnish
-from gen_data.rooms.layout import Conflict, Piece
 from gen_data.rooms.options import families_of, find_options
-from gen_data.rooms.outlook import draw_outlook, outlook_assets
 from gen_data.rooms.rules import APARTMENT, Range, find_room_type
 
 TRIES, TRIES_PER_ROOM = 12, 3
@@ -56,7 +54,7 @@ class Furnish(RandomizerBase):
     def possible_assets(self, assets: AssetIndex) -> tuple[str, ...]:
         """Ids of assets outside, and texture files; the element's group lists the furniture."""
         floors = find_textures(assets, ("floor",), f"randomizers.{self.name}")
-        return (*find_texture_files(assets, floors), *outlook_assets())
+        return (*find_texture_files(assets, floors), *outlook.outlook_assets())
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
         """Return the scene with the room redrawn.
@@ -69,13 +67,13 @@ class Furnish(RandomizerBase):
         field = f"randomizers.{self.name}.room"
         options = find_options(assets, families_of(kind, field))
         rooms, pieces = self._draw_layout(kind, options, assets, rng)
-        scene = remove_room(scene, self.room)
-        builder = Builder(scene, assets, self.room, annotated=annotated)
+        scene = bodies.remove_room(scene, self.room)
+        builder = bodies.Builder(scene, assets, self.room, annotated=annotated)
         looks = {room.name: self._draw_looks(room, assets, rng) for room in rooms}
         builder.add_shells(
             rooms, looks, {room.name: placed for room, placed in zip(rooms, pieces, strict=True)}
         )
-        builder.add_outlook(draw_outlook(rooms, rng))
+        builder.add_outlook(outlook.draw_outlook(rooms, rng))
         parts = _moving_parts(assets)
         for room, placed in zip(rooms, pieces, strict=True):
             builder.add_pieces(room, placed, parts)
@@ -101,7 +99,7 @@ class Furnish(RandomizerBase):
 
     def _draw_layout(
         self, kind: str, options: dict[str, tuple[str, ...]], assets: AssetIndex, rng: Rng
-    ) -> tuple[tuple[Room, ...], list[list[Piece]]]:
+    ) -> tuple[tuple[Room, ...], list[list[layout.Piece]]]:
         conflicts: Counter[tuple[str, str]] = Counter()
         clutter = self.clutter.draw(rng)
         for _ in range(TRIES):
@@ -138,7 +136,7 @@ class Furnish(RandomizerBase):
         ]
         return (drawn[0], drawn[1], drawn[2])
 
-    def _draw_looks(self, room: Room, assets: AssetIndex, rng: Rng) -> Looks:
+    def _draw_looks(self, room: Room, assets: AssetIndex, rng: Rng) -> bodies.Looks:
         rules = find_room_type(room.kind, "")
         field = f"randomizers.{self.name}"
         ground = choose(rules.floor, rng)
@@ -156,7 +154,7 @@ class Furnish(RandomizerBase):
         walls = self._draw_wall(wall, tint, assets, rng)
         white = 0.78 + 0.1 * float(rng.random())
         door, blind = int(rng.random() * _DOOR_STYLES), int(rng.random() * 2.0)
-        looks = Looks(
+        looks = bodies.Looks(
             floor,
             walls,
             Material((white, white, white), 0.95),
@@ -214,13 +212,13 @@ def _try_to_furnish(
     rng: Rng,
     clutter: float,
     conflicts: Counter[tuple[str, str]],
-) -> list[Piece] | None:
+) -> list[layout.Piece] | None:
     """Pieces of a room; None if no layout of several keeps the rules. Conflicts are counted."""
     rules = find_room_type(room.kind, "")
     for _ in range(TRIES_PER_ROOM):
         try:
             return furnish(room, rules, options, assets, rng, clutter)
-        except Conflict as conflict:
+        except layout.Conflict as conflict:
             conflicts[f"{room.kind}: {conflict.piece}", conflict.reason] += 1
     return None
 
@@ -231,7 +229,7 @@ def _moving_parts(assets: AssetIndex) -> dict[str, tuple[str, str]]:
     for asset in assets.find(("part_of",)):
         family = asset.asset_id.partition("?")[0]
         piece, _, part = family.rpartition("/")
-        if part in JOINTS:
+        if part in bodies.JOINTS:
             found[piece] = (part, family)
     return found
 

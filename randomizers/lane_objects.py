@@ -9,21 +9,14 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from gen_data.config import distributions as dist
-from gen_data.core.errors import ConfigError
-from gen_data.core.interfaces import AssetIndex
+from gen_data.core import errors, interfaces
 from gen_data.core.lane_geometry import LaneLine, pose_on_lane
 from gen_data.core.members import Member, add_members, remove_members
 from gen_data.core.scene import LaneKind, ObjectGroup, Scene
 from gen_data.core.se3 import SE3, Vec3
 from gen_data.core.streams import Rng
+from gen_data.randomizers import free_space
 from gen_data.randomizers.asset_groups import CategoryWeights, GroupRandomizer, draw_asset
-from gen_data.randomizers.free_space import (
-    Footprint,
-    Ground,
-    make_ground,
-    standing_bodies,
-    standing_bounds_m,
-)
 
 COUNT_MAX = 2000
 """Largest count of the template's ``lane_objects`` element."""
@@ -109,14 +102,14 @@ class LaneObjects(GroupRandomizer):
     among: Literal["all", "leftmost", "rightmost"] = "all"
     uniform_area: bool = False
 
-    def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
+    def __call__(self, scene: Scene, assets: interfaces.AssetIndex, rng: Rng) -> Scene:
         """Return the scene with the group's members replaced."""
         group, weights = self.find_group(scene, assets)
         if not weights:
             return scene
         scene = remove_members(scene, group.name)
         lines = self._select_lanes(scene, group)
-        ground = make_ground(standing_bodies(scene), assets)
+        ground = free_space.make_ground(free_space.standing_bodies(scene), assets)
         fill = self._scatter if self.uniform_area else self._fill_rows
         bounds_of = cache(partial(_bounds_m, assets))
         members = list(fill(lines, group, weights, ground, bounds_of, rng))
@@ -146,7 +139,7 @@ class LaneObjects(GroupRandomizer):
         lines: list[LaneLine],
         group: ObjectGroup,
         weights: CategoryWeights,
-        ground: Ground,
+        ground: free_space.Ground,
         bounds_of: BoundsOf,
         rng: Rng,
     ) -> Iterator[Member]:
@@ -179,7 +172,7 @@ class LaneObjects(GroupRandomizer):
                     at_m += self.gap_m.draw(rng)
                     run = self._draw_run(at_m, weights, bounds_of, rng)
             else:
-                raise ConfigError(
+                raise errors.ConfigError(
                     f"randomizers.{self.name}.gap_m: objects and gaps are so short that a lane of "
                     f"{line.length_m:.1f} m has more than {PER_LANE_MAX:,} places; expected a "
                     "larger gap_m or scale"
@@ -190,7 +183,7 @@ class LaneObjects(GroupRandomizer):
         lines: list[LaneLine],
         group: ObjectGroup,
         weights: CategoryWeights,
-        ground: Ground,
+        ground: free_space.Ground,
         bounds_of: BoundsOf,
         rng: Rng,
     ) -> Iterator[Member]:
@@ -212,9 +205,9 @@ class LaneObjects(GroupRandomizer):
                 remedy = "a smaller count or min_clearance_m"
                 raise self.reject("no free place for a scattered object", remedy)
 
-    def _occupy(self, ground: Ground, pose: SE3, bounds_m: Bounds) -> bool:
+    def _occupy(self, ground: free_space.Ground, pose: SE3, bounds_m: Bounds) -> bool:
         """Occupy the ground under an object if it is free; return whether it was."""
-        footprint = Footprint.of(pose, bounds_m)
+        footprint = free_space.Footprint.of(pose, bounds_m)
         if not ground.is_free(footprint.expand(self.min_clearance_m)):
             return False
         ground.add(footprint)
@@ -238,9 +231,9 @@ class LaneObjects(GroupRandomizer):
         return asset, scale, bounds_m, solid_m
 
 
-def _bounds_m(assets: AssetIndex, asset: str) -> tuple[Bounds, Bounds]:
+def _bounds_m(assets: interfaces.AssetIndex, asset: str) -> tuple[Bounds, Bounds]:
     """Bounds of an asset [m], and the part of them that nothing else may enter."""
-    return assets.bounds_m(asset), standing_bounds_m(assets, asset)
+    return assets.bounds_m(asset), free_space.standing_bounds_m(assets, asset)
 
 
 def _scale_bounds(bounds_m: Bounds, scale: float) -> Bounds:

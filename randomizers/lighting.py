@@ -9,16 +9,8 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from gen_data.config import distributions as dist
-from gen_data.core.errors import ConfigError
+from gen_data.core import errors, photometry
 from gen_data.core.interfaces import AssetIndex
-from gen_data.core.photometry import (
-    add_fixture,
-    fixture_asset,
-    flux_to_intensity_cd,
-    illuminance_to_intensity_cd,
-    level_side,
-    remove_lights,
-)
 from gen_data.core.scene import LIGHT_KINDS, PANEL_KINDS, Light, LightKind, Scene
 from gen_data.core.se3 import Vec3
 from gen_data.core.streams import Rng
@@ -87,14 +79,14 @@ class Lighting(RandomizerBase):
         shares = [0.3 + float(rng.uniform()) for _ in range(count)]
         strength = self.illuminance_lux if self.luminous_flux_lm is None else self.luminous_flux_lm
         total = strength.draw(rng)
-        scene = scene if self.keep_existing else remove_lights(scene)
+        scene = scene if self.keep_existing else photometry.remove_lights(scene)
         for k, share in enumerate(shares):
             light = self._draw_light(
                 scene, assets, rng, f"{self.name}/{k}", total * share / sum(shares)
             )
             if self.visible and light.kind in PANEL_KINDS:
-                materials = assets.materials(fixture_asset(light))
-                scene, light = add_fixture(scene, light, materials)
+                materials = assets.materials(photometry.fixture_asset(light))
+                scene, light = photometry.add_fixture(scene, light, materials)
             scene = replace(scene, lights=(*scene.lights, light))
         return scene
 
@@ -131,7 +123,7 @@ class Lighting(RandomizerBase):
         drawn = self.kind.draw(rng)
         kind = next(known for known in LIGHT_KINDS if known == drawn)
         if kind == "sun" and self.luminous_flux_lm is not None:
-            raise ConfigError(
+            raise errors.ConfigError(
                 f"randomizers.{self.name}.luminous_flux_lm: a sun has no flux; give an "
                 "illuminance_lux or another kind"
             )
@@ -140,9 +132,9 @@ class Lighting(RandomizerBase):
     def _set_intensity(self, light: Light, strength: float, distance_m: float) -> Light:
         """Return the light with its share of the illuminance at the focus or of the flux."""
         if self.luminous_flux_lm is None:
-            intensity_cd = illuminance_to_intensity_cd(light, strength, distance_m)
+            intensity_cd = photometry.illuminance_to_intensity_cd(light, strength, distance_m)
         else:
-            intensity_cd = flux_to_intensity_cd(light, strength)
+            intensity_cd = photometry.flux_to_intensity_cd(light, strength)
         return replace(light, intensity_cd=round(intensity_cd, 4))
 
     def _draw_direction(self, rng: Rng) -> Vec3:
@@ -172,7 +164,7 @@ def _aim(light: Light, position_m: Vec3, target_m: Vec3) -> Light:
     away = [p - t for p, t in zip(position_m, target_m, strict=True)]
     distance_m = math.sqrt(away[0] ** 2 + away[1] ** 2 + away[2] ** 2)
     direction = _round_vector((-away[0] / distance_m, -away[1] / distance_m, -away[2] / distance_m))
-    side = level_side(direction) if light.kind == "rectangle" else light.side
+    side = photometry.level_side(direction) if light.kind == "rectangle" else light.side
     return replace(light, position_m=position_m, direction=direction, side=side)
 
 

@@ -3,9 +3,8 @@
 from typing import Annotated, Any, Literal
 
 from gen_data.config import distributions as dist
-from gen_data.core.interfaces import AssetIndex
+from gen_data.core import interfaces, streams
 from gen_data.core.scene import Scene
-from gen_data.core.streams import Rng
 from gen_data.randomizers.base import SurfaceRandomizer
 
 
@@ -39,11 +38,11 @@ class Materials(SurfaceRandomizer):
     ior: Annotated[dist.Scalar, dist.Bounds(1, 3)] = dist.Constant(1.5)
     solid: dist.Flag = dist.Constant(False)
 
-    def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
+    def __call__(self, scene: Scene, assets: interfaces.AssetIndex, rng: streams.Rng) -> Scene:
         """Return the scene with one finish per object, in every material slot."""
         return self.change_targets(scene, assets, lambda: self._draw_changes(rng))
 
-    def _draw_changes(self, rng: Rng) -> dict[str, Any] | None:
+    def _draw_changes(self, rng: streams.Rng) -> dict[str, Any] | None:
         """Draw the changed fields of a material; no draw for a coat or glass that is not wanted."""
         if not self.probability.draw(rng):
             return None

@@ -3,10 +3,9 @@
 from typing import Annotated, Literal
 
 from gen_data.config import distributions as dist
-from gen_data.core.interfaces import AssetIndex
+from gen_data.core import interfaces, streams
 from gen_data.core.members import Member, add_members, remove_members
 from gen_data.core.scene import Scene
-from gen_data.core.streams import Rng
 from gen_data.randomizers.asset_groups import GroupRandomizer, draw_asset
 from gen_data.randomizers.placement import Item, find_floors, half_extents_m, lay_out
 
@@ -32,7 +31,7 @@ class Objects(GroupRandomizer):
     scale: Annotated[dist.Scalar, dist.Bounds(0.001, 1000.0)] = dist.Constant(1.0)
     upright: dist.Flag = dist.Probability(0.6)
 
-    def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
+    def __call__(self, scene: Scene, assets: interfaces.AssetIndex, rng: streams.Rng) -> Scene:
         """Return the scene with the group's objects replaced."""
         group, weights = self.find_group(scene, assets)
         if not weights:

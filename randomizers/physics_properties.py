@@ -4,9 +4,8 @@ from dataclasses import replace
 from typing import Literal
 
 from gen_data.config import distributions as dist
-from gen_data.core.interfaces import AssetIndex
+from gen_data.core import interfaces, streams
 from gen_data.core.scene import Body, Scene
-from gen_data.core.streams import Rng
 from gen_data.randomizers.base import RandomizerBase
 
 
@@ -25,13 +24,13 @@ class PhysicsProperties(RandomizerBase):
     friction: dist.NonNegative = dist.Uniform(0.4, 0.9)
     restitution: dist.UnitInterval = dist.Uniform(0.0, 0.1)
 
-    def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
+    def __call__(self, scene: Scene, assets: interfaces.AssetIndex, rng: streams.Rng) -> Scene:
         """Return the scene with drawn properties on every dynamic body."""
         del assets
         dynamic = [body for body in scene.bodies if body.motion == "dynamic"]
         return scene.with_bodies(*(self._draw_properties(body, rng) for body in dynamic))
 
-    def _draw_properties(self, body: Body, rng: Rng) -> Body:
+    def _draw_properties(self, body: Body, rng: streams.Rng) -> Body:
         return replace(
             body,
             mass_kg=round(body.mass_kg * self.mass_factor.draw(rng), 6),

@@ -4,11 +4,9 @@ from typing import Literal
 
 from pydantic import Field
 
-from gen_data.core.errors import ConfigError
-from gen_data.core.interfaces import AssetIndex
+from gen_data.core import errors, interfaces, streams
 from gen_data.core.plates import find_plates, is_catcher, show_plate
 from gen_data.core.scene import Scene
-from gen_data.core.streams import Rng
 from gen_data.randomizers.base import RandomizerBase, check_known, choose
 
 
@@ -26,11 +24,11 @@ class PhotoPlate(RandomizerBase):
     stage: Literal["scene"] = "scene"
     photos: tuple[str, ...] = Field(("rendered",), min_length=1)
 
-    def possible_assets(self, assets: AssetIndex) -> tuple[str, ...]:
+    def possible_assets(self, assets: interfaces.AssetIndex) -> tuple[str, ...]:
         """Ids of the photographs to draw from."""
         return find_plates(assets.find((), "plate"), self.photos, f"randomizers.{self.name}.photos")
 
-    def check(self, scene: Scene, assets: AssetIndex) -> None:
+    def check(self, scene: Scene, assets: interfaces.AssetIndex) -> None:
         """Check that the element exists and that every photograph can be used.
 
         Raises:
@@ -41,7 +39,7 @@ class PhotoPlate(RandomizerBase):
         for photo in self.possible_assets(assets):
             show_plate(scene, self.name, photo, assets.plate(photo))
 
-    def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
+    def __call__(self, scene: Scene, assets: interfaces.AssetIndex, rng: streams.Rng) -> Scene:
         """Return the scene with a drawn photograph."""
         self._check_element(scene)
         photo = choose(self.possible_assets(assets), rng)
@@ -50,7 +48,7 @@ class PhotoPlate(RandomizerBase):
     def _check_element(self, scene: Scene) -> None:
         known = [body.name for body in scene.bodies if is_catcher(body)]
         if not known:
-            raise ConfigError(
+            raise errors.ConfigError(
                 f"randomizers.{self.name}.name: the template has no plate; add an element "
                 f"{{type: plate, name: {self.name}}}"
             )

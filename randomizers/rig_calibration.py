@@ -6,12 +6,8 @@ from dataclasses import replace
 from typing import Any, Literal, TypeVar
 
 from gen_data.config import distributions as dist
-from gen_data.core.errors import ConfigError, did_you_mean
-from gen_data.core.interfaces import AssetIndex
+from gen_data.core import errors, interfaces, scene_time, se3, streams
 from gen_data.core.scene import Camera, Device, Lidar, Scene
-from gen_data.core.scene_time import place_sensors
-from gen_data.core.se3 import SE3, multiply_quaternions
-from gen_data.core.streams import Rng
 from gen_data.randomizers.base import RandomizerBase
 
 Sensor = TypeVar("Sensor", Camera, Lidar, Device)
@@ -35,16 +31,16 @@ class RigCalibration(RandomizerBase):
     offset_m: dist.Scalar = dist.Normal(0.0, 0.005, clip=(-0.02, 0.02))
     turn_deg: dist.Scalar = dist.Normal(0.0, 0.2, clip=(-1.0, 1.0))
 
-    def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
+    def __call__(self, scene: Scene, assets: interfaces.AssetIndex, rng: streams.Rng) -> Scene:
         """Return the scene with perturbed sensor poses."""
         del assets
         sensors: tuple[Camera | Lidar | Device, ...]
         sensors = (*scene.cameras, *scene.lidars, *scene.devices)
         known = sorted({sensor.rig for sensor in sensors if sensor.rig})
         if not known or (self.rig and self.rig not in known):
-            raise ConfigError(
+            raise errors.ConfigError(
                 f"randomizers.{self.name}.rig: no sensor is on a rig '{self.rig}'; rigs with "
-                f"sensors: {', '.join(known) or 'none'}{did_you_mean(self.rig, known)}"
+                f"sensors: {', '.join(known) or 'none'}{errors.did_you_mean(self.rig, known)}"
             )
         rigs = {self.rig} if self.rig else set(known)
         if self.whole:
@@ -52,7 +48,7 @@ class RigCalibration(RandomizerBase):
                 replace(r, T_body_rig=self._perturb(r.T_body_rig, rng)) if r.name in rigs else r
                 for r in scene.rigs
             )
-            return place_sensors(replace(scene, rigs=tuple(moved)))
+            return scene_time.place_sensors(replace(scene, rigs=tuple(moved)))
 
         def perturb_all(sensors: tuple[Sensor, ...], pose: str) -> tuple[Sensor, ...]:
             changes: Iterator[dict[str, Any]] = (
@@ -61,7 +57,7 @@ class RigCalibration(RandomizerBase):
             )
             return tuple(replace(s, **c) for s, c in zip(sensors, changes, strict=True))
 
-        return place_sensors(
+        return scene_time.place_sensors(
             replace(
                 scene,
                 cameras=perturb_all(scene.cameras, "T_rig_camera"),
@@ -70,7 +66,7 @@ class RigCalibration(RandomizerBase):
             )
         )
 
-    def _perturb(self, T_rig_sensor: SE3, rng: Rng) -> SE3:
+    def _perturb(self, T_rig_sensor: se3.SE3, rng: streams.Rng) -> se3.SE3:
         """Apply an offset, then a rotation about each axis of the sensor."""
         x, y, z = (self.offset_m.draw(rng) for _ in range(3))
         half = [0.5 * math.radians(self.turn_deg.draw(rng)) for _ in range(3)]
@@ -78,5 +74,5 @@ class RigCalibration(RandomizerBase):
         for axis, angle in enumerate(half):
             about = [math.cos(angle), 0.0, 0.0, 0.0]
             about[axis + 1] = math.sin(angle)
-            turn = multiply_quaternions(turn, (about[0], about[1], about[2], about[3]))
-        return (T_rig_sensor @ SE3((x, y, z), turn)).rounded()
+            turn = se3.multiply_quaternions(turn, (about[0], about[1], about[2], about[3]))
+        return (T_rig_sensor @ se3.SE3((x, y, z), turn)).rounded()

@@ -12,8 +12,7 @@ from gen_data.core.interfaces import AssetIndex
 from gen_data.core.scene import Body, Camera, Scene
 from gen_data.core.se3 import Array, Vec3, look_at
 from gen_data.core.streams import Rng
-from gen_data.randomizers.base import RandomizerBase
-from gen_data.randomizers.free_space import Sight, is_clear, look_around
+from gen_data.randomizers import base, free_space
 
 TRIES = 96
 _WALL_M = 0.4
@@ -26,7 +25,7 @@ _FAR_M = 12.0
 _LARGE_M, _RAYS_EACH = 0.45, 8
 
 
-class RoomCamera(RandomizerBase):
+class RoomCamera(base.RandomizerBase):
     """Places every camera without a rig on free floor of a room, looking at a piece in it.
 
     Attributes:
@@ -91,7 +90,7 @@ class RoomCamera(RandomizerBase):
             moved = replace(camera, T_world_camera=look_at(eye, target, roll).rounded())
             if _count_in_view(moved, origins_m) < least:
                 continue
-            sight = look_around(moved, scene, assets, _FAR_M)
+            sight = free_space.look_around(moved, scene, assets, _FAR_M)
             if _is_hidden(sight, self.near_m):
                 continue
             found.append((_count_furniture(sight, large), moved))
@@ -135,7 +134,7 @@ class RoomCamera(RandomizerBase):
         ahead = (mx - x) * math.cos(yaw) + (my - y) * math.sin(yaw)
         if math.hypot(tx - x, ty - y) < self.away_m or ahead < 0.0:
             return None
-        if not is_clear(eye, scene, assets, self.clearance_m):
+        if not free_space.is_clear(eye, scene, assets, self.clearance_m):
             return None
         target = (
             x + math.cos(pitch) * math.cos(yaw),
@@ -145,7 +144,7 @@ class RoomCamera(RandomizerBase):
         return eye, target, roll
 
 
-def _is_hidden(sight: Sight, near_m: float) -> bool:
+def _is_hidden(sight: free_space.Sight, near_m: float) -> bool:
     """Whether near surfaces, but floors and ceilings, hide too much of an image."""
     flat = [body.name.endswith(("/floor", "/ceiling")) for body in sight.bodies]
     near = (sight.distances_m <= near_m) & ~np.array([*flat, True])[sight.hits]
@@ -159,7 +158,7 @@ def _is_large(body: Body, assets: AssetIndex) -> bool:
     return max(b - a for a, b in zip(low, high, strict=True)) > _LARGE_M
 
 
-def _count_furniture(sight: Sight, names: set[str]) -> int:
+def _count_furniture(sight: free_space.Sight, names: set[str]) -> int:
     """Rays that meet pieces of these names; no more than a few count for each of them."""
     each = np.bincount(sight.hits[sight.hits >= 0], minlength=len(sight.bodies))
     return sum(

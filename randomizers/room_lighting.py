@@ -16,10 +16,8 @@ from gen_data.core.se3 import Vec3
 from gen_data.core.streams import Rng
 from gen_data.randomizers.base import RandomizerBase, add_attributes, scale_emission, set_emission
 from gen_data.randomizers.color_space import Temperature, temperature_to_linear
+from gen_data.rooms import interreflection, lit_rooms, window_niches
 from gen_data.rooms.bodies import OUTSIDE, keypoint_m
-from gen_data.rooms.interreflection import find_interreflection
-from gen_data.rooms.lit_rooms import find_lit_rooms
-from gen_data.rooms.window_niches import find_niches
 
 LAMP = "lamp"
 _SHADE_M2 = 0.35
@@ -89,10 +87,10 @@ class RoomLighting(RandomizerBase):
         )
         sun = self._draw_sun(windows, rng, shines=not night)
         lights = (*sun, *panels, *lamps)
-        rooms = find_lit_rooms(scene, self.room, assets)
-        volumes = find_interreflection(rooms, lights)
+        rooms = lit_rooms.find_lit_rooms(scene, self.room, assets)
+        volumes = interreflection.find_interreflection(rooms, lights)
         r, g, b = (_VIEW_MEAN * outside * c for c in _DAYLIGHT)
-        volumes += find_niches(rooms, volumes, (r, g, b))
+        volumes += window_niches.find_niches(rooms, volumes, (r, g, b))
         sky = "night_city" if night else "clear_sky" if sun else "overcast"
         image = f"environment/{sky}?seed={int(rng.random() * _SKIES)}"
         yaw = round(2.0 * math.pi * float(rng.random()), 6)

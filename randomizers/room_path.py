@@ -11,15 +11,9 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from gen_data.config import distributions as dist
-from gen_data.core.boxes import Rectangle
-from gen_data.core.errors import ConfigError
-from gen_data.core.interfaces import AssetIndex
-from gen_data.core.motion import Trajectory
+from gen_data.core import boxes, errors, interfaces, motion, se3, streams
 from gen_data.core.scene import Body, Scene
-from gen_data.core.se3 import SE3, Array
-from gen_data.core.streams import Rng
-from gen_data.randomizers.base import RandomizerBase
-from gen_data.randomizers.free_space import Footprint
+from gen_data.randomizers import base, free_space
 
 TRIES = 12
 CELL_M = 0.1
@@ -32,7 +26,7 @@ _TURN_S = 0.8
 """Time over which the heading follows the path."""
 
 
-class RoomPath(RandomizerBase):
+class RoomPath(base.RandomizerBase):
     """Moves a carrier of sensors along a path over free floor, through doors, without collision.
 
     Paths are shortest ones between drawn places on a grid of 0.1 m (Dijkstra 1959), smoothed, and
@@ -62,7 +56,7 @@ class RoomPath(RandomizerBase):
         """Duration of the motion."""
         return self.duration_s
 
-    def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
+    def __call__(self, scene: Scene, assets: interfaces.AssetIndex, rng: streams.Rng) -> Scene:
         """Return the scene with the carrier on its path.
 
         Raises:
@@ -86,7 +80,7 @@ class RoomPath(RandomizerBase):
             points = _walk(path, speed, self.duration_s)
             if grid.is_free(points):
                 poses = _poses(points, body.T_world_body.translation_m[2], sway_m)
-                track = Trajectory(body.name, KNOT_S, poses)
+                track = motion.Trajectory(body.name, KNOT_S, poses)
                 tracks = (*(t for t in scene.tracks if t.body != body.name), track)
                 return replace(
                     scene.with_bodies(replace(body, T_world_body=poses[0])), tracks=tracks
@@ -103,17 +97,17 @@ class RoomPath(RandomizerBase):
             if b.name.startswith(f"{self.room}/") and b.name.endswith("/floor")
         ]
         if not floors:
-            raise ConfigError(
+            raise errors.ConfigError(
                 f"{field}.room: the template has no element '{self.room}' of type room_layout"
             )
         if self.carrier not in [rig.name for rig in scene.rigs if rig.body]:
-            raise ConfigError(
+            raise errors.ConfigError(
                 f"{field}.carrier: the template has no element '{self.carrier}' of type carrier"
             )
         return scene.body(scene.rig(self.carrier).body), floors
 
 
-def _obstacles(scene: Scene, assets: AssetIndex, room: str) -> list[Rectangle]:
+def _obstacles(scene: Scene, assets: interfaces.AssetIndex, room: str) -> list[boxes.Rectangle]:
     """Footprints of a walker's obstacles: furniture and open doors."""
     found = []
     for body in scene.bodies:
@@ -122,7 +116,7 @@ def _obstacles(scene: Scene, assets: AssetIndex, room: str) -> list[Rectangle]:
         bounds = assets.bounds_m(body.asset)
         z = body.T_world_body.translation_m[2]
         if z + bounds[0][2] < _HEAD_M and z + bounds[1][2] > _FLAT_M:
-            found.append(Footprint.of(body.T_world_body, bounds, body.scale).rectangle)
+            found.append(free_space.Footprint.of(body.T_world_body, bounds, body.scale).rectangle)
     return found
 
 
@@ -133,8 +127,8 @@ class _Grid:
         self,
         floors: Sequence[Body],
         doors: Sequence[Body],
-        obstacles: Sequence[Rectangle],
-        assets: AssetIndex,
+        obstacles: Sequence[boxes.Rectangle],
+        assets: interfaces.AssetIndex,
         radius_m: float,
     ) -> None:
         rooms = [_extent(b, assets) for b in floors]
@@ -151,7 +145,7 @@ class _Grid:
         for door in doors:
             (lx, ly, _), (hx, hy, _) = assets.bounds_m(door.asset)
             half_across = 0.5 * (hy - ly) - 0.05 - 0.03 - radius_m
-            place = Footprint.of(door.T_world_body, ((lx, ly, 0.0), (hx, hy, 0.0)))
+            place = free_space.Footprint.of(door.T_world_body, ((lx, ly, 0.0), (hx, hy, 0.0)))
             px, py, c, s, _, _ = place.rectangle
             along, across = c * (x - px) + s * (y - py), c * (y - py) - s * (x - px)
             free |= (np.abs(along) < 0.5 * (hx - lx) + radius_m + CELL_M) & (
@@ -163,13 +157,13 @@ class _Grid:
             free &= beyond > radius_m * radius_m
         self._free = free
 
-    def is_free(self, points_m: Array) -> bool:
+    def is_free(self, points_m: se3.Array) -> bool:
         """Whether all points [n, 2] are in free cells, or next to one."""
         i = np.floor((points_m[:, 1] - self._corner[1]) / CELL_M).astype(np.intp)
         j = np.floor((points_m[:, 0] - self._corner[0]) / CELL_M).astype(np.intp)
         return bool(self._free[i, j].all())
 
-    def draw_path(self, wanted_m: float, rng: Rng) -> Array | None:
+    def draw_path(self, wanted_m: float, rng: streams.Rng) -> se3.Array | None:
         """A path [n, 2] of at least that length over several goals; None if there is none."""
         cells = np.argwhere(self._free)
         if not len(cells):
@@ -217,7 +211,7 @@ class _Grid:
                         heapq.heappush(queue, (reached, (i, j)))
         return None
 
-    def _smoothed(self, path: Sequence[tuple[int, ...]]) -> Array:
+    def _smoothed(self, path: Sequence[tuple[int, ...]]) -> se3.Array:
         x0, y0 = self._corner
         points = np.array([(x0 + (j + 0.5) * CELL_M, y0 + (i + 0.5) * CELL_M) for i, j in path])
         for _ in range(6):
@@ -226,18 +220,18 @@ class _Grid:
         return points
 
 
-def _extent(body: Body, assets: AssetIndex) -> tuple[float, float, float, float]:
+def _extent(body: Body, assets: interfaces.AssetIndex) -> tuple[float, float, float, float]:
     (x0, y0, _), (x1, y1, _) = assets.bounds_m(body.asset)
     x, y, _ = body.T_world_body.translation_m
     return (x + x0, y + y0, x + x1, y + y1)
 
 
-def _length_m(points: Array) -> float:
+def _length_m(points: se3.Array) -> float:
     steps = np.diff(points, axis=0)
     return float(np.sqrt((steps**2).sum(axis=1)).sum())
 
 
-def _walk(path: Array, speed_m_s: float, duration_s: float) -> Array:
+def _walk(path: se3.Array, speed_m_s: float, duration_s: float) -> se3.Array:
     """Points [n, 2] along a path at even steps of time."""
     steps = np.sqrt((np.diff(path, axis=0) ** 2).sum(axis=1))
     along = np.concatenate([[0.0], np.cumsum(steps)])
@@ -245,7 +239,7 @@ def _walk(path: Array, speed_m_s: float, duration_s: float) -> Array:
     return np.stack([np.interp(at, along, path[:, k]) for k in (0, 1)], axis=1)
 
 
-def _poses(points: Array, z_m: float, sway_m: float) -> tuple[SE3, ...]:
+def _poses(points: se3.Array, z_m: float, sway_m: float) -> tuple[se3.SE3, ...]:
     """Poses that look ahead; the heading follows the path smoothly."""
     ahead = round(_TURN_S / KNOT_S)
     later = np.concatenate([points[ahead:], np.repeat(points[-1:], ahead, axis=0)])
@@ -258,5 +252,5 @@ def _poses(points: Array, z_m: float, sway_m: float) -> tuple[SE3, ...]:
         yaw, phase = math.atan2(dy, dx), 2.0 * math.pi * k * KNOT_S
         side, up = sway_m * math.sin(phase), 0.5 * sway_m * math.sin(2.0 * phase)
         at = (x - side * math.sin(yaw), y + side * math.cos(yaw), z_m + up)
-        poses.append(SE3.about_z(yaw, at).rounded())
+        poses.append(se3.SE3.about_z(yaw, at).rounded())
     return tuple(poses)

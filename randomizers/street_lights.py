@@ -7,16 +7,14 @@ from typing import Annotated, Literal
 import numpy as np
 
 from gen_data.config import distributions as dist
-from gen_data.core.asset_types import Keypoint
+from gen_data.core import asset_types, interfaces
 from gen_data.core.colorimetry import luminance
-from gen_data.core.interfaces import AssetIndex
 from gen_data.core.photometry import flux_to_intensity_cd
 from gen_data.core.scene import Body, Light, Scene
 from gen_data.core.se3 import Vec3
 from gen_data.core.streams import Rng
+from gen_data.randomizers import color_space, daylight
 from gen_data.randomizers.base import RandomizerBase, body_materials, scale_emission, set_emission
-from gen_data.randomizers.color_space import Temperature, temperature_to_linear
-from gen_data.randomizers.daylight import is_dark
 
 _WHITE_K = 3400.0
 _EVEN = 0.5
@@ -47,17 +45,17 @@ class StreetLights(RandomizerBase):
     type: Literal["street_lights"] = "street_lights"
     when: Literal["dark", "always"] = "dark"
     flux_lm: dist.Positive = dist.Uniform(4000.0, 10_000.0)
-    temperature_k: Temperature = dist.Choice({2300.0: 2.0, 3000.0: 3.0, 4000.0: 2.0})
+    temperature_k: color_space.Temperature = dist.Choice({2300.0: 2.0, 3000.0: 3.0, 4000.0: 2.0})
     cone_deg: Annotated[dist.Scalar, dist.Bounds(10, 88)] = dist.Uniform(76.0, 86.0)
     broken: dist.Flag = dist.Probability(0.03)
     lamp_luminance_cd_m2: dist.Positive = dist.LogUniform(8000.0, 30_000.0)
     windows: dist.Flag = dist.Probability(0.85)
     window_luminance_cd_m2: dist.Positive = dist.LogUniform(2.0, 20.0)
-    window_temperature_k: Temperature = dist.Uniform(2400.0, 4500.0)
+    window_temperature_k: color_space.Temperature = dist.Uniform(2400.0, 4500.0)
 
-    def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
+    def __call__(self, scene: Scene, assets: interfaces.AssetIndex, rng: Rng) -> Scene:
         """Return the scene with its lamps on; the same scene by day."""
-        if self.when == "dark" and not is_dark(scene):
+        if self.when == "dark" and not daylight.is_dark(scene):
             return scene
         color = white_balanced_color(self.temperature_k.draw(rng))
         flux_lm, cone_rad = self.flux_lm.draw(rng), math.radians(self.cone_deg.draw(rng))
@@ -87,8 +85,8 @@ def white_balanced_color(temperature_k: float) -> Vec3:
 
     Images are balanced for daylight, but cameras partly adapt to the light of sodium lamps.
     """
-    lamp = temperature_to_linear(temperature_k)
-    white = temperature_to_linear(_WHITE_K)
+    lamp = color_space.temperature_to_linear(temperature_k)
+    white = color_space.temperature_to_linear(_WHITE_K)
     rgb = [part / reference**0.5 for part, reference in zip(lamp, white, strict=True)]
     relative = float(luminance(np.array(rgb)))
     red, green, blue = (round(part / relative, 6) for part in rgb)
@@ -101,7 +99,7 @@ def spot_intensity_cd(flux_lm: float, cone_rad: float) -> float:
 
 
 def _make_lamp(
-    name: str, body: Body, lamp: Keypoint, flux_lm: float, color: Vec3, cone_rad: float
+    name: str, body: Body, lamp: asset_types.Keypoint, flux_lm: float, color: Vec3, cone_rad: float
 ) -> Light:
     at_body = body.scale * np.asarray(lamp.position_m)
     x, y, z = (float(value) for value in body.T_world_body.apply(at_body))

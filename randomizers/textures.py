@@ -5,9 +5,8 @@ from typing import Any, Literal
 from pydantic import Field
 
 from gen_data.config import distributions as dist
-from gen_data.core.interfaces import AssetIndex
+from gen_data.core import interfaces, streams
 from gen_data.core.scene import Scene
-from gen_data.core.streams import Rng
 from gen_data.randomizers.base import SurfaceRandomizer, choose, find_texture_files, find_textures
 
 
@@ -27,11 +26,11 @@ class Textures(SurfaceRandomizer):
     scale_m: dist.Positive = dist.Uniform(0.15, 0.6)
     slots: tuple[int, ...] = ()
 
-    def possible_assets(self, assets: AssetIndex) -> tuple[str, ...]:
+    def possible_assets(self, assets: interfaces.AssetIndex) -> tuple[str, ...]:
         """Ids of the texture files to draw from."""
         return find_texture_files(assets, self._find_options(assets))
 
-    def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
+    def __call__(self, scene: Scene, assets: interfaces.AssetIndex, rng: streams.Rng) -> Scene:
         """Return the scene with one texture per target."""
         options = self._find_options(assets)
 
@@ -44,6 +43,6 @@ class Textures(SurfaceRandomizer):
 
         return self.change_targets(scene, assets, draw, self.slots)
 
-    def _find_options(self, assets: AssetIndex) -> tuple[str, ...]:
+    def _find_options(self, assets: interfaces.AssetIndex) -> tuple[str, ...]:
         """Ids of the textures to draw from."""
         return find_textures(assets, self.textures, f"randomizers.{self.name}.textures")

@@ -7,18 +7,16 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from gen_data.config import distributions as dist
-from gen_data.core.interfaces import AssetIndex
+from gen_data.core import interfaces, streams
 from gen_data.core.scene import Scene
-from gen_data.core.streams import Rng
-from gen_data.randomizers.base import RandomizerBase
-from gen_data.randomizers.daylight import draw_cloud_seed, set_daylight, shared_number
+from gen_data.randomizers import base, daylight
 from gen_data.sky.sky import SkyModel
 
 Altitude = Annotated[dist.Scalar, dist.Bounds(-90, 90)]
 Turbidity = Annotated[dist.Scalar, dist.Bounds(1.8, 8.0)]
 
 
-class TimeOfDay(RandomizerBase):
+class TimeOfDay(base.RandomizerBase):
     """Draws the position of the sun; daylight and sky follow from it.
 
     Attributes:
@@ -51,13 +49,13 @@ class TimeOfDay(RandomizerBase):
                 )
         return self
 
-    def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
+    def __call__(self, scene: Scene, assets: interfaces.AssetIndex, rng: streams.Rng) -> Scene:
         """Return the scene with a drawn sun and sky."""
         del assets
         altitude_deg = self.sun_altitude_deg.draw(rng)
         azimuth_deg = self.sun_azimuth_deg.draw(rng)
-        turbidity, seed = self.turbidity.draw(rng), draw_cloud_seed(rng)
-        given = 0.0 if self.sky == "preetham" else shared_number(scene, "cloudiness")
+        turbidity, seed = self.turbidity.draw(rng), daylight.draw_cloud_seed(rng)
+        given = 0.0 if self.sky == "preetham" else daylight.shared_number(scene, "cloudiness")
         if self.cloudiness is not None:
             cloudiness = self.cloudiness.draw(rng)
         elif given is not None:
@@ -65,4 +63,4 @@ class TimeOfDay(RandomizerBase):
         else:
             cloudiness = dist.Uniform(0.0, 0.6).draw(rng)
         sky = SkyModel(seed, altitude_deg, turbidity, cloudiness, model=self.sky)
-        return set_daylight(scene, sky, azimuth_deg)
+        return daylight.set_daylight(scene, sky, azimuth_deg)

@@ -6,11 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gen_data.core.interfaces import AssetIndex
+from gen_data.core import interfaces, se3
 from gen_data.core.scene import Body, Scene
-from gen_data.core.se3 import SE3, Array
-from gen_data.randomizers.free_space import Footprint, standing_bodies
-from gen_data.randomizers.pedestrian_poses import moving_poses
+from gen_data.randomizers import free_space, pedestrian_poses
 from gen_data.randomizers.traffic_lights import Signal, runs_along
 from gen_data.traffic.axles import Axles, find_axles
 from gen_data.traffic.conflict_zones import crosswalk_zones, heading
@@ -59,7 +57,7 @@ class OnRoad:
 
     body: Body
     axles: Axles
-    T_world_rear: SE3
+    T_world_rear: se3.SE3
     place: LanePosition
     category: str
 
@@ -78,7 +76,7 @@ class OnFoot:
     walks: bool
 
 
-def find_drivers(scene: Scene, graph: LaneGraph, assets: AssetIndex) -> list[OnRoad]:
+def find_drivers(scene: Scene, graph: LaneGraph, assets: interfaces.AssetIndex) -> list[OnRoad]:
     """Find the vehicles on the graph's lanes, in order: members of groups and carriers of rigs.
 
     Vehicles across a lane or against its direction are left out, and scenery at a lane's edge, such
@@ -112,7 +110,7 @@ def find_drivers(scene: Scene, graph: LaneGraph, assets: AssetIndex) -> list[OnR
 
 
 def find_pedestrians(
-    scene: Scene, sidewalks: LaneGraph, crosswalks: LaneGraph, assets: AssetIndex
+    scene: Scene, sidewalks: LaneGraph, crosswalks: LaneGraph, assets: interfaces.AssetIndex
 ) -> list[OnFoot]:
     """Find the people of the scene's groups, in order, on their nearest sidewalk or crosswalk."""
     groups = {group.name for group in scene.groups}
@@ -133,7 +131,7 @@ def find_pedestrians(
         if near:
             place = min(near, key=lambda pair: pair[0])[1]
             pose = dict(asset.attributes).get("pose", "walk")
-            walks = pose in moving_poses()
+            walks = pose in pedestrian_poses.moving_poses()
             # Somebody who stands on a crosswalk is an obstacle.
             if walks or place.lane in sidewalks.lines:
                 found.append(OnFoot(body, place, walks))
@@ -152,7 +150,7 @@ class Standing:
 
     names: tuple[str, ...]
     categories: tuple[str, ...]
-    boxes: Array
+    boxes: se3.Array
 
     def at(self, x_m: float, y_m: float) -> str:
         """Name of the obstacle at a point; empty if the point is free."""
@@ -162,13 +160,13 @@ class Standing:
         return self.names[int(np.argmax(inside))] if inside.any() else ""
 
 
-def find_obstacles(scene: Scene, moving: Iterable[Body], assets: AssetIndex) -> Standing:
+def find_obstacles(scene: Scene, moving: Iterable[Body], assets: interfaces.AssetIndex) -> Standing:
     """Find every body with an instance id, except roads and moving bodies."""
     moving_names = {body.name for body in moving}
     names: list[str] = []
     categories: list[str] = []
     rows: list[tuple[float, ...]] = []
-    for body in standing_bodies(scene):
+    for body in free_space.standing_bodies(scene):
         if body.name in moving_names:
             continue
         category = assets.get(body.asset).category
@@ -177,7 +175,7 @@ def find_obstacles(scene: Scene, moving: Iterable[Body], assets: AssetIndex) -> 
             rows.append((x, y, POST_M, POST_M, 1.0, 0.0))
         else:
             bounds_m = assets.bounds_m(body.asset)
-            footprint = Footprint.of(body.T_world_body, bounds_m, body.scale)
+            footprint = free_space.Footprint.of(body.T_world_body, bounds_m, body.scale)
             x, y, cos_yaw, sin_yaw, half_x_m, half_y_m = footprint.rectangle
             rows.append((x, y, half_x_m, half_y_m, cos_yaw, sin_yaw))
         names.append(body.name)

@@ -16,36 +16,8 @@ from gen_data.core.motion import StateChange, Trajectory
 from gen_data.core.scene import Body, Scene
 from gen_data.core.se3 import Array
 from gen_data.core.streams import Rng
-from gen_data.randomizers.base import RandomizerBase
+from gen_data.randomizers import base, traffic_actors, traffic_lights, traffic_states
 from gen_data.randomizers.ego_on_lane import Stop
-from gen_data.randomizers.traffic_actors import (
-    DRIVERS,
-    Driver,
-    OnFoot,
-    OnRoad,
-    Standing,
-    find_approaches,
-    find_drivers,
-    find_obstacles,
-    find_pedestrians,
-    heading_direction,
-    number_axes,
-    set_cycles,
-)
-from gen_data.randomizers.traffic_lights import (
-    COLORS,
-    Signal,
-    group_junctions,
-    has_lenses,
-    read_signal,
-)
-from gen_data.randomizers.traffic_states import (
-    apply_first_changes,
-    gait_changes,
-    lamp_changes,
-    lamp_states,
-    signal_changes,
-)
 from gen_data.traffic.lane_routes import LaneGraph, draw_route, lanes_through_point
 from gen_data.traffic.pedestrian_paths import WalkNetwork, draw_path, make_walk_network
 from gen_data.traffic.pedestrians import Pedestrian
@@ -79,7 +51,7 @@ class Streets:
         return cls(*(LaneGraph.of(scene.lanes, *of) for of in kinds))
 
 
-class TrafficFlow(RandomizerBase):
+class TrafficFlow(base.RandomizerBase):
     """Simulates traffic; list it after all groups, paints and lights of a street.
 
     Vehicles on driving and bicycle lanes, including the ego vehicle, follow routes over the lanes
@@ -129,11 +101,13 @@ class TrafficFlow(RandomizerBase):
         """Return the scene at time 0, with trajectories and state changes."""
         streets = Streets.of(scene)
         signals = self._draw_signal_cycles(scene, assets, rng) if self.signals else []
-        approaches = find_approaches(streets.driving, streets.crosswalks, signals)
-        drivers = find_drivers(scene, streets.driving, assets)
-        people = find_pedestrians(scene, streets.sidewalks, streets.crosswalks, assets)
+        approaches = traffic_actors.find_approaches(streets.driving, streets.crosswalks, signals)
+        drivers = traffic_actors.find_drivers(scene, streets.driving, assets)
+        people = traffic_actors.find_pedestrians(
+            scene, streets.sidewalks, streets.crosswalks, assets
+        )
         moving = [m.body for m in drivers] + [m.body for m in people]
-        standing = find_obstacles(scene, moving, assets)
+        standing = traffic_actors.find_obstacles(scene, moving, assets)
         planned = self._plan_routes(drivers, standing, streets)
         vehicles = self._make_vehicles(drivers, streets, planned, standing.boxes, rng)
         walks = make_walk_network(streets.sidewalks, streets.crosswalks, standing.boxes)
@@ -150,20 +124,31 @@ class TrafficFlow(RandomizerBase):
 
     def _draw_signal_cycles(
         self, scene: Scene, assets: AssetIndex, rng: Rng
-    ) -> list[tuple[Signal, Approach]]:
+    ) -> list[tuple[traffic_lights.Signal, Approach]]:
         """Draw one cycle per junction for all traffic lights."""
-        roles = frozenset(COLORS)
-        lights = [read_signal(body) for body in scene.bodies if has_lenses(body, assets, roles)]
+        roles = frozenset(traffic_lights.COLORS)
+        lights = [
+            traffic_lights.read_signal(body)
+            for body in scene.bodies
+            if traffic_lights.has_lenses(body, assets, roles)
+        ]
         junctions = []
-        for junction in group_junctions(lights, JUNCTION_M):
+        for junction in traffic_lights.group_junctions(lights, JUNCTION_M):
             green_s, all_red_s = self.green_s.draw(rng), self.all_red_s.draw(rng)
-            cycle = Cycle(max(number_axes(junction)) + 1, round(green_s, 2), round(all_red_s, 2))
+            cycle = Cycle(
+                max(traffic_actors.number_axes(junction)) + 1,
+                round(green_s, 2),
+                round(all_red_s, 2),
+            )
             offset_s = round(float(rng.uniform()) * cycle.length_s, 2)
             junctions.append((junction, replace(cycle, offset_s=offset_s)))
-        return set_cycles(junctions)
+        return traffic_actors.set_cycles(junctions)
 
     def _plan_routes(
-        self, drivers: Sequence[OnRoad], standing: Standing, streets: Streets
+        self,
+        drivers: Sequence[traffic_actors.OnRoad],
+        standing: traffic_actors.Standing,
+        streets: Streets,
     ) -> dict[str, tuple[str, ...]]:
         """Expand the configured routes to names of lanes, by vehicle."""
         places = {driver.body.name: driver.place for driver in drivers}
@@ -189,7 +174,7 @@ class TrafficFlow(RandomizerBase):
 
     def _make_vehicles(
         self,
-        drivers: Sequence[OnRoad],
+        drivers: Sequence[traffic_actors.OnRoad],
         streets: Streets,
         planned: dict[str, tuple[str, ...]],
         obstacles: Array,
@@ -199,7 +184,7 @@ class TrafficFlow(RandomizerBase):
         vehicles = []
         for member in drivers:
             factor, headway_s = self.speed_factor.draw(rng), self.headway_s.draw(rng)
-            kind = DRIVERS.get(member.category, Driver())
+            kind = traffic_actors.DRIVERS.get(member.category, traffic_actors.Driver())
             given = planned.get(member.body.name, (member.place.lane,))
             fastest = max(line.lane.speed_m_s for line in streets.driving.lines.values())
             reach_m = min(factor * fastest, kind.speed_m_s) * self.duration_s
@@ -234,13 +219,13 @@ class TrafficFlow(RandomizerBase):
         return make_vehicles(vehicles, streets.driving, streets.crosswalks, obstacles, reach_m)
 
     def _make_pedestrians(
-        self, people: Sequence[OnFoot], walks: WalkNetwork, rng: Rng
+        self, people: Sequence[traffic_actors.OnFoot], walks: WalkNetwork, rng: Rng
     ) -> list[Pedestrian]:
         pedestrians = []
         for member in people:
             speed_m_s = self.walking_m_s.draw(rng)
             x, y, _ = member.body.T_world_body.translation_m
-            ahead = heading_direction(member.body)
+            ahead = traffic_actors.heading_direction(member.body)
             graph = walks.sidewalks
             if member.place.lane in walks.crosswalks.lines:
                 graph = walks.crosswalks
@@ -257,19 +242,24 @@ class TrafficFlow(RandomizerBase):
         return pedestrians
 
     def _draw_signal_changes(
-        self, signals: Sequence[tuple[Signal, Approach]], assets: AssetIndex, rng: Rng
+        self,
+        signals: Sequence[tuple[traffic_lights.Signal, Approach]],
+        assets: AssetIndex,
+        rng: Rng,
     ) -> list[StateChange]:
         lens_cd_m2 = round(self.lens_cd_m2.draw(rng), 2)
         return [
             change
             for signal, approach in signals
-            for change in signal_changes(signal, approach, assets, lens_cd_m2, self.duration_s)
+            for change in traffic_states.signal_changes(
+                signal, approach, assets, lens_cd_m2, self.duration_s
+            )
         ]
 
     def _draw_lamp_changes(
         self,
         vehicles: Vehicles | None,
-        drivers: Sequence[OnRoad],
+        drivers: Sequence[traffic_actors.OnRoad],
         motion: SimulatedMotion,
         assets: AssetIndex,
         rng: Rng,
@@ -279,7 +269,7 @@ class TrafficFlow(RandomizerBase):
             brake, blink = self.brakelight_cd_m2.draw(rng), self.indicator_cd_m2.draw(rng)
             begun = float(rng.uniform())
             assert vehicles is not None, "drivers imply vehicles"
-            states = lamp_states(
+            states = traffic_states.lamp_states(
                 motion.station_m[:, k],
                 motion.speed_m_s[:, k],
                 motion.acceleration_m_s2[:, k],
@@ -287,11 +277,11 @@ class TrafficFlow(RandomizerBase):
                 vehicles.entries[k],
                 begun,
             )
-            made += lamp_changes(member.body, assets, states, brake, blink)
+            made += traffic_states.lamp_changes(member.body, assets, states, brake, blink)
         return made
 
 
-def _check_points(standing: Standing, stops: Sequence[Stop], where: str) -> None:
+def _check_points(standing: traffic_actors.Standing, stops: Sequence[Stop], where: str) -> None:
     """Raise ConfigError if a point of a route is inside a standing body."""
     for k, stop in enumerate(stops):
         wall = "" if isinstance(stop, str) else standing.at(*stop)
@@ -303,20 +293,23 @@ def _check_points(standing: Standing, stops: Sequence[Stop], where: str) -> None
 
 
 def _draw_gait_changes(
-    people: Sequence[OnFoot], motion: SimulatedMotion, assets: AssetIndex, rng: Rng
+    people: Sequence[traffic_actors.OnFoot], motion: SimulatedMotion, assets: AssetIndex, rng: Rng
 ) -> list[StateChange]:
     made: list[StateChange] = []
     for k, member in enumerate(people):
         start = float(rng.uniform())
         if member.walks:
-            made += gait_changes(
+            made += traffic_states.gait_changes(
                 member.body, assets, motion.walked_m[:, k], motion.pace_m_s[:, k], start
             )
     return made
 
 
 def _make_trajectories(
-    motion: SimulatedMotion, drivers: Sequence[OnRoad], people: Sequence[OnFoot], assets: AssetIndex
+    motion: SimulatedMotion,
+    drivers: Sequence[traffic_actors.OnRoad],
+    people: Sequence[traffic_actors.OnFoot],
+    assets: AssetIndex,
 ) -> list[tuple[Body, Trajectory | None]]:
     """Trajectory of every vehicle and pedestrian; None for a body that never moves."""
     backs = [member.axles.T_body_rear.inverse().translation_m for member in drivers]
@@ -341,9 +334,9 @@ def _make_trajectories(
 
 def _reject_collisions(
     motion: SimulatedMotion,
-    drivers: Sequence[OnRoad],
-    people: Sequence[OnFoot],
-    standing: Standing,
+    drivers: Sequence[traffic_actors.OnRoad],
+    people: Sequence[traffic_actors.OnFoot],
+    standing: traffic_actors.Standing,
     name: str,
 ) -> None:
     """Raise LayoutRejected if a moving body overlaps another body."""
@@ -375,7 +368,7 @@ def _set_in_motion(
         for body, track in tracks
         if track is not None
     ]
-    scene = apply_first_changes(scene.with_bodies(*moved), changes)
+    scene = traffic_states.apply_first_changes(scene.with_bodies(*moved), changes)
     order = sorted(range(len(changes)), key=lambda k: (changes[k].time_s, k))
     return replace(
         scene,

@@ -6,17 +6,14 @@ from pydantic import Field
 
 from gen_data.assets.asset_ids import AssetId, parse_asset_id
 from gen_data.config import distributions as dist
-from gen_data.core.interfaces import AssetIndex
-from gen_data.core.members import change_assets
+from gen_data.core import interfaces, members, streams
 from gen_data.core.scene import ObjectGroup, Scene
-from gen_data.core.streams import Rng
-from gen_data.randomizers.base import RandomizerBase, check_known
-from gen_data.randomizers.pedestrian_poses import free_handed_poses, moving_poses
+from gen_data.randomizers import base, pedestrian_poses
 
 _WALKS, _STANDS = "walk_umbrella", "stand_umbrella"
 
 
-class Umbrellas(RandomizerBase):
+class Umbrellas(base.RandomizerBase):
     """Lets people open umbrellas in rain; list it after their groups and after the weather.
 
     Those who walk or stand and hold nothing else may have one.
@@ -33,15 +30,15 @@ class Umbrellas(RandomizerBase):
     opened: dist.Flag = dist.Probability(0.55)
     rain_mm_h: float = Field(2.5, gt=0, le=500)
 
-    def check(self, scene: Scene, assets: AssetIndex) -> None:
+    def check(self, scene: Scene, assets: interfaces.AssetIndex) -> None:
         """Raise ConfigError if a target is not a group of the template."""
         del assets
         groups: dict[str, ObjectGroup] = {group.name: group for group in scene.groups}
         for name in self.targets:
             where = f"randomizers.{self.name}.targets: the template has no object group"
-            check_known(name, groups, where)
+            base.check_known(name, groups, where)
 
-    def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
+    def __call__(self, scene: Scene, assets: interfaces.AssetIndex, rng: streams.Rng) -> Scene:
         """Return the scene with people under umbrellas; the same scene without rain."""
         share = min(1.0, scene.weather.rain_mm_h / self.rain_mm_h)
         if share <= 0.0:
@@ -52,13 +49,13 @@ class Umbrellas(RandomizerBase):
                 continue
             wanted = self.opened.draw(rng) and float(rng.uniform()) < share
             pose = dict(assets.get(body.asset).attributes).get("pose", "")
-            if wanted and pose in free_handed_poses():
+            if wanted and pose in pedestrian_poses.free_handed_poses():
                 opened[body.name] = _under_umbrella(body.asset, pose)
-        return change_assets(scene, opened)
+        return members.change_assets(scene, opened)
 
 
 def _under_umbrella(asset: str, pose: str) -> str:
     """The same person with an open umbrella; who walks keeps the phase of the stride."""
     parsed = parse_asset_id(asset)
-    held = _WALKS if pose in moving_poses() else _STANDS
+    held = _WALKS if pose in pedestrian_poses.moving_poses() else _STANDS
     return str(AssetId(parsed.name, {**parsed.parameters, "pose": held}))

@@ -10,13 +10,7 @@ from gen_data.core.interfaces import AssetIndex
 from gen_data.core.scene import Body, Light, Scene
 from gen_data.core.se3 import SE3, Vec3
 from gen_data.core.streams import Rng
-from gen_data.randomizers.base import (
-    SurfaceRandomizer,
-    add_attributes,
-    scale_emission,
-    set_emission,
-)
-from gen_data.randomizers.daylight import is_dark
+from gen_data.randomizers import base, daylight
 
 INDICATORS = ("none", "left", "right", "both")
 _WHITE: Vec3 = (1.02, 1.0, 0.94)
@@ -32,7 +26,7 @@ _OUTSIDE_M = 0.06
 """A beam starts this far in front of its lens, which therefore does not shade it."""
 
 
-class VehicleLights(SurfaceRandomizer):
+class VehicleLights(base.SurfaceRandomizer):
     """Switches the lights of vehicles and adds their states to the labels.
 
     Attributes:
@@ -63,14 +57,14 @@ class VehicleLights(SurfaceRandomizer):
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
         """Return the scene with drawn states of all vehicle lights."""
-        dark = is_dark(scene)
+        dark = daylight.is_dark(scene)
         bodies, lights, states = [], list(scene.lights), {}
         for body in self.find_targets(scene):
             on, braking = self.headlights.draw(rng), self.braking.draw(rng)
             side, beam_cd = self.indicator.draw(rng), self.beam_cd.draw(rng)
             on = on or dark
             glow = self._draw_emission(on, braking, side, rng)
-            bodies.append(set_emission(body, assets, glow))
+            bodies.append(base.set_emission(body, assets, glow))
             states[body.instance_id] = (
                 ("brake_lights", "on" if braking else "off"),
                 ("head_lights", "on" if on else "off"),
@@ -79,7 +73,7 @@ class VehicleLights(SurfaceRandomizer):
             if dark and self.beams:
                 lights += _beams(self.name, body, assets, beam_cd)
         lit = replace(scene.with_bodies(*bodies), lights=tuple(lights))
-        return add_attributes(lit, states)
+        return base.add_attributes(lit, states)
 
     def _draw_emission(self, on: bool, braking: bool, side: str, rng: Rng) -> dict[str, Vec3]:
         """Draw emission by role; every luminance is drawn: switches shift no other draw."""
@@ -87,13 +81,13 @@ class VehicleLights(SurfaceRandomizer):
         brake, blink = self.brakelight_cd_m2.draw(rng), self.indicator_cd_m2.draw(rng)
         glow: dict[str, Vec3] = {}
         if on:
-            glow["headlight"] = scale_emission(_WHITE, head)
-            glow["taillight"] = scale_emission(RED, tail)
+            glow["headlight"] = base.scale_emission(_WHITE, head)
+            glow["taillight"] = base.scale_emission(RED, tail)
         if braking:
-            glow["brakelight"] = scale_emission(RED, brake)
+            glow["brakelight"] = base.scale_emission(RED, brake)
         for name in ("left", "right"):
             if side in (name, "both"):
-                glow[f"indicator_{name}"] = scale_emission(AMBER, blink)
+                glow[f"indicator_{name}"] = base.scale_emission(AMBER, blink)
         return glow
 
 

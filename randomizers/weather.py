@@ -11,14 +11,10 @@ from pydantic import Field, field_validator
 from gen_data.config import distributions as dist
 from gen_data.config.data_files import load_table
 from gen_data.config.yaml_scalars import quote_value
-from gen_data.core.errors import did_you_mean
-from gen_data.core.interfaces import AssetIndex
+from gen_data.core import errors, interfaces, streams
 from gen_data.core.scene import Scene
 from gen_data.core.scene import Weather as SceneWeather
-from gen_data.core.streams import Rng
-from gen_data.randomizers.base import RandomizerBase
-from gen_data.randomizers.daylight import draw_cloud_seed, set_daylight
-from gen_data.randomizers.time_of_day import Altitude, Turbidity
+from gen_data.randomizers import base, daylight, time_of_day
 from gen_data.sky.sky import SkyModel
 
 _FIELDS = ("fog_extinction_per_m", "fog_height_m", "rain_mm_h", "snow_mm_h", "wetness", "puddles",
@@ -70,7 +66,7 @@ PRESETS: dict[str, Preset] = {
 }
 
 
-class Weather(RandomizerBase):
+class Weather(base.RandomizerBase):
     """Draws a weather preset; other fields, where given, override the preset's values.
 
     Attributes:
@@ -95,10 +91,10 @@ class Weather(RandomizerBase):
 
     type: Literal["weather"] = "weather"
     preset: dist.Name = dist.Choice(("ClearNoon", "CloudyNoon", "ClearSunset", "WetNoon"))
-    sun_altitude_deg: Altitude | None = Field(None)
+    sun_altitude_deg: time_of_day.Altitude | None = Field(None)
     sun_azimuth_deg: dist.Scalar = dist.Uniform(0.0, 360.0)
     cloudiness: dist.UnitInterval | None = Field(None)
-    turbidity: Turbidity | None = Field(None)
+    turbidity: time_of_day.Turbidity | None = Field(None)
     fog_extinction_per_m: dist.NonNegative | None = Field(None)
     fog_height_m: dist.NonNegative | None = Field(None)
     rain_mm_h: dist.NonNegative | None = Field(None)
@@ -108,7 +104,7 @@ class Weather(RandomizerBase):
     snow_cover: dist.UnitInterval | None = Field(None)
     lens_drops: dist.UnitInterval | None = Field(None)
 
-    def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
+    def __call__(self, scene: Scene, assets: interfaces.AssetIndex, rng: streams.Rng) -> Scene:
         """Return the scene with drawn weather, sun and sky."""
         del assets
         preset = PRESETS[self.preset.draw(rng)]
@@ -117,14 +113,14 @@ class Weather(RandomizerBase):
         azimuth_deg = self.sun_azimuth_deg.draw(rng)
         cloudiness = _draw(self.cloudiness, condition.cloudiness, rng)
         turbidity = _draw(self.turbidity, condition.turbidity, rng)
-        sky = SkyModel(draw_cloud_seed(rng), altitude_deg, turbidity, cloudiness)
+        sky = SkyModel(daylight.draw_cloud_seed(rng), altitude_deg, turbidity, cloudiness)
         values: dict[str, Any] = {"seed": int(rng.integers(_PATTERNS))}
         for name in _FIELDS:
             given: dist.Scalar | None = getattr(self, name)
             if given is not None:
                 values[name] = round(given.draw(rng), 6)
         weather = replace(condition.weather, **values)
-        return set_daylight(replace(scene, weather=weather), sky, azimuth_deg)
+        return daylight.set_daylight(replace(scene, weather=weather), sky, azimuth_deg)
 
     @field_validator("preset")
     @classmethod
@@ -134,10 +130,10 @@ class Weather(RandomizerBase):
             if name not in PRESETS:
                 raise ValueError(
                     f"there is no weather {quote_value(name)}; expected a condition and a time "
-                    f"such as ClearNoon{did_you_mean(name, PRESETS)}"
+                    f"such as ClearNoon{errors.did_you_mean(name, PRESETS)}"
                 )
         return preset
 
 
-def _draw(given: dist.Scalar | None, default: Range, rng: Rng) -> float:
+def _draw(given: dist.Scalar | None, default: Range, rng: streams.Rng) -> float:
     return (given or dist.Uniform(*default)).draw(rng)

@@ -5,11 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from gen_data.core.errors import ConfigError
+from gen_data.core import errors, plates, se3
 from gen_data.core.interfaces import AssetIndex, Element
-from gen_data.core.plates import has_plate
 from gen_data.core.scene import Lane, Light, Region, Scene, SupportSurface
-from gen_data.core.se3 import Vec3
 from gen_data.scene_templates.element import Element as TemplateElement
 
 CONTENT_HEIGHT_M = 0.25
@@ -37,7 +35,7 @@ def build_scene(name: str, elements: Sequence[Element], assets: AssetIndex) -> S
     scene = Scene(template=name)
     for element in sorted(elements, key=lambda element: element.follows_others):
         scene = element.leave_out(scene) if element in absent else element.add(scene, assets)
-    if not scene.lights and not has_plate(scene):
+    if not scene.lights and not plates.has_plate(scene):
         scene = replace(scene, lights=(DEFAULT_LIGHT,))
     if scene.lanes:
         scene = replace(scene, interior_m=_bounds_of_lanes(scene.lanes))
@@ -58,7 +56,7 @@ def focus_region(scene: Scene) -> Region:
     return Region((x, y, z), (length_m, width_m, height_m))
 
 
-def _bounds_of_lanes(lanes: Sequence[Lane]) -> tuple[Vec3, Vec3]:
+def _bounds_of_lanes(lanes: Sequence[Lane]) -> tuple[se3.Vec3, se3.Vec3]:
     """Space for the cameras and lamps of a street: above its lanes and next to them."""
     points = np.concatenate([np.array(lane.center_m) for lane in lanes])
     low, high = points.min(axis=0), points.max(axis=0)
@@ -71,7 +69,7 @@ def _check_names(elements: Sequence[Element]) -> None:
     seen: set[str] = set()
     for element in elements:
         if element.name in seen:
-            raise ConfigError(
+            raise errors.ConfigError(
                 f"elements.{element.name}: two elements have this name; names must be unique"
             )
         seen.add(element.name)
@@ -84,7 +82,7 @@ def _check_relations(elements: Sequence[Element], absent: Collection[str]) -> No
             continue
         for field, name in element.relations.items():
             if name in absent:
-                raise ConfigError(
+                raise errors.ConfigError(
                     f"elements.{element.name}.{field}: the element '{name}' is absent from this "
                     f"scene; expected one that is present, or present: false for '{element.name}'"
                 )

@@ -5,9 +5,8 @@ from typing import Literal
 
 from pydantic import Field
 
-from gen_data.core.interfaces import AssetIndex
+from gen_data.core import interfaces, se3
 from gen_data.core.scene import Body, Instance, Rig, Scene
-from gen_data.core.se3 import SE3
 from gen_data.scene_templates.element import Element, next_instance_id
 
 CATEGORY = "ego"
@@ -31,11 +30,11 @@ class Carrier(Element):
     asset: str = "pedestal?size_m=0.36,0.36,0.16"
     height_m: float = Field(0.0, ge=0, le=2.5)
 
-    def add(self, scene: Scene, assets: AssetIndex) -> Scene:
+    def add(self, scene: Scene, assets: interfaces.AssetIndex) -> Scene:
         """Add the body at the origin, and its rig."""
         low, _ = assets.bounds_m(self.asset)
         instance_id = next_instance_id(scene)
-        pose = SE3((0.0, 0.0, self.height_m - low[2])).rounded()
+        pose = se3.SE3((0.0, 0.0, self.height_m - low[2])).rounded()
         body = Body(self.name, self.asset, pose, instance_id=instance_id, collides=False)
         instance = Instance(instance_id, self.name, CATEGORY, 0, self.asset, annotated=False)
         return replace(

@@ -6,8 +6,7 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field
 
-from gen_data.core.errors import ConfigError
-from gen_data.core.interfaces import AssetIndex
+from gen_data.core import errors, interfaces
 from gen_data.core.scene import Lane, Scene
 from gen_data.roads.cross_section import height_m, non_default_fields
 from gen_data.roads.lane_graph import world_points
@@ -36,12 +35,12 @@ class Crosswalk(Element):
         """The road."""
         return name_relations(road=self.road)
 
-    def add(self, scene: Scene, assets: AssetIndex) -> Scene:
+    def add(self, scene: Scene, assets: interfaces.AssetIndex) -> Scene:
         """Add the markings on the road, and the lane of the pedestrians."""
         where = f"elements.{self.name}"
         shape, parameters, T_world_road = find_road(scene, self.road, f"{where}.road")
         if not 0.5 * self.width_m <= self.station_m <= shape.length_m - 0.5 * self.width_m:
-            raise ConfigError(
+            raise errors.ConfigError(
                 f"{where}.station_m: {self.station_m:g} is not on '{self.road}', which is "
                 f"{shape.length_m:g} m long"
             )

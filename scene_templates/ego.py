@@ -6,9 +6,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from gen_data.core.errors import ConfigError
-from gen_data.core.interfaces import AssetIndex
-from gen_data.core.lane_geometry import LaneLine
+from gen_data.core import errors, interfaces, lane_geometry
 from gen_data.core.scene import Body, Instance, Rig, Scene
 from gen_data.scene_templates.element import Element, name_relations, next_instance_id
 from gen_data.traffic.axles import find_axles
@@ -39,17 +37,17 @@ class Ego(Element):
         """The road of its lane."""
         return name_relations(lane=self.lane)
 
-    def add(self, scene: Scene, assets: AssetIndex) -> Scene:
+    def add(self, scene: Scene, assets: interfaces.AssetIndex) -> Scene:
         """Add the vehicle and its rig."""
         asset = self.asset or self._find_asset(assets)
         lanes = [lane for lane in scene.lanes if lane.name == self.lane or not self.lane]
         lanes = [lane for lane in lanes if lane.kind == "driving" and not lane.junction]
         if not lanes:
             wanted = f"driving lane '{self.lane}'" if self.lane else "driving lane"
-            raise ConfigError(
+            raise errors.ConfigError(
                 f"elements.{self.name}.lane: there is no {wanted}; list the road before it"
             )
-        line = LaneLine(lanes[0])
+        line = lane_geometry.LaneLine(lanes[0])
         T_body_rig = find_axles(assets, asset, 1.0).T_body_rear
         place = line.pose(0.5 * line.length_m)
         instance_id = next_instance_id(scene)
@@ -63,10 +61,10 @@ class Ego(Element):
             rigs=(*scene.rigs, Rig(self.name, self.name, T_body_rig)),
         )
 
-    def _find_asset(self, assets: AssetIndex) -> str:
+    def _find_asset(self, assets: interfaces.AssetIndex) -> str:
         found = assets.find(self.tags)
         if not found:
-            raise ConfigError(
+            raise errors.ConfigError(
                 f"elements.{self.name}.tags: no asset is tagged {', '.join(self.tags)}"
             )
         return found[0].asset_id

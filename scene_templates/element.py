@@ -10,9 +10,7 @@ from pydantic import Field
 
 from gen_data.assets.asset_ids import AssetId, ParameterValue
 from gen_data.config.base_model import NAME_PATTERN, Strict
-from gen_data.core.errors import ConfigError, did_you_mean
-from gen_data.core.interfaces import AssetIndex
-from gen_data.core.members import free_instance_ids
+from gen_data.core import errors, interfaces, members
 from gen_data.core.scene import Body, Instance, Scene, SupportSurface
 from gen_data.core.se3 import SE3, Vec3
 
@@ -44,7 +42,7 @@ class Element(Strict):
         return scene
 
     @abstractmethod
-    def add(self, scene: Scene, assets: AssetIndex) -> Scene:
+    def add(self, scene: Scene, assets: interfaces.AssetIndex) -> Scene:
         """Return the scene with this element at its nominal pose. Draws nothing.
 
         Raises:
@@ -119,9 +117,9 @@ def find_surfaces(scene: Scene, name: str, field: str) -> tuple[SupportSurface, 
     if not found:
         known = sorted({s.name for s in scene.surfaces} | {s.body for s in scene.surfaces})
         listed = ", ".join(known) or "none: list the surface before the elements on it"
-        raise ConfigError(
+        raise errors.ConfigError(
             f"{field}: there is no surface '{name}'; expected one of {listed}"
-            f"{did_you_mean(name, known)}"
+            f"{errors.did_you_mean(name, known)}"
         )
     return found
 
@@ -133,11 +131,11 @@ def parametric_id(family: str, **parameters: ParameterValue) -> str:
 
 def next_instance_id(scene: Scene) -> int:
     """Smallest free instance id."""
-    return free_instance_ids(scene, 1)[0]
+    return members.free_instance_ids(scene, 1)[0]
 
 
 def add_background(
-    scene: Scene, assets: AssetIndex, name: str, asset: str, T_world_body: SE3
+    scene: Scene, assets: interfaces.AssetIndex, name: str, asset: str, T_world_body: SE3
 ) -> Scene:
     """Add a static body without an instance, such as walls and ground."""
     assets.get(asset)
@@ -146,7 +144,7 @@ def add_background(
 
 def add_static(
     scene: Scene,
-    assets: AssetIndex,
+    assets: interfaces.AssetIndex,
     name: str,
     asset: str,
     T_world_body: SE3,
@@ -161,13 +159,13 @@ def add_static(
     return replace(scene, bodies=(*scene.bodies, body), instances=(*scene.instances, instance))
 
 
-def stand_upright(assets: AssetIndex, asset: str, T_world_stand: SE3) -> SE3:
+def stand_upright(assets: interfaces.AssetIndex, asset: str, T_world_stand: SE3) -> SE3:
     """``T_world_body`` of an upright asset whose lowest point is at a pose's origin."""
     low, _ = assets.bounds_m(asset)
     return T_world_stand @ SE3((0.0, 0.0, -low[2]))
 
 
-def extent_m(assets: AssetIndex, asset: str) -> Vec3:
+def extent_m(assets: interfaces.AssetIndex, asset: str) -> Vec3:
     """Size of an asset's bounding box along its own axes [m]."""
     low, high = assets.bounds_m(asset)
     return (high[0] - low[0], high[1] - low[1], high[2] - low[2])

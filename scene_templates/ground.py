@@ -5,9 +5,8 @@ from typing import Literal
 from pydantic import Field
 
 from gen_data.config.base_model import NAME_PATTERN
-from gen_data.core.interfaces import AssetIndex
+from gen_data.core import interfaces, se3
 from gen_data.core.scene import Scene
-from gen_data.core.se3 import SE3
 from gen_data.scene_templates.element import PlacedElement, add_background, parametric_id
 from gen_data.scene_templates.road import Ground
 
@@ -31,8 +30,8 @@ class GroundElement(PlacedElement):
     seed: int = Field(0, ge=0, le=1_000_000)
     name: str = Field("ground", pattern=NAME_PATTERN)
 
-    def add(self, scene: Scene, assets: AssetIndex) -> Scene:
+    def add(self, scene: Scene, assets: interfaces.AssetIndex) -> Scene:
         """Add a static body; background has no instance."""
         shape = {name: getattr(self, name) for name in ("size_m", "cover", "relief_m", "seed")}
-        pose = self.pose(scene) @ SE3((0.0, 0.0, self.level_m))
+        pose = self.pose(scene) @ se3.SE3((0.0, 0.0, self.level_m))
         return add_background(scene, assets, self.name, parametric_id("ground", **shape), pose)

@@ -9,8 +9,7 @@ from pydantic import Field
 
 from gen_data.assets.families import declared
 from gen_data.config.base_model import NAME_PATTERN
-from gen_data.core.errors import ConfigError
-from gen_data.core.interfaces import AssetIndex
+from gen_data.core import errors, interfaces
 from gen_data.core.scene import Lane, Scene
 from gen_data.core.se3 import SE3, Array
 from gen_data.core.variant_rng import VariantRng, variant_rng
@@ -66,10 +65,10 @@ class Horizon(Element):
         """True: it surrounds every road."""
         return True
 
-    def add(self, scene: Scene, assets: AssetIndex) -> Scene:
+    def add(self, scene: Scene, assets: interfaces.AssetIndex) -> Scene:
         """Add a static body per piece; background has no instance."""
         if not scene.lanes:
-            raise ConfigError(
+            raise errors.ConfigError(
                 f"elements.{self.name}: there is no lane to surround; expected a road, a junction "
                 "or a road network among the elements"
             )

@@ -7,10 +7,8 @@ from typing import Any, ClassVar, Literal
 
 from pydantic import Field
 
-from gen_data.core.errors import ConfigError
-from gen_data.core.interfaces import AssetIndex
+from gen_data.core import errors, interfaces, se3
 from gen_data.core.scene import Lane, Scene
-from gen_data.core.se3 import SE3
 from gen_data.roads.cross_section import non_default_fields
 from gen_data.roads.junction_shape import ABSENT, JunctionShape
 from gen_data.roads.roundabout_shape import RoundaboutShape
@@ -66,10 +64,10 @@ class Intersection(RoadSurface, Element):
         """Return its shape. Raises ConfigError if the arms or the corners are impossible."""
 
     @abstractmethod
-    def _lanes(self, T_world_body: SE3) -> tuple[Lane, ...]:
+    def _lanes(self, T_world_body: se3.SE3) -> tuple[Lane, ...]:
         """All lanes, in the world."""
 
-    def add(self, scene: Scene, assets: AssetIndex) -> Scene:
+    def add(self, scene: Scene, assets: interfaces.AssetIndex) -> Scene:
         """Add it as background, and link its lanes to the roads that it meets."""
         shape = self.shape()
         pose = self._find_pose(scene, shape)
@@ -87,7 +85,7 @@ class Intersection(RoadSurface, Element):
         """
         arms = self.arms_deg
         if not all(a < b for a, b in pairwise(arms)) or arms[0] < 0.0 or arms[-1] >= 360.0:
-            raise ConfigError(
+            raise errors.ConfigError(
                 f"elements.{self.name}.arms_deg: expected ascending directions from 0 to below 360"
             )
         first, second, third = arms[:3]
@@ -96,18 +94,18 @@ class Intersection(RoadSurface, Element):
     def check_corners(self, shape: Shape) -> None:
         """Raise ConfigError if the sidewalk does not fit around the corners."""
         if self.sidewalk_m > 0.0 and self.radius_m < shape.border_m + 0.5:
-            raise ConfigError(
+            raise errors.ConfigError(
                 f"elements.{self.name}.radius_m: {self.radius_m:g} m is too tight for the "
                 f"sidewalk; expected at least {shape.border_m + 0.5:.2f}"
             )
 
-    def _find_pose(self, scene: Scene, shape: Shape) -> SE3:
+    def _find_pose(self, scene: Scene, shape: Shape) -> se3.SE3:
         if not self.after:
             return level_pose(self.at_m, self.yaw_deg)
         if 180.0 not in self.arms_deg:
-            raise ConfigError(
+            raise errors.ConfigError(
                 f"elements.{self.name}.after: no arm points at the road; expected 180 in arms_deg"
             )
-        return find_port(scene, self.after, f"elements.{self.name}.after") @ SE3(
+        return find_port(scene, self.after, f"elements.{self.name}.after") @ se3.SE3(
             (shape.reach_m(), 0.0, 0.0)
         )

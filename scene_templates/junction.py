@@ -5,15 +5,12 @@ from typing import ClassVar, Literal
 
 from pydantic import Field
 
-from gen_data.core.errors import ConfigError
-from gen_data.core.scene import Lane
-from gen_data.core.se3 import SE3
+from gen_data.core import errors, scene, se3
 from gen_data.roads.junction_shape import JunctionShape, junction_lanes
-from gen_data.scene_templates.intersection import Intersection
-from gen_data.scene_templates.road import TURN_LANE_M
+from gen_data.scene_templates import intersection, road
 
 
-class Junction(Intersection):
+class Junction(intersection.Intersection):
     """A level junction with rounded corners; roads start at its arms with ``after: <name>/<arm>``.
 
     Attributes:
@@ -41,20 +38,20 @@ class Junction(Intersection):
             self.beside_m, self.radius_m, self.crown, self.traffic, self.setback_m,
             self.median_m, float(self.turn_lane),
         )  # fmt: skip
-        if self.turn_lane and self.median_m < TURN_LANE_M:
-            raise ConfigError(
+        if self.turn_lane and self.median_m < road.TURN_LANE_M:
+            raise errors.ConfigError(
                 f"elements.{self.name}.median_m: {self.median_m:g} m; a lane for turning vehicles "
-                f"needs at least {TURN_LANE_M:g}"
+                f"needs at least {road.TURN_LANE_M:g}"
             )
         gaps = shape.gaps_rad()
         if min(gaps) < math.radians(40.0) or max(gaps) > math.pi + 1e-3:
-            raise ConfigError(
+            raise errors.ConfigError(
                 f"elements.{self.name}.arms_deg: neighbouring arms must be 40 to 180 degrees "
                 f"apart; found {math.degrees(min(gaps)):.0f} to {math.degrees(max(gaps)):.0f}"
             )
         self.check_corners(shape)
         return shape
 
-    def _lanes(self, T_world_body: SE3) -> tuple[Lane, ...]:
+    def _lanes(self, T_world_body: se3.SE3) -> tuple[scene.Lane, ...]:
         crosswalks = self.crossings != "none"
         return junction_lanes(self.shape(), self.name, T_world_body, self.speed_m_s, crosswalks)

@@ -5,16 +5,14 @@ from typing import Literal
 
 from pydantic import Field
 
-from gen_data.core.errors import ConfigError
-from gen_data.core.interfaces import AssetIndex
+from gen_data.core import errors, interfaces
 from gen_data.core.lane_geometry import LaneLine, pose_on_lane
 from gen_data.core.members import Member, add_members
 from gen_data.core.scene import LaneKind, ObjectGroup, Scene
-from gen_data.scene_templates.element import Element
-from gen_data.scene_templates.objects import AssetChoice, empty_group
+from gen_data.scene_templates import element, objects
 
 
-class LaneObjects(Element):
+class LaneObjects(element.Element):
     """Objects along lanes; the ``lane_objects`` randomizer of the same name draws them.
 
     Attributes:
@@ -28,21 +26,21 @@ class LaneObjects(Element):
 
     type: Literal["lane_objects"] = "lane_objects"
     lanes: tuple[LaneKind, ...] = Field(min_length=1)
-    assets: AssetChoice = Field(examples=[{"tags": ["car"]}])
+    assets: objects.AssetChoice = Field(examples=[{"tags": ["car"]}])
     count: int = Field(0, ge=0, le=2000)
     facing: Literal["along", "left"] = "along"
     annotate: bool = True
 
     def leave_out(self, scene: Scene) -> Scene:
         """Return the scene with a group of no objects, whose name randomizers accept."""
-        return replace(scene, groups=(*scene.groups, empty_group(self.name, "along")))
+        return replace(scene, groups=(*scene.groups, objects.empty_group(self.name, "along")))
 
-    def add(self, scene: Scene, assets: AssetIndex) -> Scene:
+    def add(self, scene: Scene, assets: interfaces.AssetIndex) -> Scene:
         """Add the group, and its objects evenly along the lanes."""
         lines = [LaneLine(lane) for lane in scene.lanes if lane.kind in self.lanes]
         if not lines and self.count:
             known = ", ".join(sorted({lane.kind for lane in scene.lanes})) or "none"
-            raise ConfigError(
+            raise errors.ConfigError(
                 f"elements.{self.name}.lanes: there is no lane of kind {' or '.join(self.lanes)}; "
                 f"there is {known}: list the road before the objects along it"
             )

@@ -8,10 +8,8 @@ from typing import Literal
 
 from pydantic import Field, model_validator
 
-from gen_data.core.interfaces import AssetIndex
-from gen_data.core.photometry import add_fixture, fixture_asset, level_side, scale_to_flux
+from gen_data.core import interfaces, photometry, se3
 from gen_data.core.scene import PANEL_KINDS, LampKind, Light, Scene
-from gen_data.core.se3 import Vec3
 from gen_data.scene_templates.element import Element
 
 
@@ -54,7 +52,7 @@ class LightElement(Element):
             raise ValueError("direction must not be 0")
         return self
 
-    def add(self, scene: Scene, assets: AssetIndex) -> Scene:
+    def add(self, scene: Scene, assets: interfaces.AssetIndex) -> Scene:
         """Add the light and, if visible, its housing."""
         light = Light(
             self.name,
@@ -67,16 +65,16 @@ class LightElement(Element):
         if self.kind == "spot":
             light = replace(light, cone_rad=round(math.radians(self.cone_deg), 6))
         if self.kind == "rectangle":
-            light = replace(light, size_m=self.size_m, side=level_side(light.direction))
+            light = replace(light, size_m=self.size_m, side=photometry.level_side(light.direction))
         if self.luminous_flux_lm is not None:
-            light = scale_to_flux(light, self.luminous_flux_lm)
+            light = photometry.scale_to_flux(light, self.luminous_flux_lm)
         if self.visible and self.kind in PANEL_KINDS:
-            materials = assets.materials(fixture_asset(light))
-            scene, light = add_fixture(scene, light, materials)
+            materials = assets.materials(photometry.fixture_asset(light))
+            scene, light = photometry.add_fixture(scene, light, materials)
         return replace(scene, lights=(*scene.lights, light))
 
 
-def _normalize(direction: Vec3) -> Vec3:
+def _normalize(direction: se3.Vec3) -> se3.Vec3:
     length = math.sqrt(sum(v * v for v in direction))
     x, y, z = (round(v / length, 6) for v in direction)
     return (x, y, z)

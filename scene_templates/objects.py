@@ -11,20 +11,13 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from gen_data.config.base_model import Strict
+from gen_data.core import bounded_cache, errors
 from gen_data.core.asset_types import Asset
-from gen_data.core.bounded_cache import ObjectCache
-from gen_data.core.errors import ConfigError
 from gen_data.core.interfaces import AssetIndex
 from gen_data.core.members import Member, add_members
 from gen_data.core.scene import ObjectGroup, Placement, Scene, SupportSurface
 from gen_data.core.se3 import SE3, Vec3
-from gen_data.scene_templates.element import (
-    Element,
-    extent_m,
-    find_surfaces,
-    name_relations,
-    stand_upright,
-)
+from gen_data.scene_templates import element
 
 LAYERS: dict[Placement, int] = {"drop": 4, "scatter": 1, "grid": 1, "stack": 4}
 """Largest number of objects that start above one another, by placement."""
@@ -32,7 +25,7 @@ MARGIN_M = 0.02
 """Gap between objects and other elements on the surface."""
 _GAPS_M = (0.24, 0.18, 0.12, 0.08, 0.05, 0.03, 0.015, 0.005)
 _STEP_M = 0.02
-_FAMILIES: ObjectCache[Mapping[str, list[Asset]]] = ObjectCache(1)
+_FAMILIES: bounded_cache.ObjectCache[Mapping[str, list[Asset]]] = bounded_cache.ObjectCache(1)
 """Of the latest library: a street has dozens of groups, and a library thousands of assets."""
 _TURNS_MAX = 100_000
 """Limit on the steps, rows and layers tried for one object; large surfaces need fewer."""
@@ -83,7 +76,7 @@ class AssetChoice(Strict):
         ]
         kept = sorted(asset.asset_id for asset in self._select_preferred(fitting))
         if not kept:
-            raise ConfigError(f"{field}: no asset matches; expected other tags or ids")
+            raise errors.ConfigError(f"{field}: no asset matches; expected other tags or ids")
         return tuple(kept)
 
     def _select_preferred(self, fitting: list[Asset]) -> Iterator[Asset]:
@@ -100,7 +93,7 @@ class AssetChoice(Strict):
                 yield from same
 
 
-class Objects(Element):
+class Objects(element.Element):
     """Objects on one or several surfaces; the ``objects`` randomizer of the same name draws them.
 
     Attributes:
@@ -127,7 +120,7 @@ class Objects(Element):
     @property
     def relations(self) -> Mapping[str, str]:
         """The element that supports them."""
-        return name_relations(on=self.on)
+        return element.name_relations(on=self.on)
 
     def leave_out(self, scene: Scene) -> Scene:
         """Return the scene with a group of no objects, whose name randomizers accept."""
@@ -135,7 +128,7 @@ class Objects(Element):
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
         """Add the group, and its objects in rows on its surfaces, clear of other elements."""
-        surfaces = find_surfaces(scene, self.on, f"elements.{self.name}.on")
+        surfaces = element.find_surfaces(scene, self.on, f"elements.{self.name}.on")
         discs = [find_keep_out_discs(scene, surface, assets) for surface in surfaces]
         group = ObjectGroup(
             name=self.name,
@@ -154,7 +147,9 @@ class Objects(Element):
             points = self._place(chosen, surface, group, assets)
             members = []
             for asset, point in zip(chosen, points, strict=True):
-                pose = stand_upright(assets, asset, surface.T_world_surface @ SE3(point)).rounded()
+                pose = element.stand_upright(
+                    assets, asset, surface.T_world_surface @ SE3(point)
+                ).rounded()
                 mass_kg = assets.get(asset).mass_kg
                 members.append(Member(asset, pose, motion="dynamic", mass_kg=mass_kg))
             scene = add_members(scene, group, members, assets, first=here.start)
@@ -166,11 +161,11 @@ class Objects(Element):
         """Choose the asset of an object: evenly from the group, or the next one that fits."""
         first = (number * len(group.assets)) // max(self.count, 1)
         for asset in (*group.assets[first:], *group.assets[:first]):
-            length_m, width_m, height_m = extent_m(assets, asset)
+            length_m, width_m, height_m = element.extent_m(assets, asset)
             fits = length_m <= surface.size_m[0] and width_m <= surface.size_m[1]
             if fits and height_m <= surface.clearance_m:
                 return asset
-        raise ConfigError(
+        raise errors.ConfigError(
             f"elements.{self.name}.assets: every asset is larger than surface '{surface.name}'; "
             "expected smaller assets or a larger surface"
         )
@@ -185,10 +180,10 @@ class Objects(Element):
         for x, y, radius_m in group.keep_out:
             here = (T_surface_world @ SE3((x, y, height_m))).translation_m
             discs.append((here[0], here[1], radius_m))
-        sizes_m = [extent_m(assets, asset) for asset in chosen]
+        sizes_m = [element.extent_m(assets, asset) for asset in chosen]
         points = place_in_rows(sizes_m, surface, discs, LAYERS[self.placement])
         if points is None:
-            raise ConfigError(
+            raise errors.ConfigError(
                 f"elements.{self.name}.count: {len(chosen)} objects do not fit on surface "
                 f"'{surface.name}' of {surface.size_m[0]:g} m x {surface.size_m[1]:g} m; "
                 "expected fewer objects or a larger surface"

@@ -9,20 +9,14 @@ from pydantic import Field
 from gen_data.assets.families import declared
 from gen_data.core.interfaces import AssetIndex
 from gen_data.core.scene import Scene
-from gen_data.scene_templates.element import (
-    Element,
-    add_background,
-    add_static,
-    name_relations,
-    parametric_id,
-)
+from gen_data.scene_templates import element
 from gen_data.scene_templates.road_places import cut_lanes, find_place
 
 _MARGIN_M, _PIER_MEDIAN_M = 1.0, 2.0
 """Room between the road's edge and the abutments; smallest median with pillars."""
 
 
-class Overpass(Element):
+class Overpass(element.Element):
     """A bridge over a road with embankments at both ends; every lane passes beneath, unlabelled.
 
     Nothing is planted or built where it stands.
@@ -49,7 +43,7 @@ class Overpass(Element):
     @property
     def relations(self) -> Mapping[str, str]:
         """The road."""
-        return name_relations(road=self.road)
+        return element.name_relations(road=self.road)
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
         """Add the deck as background, and the ends, which take room."""
@@ -62,17 +56,17 @@ class Overpass(Element):
         )
         left, right = (place.edge_m(side, land=False)[0] + _MARGIN_M for side in (1, -1))
         pier = place.shape.median_m >= _PIER_MEDIAN_M and left == right
-        deck = parametric_id(
+        deck = element.parametric_id(
             "overpass", clearance_m=self.clearance_m, kind=self.kind, pier=float(pier),
             seed=self.seed % 4, span_m=round(left + right, 3), width_m=self.width_m,
         )  # fmt: skip
         middle = place.pose(0.5 * (left - right))
-        scene = add_background(scene, assets, f"{self.name}/deck", deck, middle)
-        end = parametric_id(
+        scene = element.add_background(scene, assets, f"{self.name}/deck", deck, middle)
+        end = element.parametric_id(
             "embankment", height_m=round(height_m, 3), length_m=self.ramp_m,
             seed=self.seed % 4, width_m=self.width_m,
         )  # fmt: skip
         for word, t_m, turn in (("left", left, 0.5), ("right", -right, -0.5)):
             pose = place.pose(t_m, -0.1, turn * math.pi)
-            scene = add_static(scene, assets, f"{self.name}/{word}", end, pose)
+            scene = element.add_static(scene, assets, f"{self.name}/{word}", end, pose)
         return scene

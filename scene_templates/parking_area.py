@@ -6,13 +6,11 @@ from pydantic import Field
 
 from gen_data.core.interfaces import AssetIndex
 from gen_data.core.scene import Scene
-from gen_data.roads.cross_section import non_default_fields
-from gen_data.roads.parking_shape import ParkingShape, parking_lanes
-from gen_data.scene_templates.element import PlacedElement, parametric_id
-from gen_data.scene_templates.road import RoadSurface, add_street
+from gen_data.roads import cross_section, parking_shape
+from gen_data.scene_templates import element, road
 
 
-class ParkingArea(RoadSurface, PlacedElement):
+class ParkingArea(road.RoadSurface, element.PlacedElement):
     """Aisles along X with bays at right angles on both sides, around ``at_m``.
 
     Attributes:
@@ -30,9 +28,9 @@ class ParkingArea(RoadSurface, PlacedElement):
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
         """Add the surface as background; every bay is a lane."""
-        shape = ParkingShape(self.bays, self.aisles, self.bay_m, self.aisle_m)
+        shape = parking_shape.ParkingShape(self.bays, self.aisles, self.bay_m, self.aisle_m)
         pose = self.pose(scene)
-        parameters = non_default_fields(shape) | self.surface_parameters()
-        asset = parametric_id("parking_area", **parameters)
-        lanes = parking_lanes(shape, self.name, pose)
-        return add_street(scene, assets, self.name, asset, pose, lanes)
+        parameters = cross_section.non_default_fields(shape) | self.surface_parameters()
+        asset = element.parametric_id("parking_area", **parameters)
+        lanes = parking_shape.parking_lanes(shape, self.name, pose)
+        return road.add_street(scene, assets, self.name, asset, pose, lanes)

@@ -13,14 +13,7 @@ from gen_data.core.scene import LaneKind, Scene
 from gen_data.core.se3 import SE3
 from gen_data.core.variant_rng import variant_rng
 from gen_data.roads.cross_section import strips
-from gen_data.scene_templates.element import (
-    Element,
-    add_background,
-    add_static,
-    name_relations,
-    parametric_id,
-    stand_upright,
-)
+from gen_data.scene_templates import element
 from gen_data.scene_templates.road_places import RoadPlace, cut_lanes, find_place
 
 LENGTH_M, DEPTH_M = 38.0, 30.0
@@ -33,7 +26,7 @@ _BESIDE_M, _CARS = 1.75, 124
 """Distance of a car that is filled up from the middle of its island; variants of cars."""
 
 
-class PetrolStation(Element):
+class PetrolStation(element.Element):
     """A forecourt next to a road with a canopy over pumps, a shop and a price sign.
 
     It takes the place of houses, gardens and trees there; the road stays as it is. Two driveways
@@ -57,7 +50,7 @@ class PetrolStation(Element):
     @property
     def relations(self) -> Mapping[str, str]:
         """The road."""
-        return name_relations(road=self.road)
+        return element.name_relations(road=self.road)
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
         """Add the forecourt as background; canopy, shop and sign take room."""
@@ -70,20 +63,20 @@ class PetrolStation(Element):
         # X away from the road; Y along it.
         frame = place.pose(side * edge_m, max(z_m, -0.02) + 0.02, side * 0.5 * math.pi)
         brand = self.seed % 4
-        pad = parametric_id(
+        pad = element.parametric_id(
             "paved_area", cover="asphalt", seed=self.seed % 4, size_m=(DEPTH_M, LENGTH_M)
         )
         at = SE3((0.5 * DEPTH_M, 0.0, 0.0))
-        scene = add_background(scene, assets, f"{self.name}/forecourt", pad, frame @ at)
+        scene = element.add_background(scene, assets, f"{self.name}/forecourt", pad, frame @ at)
         parts = (
             ("canopy", "petrol_canopy", SE3((_CANOPY_M, 0.0, 0.0))),
             ("shop", "petrol_shop", SE3.about_z(math.pi, (_SHOP_M, 0.0, 0.0))),
             ("sign", "price_sign", SE3.about_z(0.5 * math.pi, (1.6, 0.4 * LENGTH_M, 0.0))),
         )
         for word, family, stand in parts:
-            asset = parametric_id(family, seed=brand)
-            pose = stand_upright(assets, asset, frame @ stand)
-            scene = add_static(scene, assets, f"{self.name}/{word}", asset, pose)
+            asset = element.parametric_id(family, seed=brand)
+            pose = element.stand_upright(assets, asset, frame @ stand)
+            scene = element.add_static(scene, assets, f"{self.name}/{word}", asset, pose)
         scene = self._add_driveways(scene, assets, place, side, max(z_m, -0.02) + 0.02)
         return self._add_cars(scene, assets, frame @ SE3((_CANOPY_M, 0.0, 0.0)), brand)
 
@@ -99,13 +92,15 @@ class PetrolStation(Element):
             edge_m = place.edge_m(side, land=False)[0] + place.sagitta_m(side, 0.5 * LENGTH_M)
             # On the inside of bends the road comes nearer to the forecourt's edge.
             bent_m = 0.5 * side * place.shape.curvature_per_m * along * along
-            asset = parametric_id(
+            asset = element.parametric_id(
                 "driveway", seed=self.seed % 4, width_m=_DRIVEWAY_M,
                 depth_m=round(edge_m - foot_m - min(bent_m, edge_m - foot_m - 0.5) + 0.3, 3),
                 kerb_m=round(kerb_m, 4), rise_m=round(rise_m, 4),
             )  # fmt: skip
             pose = here.pose(side * foot_m, 0.0, side * 0.5 * math.pi)
-            scene = add_background(scene, assets, f"{self.name}/driveway{number}", asset, pose)
+            scene = element.add_background(
+                scene, assets, f"{self.name}/driveway{number}", asset, pose
+            )
         return scene
 
     def _add_cars(self, scene: Scene, assets: AssetIndex, T_world_canopy: SE3, brand: int) -> Scene:
@@ -115,9 +110,9 @@ class PetrolStation(Element):
             here = rng.chance(self.cars)
             at = SE3.about_z(math.pi * (rng.random() < 0.5), (rng.between(-1.4, 1.4), y + _BESIDE_M,
                              0.0))  # fmt: skip
-            asset = parametric_id("car", seed=int(rng.between(0, _CARS)))
+            asset = element.parametric_id("car", seed=int(rng.between(0, _CARS)))
             if here:
-                pose = stand_upright(assets, asset, T_world_canopy @ at)
+                pose = element.stand_upright(assets, asset, T_world_canopy @ at)
                 name = f"{self.name}/car{number}"
-                scene = add_static(scene, assets, name, asset, pose, annotated=True)
+                scene = element.add_static(scene, assets, name, asset, pose, annotated=True)
         return scene

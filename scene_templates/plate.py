@@ -6,11 +6,8 @@ from typing import Literal
 from pydantic import Field
 
 from gen_data.config.base_model import NAME_PATTERN
-from gen_data.core.asset_types import Material
-from gen_data.core.interfaces import AssetIndex
-from gen_data.core.plates import CATCHER, EV100, find_plates, show_plate
+from gen_data.core import asset_types, interfaces, plates, se3
 from gen_data.core.scene import Body, Camera, Scene
-from gen_data.core.se3 import SE3
 from gen_data.scene_templates.element import Element, parametric_id
 
 _GROUND_M, _GROUND_SCALE = (100.0, 100.0), 6.0
@@ -34,7 +31,7 @@ class PlateElement(Element):
     photos: tuple[str, ...] = Field(("rendered",), min_length=1)
     camera: str = Field("color", pattern=NAME_PATTERN)
 
-    def add(self, scene: Scene, assets: AssetIndex) -> Scene:
+    def add(self, scene: Scene, assets: interfaces.AssetIndex) -> Scene:
         """Add the ground, its surface and lanes, the light, and a camera of the whole photograph.
 
         Raises:
@@ -42,11 +39,11 @@ class PlateElement(Element):
             AssetError: no horizon was found in it.
         """
         field = f"elements.{self.name}.photos"
-        photo = find_plates(assets.find((), "plate"), self.photos, field)[0]
+        photo = plates.find_plates(assets.find((), "plate"), self.photos, field)[0]
         plate = assets.plate(photo)
-        catcher = (Material(role=CATCHER),)
+        catcher = (asset_types.Material(role=plates.CATCHER),)
         ground = parametric_id("plane", size_m=_GROUND_M)
-        body = Body(self.name, ground, SE3(), _GROUND_SCALE, materials=catcher)
-        camera = Camera(self.camera, plate.T_world_camera, plate.intrinsics, EV100)
+        body = Body(self.name, ground, se3.SE3(), _GROUND_SCALE, materials=catcher)
+        camera = Camera(self.camera, plate.T_world_camera, plate.intrinsics, plates.EV100)
         scene = replace(scene, bodies=(*scene.bodies, body), cameras=(*scene.cameras, camera))
-        return show_plate(scene, self.name, photo, plate)
+        return plates.show_plate(scene, self.name, photo, plate)

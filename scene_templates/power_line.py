@@ -7,10 +7,8 @@ import numpy as np
 from pydantic import Field
 
 from gen_data.assets.families import declared
-from gen_data.core.errors import ConfigError
-from gen_data.core.interfaces import AssetIndex
+from gen_data.core import errors, interfaces, se3
 from gen_data.core.scene import Scene
-from gen_data.core.se3 import SE3, Array
 from gen_data.scene_templates.element import Element, add_static, parametric_id
 
 CLEAR_M = 20.0
@@ -43,32 +41,32 @@ class PowerLine(Element):
         """True: it keeps clear of every road."""
         return True
 
-    def add(self, scene: Scene, assets: AssetIndex) -> Scene:
+    def add(self, scene: Scene, assets: interfaces.AssetIndex) -> Scene:
         """Add the pylons. Raises ConfigError if there is no place for them."""
         yaw = math.radians(self.yaw_deg)
         asset = parametric_id("power_pylon", seed=self.seed % 4, span_m=self.span_m)
         for number, (x, y) in enumerate(self._places(scene).tolist()):
-            pose = SE3.about_z(yaw, (x, y, -0.1))
+            pose = se3.SE3.about_z(yaw, (x, y, -0.1))
             scene = add_static(scene, assets, f"{self.name}/{number}", asset, pose)
         return scene
 
-    def _places(self, scene: Scene) -> Array:
+    def _places(self, scene: Scene) -> se3.Array:
         """Feet of the pylons [n, 2], all of them clear of lanes."""
         yaw = math.radians(self.yaw_deg)
         along = np.array([math.cos(yaw), math.sin(yaw)])
         offsets = (np.arange(self.count) - 0.5 * (self.count - 1)) * self.span_m
-        feet: Array = np.array(self.at_m) + offsets[:, None] * along
+        feet: se3.Array = np.array(self.at_m) + offsets[:, None] * along
         borders = [
             (np.array(lane.center_m)[:, :2], 0.5 * lane.width_m + CLEAR_M) for lane in scene.lanes
         ]
         for shift in np.arange(0.0, self.span_m, _STEP_M):
-            moved: Array = feet + shift * along
+            moved: se3.Array = feet + shift * along
             if all(
                 np.hypot(*(moved[:, None] - line[None]).transpose(2, 0, 1)).min() > reach
                 for line, reach in borders
             ):
                 return moved
-        raise ConfigError(
+        raise errors.ConfigError(
             f"elements.{self.name}.at_m: pylons would stand on a lane wherever the line begins; "
             "expected another at_m or yaw_deg"
         )

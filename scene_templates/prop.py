@@ -8,20 +8,12 @@ from typing import Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from gen_data.core.interfaces import AssetIndex
-from gen_data.core.kinematics import link_poses, rigid_group
+from gen_data.core import interfaces, kinematics, se3
 from gen_data.core.scene import Body, Instance, Scene
-from gen_data.core.se3 import SE3
-from gen_data.scene_templates.element import (
-    PlacedElement,
-    add_background,
-    add_static,
-    next_instance_id,
-    stand_upright,
-)
+from gen_data.scene_templates import element
 
 
-class Prop(PlacedElement):
+class Prop(element.PlacedElement):
     """A static asset, such as a gantry, a plinth or a tray.
 
     A jointed object, listed under ``robots`` of an asset folder with a category such as
@@ -45,27 +37,29 @@ class Prop(PlacedElement):
             raise ValueError("annotate and hollow exclude each other")
         return self
 
-    def add(self, scene: Scene, assets: AssetIndex) -> Scene:
+    def add(self, scene: Scene, assets: interfaces.AssetIndex) -> Scene:
         """Add a static body and, unless it is background, its instance."""
         if assets.get(self.asset).kind == "robot":
             return self._add_jointed(scene, assets)
-        pose = stand_upright(assets, self.asset, self.pose(scene))
+        pose = element.stand_upright(assets, self.asset, self.pose(scene))
         if self.hollow:
-            return add_background(scene, assets, self.name, self.asset, pose)
-        return add_static(scene, assets, self.name, self.asset, pose, annotated=self.annotate)
+            return element.add_background(scene, assets, self.name, self.asset, pose)
+        return element.add_static(
+            scene, assets, self.name, self.asset, pose, annotated=self.annotate
+        )
 
-    def _add_jointed(self, scene: Scene, assets: AssetIndex) -> Scene:
+    def _add_jointed(self, scene: Scene, assets: interfaces.AssetIndex) -> Scene:
         """Add a body per visible link at the home positions; the lowest one stands there."""
-        thing, number = assets.robot(self.asset), next_instance_id(scene)
-        poses = link_poses(thing, SE3(), thing.home)
+        thing, number = assets.robot(self.asset), element.next_instance_id(scene)
+        poses = kinematics.link_poses(thing, se3.SE3(), thing.home)
         lowest_m = min(
             poses[link].apply(assets.vertices_m(mesh).astype(np.float64))[:, 2].min()
             for link, mesh in thing.visuals.items()
         )
-        T_world_base = (self.pose(scene) @ SE3((0.0, 0.0, -float(lowest_m)))).rounded()
+        T_world_base = (self.pose(scene) @ se3.SE3((0.0, 0.0, -float(lowest_m)))).rounded()
         parts = tuple(link for link in thing.links if link in thing.visuals)
         # The frame of an instance is that of its first body, which should not move with a joint.
-        rigid = rigid_group(thing, thing.links[0])
+        rigid = kinematics.rigid_group(thing, thing.links[0])
         bodies = tuple(
             Body(
                 f"{self.name}/{link}",

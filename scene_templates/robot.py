@@ -7,11 +7,8 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
-from gen_data.core.asset_types import RobotModel
-from gen_data.core.interfaces import AssetIndex
-from gen_data.core.kinematics import finger_links, link_poses, make_link_bodies, rigid_group
+from gen_data.core import asset_types, interfaces, kinematics, se3
 from gen_data.core.scene import Articulation, Instance, Rig, Scene
-from gen_data.core.se3 import SE3, Vec3
 from gen_data.scene_templates.element import PlacedElement, find_surfaces, next_instance_id
 
 CATEGORY = "robot_arm"
@@ -37,7 +34,7 @@ class Robot(PlacedElement):
     reach_m: float = Field(0.75, gt=0)
     annotate: bool = True
 
-    def add(self, scene: Scene, assets: AssetIndex) -> Scene:
+    def add(self, scene: Scene, assets: interfaces.AssetIndex) -> Scene:
         """Add an articulation, one instance, and a body per visible link."""
         asset = self._find_installed(assets)
         robot = assets.robot(asset)
@@ -58,11 +55,11 @@ class Robot(PlacedElement):
             scene,
             instances=(*scene.instances, instance),
             articulations=(*scene.articulations, articulation),
-            bodies=(*scene.bodies, *make_link_bodies(articulation, robot, parts)),
+            bodies=(*scene.bodies, *kinematics.make_link_bodies(articulation, robot, parts)),
             rigs=(*scene.rigs, make_wrist_rig(f"{self.name}_wrist", self.name, robot)),
         )
 
-    def _find_installed(self, assets: AssetIndex) -> str:
+    def _find_installed(self, assets: interfaces.AssetIndex) -> str:
         """Find its first installed asset; if there is none, the first that needs no pack.
 
         The error text then is about that one; ids of packs have a slash. A name that its installed
@@ -80,7 +77,7 @@ class Robot(PlacedElement):
         without_pack = [name for name in wanted if "/" not in name]
         return next((name for name in wanted if name in known), [*without_pack, wanted[0]][0])
 
-    def _workspace_m(self, scene: Scene, T_world_base: SE3) -> tuple[Vec3, Vec3]:
+    def _workspace_m(self, scene: Scene, T_world_base: se3.SE3) -> tuple[se3.Vec3, se3.Vec3]:
         """Space for the hand's goals: above the supporting surface, within reach."""
         x, y, z = T_world_base.translation_m
         low, high = [x - self.reach_m, y - self.reach_m], [x + self.reach_m, y + self.reach_m]
@@ -95,17 +92,17 @@ class Robot(PlacedElement):
         return (low[0], low[1], z + 0.10), (high[0], high[1], z + 0.50)
 
 
-def make_wrist_rig(name: str, arm: str, robot: RobotModel) -> Rig:
+def make_wrist_rig(name: str, arm: str, robot: asset_types.RobotModel) -> Rig:
     """Make the rig on a robot's hand, or on its last link if it has no gripper."""
-    fixed = [link for link in robot.links if link not in finger_links(robot)]
-    hand, turn = fixed[-1], SE3().quaternion_wxyz
+    fixed = [link for link in robot.links if link not in kinematics.finger_links(robot)]
+    hand, turn = fixed[-1], se3.SE3().quaternion_wxyz
     if robot.gripper is not None:
         hand, turn = robot.gripper.link, robot.gripper.T_link_grasp.quaternion_wxyz
     # The hand may be a mere frame: the last visible link before it carries the rig.
-    with_it = [k for k in fixed if k in robot.visuals and k in rigid_group(robot, hand)]
+    with_it = [k for k in fixed if k in robot.visuals and k in kinematics.rigid_group(robot, hand)]
     visible = with_it or [k for k in fixed if k in robot.visuals]
     carrier = hand if hand in visible else visible[-1]
-    poses = link_poses(robot, SE3(), robot.home)
+    poses = kinematics.link_poses(robot, se3.SE3(), robot.home)
     T_carrier_hand = poses[carrier].inverse() @ poses[hand]
-    T_hand_rig = SE3((0.0, 0.0, 0.0), turn) @ SE3((0.0, 0.0, 0.0), R_GRASP_RIG)
+    T_hand_rig = se3.SE3((0.0, 0.0, 0.0), turn) @ se3.SE3((0.0, 0.0, 0.0), R_GRASP_RIG)
     return Rig(name, f"{arm}/{carrier}", (T_carrier_hand @ T_hand_rig).rounded())

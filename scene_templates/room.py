@@ -7,9 +7,8 @@ from pydantic import Field
 
 from gen_data.assets.asset_ids import ParameterValue
 from gen_data.config.base_model import NAME_PATTERN
-from gen_data.core.interfaces import AssetIndex
+from gen_data.core import interfaces, se3
 from gen_data.core.scene import Scene
-from gen_data.core.se3 import SE3
 from gen_data.scene_templates.element import Element, add_background, parametric_id
 
 CLEARANCE_M = 0.15
@@ -32,7 +31,7 @@ class Room(Element):
     walls: bool = True
     name: str = Field("room", pattern=NAME_PATTERN)
 
-    def add(self, scene: Scene, assets: AssetIndex) -> Scene:
+    def add(self, scene: Scene, assets: interfaces.AssetIndex) -> Scene:
         """Add the room as background, without an instance."""
         x, y, z = self.size_m
         shape: dict[str, ParameterValue] = {
@@ -44,7 +43,7 @@ class Room(Element):
         if not self.walls:
             shape["walls"] = 0
         asset = parametric_id("room", **shape)
-        scene = add_background(scene, assets, self.name, asset, SE3())
+        scene = add_background(scene, assets, self.name, asset, se3.SE3())
         inside = (
             (-x / 2 + CLEARANCE_M, -y / 2 + CLEARANCE_M, CLEARANCE_M),
             (x / 2 - CLEARANCE_M, y / 2 - CLEARANCE_M, z - CLEARANCE_M),

@@ -5,9 +5,7 @@ from typing import ClassVar, Literal
 
 from pydantic import Field
 
-from gen_data.core.errors import ConfigError
-from gen_data.core.scene import Lane
-from gen_data.core.se3 import SE3
+from gen_data.core import errors, scene, se3
 from gen_data.roads.roundabout_shape import RoundaboutShape, roundabout_lanes
 from gen_data.scene_templates.intersection import Intersection
 
@@ -48,7 +46,7 @@ class Roundabout(Intersection):
             self.truck_apron_m, float(self.splitters), self.setback_m,
         )  # fmt: skip
         if self.ring_m < self.truck_apron_m + self.lane_width_m or shape.island_m < 2.0:
-            raise ConfigError(
+            raise errors.ConfigError(
                 f"{where}.ring_m: {self.ring_m:g} m; expected {self.truck_apron_m:g} m of truck "
                 f"apron and at least {self.lane_width_m:g} m at its side, and an island of at "
                 f"least 4 m within a diameter of {self.diameter_m:g} m"
@@ -56,13 +54,13 @@ class Roundabout(Intersection):
         self.check_corners(shape)
         needed = 2.0 * shape.mouth_rad() + _SPARE_RAD
         if min(shape.gaps_rad()) < needed:
-            raise ConfigError(
+            raise errors.ConfigError(
                 f"{where}.arms_deg: neighbouring arms are "
                 f"{math.degrees(min(shape.gaps_rad())):.0f} degrees apart; expected at least "
                 f"{math.degrees(needed):.0f}, or a larger diameter_m or a smaller radius_m"
             )
         return shape
 
-    def _lanes(self, T_world_body: SE3) -> tuple[Lane, ...]:
+    def _lanes(self, T_world_body: se3.SE3) -> tuple[scene.Lane, ...]:
         crosswalks = self.crossings != "none"
         return roundabout_lanes(self.shape(), self.name, T_world_body, self.speed_m_s, crosswalks)

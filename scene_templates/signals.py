@@ -6,24 +6,15 @@ from typing import Literal
 
 from pydantic import Field
 
-from gen_data.core.errors import ConfigError
-from gen_data.core.interfaces import AssetIndex
-from gen_data.core.lane_geometry import LaneLine
+from gen_data.core import errors, interfaces, lane_geometry, se3
 from gen_data.core.scene import Lane, Scene
-from gen_data.core.se3 import SE3
-from gen_data.scene_templates.element import (
-    Element,
-    add_static,
-    name_relations,
-    parametric_id,
-    stand_upright,
-)
+from gen_data.scene_templates import element
 
 SIGNAL_M = 0.6
 """Distance of the pole from the kerb."""
 
 
-class Signals(Element):
+class Signals(element.Element):
     """A traffic light at every road into a junction, facing the incoming traffic.
 
     Attributes:
@@ -44,24 +35,24 @@ class Signals(Element):
     @property
     def relations(self) -> Mapping[str, str]:
         """The junction."""
-        return name_relations(junction=self.junction)
+        return element.name_relations(junction=self.junction)
 
-    def add(self, scene: Scene, assets: AssetIndex) -> Scene:
+    def add(self, scene: Scene, assets: interfaces.AssetIndex) -> Scene:
         """Add one light per incoming road."""
         crossing = {lane.name for lane in scene.lanes if lane.road == self.junction}
         coming = [lane for lane in scene.lanes if _is_entry(lane, crossing, self.junction)]
         if not coming:
-            raise ConfigError(
+            raise errors.ConfigError(
                 f"elements.{self.name}.junction: no road leads to a junction '{self.junction}'; "
                 "list the junction and its roads before its signals"
             )
-        asset = parametric_id("traffic_light", mount=self.mount, seed=self.seed)
+        asset = element.parametric_id("traffic_light", mount=self.mount, seed=self.seed)
         for number, lane in enumerate(coming):
-            line = LaneLine(lane)
+            line = lane_geometry.LaneLine(lane)
             right_m = 0.5 * lane.width_m + self.beside_m + SIGNAL_M
-            stand = line.pose(line.length_m, -right_m) @ SE3.about_z(math.pi)
-            name, pose = f"{self.name}/{number}", stand_upright(assets, asset, stand)
-            scene = add_static(scene, assets, name, asset, pose, annotated=self.annotate)
+            stand = line.pose(line.length_m, -right_m) @ se3.SE3.about_z(math.pi)
+            name, pose = f"{self.name}/{number}", element.stand_upright(assets, asset, stand)
+            scene = element.add_static(scene, assets, name, asset, pose, annotated=self.annotate)
         return scene
 
 

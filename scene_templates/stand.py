@@ -6,9 +6,8 @@ from typing import Literal
 
 from pydantic import Field
 
-from gen_data.core.interfaces import AssetIndex
+from gen_data.core import interfaces, se3
 from gen_data.core.scene import Rig, Scene
-from gen_data.core.se3 import Vec3, turned
 from gen_data.scene_templates.element import Element
 
 
@@ -25,14 +24,14 @@ class Stand(Element):
     """
 
     type: Literal["stand"] = "stand"
-    position_m: Vec3 = (0.0, 0.0, 1.5)
+    position_m: se3.Vec3 = (0.0, 0.0, 1.5)
     yaw_deg: float = Field(0.0, ge=-180, le=180)
     pitch_deg: float = Field(-90.0, ge=-90, le=90)
     roll_deg: float = Field(0.0, ge=-180, le=180)
 
-    def add(self, scene: Scene, assets: AssetIndex) -> Scene:
+    def add(self, scene: Scene, assets: interfaces.AssetIndex) -> Scene:
         """Add the rig."""
         del assets
         angles = (math.radians(a) for a in (self.yaw_deg, self.pitch_deg, self.roll_deg))
-        pose = turned(self.position_m, *angles).rounded()
+        pose = se3.turned(self.position_m, *angles).rounded()
         return replace(scene, rigs=(*scene.rigs, Rig(self.name, "", pose)))

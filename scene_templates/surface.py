@@ -6,18 +6,12 @@ from pydantic import Field
 
 from gen_data.core.interfaces import AssetIndex
 from gen_data.core.scene import Scene
-from gen_data.scene_templates.element import (
-    PlacedElement,
-    add_static,
-    extent_m,
-    parametric_id,
-    stand_upright,
-)
+from gen_data.scene_templates import element
 
 CLEARANCE_M = 1.5
 
 
-class SurfaceElement(PlacedElement):
+class SurfaceElement(element.PlacedElement):
     """A table or another asset whose top supports other elements.
 
     Attributes:
@@ -40,8 +34,8 @@ class SurfaceElement(PlacedElement):
         asset = self.asset
         if asset == "table":
             size_m = (*self.top_size_m, self.height_m)
-            asset = parametric_id("table", size_m=size_m, style=self.style)
-        pose = stand_upright(assets, asset, self.pose(scene))
-        scene = add_static(scene, assets, self.name, asset, pose, annotated=self.annotate)
-        length_m, width_m, height_m = extent_m(assets, asset)
+            asset = element.parametric_id("table", size_m=size_m, style=self.style)
+        pose = element.stand_upright(assets, asset, self.pose(scene))
+        scene = element.add_static(scene, assets, self.name, asset, pose, annotated=self.annotate)
+        length_m, width_m, height_m = element.extent_m(assets, asset)
         return self.add_surface(scene, height_m, (length_m, width_m), clearance_m=CLEARANCE_M)

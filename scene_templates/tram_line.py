@@ -6,25 +6,17 @@ from typing import Literal
 
 from pydantic import Field
 
-from gen_data.core.errors import ConfigError
-from gen_data.core.interfaces import AssetIndex
+from gen_data.core import errors, interfaces
 from gen_data.core.scene import Scene
 from gen_data.roads.cross_section import KERB_WIDTH_M, RoadShape, strips
-from gen_data.scene_templates.element import (
-    Element,
-    add_background,
-    add_static,
-    name_relations,
-    parametric_id,
-)
+from gen_data.scene_templates import element, road_places
 from gen_data.scene_templates.road import find_road
-from gen_data.scene_templates.road_places import RoadPlace
 
 BEHIND_KERB_M = 0.4
 """Distance of poles from the kerb."""
 
 
-class TramLine(Element):
+class TramLine(element.Element):
     """Contact wires over the tracks of a straight road with ``tram: true``; unlabelled.
 
     Cross wires between poles at both kerbs hold them. Poles take room, wires do not.
@@ -43,34 +35,34 @@ class TramLine(Element):
     @property
     def relations(self) -> Mapping[str, str]:
         """The road."""
-        return name_relations(road=self.road)
+        return element.name_relations(road=self.road)
 
-    def add(self, scene: Scene, assets: AssetIndex) -> Scene:
+    def add(self, scene: Scene, assets: interfaces.AssetIndex) -> Scene:
         """Add wires and poles. Raises ConfigError if the road bends or has no track."""
         where = f"elements.{self.name}"
         shape, parameters, T_world_road = find_road(scene, self.road, f"{where}.road")
         if shape.curvature_per_m or not parameters.get("tram"):
             fact = "bends" if shape.curvature_per_m else "has no track"
-            raise ConfigError(
+            raise errors.ConfigError(
                 f"{where}.road: '{self.road}' {fact}; expected a straight road with tram: true"
             )
         away_m = {side: _pole_m(shape, side) for side in (1, -1)}
         tracks_m = 0.5 * (shape.median_m + shape.lane_width_m)
         count = max(1, round(shape.length_m / self.span_m))
-        wires = parametric_id(
+        wires = element.parametric_id(
             "contact_wires", span_m=round(shape.length_m / count, 6), left_m=away_m[1],
             right_m=away_m[-1], tracks_m=round(tracks_m, 6),
         )  # fmt: skip
-        pole = parametric_id("tram_pole", seed=self.seed % 4)
+        pole = element.parametric_id("tram_pole", seed=self.seed % 4)
         for number in range(count):
             at_m = shape.length_m * (number + 0.5) / count
-            place = RoadPlace(self.road, shape, T_world_road, at_m)
+            place = road_places.RoadPlace(self.road, shape, T_world_road, at_m)
             name = f"{self.name}/{number}"
-            scene = add_background(scene, assets, f"{name}/wires", wires, place.pose(0.0))
+            scene = element.add_background(scene, assets, f"{name}/wires", wires, place.pose(0.0))
             for word, side in (("left", 1), ("right", -1)):
                 z_m = place.edge_m(side, land=False)[1] - 0.05
                 pose = place.pose(side * away_m[side], z_m, side * 0.5 * math.pi)
-                scene = add_static(scene, assets, f"{name}/pole_{word}", pole, pose)
+                scene = element.add_static(scene, assets, f"{name}/pole_{word}", pole, pose)
         return scene
 
 

@@ -5,10 +5,8 @@ from typing import Literal
 
 from pydantic import Field
 
-from gen_data.core.interfaces import AssetIndex
+from gen_data.core import interfaces, scene_time, se3
 from gen_data.core.scene import Body, Instance, Light, Rig, Scene, StageModel, StagePiece
-from gen_data.core.scene_time import RIG_AXES
-from gen_data.core.se3 import SE3, rotate_by_quaternion
 from gen_data.scene_templates.element import PlacedElement, next_instance_id
 
 
@@ -32,7 +30,7 @@ class UsdStage(PlacedElement):
     cameras: bool = False
     collides: bool = True
 
-    def add(self, scene: Scene, assets: AssetIndex) -> Scene:
+    def add(self, scene: Scene, assets: interfaces.AssetIndex) -> Scene:
         """Add a static body per mesh, ``<name>/<prim>``, its lights and, as rigs, its cameras."""
         stage, pose = assets.stage(self.asset), self.pose(scene)
         first = next_instance_id(scene)
@@ -73,15 +71,15 @@ class UsdStage(PlacedElement):
             for k, (thing, piece) in enumerate(first.items())
         }
 
-    def _place_light(self, light: Light, pose: SE3) -> Light:
+    def _place_light(self, light: Light, pose: se3.SE3) -> Light:
         return replace(
             light,
             name=f"{self.name}/{light.name}",
-            position_m=(pose @ SE3(light.position_m)).translation_m,
-            direction=rotate_by_quaternion(pose.quaternion_wxyz, light.direction),
-            side=rotate_by_quaternion(pose.quaternion_wxyz, light.side),
+            position_m=(pose @ se3.SE3(light.position_m)).translation_m,
+            direction=se3.rotate_by_quaternion(pose.quaternion_wxyz, light.direction),
+            side=se3.rotate_by_quaternion(pose.quaternion_wxyz, light.side),
         )
 
-    def _make_rig(self, name: str, T_world_camera: SE3, carrier: Body) -> Rig:
-        T_body_rig = carrier.T_world_body.inverse() @ T_world_camera @ RIG_AXES
+    def _make_rig(self, name: str, T_world_camera: se3.SE3, carrier: Body) -> Rig:
+        T_body_rig = carrier.T_world_body.inverse() @ T_world_camera @ scene_time.RIG_AXES
         return Rig(f"{self.name}/{name}", carrier.name, T_body_rig)

@@ -18,10 +18,7 @@ from benchmarks.faults.results import Result, Scale
 from gen_data.core.capture import Channel
 from gen_data.core.errors import CacheWarning, ConfigWarning, GenDataError, NoLabels, StorageError
 from gen_data.renderers.warp.kernel_cache import OURS, fill_cache
-from gen_data.runner.object_store import ObjectFolder
-from gen_data.runner.shard_record import FileRecord, parse_record
-from gen_data.runner.store import LocalStore
-from gen_data.runner.stored import StoredSamples
+from gen_data.runner import object_store, shard_record, store, stored
 
 URL = "memory://faults/set"
 
@@ -32,7 +29,7 @@ def objects(scale: Scale, folder: Path) -> Result:
     rng = random.Random(scale.seed)
     digest = reference_digest(folder)
     os.environ["XDG_CACHE_HOME"] = str(folder / "cache")
-    system, place = fsspec.filesystem("memory"), ObjectFolder(URL)
+    system, place = fsspec.filesystem("memory"), object_store.ObjectFolder(URL)
     record().make(URL)
     names = sorted(name for name in place.tree() if not name.startswith("run/"))
     for number in result.until_end(scale, range(scale.pick(300, 10))):
@@ -57,7 +54,7 @@ def objects(scale: Scale, folder: Path) -> Result:
     return result
 
 
-def _repeat(place: ObjectFolder, copy: Path, digest: str) -> str:
+def _repeat(place: object_store.ObjectFolder, copy: Path, digest: str) -> str:
     """Give the command again; what is wrong, or nothing."""
     try:
         record().make(URL)
@@ -78,11 +75,11 @@ def foreign(scale: Scale, folder: Path) -> Result:
     """Records of somebody else that name files outside; media of another kind."""
     result = Result()
     reference_digest(folder)
-    source = LocalStore(folder / "reference")
+    source = store.LocalStore(folder / "reference")
     first = source.record(0)
     assert first is not None
     for name in result.until_end(scale, NAMES):
-        file = FileRecord("name", 1, hashlib.sha256(b"x").hexdigest())
+        file = shard_record.FileRecord("name", 1, hashlib.sha256(b"x").hexdigest())
         # Past the check of its own constructor, as somebody else writes it.
         object.__setattr__(file, "path", name)
         data = replace(first, files=(*first.files, file)).to_bytes()
@@ -95,7 +92,7 @@ def foreign(scale: Scale, folder: Path) -> Result:
         path.write_bytes(data)
         try:
             _ = (
-                StoredSamples(source.root)
+                stored.StoredSamples(source.root)
                 .sample(0)
                 .capture.readings["color"]
                 .channels[Channel.Z_DEPTH]
@@ -111,7 +108,7 @@ def foreign(scale: Scale, folder: Path) -> Result:
 
 def _is_refused(data: bytes) -> bool:
     try:
-        return parse_record(data) is None
+        return shard_record.parse_record(data) is None
     except GenDataError:
         return True
 

@@ -10,9 +10,7 @@ import subprocess
 import time
 from pathlib import Path
 
-from benchmarks.faults.children import fork_run
-from benchmarks.faults.recorded_run import reference_digest, resumes_to, tree_digest
-from benchmarks.faults.results import Result, Scale
+from benchmarks.faults import children, recorded_run, results
 
 GOINGDOWN = 0x8004587D
 """``FS_IOC_GOINGDOWN`` of Linux's ``include/uapi/linux/fs.h`` (``XFS_IOC_GOINGDOWN`` before)."""
@@ -23,11 +21,11 @@ RUN_S = 0.2
 """Cuts are drawn from this duration; a run takes about as long."""
 
 
-def power_cuts(scale: Scale, folder: Path) -> Result:
+def power_cuts(scale: results.Scale, folder: Path) -> results.Result:
     """Cut the power of ext4 and xfs at random instants of a run, mount again, and resume."""
-    result = Result()
+    result = results.Result()
     rng = random.Random(scale.seed)
-    digest = reference_digest(folder)
+    digest = recorded_run.reference_digest(folder)
     for kind, size_mb in SIZES_MB.items():
         reason = _find_obstacle(kind, folder)
         if reason:
@@ -87,7 +85,7 @@ class _Disk:
         self.mount()
         out, message = self._root / "out", self._image.with_suffix(".message")
         try:
-            pid = fork_run(out, message)
+            pid = children.fork_run(out, message)
             time.sleep(instant_s)
             self._cut_power()
             os.kill(pid, signal.SIGKILL)
@@ -97,9 +95,9 @@ class _Disk:
             self.mount()
             finished = (out / "manifest.json").exists()
             if finished:
-                equal = tree_digest(out) == digest
+                equal = recorded_run.tree_digest(out) == digest
                 return ("" if equal else "a finished data set has other bytes"), True
-            return resumes_to(out, digest), False
+            return recorded_run.resumes_to(out, digest), False
         finally:
             self.unmount()
 

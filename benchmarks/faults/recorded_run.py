@@ -18,8 +18,7 @@ from typing import Any
 
 from gen_data.api.config import load_config
 from gen_data.assemble.pipeline_factory import PipelineFactory
-from gen_data.core.errors import GenDataError
-from gen_data.core.interfaces import DatasetInfo, Exporter
+from gen_data.core import errors, interfaces
 from gen_data.core.sample import Sample
 from gen_data.runner.identity import make_plan
 from gen_data.runner.plan import Plan
@@ -34,8 +33,8 @@ RESUME = "gen-data --config tiny.yaml --n 6 --out here"
 class Replay:
     """A pipeline of recorded samples, and what makes it in any process."""
 
-    info: DatasetInfo
-    exporters: Mapping[str, Exporter]
+    info: interfaces.DatasetInfo
+    exporters: Mapping[str, interfaces.Exporter]
     samples: Sequence[Sample]
 
     def __call__(self) -> Replay:
@@ -160,6 +159,6 @@ def resumes_to(out: Path, digest: str) -> str:
     """Resume a run; empty if the result has this digest, else what is wrong."""
     try:
         record().make(out)
-    except GenDataError as error:
+    except errors.GenDataError as error:
         return f"resuming failed: {error}"
     return "" if tree_digest(out) == digest else "the resumed data set has other bytes"

@@ -17,12 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gen_data import configs
-from gen_data.assemble.config import Config, load_config
-from gen_data.assemble.pipeline_factory import open_pipeline
-from gen_data.core.capture import Channel
+from gen_data.assemble import config, pipeline_factory
+from gen_data.core import capture, scene, scene_time
 from gen_data.core.sample import Sample
-from gen_data.core.scene import Scene
-from gen_data.core.scene_time import place_sensors
 from gen_data.core.streams import Streams
 from gen_data.pipeline import Pipeline
 from gen_data.pipeline.pipeline import DrawnView
@@ -45,12 +42,12 @@ def config_names() -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in Path(configs.__path__[0]).glob("*.yaml")))
 
 
-def reduced_config(name: str, device: str) -> Config:
+def reduced_config(name: str, device: str) -> config.Config:
     """A shipped configuration with at most a sixteenth of the pixels, and few paths.
 
     Scanners are ideal: a point that is missing would change the noise of all points after it.
     """
-    spec = load_config(f"{name}.yaml", seed=1)
+    spec = config.load_config(f"{name}.yaml", seed=1)
     texts = ["render.visibility=rays", f"render.device={device}", "exporters=[]"]
     if "tier" in spec.resolved["render"]:
         texts.append("render.samples=4")
@@ -62,13 +59,13 @@ def reduced_config(name: str, device: str) -> Config:
             factor = max(4.0, max(size_px) / SIDE_MAX_PX)
             width_px, height_px = (max(64, 4 * round(side / factor / 4)) for side in size_px)
             texts.append(f"sensors[{number}].size_px=[{width_px}, {height_px}]")
-    return load_config(f"{name}.yaml", seed=1, overrides=texts)
+    return config.load_config(f"{name}.yaml", seed=1, overrides=texts)
 
 
 def make_references(name: str) -> Arrays:
     """References of a configuration, from the CPU; keys begin with its name."""
     arrays: Arrays = {}
-    with open_pipeline(reduced_config(name, "cpu")) as pipeline:
+    with pipeline_factory.open_pipeline(reduced_config(name, "cpu")) as pipeline:
         for index in range(SAMPLES):
             sample = pipeline.sample(index)
             view = pipeline.sample(index - index % pipeline.info.steps_per_scene)
@@ -88,9 +85,9 @@ def observed(sample: Sample) -> Iterator[tuple[str, NDArray[Any]]]:
     for name, reading in sorted(sample.capture.readings.items()):
         for channel, image in sorted(reading.channels.items()):
             place = f"{name}/{channel}"
-            if channel is Channel.RGB:
+            if channel is capture.Channel.RGB:
                 yield f"image/{place}", cv2.imencode(".png", image)[1].reshape(-1)
-            elif channel not in (Channel.MEASURED_DEPTH, Channel.INFRARED):
+            elif channel not in (capture.Channel.MEASURED_DEPTH, capture.Channel.INFRARED):
                 yield f"digest/{place}", _digest(image)
                 whole = image.dtype.kind == "u"
                 yield f"values/{place}", image if whole else image.reshape(-1)[::31]
@@ -123,7 +120,7 @@ def compare(name: str, references: Path, device: str) -> dict[str, Any]:
     compared, repeats = 0, True
     with np.load(references) as stored:
         known = [key for key in stored.files if key.startswith(f"{name}/")]
-        pipeline = open_pipeline(reduced_config(name, device))
+        pipeline = pipeline_factory.open_pipeline(reduced_config(name, device))
         for index in sorted({int(key.split("/")[1]) for key in known}):
             place = f"{name}/{index}/"
             reference = {
@@ -164,11 +161,11 @@ def draw_again(pipeline: Pipeline, line: bytes, index: int) -> Sample:
         attempt=kept.view_attempts - 1,
         index=number,
     )
-    view = DrawnView(number, place_sensors(kept.scene), streams)
+    view = DrawnView(number, scene_time.place_sensors(kept.scene), streams)
     return pipeline.read_sensors(view, sensors, index % info.steps_per_scene)
 
 
-def _no_other_scene(index: int) -> Scene:
+def _no_other_scene(index: int) -> scene.Scene:
     raise LookupError(f"a reference refers to sample {index}")
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.readers import detection, records, rigs, sequences
+from benchmarks.readers import detection, records, rigs, sequences, views
 from benchmarks.readers.truth import (
     POSES,
     Boxes,
@@ -24,15 +24,13 @@ from benchmarks.readers.truth import (
     scans,
     scans_and_lenses,
 )
-from benchmarks.readers.views import View
 from gen_data.core.scene import Instance
-from gen_data.exporters.cityscapes_classes import city_classes
+from gen_data.exporters import cityscapes_classes, label_map
 from gen_data.exporters.kitti import official_type
-from gen_data.exporters.label_map import public_classes
 from gen_data.exporters.nuscenes_classes import category_of
 from gen_data.exporters.scannet import class_numbers
 
-Read = Callable[[Path], Iterable[View]]
+Read = Callable[[Path], Iterable[views.View]]
 """Views of a folder: of an export by a reader, or of a data set by ``gen_data.open``."""
 
 
@@ -89,7 +87,7 @@ def frame(number: str) -> str:
 
 def city_class(instance: Instance) -> str:
     """Class of Cityscapes."""
-    return city_classes().of_instance(instance).name
+    return cityscapes_classes.city_classes().of_instance(instance).name
 
 
 def tracked(instance: Instance) -> str:
@@ -101,7 +99,7 @@ def tracked(instance: Instance) -> str:
 def nyu40_class(instance: Instance) -> str:
     """Class of ScanNet's images; empty = none."""
     number = class_numbers("nyu40").get(instance.category, 0)
-    return ("", *public_classes("nyu40"))[number]
+    return ("", *label_map.public_classes("nyu40"))[number]
 
 
 STEREO = {

@@ -5,15 +5,14 @@ from collections.abc import Sequence
 from gen_data.content.procedural import surface_shapes as shapes
 from gen_data.content.procedural.material_presets import painted_material, patterned_material
 from gen_data.content.procedural.patches import Patch
-from gen_data.core.asset_types import Material
-from gen_data.core.variant_rng import VariantRng
+from gen_data.core import asset_types, variant_rng
 
 
 def tape_carton(
     patches: list[Patch],
     low: Sequence[float],
     high: Sequence[float],
-    rng: VariantRng,
+    rng: variant_rng.VariantRng,
     slots: tuple[int, int, int, int],
 ) -> None:
     """Add a closed carton: body, tape over the joint of its flaps, a label, printed marks.
@@ -98,7 +97,7 @@ def _sticker(
     return shapes.block(low, high, 0.0, slot)
 
 
-def carton_looks(rng: VariantRng, seed: int) -> list[Material]:
+def carton_looks(rng: variant_rng.VariantRng, seed: int) -> list[asset_types.Material]:
     """Materials of ``tape_carton``: card, tape, label, print."""
     pale = rng.chance(0.2)
     card = (

@@ -12,20 +12,14 @@ from xml.etree.ElementTree import Element, tostring
 
 import numpy as np
 
-from gen_data.assets.asset_folder import Folder
-from gen_data.assets.folder_index import Finish, FolderIndex, RobotEntry, ToolEntry
-from gen_data.assets.installed_packs import TAG, write_index
+from gen_data.assets import asset_folder, folder_index, installed_packs
 from gen_data.config.data_files import load_data
-from gen_data.core.asset_types import WORKSPACE_FROM_M
-from gen_data.core.colorimetry import srgb_encode
-from gen_data.core.errors import AssetError
-from gen_data.core.safe_xml import parse_xml
-from gen_data.core.se3 import Array
+from gen_data.core import asset_types, colorimetry, errors, safe_xml, se3
 
 _ROOT = "cmeel.prefix/share/example-robot-data/robots/ur_description"
 _PACKAGE = "package://example-robot-data/robots/ur_description/"
 _MAX_ELEMENTS = 50_000
-_FINGERS = ToolEntry(kind="fingers", flange="tool0", instead_of="ee_link")
+_FINGERS = folder_index.ToolEntry(kind="fingers", flange="tool0", instead_of="ee_link")
 """On the flange as the controller sees it, instead of a box that marks it."""
 
 
@@ -40,7 +34,7 @@ class Arm:
 
     name: str
     home: dict[str, float]
-    workspace_from_m: float = WORKSPACE_FROM_M
+    workspace_from_m: float = asset_types.WORKSPACE_FROM_M
 
 
 ARMS = tuple(Arm(**arm) for arm in load_data(__package__, "example_robot_data"))
@@ -52,38 +46,38 @@ def convert(source: Path, target: Path) -> None:
     Raises:
         AssetError: if a description or a mesh is missing or unreadable.
     """
-    folder = Folder(source / _ROOT)
+    folder = asset_folder.Folder(source / _ROOT)
     for arm in ARMS:
         file = f"urdf/{arm.name}_robot.urdf"
-        robot = parse_xml(
+        robot = safe_xml.parse_xml(
             folder.read(file), str(folder.root / file), "robot", "a URDF", _MAX_ELEMENTS
         )
         for mesh in robot.iter("mesh"):
             _take_mesh(mesh, folder, target)
         (target / f"{arm.name}.urdf").write_bytes(tostring(robot, encoding="utf-8"))
-    index = FolderIndex(
+    index = folder_index.FolderIndex(
         licence="BSD-3-Clause (ROS-Industrial ur_description)",
         author="Universal Robots; ROS-Industrial contributors",
         source="PyPI example-robot-data 6.0.0",
         robots=tuple(_index_entry(arm) for arm in ARMS),
     )
-    write_index(target, index)
+    installed_packs.write_index(target, index)
 
 
-def _index_entry(arm: Arm) -> RobotEntry:
-    return RobotEntry(
+def _index_entry(arm: Arm) -> folder_index.RobotEntry:
+    return folder_index.RobotEntry(
         id=arm.name,
         file=f"{arm.name}.urdf",
-        tags=("arm", "gripper", TAG),
+        tags=("arm", "gripper", installed_packs.TAG),
         home=arm.home,
         tool=_FINGERS,
         workspace_from_m=arm.workspace_from_m,
         max_faces=6000,
-        materials={"*": Finish(roughness=0.4)},
+        materials={"*": folder_index.Finish(roughness=0.4)},
     )
 
 
-def _take_mesh(mesh: Element, folder: Folder, target: Path) -> None:
+def _take_mesh(mesh: Element, folder: asset_folder.Folder, target: Path) -> None:
     """Copy or convert the file of a mesh, and refer to it by its path in the pack."""
     file = PurePosixPath(mesh.attrib["filename"].removeprefix(_PACKAGE))
     stored = file.with_suffix(".obj") if file.suffix == ".dae" else file
@@ -108,7 +102,7 @@ def collada_to_obj(source: Path, target: Path) -> None:
     lines, count = [f"mtllib {target.stem}.mtl"], 0
     for name, color, corners in _read_collada(source):
         # Blender, which wrote these files, writes linear values; those of MTL are sRGB.
-        colors[name] = " ".join(f"{c:.4f}" for c in srgb_encode(color))
+        colors[name] = " ".join(f"{c:.4f}" for c in colorimetry.srgb_encode(color))
         points, numbers = np.unique(corners, axis=0, return_inverse=True)
         lines += [f"v {x:.6f} {y:.6f} {z:.6f}" for x, y, z in points]
         lines.append(f"usemtl {name}")
@@ -119,7 +113,7 @@ def collada_to_obj(source: Path, target: Path) -> None:
     target.with_suffix(".mtl").write_text(text, encoding="utf-8")
 
 
-def _read_collada(path: Path) -> list[tuple[str, Array, Array]]:
+def _read_collada(path: Path) -> list[tuple[str, se3.Array, se3.Array]]:
     """Name and diffuse colour of the material, and corners [3 n, 3], of all triangles."""
     from collada import Collada
     from collada.common import DaeError
@@ -134,7 +128,7 @@ def _read_collada(path: Path) -> list[tuple[str, Array, Array]]:
         try:
             geometries = list(Collada(str(path)).scene.objects("geometry"))
         except DaeError as error:
-            raise AssetError(f"{path}: malformed COLLADA ({error})") from None
+            raise errors.AssetError(f"{path}: malformed COLLADA ({error})") from None
         for part in (part for geometry in geometries for part in geometry.primitives()):
             triangles = part.triangleset() if isinstance(part, BoundPolylist) else part
             # Other primitives are stray lines.

@@ -12,9 +12,8 @@ from pathlib import PurePosixPath
 from xml.etree.ElementTree import Element, SubElement
 
 from gen_data.assets.asset_folder import Folder
+from gen_data.core import safe_xml, se3
 from gen_data.core.errors import AssetError
-from gen_data.core.safe_xml import parse_xml
-from gen_data.core.se3 import SE3
 
 _MAX_ELEMENTS = 50_000
 _VISUAL_GROUP = "1"
@@ -43,7 +42,7 @@ class Mjcf:
 def read_mjcf(folder: Folder, relative: str) -> Mjcf:
     """Read an MJCF file. Raises AssetError if it is malformed."""
     place = str(folder.root / relative)
-    root = parse_xml(folder.read(relative), place, "mujoco", "an MJCF", _MAX_ELEMENTS)
+    root = safe_xml.parse_xml(folder.read(relative), place, "mujoco", "an MJCF", _MAX_ELEMENTS)
     body = root.find("worldbody/body")
     if body is None:
         raise AssetError(f"{place}: holds no body")
@@ -146,7 +145,7 @@ def _add_origin(element: Element, source: Element) -> None:
     """Add an ``<origin>`` with position and roll, pitch, yaw from MJCF's ``pos`` and ``quat``."""
     w, x, y, z = (float(v) for v in source.get("quat", "1 0 0 0").split())
     norm = math.sqrt(w * w + x * x + y * y + z * z)
-    r = SE3(quaternion_wxyz=(w / norm, x / norm, y / norm, z / norm)).rotation()
+    r = se3.SE3(quaternion_wxyz=(w / norm, x / norm, y / norm, z / norm)).rotation()
     pitch = math.atan2(-r[2, 0], math.hypot(r[0, 0], r[1, 0]))
     if abs(float(r[2, 0])) < 1.0 - 1e-9:
         roll, yaw = math.atan2(r[2, 1], r[2, 2]), math.atan2(r[1, 0], r[0, 0])

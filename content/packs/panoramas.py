@@ -15,8 +15,7 @@ from gen_data.assets.folder_index import FolderIndex, ImageEntry
 from gen_data.assets.image_decoding import read_exr
 from gen_data.assets.installed_packs import TAG, write_index
 from gen_data.config.data_files import load_data
-from gen_data.core.asset_types import Float32
-from gen_data.core.errors import AssetError
+from gen_data.core import asset_types, errors
 
 _DATA_URL = re.compile(rb"base64,([A-Za-z0-9+/=]+)")
 _SUFFIX = ".exr.js"
@@ -34,7 +33,7 @@ def convert(source: Path, target: Path) -> None:
     entries = []
     for name, tags in TAGS.items():
         if name not in found:
-            raise AssetError(f"{source}: holds no panorama '{name}'")
+            raise errors.AssetError(f"{source}: holds no panorama '{name}'")
         place = str(found[name])
         (target / f"{name}.hdr").write_bytes(
             encode_radiance(read_exr(exr_bytes(found[name].read_bytes(), place), place))
@@ -57,10 +56,10 @@ def exr_bytes(script: bytes, place: str) -> bytes:
             return base64.b64decode(match[1], validate=True)
     except binascii.Error:
         pass  # the same as none
-    raise AssetError(f"{place}: holds no base64 data URL")
+    raise errors.AssetError(f"{place}: holds no base64 data URL")
 
 
-def encode_radiance(rgb: Float32) -> bytes:
+def encode_radiance(rgb: asset_types.Float32) -> bytes:
     """Encode RGB [height, width, 3] as an uncompressed Radiance .hdr file.
 
     Source: Ward's ``color.c``: the largest component gives the shared exponent, with bias 128.

@@ -5,9 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
-from gen_data.assets.asset_folder import Folder
-from gen_data.assets.folder_index import Finish, FolderIndex, GripperEntry, RobotEntry
-from gen_data.assets.installed_packs import TAG, write_index
+from gen_data.assets import asset_folder, folder_index, installed_packs
 from gen_data.config.data_files import load_data
 from gen_data.content.packs.mjcf import add_bodies, read_mjcf
 from gen_data.core.errors import AssetError
@@ -50,7 +48,7 @@ def convert(source: Path, target: Path) -> None:
     Raises:
         AssetError: if a description is missing or unsupported.
     """
-    folder = Folder(source / _ROOT)
+    folder = asset_folder.Folder(source / _ROOT)
     for arm in ARMS:
         robot = Element("robot", name=arm.name)
         files = add_bodies(robot, read_mjcf(folder, f"robots/{arm.name}/robot.xml"))
@@ -63,23 +61,23 @@ def convert(source: Path, target: Path) -> None:
             path = target / file
             path.parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(folder.path(file), path)
-    index = FolderIndex(
+    index = folder_index.FolderIndex(
         licence="MIT (package robosuite)",
         source="PyPI robosuite 1.5.2",
         robots=tuple(_index_entry(arm) for arm in ARMS),
     )
-    write_index(target, index)
+    installed_packs.write_index(target, index)
 
 
-def _index_entry(arm: Arm) -> RobotEntry:
+def _index_entry(arm: Arm) -> folder_index.RobotEntry:
     fingers = dict.fromkeys(_FINGERS, _STROKE_M / 2.0)
-    return RobotEntry(
+    return folder_index.RobotEntry(
         id=arm.name,
         file=f"{arm.name}.urdf",
-        tags=("arm", "gripper", TAG),
+        tags=("arm", "gripper", installed_packs.TAG),
         author=arm.author,
         home={**arm.home, **fingers},
-        gripper=GripperEntry(
+        gripper=folder_index.GripperEntry(
             link=_HAND,
             grasp_offset_m=_GRASP_M,
             finger_joints=_FINGERS,
@@ -87,7 +85,7 @@ def _index_entry(arm: Arm) -> RobotEntry:
         ),
         touching=arm.touching,
         max_faces=1500,
-        materials={"*": Finish(roughness=0.4)},
+        materials={"*": folder_index.Finish(roughness=0.4)},
     )
 
 

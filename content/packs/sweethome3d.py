@@ -13,19 +13,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from gen_data.assets.asset_folder import Folder
-from gen_data.assets.content_hashes import find_referenced_files
-from gen_data.assets.folder_index import (
-    Finish,
-    FolderIndex,
-    Id,
-    MeshEntry,
-    Point,
-    Region,
-    Word,
-    read_document,
-)
-from gen_data.assets.installed_packs import TAG, write_index
+from gen_data.assets import asset_folder, content_hashes, folder_index, installed_packs
 from gen_data.config.base_model import Strict
 from gen_data.core.errors import AssetError
 
@@ -61,8 +49,8 @@ class Shared(Strict):
 
     category: str = ""
     subcategory: str = ""
-    attributes: dict[Word, Word] = Field(default_factory=dict)
-    tags: tuple[Word, ...] = ()
+    attributes: dict[folder_index.Word, folder_index.Word] = Field(default_factory=dict)
+    tags: tuple[folder_index.Word, ...] = ()
     origin: Literal["center", "floor"] | None = None
     yaw_deg: float | None = None
     """Rotation about the vertical that turns the front to +X; the catalogue's front is -Y."""
@@ -78,13 +66,13 @@ class Shared(Strict):
 class ModelChoice(Shared):
     """A selected model."""
 
-    id: Id
+    id: folder_index.Id
     model: str
     """Its OBJ file in the catalogue."""
     size_m: Annotated[float, Field(gt=0.0)] | None = None
     """Longest edge; by default the catalogue's."""
     stackable: bool = False
-    keypoints: dict[Word, Place] = Field(default_factory=dict)
+    keypoints: dict[folder_index.Word, Place] = Field(default_factory=dict)
     """A point with y != 0 is mirrored to a pair: ``<name>_left`` and ``<name>_right``."""
     lamps: tuple[Lamp, ...] = ()
 
@@ -98,7 +86,7 @@ class Group(Shared):
 class Selection(Strict):
     """Content of ``catalogue.yaml``."""
 
-    finishes: dict[str, Finish]
+    finishes: dict[str, folder_index.Finish]
     groups: dict[str, Group]
 
 
@@ -132,14 +120,14 @@ def convert(source: Path, target: Path) -> None:
                 raise AssetError(f"{source}: holds no model '{choice.model}' ({choice.id})")
             model = models[choice.model]
             entries.append(mesh_entry(choice, group, model, selection.finishes))
-            _copy_model(Folder(model.folder), choice.model, target)
-    index = FolderIndex(licence=_LICENCE, source=_SOURCE, assets=tuple(entries))
-    write_index(target, index)
+            _copy_model(asset_folder.Folder(model.folder), choice.model, target)
+    index = folder_index.FolderIndex(licence=_LICENCE, source=_SOURCE, assets=tuple(entries))
+    installed_packs.write_index(target, index)
 
 
 def read_selection(path: Path = SELECTION) -> Selection:
     """Read the selected models. Raises ConfigError listing every fault with its place."""
-    return read_document(path, Selection)[0]
+    return folder_index.read_document(path, Selection)[0]
 
 
 def read_models(source: Path) -> dict[str, Model]:
@@ -163,15 +151,15 @@ def read_models(source: Path) -> dict[str, Model]:
 
 
 def mesh_entry(
-    choice: ModelChoice, group: Group, model: Model, finishes: Mapping[str, Finish]
-) -> MeshEntry:
+    choice: ModelChoice, group: Group, model: Model, finishes: Mapping[str, folder_index.Finish]
+) -> folder_index.MeshEntry:
     """Index entry of a selected model."""
     width, depth, height = model.size_m
     size_m = choice.size_m or max(model.size_m)
     scale = size_m / max(model.size_m)
     guess_kg = max(_DENSITY * width * depth * height * scale**3, 0.005)
     named = {**group.materials, **choice.materials}
-    return MeshEntry(
+    return folder_index.MeshEntry(
         id=choice.id,
         file=choice.model,
         category=choice.category or group.category,
@@ -199,7 +187,7 @@ def mesh_entry(
 
 
 def _tags(choice: ModelChoice, group: Group, thickness_m: float) -> tuple[str, ...]:
-    tags = {*group.tags, *choice.tags, TAG}
+    tags = {*group.tags, *choice.tags, installed_packs.TAG}
     if "household" in tags and thickness_m <= _GRASPABLE_M:
         tags.add("graspable")
     return tuple(sorted(tags))
@@ -209,12 +197,12 @@ def _first_given(*values: float | None) -> float:
     return next(value for value in values if value is not None)
 
 
-def _mirror_points(name: str, place: Place) -> tuple[Point, ...]:
+def _mirror_points(name: str, place: Place) -> tuple[folder_index.Point, ...]:
     x, y, z = place
     sides = (("", 1.0),) if y == 0.0 else (("_left", 1.0), ("_right", -1.0))
     radius_m = _radius_m(name, place)
     return tuple(
-        Point(name=f"{name}{side}", position_m=(x, sign * y, z), radius_m=radius_m)
+        folder_index.Point(name=f"{name}{side}", position_m=(x, sign * y, z), radius_m=radius_m)
         for side, sign in sides
     )
 
@@ -228,18 +216,24 @@ def _radius_m(name: str, place: Place) -> float:
     return round(1.1 * place[2], 3) if name.startswith("wheel") else 0.15
 
 
-def _mirror_regions(lamp: Lamp, finishes: Mapping[str, Finish]) -> tuple[Region, Region]:
+def _mirror_regions(
+    lamp: Lamp, finishes: Mapping[str, folder_index.Finish]
+) -> tuple[folder_index.Region, folder_index.Region]:
     (x0, y0, z0), (x1, y1, z1) = lamp.low_m, lamp.high_m
     finish = finishes[lamp.finish]
     return (
-        Region(material=lamp.material, low_m=lamp.low_m, high_m=lamp.high_m, finish=finish),
-        Region(material=lamp.material, low_m=(x0, -y1, z0), high_m=(x1, -y0, z1), finish=finish),
+        folder_index.Region(
+            material=lamp.material, low_m=lamp.low_m, high_m=lamp.high_m, finish=finish
+        ),
+        folder_index.Region(
+            material=lamp.material, low_m=(x0, -y1, z0), high_m=(x1, -y0, z1), finish=finish
+        ),
     )
 
 
-def _copy_model(folder: Folder, model: str, target: Path) -> None:
+def _copy_model(folder: asset_folder.Folder, model: str, target: Path) -> None:
     """Copy a model and the files it refers to, under their own names."""
-    for name in find_referenced_files(folder, model):
+    for name in content_hashes.find_referenced_files(folder, model):
         path = target / name
         if not path.exists():
             path.parent.mkdir(parents=True, exist_ok=True)

@@ -9,25 +9,17 @@ from collections.abc import Sequence
 import numpy as np
 
 from gen_data.config.data_files import load_table
-from gen_data.content.people.head_layout import (
-    EYE_CELL_M,
-    EYE_COLUMNS,
-    EYE_ROWS,
-    HEIGHT_PX,
-    WIDTH_PX,
-    face_texels,
-)
-from gen_data.content.people.person import FaceKind
+from gen_data.content.people import head_layout, person
 from gen_data.content.procedural.textures.texture_images import color, mix_colors, texture
 from gen_data.core.asset_types import Float32, TextureData
 from gen_data.core.noise import fbm, perlin, smoothstep
 from gen_data.core.variant_rng import VariantRng, variant_rng
 
-FACES = load_table(__package__, "faces", FaceKind)
+FACES = load_table(__package__, "faces", person.FaceKind)
 EYES = load_table(__package__, "eye_colors", str)
 """Colours of the iris, sRGB; a cell of the texture each."""
 
-_ASIDE_M, _Z_M = face_texels()
+_ASIDE_M, _Z_M = head_layout.face_texels()
 # Edges of the lids of the template body, in order: distance from the middle line, height [mm].
 _UPPER_LID = ((18.5, 727.2), (19.4, 727.9), (22.9, 729.3), (24.9, 730.9), (28.6, 732.3),
               (32.6, 733.0), (36.2, 732.9), (40.0, 732.2), (43.1, 731.2),
@@ -56,7 +48,7 @@ def face(seed: int) -> TextureData:
     pores, blotches = _noise((90, 70), 2, rng), _noise((7, 6), 4, rng)
     hairs = _noise((40, 150), 1, rng)
     height = 0.35 * pores + 0.35 * blotches
-    skin = np.ones((HEIGHT_PX, WIDTH_PX, 3), np.float32) * 0.93
+    skin = np.ones((head_layout.HEIGHT_PX, head_layout.WIDTH_PX, 3), np.float32) * 0.93
     skin *= (1.0 + 0.025 * pores)[..., None]
     skin = _redden(skin, 0.045 * blotches + _flush())
     freckles = smoothstep(0.42, 0.62, _noise((110, 95), 1, rng)) * _spot(0.035, 0.7, 0.045, 0.03)
@@ -78,13 +70,13 @@ def face(seed: int) -> TextureData:
 def eyes(seed: int) -> TextureData:
     """Eyeballs seen from ahead, a cell for each colour of the iris; ``seed`` has no effect."""
     rng = variant_rng("eyes", seed)
-    cell = WIDTH_PX // EYE_COLUMNS
-    at = ((np.arange(cell) + 0.5) / cell - 0.5) * EYE_CELL_M
+    cell = head_layout.WIDTH_PX // head_layout.EYE_COLUMNS
+    at = ((np.arange(cell) + 0.5) / cell - 0.5) * head_layout.EYE_CELL_M
     y, z = at.astype(np.float32)[None, :], -at.astype(np.float32)[:, None]
     away, turn = np.hypot(y, z), np.arctan2(z, y)
     codes = list(EYES.values())
-    image = np.zeros((HEIGHT_PX, WIDTH_PX, 3), np.float32)
-    for k in range(EYE_COLUMNS * EYE_ROWS):
+    image = np.zeros((head_layout.HEIGHT_PX, head_layout.WIDTH_PX, 3), np.float32)
+    for k in range(head_layout.EYE_COLUMNS * head_layout.EYE_ROWS):
         fibres = perlin((16, 4), rng, cell)
         rays = 1.0 + 0.25 * fibres + 0.1 * np.sin(40 * turn)
         iris = color(codes[k % len(codes)]) * rays[..., None]
@@ -95,15 +87,15 @@ def eyes(seed: int) -> TextureData:
         eye *= (1.0 - 0.93 * smoothstep(0.0026, 0.0021, away))[..., None]
         # The upper lid and its lashes shade the eye.
         eye *= (1.0 - 0.42 * smoothstep(0.0, 0.0045, z + 0 * y))[..., None]
-        row, column = divmod(k, EYE_COLUMNS)
-        top = HEIGHT_PX - (row + 1) * cell
+        row, column = divmod(k, head_layout.EYE_COLUMNS)
+        top = head_layout.HEIGHT_PX - (row + 1) * cell
         image[top : top + cell, column * cell : (column + 1) * cell] = eye
     return texture(image)
 
 
 def _noise(cells: tuple[int, int], octaves: int, rng: VariantRng) -> Float32:
     """Noise for the face's field: cells across and along."""
-    field: Float32 = fbm(cells, octaves, rng)[:: WIDTH_PX // HEIGHT_PX]
+    field: Float32 = fbm(cells, octaves, rng)[:: head_layout.WIDTH_PX // head_layout.HEIGHT_PX]
     return field
 
 
@@ -200,7 +192,7 @@ def _roots(hairs: Float32) -> Float32:
     return roots
 
 
-def _dark_lines(kind: FaceKind) -> Float32:
+def _dark_lines(kind: person.FaceKind) -> Float32:
     """Darkness of lashes, lid creases, nostrils and the line between the lips."""
     upper, lower = _stroke(_UPPER_LID, 0.0012), _stroke(_LOWER_LID, 0.0007)
     lashes = kind.lashes * np.maximum(upper, 0.5 * lower)

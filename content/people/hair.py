@@ -10,8 +10,7 @@ from gen_data.content.people.edges import Tufts
 from gen_data.content.people.head_layout import lay_out_hair
 from gen_data.content.people.layer import Layer, Profile
 from gen_data.content.people.person import Outfit, Person
-from gen_data.core.asset_types import Material
-from gen_data.core.se3 import Vec3
+from gen_data.core import asset_types, se3
 
 _LIFT = 1.75
 """One over the mean reflectance of ``hair_strands``."""
@@ -57,13 +56,13 @@ _CAP: Profile = ((0.66, 0.006), (0.76, 0.009), (0.83, 0.02), (0.85, 0.016))
 _BEANIE: Profile = ((0.66, 0.008), (0.8, 0.012), (0.85, 0.022))
 
 
-def hair_material(person: Person) -> Material:
+def hair_material(person: Person) -> asset_types.Material:
     """Hair of a person, for sheets with coordinates of ``lay_out_hair``."""
     r, g, b = person.hair
-    color: Vec3 = (min(1.0, _LIFT * r), min(1.0, _LIFT * g), min(1.0, _LIFT * b))
+    color: se3.Vec3 = (min(1.0, _LIFT * r), min(1.0, _LIFT * g), min(1.0, _LIFT * b))
     curly = person.haircut in ("curly", "afro")
     texture = f"texture/hair_strands?seed={1 if curly else 0}"
-    return Material(color, 0.5, specular=0.6, texture=texture, role="hair")
+    return asset_types.Material(color, 0.5, specular=0.6, texture=texture, role="hair")
 
 
 def hair_layers(person: Person) -> tuple[Layer, ...]:
@@ -89,7 +88,7 @@ def hair_layers(person: Person) -> tuple[Layer, ...]:
     return tuple(made)
 
 
-def _shell(haircut: str, hair: Material) -> Layer:
+def _shell(haircut: str, hair: asset_types.Material) -> Layer:
     cut = _CUTS[haircut]
     low = cut.fade * cut.thick_m
     profile: Profile = ((0.66, 0.8 * low), (0.76, low), (0.83, cut.thick_m), (0.85, cut.thick_m))

@@ -3,13 +3,12 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from gen_data.content.people.body import Array
-from gen_data.content.people.edges import Collar, Tufts
+from gen_data.content.people import body, edges
 from gen_data.core.asset_types import Material
 
 Profile = Sequence[tuple[float, float]]
 """(height in the template [m], distance from the body [m]), heights rising."""
-Field = Callable[[Array], Array]
+Field = Callable[[body.Array], body.Array]
 """Function of positions in the template frame [n, 3]."""
 
 
@@ -42,5 +41,5 @@ class Layer:
     layout: Field | None = None
     relief: Field | None = None
     keeps: Field | None = None
-    tufts: Tufts | None = None
-    collar: Collar | None = None
+    tufts: edges.Tufts | None = None
+    collar: edges.Collar | None = None

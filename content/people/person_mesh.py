@@ -6,8 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gen_data.assets.family import Solid
-from gen_data.assets.paths import packs_dir
+from gen_data.assets import family, paths
 from gen_data.config.data_files import load_table
 from gen_data.content.people.analytic_body import simple_body
 from gen_data.content.people.body import FILE, LANDMARKS, Array, BodyTemplate, Indices, load
@@ -108,7 +107,7 @@ def _make_piece(body: BodyTemplate, layer: Layer, points: Array, rng: VariantRng
     )  # fmt: skip
 
 
-def build_person(person: Person, figure: Figure) -> Solid:
+def build_person(person: Person, figure: Figure) -> family.Solid:
     """The mesh of a person; the origin is on the ground between the feet, +X is ahead."""
     body, points, scale = figure.body, figure.points_m, figure.scale
     bones = len(body.bones)
@@ -126,7 +125,7 @@ def build_person(person: Person, figure: Figure) -> Solid:
         for name, (mark, radius) in KEYPOINTS.items()
     )
     hull = extreme(mesh.vertices_m.astype(np.float64), _HULL_POINTS)
-    return Solid(mesh, ConvexParts((hull,)), keypoints)
+    return family.Solid(mesh, ConvexParts((hull,)), keypoints)
 
 
 _NO_SURFACE = (np.zeros((0, 3)),) * 3
@@ -217,15 +216,15 @@ _FIGURES = 64
 
 def pack_file() -> Path:
     """Path of the people pack's body; the file exists only if the pack is installed."""
-    return packs_dir() / "people" / FILE
+    return paths.packs_dir() / "people" / FILE
 
 
-def person(seed: int, pose: str, phase: float) -> Solid:
+def person(seed: int, pose: str, phase: float) -> family.Solid:
     """A person from the pack. Raises AssetError if the pack cannot be read."""
     return build_person(draw_person(seed, pose, phase), _figure(seed, str(pack_file())))
 
 
-def simple_person(seed: int, pose: str, phase: float) -> Solid:
+def simple_person(seed: int, pose: str, phase: float) -> family.Solid:
     """A person from formulas."""
     return build_person(draw_person(seed, pose, phase), _figure(seed, ""))
 

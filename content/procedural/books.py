@@ -6,16 +6,10 @@ import numpy as np
 
 from gen_data.assets.family import Solid
 from gen_data.content.procedural import collision_hulls as hulls
-from gen_data.content.procedural.material_presets import (
-    hex_to_linear,
-    jitter_color,
-    printed_material,
-)
+from gen_data.content.procedural import material_presets, wear
 from gen_data.content.procedural.patches import Array, Patch, join_patches, make_centred_solid
 from gen_data.content.procedural.surface_shapes import Point2, UvRect, grid, rounded_box
-from gen_data.content.procedural.wear import draw_wear, dulled
-from gen_data.core.asset_types import Material
-from gen_data.core.se3 import Vec3
+from gen_data.core import asset_types, se3
 from gen_data.core.variant_rng import in_turn, variant_rng
 
 COVER_ATLAS: Mapping[str, UvRect] = {
@@ -46,15 +40,17 @@ def book(seed: int) -> Solid:
     inside = margin + board + bow
     block = rounded_box((length - 2 * margin, width - inside, thickness - 2 * board), 0.0003, 1)
     pages = block.painted(1).moved(y=0.5 * (board + bow - margin))
-    paper = Material(jitter_color(hex_to_linear("#e9e2cf"), 0.05, rng), 0.85)
-    rough = dulled(rng.between(0.25, 0.6), draw_wear("book_cover", seed))
-    print_ = printed_material(f"texture/book_cover?seed={seed}", rough)
+    paper = asset_types.Material(
+        material_presets.jitter_color(material_presets.hex_to_linear("#e9e2cf"), 0.05, rng), 0.85
+    )
+    rough = wear.dulled(rng.between(0.25, 0.6), wear.draw_wear("book_cover", seed))
+    print_ = material_presets.printed_material(f"texture/book_cover?seed={seed}", rough)
     half = (0.5 * length, 0.5 * width, 0.5 * thickness)
     low = (-half[0], -half[1], -half[2])
     return make_centred_solid([cover, pages], (print_, paper), [hulls.box(low, half)])
 
 
-def _cover(size_m: Vec3, board: float, bow: float) -> Patch:
+def _cover(size_m: se3.Vec3, board: float, bow: float) -> Patch:
     """A folded sheet: back, rounded spine, front, as one closed band around X."""
     length, width, thickness = size_m
     h = 0.5 * thickness

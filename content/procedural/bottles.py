@@ -13,18 +13,9 @@ import numpy as np
 from gen_data.assets.family import Facts, Solid
 from gen_data.config.data_files import load_table
 from gen_data.content.procedural import collision_hulls as hulls
-from gen_data.content.procedural.material_presets import (
-    CAPS,
-    PALETTES,
-    STEEL,
-    draw_linear,
-    metal_material,
-    plastic_material,
-    printed_material,
-)
+from gen_data.content.procedural import material_presets, vessel_contents
 from gen_data.content.procedural.patches import Array, Patch, join_patches, make_centred_solid
 from gen_data.content.procedural.surface_shapes import Point2, block, cone, fillet, grid, lathe
-from gen_data.content.procedural.vessel_contents import CONTENTS, DRINKS, liquid
 from gen_data.content.procedural.vessels import radius_at, subdivide
 from gen_data.content.procedural.wear import draw_wear, dulled
 from gen_data.core.asset_types import Material
@@ -143,7 +134,7 @@ def bottle(seed: int) -> Solid:
     if choice.drink:
         level = 0.01 + rng.between(*style.fill) * (neck_z - 0.01)
         patches.append(_contents(wall, level))
-        materials.append(liquid(DRINKS[choice.drink], rng))
+        materials.append(vessel_contents.liquid(vessel_contents.DRINKS[choice.drink], rng))
     flattened = [patch.scaled(1.0, style.depth, 1.0) for patch in patches]
     return make_centred_solid(flattened, materials, parts)
 
@@ -152,18 +143,20 @@ def _bottle_materials(
     style: BottleStyle, choice: BottleChoice, seed: int, rng: VariantRng
 ) -> list[Material]:
     """Body, label and cap."""
-    color, gloss = draw_linear(style.colors, 0.1, rng), rng.between(*style.gloss)
+    color, gloss = material_presets.draw_linear(style.colors, 0.1, rng), rng.between(*style.gloss)
     body = Material(color, gloss)
     if style.clear:
         body = Material(color, 0.04, transmission=1.0, ior=1.5)
     elif choice.kind == "flask" and min(color) > 0.4:
-        body = metal_material(color, gloss)
+        body = material_presets.metal_material(color, gloss)
     name = "front_label" if choice.label == "front" else "label"
     rough = dulled(rng.between(0.35, 0.6), draw_wear(name, seed))
-    label = printed_material(f"texture/{name}?seed={seed}", rough)
-    cap = plastic_material(rng, style.caps)
+    label = material_presets.printed_material(f"texture/{name}?seed={seed}", rough)
+    cap = material_presets.plastic_material(rng, style.caps)
     if choice.closure == "crown":
-        cap = metal_material(draw_linear(style.caps, 0.05, rng), 0.3)
+        cap = material_presets.metal_material(
+            material_presets.draw_linear(style.caps, 0.05, rng), 0.3
+        )
     return [body, label, cap]
 
 
@@ -181,13 +174,16 @@ def jar(seed: int) -> Solid:
         lathe([(mouth, top + 0.004), (0.0, top + 0.004)], _SEGMENTS, 0),
         _lid(lid_radius, top, height),
     ]
-    filling = draw_linear(PALETTES["fillings"], 0.15, rng)
+    filling = material_presets.draw_linear(material_presets.PALETTES["fillings"], 0.15, rng)
     body = Material(filling, rng.between(0.06, 0.12))
     name = "front_label" if style == "front" else "label"
     rough = dulled(rng.between(0.45, 0.65), draw_wear(name, seed + 1000))
-    label = printed_material(f"texture/{name}?seed={seed + 1000}", rough)
-    metals = (metal_material(color, 0.3) for color in ((0.83, 0.69, 0.35), STEEL))
-    lid = rng.choose((*metals, plastic_material(rng, CAPS)))
+    label = material_presets.printed_material(f"texture/{name}?seed={seed + 1000}", rough)
+    metals = (
+        material_presets.metal_material(color, 0.3)
+        for color in ((0.83, 0.69, 0.35), material_presets.STEEL)
+    )
+    lid = rng.choose((*metals, material_presets.plastic_material(rng, material_presets.CAPS)))
     materials = [body, label, lid]
     if rng.chance(0.6):
         # Half-empty glass, with the filling behind it.
@@ -195,7 +191,7 @@ def jar(seed: int) -> Solid:
         level = rng.between(0.25, 0.97) * neck * height
         patches.append(_contents(wall, max(0.012, level)))
         rough = rng.between(0.2, 0.7)
-        materials.append(Material(filling, rough, printed=True, role=CONTENTS))
+        materials.append(Material(filling, rough, printed=True, role=vessel_contents.CONTENTS))
     stages = [(0.92 * radius, 0.0), (radius, 0.008), (radius, neck * height), (lid_radius, top),
               (lid_radius, height)]  # fmt: skip
     return make_centred_solid(patches, materials, hulls.stack(stages))

@@ -21,8 +21,7 @@ from gen_data.content.procedural.material_presets import (
     printed_material,
 )
 from gen_data.content.procedural.patches import Array, Patch, join_patches, make_centred_solid
-from gen_data.core.asset_types import Material
-from gen_data.core.se3 import Vec3
+from gen_data.core import asset_types, se3
 from gen_data.core.variant_rng import VariantRng, variant_rng
 
 _GREYS = ("#1d1d1f", "#26282b", "#3a3c40", "#0f1012")
@@ -67,7 +66,7 @@ def cell_phone(seed: int) -> Solid:
         frame,
         _screen_material(seed, rng),
         back,
-        Material((0.01, 0.01, 0.012), 0.06, printed=True),
+        asset_types.Material((0.01, 0.01, 0.012), 0.06, printed=True),
         frame,
     )
     half = (0.5 * length + grow, 0.5 * width + grow)
@@ -78,7 +77,7 @@ def cell_phone(seed: int) -> Solid:
     )
 
 
-def _screen_material(seed: int, rng: VariantRng) -> Material:
+def _screen_material(seed: int, rng: VariantRng) -> asset_types.Material:
     """A dark screen with fingerprints, or a lit one of 100 to 500 cd/m^2 (data sheets)."""
     if rng.chance(0.5):
         return replace(
@@ -142,7 +141,7 @@ def remote(seed: int) -> Solid:
         plastic_material(rng, (*_GREYS, *_GREYS, "#d9dadb", "#8a8d91")),
         replace(plastic_material(rng, ("#4a4c50", "#8a8d91", "#d9dadb", "#2a2c30")), roughness=0.7),
         replace(plastic_material(rng, ("#c3121f", "#d9652a", "#1f6fb5", "#2e9e4f")), roughness=0.6),
-        Material((0.03, 0.005, 0.01), 0.1, printed=True),
+        asset_types.Material((0.03, 0.005, 0.01), 0.1, printed=True),
     )
     low = float(corners[..., 2].min())
     hull = hulls.extreme(np.concatenate([patches[0].corners_m.reshape(-1, 3)]), 48)
@@ -301,7 +300,7 @@ def _row_of_keys(row: int, layout: _Layout) -> tuple[float, ...]:
     return (*main, *block)
 
 
-def _key_cap(low: Vec3, size: Vec3, taper: float, letter: int) -> Patch:
+def _key_cap(low: se3.Vec3, size: se3.Vec3, taper: float, letter: int) -> Patch:
     """A truncated pyramid; its top shows the cell of one letter, its sides the cell's corner."""
     x0, y0, z0 = low
     dx, dy, dz = size

@@ -11,9 +11,8 @@ from dataclasses import replace
 import numpy as np
 
 from gen_data.assets.family import Facts, Solid, choose_option
-from gen_data.content.procedural import hand_shape
+from gen_data.content.procedural import food_shapes, hand_shape
 from gen_data.content.procedural import surface_shapes as shapes
-from gen_data.content.procedural.food_shapes import wrap
 from gen_data.content.procedural.hand_shape import ARM_M, Bones
 from gen_data.content.procedural.material_presets import hex_to_linear, jitter_color
 from gen_data.content.procedural.patches import (
@@ -178,7 +177,7 @@ def _hulls(skin: Patch, owner: Indices, nails: Sequence[Patch]) -> list[Array]:
         points = skin.corners_m[owner == part].reshape(-1, 3)
         if part and part % 3 == 0:
             points = np.concatenate([points, nails[part // 3 - 1].corners_m.reshape(-1, 3)])
-        made.append(wrap(points, 32))
+        made.append(food_shapes.wrap(points, 32))
     return made
 
 
@@ -243,7 +242,7 @@ def _arm(
     points = np.concatenate([patch.corners_m.reshape(-1, 3) for patch in shown])
     along = points @ bones.arm
     hulls = [
-        wrap(points[(along > a - 0.001) & (along < b + 0.04)])
+        food_shapes.wrap(points[(along > a - 0.001) & (along < b + 0.04)])
         for a, b in ((0.0, 0.1), (0.1, 0.2), (0.2, 0.31), (0.31, ARM_M))
     ]
     return arm, sleeve, hulls

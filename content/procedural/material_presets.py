@@ -8,10 +8,9 @@ of shading", 2015).
 from collections.abc import Sequence
 
 from gen_data.config.data_files import load_table
+from gen_data.core import colorimetry, variant_rng
 from gen_data.core.asset_types import Material
-from gen_data.core.colorimetry import srgb_decode
 from gen_data.core.se3 import Vec3
-from gen_data.core.variant_rng import VariantRng
 
 STEEL: Vec3 = (0.56, 0.57, 0.58)
 STAINLESS: Vec3 = (0.66, 0.65, 0.63)
@@ -25,7 +24,7 @@ GLAZES, PLASTICS, CAPS, WOODS = (PALETTES[name] for name in ("glazes", "plastics
 
 def hex_to_linear(code: str) -> Vec3:
     """Linear RGB of an sRGB colour ``#rrggbb`` (IEC 61966-2-1)."""
-    r, g, b = (srgb_decode(int(code[i : i + 2], 16) / 255.0) for i in (1, 3, 5))
+    r, g, b = (colorimetry.srgb_decode(int(code[i : i + 2], 16) / 255.0) for i in (1, 3, 5))
     return (r, g, b)
 
 
@@ -41,7 +40,7 @@ def lighten(color: Vec3, amount: float) -> Vec3:
     return (r, g, b)
 
 
-def jitter_color(color: Vec3, amount: float, rng: VariantRng) -> Vec3:
+def jitter_color(color: Vec3, amount: float, rng: variant_rng.VariantRng) -> Vec3:
     """The colour with brightness and tint moved by up to the given fraction."""
     level = 1.0 + rng.between(-amount, amount)
     r, g, b = (
@@ -50,18 +49,18 @@ def jitter_color(color: Vec3, amount: float, rng: VariantRng) -> Vec3:
     return (r, g, b)
 
 
-def draw_linear(codes: Sequence[str], amount: float, rng: VariantRng) -> Vec3:
+def draw_linear(codes: Sequence[str], amount: float, rng: variant_rng.VariantRng) -> Vec3:
     """One of several sRGB colours, jittered; linear RGB."""
     return jitter_color(hex_to_linear(rng.choose(codes)), amount, rng)
 
 
-def ceramic_material(rng: VariantRng, colors: Sequence[str] = GLAZES) -> Material:
+def ceramic_material(rng: variant_rng.VariantRng, colors: Sequence[str] = GLAZES) -> Material:
     """Glazed stoneware or porcelain."""
     color = draw_linear(colors, 0.08, rng)
     return Material(base_color=color, roughness=rng.between(0.1, 0.3))
 
 
-def plastic_material(rng: VariantRng, colors: Sequence[str] = PLASTICS) -> Material:
+def plastic_material(rng: variant_rng.VariantRng, colors: Sequence[str] = PLASTICS) -> Material:
     """Injection-moulded plastic."""
     color = draw_linear(colors, 0.06, rng)
     return Material(base_color=color, roughness=rng.between(0.25, 0.5))

@@ -2,14 +2,13 @@
 
 from gen_data.config.data_files import load_table
 from gen_data.content.procedural.material_presets import hex_to_linear, jitter_color
-from gen_data.core.se3 import Vec3
-from gen_data.core.variant_rng import VariantRng
+from gen_data.core import se3, variant_rng
 
 SKIN = load_table(__package__, "skin_tones", tuple[str, ...])
 TONES = len(SKIN["monk"])
 
 
-def skin_color(tone: int, rng: VariantRng) -> Vec3:
+def skin_color(tone: int, rng: variant_rng.VariantRng) -> se3.Vec3:
     """Linear RGB of bare skin.
 
     The scale's swatches are lighter than skin, whose lightest tones reflect some six tenths of the

@@ -17,8 +17,7 @@ from gen_data.content.procedural.patches import (
     make_solid_in_place,
 )
 from gen_data.content.procedural.surface_shapes import circle, cone, grid, sweep
-from gen_data.core.asset_types import Keypoint, Material
-from gen_data.core.se3 import Vec3
+from gen_data.core import asset_types, se3
 
 Span = tuple[float, float]
 WHOLE: tuple[Span, Span] = ((0.0, 1.0), (0.0, 1.0))
@@ -26,9 +25,9 @@ WHOLE: tuple[Span, Span] = ((0.0, 1.0), (0.0, 1.0))
 
 def make_solid(
     patches: Iterable[Patch],
-    materials: Sequence[Material],
+    materials: Sequence[asset_types.Material],
     hulls_m: Iterable[Array],
-    keypoints: Sequence[Keypoint] = (),
+    keypoints: Sequence[asset_types.Keypoint] = (),
     body: Sequence[Patch] = (),
 ) -> Solid:
     """A solid that keeps its frame; materials that no triangle uses are left out.
@@ -60,12 +59,12 @@ def facing_rectangle(x: float, y_m: Span, z_m: Span, slot: int = 0) -> Patch:
     return quad([(x, y0, z0), (x, y1, z0), (x, y1, z1), (x, y0, z1)], slot)
 
 
-def post(radius_m: float, z_m: Span, at: Vec3 = (0.0, 0.0, 0.0), sides: int = 10) -> Patch:
+def post(radius_m: float, z_m: Span, at: se3.Vec3 = (0.0, 0.0, 0.0), sides: int = 10) -> Patch:
     """An upright cylinder."""
     return cone((radius_m, z_m[0]), (radius_m, z_m[1]), sides).moved(*at)
 
 
-def tube(path: Sequence[Vec3], radius_m: float, sides: int = 8) -> Patch:
+def tube(path: Sequence[se3.Vec3], radius_m: float, sides: int = 8) -> Patch:
     """A round bar along a path."""
     points = np.array(path, dtype=np.float64)
     start = points[1] - points[0]

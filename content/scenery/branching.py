@@ -19,9 +19,8 @@ from gen_data.content.procedural.patches import (
     unit,
 )
 from gen_data.content.procedural.surface_shapes import circle, sweep
+from gen_data.core import se3, streams
 from gen_data.core.noise import uniform
-from gen_data.core.se3 import Vec3
-from gen_data.core.streams import Rng
 
 _PIPE_EXPONENT = 2.3
 _ROUNDS_MAX = 70
@@ -33,8 +32,8 @@ _SEEN, _REACHED = 9.0, 1.8
 class Lobe:
     """An ellipsoid of a crown: its centre and semi-axes [m]."""
 
-    centre_m: Vec3
-    axes_m: Vec3
+    centre_m: se3.Vec3
+    axes_m: se3.Vec3
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -57,7 +56,7 @@ class Skeleton:
         return np.array(self.nodes_m[thin])
 
 
-def points_in(lobes: Sequence[Lobe], count: int, rng: Rng) -> Array:
+def points_in(lobes: Sequence[Lobe], count: int, rng: streams.Rng) -> Array:
     """Points in ellipsoids, denser towards their surfaces, [about count, 3]."""
     volume = np.array([float(np.prod(lobe.axes_m)) for lobe in lobes])
     found = []

@@ -15,15 +15,9 @@ from gen_data.assets.family import Facts, Solid
 from gen_data.content.procedural import collision_hulls as hulls
 from gen_data.content.procedural.patches import Patch, join_patches
 from gen_data.content.procedural.surface_shapes import block
-from gen_data.content.scenery import facade, other_sides, roofs, street_side
+from gen_data.content.scenery import building_designs, facade, other_sides, roofs, street_side
 from gen_data.content.scenery import facade_fittings as fittings
 from gen_data.content.scenery.basic_shapes import Span, make_solid, quad
-from gen_data.content.scenery.building_designs import (
-    Design,
-    building_materials,
-    choose_region,
-    draw_design,
-)
 from gen_data.content.scenery.facade import BASE, DOOR, FACADE, METAL
 from gen_data.content.scenery.textures.facade_finish import PLASTER_WIDTH_M
 from gen_data.core.asset_types import Keypoint
@@ -40,8 +34,8 @@ def building(seed: int, style: str, region: str = "any") -> Solid:
     Raises:
         AssetError: for an unknown style or region.
     """
-    plan = draw_design(style, seed)
-    materials = building_materials(plan, seed, region)
+    plan = building_designs.draw_design(style, seed)
+    materials = building_designs.building_materials(plan, seed, region)
     rng = variant_rng(f"building/{style}/details", seed)
     front = street_side.front(plan, rng)
     wing = street_side.wing_span(plan, front)
@@ -83,8 +77,8 @@ def _main_door(front: Patch, x_m: float) -> list[Keypoint]:
 
 def building_facts(seed: int, style: str, region: str = "any") -> Facts:
     """Style, number of floors and region, without building it."""
-    place = choose_region(style, seed, region)
-    floors = str(draw_design(style, seed).floors)
+    place = building_designs.choose_region(style, seed, region)
+    floors = str(building_designs.draw_design(style, seed).floors)
     return Facts(style, {"floors": floors, "region": place})
 
 
@@ -113,7 +107,7 @@ def _mirrored(patch: Patch) -> Patch:
     return Patch(corners[:, ::-1], patch.uvs[:, ::-1], patch.slots)
 
 
-def _wing_roof(plan: Design, y_m: Span, rng: VariantRng) -> Patch:
+def _wing_roof(plan: building_designs.Design, y_m: Span, rng: VariantRng) -> Patch:
     """The roof of a wing: a gable that looks at the street, or a parapet."""
     front, width = 0.5 * plan.depth_m + plan.wing_out_m, y_m[1] - y_m[0]
     middle = 0.5 * (y_m[0] + y_m[1])
@@ -128,7 +122,7 @@ def _wing_roof(plan: Design, y_m: Span, rng: VariantRng) -> Patch:
     return shell.rotated("z", 0.5 * math.pi).moved(0.5 * front, middle, plan.eaves_m)
 
 
-def _roof(plan: Design, wing: Span | None, rng: VariantRng) -> Patch:
+def _roof(plan: building_designs.Design, wing: Span | None, rng: VariantRng) -> Patch:
     if plan.roof == "flat":
         return _flat_roof(plan, rng)
     if plan.roof == "hip":
@@ -156,7 +150,7 @@ def _roof(plan: Design, wing: Span | None, rng: VariantRng) -> Patch:
     return join_patches(made)
 
 
-def _flat_roof(plan: Design, rng: VariantRng) -> Patch:
+def _flat_roof(plan: building_designs.Design, rng: VariantRng) -> Patch:
     """A deck with stair heads, machinery and aerials."""
     parts = [roofs.flat(plan.depth_m, plan.width_m, rng.between(0.25, 0.9))]
     for _ in range(rng.choose((1, 1, 2, 3))):
@@ -181,7 +175,7 @@ def _crown(at_m: tuple[float, float], ridge_m: float, rng: VariantRng) -> list[P
     return parts
 
 
-def _on_slope(plan: Design, rng: VariantRng) -> list[Patch]:
+def _on_slope(plan: building_designs.Design, rng: VariantRng) -> list[Patch]:
     """Roof windows or solar panels on the street side of a gable roof."""
     kind = rng.choose(("none", "none", "windows", "panels"))
     half, rise = 0.5 * plan.depth_m, math.tan(plan.pitch_rad)
@@ -210,7 +204,7 @@ def _roof_window(y: float, rng: VariantRng) -> Patch:
     return join_patches([frame, quad([(a, b, 0.01) for a, b in pane], slot, image)])
 
 
-def _gable_front(plan: Design, rng: VariantRng) -> Patch:
+def _gable_front(plan: building_designs.Design, rng: VariantRng) -> Patch:
     """A gable roof whose ridge runs along X, with a window in the gable."""
     profile = roofs.gable_profile(plan.width_m, plan.pitch_rad, _EAVES_M)
     shell = roofs.over_profile(profile, plan.depth_m, plan.verge_m, 0.24)
@@ -221,7 +215,9 @@ def _gable_front(plan: Design, rng: VariantRng) -> Patch:
     return join_patches([shell.rotated("z", 0.5 * math.pi), attic.moved(0.5 * plan.depth_m), stack])
 
 
-def _dormers(plan: Design, slope: float, wing: Span | None, rng: VariantRng) -> list[Patch]:
+def _dormers(
+    plan: building_designs.Design, slope: float, wing: Span | None, rng: VariantRng
+) -> list[Patch]:
     """Dormers on the street side; ``slope`` is how far the roof recedes per metre of height."""
     foot = 0.45
     x = 0.5 * plan.depth_m - slope * foot - 0.05

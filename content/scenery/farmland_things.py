@@ -21,11 +21,8 @@ from gen_data.content.procedural.surface_shapes import (
     rounded_box,
     sweep,
 )
-from gen_data.content.scenery.basic_shapes import make_solid
-from gen_data.content.scenery.clutter_shapes import wire
-from gen_data.content.scenery.street_furniture import GALVANISED
-from gen_data.core.errors import AssetError
-from gen_data.core.se3 import Vec3
+from gen_data.content.scenery import basic_shapes, clutter_shapes, street_furniture
+from gen_data.core import errors, se3
 from gen_data.core.variant_rng import variant_rng
 
 BALES = ("round", "round", "wrapped", "square", "stack", "wrapped")
@@ -79,7 +76,7 @@ def straw_bale(seed: int) -> Solid:
                 ]
     straw = patterned_material("texture/crop?kind=stubble&seed=1", 1.5, 0.95, (0.85, 0.8, 0.7))
     film = painted_material(rng.choose(("#dfe3df", "#aeb9a6", "#23262a", "#dfe3df")), 0.3)
-    return make_solid(
+    return basic_shapes.make_solid(
         parts, (film if kind == "wrapped" else straw, painted_material("#8d7d52", 0.9)), hull
     )
 
@@ -103,7 +100,7 @@ def power_pylon(seed: int, span_m: float) -> Solid:
         AssetError: if the span is not between 0 and 450 m.
     """
     if not 0.0 <= span_m <= SPAN_MAX_M:
-        raise AssetError(f"power_pylon: span_m={span_m} is not between 0 and {SPAN_MAX_M:g}")
+        raise errors.AssetError(f"power_pylon: span_m={span_m} is not between 0 and {SPAN_MAX_M:g}")
     rng = variant_rng("power_pylon", seed)
     kind = rng.turn(PYLONS, "kind")
     high, foot = rng.between(26.0, 34.0, "height_m"), rng.between(2.2, 3.0, "foot_m")
@@ -112,29 +109,29 @@ def power_pylon(seed: int, span_m: float) -> Solid:
     for x in (-foot, foot):
         for y in (-foot, foot):
             parts.append(block((x - 0.4, y - 0.4, 0.0), (x + 0.4, y + 0.4, 0.35), 0.0, 1))
-    grips: list[Vec3] = []
+    grips: list[se3.Vec3] = []
     for share, reach in _ARMS[kind]:
         z, half = share * high, float(np.interp(share * high, widths[:, 0], widths[:, 1]))
         for side in (-1.0, 1.0):
             tip = (0.0, side * reach, z)
             for x in (-half, half):
-                parts.append(wire((x, side * half, z), tip, 0.06))
-                parts.append(wire((x, side * half, z + 1.6), tip, 0.06))
+                parts.append(clutter_shapes.wire((x, side * half, z), tip, 0.06))
+                parts.append(clutter_shapes.wire((x, side * half, z + 1.6), tip, 0.06))
             places = (0.55, 1.0) if reach > 6.0 else (1.0,)
             for place in places:
                 y = side * reach * place
-                parts.append(wire((0.0, y, z), (0.0, y, z - 1.6), 0.08, 2))
+                parts.append(clutter_shapes.wire((0.0, y, z), (0.0, y, z - 1.6), 0.08, 2))
                 grips.append((0.0, y, z - 1.6))
     grips.append((0.0, 0.0, high))
     cables = list(_half_spans(grips, span_m)) if span_m else []
     materials = (
-        GALVANISED,
+        street_furniture.GALVANISED,
         patterned_material("texture/concrete?seed=3", 2.0, 0.9),
         painted_material(rng.choose(("#5a3d30", "#7d8684")), 0.3),
         painted_material("#55585a", 0.5),
     )
     hull = hulls.frustum((foot, 0.0), (0.5, high), 4)
-    return make_solid([*parts, *cables], materials, [hull], body=parts)
+    return basic_shapes.make_solid([*parts, *cables], materials, [hull], body=parts)
 
 
 def power_pylon_facts(seed: int, span_m: float) -> Facts:
@@ -158,15 +155,15 @@ def _mast(widths: Array) -> Iterator[Patch]:
         corners = ((1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0))
         for k, (a, b) in enumerate(corners):
             c, d = corners[(k + 1) % 4]
-            yield wire((a * h0, b * h0, z0), (a * h1, b * h1, z1), 0.09)
-            yield wire((a * h0, b * h0, z0), (c * h1, d * h1, z1), 0.045)
-            yield wire((c * h0, d * h0, z0), (a * h1, b * h1, z1), 0.045)
-            yield wire((a * h1, b * h1, z1), (c * h1, d * h1, z1), 0.045)
+            yield clutter_shapes.wire((a * h0, b * h0, z0), (a * h1, b * h1, z1), 0.09)
+            yield clutter_shapes.wire((a * h0, b * h0, z0), (c * h1, d * h1, z1), 0.045)
+            yield clutter_shapes.wire((c * h0, d * h0, z0), (a * h1, b * h1, z1), 0.045)
+            yield clutter_shapes.wire((a * h1, b * h1, z1), (c * h1, d * h1, z1), 0.045)
     z, half = widths[-1].tolist()
     yield cone((1.2 * half, z), (0.04, z + 1.5), 4)
 
 
-def _half_spans(grips: list[Vec3], span_m: float) -> Iterator[Patch]:
+def _half_spans(grips: list[se3.Vec3], span_m: float) -> Iterator[Patch]:
     """Conductors along X from the pylon to the middle of the span on both sides, as parabolas."""
     t = np.linspace(0.0, 1.0, 7)
     for _, y, z in grips:

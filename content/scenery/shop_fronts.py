@@ -3,8 +3,7 @@
 from dataclasses import dataclass, replace
 
 from gen_data.content.procedural.patches import Patch, join_patches
-from gen_data.content.scenery import facade
-from gen_data.content.scenery.awnings import awning_cloth
+from gen_data.content.scenery import awnings, facade
 from gen_data.content.scenery.basic_shapes import Span, tube
 from gen_data.content.scenery.facade import (
     ACCENT,
@@ -195,7 +194,7 @@ def awning(y_m: Span, z1: float, out_m: float, rng: VariantRng) -> Patch:
     edges = [y0 + (y1 - y0) * k / count for k in range(count + 1)]
     paints = (rng.choose((AWNING, ACCENT)), facade.WHITE)
     slots = [paints[k % 2 if is_striped else 0] for k in range(count)]
-    parts = awning_cloth((out_m, low), (0.02, z1), edges, slots, 0.2)
+    parts = awnings.awning_cloth((out_m, low), (0.02, z1), edges, slots, 0.2)
     # The box that it rolls into, the bar in front, and the arms.
     box = (0.0, 0.1, y0, y1, z1 - 0.01, z1 + 0.1)
     bar = (out_m - 0.04, out_m - 0.006, y0, y1, low - 0.035, low - 0.006)

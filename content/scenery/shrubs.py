@@ -10,15 +10,7 @@ from gen_data.content.procedural import collision_hulls as hulls
 from gen_data.content.procedural.material_presets import hex_to_linear, patterned_material
 from gen_data.content.procedural.patches import Array, Patch, finish_mesh, join_patches
 from gen_data.content.procedural.surface_shapes import ball, block
-from gen_data.content.scenery.foliage import (
-    Habit,
-    directions,
-    leaf_mesh,
-    merge_meshes,
-    sprays_about,
-)
-from gen_data.content.scenery.leaf_cards import PETAL, transmitting
-from gen_data.content.scenery.trees import leaf_greens
+from gen_data.content.scenery import foliage, leaf_cards, trees
 from gen_data.core.asset_types import ConvexParts, Material
 from gen_data.core.variant_rng import VariantRng, variant_rng
 
@@ -45,7 +37,7 @@ def bush(seed: int) -> Solid:
     anchors = np.concatenate([_shell(x, y, z, r, 90, rng) for x, y, z, r in lobes])
     hull = hulls.frustum((0.45 * h, 0.0), (0.4 * h, 0.9 * h), 12)
     length = 0.12 + 0.03 * h
-    return _leafy(core, anchors, 0.3 * h, Habit(2400, length, 0.6 * length), hull, rng)
+    return _leafy(core, anchors, 0.3 * h, foliage.Habit(2400, length, 0.6 * length), hull, rng)
 
 
 def planter(seed: int) -> Solid:
@@ -77,25 +69,27 @@ def planter(seed: int) -> Solid:
     greens = _shades(rng)
     if rng.chance(0.6):
         blossom = Material(hex_to_linear(rng.choose(_FLOWERS)), roughness=0.8, role="leaf")
-        greens = (*greens[:3], transmitting(blossom, PETAL))
+        greens = (*greens[:3], leaf_cards.transmitting(blossom, leaf_cards.PETAL))
     mesh = finish_mesh(core, (rng.choose(stuff), _core_material(greens)), 50.0)
-    sprays = sprays_about(anchors, np.array([0.0, 0.0, h - 0.2]), Habit(620, 0.095, 0.07), rng)
-    leaves = leaf_mesh(sprays, greens, 0.7, rng)
-    return Solid(merge_meshes(mesh, leaves), ConvexParts((np.round(hull, 6),)))
+    sprays = foliage.sprays_about(
+        anchors, np.array([0.0, 0.0, h - 0.2]), foliage.Habit(620, 0.095, 0.07), rng
+    )
+    leaves = foliage.leaf_mesh(sprays, greens, 0.7, rng)
+    return Solid(foliage.merge_meshes(mesh, leaves), ConvexParts((np.round(hull, 6),)))
 
 
 def _leafy(
-    core: Patch, anchors: Array, middle_z: float, habit: Habit, hull: Array, rng: VariantRng
+    core: Patch, anchors: Array, middle_z: float, habit: foliage.Habit, hull: Array, rng: VariantRng
 ) -> Solid:
     greens = _shades(rng)
     mesh = finish_mesh(core, (_core_material(greens),), 70.0)
-    sprays = sprays_about(anchors, np.array([0.0, 0.0, middle_z]), habit, rng)
-    leaves = leaf_mesh(sprays, greens, 0.7, rng)
-    return Solid(merge_meshes(mesh, leaves), ConvexParts((np.round(hull, 6),)))
+    sprays = foliage.sprays_about(anchors, np.array([0.0, 0.0, middle_z]), habit, rng)
+    leaves = foliage.leaf_mesh(sprays, greens, 0.7, rng)
+    return Solid(foliage.merge_meshes(mesh, leaves), ConvexParts((np.round(hull, 6),)))
 
 
 def _shades(rng: VariantRng) -> tuple[Material, ...]:
-    return leaf_greens(rng.choose(_GREENS), rng)
+    return trees.leaf_greens(rng.choose(_GREENS), rng)
 
 
 def _core_material(greens: tuple[Material, ...]) -> Material:
@@ -108,7 +102,7 @@ def _core_material(greens: tuple[Material, ...]) -> Material:
 
 def _shell(x: float, y: float, z: float, r: float, count: int, rng: VariantRng) -> Array:
     """Points on a ball."""
-    points: Array = np.array([x, y, z]) + r * directions(count, rng)
+    points: Array = np.array([x, y, z]) + r * foliage.directions(count, rng)
     points[:, 2] = np.maximum(points[:, 2], 0.05)
     return points
 

@@ -11,8 +11,7 @@ from gen_data.assets.family import Solid
 from gen_data.content.procedural.material_presets import hex_to_linear, patterned_material
 from gen_data.content.procedural.patches import Array, Patch, finish_mesh, join_patches
 from gen_data.content.procedural.surface_shapes import ball, block, cone, grid
-from gen_data.content.scenery.basic_shapes import facing_rectangle
-from gen_data.content.scenery.horizons import centred_piece
+from gen_data.content.scenery import basic_shapes, horizons
 from gen_data.core.asset_types import Material
 from gen_data.core.variant_rng import VariantRng, variant_rng
 
@@ -120,7 +119,7 @@ def _piece(parts: list[Patch], colors: tuple[str, ...], rng: VariantRng) -> Soli
         Material((0.035, 0.04, 0.045), roughness=0.15, role="window"),
         Material(hex_to_linear("#5a6b40"), 0.95, specular=0.2, role="leaf"),
     )
-    return centred_piece(finish_mesh(join_patches(parts), materials, 30.0))
+    return horizons.centred_piece(finish_mesh(join_patches(parts), materials, 30.0))
 
 
 def _walls(plan: _Block) -> Iterator[Patch]:
@@ -145,7 +144,7 @@ def _lit_windows(plan: _Block, rng: VariantRng) -> Iterator[Patch]:
                 z = plan.base_m + (storey + 0.54) * plan.storey_m
                 span = (y - 0.2 * bay, y + 0.2 * bay)
                 high = (z - 0.21 * plan.storey_m, z + 0.21 * plan.storey_m)
-                yield facing_rectangle(plan.x1 + 0.03, span, high, _WINDOW)
+                yield basic_shapes.facing_rectangle(plan.x1 + 0.03, span, high, _WINDOW)
 
 
 def _city_block(plan: _Block, rng: VariantRng) -> Iterator[Patch]:

@@ -19,6 +19,7 @@ from gen_data.content.procedural.material_presets import (
 )
 from gen_data.content.procedural.patches import Array, Patch, finish_mesh, unit
 from gen_data.content.procedural.surface_shapes import circle, sweep
+from gen_data.content.scenery import leaf_cards
 from gen_data.content.scenery.branching import Lobe, Skeleton, grow_skeleton, points_in, wood
 from gen_data.content.scenery.foliage import (
     OUTWARD,
@@ -27,18 +28,6 @@ from gen_data.content.scenery.foliage import (
     directions,
     merge_meshes,
     sprays_about,
-)
-from gen_data.content.scenery.leaf_cards import (
-    BROAD,
-    Cards,
-    card_mesh,
-    crown_shades,
-    depth_levels,
-    drop_unused_slots,
-    first_cards,
-    leaf_material,
-    spray_cards,
-    transmitting,
 )
 from gen_data.core.asset_types import ConvexParts, Material, MeshData
 from gen_data.core.errors import AssetError
@@ -199,11 +188,11 @@ def _broadleaf(kind: Species, shape: Shape, leaves: float, season: str, rng: Var
         if season == "spring" and kind.blossom:
             cards = replace(cards, slots=np.where(np.arange(len(cards.slots)) % 4 < 2,
                                                   len(foliage) - 1, cards.slots))  # fmt: skip
-        crown = card_mesh(first_cards(cards, count), foliage, OUTWARD, rng)
+        crown = leaf_cards.card_mesh(leaf_cards.first_cards(cards, count), foliage, OUTWARD, rng)
         mesh = merge_meshes(mesh, crown)
     else:
         mesh = merge_meshes(mesh, _bare_twigs(shape, skeleton, rng))
-    return Solid(drop_unused_slots(mesh), ConvexParts((np.round(hull, 6),)))
+    return Solid(leaf_cards.drop_unused_slots(mesh), ConvexParts((np.round(hull, 6),)))
 
 
 def _season_leaves(
@@ -214,9 +203,9 @@ def _season_leaves(
     codes = kind.autumn if season == "autumn" and kind.autumn else shape.green
     if season == "spring":
         level *= 1.25
-    made = list(crown_shades(kind.leaf, codes, level, warm))
+    made = list(leaf_cards.crown_shades(kind.leaf, codes, level, warm))
     if kind.blossom:
-        made.append(leaf_material("blossom", kind.blossom, 1.1))
+        made.append(leaf_cards.leaf_material("blossom", kind.blossom, 1.1))
     return tuple(made)
 
 
@@ -231,7 +220,9 @@ def _without_gaps(points: Array, shape: Shape, rng: VariantRng) -> Array:
     return points[kept] if int(kept.sum()) > len(shape.lobes) * 8 else points
 
 
-def _crown(kind: Species, shape: Shape, skeleton: Skeleton, shades: int, rng: VariantRng) -> Cards:
+def _crown(
+    kind: Species, shape: Shape, skeleton: Skeleton, shades: int, rng: VariantRng
+) -> leaf_cards.Cards:
     """Sprays at the twigs' ends, as many as it takes to fill the crown."""
     outer = np.array([lobe.centre_m for lobe in shape.lobes]).mean(axis=0)
     radius = math.sqrt(math.prod(max(lobe.axes_m[i] for lobe in shape.lobes) for i in (0, 2)))
@@ -243,7 +234,7 @@ def _crown(kind: Species, shape: Shape, skeleton: Skeleton, shades: int, rng: Va
     length = min(math.sqrt(wanted / count), 1.8 * kind.spray_m)
     middle = outer - np.array([0.0, 0.0, 0.25 * radius])
     habit = Habit(count, length, 1.1 * length, shades, kind.droop)
-    return spray_cards(sprays_about(skeleton.twigs(), middle, habit, rng), rng)
+    return leaf_cards.spray_cards(sprays_about(skeleton.twigs(), middle, habit, rng), rng)
 
 
 def _bare_twigs(shape: Shape, skeleton: Skeleton, rng: VariantRng) -> MeshData:
@@ -251,9 +242,9 @@ def _bare_twigs(shape: Shape, skeleton: Skeleton, rng: VariantRng) -> MeshData:
     middle = np.array([0.0, 0.0, shape.clear_m])
     length = min(0.11 * (shape.height_m - shape.clear_m), 1.1)
     habit = Habit(_TWIGS, length, 0.25 * length, 1, -0.3)
-    cards = spray_cards(sprays_about(skeleton.twigs(), middle, habit, rng), rng)
-    twigs = replace(leaf_material("twigs", shape.bark, 0.8), role="bark")
-    return card_mesh(cards, (twigs,), 0.5, rng)
+    cards = leaf_cards.spray_cards(sprays_about(skeleton.twigs(), middle, habit, rng), rng)
+    twigs = replace(leaf_cards.leaf_material("twigs", shape.bark, 0.8), role="bark")
+    return leaf_cards.card_mesh(cards, (twigs,), 0.5, rng)
 
 
 def _trunk(shape: Shape, leader: float, rng: VariantRng) -> Array:
@@ -301,9 +292,11 @@ def _conifer(rng: VariantRng) -> Solid:
     sprays = Sprays(places, outward, growth, reach_m, slots)
     warm = rng.between(0.9, 1.1)
     codes = ("#2a3926", "#364a30", "#435839", "#526845")
-    greens = crown_shades("needle", codes, _LEAF_LEVEL, warm)
+    greens = leaf_cards.crown_shades("needle", codes, _LEAF_LEVEL, warm)
     wooden = finish_mesh(trunk, (_bark("#6a5a4c"),), 60.0)
-    mesh = merge_meshes(wooden, card_mesh(spray_cards(sprays, rng), greens, OUTWARD, rng))
+    mesh = merge_meshes(
+        wooden, leaf_cards.card_mesh(leaf_cards.spray_cards(sprays, rng), greens, OUTWARD, rng)
+    )
     hull = hulls.frustum((base_m, 0.0), (0.6 * base_m, 0.5 * height), 10)
     return Solid(mesh, ConvexParts((np.round(hull, 6),)))
 
@@ -345,10 +338,10 @@ def leaf_greens(codes: tuple[str, ...], rng: VariantRng) -> tuple[Material, ...]
     warm, level = rng.between(0.85, 1.18), rng.between(0.85, 1.15)
     colors = (
         (k * level * warm * c[0] * r, k * level * c[1] * g, k * level * c[2] * b)
-        for c, k in zip(map(hex_to_linear, codes), depth_levels(codes), strict=True)
+        for c, k in zip(map(hex_to_linear, codes), leaf_cards.depth_levels(codes), strict=True)
     )
     plain = (Material(c, roughness=0.75, specular=0.35, role="leaf") for c in colors)
-    return tuple(transmitting(leaf, BROAD) for leaf in plain)
+    return tuple(leaf_cards.transmitting(leaf, leaf_cards.BROAD) for leaf in plain)
 
 
 def _draw_shape(species: Species, rng: VariantRng) -> Shape:

@@ -13,9 +13,8 @@ from gen_data.content.procedural.material_presets import hex_to_linear
 from gen_data.content.procedural.patches import Array, Patch, join_patches
 from gen_data.content.procedural.surface_shapes import block, circle, cone, lathe, sweep
 from gen_data.content.scenery.basic_shapes import make_solid
-from gen_data.content.vehicles import luggage
+from gen_data.content.vehicles import body_shell, luggage
 from gen_data.content.vehicles import rider as people
-from gen_data.content.vehicles.body_shell import drop_uvs
 from gen_data.content.vehicles.rider import Seat, blob, limb
 from gen_data.content.vehicles.vehicle_materials import COLORS, materials
 from gen_data.content.vehicles.vehicle_materials import VehicleSlot as Slot
@@ -72,7 +71,7 @@ def bicycle_parts(seed: int) -> tuple[list[Patch], tuple[Material, ...]]:
     frame = _FRAMES[in_turn(STYLES, seed)]
     parts = _machine(in_turn(STYLES, seed), frame, rng.between(0.0, 2.0 * math.pi), rng)
     paint = hex_to_linear(rng.choose(COLORS["bicycles"]))
-    return [drop_uvs(part) for part in parts], materials(rng, paint)
+    return [body_shell.drop_uvs(part) for part in parts], materials(rng, paint)
 
 
 def bicycle_facts(seed: int) -> Facts:
@@ -138,7 +137,7 @@ def _solid(parts: list[Patch], frame: _Frame, finish: tuple[Material, ...], top:
         hulls.box((-reach, -0.05, 0.0), (reach, 0.05, 0.7)),
         hulls.box((-0.45, -0.28, 0.25), (0.45, 0.28, top)),
     ]
-    return make_solid([drop_uvs(part) for part in parts], finish, hull, points)
+    return make_solid([body_shell.drop_uvs(part) for part in parts], finish, hull, points)
 
 
 def _machine(style: str, frame: _Frame, turn_rad: float, rng: VariantRng) -> list[Patch]:

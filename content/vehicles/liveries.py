@@ -10,8 +10,7 @@ from gen_data.assets.family import check_option
 from gen_data.config.data_files import load_table
 from gen_data.content.procedural.material_presets import hex_to_linear, hex_to_srgb8
 from gen_data.content.procedural.textures import artwork as art
-from gen_data.core.asset_types import TextureData
-from gen_data.core.se3 import Vec3
+from gen_data.core import asset_types, se3
 from gen_data.core.variant_rng import variant_rng
 
 if TYPE_CHECKING:
@@ -47,12 +46,12 @@ def livery_id(kind: str, seed: int) -> str:
     return f"texture/vehicle_livery?kind={kind}&seed={seed}"
 
 
-def livery_ground(kind: str, seed: int) -> Vec3:
+def livery_ground(kind: str, seed: int) -> se3.Vec3:
     """Colour of the paint around the print, linear RGB."""
     return hex_to_linear(_find(kind, seed).ground)
 
 
-def vehicle_livery(seed: int, kind: str) -> TextureData:
+def vehicle_livery(seed: int, kind: str) -> asset_types.TextureData:
     """The side of a vehicle, its front at the left border.
 
     Args:

@@ -1,7 +1,6 @@
 """Luggage of cyclists: bags beside the rear wheel and on the back."""
 
-from gen_data.content.procedural.material_presets import hex_to_linear
-from gen_data.content.procedural.patches import Patch
+from gen_data.content.procedural import material_presets, patches
 from gen_data.content.procedural.surface_shapes import block
 from gen_data.content.vehicles.rider import Seat
 from gen_data.content.vehicles.vehicle_materials import COLORS
@@ -17,10 +16,10 @@ _SLOT = Slot.SOFT_TOP
 
 def draw_color(rng: VariantRng) -> Vec3:
     """Colour of the luggage, linear RGB."""
-    return hex_to_linear(rng.choose(COLORS["luggage"]))
+    return material_presets.hex_to_linear(rng.choose(COLORS["luggage"]))
 
 
-def backpack(seat: Seat, rng: VariantRng) -> Patch:
+def backpack(seat: Seat, rng: VariantRng) -> patches.Patch:
     """A bag on the rider's back."""
     depth, width, height = (
         rng.between(0.12, 0.2),
@@ -32,7 +31,7 @@ def backpack(seat: Seat, rng: VariantRng) -> Patch:
     return bag.rotated("y", seat.lean_rad).moved(*seat.hips)
 
 
-def panniers(carrier: Vec3, rng: VariantRng) -> list[Patch]:
+def panniers(carrier: Vec3, rng: VariantRng) -> list[patches.Patch]:
     """Bags that hang from a carrier whose middle is given, on one side or both."""
     x, _, z = carrier
     length, width, height = (

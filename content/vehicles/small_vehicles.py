@@ -6,11 +6,7 @@ import numpy as np
 
 from gen_data.assets.family import Facts, Solid
 from gen_data.content.procedural import collision_hulls as hulls
-from gen_data.content.procedural.material_presets import (
-    painted_material,
-    patterned_material,
-    printed_material,
-)
+from gen_data.content.procedural import material_presets
 from gen_data.content.procedural.patches import Patch, join_patches
 from gen_data.content.procedural.surface_shapes import block, cone, rounded_box
 from gen_data.content.scenery.basic_shapes import facing_rectangle, make_solid, post
@@ -41,7 +37,7 @@ def parked_bicycle(seed: int) -> Solid:
     """
     rng = variant_rng("parked_bicycle", seed)
     kind = rng.turn(PARKINGS, "parking")
-    steel = (GALVANISED if rng.chance(0.6) else painted_material("#3b3d3f", 0.5),)
+    steel = (GALVANISED if rng.chance(0.6) else material_presets.painted_material("#3b3d3f", 0.5),)
     count = {"rack": 3, "hoop_pair": 2}.get(kind, 1)
     pieces: list[tuple[list[Patch], tuple[Material, ...]]] = []
     for k in range(count):
@@ -146,9 +142,9 @@ def kick_scooter(seed: int) -> Solid:
     color = in_turn(("#2fb35a", "#17181a", "#e9e9e4", "#e0622a", "#1fa0a8", "#7fc31f"), seed)
     materials = (
         worn_paint((color,), 0.35, rng),
-        painted_material("#1c1d1e", 0.9),
+        material_presets.painted_material("#1c1d1e", 0.9),
         Material((0.02, 0.02, 0.02), roughness=0.85, role="tyre"),
-        painted_material(rng.choose(("#17181a", "#2f3234")), 0.5),
+        material_presets.painted_material(rng.choose(("#17181a", "#2f3234")), 0.5),
         Material((0.62, 0.65, 0.68), roughness=0.1, role="headlight"),
         Material((0.3, 0.008, 0.01), roughness=0.12, role="taillight"),
     )
@@ -223,15 +219,17 @@ def trailer(seed: int) -> Solid:
     body_color = rng.choose(("#c9cccd", "#6a6e70", "#2f4f7a", "#7a2f2a", "#3f4a3f"))
     sheet = rng.choose(("#22406f", "#8d9091", "#2f5f3a", "#26282a", "#b0392c"))
     materials = (
-        painted_material(body_color, 0.4),
-        painted_material("#1a1b1c", 0.6),
+        material_presets.painted_material(body_color, 0.4),
+        material_presets.painted_material("#1a1b1c", 0.6),
         Material((0.5, 0.5, 0.51), roughness=0.35, metallic=0.9, role="rim"),
         Material((0.02, 0.02, 0.02), roughness=0.85, role="tyre"),
         Material((0.3, 0.008, 0.01), roughness=0.12, role="taillight"),
-        painted_material(sheet, 0.65),
+        material_presets.painted_material(sheet, 0.65),
         GALVANISED,
-        printed_material(f"texture/licence_plate?seed={seed % 12}", 0.4),
-        patterned_material("texture/wood_planks?seed=2", 1.2, 0.8, (0.55, 0.5, 0.45)),
+        material_presets.printed_material(f"texture/licence_plate?seed={seed % 12}", 0.4),
+        material_presets.patterned_material(
+            "texture/wood_planks?seed=2", 1.2, 0.8, (0.55, 0.5, 0.45)
+        ),
     )
     return make_solid(
         on_ground(parts), materials, [hulls.box((-half, -wide, 0.2), (half, wide, floor + 0.4))]

@@ -9,9 +9,7 @@ import numpy as np
 from gen_data.config.data_files import load_table
 from gen_data.content.procedural.material_presets import hex_to_linear
 from gen_data.content.vehicles import plates
-from gen_data.core.asset_types import Material
-from gen_data.core.se3 import Vec3
-from gen_data.core.variant_rng import VariantRng
+from gen_data.core import asset_types, se3, variant_rng
 
 
 class VehicleSlot(IntEnum):
@@ -49,7 +47,7 @@ class VehicleSlot(IntEnum):
 
 
 COLORS = load_table(__package__, "colors", tuple[str, ...])
-_MATERIALS = load_table(__package__, "materials", Material)
+_MATERIALS = load_table(__package__, "materials", asset_types.Material)
 _WORN = tuple(VehicleSlot)[VehicleSlot.SKIN : VehicleSlot.HELMET + 1]
 """Slots of a rider."""
 PRINTED = (VehicleSlot.PLATE, VehicleSlot.REAR_PLATE, VehicleSlot.LIVERY)
@@ -58,7 +56,7 @@ SIDES = ((VehicleSlot.INDICATOR_LEFT, VehicleSlot.INDICATOR_RIGHT),)
 """Slots that a mirror image exchanges."""
 
 
-def draw_paint(rng: VariantRng) -> Vec3:
+def draw_paint(rng: variant_rng.VariantRng) -> se3.Vec3:
     """Colour of a private car, linear RGB."""
     weights, codes = zip(*(row.split() for row in COLORS["cars"]), strict=True)
     shares = np.cumsum([float(weight) for weight in weights])
@@ -79,7 +77,7 @@ class Print:
 
     livery: str = ""
     fixed: bool = False
-    sign: Vec3 = (0.8, 0.62, 0.08)
+    sign: se3.Vec3 = (0.8, 0.62, 0.08)
     plate_rows: int = 1
 
 
@@ -87,12 +85,12 @@ PLAIN = Print()
 
 
 def materials(
-    rng: VariantRng,
-    paint: Vec3,
-    second: Vec3 = (0.8, 0.8, 0.78),
-    clothes: tuple[Vec3, ...] = (),
+    rng: variant_rng.VariantRng,
+    paint: se3.Vec3,
+    second: se3.Vec3 = (0.8, 0.8, 0.78),
+    clothes: tuple[se3.Vec3, ...] = (),
     printed: Print = PLAIN,
-) -> tuple[Material, ...]:
+) -> tuple[asset_types.Material, ...]:
     """One material per slot; colours are linear RGB.
 
     Args:

@@ -4,18 +4,10 @@ from collections.abc import Mapping, Sequence
 
 from pydantic import Field
 
-from gen_data.annotations.consistency_checks import check_truth
-from gen_data.annotations.instance_extents import find_extents
+from gen_data.annotations import consistency_checks, instance_extents
 from gen_data.config.base_model import Strict
+from gen_data.core import errors, interfaces
 from gen_data.core.capture import Channel, SensorReading
-from gen_data.core.errors import ConfigError
-from gen_data.core.interfaces import (
-    Annotator,
-    AnyAnnotator,
-    AssetLibrary,
-    FrameAnnotator,
-    ImageAnnotator,
-)
 from gen_data.core.sample import EgoTruth, ImageTruth, ObjectTruth
 from gen_data.core.scene import Scene
 from gen_data.core.scene_time import ego_rig, rig_twist
@@ -40,9 +32,9 @@ class Thresholds(Strict):
 def annotate_reading(
     scene: Scene,
     reading: SensorReading,
-    annotators: Sequence[AnyAnnotator],
+    annotators: Sequence[interfaces.AnyAnnotator],
     thresholds: Thresholds,
-    assets: AssetLibrary,
+    assets: interfaces.AssetLibrary,
 ) -> ImageTruth:
     """Annotate one reading: its objects, and the image as a whole.
 
@@ -51,19 +43,21 @@ def annotate_reading(
     """
     truth = annotate_objects(scene, reading, annotators, thresholds)
     for annotator in annotators:
-        if isinstance(annotator, ImageAnnotator):
+        if isinstance(annotator, interfaces.ImageAnnotator):
             truth = annotator.annotate_image(scene, assets, reading, truth)
     return truth
 
 
 def annotate_ego(
-    scenes: Mapping[str, Scene], annotators: Sequence[AnyAnnotator], assets: AssetLibrary
+    scenes: Mapping[str, Scene],
+    annotators: Sequence[interfaces.AnyAnnotator],
+    assets: interfaces.AssetLibrary,
 ) -> EgoTruth | None:
     """Annotate one sample as a whole; None without an annotator of samples.
 
     ``scenes`` are as in ``FrameAnnotator``.
     """
-    of_frames = [a for a in annotators if isinstance(a, FrameAnnotator)]
+    of_frames = [a for a in annotators if isinstance(a, interfaces.FrameAnnotator)]
     if not of_frames:
         return None
     scene = scenes[""]
@@ -77,7 +71,10 @@ def annotate_ego(
 
 
 def annotate_objects(
-    scene: Scene, reading: SensorReading, annotators: Sequence[AnyAnnotator], thresholds: Thresholds
+    scene: Scene,
+    reading: SensorReading,
+    annotators: Sequence[interfaces.AnyAnnotator],
+    thresholds: Thresholds,
 ) -> ImageTruth:
     """Annotate the objects in one reading, in order of instance id.
 
@@ -87,10 +84,10 @@ def annotate_objects(
         SampleError: the labels of an instance contradict each other or the images.
         ConfigError: a threshold requires an annotation that is not configured.
     """
-    of_objects = [a for a in annotators if isinstance(a, Annotator)]
+    of_objects = [a for a in annotators if isinstance(a, interfaces.Annotator)]
     if not of_objects:
         return ImageTruth(reading.camera, ())
-    seen = find_extents(reading.channels[Channel.INSTANCE])
+    seen = instance_extents.find_extents(reading.channels[Channel.INSTANCE])
     instances = sorted((i for i in scene.instances if i.annotated), key=lambda i: i.instance_id)
     objects = []
     for instance in instances:
@@ -104,7 +101,7 @@ def annotate_objects(
         )
         for annotator in of_objects:
             truth = annotator.annotate(scene, reading, truth)
-        check_truth(reading, truth)
+        consistency_checks.check_truth(reading, truth)
         if is_listed(truth, thresholds):
             objects.append(truth)
     return ImageTruth(reading.camera, tuple(objects))
@@ -123,7 +120,7 @@ def is_listed(truth: ObjectTruth, thresholds: Thresholds) -> bool:
     if min(truth.box.width_px, truth.box.height_px) < thresholds.min_box_px:
         return False
     if thresholds.min_visible_fraction > 0 and truth.visible_fraction is None:
-        raise ConfigError(
+        raise errors.ConfigError(
             "min_visible_fraction: the visible fraction of objects is unknown; "
             "add 'visibility' to annotations or set min_visible_fraction to 0"
         )

@@ -18,11 +18,8 @@ from gen_data.annotations.bev_raster import (
     strips,
 )
 from gen_data.config.base_model import Strict
-from gen_data.core.capture import Channel
-from gen_data.core.errors import ConfigError
-from gen_data.core.interfaces import AssetLibrary
+from gen_data.core import capture, errors, interfaces, sample
 from gen_data.core.lane_geometry import lane_borders, left_normals
-from gen_data.core.sample import BirdseyeMap, EgoTruth
 from gen_data.core.scene import Body, Instance, Scene
 from gen_data.core.se3 import SE3, Array
 
@@ -55,21 +52,21 @@ class BevMap(Strict):
         reach_m: Distance from the ego to the nearest edge of the map.
     """
 
-    channels: ClassVar[frozenset[Channel]] = frozenset()
+    channels: ClassVar[frozenset[capture.Channel]] = frozenset()
     type: Literal["bev_map"] = "bev_map"
     px_m: float = Field(0.2, ge=0.02, le=5)
     reach_m: float = Field(40.0, ge=1, le=500)
 
     def annotate_frame(
-        self, scenes: Mapping[str, Scene], assets: AssetLibrary, truth: EgoTruth
-    ) -> EgoTruth:
+        self, scenes: Mapping[str, Scene], assets: interfaces.AssetLibrary, truth: sample.EgoTruth
+    ) -> sample.EgoTruth:
         """Fill in ``birdseye``.
 
         Raises:
             ConfigError: the scene has no rig.
         """
         if not truth.rig:
-            raise ConfigError(
+            raise errors.ConfigError(
                 "annotation 'bev_map': the scene has no rig to centre the map on; add an element"
                 " 'ego' or 'carrier'"
             )
@@ -81,11 +78,12 @@ class BevMap(Strict):
         )
         own = scene.body(scene.rig(truth.rig).body).instance_id
         return replace(
-            truth, birdseye=BirdseyeMap(T_world_map, self.px_m, layers(grid, scene, assets, own))
+            truth,
+            birdseye=sample.BirdseyeMap(T_world_map, self.px_m, layers(grid, scene, assets, own)),
         )
 
 
-def _street_layers(grid: Grid, scene: Scene, assets: AssetLibrary, own: int) -> Layers:
+def _street_layers(grid: Grid, scene: Scene, assets: interfaces.AssetLibrary, own: int) -> Layers:
     drivable = covered_cells(grid, carriageways(scene, assets))
     standing = [b for b in scene.bodies if b.instance_id not in (0, own)]
     kinds = {i.instance_id: frozenset(assets.get(i.asset).tags) for i in scene.instances}
@@ -105,7 +103,7 @@ def _street_layers(grid: Grid, scene: Scene, assets: AssetLibrary, own: int) -> 
     }
 
 
-def _room_layers(grid: Grid, scene: Scene, assets: AssetLibrary, own: int) -> Layers:
+def _room_layers(grid: Grid, scene: Scene, assets: interfaces.AssetLibrary, own: int) -> Layers:
     """Layers of rooms: an occupancy map, and what walls hold.
 
     ``occupied`` is covered by furniture and things whose lowest point is below ``HEAD_M``, rugs
@@ -144,7 +142,7 @@ def _room_layers(grid: Grid, scene: Scene, assets: AssetLibrary, own: int) -> La
     }
 
 
-def _height_m(body: Body, assets: AssetLibrary, corner: int) -> float:
+def _height_m(body: Body, assets: interfaces.AssetLibrary, corner: int) -> float:
     """Height of the lowest (0) or highest (1) point of an upright body."""
     return body.T_world_body.translation_m[2] + body.scale * assets.bounds_m(body.asset)[corner][2]
 

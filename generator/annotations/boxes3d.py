@@ -5,12 +5,10 @@ from dataclasses import replace
 from typing import ClassVar, Literal
 
 from gen_data.config.base_model import Strict
-from gen_data.core.boxes import OrientedBox
+from gen_data.core import boxes, interfaces, se3
 from gen_data.core.capture import Channel, SensorReading
-from gen_data.core.interfaces import AssetLibrary
 from gen_data.core.sample import EgoTruth, ObjectTruth
 from gen_data.core.scene import Scene
-from gen_data.core.se3 import SE3
 
 
 class Boxes3d(Strict):
@@ -31,7 +29,7 @@ class Boxes3d(Strict):
         )
 
     def annotate_frame(
-        self, scenes: Mapping[str, Scene], assets: AssetLibrary, truth: EgoTruth
+        self, scenes: Mapping[str, Scene], assets: interfaces.AssetLibrary, truth: EgoTruth
     ) -> EgoTruth:
         """Fill in ``boxes3d``: in the ego's frame, and in every laser scanner's at its instant."""
         del assets
@@ -41,7 +39,7 @@ class Boxes3d(Strict):
         return replace(truth, boxes3d=frames)
 
 
-def annotate_boxes(scene: Scene, T_world_frame: SE3) -> dict[int, OrientedBox]:
+def annotate_boxes(scene: Scene, T_world_frame: se3.SE3) -> dict[int, boxes.OrientedBox]:
     """The boxes of all annotated instances in a frame, by instance id."""
     T_frame_world = T_world_frame.inverse()
     instances = sorted((i for i in scene.instances if i.annotated), key=lambda i: i.instance_id)

@@ -15,10 +15,8 @@ from functools import cache, lru_cache
 
 import numpy as np
 
-from gen_data.core.colorimetry import XYZ_FROM_REC709, srgb_decode
-from gen_data.core.interfaces import AssetLibrary
+from gen_data.core import colorimetry, interfaces, se3
 from gen_data.core.scene import Body
-from gen_data.core.se3 import Array, Vec3
 
 CENTROIDS = {
     "white": ("F2F3F4",),
@@ -48,7 +46,7 @@ CLEAR_MAX = 0.1
 """Metals, and what light goes through, have the colour of something else above this share."""
 
 
-def color_word(rgb: Vec3) -> str:
+def color_word(rgb: se3.Vec3) -> str:
     """Basic word for a surface of a linear RGB reflectance; empty if none is beyond doubt."""
     words, centroids = _centroids()
     apart = np.sqrt(((centroids - cielab(np.array(rgb))) ** 2).sum(axis=1))
@@ -59,10 +57,10 @@ def color_word(rgb: Vec3) -> str:
     return word if clear else ""
 
 
-def cielab(rgb: Array) -> Array:
+def cielab(rgb: se3.Array) -> se3.Array:
     """L*, a* and b* of linear RGB [..., 3] under its white, D65 (CIE 15:2004, 8.2.1)."""
-    white = XYZ_FROM_REC709.sum(axis=1)
-    ratio = np.einsum("ij,...j->...i", XYZ_FROM_REC709, rgb, optimize=False) / white
+    white = colorimetry.XYZ_FROM_REC709.sum(axis=1)
+    ratio = np.einsum("ij,...j->...i", colorimetry.XYZ_FROM_REC709, rgb, optimize=False) / white
     edge = 6.0 / 29.0
     x, y, z = np.moveaxis(
         np.where(ratio > edge**3, np.cbrt(ratio), ratio / (3.0 * edge**2) + 4.0 / 29.0), -1, 0
@@ -70,7 +68,7 @@ def cielab(rgb: Array) -> Array:
     return np.stack([116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)], axis=-1)
 
 
-def color_of(bodies: Sequence[Body], assets: AssetLibrary) -> str:
+def color_of(bodies: Sequence[Body], assets: interfaces.AssetLibrary) -> str:
     """Word of nearly all of the surface of some bodies; empty if there is none."""
     areas: dict[str, float] = {}
     for body in bodies:
@@ -88,7 +86,7 @@ def color_of(bodies: Sequence[Body], assets: AssetLibrary) -> str:
 
 
 @lru_cache(maxsize=512)
-def _slot_areas(asset: str, assets: AssetLibrary) -> tuple[float, ...]:
+def _slot_areas(asset: str, assets: interfaces.AssetLibrary) -> tuple[float, ...]:
     """Surface [m^2] of every material slot of an asset."""
     mesh = assets.mesh(asset)
     corners = mesh.vertices_m.astype(np.float64)[mesh.faces]
@@ -98,8 +96,8 @@ def _slot_areas(asset: str, assets: AssetLibrary) -> tuple[float, ...]:
 
 
 @cache
-def _centroids() -> tuple[tuple[str, ...], Array]:
+def _centroids() -> tuple[tuple[str, ...], se3.Array]:
     """Words, and CIELAB [n, 3]."""
     listed = [(word, code) for word, codes in CENTROIDS.items() for code in codes]
     encoded = np.array([[int(c[k : k + 2], 16) / 255.0 for k in (0, 2, 4)] for _, c in listed])
-    return tuple(word for word, _ in listed), cielab(srgb_decode(encoded))
+    return tuple(word for word, _ in listed), cielab(colorimetry.srgb_decode(encoded))

@@ -6,12 +6,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.annotations.instance_extents import (
-    instance_error,
-    silhouette_box,
-    silhouette_crop,
-    visible_mask,
-)
+from gen_data.annotations import instance_extents
 from gen_data.core.boxes import BoxPx
 from gen_data.core.capture import SensorReading
 from gen_data.core.sample import MaskPx, ObjectTruth
@@ -28,13 +23,13 @@ def check_truth(reading: SensorReading, truth: ObjectTruth) -> None:
         SampleError: they contradict each other; names sensor, instance and contradiction.
     """
     for fault in _faults(reading, truth):
-        raise instance_error(reading, truth.instance, fault)
+        raise instance_extents.instance_error(reading, truth.instance, fault)
 
 
 def _faults(reading: SensorReading, truth: ObjectTruth) -> Iterator[str]:
     if truth.instance.category_id < 1:
         yield f"it is annotated and its category '{truth.instance.category}' has no id"
-    visible = visible_mask(reading, truth)
+    visible = instance_extents.visible_mask(reading, truth)
     if int(np.count_nonzero(visible)) != truth.visible_px:
         yield f"its box does not hold its {truth.visible_px} visible pixels"
     if truth.box is not None:
@@ -67,14 +62,14 @@ def _silhouette_faults(
     silhouette = reading.silhouettes.get(truth.instance.instance_id)
     if silhouette is None:
         return
-    outer = silhouette_box(silhouette)
+    outer = instance_extents.silhouette_box(silhouette)
     if outer is not None and not _is_tight(silhouette.mask):
         yield "its silhouette is not stored tight"
     if truth.box is None:
         return
     if outer is None or truth.box.intersection(outer) != truth.box:
         yield f"its visible box {truth.box} leaves the box {outer} of its silhouette"
-    elif (visible > silhouette_crop(silhouette, truth.box)).any():
+    elif (visible > instance_extents.silhouette_crop(silhouette, truth.box)).any():
         yield "pixels are visible that are not in its silhouette"
 
 

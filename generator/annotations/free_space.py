@@ -10,13 +10,11 @@ from pydantic import Field
 
 from gen_data.annotations.bev_raster import Float32, Grid, carriageway, heights_m
 from gen_data.config.base_model import Strict
-from gen_data.core.boxes import tight_box
+from gen_data.core import boxes, rolling_shutter_projection, se3
 from gen_data.core.capture import Channel, SensorReading
 from gen_data.core.interfaces import AssetLibrary
-from gen_data.core.rolling_shutter_projection import world_points
 from gen_data.core.sample import ImageTruth, MaskPx
 from gen_data.core.scene import Body, Scene
-from gen_data.core.se3 import SE3
 
 TILE_M = 16.0
 """Grids are centred on multiples of this, so that the cameras of a rig share one."""
@@ -48,11 +46,11 @@ class FreeSpace(Strict):
         x, y, _ = reading.camera.T_world_camera.translation_m
         middle = (TILE_M * round(x / TILE_M), TILE_M * round(y / TILE_M))
         background = tuple(b for b in scene.bodies if b.instance_id == 0 and b.motion == "static")
-        grid = Grid(SE3((*middle, 0.0)), CELL_M, 2 * round((self.far_m + TILE_M) / CELL_M))
+        grid = Grid(se3.SE3((*middle, 0.0)), CELL_M, 2 * round((self.far_m + TILE_M) / CELL_M))
         ground = _ground(background, assets, grid)
         p_camera = reading.camera.intrinsics.pixel_rays()[rows, columns]
         p_camera = p_camera * ranges_m[rows, columns, None].astype(np.float64)
-        p_world = world_points(scene, reading.camera, p_camera, rows)
+        p_world = rolling_shutter_projection.world_points(scene, reading.camera, p_camera, rows)
         here = (p_world[:, 0] - x) ** 2 + (p_world[:, 1] - y) ** 2 < self.far_m**2
         cells = grid.cells(p_world)
         on = np.where(here[:, None], np.floor(cells[:, :2]), 0.0).astype(np.intp)
@@ -68,7 +66,7 @@ def _ground(background: tuple[Body, ...], assets: AssetLibrary, grid: Grid) -> F
 
 
 def _crop_mask(mask: NDArray[np.bool_]) -> MaskPx:
-    box = tight_box(mask)
+    box = boxes.tight_box(mask)
     if box is None:
         return MaskPx(0, 0, np.zeros((0, 0), dtype=bool))
     return MaskPx(box.x_min, box.y_min, mask[box.window()].copy())

@@ -11,8 +11,7 @@ from pydantic import Field
 
 from gen_data.annotations.surface_contacts import Rows, first_hits, hits_by_rays, triangle_normals
 from gen_data.config.base_model import Strict
-from gen_data.core.capture import Channel
-from gen_data.core.interfaces import AssetLibrary
+from gen_data.core import capture, interfaces
 from gen_data.core.sample import EgoTruth, Grasp, Suction
 from gen_data.core.scene import Instance, Scene
 from gen_data.core.se3 import SE3, Array
@@ -61,7 +60,7 @@ class Grasps(Strict):
         most: Largest number of grasps, and of suctions, per object.
     """
 
-    channels: ClassVar[frozenset[Channel]] = frozenset()
+    channels: ClassVar[frozenset[capture.Channel]] = frozenset()
     type: Literal["grasps"] = "grasps"
     opening_m: float = Field(0.08, gt=0)
     friction: float = Field(0.6, gt=0, le=1)
@@ -75,7 +74,7 @@ class Grasps(Strict):
     most: int = Field(12, ge=1)
 
     def annotate_frame(
-        self, scenes: Mapping[str, Scene], assets: AssetLibrary, truth: EgoTruth
+        self, scenes: Mapping[str, Scene], assets: interfaces.AssetLibrary, truth: EgoTruth
     ) -> EgoTruth:
         """Fill in ``grasps`` and ``suctions``."""
         scene = scenes[""]
@@ -200,7 +199,7 @@ class Grasps(Strict):
         return not ((apart * apart).sum(1) < self.cup_m**2).any()
 
 
-def world_meshes(scene: Scene, assets: AssetLibrary) -> list[tuple[int, Array]]:
+def world_meshes(scene: Scene, assets: interfaces.AssetLibrary) -> list[tuple[int, Array]]:
     """Instance id and triangles [n, 3, 3] of all bodies, world."""
     found = []
     for body in scene.bodies:

@@ -5,10 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gen_data.core import errors, sample
 from gen_data.core.boxes import BoxPx
 from gen_data.core.capture import Channel, SensorReading, Silhouette
-from gen_data.core.errors import SampleError
-from gen_data.core.sample import ObjectTruth
 from gen_data.core.scene import Instance
 
 
@@ -55,9 +54,9 @@ def find_extents(ids: NDArray[np.uint16]) -> dict[int, Extent]:
     }
 
 
-def instance_error(reading: SensorReading, instance: Instance, fault: str) -> SampleError:
+def instance_error(reading: SensorReading, instance: Instance, fault: str) -> errors.SampleError:
     """An error that names sensor and instance."""
-    return SampleError(
+    return errors.SampleError(
         f"sensor '{reading.sensor}', instance {instance.instance_id} '{instance.name}': {fault}"
     )
 
@@ -67,7 +66,7 @@ def crop(image: NDArray[np.generic], box: BoxPx) -> NDArray[np.generic]:
     return image[box.window()]
 
 
-def visible_mask(reading: SensorReading, truth: ObjectTruth) -> NDArray[np.bool_]:
+def visible_mask(reading: SensorReading, truth: sample.ObjectTruth) -> NDArray[np.bool_]:
     """The object's visible pixels inside its box, bool [box height, box width]."""
     if truth.box is None:
         return np.zeros((0, 0), dtype=bool)

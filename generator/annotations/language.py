@@ -15,12 +15,8 @@ from typing import Any, ClassVar, Literal
 
 from pydantic import Field
 
-from gen_data.annotations.color_words import color_of
-from gen_data.annotations.instance_extents import find_extents
-from gen_data.annotations.relations import Relations
-from gen_data.annotations.visibility import Visibility
-from gen_data.config.base_model import Strict
-from gen_data.config.data_files import load_data
+from gen_data.annotations import color_words, instance_extents, relations, visibility
+from gen_data.config import base_model, data_files
 from gen_data.core.boxes import BoxPx
 from gen_data.core.capture import Channel, SensorReading
 from gen_data.core.english import count, join, plural, singular
@@ -37,7 +33,7 @@ LARGER = 1.25
 """Smallest ratio of the diagonals of two boxes of which one thing is called the larger."""
 
 
-class Language(Strict):
+class Language(base_model.Strict):
     """Captions, relations, referring expressions, and questions about number, existence and place.
 
     A thing is spoken of if it is clearly visible. A category is countable, and a thing has a name
@@ -68,7 +64,7 @@ class Language(Strict):
         """Fill in ``utterances``."""
         graph = truth
         if graph.relations is None:
-            graph = Relations().annotate_image(scene, assets, reading, truth)
+            graph = relations.Relations().annotate_image(scene, assets, reading, truth)
         things = tuple(self._things(scene, assets, reading, truth))
         present = {_in_words(i.category) for i in scene.instances}
         edges = frozenset(both_ways(graph.relations or ()))
@@ -80,7 +76,7 @@ class Language(Strict):
     ) -> Iterator[Thing]:
         """Everything with a visible pixel; annotated things are clear only if they are listed."""
         listed = {t.instance.instance_id: t for t in truth.objects}
-        extents = find_extents(reading.channels[Channel.INSTANCE])
+        extents = instance_extents.find_extents(reading.channels[Channel.INSTANCE])
         for instance in scene.instances:
             number = instance.instance_id
             if number not in extents:
@@ -91,7 +87,9 @@ class Language(Strict):
                     clear and number in listed and self._is_whole(scene, reading, listed[number])
                 )
             category, box = _in_words(instance.category), extents[number].box
-            color = color_of([b for b in scene.bodies if b.instance_id == number], assets)
+            color = color_words.color_of(
+                [b for b in scene.bodies if b.instance_id == number], assets
+            )
             diagonal_m = math.dist(instance.box_min_m, instance.box_max_m)
             yield Thing(number, category, box, clear, instance.annotated, color, diagonal_m)
 
@@ -99,7 +97,7 @@ class Language(Strict):
         """Whether enough of an object's silhouette is visible."""
         share = truth.visible_fraction
         if share is None:
-            share = Visibility().annotate(scene, reading, truth).visible_fraction
+            share = visibility.Visibility().annotate(scene, reading, truth).visible_fraction
         return (share or 0.0) >= self.min_visible_fraction
 
     def _spread(self, utterances: Iterable[Utterance]) -> Iterator[Utterance]:
@@ -366,7 +364,7 @@ def _sentence(text: str) -> str:
 @cache
 def grammar() -> Mapping[str, Any]:
     """The table ``language.yaml``."""
-    found: Mapping[str, Any] = load_data(__package__, "language")
+    found: Mapping[str, Any] = data_files.load_data(__package__, "language")
     return found
 
 

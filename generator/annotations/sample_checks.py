@@ -11,14 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gen_data.annotations.instance_extents import crop
+from gen_data.core import errors, motion, se3
 from gen_data.core.boxes import BoxPx, OrientedBox, tight_box
 from gen_data.core.capture import Channel, Measurements, PointCloud, SensorReading
-from gen_data.core.errors import SampleError
 from gen_data.core.interfaces import DatasetInfo
-from gen_data.core.motion import Twist
 from gen_data.core.sample import EgoTruth, ImageTruth, MaskPx, ObjectTruth, Relation, Sample
 from gen_data.core.scene import Instance, Scene
-from gen_data.core.se3 import SE3
 
 UNIT_TOLERANCE = 1e-6
 """Largest deviation of a quaternion's length from 1; R^T R deviates from I by twice as much."""
@@ -49,7 +47,7 @@ def check_sample(info: DatasetInfo, sample: Sample) -> None:
         SampleError: it is not; the message names the first wrong field.
     """
     for field, fact in sample_faults(info, sample):
-        raise SampleError(f"{field}: {fact}")
+        raise errors.SampleError(f"{field}: {fact}")
 
 
 def sample_faults(info: DatasetInfo, sample: Sample) -> Iterator[Fault]:
@@ -92,7 +90,7 @@ def _scene_faults(scene: Scene) -> Iterator[Fault]:
             yield field, f"its pose is not rigid: {pose}"
 
 
-def _is_rigid(pose: SE3) -> bool:
+def _is_rigid(pose: se3.SE3) -> bool:
     """Whether a pose is finite and its quaternion has length 1, that is, R^T R = I."""
     w, x, y, z = pose.quaternion_wxyz
     tx, ty, tz = pose.translation_m
@@ -312,7 +310,7 @@ def _share_faults(item: ObjectTruth) -> Iterator[Fault]:
 def _space_faults(truth: ImageTruth, item: ObjectTruth) -> Iterator[Fault]:
     """Contradictions between statements of one pose in several frames."""
     T_world_camera = truth.camera.T_world_camera
-    pairs: list[tuple[str, SE3, SE3]] = []
+    pairs: list[tuple[str, se3.SE3, se3.SE3]] = []
     if item.box3d_world is not None and item.box3d_camera is not None:
         seen = T_world_camera @ item.box3d_camera.T_frame_box
         pairs.append(("box3d_camera", seen, item.box3d_world.T_frame_box))
@@ -339,7 +337,7 @@ def _is_box(box: OrientedBox) -> bool:
     return known and _is_rigid(box.T_frame_box)
 
 
-def _are_equal(one: SE3, other: SE3) -> bool:
+def _are_equal(one: se3.SE3, other: se3.SE3) -> bool:
     """Whether two poses agree; quaternions q and -q are the same rotation."""
     scale = 1.0 + max(abs(v) for v in other.translation_m)
     pairs = zip(one.translation_m, other.translation_m, strict=True)
@@ -348,7 +346,7 @@ def _are_equal(one: SE3, other: SE3) -> bool:
     return near and abs(abs(dot) - 1.0) <= UNIT_TOLERANCE
 
 
-def _is_finite(twist: Twist) -> bool:
+def _is_finite(twist: motion.Twist) -> bool:
     return all(math.isfinite(v) for v in (*twist.velocity_m_s, *twist.angular_velocity_rad_s))
 
 

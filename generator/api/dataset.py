@@ -19,14 +19,7 @@ from numpy.typing import NDArray
 from gen_data.api.config import ConfigLike, check_whole, load_config, path_text
 from gen_data.api.relabelling import LabelMapLike, RelabelledSamples, load_label_map
 from gen_data.api.sample import Sample, SampleRecord, SampleSource
-from gen_data.core.errors import (
-    ConfigError,
-    ConfigWarning,
-    IndexKindError,
-    SampleIndexError,
-    UnknownNameError,
-    did_you_mean,
-)
+from gen_data.core import errors
 from gen_data.runner.stored_objects import open_stored
 
 if TYPE_CHECKING:
@@ -80,11 +73,13 @@ class SampleSequence(Sequence[Sample], AbstractContextManager["SampleSequence", 
             return part
         _check_index(index)
         if index < 0 and not self.is_bounded:
-            raise SampleIndexError(f"index {index}: a data set without a size has no end; give n=")
+            raise errors.SampleIndexError(
+                f"index {index}: a data set without a size has no end; give n="
+            )
         try:
             number = self._indices[index]
         except IndexError:
-            raise SampleIndexError(
+            raise errors.SampleIndexError(
                 f"index {index} is out of range for {len(self._indices)} samples"
             ) from None
         return Sample(self._source.sample(number))
@@ -135,15 +130,15 @@ class SampleSequence(Sequence[Sample], AbstractContextManager["SampleSequence", 
         known = [*splits.shares, ALL]
         if name not in known:
             is_empty = name in ("train", "val", "test")
-            raise UnknownNameError(
+            raise errors.UnknownNameError(
                 f"there is no split '{name}'{': its share is 0' if is_empty else ''}; expected one "
-                f"of {', '.join(known)}{'' if is_empty else did_you_mean(str(name), known)}"
+                f"of {', '.join(known)}{'' if is_empty else errors.did_you_mean(str(name), known)}"
             )
         is_in = SplitTest(splits, self.config.get("seed", 0), self._samples_per_scene, name)
         part._indices = SplitIndices(self._indices, is_in)
         if part.is_bounded and not len(part):
             text = f"split '{name}': none of the {len(self)} samples is in it"
-            warnings.warn(text, ConfigWarning, stacklevel=2)
+            warnings.warn(text, errors.ConfigWarning, stacklevel=2)
         return part
 
     def _select(self, split: str) -> None:
@@ -171,7 +166,7 @@ class SampleSequence(Sequence[Sample], AbstractContextManager["SampleSequence", 
         warnings.warn(
             f"samples of the splits {', '.join(names[:-1])} and {names[-1]} are mixed; expected "
             f"one split: data.split('{names[0]}'); data.split('all') mixes them on purpose",
-            ConfigWarning,
+            errors.ConfigWarning,
             stacklevel=3,
         )
 
@@ -309,7 +304,7 @@ def _check_index(index: Any) -> None:
     """Refuse an index that is not a whole number; for a name, the text has the remedy."""
     if not hasattr(index, "__index__") or isinstance(index, bool):
         remedy = f"; .split({index!r}) has the samples of a split" if isinstance(index, str) else ""
-        raise IndexKindError(f"index: {index!r}; expected a whole number or a slice{remedy}")
+        raise errors.IndexKindError(f"index: {index!r}; expected a whole number or a slice{remedy}")
 
 
 class Dataset(SampleSequence):
@@ -499,8 +494,8 @@ def _parse_channels(names: Sequence[str]) -> frozenset[Channel]:
     known = {channel.value: channel for channel in Channel if channel is not Channel.AMODAL}
     for name in names:
         if name not in known:
-            raise ConfigError(
+            raise errors.ConfigError(
                 f"channels: unknown channel '{name}'; expected some of {', '.join(known)}"
-                f"{did_you_mean(name, known)}"
+                f"{errors.did_you_mean(name, known)}"
             )
     return frozenset(known[name] for name in names)

@@ -5,8 +5,7 @@ from __future__ import annotations
 import warnings
 from typing import TYPE_CHECKING
 
-from gen_data.core.errors import ConfigWarning, NoLabels
-from gen_data.core.urls import is_url
+from gen_data.core import errors, urls
 
 if TYPE_CHECKING:
     from gen_data.runner.progress import Summary
@@ -26,16 +25,16 @@ def check_label_gaps(summary: Summary) -> Summary:
     Warns:
         ConfigWarning: once for each sensor, and each class of the label map, without a label.
     """
-    if not summary.dataset_id or is_url(summary.folder):
+    if not summary.dataset_id or urls.is_url(summary.folder):
         return summary
     from gen_data.report.label_gaps import find_label_gaps
     from gen_data.runner.stored import StoredSamples
 
     gaps = find_label_gaps(StoredSamples(summary.folder))
     for line in gaps.lines():
-        warnings.warn(line, ConfigWarning, stacklevel=3)
+        warnings.warn(line, errors.ConfigWarning, stacklevel=3)
     if gaps.is_total:
-        raise NoLabels(
+        raise errors.NoLabels(
             f"{summary.folder}: finished, but none of its {summary.samples} samples has a label. "
             "Compare the poses of the sensors with the scene's (gen-data contact-sheet), and the "
             "label map with the categories; without annotations and exporters, images alone are "

@@ -7,8 +7,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gen_data.api.label_gaps import check_label_gaps
-from gen_data.api.repair import restore
+from gen_data.api import label_gaps, repair
 from gen_data.core.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -53,7 +52,7 @@ def merge(
     plan = common_plan(folders)
     store = LocalStore(target.absolute(), resume_command)
     gather_shards(plan, folders, store, allow_mixed_numerics)
-    summary = restore(
+    summary = repair.restore(
         plan,
         target,
         workers=workers,
@@ -61,4 +60,4 @@ def merge(
         on_progress=on_progress,
         resume_command=resume_command,
     )
-    return check_label_gaps(summary)
+    return label_gaps.check_label_gaps(summary)

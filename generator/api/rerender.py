@@ -12,8 +12,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gen_data.api.config import count_workers
-from gen_data.api.label_gaps import check_label_gaps
+from gen_data.api import config, label_gaps
 from gen_data.core.errors import ConfigError, ConfigWarning
 
 if TYPE_CHECKING:
@@ -88,12 +87,12 @@ def rerender(  # noqa: PLR0913  (keywords of one front door)
             now,
             Path(out),
             redraw=redraw,
-            workers=count_workers(workers),
+            workers=config.count_workers(workers),
             resume_command=resume_command,
             progress=on_progress,
             force=force,
         )
-    return check_label_gaps(summary)
+    return label_gaps.check_label_gaps(summary)
 
 
 def _with_fitting_exporters(

@@ -8,12 +8,10 @@ from typing import Any, Generic, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.core.boxes import BoxPx, OrientedBox
+from gen_data.core import boxes, errors, se3
 from gen_data.core.capture import Capture, Channel, PointCloud, SensorReading
-from gen_data.core.errors import UnknownNameError, did_you_mean
 from gen_data.core.sample import EgoTruth, ImageTruth, ObjectTruth
 from gen_data.core.scene import Scene
-from gen_data.core.se3 import Array
 
 T = TypeVar("T")
 
@@ -33,9 +31,9 @@ class ByName(Mapping[str, T], Generic[T]):
         """
         if name not in self._values:
             names = ", ".join(self._values) or "none"
-            raise UnknownNameError(
+            raise errors.UnknownNameError(
                 f"there is no {self._kind} '{name}'; expected one of: {names}"
-                f"{did_you_mean(str(name), self._values)}"
+                f"{errors.did_you_mean(str(name), self._values)}"
             )
         return self._values[name]
 
@@ -98,8 +96,8 @@ class Box3d:
     category: str
     category_id: int
     instance_id: int
-    box: OrientedBox
-    box_camera: OrientedBox | None = None
+    box: boxes.OrientedBox
+    box_camera: boxes.OrientedBox | None = None
 
 
 class CameraReading:
@@ -171,12 +169,12 @@ class CameraReading:
         )
 
     @property
-    def K(self) -> Array:  # noqa: N802
+    def K(self) -> se3.Array:  # noqa: N802
         """Intrinsic matrix, float64 [3, 3]; pixel ``i`` has its centre at ``i + 0.5``."""
         return self._reading.camera.intrinsics.matrix()
 
     @property
-    def T_world_camera(self) -> Array:  # noqa: N802
+    def T_world_camera(self) -> se3.Array:  # noqa: N802
         """Transform from camera (X right, Y down, Z forward) to world, float64 [4, 4], metres."""
         return self._truth.camera.T_world_camera.matrix()
 
@@ -352,7 +350,7 @@ def _names(*groups: Iterable[str]) -> list[str]:
     return [name for group in groups for name in group]
 
 
-def _corners(box: BoxPx) -> tuple[int, int, int, int]:
+def _corners(box: boxes.BoxPx) -> tuple[int, int, int, int]:
     return box.x_min, box.y_min, box.x_max, box.y_max
 
 

@@ -14,11 +14,7 @@ from pydantic import Field
 from typing_extensions import Unpack
 
 from gen_data.annotations.annotate import Thresholds
-from gen_data.assemble.documents import (
-    load_config_document,
-    parse_config_document,
-    resolve_document,
-)
+from gen_data.assemble import documents
 from gen_data.assemble.plugin_tables import (
     ANNOTATIONS,
     ELEMENTS,
@@ -27,32 +23,14 @@ from gen_data.assemble.plugin_tables import (
     RENDERERS,
     SENSORS,
 )
+from gen_data.config import shared_values
 from gen_data.config.base_model import Strict
 from gen_data.config.paths import PLAN, find_path
 from gen_data.config.problems import Problems
-from gen_data.config.shared_values import (
-    draw_shared,
-    is_reference,
-    names_in,
-    probe_values,
-    refers,
-    resolve_shared,
-    varying_place,
-)
 from gen_data.config.validation import validate
 from gen_data.config.yaml_tree import Node
-from gen_data.core.bounded_cache import ObjectCache
-from gen_data.core.errors import ConfigError, did_you_mean
-from gen_data.core.interfaces import (
-    AnyAnnotator,
-    Element,
-    Exporter,
-    Randomizer,
-    RendererSettings,
-    Sensor,
-)
+from gen_data.core import bounded_cache, errors, interfaces, scene
 from gen_data.core.plugins import PluginTable
-from gen_data.core.scene import Box3dExtent, SharedValue
 from gen_data.core.streams import Streams
 from gen_data.exporters.label_map import LabelMap
 from gen_data.physics import PhysicsConfig
@@ -104,7 +82,7 @@ class DatasetSettings(Strict):
 class LabelSettings(Thresholds):
     """Thresholds for annotating an instance, extent of boxes, and the label map of all exports."""
 
-    box3d: Box3dExtent = Field(
+    box3d: scene.Box3dExtent = Field(
         "body",
         description="3D boxes of vehicles: body, without exterior mirrors, as annotators draw "
         "them; or all of the geometry.",
@@ -154,10 +132,10 @@ class SceneConfig:
         shared: Names and values of shared values, sorted by name.
     """
 
-    shared: tuple[tuple[str, SharedValue], ...]
-    elements: tuple[Element, ...]
-    randomizers: tuple[Randomizer, ...]
-    sensors: tuple[Sensor, ...]
+    shared: tuple[tuple[str, scene.SharedValue], ...]
+    elements: tuple[interfaces.Element, ...]
+    randomizers: tuple[interfaces.Randomizer, ...]
+    sensors: tuple[interfaces.Sensor, ...]
 
 
 VARYING: Mapping[str, PluginTable[Any]] = {
@@ -204,14 +182,14 @@ class Config:
     name: str
     resolved: Mapping[str, Any]
     general: GeneralSettings
-    render: RendererSettings
-    annotations: Mapping[str, AnyAnnotator]
-    exporters: tuple[Exporter, ...]
+    render: interfaces.RendererSettings
+    annotations: Mapping[str, interfaces.AnyAnnotator]
+    exporters: tuple[interfaces.Exporter, ...]
     probes: tuple[SceneConfig, ...]
     document: Node = field(compare=False)
 
     @property
-    def sensors(self) -> tuple[Sensor, ...]:
+    def sensors(self) -> tuple[interfaces.Sensor, ...]:
         """Sensors of the first scene; those of other scenes differ in parameters only."""
         return self.probes[0].sensors
 
@@ -222,12 +200,16 @@ class Config:
         for config in self.probes:
             yield from (*config.elements, *config.randomizers, *config.sensors)
 
-    def shared(self, streams: Streams) -> tuple[tuple[str, SharedValue], ...]:
+    def shared(self, streams: Streams) -> tuple[tuple[str, scene.SharedValue], ...]:
         """Draw the shared values of one scene, sorted by name."""
         section = self.document.entries["shared"]
-        return tuple(sorted(draw_shared(section, streams).items())) if section.content else ()
+        return (
+            tuple(sorted(shared_values.draw_shared(section, streams).items()))
+            if section.content
+            else ()
+        )
 
-    def scene_config(self, shared: tuple[tuple[str, SharedValue], ...]) -> SceneConfig:
+    def scene_config(self, shared: tuple[tuple[str, scene.SharedValue], ...]) -> SceneConfig:
         """Make the configuration of a scene with these shared values.
 
         Raises:
@@ -298,12 +280,12 @@ def load_config(source: str, **changes: Unpack[Changes]) -> Config:
     """
     plan = Path(source) / PLAN
     if not _is_file(plan):
-        return _make_config(load_config_document(source), Path(source).stem, changes)
+        return _make_config(documents.load_config_document(source), Path(source).stem, changes)
     try:
         kept = json.loads(plan.read_bytes())
         text, name = json.dumps(kept["config"], ensure_ascii=False), str(kept["name"])
     except (ValueError, KeyError, TypeError, OSError) as error:
-        raise ConfigError(f"{plan}: is not the plan of a data set: {error}") from error
+        raise errors.ConfigError(f"{plan}: is not the plan of a data set: {error}") from error
     return parse_config(text, str(plan), name, **changes)
 
 
@@ -321,21 +303,21 @@ def parse_config(text: str, file: str, name: str, **changes: Unpack[Changes]) ->
     Raises:
         ConfigError: the message lists all errors with their positions.
     """
-    return _make_config(parse_config_document(text, file), name, changes)
+    return _make_config(documents.parse_config_document(text, file), name, changes)
 
 
 def _make_config(document: Node, name: str, changes: Changes) -> Config:
     seed = changes.get("seed")
     if seed is not None and seed < 0:
-        raise ConfigError(f"--seed: {seed} is negative; expected 0 or more")
+        raise errors.ConfigError(f"--seed: {seed} is negative; expected 0 or more")
     overrides, without = changes.get("overrides", ()), changes.get("without", ())
-    document = resolve_document(document, seed=seed, overrides=overrides, without=without)
+    document = documents.resolve_document(document, seed=seed, overrides=overrides, without=without)
     sections, problems = document.entries, Problems()
     apart = {*PLUGIN_LISTS, "annotations", "shared", "render"}
     general = {key: node for key, node in sections.items() if key not in apart}
     head = validate(replace(document, content=general), GeneralSettings, problems)
     for key, node in sections.items():
-        if key not in ("shared", *VARYING) and refers(node):
+        if key not in ("shared", *VARYING) and shared_values.refers(node):
             fact = f"cannot depend on shared values; expected them in {', '.join(VARYING)} only"
             problems.add(node.position, (key,), fact)
     render = _plugin(sections["render"], "render", RENDERERS, problems, DEFAULT_RENDERER)
@@ -371,7 +353,7 @@ def _refuse_varying(listed: Node, key: str, names: tuple[str, ...]) -> None:
     problems = Problems()
     for number, item in enumerate(listed.items):
         for name in names:
-            place = varying_place(item, name)
+            place = shared_values.varying_place(item, name)
             if place == item.position:
                 problems.add(place, f"{key}[{number}]", fact)
             elif place is not None:
@@ -384,7 +366,9 @@ def _probe(
 ) -> tuple[SceneConfig, ...]:
     """Distinct configurations of the first probe values (None = all); stops at errors."""
     section = document.entries["shared"]
-    every = list(islice(probe_values(section, seed), scenes)) if section.content else [{}]
+    every = (
+        list(islice(shared_values.probe_values(section, seed), scenes)) if section.content else [{}]
+    )
     configs: list[SceneConfig] = []
     known = _Known()
     for shared in every:
@@ -423,22 +407,22 @@ class _Known:
         """A copy that may grow by the parts of one scene."""
         return _Known(dict(self.names), dict(self.items), dict(self.plugins))
 
-    def resolve(self, listed: Node, shared: Mapping[str, SharedValue], key: str) -> Node:
+    def resolve(self, listed: Node, shared: Mapping[str, scene.SharedValue], key: str) -> Node:
         """Replace the shared values in a list of the document.
 
         Raises:
             ConfigError: a name is unknown, or a ``switch`` has no entry for its value.
         """
-        if is_reference(listed):
-            return resolve_shared(listed, shared, key)
+        if shared_values.is_reference(listed):
+            return shared_values.resolve_shared(listed, shared, key)
 
         def resolve_item(number: str | int, item: Node) -> Node:
             if id(item) not in self.names:
-                self.names[id(item)] = sorted(names_in(item))
+                self.names[id(item)] = sorted(shared_values.names_in(item))
             # As text: 1, 1.0 and true are equal, but not the same value.
             place = id(item), repr([shared.get(name) for name in self.names[id(item)]])
             if place not in self.items:
-                self.items[place] = resolve_shared(item, shared, key, number)
+                self.items[place] = shared_values.resolve_shared(item, shared, key, number)
             return self.items[place]
 
         return listed.with_children(resolve_item)
@@ -453,12 +437,12 @@ class _Known:
         return plugin
 
 
-_CONSTANT_PARTS: ObjectCache[_Known] = ObjectCache(4)
+_CONSTANT_PARTS: bounded_cache.ObjectCache[_Known] = bounded_cache.ObjectCache(4)
 """Parts of the latest documents that do not depend on shared values."""
 
 
 def _scene_config(
-    document: Node, shared: Mapping[str, SharedValue], problems: Problems, known: _Known
+    document: Node, shared: Mapping[str, scene.SharedValue], problems: Problems, known: _Known
 ) -> SceneConfig:
     lists = {key: known.resolve(document.entries[key], shared, key) for key in VARYING}
     return SceneConfig(
@@ -508,22 +492,22 @@ def _plugin(
     try:
         model = cast("type[Strict]", table.load(name))
         return cast("P | None", validate(node, model, problems, field))
-    except ConfigError as refused:
+    except errors.ConfigError as refused:
         problems.add(where, f"{field}.{table.tag}", str(refused))
         return None
 
 
-def _annotations(listed: Node, problems: Problems) -> dict[str, AnyAnnotator]:
+def _annotations(listed: Node, problems: Problems) -> dict[str, interfaces.AnyAnnotator]:
     """Annotators by name; an item is a name, or a mapping with ``type`` and parameters."""
     items = listed.items if isinstance(listed.content, tuple) else (listed,)
-    made: dict[str, AnyAnnotator] = {}
+    made: dict[str, interfaces.AnyAnnotator] = {}
     for number, node in enumerate(items):
         field = f"annotations[{number}]"
         kind = node.get("type") or node
         name = kind.content
         if not isinstance(name, str) or name not in ANNOTATIONS:
             fact = f"unknown annotation {name!r}; expected one of {', '.join(ANNOTATIONS)}"
-            fact += did_you_mean(str(name), ANNOTATIONS)
+            fact += errors.did_you_mean(str(name), ANNOTATIONS)
             problems.add(kind.position, field, fact)
         elif kind is not node and name in made:
             problems.add(node.position, field, f"the annotation '{name}' is listed twice")

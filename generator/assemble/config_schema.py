@@ -2,14 +2,7 @@
 
 from typing import Any
 
-from gen_data.assemble.config import (
-    CONSTANT,
-    DEFAULT_RENDERER,
-    PLUGIN_LISTS,
-    VARYING,
-    GeneralSettings,
-)
-from gen_data.assemble.documents import ALL, NAMED
+from gen_data.assemble import config, documents
 from gen_data.assemble.plugin_tables import ANNOTATIONS, RENDERERS
 from gen_data.config.schema import json_schema, with_shared_values
 from gen_data.core.plugins import PluginTable
@@ -26,9 +19,9 @@ DRAFT = "https://json-schema.org/draft/2020-12/schema"
 def config_schema() -> dict[str, Any]:
     """Schema of a configuration, with the plug-ins of all tables."""
     definitions: dict[str, Any] = {}
-    schema = _hoist_definitions(json_schema(GeneralSettings), definitions)
+    schema = _hoist_definitions(json_schema(config.GeneralSettings), definitions)
     properties = schema["properties"]
-    for key, table in PLUGIN_LISTS.items():
+    for key, table in config.PLUGIN_LISTS.items():
         properties[key] = {
             "type": "array",
             "items": {"oneOf": [INHERITED, *(_plugin(table, n, definitions) for n in table)]},
@@ -50,11 +43,11 @@ def config_schema() -> dict[str, Any]:
         "type": "string",
         "description": "Configuration to inherit from: a path or a shipped name.",
     }
-    names = {"anyOf": [{"const": ALL}, {"type": "array", "items": {"type": "string"}}]}
+    names = {"anyOf": [{"const": documents.ALL}, {"type": "array", "items": {"type": "string"}}]}
     properties["without"] = {
         "type": "object",
         "description": "Names of items that are not inherited, by section.",
-        "properties": dict.fromkeys(NAMED, names),
+        "properties": dict.fromkeys(documents.NAMED, names),
         "additionalProperties": False,
     }
     # Annotators with parameters may be written as mappings.
@@ -79,11 +72,11 @@ def config_schema() -> dict[str, Any]:
 
 def _plugin(table: PluginTable[Any], name: str, definitions: dict[str, Any]) -> dict[str, str]:
     schema = json_schema(table.load(name))
-    varying = next((key for key, known in VARYING.items() if known is table), None)
+    varying = next((key for key, known in config.VARYING.items() if known is table), None)
     if varying is not None:
-        schema = with_shared_values(schema, CONSTANT[varying])
+        schema = with_shared_values(schema, config.CONSTANT[varying])
     schema = _hoist_definitions(schema, definitions)
-    if (table, name) != (RENDERERS, DEFAULT_RENDERER):
+    if (table, name) != (RENDERERS, config.DEFAULT_RENDERER):
         # The tag selects the plug-in, so it is required although its field has a default.
         schema["required"] = sorted({table.tag, *schema.get("required", ())})
     definitions[f"{table.kind}.{name}"] = schema

@@ -6,12 +6,8 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from gen_data.assemble.config import SceneConfig
-from gen_data.core.errors import ConfigError
-from gen_data.core.interfaces import AssetIndex
+from gen_data.core import errors, interfaces, scene_time, stereo, streams
 from gen_data.core.scene import Camera, Region, Scene
-from gen_data.core.scene_time import place_sensors
-from gen_data.core.stereo import baseline_m
-from gen_data.core.streams import Streams
 from gen_data.randomizers.rig_calibration import RigCalibration
 from gen_data.randomizers.room_path import RoomPath
 from gen_data.scene_templates.carrier import Carrier
@@ -23,8 +19,8 @@ PAIR_REMEDY = (
 
 
 def unrectified_pairs(
-    config: SceneConfig, scene: Scene, assets: AssetIndex
-) -> Iterable[ConfigError]:
+    config: SceneConfig, scene: Scene, assets: interfaces.AssetIndex
+) -> Iterable[errors.ConfigError]:
     """Pairs of ``stereo_with`` that are no rectified pair in any scene of a configuration.
 
     Args:
@@ -38,15 +34,15 @@ def unrectified_pairs(
     )
     for randomizer in config.randomizers:
         if isinstance(randomizer, RigCalibration) and any(camera.rig for camera in scene.cameras):
-            scene = randomizer(scene, assets, Streams(0, 0).rng(randomizer.name))
-    cameras = {camera.name: camera for camera in place_sensors(scene).cameras}
+            scene = randomizer(scene, assets, streams.Streams(0, 0).rng(randomizer.name))
+    cameras = {camera.name: camera for camera in scene_time.place_sensors(scene).cameras}
     for sensor in config.sensors:
         other = cameras.get(getattr(sensor, "stereo_with", ""))
         here = cameras.get(sensor.name)
         if here and other and (are_free_ones_known or (here.rig and other.rig)):
             fault = _fault_of_pair(here, other)
             if fault:
-                yield ConfigError(
+                yield errors.ConfigError(
                     f"sensors.{here.name}.stereo_with: '{here.name}' and '{other.name}' are no "
                     f"rectified pair: {fault}; {PAIR_REMEDY}"
                 )
@@ -57,7 +53,7 @@ def _fault_of_pair(left: Camera, right: Camera) -> str:
     if not left.rig and not right.rig:
         return "each gets a pose of its own"
     try:
-        baseline_m(left, right)
+        stereo.baseline_m(left, right)
     except ValueError as error:
         return str(error)
     return ""
@@ -85,7 +81,7 @@ def cameras_that_look_away(config: SceneConfig, scene: Scene) -> Iterator[str]:
     center, size = np.array(scene.focus.center_m), np.array(scene.focus.size_m)
     steps = np.linspace(-0.5, 0.5, 5)
     points_m = center + size * np.stack(np.meshgrid(steps, steps, steps), axis=-1).reshape(-1, 3)
-    for camera in place_sensors(scene).cameras:
+    for camera in scene_time.place_sensors(scene).cameras:
         if camera.rig not in rigs:
             continue
         T_world_camera = camera.T_world_camera

@@ -9,10 +9,8 @@ import numpy as np
 
 from gen_data.assets.folder_index import METRES_PER_UNIT, IndexedAsset, MeshEntry, user_folder
 from gen_data.assets.library import Library
+from gen_data.core import kinematics, plates, se3
 from gen_data.core.errors import AssetError
-from gen_data.core.kinematics import link_poses
-from gen_data.core.plates import ground_rectangle, horizon_px
-from gen_data.core.se3 import SE3, Vec3
 
 NO_LICENCE = "no licence is given"
 _SMALLEST_M, _LARGEST_M = 0.001, 20.0
@@ -38,7 +36,7 @@ class Finding:
     kind: str
     category: str
     triangles: int = 0
-    size_m: Vec3 | None = None
+    size_m: se3.Vec3 | None = None
     unit: str = ""
     up: str = ""
     error: str = ""
@@ -109,12 +107,12 @@ def _inspect_plate(one: IndexedAsset, library: Library, doubts: tuple[str, ...])
     """Estimate a photograph's camera."""
     plate = library.plate(one.asset_id)
     library.environment(one.asset_id)
-    (_, left_px), (_, right_px) = horizon_px(plate)
+    (_, left_px), (_, right_px) = plates.horizon_px(plate)
     source = "given"
     if plate.estimated:
         source = f"estimated to {math.degrees(plate.horizon_error_rad):.2f} deg"
     hfov = math.degrees(2.0 * math.atan(0.5 * plate.size_px[0] / plate.focal_px))
-    _, (length_m, width_m) = ground_rectangle(plate)
+    _, (length_m, width_m) = plates.ground_rectangle(plate)
     note = (
         f"horizon from row {left_px:.0f} to row {right_px:.0f} px ({source}), hfov {hfov:.1f} deg, "
         f"room for things {length_m:.1f} m x {width_m:.1f} m"
@@ -122,16 +120,16 @@ def _inspect_plate(one: IndexedAsset, library: Library, doubts: tuple[str, ...])
     return Finding(one.asset_id, one.kind, "", note=note, warnings=doubts)
 
 
-def _measure_object(one: IndexedAsset, library: Library) -> tuple[int, Vec3, Vec3]:
+def _measure_object(one: IndexedAsset, library: Library) -> tuple[int, se3.Vec3, se3.Vec3]:
     """Number of triangles and bounding box of an object."""
     library.convex_parts(one.asset_id)
     return (len(library.mesh(one.asset_id).faces), *library.bounds_m(one.asset_id))
 
 
-def _measure_robot(one: IndexedAsset, library: Library) -> tuple[int, Vec3, Vec3]:
+def _measure_robot(one: IndexedAsset, library: Library) -> tuple[int, se3.Vec3, se3.Vec3]:
     """Number of triangles and bounding box of a robot in its home position."""
     robot = library.robot(one.asset_id)
-    poses = link_poses(robot, SE3(), robot.home)
+    poses = kinematics.link_poses(robot, se3.SE3(), robot.home)
     for asset_id in robot.collisions.values():
         library.convex_parts(asset_id)
     if not robot.visuals:

@@ -18,9 +18,7 @@ from urllib.parse import unquote
 from gen_data.assets.asset_cache import DiskCache
 from gen_data.assets.asset_folder import Folder
 from gen_data.assets.parsing import parse_described_files, parse_layer_references, unpack_value
-from gen_data.assets.readers.mesh_source import locate_file
-from gen_data.assets.readers.obj import mtl_references, obj_references
-from gen_data.assets.readers.ply import ply_references
+from gen_data.assets.readers import mesh_source, obj, ply
 from gen_data.assets.robot_formats import is_description, is_foreign, read_description
 from gen_data.assets.sandbox import run_sandboxed
 from gen_data.core.errors import AssetError
@@ -160,7 +158,7 @@ def find_references(folder: Folder, relative: str) -> dict[str, bool]:
             # References that leave the folder are skipped here; the reader refuses those it needs.
             with contextlib.suppress(AssetError):
                 # The file that is named may appear later; another one may stand in for it.
-                pending.append(locate_file(folder, name, reference))
+                pending.append(mesh_source.locate_file(folder, name, reference))
                 pending.append(folder.refer(name, reference))
     return dict(sorted(found.items()))
 
@@ -176,11 +174,11 @@ def _references(folder: Folder, name: str) -> Iterator[str]:
             files = read_description(folder, name).files()
         yield from ("../" * depth + file for file in files)
     elif suffix == ".obj":
-        yield from obj_references(folder.read(name))
+        yield from obj.obj_references(folder.read(name))
     elif suffix == ".mtl":
-        yield from mtl_references(folder.read(name))
+        yield from obj.mtl_references(folder.read(name))
     elif suffix == ".ply":
-        yield from ply_references(folder.read(name))
+        yield from ply.ply_references(folder.read(name))
     elif suffix == ".gltf":
         yield from (unquote(uri) for uri in _uris(folder.read(name)))
     elif suffix == ".dae":

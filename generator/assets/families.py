@@ -11,8 +11,7 @@ from typing import Any
 
 from gen_data.assets.content import content
 from gen_data.assets.family import EnvironmentFamily, Family, Lazy, TextureFamily, Worn
-from gen_data.core.errors import AssetError, ConfigError
-from gen_data.core.plugins import loaded, package_of, third_party
+from gen_data.core import errors, plugins
 
 AnyFamily = Family | TextureFamily | EnvironmentFamily
 KIND = "asset_family"
@@ -52,14 +51,14 @@ def third_party_families() -> Mapping[str, tuple[AnyFamily, str]]:
         ConfigError: one of them cannot be imported, or is not a family.
     """
     found = {}
-    for name, entry in sorted(third_party(KIND).items()):
-        family = loaded(entry.value, f"{KIND} '{name}'")
+    for name, entry in sorted(plugins.third_party(KIND).items()):
+        family = plugins.loaded(entry.value, f"{KIND} '{name}'")
         if not isinstance(family, (Family, TextureFamily, EnvironmentFamily)):
-            raise ConfigError(
+            raise errors.ConfigError(
                 f"{KIND} '{name}': {entry.value} is not a Family, TextureFamily or "
                 "EnvironmentFamily; see gen_data.assets.family"
             )
-        found[_PREFIXES[kind_of(family)] + name] = (family, package_of(entry))
+        found[_PREFIXES[kind_of(family)] + name] = (family, plugins.package_of(entry))
     return found
 
 
@@ -91,5 +90,5 @@ def declared(asset_id: str, fact: str, default: Any = _REQUIRED) -> Any:
     family = own_families().get(name) or third_party_families().get(name, (None, ""))[0]
     value = default if family is None else family.declares.get(fact, default)
     if value is _REQUIRED:
-        raise AssetError(f"family '{name}': declares no fact '{fact}'")
+        raise errors.AssetError(f"family '{name}': declares no fact '{fact}'")
     return value.value if isinstance(value, Lazy) else value

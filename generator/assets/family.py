@@ -8,10 +8,7 @@ from typing import Any, NamedTuple
 
 from gen_data.assets.content import content
 from gen_data.config.data_files import load_data
-from gen_data.core.asset_types import ConvexParts, Keypoint, MeshData, Symmetry
-from gen_data.core.errors import AssetError, did_you_mean
-from gen_data.core.se3 import Vec3
-from gen_data.core.variant_rng import in_turn
+from gen_data.core import asset_types, errors, se3, variant_rng
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -26,10 +23,10 @@ class Solid:
             smallest and largest coordinates [m]; None if it has none.
     """
 
-    mesh: MeshData
-    collision: ConvexParts
-    keypoints: tuple[Keypoint, ...] = ()
-    body_bounds_m: tuple[Vec3, Vec3] | None = None
+    mesh: asset_types.MeshData
+    collision: asset_types.ConvexParts
+    keypoints: tuple[asset_types.Keypoint, ...] = ()
+    body_bounds_m: tuple[se3.Vec3, se3.Vec3] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +92,7 @@ class Family:
     stored: bool = True
     stored_parameters: tuple[str, ...] = ()
     origin: Provenance = OURS
-    symmetries: Callable[..., tuple[Symmetry, ...]] | None = None
+    symmetries: Callable[..., tuple[asset_types.Symmetry, ...]] | None = None
     declares: Mapping[str, object] = field(default_factory=dict)
 
 
@@ -192,14 +189,14 @@ class ConstantSymmetries:
 
     folds: Mapping[str, int]
 
-    def __call__(self, **_: Any) -> tuple[Symmetry, ...]:
+    def __call__(self, **_: Any) -> tuple[asset_types.Symmetry, ...]:
         """The symmetries, whatever the arguments."""
         return axis_symmetries(**self.folds)
 
 
-def axis_symmetries(**folds: int) -> tuple[Symmetry, ...]:
+def axis_symmetries(**folds: int) -> tuple[asset_types.Symmetry, ...]:
     """Symmetries about axes of the object's frame, by name: ``z=0`` is any turn about Z."""
-    return tuple(Symmetry(_AXES[name], fold) for name, fold in folds.items())
+    return tuple(asset_types.Symmetry(_AXES[name], fold) for name, fold in folds.items())
 
 
 _AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
@@ -214,7 +211,7 @@ def choose_option(
         AssetError: if it is neither ``any`` nor one of the options.
     """
     if value == "any":
-        return in_turn(options, seed)
+        return variant_rng.in_turn(options, seed)
     check_option(family, parameter, value, ("any", *options))
     return value
 
@@ -222,9 +219,9 @@ def choose_option(
 def check_option(family: str, parameter: str, value: str, options: Iterable[str]) -> None:
     """Raise AssetError if a parameter of a family has none of the values that it may have."""
     if value not in options:
-        raise AssetError(
+        raise errors.AssetError(
             f"{family}: {parameter}={value} is unknown; expected one of {', '.join(options)}"
-            f"{did_you_mean(value, options)}"
+            f"{errors.did_you_mean(value, options)}"
         )
 
 

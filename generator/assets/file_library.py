@@ -12,11 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from gen_data.assets.asset_arrays import unpack_imported
+from gen_data.assets import asset_arrays, content_hashes, image_decoding, importer, parsing
 from gen_data.assets.asset_cache import FORMAT, Arrays, DiskCache, Store, content_key
 from gen_data.assets.asset_folder import Folder
 from gen_data.assets.content import content
-from gen_data.assets.content_hashes import ContentHashes
 from gen_data.assets.folder_index import (
     INDEX_NAME,
     ROAD_SUFFIX,
@@ -31,27 +30,7 @@ from gen_data.assets.folder_index import (
     read_index,
     user_folder,
 )
-from gen_data.assets.image_decoding import DECODER_VERSION
-from gen_data.assets.importer import (
-    ROADS_VERSION,
-    VERSION,
-    FileRemarks,
-    ImportedMesh,
-    RoadNetworkContent,
-)
 from gen_data.assets.installed_packs import RECORD_NAME, pack_assets
-from gen_data.assets.parsing import (
-    parse_image,
-    parse_lanes,
-    parse_link,
-    parse_object,
-    parse_plate,
-    parse_road_network,
-    parse_robot,
-    parse_stage,
-    parse_surroundings,
-    unpack_value,
-)
 from gen_data.assets.robot_description import DescriptionParts, RobotDescription
 from gen_data.assets.robot_formats import is_description, is_foreign
 from gen_data.assets.robot_models import describe_robot, robot_model
@@ -91,7 +70,7 @@ class FileLibrary:
         self._user_roots = tuple(user_roots)
         self._store, self._disk = store, disk
         self._provide = provide
-        self._digests = ContentHashes(disk)
+        self._digests = content_hashes.ContentHashes(disk)
         self._listed: dict[str, IndexedAsset] | None = None
         self._robots: dict[str, RobotDescription] = {}
         self._stages: dict[str, StageModel] = {}
@@ -137,7 +116,7 @@ class FileLibrary:
         self._digests.save()
         return asset
 
-    def imported(self, asset_id: str) -> ImportedMesh:
+    def imported(self, asset_id: str) -> importer.ImportedMesh:
         """Geometry of an object, a robot's link or a stage's piece."""
         part = self._part(asset_id)
         one = part[0] if part else self._entries()[asset_id]
@@ -145,22 +124,22 @@ class FileLibrary:
 
         def compute() -> Arrays:
             if isinstance(entry, RobotEntry):
-                return self._parse(one, parse_link, entry, one.asset_id, name)
+                return self._parse(one, parsing.parse_link, entry, one.asset_id, name)
             if _is_road_network(entry):
-                return self._parse(one, parse_road_network, entry.file)
+                return self._parse(one, parsing.parse_road_network, entry.file)
             if isinstance(entry, MeshEntry):
-                return self._parse(one, parse_object, entry, one.asset_id, name)
+                return self._parse(one, parsing.parse_object, entry, one.asset_id, name)
             raise AssetError(f"asset '{asset_id}': is of kind {one.kind}, not an object")
 
         if isinstance(entry, RobotEntry) and not part:
             links = ", ".join(f"{asset_id}/{n}" for n in list(self._robot(one).links)[:2])
             raise AssetError(f"asset '{asset_id}': is a robot; its meshes are {links}, ...")
-        return self._store.get(self._mesh_key(one, name), compute, unpack_imported)
+        return self._store.get(self._mesh_key(one, name), compute, asset_arrays.unpack_imported)
 
     def _mesh_key(self, one: IndexedAsset, part: str) -> str:
         return content_key({"asset": self._key(one), "link": part})
 
-    def remarks(self, asset_id: str, *, read: bool) -> tuple[FileRemarks, ...] | None:
+    def remarks(self, asset_id: str, *, read: bool) -> tuple[importer.FileRemarks, ...] | None:
         """What was seen in an asset's files and not used.
 
         Args:
@@ -187,7 +166,7 @@ class FileLibrary:
             return None
         has_links = not part and one.kind in ("object", "robot")
         described = self._described_remarks(one) if has_links else ()
-        own = (FileRemarks(one.entry.file, described),) if described else ()
+        own = (importer.FileRemarks(one.entry.file, described),) if described else ()
         return tuple(
             replace(remarks, file=str(one.root / remarks.file))
             for remarks in dict.fromkeys((*own, *chain(*known)))
@@ -195,11 +174,11 @@ class FileLibrary:
 
     def _remarks_of(
         self, one: IndexedAsset, part: str, read: bool
-    ) -> tuple[FileRemarks, ...] | None:
+    ) -> tuple[importer.FileRemarks, ...] | None:
         """Remarks on an object, one link or one piece; see ``remarks``."""
         stored = self._disk.find(self._mesh_key(one, part))
         if stored is not None:
-            return unpack_imported(stored).remarks
+            return asset_arrays.unpack_imported(stored).remarks
         name = f"{one.asset_id}/{part}" if part else one.asset_id
         return self.imported(name).remarks if read else None
 
@@ -214,15 +193,15 @@ class FileLibrary:
         content = self._road_network(asset_id)
         return content.lanes if content else ()
 
-    def _road_network(self, asset_id: str) -> RoadNetworkContent | None:
+    def _road_network(self, asset_id: str) -> importer.RoadNetworkContent | None:
         """Content of a road network; None for anything else."""
         one = self._entries().get(asset_id)
         if one is None or not _is_road_network(one.entry):
             return None
         return self._store.get(
             content_key({"asset": self._key(one), "part": "lanes"}),
-            lambda: self._parse(one, parse_lanes, one.entry.file),
-            lambda arrays: unpack_value(RoadNetworkContent, arrays),
+            lambda: self._parse(one, parsing.parse_lanes, one.entry.file),
+            lambda arrays: parsing.unpack_value(importer.RoadNetworkContent, arrays),
         )
 
     def _described_remarks(self, one: IndexedAsset) -> tuple[str, ...]:
@@ -252,8 +231,8 @@ class FileLibrary:
         if asset_id not in self._stages:
             self._stages[asset_id] = self._store.get(
                 content_key({"asset": self._key(one), "part": "stage"}),
-                lambda: self._parse(one, parse_stage, entry, asset_id),
-                lambda arrays: unpack_value(StageModel, arrays),
+                lambda: self._parse(one, parsing.parse_stage, entry, asset_id),
+                lambda arrays: parsing.unpack_value(StageModel, arrays),
             )
         return self._stages[asset_id]
 
@@ -265,8 +244,8 @@ class FileLibrary:
             raise AssetError(f"asset '{asset_id}': is of kind {one.kind}, not a plate")
         plate: Plate = self._store.get(
             content_key({"asset": self._key(one), "part": "plate", "version": PLATES_VERSION}),
-            lambda: self._parse(one, parse_plate, entry),
-            lambda arrays: unpack_value(Plate, arrays),
+            lambda: self._parse(one, parsing.parse_plate, entry),
+            lambda arrays: parsing.unpack_value(Plate, arrays),
         )
         return plate
 
@@ -315,7 +294,7 @@ class FileLibrary:
         plate = self.plate(one.asset_id)
         radiance: Float32 = self._store.get(
             content_key({"asset": self._key(one), "part": "around", "version": PLATES_VERSION}),
-            lambda: self._parse(one, parse_surroundings, one.entry.file, plate),
+            lambda: self._parse(one, parsing.parse_surroundings, one.entry.file, plate),
             lambda arrays: next(iter(arrays.values())),
         )
         return radiance
@@ -329,14 +308,14 @@ class FileLibrary:
         digests = self._digests.of(folder, name)
         key: dict[str, object] = {
             "format": FORMAT,
-            "decoder": DECODER_VERSION,
+            "decoder": image_decoding.DECODER_VERSION,
             "image": digests[name],
         }
         if channels == "rgba":
             key["channels"] = channels
         return self._store.get(
             content_key(key),
-            lambda: run_sandboxed(parse_image, folder.root, digests, name, channels),
+            lambda: run_sandboxed(parsing.parse_image, folder.root, digests, name, channels),
             lambda arrays: next(iter(arrays.values())),
         )
 
@@ -388,8 +367,8 @@ class FileLibrary:
             ):
                 parts: DescriptionParts = self._store.get(
                     content_key({"asset": self._key(one), "part": "robot"}),
-                    lambda: self._parse(one, parse_robot, entry),
-                    lambda arrays: unpack_value(DescriptionParts, arrays),
+                    lambda: self._parse(one, parsing.parse_robot, entry),
+                    lambda arrays: parsing.unpack_value(DescriptionParts, arrays),
                 )
                 self._robots[one.asset_id] = parts.whole()
             else:
@@ -422,7 +401,7 @@ class FileLibrary:
             origin = set(Origin.model_fields)
             content = {
                 "format": FORMAT,
-                "version": VERSION,
+                "version": importer.VERSION,
                 "id": one.asset_id,
                 "entry": one.entry.model_dump(exclude=origin, exclude_defaults=True),
                 "files": self._files(one),
@@ -430,7 +409,7 @@ class FileLibrary:
             if isinstance(one.entry, RobotEntry) and one.entry.tool is not None:
                 content["tools"] = TOOLS_VERSION
             if _is_road_network(one.entry):
-                content["roads"] = ROADS_VERSION
+                content["roads"] = importer.ROADS_VERSION
             self._keys[one.asset_id] = content_key(content)
         return self._keys[one.asset_id]
 

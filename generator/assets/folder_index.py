@@ -19,6 +19,7 @@ from typing import Annotated, Literal, TypeVar
 
 from pydantic import AfterValidator, Field, model_validator
 
+from gen_data.assets import robot_formats
 from gen_data.assets.asset_folder import (
     Folder,
     asset_id_from_path,
@@ -29,23 +30,14 @@ from gen_data.assets.asset_folder import (
     sanitize_word,
 )
 from gen_data.assets.readers import MESH_SUFFIXES
-from gen_data.assets.robot_formats import (
-    LISTED_SUFFIXES,
-    MJCF_SUFFIX,
-    is_description,
-    is_foreign,
-    read_description,
-)
 from gen_data.assets.texture_maps import TextureMaps as Maps
 from gen_data.config.base_model import Strict
 from gen_data.config.problems import Problems
 from gen_data.config.validation import validate
 from gen_data.config.yaml_tree import Node, find_text, load_yaml
-from gen_data.core.asset_types import WORKSPACE_FROM_M
+from gen_data.core import asset_types, scene, se3
 from gen_data.core.errors import AssetError, did_you_mean
 from gen_data.core.path_names import CATEGORY_MAX, check_name
-from gen_data.core.scene import LaneKind
-from gen_data.core.se3 import Vec3
 
 INDEX_NAME = "assets.yaml"
 ROAD_SUFFIX = ".xodr"
@@ -171,7 +163,7 @@ class SymmetryEntry(Strict):
             raise ValueError("expected an axis with non-zero length")
         return self
 
-    def direction(self) -> Vec3:
+    def direction(self) -> se3.Vec3:
         """Axis vector, not normalised."""
         named = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
         return named[self.axis] if isinstance(self.axis, str) else self.axis
@@ -325,7 +317,7 @@ class RobotEntry(Origin):
     gripper: GripperEntry | None = None
     tool: ToolEntry | None = None
     """Instead of a gripper in its description."""
-    workspace_from_m: Annotated[float, Field(ge=0.0)] = WORKSPACE_FROM_M
+    workspace_from_m: Annotated[float, Field(ge=0.0)] = asset_types.WORKSPACE_FROM_M
     """Horizontal distance from the base to where its workspace on a table begins: the things of
     tasks lie so much nearer or farther."""
     touching: tuple[tuple[str, str], ...] = ()
@@ -412,7 +404,7 @@ class PlateSunEntry(Strict):
 class PlateLane(Strict):
     """A lane on the ground of a photograph."""
 
-    kind: LaneKind = "driving"
+    kind: scene.LaneKind = "driving"
     center_px: Annotated[tuple[PointPx, ...], Field(min_length=2)]
     """Points of its centre line, in the direction of travel."""
     width_m: Length = 3.0
@@ -611,14 +603,19 @@ def _count_by_suffix(files: tuple[str, ...]) -> str:
 def _index_files(root: Path) -> FolderIndex:
     """Index a folder's files, except for meshes that a URDF uses."""
     suffixes = {name: PurePosixPath(name).suffix.lower() for name in list_files(root)}
-    meshes = {*MESH_SUFFIXES, *LISTED_SUFFIXES, ROAD_SUFFIX}
+    meshes = {*MESH_SUFFIXES, *robot_formats.LISTED_SUFFIXES, ROAD_SUFFIX}
     files = [
         name
         for name, suffix in suffixes.items()
-        if suffix in meshes and (suffix != MJCF_SUFFIX or _is_mjcf(root, name))
+        if suffix in meshes and (suffix != robot_formats.MJCF_SUFFIX or _is_mjcf(root, name))
     ]
     panoramas = [name for name, suffix in suffixes.items() if suffix in PANORAMA_SUFFIXES]
-    used = {f for name in files if is_description(name) for f in _described_files(root, name)}
+    used = {
+        f
+        for name in files
+        if robot_formats.is_description(name)
+        for f in _described_files(root, name)
+    }
     return FolderIndex(
         licence="unknown",
         author="unknown",
@@ -654,12 +651,12 @@ def _is_mjcf(root: Path, file: str) -> bool:
 def _described_files(root: Path, description: str) -> tuple[str, ...]:
     """Files that belong to a description, and are no assets themselves."""
     try:
-        if is_foreign(description):
+        if robot_formats.is_foreign(description):
             # Its own reader starts a process: the names of its files are enough here.
             names = set(_FILE_NAME.findall(Folder(root).read(description)))
             parts = {PurePosixPath(name.decode("utf-8", "replace")).name for name in names}
             return tuple(file for file in list_files(root) if PurePosixPath(file).name in parts)
-        return read_description(Folder(root), description).files()
+        return robot_formats.read_description(Folder(root), description).files()
     except AssetError:
         # It is listed nevertheless; its import reports the fault.
         return ()

@@ -21,9 +21,8 @@ from gen_data.assets.folder_index import Finish, MeshEntry, Region, RobotEntry
 from gen_data.assets.image_decoding import decode_image
 from gen_data.assets.mesh_decimation import decimate
 from gen_data.assets.normal_form import check_coordinates, normal_form
-from gen_data.assets.readers import read_mesh
+from gen_data.assets.readers import read_mesh, usd
 from gen_data.assets.readers.mesh_source import MeshSource, srgb_to_linear
-from gen_data.assets.readers.usd import open_stage
 from gen_data.assets.robot_description import RobotDescription, Shape
 from gen_data.assets.robot_formats import is_description, read_description
 from gen_data.assets.robot_shapes import read_shape
@@ -34,8 +33,7 @@ from gen_data.core.asset_types import ConvexParts, Keypoint, Material, MeshData,
 from gen_data.core.errors import AssetError
 from gen_data.core.scene import Lane
 from gen_data.core.se3 import SE3, Vec3
-from gen_data.roads.opendrive import Network, read_opendrive
-from gen_data.roads.opendrive_lanes import network_lanes
+from gen_data.roads import opendrive, opendrive_lanes
 
 VERSION = 8
 """Increased whenever the same files are imported as different geometry."""
@@ -270,7 +268,7 @@ def _read_geometry(
 
 def _read_piece(folder: Folder, entry: MeshEntry, name: str) -> MeshSource:
     """Read one mesh of a stage. Raises AssetError if there is none of that name."""
-    with open_stage(folder, entry.file) as stage:
+    with usd.open_stage(folder, entry.file) as stage:
         pieces = tuple(piece for piece in stage.pieces() if piece.name == name)
         if not pieces:
             raise AssetError(f"{folder.root / entry.file}: has no mesh '{name}'; correct the id")
@@ -470,7 +468,7 @@ def _scale_to_size(extents: Float64, size_m: float | Vec3, place: str) -> float:
 
 def import_road_network(folder: Folder, relative: str) -> ImportedMesh:
     """Import the road surface of an OpenDRIVE file. Raises AssetError if it is unusable."""
-    build: Callable[[Network], Solid] = Lazy(content().ROAD_NETWORK)
+    build: Callable[[opendrive.Network], Solid] = Lazy(content().ROAD_NETWORK)
     solid = build(_read_network(folder, relative))
     return ImportedMesh(solid.mesh, solid.collision, {}, solid.keypoints)
 
@@ -495,8 +493,8 @@ def road_network_content(folder: Folder, relative: str) -> RoadNetworkContent:
         AssetError: if it is malformed, or linked lanes do not meet.
     """
     network = _read_network(folder, relative)
-    return RoadNetworkContent(network_lanes(network), tuple(network.unused.items()))
+    return RoadNetworkContent(opendrive_lanes.network_lanes(network), tuple(network.unused.items()))
 
 
-def _read_network(folder: Folder, relative: str) -> Network:
-    return read_opendrive(folder.read(relative), str(folder.root / relative))
+def _read_network(folder: Folder, relative: str) -> opendrive.Network:
+    return opendrive.read_opendrive(folder.read(relative), str(folder.root / relative))

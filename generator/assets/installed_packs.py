@@ -14,8 +14,7 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from gen_data.assets.folder_index import FolderIndex, IndexedAsset, list_assets
-from gen_data.core.errors import AssetError
-from gen_data.core.serialization import canonical_json, from_plain
+from gen_data.core import errors, serialization
 
 RECORD_NAME = "pack.json"
 INDEX_NAME = "index.json"
@@ -58,7 +57,7 @@ class Record:
     @property
     def digest(self) -> str:
         """Hexadecimal sha256 of the list of all files."""
-        return sha256(canonical_json(self.files).encode()).hexdigest()
+        return sha256(serialization.canonical_json(self.files).encode()).hexdigest()
 
     @property
     def size(self) -> int:
@@ -79,9 +78,9 @@ def read_record(pack: Path) -> Record:
     """Read the record in a pack's folder. Raises AssetError if it is damaged."""
     path = pack / RECORD_NAME
     try:
-        return from_plain(Record, json.loads(path.read_bytes()))
+        return serialization.from_plain(Record, json.loads(path.read_bytes()))
     except (OSError, ValueError, TypeError, KeyError, AttributeError) as error:
-        raise AssetError(
+        raise errors.AssetError(
             f"{path}: unreadable ({error}); install the pack again: "
             f"gen-data assets install {pack.name}"
         ) from None
@@ -104,7 +103,7 @@ def pack_assets(folder: Path) -> Iterator[IndexedAsset]:
             # JSON mode accepts lists for tuples; all other types stay strict.
             index = FolderIndex.model_validate_json(path.read_bytes())
         except (OSError, ValidationError) as error:
-            raise AssetError(
+            raise errors.AssetError(
                 f"{path}: unreadable ({str(error).splitlines()[0]}); install the pack again: "
                 f"gen-data assets install {path.parent.name}"
             ) from None

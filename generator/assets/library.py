@@ -8,30 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
+from gen_data.assets import family_parameters, file_library, paths, procedural_library
 from gen_data.assets.asset_cache import Arrays, DiskCache, Store, content_key
 from gen_data.assets.asset_ids import parse_asset_id
-from gen_data.assets.family_parameters import FamilyParameter
-from gen_data.assets.file_library import FileLibrary
 from gen_data.assets.importer import FileRemarks, ImportedMesh
-from gen_data.assets.paths import packs_dir
-from gen_data.assets.procedural_library import ProceduralLibrary
-from gen_data.core.asset_types import (
-    Asset,
-    ConvexParts,
-    Float32,
-    Keypoint,
-    Material,
-    MeshData,
-    RobotModel,
-    TextureData,
-)
+from gen_data.core import asset_types, colorimetry, plates, scene, se3, serialization
 from gen_data.core.bounded_cache import CountCache
-from gen_data.core.colorimetry import srgb_decode
 from gen_data.core.errors import AssetError, UnknownAsset, did_you_mean
-from gen_data.core.plates import Plate
-from gen_data.core.scene import Lane, StageModel
-from gen_data.core.se3 import Vec3
-from gen_data.core.serialization import find_not_finite, to_plain
 
 VEHICLES = frozenset(
     {"bus", "car", "caravan", "minibus", "motorcycle", "suv", "trailer", "tram", "truck", "van"}
@@ -62,10 +45,10 @@ def open_library(
             install their pack. ``packs.provision.open_assets`` passes such a function.
     """
     roots = tuple(Path(root) for root in user_roots)
-    return Library(roots, cache_dir or default_cache_dir(), packs or packs_dir(), provide)
+    return Library(roots, cache_dir or default_cache_dir(), packs or paths.packs_dir(), provide)
 
 
-Bounds = tuple[Vec3, Vec3]
+Bounds = tuple[se3.Vec3, se3.Vec3]
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,8 +57,8 @@ class _MeshSummary:
 
     bounds_m: Bounds
     body_bounds_m: Bounds | None
-    materials: tuple[Material, ...]
-    keypoints: tuple[Keypoint, ...]
+    materials: tuple[asset_types.Material, ...]
+    keypoints: tuple[asset_types.Keypoint, ...]
 
 
 class Library:
@@ -96,25 +79,25 @@ class Library:
         disk = DiskCache(cache_dir)
         store = Store(disk)
         self._disk = disk
-        self._generated = ProceduralLibrary(store)
-        self._files = FileLibrary(packs, user_roots, disk, store, provide)
-        self._entries: CountCache[Asset] = CountCache(_ENTRIES)
-        self._found: dict[tuple[frozenset[str], str], tuple[Asset, ...]] = {}
+        self._generated = procedural_library.ProceduralLibrary(store)
+        self._files = file_library.FileLibrary(packs, user_roots, disk, store, provide)
+        self._entries: CountCache[asset_types.Asset] = CountCache(_ENTRIES)
+        self._found: dict[tuple[frozenset[str], str], tuple[asset_types.Asset, ...]] = {}
         self._summaries: CountCache[_MeshSummary] = CountCache(_SUMMARIES)
         self._boxes: CountCache[tuple[Bounds, ...]] = CountCache(_SUMMARIES)
-        self._mean_colors: CountCache[Vec3] = CountCache(_SUMMARIES)
+        self._mean_colors: CountCache[se3.Vec3] = CountCache(_SUMMARIES)
 
-    def get(self, asset_id: str) -> Asset:
+    def get(self, asset_id: str) -> asset_types.Asset:
         """Description of an asset. Raises UnknownAsset if there is none."""
 
-        def read() -> Asset:
+        def read() -> asset_types.Asset:
             if self._is_generated(asset_id):
                 return self._generated.get(parse_asset_id(asset_id))
             return self._files.get(asset_id)
 
         return self._entries.get(asset_id, read)
 
-    def find(self, tags: Iterable[str], kind: str = "object") -> tuple[Asset, ...]:
+    def find(self, tags: Iterable[str], kind: str = "object") -> tuple[asset_types.Asset, ...]:
         """All assets of a kind that have every tag, sorted by id; may be empty."""
         key = (frozenset(tags), kind)
         if key not in self._found:
@@ -126,11 +109,13 @@ class Library:
             self._found[key] = tuple(sorted(found, key=lambda asset: asset.asset_id))
         return self._found[key]
 
-    def _hold(self, asset: Asset) -> Asset:
+    def _hold(self, asset: asset_types.Asset) -> asset_types.Asset:
         """Keep a description, so that asking for it by its id reads nothing again."""
         return self._entries.get(asset.asset_id, lambda: asset)
 
-    def parameters(self, family: str, variants: int = 24) -> tuple[FamilyParameter, ...]:
+    def parameters(
+        self, family: str, variants: int = 24
+    ) -> tuple[family_parameters.FamilyParameter, ...]:
         """Named draws of a procedural family in its first variants, which it makes.
 
         Raises:
@@ -140,7 +125,7 @@ class Library:
             raise UnknownAsset(f"asset '{family}': is a file, which has no parameters")
         return self._generated.parameters(family, variants)
 
-    def materials(self, asset_id: str) -> tuple[Material, ...]:
+    def materials(self, asset_id: str) -> tuple[asset_types.Material, ...]:
         """The asset's own materials, one per mesh slot."""
         return self._summarize(asset_id).materials
 
@@ -159,7 +144,7 @@ class Library:
         _, *body = self._bounds(asset_id)
         return body[0] if body else None
 
-    def vertices_m(self, asset_id: str) -> Float32:
+    def vertices_m(self, asset_id: str) -> asset_types.Float32:
         """Vertices of the asset's mesh in its own frame [m], float32 [n, 3].
 
         Raises:
@@ -167,7 +152,7 @@ class Library:
         """
         return self.mesh(asset_id).vertices_m
 
-    def keypoints(self, asset_id: str) -> tuple[Keypoint, ...]:
+    def keypoints(self, asset_id: str) -> tuple[asset_types.Keypoint, ...]:
         """Named points of the asset, in its own frame; empty if it has none."""
         if asset_id not in self._summaries:
             imported = self._imported(asset_id)
@@ -175,7 +160,7 @@ class Library:
                 return imported.keypoints
         return self._summarize(asset_id).keypoints
 
-    def lanes(self, asset_id: str) -> tuple[Lane, ...]:
+    def lanes(self, asset_id: str) -> tuple[scene.Lane, ...]:
         """Lanes of a road network (``.xodr``), in its own frame; empty for other assets."""
         return () if self._is_generated(asset_id) else self._files.lanes(asset_id)
 
@@ -186,7 +171,7 @@ class Library:
         """
         return () if self._is_generated(asset_id) else self._files.remarks(asset_id, read=read)
 
-    def file_shift_m(self, asset_id: str) -> Vec3 | None:
+    def file_shift_m(self, asset_id: str) -> se3.Vec3 | None:
         """What was added to the coordinates of a user's file, scaled and upright, on import [m].
 
         None for assets that are not of a user's folder.
@@ -195,25 +180,25 @@ class Library:
             return None
         return self._imported(asset_id).shift_m
 
-    def robot(self, asset_id: str) -> RobotModel:
+    def robot(self, asset_id: str) -> asset_types.RobotModel:
         """Kinematics of a robot. Raises AssetError if the asset is not a robot."""
         if self._is_generated(asset_id):
             raise AssetError(f"asset '{asset_id}': is not a robot")
         return self._files.robot(asset_id)
 
-    def stage(self, asset_id: str) -> StageModel:
+    def stage(self, asset_id: str) -> scene.StageModel:
         """Content of an OpenUSD stage. Raises AssetError if the asset is not a stage."""
         if self._is_generated(asset_id):
             raise AssetError(f"asset '{asset_id}': is not a stage")
         return self._files.stage(asset_id)
 
-    def plate(self, asset_id: str) -> Plate:
+    def plate(self, asset_id: str) -> plates.Plate:
         """Camera, ground and light of a photograph. Raises AssetError if the asset is none."""
         if self._is_generated(asset_id):
             raise AssetError(f"asset '{asset_id}': is not a plate")
         return self._files.plate(asset_id)
 
-    def mesh(self, asset_id: str) -> MeshData:
+    def mesh(self, asset_id: str) -> asset_types.MeshData:
         """Visual geometry of an object or a robot link: ``franka_panda/panda_link3``.
 
         Raises:
@@ -224,31 +209,33 @@ class Library:
             raise AssetError(f"asset '{asset_id}': is a link without visual geometry")
         return mesh
 
-    def convex_parts(self, asset_id: str) -> ConvexParts:
+    def convex_parts(self, asset_id: str) -> asset_types.ConvexParts:
         """Collision geometry, in the frame of the mesh. Raises AssetError if a link has none."""
         collision = self._imported(asset_id).collision
         if collision is None:
             raise AssetError(f"asset '{asset_id}': is a link without collision geometry")
         return collision
 
-    def texture(self, texture_id: str) -> TextureData:
+    def texture(self, texture_id: str) -> asset_types.TextureData:
         """Images of a texture."""
         if self._is_generated(texture_id.partition("#")[0]):
             return self._generated.texture(parse_asset_id(texture_id))
         return self._files.texture(texture_id)
 
-    def mean_color(self, texture_id: str) -> Vec3:
+    def mean_color(self, texture_id: str) -> se3.Vec3:
         """Mean reflectance of a texture, linear RGB."""
 
-        def read() -> Vec3:
+        def read() -> se3.Vec3:
             # Every eighth texel in both directions: a mean needs no more.
             albedo = self.texture(texture_id).albedo[::8, ::8].reshape(-1, 3)
-            r, g, b = srgb_decode(albedo.astype(np.float64) / 255.0).mean(axis=0).tolist()
+            r, g, b = (
+                colorimetry.srgb_decode(albedo.astype(np.float64) / 255.0).mean(axis=0).tolist()
+            )
             return (round(r, 4), round(g, 4), round(b, 4))
 
         return self._mean_colors.get(texture_id, read)
 
-    def environment(self, environment_id: str) -> Float32:
+    def environment(self, environment_id: str) -> asset_types.Float32:
         """Equirectangular relative radiance; see ``AssetLibrary.environment``."""
         if self._is_generated(environment_id):
             radiance = self._generated.environment(parse_asset_id(environment_id))
@@ -331,7 +318,7 @@ class Library:
         return f"unknown; your asset folders hold {held}{some}"
 
 
-def _vec3(values: Sequence[float]) -> Vec3:
+def _vec3(values: Sequence[float]) -> se3.Vec3:
     x, y, z = values
     return (x, y, z)
 
@@ -343,7 +330,7 @@ def default_cache_dir() -> Path:
     return user_cache_path("gen-data")
 
 
-def check_finite(asset_id: str, mesh: MeshData) -> None:
+def check_finite(asset_id: str, mesh: asset_types.MeshData) -> None:
     """Check that geometry and materials of a mesh are finite: no renderer or engine shows NaN.
 
     Raises:
@@ -354,5 +341,5 @@ def check_finite(asset_id: str, mesh: MeshData) -> None:
         if not np.isfinite(values).all():
             number = int(np.argwhere(~np.isfinite(values))[0, 0])
             raise AssetError(f"asset '{asset_id}': {name}[{number}] is NaN or infinite")
-    if field := find_not_finite(to_plain(mesh.materials), "materials"):
+    if field := serialization.find_not_finite(serialization.to_plain(mesh.materials), "materials"):
         raise AssetError(f"asset '{asset_id}': {field} is NaN or infinite")

@@ -15,17 +15,7 @@ from xml.etree.ElementTree import Element, tostring
 
 import numpy as np
 
-from gen_data.assets.asset_folder import Folder
-from gen_data.assets.robot_description import (
-    FORMAT_ROOTS,
-    MAX_LINKS,
-    Link,
-    Look,
-    PlacedJoint,
-    RobotDescription,
-    Shape,
-    jointed,
-)
+from gen_data.assets import asset_folder, robot_description
 from gen_data.core.asset_types import Joint
 from gen_data.core.distribution import install_command
 from gen_data.core.errors import AssetError
@@ -33,14 +23,14 @@ from gen_data.core.safe_xml import parse_xml
 from gen_data.core.se3 import SE3, Vec3, rotation_to_quaternion
 
 _MAX_ELEMENTS = 200_000
-_ROOT = FORMAT_ROOTS[0]
+_ROOT = robot_description.FORMAT_ROOTS[0]
 _SHOWN_GROUPS = 3
 """MuJoCo's viewer shows the groups 0 to 2."""
 _PLAIN = (0.5, 0.5, 0.5, 1.0)
 """Colour of geoms that state none; only another one overrides that of a material."""
 
 
-def read_mjcf(folder: Folder, relative: str) -> RobotDescription:
+def read_mjcf(folder: asset_folder.Folder, relative: str) -> robot_description.RobotDescription:
     """Read an MJCF file.
 
     Its bodies are links and its named sites are links without geometry; both hang below the link
@@ -75,7 +65,7 @@ def read_mjcf(folder: Folder, relative: str) -> RobotDescription:
     return replace(described, included=included)
 
 
-def _expand(folder: Folder, relative: str, root: Element) -> tuple[str, ...]:
+def _expand(folder: asset_folder.Folder, relative: str, root: Element) -> tuple[str, ...]:
     """Put the content of included files in place of ``<include>``; return the files."""
     files: list[str] = []
 
@@ -115,7 +105,7 @@ class _File:
 class _Source:
     """What is taken out of a description before MuJoCo compiles it."""
 
-    folder: Folder
+    folder: asset_folder.Folder
     relative: str
     meshes: dict[str, _File]
     images: dict[str, str]
@@ -209,20 +199,20 @@ class _Reader:
     source: _Source
     model: Any
     mujoco: Any
-    links: dict[str, Link] = field(default_factory=dict)
+    links: dict[str, robot_description.Link] = field(default_factory=dict)
     poses: dict[str, SE3] = field(default_factory=dict)
-    joints: list[PlacedJoint] = field(default_factory=list)
+    joints: list[robot_description.PlacedJoint] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.data = self.mujoco.MjData(self.model)
         self.mujoco.mj_kinematics(self.model, self.data)
         self.remarks = self.source.remarks
 
-    def describe(self) -> RobotDescription:
+    def describe(self) -> robot_description.RobotDescription:
         """Links, joints and geometry of all bodies."""
         model = self.model
-        if model.nbody + model.nsite > MAX_LINKS:
-            raise ValueError(f"more than {MAX_LINKS} bodies and sites")
+        if model.nbody + model.nsite > robot_description.MAX_LINKS:
+            raise ValueError(f"more than {robot_description.MAX_LINKS} bodies and sites")
         if model.nbody < 2:
             raise ValueError("it holds no body")
         names = [_ROOT, *(self._name("body", k) for k in range(1, model.nbody))]
@@ -230,17 +220,17 @@ class _Reader:
             self.poses[name] = _pose(self.data.xpos[k], self.data.xquat[k])
             if k:
                 self._add_joints(k, name, names[int(model.body_parentid[k])])
-            self.links[name] = Link(name, *self._shapes(k))
+            self.links[name] = robot_description.Link(name, *self._shapes(k))
         for k in range(model.nsite):
             name = _plain(model.site(k).name)
             if name and name not in self.links:
                 body = names[int(model.site_bodyid[k])]
                 turn = rotation_to_quaternion(self.data.site_xmat[k].reshape(3, 3))
-                self.links[name] = Link(name, (), ())
+                self.links[name] = robot_description.Link(name, (), ())
                 self.poses[name] = SE3(_vec3(self.data.site_xpos[k]), turn)
                 self._join(Joint(f"{name}_site", "fixed", body, name, SE3(), _X, 0.0, 0.0))
         self._couple()
-        described = jointed(self.links, self.poses, self.joints)
+        described = robot_description.jointed(self.links, self.poses, self.joints)
         if model.ntendon:
             self.remarks["tendon"] += int(model.ntendon)
         remarks = tuple(
@@ -254,7 +244,7 @@ class _Reader:
 
     def _join(self, joint: Joint, anchor_m: Vec3 = (0.0, 0.0, 0.0), axis: Vec3 = (1.0, 0.0, 0.0),
               position: float = 0.0) -> None:  # fmt: skip
-        self.joints.append(PlacedJoint(joint, anchor_m, axis, position))
+        self.joints.append(robot_description.PlacedJoint(joint, anchor_m, axis, position))
 
     def _add_joints(self, body: int, name: str, parent: str) -> None:
         """Joints of a body; all but the last move links without geometry."""
@@ -276,7 +266,7 @@ class _Reader:
         for j in moving:
             child = name if j == moving[-1] else f"{name}.{self._name('joint', j)}"
             if child != name:
-                self.links[child] = Link(child, (), ())
+                self.links[child] = robot_description.Link(child, (), ())
                 self.poses[child] = self.poses[name]
             lower, upper = (round(float(v), _DECIMALS) for v in model.jnt_range[j])
             kind = "prismatic" if model.jnt_type[j] == int(kinds.mjJNT_SLIDE) else "revolute"
@@ -316,7 +306,7 @@ class _Reader:
             )
             self.joints[k] = replace(self.joints[k], joint=follower)
 
-    def _home(self, described: RobotDescription) -> dict[str, float]:
+    def _home(self, described: robot_description.RobotDescription) -> dict[str, float]:
         """Positions of the keyframe ``home``, or of the only one."""
         model = self.model
         keys = [k for k in range(model.nkey) if model.key(k).name == "home" or model.nkey == 1]
@@ -332,7 +322,9 @@ class _Reader:
                 home[name] = round(min(max(value, low), high), 6)
         return home
 
-    def _shapes(self, body: int) -> tuple[tuple[Shape, ...], tuple[Shape, ...]]:
+    def _shapes(
+        self, body: int
+    ) -> tuple[tuple[robot_description.Shape, ...], tuple[robot_description.Shape, ...]]:
         """Visual and collision shapes of a body."""
         model = self.model
         first = int(model.body_geomadr[body])
@@ -350,7 +342,7 @@ class _Reader:
                 collisions.append(shape)
         return tuple(visuals), tuple(collisions)
 
-    def _geoms(self, body: int, geoms: range) -> Iterator[tuple[int, Shape]]:
+    def _geoms(self, body: int, geoms: range) -> Iterator[tuple[int, robot_description.Shape]]:
         """Yield number and shape of every geom that has one."""
         kinds, model = self.mujoco.mjtGeom, self.model
         T_body_world = _pose(self.data.xpos[body], self.data.xquat[body]).inverse()
@@ -376,17 +368,17 @@ class _Reader:
                 size = (a, 2.0 * b, 0.0)
             if kind:
                 x, y, z = (round(v, _DECIMALS) for v in size)
-                yield g, Shape(kind, file, (x, y, z), pose, self._look(g))
+                yield g, robot_description.Shape(kind, file, (x, y, z), pose, self._look(g))
             else:
                 self.remarks[f"{kinds(number).name.removeprefix('mjGEOM_').lower()} geom"] += 1
 
-    def _look(self, geom: int) -> Look:
+    def _look(self, geom: int) -> robot_description.Look:
         """Colour and image of a geom, as MuJoCo's viewer shows them."""
         model = self.model
         rgba = tuple(round(float(v), 6) for v in model.geom_rgba[geom])
         number = int(model.geom_matid[geom])
         name, texture = "", ""
-        look = Look(whole=True)
+        look = robot_description.Look(whole=True)
         if number >= 0:
             name = model.mat(number).name
             texture = self.source.images.get(name, "")

@@ -10,23 +10,14 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from gen_data.assets import importer, robot_formats, usd_stages
 from gen_data.assets.asset_arrays import encode_text, pack_imported
 from gen_data.assets.asset_cache import Arrays
 from gen_data.assets.asset_folder import Folder
 from gen_data.assets.folder_index import MeshEntry, PlateEntry, RobotEntry
 from gen_data.assets.image_decoding import decode_image, decode_radiance
-from gen_data.assets.importer import (
-    import_link,
-    import_object,
-    import_road_network,
-    road_network_content,
-)
-from gen_data.assets.robot_formats import read_description
 from gen_data.assets.robot_models import describe_robot
-from gen_data.assets.usd_stages import stage_model
-from gen_data.core.errors import AssetError
-from gen_data.core.plates import Plate
-from gen_data.core.serialization import canonical_json, from_plain
+from gen_data.core import errors, plates, serialization
 from gen_data.usd.stage_reader import layer_references
 
 T = TypeVar("T")
@@ -40,7 +31,9 @@ def parse_object(
 ) -> Arrays:
     """Import an object, or a piece of a stage (``importer.import_object``)."""
     folder = Folder(root)
-    return _checked(folder, digests, pack_imported(import_object(folder, entry, asset_id, piece)))
+    return _checked(
+        folder, digests, pack_imported(importer.import_object(folder, entry, asset_id, piece))
+    )
 
 
 def parse_robot(root: Path, digests: Digests, entry: RobotEntry) -> Arrays:
@@ -55,7 +48,7 @@ def parse_described_files(root: Path, digests: Digests, file: str) -> Arrays:
     They are hashed after it; ``digests`` has none yet.
     """
     del digests
-    return _pack_value(read_description(Folder(root), file).files())
+    return _pack_value(robot_formats.read_description(Folder(root), file).files())
 
 
 def parse_link(root: Path, digests: Digests, entry: RobotEntry, robot_id: str, link: str) -> Arrays:
@@ -63,26 +56,26 @@ def parse_link(root: Path, digests: Digests, entry: RobotEntry, robot_id: str, l
     folder = Folder(root)
     robot = describe_robot(folder, entry)
     return _checked(
-        folder, digests, pack_imported(import_link(folder, entry, robot_id, robot, link))
+        folder, digests, pack_imported(importer.import_link(folder, entry, robot_id, robot, link))
     )
 
 
 def parse_road_network(root: Path, digests: Digests, file: str) -> Arrays:
     """Import the surface of a road network."""
     folder = Folder(root)
-    return _checked(folder, digests, pack_imported(import_road_network(folder, file)))
+    return _checked(folder, digests, pack_imported(importer.import_road_network(folder, file)))
 
 
 def parse_lanes(root: Path, digests: Digests, file: str) -> Arrays:
     """Read the lanes of a road network, and what it leaves out, for ``unpack_value``."""
     folder = Folder(root)
-    return _checked(folder, digests, _pack_value(road_network_content(folder, file)))
+    return _checked(folder, digests, _pack_value(importer.road_network_content(folder, file)))
 
 
 def parse_stage(root: Path, digests: Digests, entry: MeshEntry, asset_id: str) -> Arrays:
     """Read pieces, lights and cameras of a stage, for ``unpack_value``."""
     folder = Folder(root)
-    return _checked(folder, digests, _pack_value(stage_model(folder, entry, asset_id)))
+    return _checked(folder, digests, _pack_value(usd_stages.stage_model(folder, entry, asset_id)))
 
 
 def parse_image(root: Path, digests: Digests, name: str, channels: str) -> Arrays:
@@ -105,7 +98,7 @@ def parse_plate(root: Path, digests: Digests, entry: PlateEntry) -> Arrays:
     return _checked(folder, digests, _pack_value(import_plate(folder, entry)))
 
 
-def parse_surroundings(root: Path, digests: Digests, file: str, plate: Plate) -> Arrays:
+def parse_surroundings(root: Path, digests: Digests, file: str, plate: plates.Plate) -> Arrays:
     """Continue a photograph to all sides: ``{"radiance": pixels}``."""
     from gen_data.assets.plates.surroundings import surroundings
 
@@ -122,16 +115,16 @@ def parse_layer_references(root: Path, digests: Digests, file: str) -> Arrays:
 
 def unpack_value(kind: type[T], arrays: Arrays) -> T:
     """Restore the value of a function above that does not return geometry."""
-    return from_plain(kind, json.loads(arrays[_TEXT].tobytes()))
+    return serialization.from_plain(kind, json.loads(arrays[_TEXT].tobytes()))
 
 
 def _pack_value(value: object) -> Arrays:
-    return {_TEXT: encode_text(canonical_json(value))}
+    return {_TEXT: encode_text(serialization.canonical_json(value))}
 
 
 def _checked(folder: Folder, digests: Digests, arrays: Arrays) -> Arrays:
     """The arrays. Raises AssetError if a parsed file differs from the one that was hashed."""
     for name, digest in folder.digests.items():
         if digests.get(name, digest) != digest:
-            raise AssetError(f"{folder.root / name}: changed while it was read; start again")
+            raise errors.AssetError(f"{folder.root / name}: changed while it was read; start again")
     return {name: np.ascontiguousarray(array) for name, array in arrays.items()}

@@ -4,18 +4,10 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 from functools import partial
 from typing import Any, TypeVar
 
-from gen_data.assets.asset_arrays import (
-    pack_imported,
-    pack_texture,
-    unpack_imported,
-    unpack_texture,
-)
-from gen_data.assets.asset_cache import Arrays, Store, content_key
+from gen_data.assets import asset_arrays, asset_cache, family_parameters, importer
 from gen_data.assets.asset_ids import AssetId, ParameterValue, format_parameter
 from gen_data.assets.families import AnyFamily, kind_of, own_families, third_party_families
 from gen_data.assets.family import EnvironmentFamily, Facts, Family, TextureFamily
-from gen_data.assets.family_parameters import FamilyParameter, merge_draws
-from gen_data.assets.importer import ImportedMesh
 from gen_data.core.asset_types import Asset, Float32, Symmetry, TextureData
 from gen_data.core.bounded_cache import CountCache, Sized
 from gen_data.core.errors import AssetError, did_you_mean
@@ -37,7 +29,7 @@ F = TypeVar("F", Family, TextureFamily, EnvironmentFamily)
 class ProceduralLibrary:
     """Part of the library that needs no file. Names are the part of ids before ``?``."""
 
-    def __init__(self, store: Store) -> None:
+    def __init__(self, store: asset_cache.Store) -> None:
         self._store = store
         others = third_party_families()
         own = own_families()
@@ -77,10 +69,10 @@ class ProceduralLibrary:
         except ValueError as error:
             raise AssetError(f"asset '{asset_id}': {error}") from error
 
-    def parameters(self, name: str, variants: int) -> tuple[FamilyParameter, ...]:
+    def parameters(self, name: str, variants: int) -> tuple[family_parameters.FamilyParameter, ...]:
         """Named draws of the first variants of a family with a known name, which are made."""
         seeds = range(min(self._families[name].variants, variants))
-        return merge_draws(self.draws(AssetId(name, {"seed": k})) for k in seeds)
+        return family_parameters.merge_draws(self.draws(AssetId(name, {"seed": k})) for k in seeds)
 
     def _describe(self, asset_id: AssetId, family: AnyFamily) -> Asset:
         if _merge_arguments(asset_id, family)[1]:
@@ -104,23 +96,27 @@ class ProceduralLibrary:
             symmetries=_list_symmetries(asset_id, family),
         )
 
-    def imported(self, asset_id: AssetId) -> ImportedMesh:
+    def imported(self, asset_id: AssetId) -> importer.ImportedMesh:
         """Geometry of an object."""
         family = self._find(asset_id, Family, "an object")
 
-        def compute() -> ImportedMesh:
+        def compute() -> importer.ImportedMesh:
             solid = _make(asset_id, family)
-            return ImportedMesh(
+            return importer.ImportedMesh(
                 solid.mesh, solid.collision, {}, solid.keypoints, solid.body_bounds_m
             )
 
-        return self._result(asset_id, family, compute, pack_imported, unpack_imported)
+        return self._result(
+            asset_id, family, compute, asset_arrays.pack_imported, asset_arrays.unpack_imported
+        )
 
     def texture(self, asset_id: AssetId) -> TextureData:
         """Images of a texture."""
         family = self._find(asset_id, TextureFamily, "a texture")
         compute: Callable[[], TextureData] = partial(_make, asset_id, family)
-        return self._result(asset_id, family, compute, pack_texture, unpack_texture)
+        return self._result(
+            asset_id, family, compute, asset_arrays.pack_texture, asset_arrays.unpack_texture
+        )
 
     def environment(self, asset_id: AssetId) -> Float32:
         """Pixels of an environment."""
@@ -147,8 +143,8 @@ class ProceduralLibrary:
         asset_id: AssetId,
         family: AnyFamily,
         compute: Callable[[], S],
-        pack: Callable[[S], Arrays],
-        unpack: Callable[[Arrays], S],
+        pack: Callable[[S], asset_cache.Arrays],
+        unpack: Callable[[asset_cache.Arrays], S],
     ) -> S:
         key = self._key(asset_id, family)
         try:
@@ -170,7 +166,7 @@ class ProceduralLibrary:
         if asset_id.name in self._packages:
             # Another release of a package, or another package, may use the same version number.
             content["package"] = self._packages[asset_id.name]
-        return content_key(content)
+        return asset_cache.content_key(content)
 
 
 def _is_offered(asset_id: AssetId, family: AnyFamily) -> bool:

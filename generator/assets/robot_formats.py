@@ -3,19 +3,17 @@
 from collections.abc import Callable
 from pathlib import PurePosixPath
 
-from gen_data.assets.asset_folder import Folder
-from gen_data.assets.mjcf import read_mjcf
+from gen_data.assets import asset_folder, mjcf, sdf
 from gen_data.assets.robot_description import RobotDescription
-from gen_data.assets.sdf import read_sdf
 from gen_data.assets.urdf import read_urdf
 from gen_data.core.errors import AssetError
 
-_READERS: dict[str, Callable[[Folder, str], RobotDescription]] = {
+_READERS: dict[str, Callable[[asset_folder.Folder, str], RobotDescription]] = {
     ".urdf": read_urdf,
     # Refused with the command that expands it.
     ".xacro": read_urdf,
-    ".xml": read_mjcf,
-    ".sdf": read_sdf,
+    ".xml": mjcf.read_mjcf,
+    ".sdf": sdf.read_sdf,
 }
 MJCF_SUFFIX = ".xml"
 LISTED_SUFFIXES = frozenset(_READERS) - {".xacro"}
@@ -34,7 +32,7 @@ def is_foreign(file: str) -> bool:
     return PurePosixPath(file).suffix.lower() in _FOREIGN
 
 
-def read_description(folder: Folder, relative: str) -> RobotDescription:
+def read_description(folder: asset_folder.Folder, relative: str) -> RobotDescription:
     """Read a description of links and joints.
 
     Raises:

@@ -3,31 +3,27 @@
 from dataclasses import replace
 from itertools import combinations
 
-from gen_data.assets.asset_folder import Folder
+from gen_data.assets import asset_folder, robot_formats, robot_tools
 from gen_data.assets.folder_index import RobotEntry
 from gen_data.assets.robot_description import RobotDescription
-from gen_data.assets.robot_formats import read_description
-from gen_data.assets.robot_tools import tool_gripper, with_tool
+from gen_data.core import errors, kinematics, se3
 from gen_data.core.asset_types import Gripper, RobotModel
-from gen_data.core.errors import AssetError, did_you_mean
-from gen_data.core.kinematics import POSITION_DECIMALS, finger_links, positions_of
-from gen_data.core.se3 import SE3
 
-_TOLERANCE = 10.0**-POSITION_DECIMALS
+_TOLERANCE = 10.0**-kinematics.POSITION_DECIMALS
 """Tolerance when comparing positions [rad or m]."""
 
 
-def describe_robot(folder: Folder, entry: RobotEntry) -> RobotDescription:
+def describe_robot(folder: asset_folder.Folder, entry: RobotEntry) -> RobotDescription:
     """Links and joints of a robot with its tool.
 
     Raises:
         AssetError: its description is malformed, or has no such flange.
     """
-    arm = read_description(folder, entry.file)
+    arm = robot_formats.read_description(folder, entry.file)
     if entry.tool is None:
         return arm
-    hand = read_description(folder, entry.tool.file) if entry.tool.file else None
-    return with_tool(arm, entry.tool, str(folder.root / entry.file), hand)
+    hand = robot_formats.read_description(folder, entry.tool.file) if entry.tool.file else None
+    return robot_tools.with_tool(arm, entry.tool, str(folder.root / entry.file), hand)
 
 
 def robot_model(
@@ -63,8 +59,8 @@ def _check_names(described: RobotDescription, entry: RobotEntry, place: str) -> 
         named.append((entry.gripper.link, links, "link"))
     for name, known, what in named:
         if name not in known:
-            raise AssetError(
-                f"{place}: no {what} '{name}'{did_you_mean(name, known)}; "
+            raise errors.AssetError(
+                f"{place}: no {what} '{name}'{errors.did_you_mean(name, known)}; "
                 f"correct the entry '{entry.id}' of the asset index"
             )
 
@@ -83,16 +79,16 @@ def _home_positions(
     middle = {j.name: 0.0 if j.lower <= 0.0 <= j.upper else m for j, m in middles}
     wanted = {**middle, **described.home, **entry.home}
     given = {j.name: wanted[j.name] for j in movable if not j.mimic}
-    positions = positions_of(described.joints, given)
+    positions = kinematics.positions_of(described.joints, given)
     for joint, position in zip(movable, positions, strict=True):
         correct = f"correct the entry '{entry.id}' of the asset index"
         if not joint.lower - _TOLERANCE <= position <= joint.upper + _TOLERANCE:
-            raise AssetError(
+            raise errors.AssetError(
                 f"{place}: home position {position} of joint '{joint.name}' is not within "
                 f"[{joint.lower}, {joint.upper}]; {correct}"
             )
         if abs(entry.home.get(joint.name, position) - position) > _TOLERANCE:
-            raise AssetError(
+            raise errors.AssetError(
                 f"{place}: home position {entry.home[joint.name]} of joint '{joint.name}' "
                 f"contradicts {position:g} by its leader '{joint.mimic}'; {correct}"
             )
@@ -102,10 +98,10 @@ def _home_positions(
 def _make_gripper(entry: RobotEntry) -> Gripper | None:
     gripper = entry.gripper
     if entry.tool is not None and not entry.tool.file:
-        return tool_gripper(entry.tool)
+        return robot_tools.tool_gripper(entry.tool)
     if gripper is None:
         return None
-    grasp = SE3((0.0, 0.0, gripper.grasp_offset_m))
+    grasp = se3.SE3((0.0, 0.0, gripper.grasp_offset_m))
     return Gripper(gripper.link, grasp, gripper.finger_joints, gripper.stroke_m, gripper.open_at)
 
 
@@ -123,4 +119,4 @@ def _permanent_contacts(robot: RobotModel) -> set[tuple[str, str]]:
         if piece[a] == piece[b] or (piece[a], piece[b]) in connected
     }
     # The bars of a finger linkage overlap at their pins.
-    return pairs | set(combinations(finger_links(robot), 2))
+    return pairs | set(combinations(kinematics.finger_links(robot), 2))

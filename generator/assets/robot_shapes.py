@@ -5,11 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from gen_data.assets.asset_folder import Folder
-from gen_data.assets.readers import read_mesh
-from gen_data.assets.readers.mesh_source import MeshSource, srgb_to_linear
+from gen_data.assets import asset_folder, texture_maps
+from gen_data.assets.readers import mesh_source, read_mesh
 from gen_data.assets.robot_description import Look, Shape
-from gen_data.assets.texture_maps import find_maps
 from gen_data.assets.triangle_soup import (
     Float64,
     MaterialSlot,
@@ -25,8 +23,8 @@ from gen_data.core.se3 import SE3
 
 
 def read_shape(
-    folder: Folder, shape: Shape, T_root_link: SE3, *, materials: bool = True
-) -> MeshSource:
+    folder: asset_folder.Folder, shape: Shape, T_root_link: SE3, *, materials: bool = True
+) -> mesh_source.MeshSource:
     """Read or make the triangles of a shape, in the root frame and its colour.
 
     The name of an image inside a mesh file is preceded by that of the file.
@@ -46,7 +44,7 @@ def read_shape(
             # Y points up in glTF: RViz (ros2/rviz pull request 1482) and Drake turn it, too.
             matrix = matrix[:, [0, 2, 1, 3]] * (1.0, 1.0, -1.0, 1.0)
     else:
-        source = MeshSource(TriangleSoup.of(_primitive(shape)))
+        source = mesh_source.MeshSource(TriangleSoup.of(_primitive(shape)))
         if shape.look.texture and materials:
             uvs = _wrapped(shape.kind, source.soup.corners)
             source = replace(source, soup=replace(source.soup, uvs=uvs))
@@ -56,7 +54,7 @@ def read_shape(
     return replace(source, soup=replace(soup, slots=slots).transformed(matrix))
 
 
-def _part_of(soup: TriangleSoup, shape: Shape, folder: Folder) -> TriangleSoup:
+def _part_of(soup: TriangleSoup, shape: Shape, folder: asset_folder.Folder) -> TriangleSoup:
     """The triangles of the named object of a mesh file.
 
     Raises:
@@ -74,14 +72,14 @@ def _part_of(soup: TriangleSoup, shape: Shape, folder: Folder) -> TriangleSoup:
     return part
 
 
-def _with_named_images(source: MeshSource, file: str) -> MeshSource:
+def _with_named_images(source: mesh_source.MeshSource, file: str) -> mesh_source.MeshSource:
     """The source with unique names of its images: a link may have several mesh files."""
     if not source.images:
         return source
     known = {name: f"{file}/{name}" for name in source.images}
 
     def renamed(texture: str) -> str:
-        maps = find_maps(texture)
+        maps = texture_maps.find_maps(texture)
         if maps is None:
             return known.get(texture, texture)
         return maps.renamed(known).name()
@@ -126,7 +124,7 @@ def _apply_look(slot: MaterialSlot, look: Look, extent_m: float) -> MaterialSlot
         changes |= {"texture": look.texture, "base_color": (1.0, 1.0, 1.0)}
         changes["texture_scale_m"] = round(extent_m, 6)
     if look.color is not None and replaced:
-        changes["base_color"] = srgb_to_linear(look.color)
+        changes["base_color"] = mesh_source.srgb_to_linear(look.color)
     if not changes:
         return slot
     material = replace(slot.material, **changes)  # type: ignore[arg-type]

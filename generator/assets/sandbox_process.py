@@ -18,9 +18,7 @@ import numpy as np
 
 from gen_data.assets.asset_cache import Arrays, encode_arrays
 from gen_data.assets.sandbox import LENGTH
-from gen_data.core.errors import AssetError
-from gen_data.core.processes import end_with_parent, forbid_core_dumps
-from gen_data.core.system_calls import read_binary
+from gen_data.core import errors, processes, system_calls
 
 try:
     resource: Any = import_module("resource")
@@ -34,7 +32,7 @@ _CLONE_NEWUSER, _CLONE_NEWNET = 0x10000000, 0x40000000  # <linux/sched.h>
 
 def main(parent_pid: int, temporary_folder: str) -> None:
     """Serve requests from standard input until it ends or stays silent."""
-    end_with_parent(parent_pid)
+    processes.end_with_parent(parent_pid)
     tempfile.tempdir = temporary_folder
     # An interrupt from the terminal reaches the whole group; the parent decides.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -42,7 +40,7 @@ def main(parent_pid: int, temporary_folder: str) -> None:
     # Libraries print warnings, which must not mix with replies.
     os.dup2(2, 1)
     _give_up_rights()
-    read_binary(0, replies)
+    system_calls.read_binary(0, replies)
     while _is_request_due():
         head = _read(LENGTH.size)
         if not head:
@@ -59,7 +57,7 @@ def _is_request_due() -> bool:
 
 def _give_up_rights() -> None:
     """No core dumps, few open files and, where permitted, no network; Windows has no limits."""
-    forbid_core_dumps()
+    processes.forbid_core_dumps()
     if resource is None:
         return
     files = min(_FILES_MAX, resource.getrlimit(resource.RLIMIT_NOFILE)[1])
@@ -82,7 +80,7 @@ def _serve(request: bytes) -> bytes:
             os.chdir(working_folder)
         _limit(cpu_s, memory_bytes)
         return encode_arrays("", function(*arguments))
-    except AssetError as error:
+    except errors.AssetError as error:
         return _encode_error(str(error), expected=True)
     except MemoryError:
         message = f"{place}: needs more than {memory_bytes / 1e9:.1f} GB; simplify it"

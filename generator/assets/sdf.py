@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import PurePosixPath
 from xml.etree.ElementTree import Element
 
-from gen_data.assets.asset_folder import Folder
+from gen_data.assets import asset_folder, urdf
 from gen_data.assets.robot_description import (
     FORMAT_ROOTS,
     MAX_LINKS,
@@ -24,7 +24,6 @@ from gen_data.assets.robot_description import (
     jointed,
 )
 from gen_data.assets.robot_files import resolve_uri
-from gen_data.assets.urdf import rpy_to_quaternion
 from gen_data.core.asset_types import Joint
 from gen_data.core.errors import AssetError
 from gen_data.core.safe_xml import format_position, parse_xml
@@ -59,7 +58,7 @@ _GAZEBO: dict[str, Vec3] = {
 """Diffuse sRGB of Gazebo's plain materials (its media/materials/scripts/gazebo.material)."""
 
 
-def read_sdf(folder: Folder, relative: str) -> RobotDescription:
+def read_sdf(folder: asset_folder.Folder, relative: str) -> RobotDescription:
     """Read the model of an SDF file; all its links hang below the link ``__model__``.
 
     Raises:
@@ -124,7 +123,7 @@ class _Reader:
         anchors: Joints with the frame of the axis and the axis in it.
     """
 
-    folder: Folder
+    folder: asset_folder.Folder
     relative: str
     frames: dict[str, tuple[str, SE3]] = field(default_factory=dict)
     attached: dict[str, str] = field(default_factory=dict)
@@ -468,7 +467,7 @@ def _parse_pose(pose: Element) -> SE3:
     x, y, z, *angles = _numbers_of((pose.text or "").strip() or "0 0 0 0 0 0", (6,))
     if pose.get("degrees") in ("true", "1"):
         angles = [math.radians(a) for a in angles]
-    return SE3((x, y, z), rpy_to_quaternion(*angles))
+    return SE3((x, y, z), urdf.rpy_to_quaternion(*angles))
 
 
 def _numbers(text: str, count: int) -> Vec3:

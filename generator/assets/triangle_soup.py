@@ -9,8 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.core.asset_types import Material
-from gen_data.core.se3 import Vec3
+from gen_data.core import asset_types, se3
 
 Float64 = NDArray[np.float64]
 Int64 = NDArray[np.int64]
@@ -19,7 +18,7 @@ SEGMENTS = 32
 _BOX_QUADS = ((0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5))
 
 
-_PLAIN = Material()
+_PLAIN = asset_types.Material()
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,9 +34,9 @@ class MaterialSlot:
     """
 
     name: str = ""
-    material: Material = _PLAIN
+    material: asset_types.Material = _PLAIN
     from_file: bool = False
-    declared_color: Vec3 = (1.0, 1.0, 1.0)
+    declared_color: se3.Vec3 = (1.0, 1.0, 1.0)
     missing: str = ""
 
 

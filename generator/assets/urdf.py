@@ -11,16 +11,8 @@ from dataclasses import replace
 from pathlib import PurePosixPath
 from xml.etree.ElementTree import Element
 
+from gen_data.assets import robot_description
 from gen_data.assets.asset_folder import Folder
-from gen_data.assets.robot_description import (
-    MAX_LINKS,
-    Link,
-    Look,
-    MisplacedJoint,
-    RobotDescription,
-    Shape,
-    sort_links,
-)
 from gen_data.assets.robot_files import resolve_uri
 from gen_data.core.asset_types import Joint
 from gen_data.core.errors import AssetError
@@ -45,7 +37,7 @@ class _Fault(ValueError):
         self.element = element
 
 
-def read_urdf(folder: Folder, relative: str) -> RobotDescription:
+def read_urdf(folder: Folder, relative: str) -> robot_description.RobotDescription:
     """Read a URDF file.
 
     Raises:
@@ -59,14 +51,14 @@ def read_urdf(folder: Folder, relative: str) -> RobotDescription:
     at = root
     try:
         looks = dict(_named_looks(folder, relative, root))
-        links: dict[str, Link] = {}
+        links: dict[str, robot_description.Link] = {}
         for name, at in _iterate_unique(root, "link"):
             visuals, collisions = (
                 tuple(_read_shapes(folder, relative, at, tag, looks, remarks))
                 for tag in ("visual", "collision")
             )
             link = _link_name(name)
-            links[link] = Link(link, visuals, collisions)
+            links[link] = robot_description.Link(link, visuals, collisions)
         elements = [element for _, element in _iterate_unique(root, "joint")]
         joints = []
         for at in elements:
@@ -79,8 +71,8 @@ def read_urdf(folder: Folder, relative: str) -> RobotDescription:
             for joint, element in zip(joints, elements, strict=True)
         ]
         at = root
-        described = sort_links(links, joints)
-    except MisplacedJoint as error:
+        described = robot_description.sort_links(links, joints)
+    except robot_description.MisplacedJoint as error:
         at = next(e for e in elements if e.get("name") == error.joint.name)
         raise AssetError(
             f"{place}{format_position(at)}: malformed URDF ({error}); correct it"
@@ -123,8 +115,8 @@ def _iterate_unique(root: Element, tag: str) -> Iterator[tuple[str, Element]]:
             raise _Fault(element, f"two {tag}s named '{name[:40]}'")
         seen.add(name)
         yield name, element
-    if len(seen) > MAX_LINKS:
-        raise ValueError(f"more than {MAX_LINKS} {tag}s")
+    if len(seen) > robot_description.MAX_LINKS:
+        raise ValueError(f"more than {robot_description.MAX_LINKS} {tag}s")
 
 
 def _link_name(name: str) -> str:
@@ -132,7 +124,9 @@ def _link_name(name: str) -> str:
     return name.replace("/", "_")
 
 
-def _named_looks(folder: Folder, relative: str, root: Element) -> Iterator[tuple[str, Look]]:
+def _named_looks(
+    folder: Folder, relative: str, root: Element
+) -> Iterator[tuple[str, robot_description.Look]]:
     """Yield all named materials; the last one of a name wins.
 
     That is the robot's own, as in urdfdom, else the first definition inside a link.
@@ -140,14 +134,14 @@ def _named_looks(folder: Folder, relative: str, root: Element) -> Iterator[tuple
     shared = root.findall("material")
     for material in reversed([*shared, *root.findall("*//material")]):
         look = _read_look(folder, relative, material)
-        if look.name and look != Look(look.name):
+        if look.name and look != robot_description.Look(look.name):
             yield look.name, look
 
 
-def _read_look(folder: Folder, relative: str, material: Element) -> Look:
+def _read_look(folder: Folder, relative: str, material: Element) -> robot_description.Look:
     """A material as its element defines it. Raises _Fault."""
     color, texture = material.find("color"), material.find("texture")
-    look = Look(material.get("name", ""))
+    look = robot_description.Look(material.get("name", ""))
     try:
         if color is not None:
             red, green, blue, alpha = _parse_numbers(color.attrib["rgba"], 4)
@@ -165,9 +159,9 @@ def _read_shapes(
     relative: str,
     link: Element,
     tag: str,
-    looks: dict[str, Look],
+    looks: dict[str, robot_description.Look],
     remarks: list[str],
-) -> Iterator[Shape]:
+) -> Iterator[robot_description.Shape]:
     """Yield the shapes of a link that there is something of; remark on the others."""
     for element in link.findall(tag):
         geometry = element.find("geometry")
@@ -180,7 +174,7 @@ def _read_shapes(
             material = element.find("material")
             if material is not None:
                 look = _read_look(folder, relative, material)
-                if look == Look(look.name):
+                if look == robot_description.Look(look.name):
                     look = looks.get(look.name, look)
                 shape = replace(shape, look=look)
         except (ValueError, KeyError) as error:
@@ -202,7 +196,9 @@ _EXTENTS = {"box": 3, "cylinder": 2, "capsule": 1, "sphere": 1}
 """Number of sizes that must not be 0."""
 
 
-def _read_shape(folder: Folder, relative: str, element: Element, pose: SE3) -> Shape:
+def _read_shape(
+    folder: Folder, relative: str, element: Element, pose: SE3
+) -> robot_description.Shape:
     get = element.attrib
     if element.tag == "mesh":
         file = resolve_uri(folder, relative, get["filename"])
@@ -210,7 +206,7 @@ def _read_shape(folder: Folder, relative: str, element: Element, pose: SE3) -> S
         size = _parse_vector(" ".join(scale * 3 if len(scale) == 1 else scale))
         if 0.0 in size:
             raise ValueError(f"scale '{get['scale'][:40]}' is 0 along an axis")
-        return Shape("mesh", file, size, pose)
+        return robot_description.Shape("mesh", file, size, pose)
     if element.tag == "box":
         size = _parse_vector(get["size"])
     elif element.tag in ("cylinder", "capsule"):
@@ -221,7 +217,7 @@ def _read_shape(folder: Folder, relative: str, element: Element, pose: SE3) -> S
         raise ValueError(f"unknown geometry <{element.tag[:40]}>")
     if min(size) < 0.0:
         raise ValueError(f"<{element.tag}> of negative size {min(size):g}")
-    return Shape(element.tag, "", size, pose)
+    return robot_description.Shape(element.tag, "", size, pose)
 
 
 def _read_joint(element: Element, remarks: list[str]) -> Joint:

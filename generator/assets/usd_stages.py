@@ -3,9 +3,8 @@
 from dataclasses import replace
 from pathlib import PurePosixPath
 
-from gen_data.assets.asset_folder import Folder
+from gen_data.assets import asset_folder, importer
 from gen_data.assets.folder_index import Entry, MeshEntry
-from gen_data.assets.importer import scale_and_shift, upright_transform
 from gen_data.assets.readers.usd import ARCHIVE, open_stage
 from gen_data.core.errors import AssetError
 from gen_data.core.scene import Light, StageModel, StagePiece
@@ -19,7 +18,7 @@ def is_stage(entry: Entry) -> bool:
     return isinstance(entry, MeshEntry) and suffix in (*SUFFIXES, ARCHIVE)
 
 
-def stage_model(folder: Folder, entry: MeshEntry, asset_id: str) -> StageModel:
+def stage_model(folder: asset_folder.Folder, entry: MeshEntry, asset_id: str) -> StageModel:
     """Read a stage, oriented and scaled by its entry.
 
     Raises:
@@ -28,14 +27,14 @@ def stage_model(folder: Folder, entry: MeshEntry, asset_id: str) -> StageModel:
     place = str(folder.root / entry.file)
     if entry.size_m is not None:
         raise AssetError(f"{place}: size_m does not apply to a stage; give scale")
-    matrix = upright_transform(entry)
+    matrix = importer.upright_transform(entry)
     T_model_stage = SE3.from_matrix(matrix)
     entry = entry.model_copy(update={"origin": "center"})
     pieces = []
     with open_stage(folder, entry.file) as file:
         for piece in file.pieces():
             soup = file.source((piece,), materials=False).soup.transformed(matrix)
-            _, shift = scale_and_shift(soup, entry, f"{place}: {piece.name}")
+            _, shift = importer.scale_and_shift(soup, entry, f"{place}: {piece.name}")
             x, y, z = (float(-v) for v in shift)
             named = (piece.label.prim, piece.label.category) if piece.label else ("", "")
             asset = f"{asset_id}/{piece.name}"

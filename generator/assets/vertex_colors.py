@@ -16,8 +16,7 @@ from gen_data.assets.triangle_soup import (
     TriangleSoup,
     first_occurrences,
 )
-from gen_data.core.asset_types import Material, UInt8
-from gen_data.core.colorimetry import srgb_encode
+from gen_data.core import asset_types, colorimetry
 
 IMAGE = "vertex_colors"
 """Name of the image that holds gradients."""
@@ -38,7 +37,7 @@ class ColoredSoup:
     """
 
     soup: TriangleSoup
-    image: UInt8 | None = None
+    image: asset_types.UInt8 | None = None
     remarks: tuple[str, ...] = ()
 
 
@@ -109,8 +108,8 @@ def _split(
 
 
 def _bake(
-    soup: TriangleSoup, graded: set[Material], original: TriangleSoup | None
-) -> tuple[TriangleSoup, UInt8]:
+    soup: TriangleSoup, graded: set[asset_types.Material], original: TriangleSoup | None
+) -> tuple[TriangleSoup, asset_types.UInt8]:
     """Triangles of some materials with UVs into the image of their colours.
 
     Each triangle has a square cell of texels; its corners are at the centres of three of them, so
@@ -134,7 +133,7 @@ def _bake(
         a, b = (s / beyond)[:, None], (t / beyond)[:, None]
         p0, p1, p2 = np.moveaxis(soup.corners[chosen], 1, 0)[:, :, None]
         texels = _nearest_colors(original, p0 + a * (p1 - p0) + b * (p2 - p0))
-    encoded = np.rint(srgb_encode(np.clip(texels, 0.0, 1.0)) * 255.0).astype(np.uint8)
+    encoded = np.rint(colorimetry.srgb_encode(np.clip(texels, 0.0, 1.0)) * 255.0).astype(np.uint8)
     column, row = _cells(soup.corners[chosen].mean(axis=1))
     cells = np.zeros((rows, columns, side, side, 3), np.uint8)
     # Free cells look like the last one, so that coarse levels of the image have no dark rims.

@@ -25,12 +25,8 @@ from typing import Any
 
 import click
 
+from gen_data.core import errors, optional_packages, processes, system_calls, temporary_folders
 from gen_data.core.distribution import DISTRIBUTION, install_command
-from gen_data.core.errors import GenDataError, SampleError
-from gen_data.core.optional_packages import missing_packages
-from gen_data.core.processes import silence_stdio
-from gen_data.core.system_calls import usable_cores
-from gen_data.core.temporary_folders import temporary_folder
 from gen_data.core.version import __version__
 
 FILES_MIN = 64
@@ -65,7 +61,7 @@ def doctor() -> None:
     """
     failed = [check.name for check in CHECKS if not _passes(check) and check.required]
     if failed:
-        raise SampleError(f"doctor: {', '.join(failed)} failed; see above")
+        raise errors.SampleError(f"doctor: {', '.join(failed)} failed; see above")
 
 
 def _passes(check: Check) -> bool:
@@ -97,10 +93,10 @@ def _attempt_in_process(check: Check) -> tuple[bool, str]:
 
 def _report(check: Check, sender: Connection) -> None:
     try:
-        with silence_stdio():
+        with processes.silence_stdio():
             finding = check.attempt()
         sender.send((True, finding))
-    except GenDataError as error:
+    except errors.GenDataError as error:
         sender.send((False, str(error)))
     except Exception as error:
         sender.send((False, f"{type(error).__name__}: {error}"))
@@ -108,7 +104,7 @@ def _report(check: Check, sender: Connection) -> None:
 
 def _expect(condition: bool, fact: str) -> None:
     if not condition:
-        raise SampleError(fact)
+        raise errors.SampleError(fact)
 
 
 def _try_python() -> str:
@@ -141,14 +137,14 @@ def _try_limits() -> str:
     try:
         resource: Any = import_module("resource")
     except ImportError:
-        return f"none, {usable_cores()} cores"
+        return f"none, {system_calls.usable_cores()} cores"
     files, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
     _expect(files == resource.RLIM_INFINITY or files >= FILES_MIN, f"only {files} open files")
     for name, kind in (("memory", resource.RLIMIT_AS), ("file size", resource.RLIMIT_FSIZE)):
         limit, _ = resource.getrlimit(kind)
         few = limit != resource.RLIM_INFINITY and limit < MEMORY_MIN_BYTES
         _expect(not few, f"{name} is limited to {limit / 1e6:.0f} MB")
-    cores = f"{usable_cores()} cores"
+    cores = f"{system_calls.usable_cores()} cores"
     if "SC_AVPHYS_PAGES" not in os.sysconf_names:  # macOS
         return f"{files} open files, {cores}"
     free = os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
@@ -235,7 +231,7 @@ def _try_openexr() -> str:
     import numpy as np
     import OpenEXR
 
-    with temporary_folder("doctor") as folder:
+    with temporary_folders.temporary_folder("doctor") as folder:
         path = str(folder / "probe.exr")
         header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
         OpenEXR.File(header, {"RGB": np.ones((2, 2, 3), np.float32)}).write(path)
@@ -334,7 +330,7 @@ def _try_packs() -> str:
 
 def _is_installed(module: str) -> bool:
     """Whether an optional package must work because it is there."""
-    return not missing_packages(module)
+    return not optional_packages.missing_packages(module)
 
 
 CHECKS = (

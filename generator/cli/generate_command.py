@@ -10,8 +10,7 @@ from functools import cache
 from typing import TYPE_CHECKING
 
 from gen_data.api.generate import generate
-from gen_data.cli.options import ConfigurationOptions
-from gen_data.cli.tables import print_facts
+from gen_data.cli import options, tables
 from gen_data.core.errors import SamplesSkipped
 
 if TYPE_CHECKING:
@@ -22,7 +21,7 @@ if TYPE_CHECKING:
 
 
 def generate_with_progress(
-    choice: ConfigurationOptions,
+    choice: options.ConfigurationOptions,
     n: int,
     *,
     out: str | None,
@@ -119,7 +118,7 @@ def print_summary(summary: Summary) -> None:
     """
     from rich.console import Console
 
-    print_facts(Console(stderr=True), summary.folder, summary.rows())
+    tables.print_facts(Console(stderr=True), summary.folder, summary.rows())
     if summary.failed:
         raise SamplesSkipped(
             f"{len(summary.failed)} samples could not be made and were skipped; the first one: "

@@ -22,20 +22,8 @@ from gen_data.cli.options import (
     parse_shards,
 )
 from gen_data.cli.stop_signals import handle_stop_signals, ignore_stop_signals, is_stop_requested
-from gen_data.core.errors import (
-    AssetWarning,
-    CacheWarning,
-    ConfigError,
-    ConfigWarning,
-    GenDataError,
-    Interrupted,
-    OutOfMemory,
-    did_you_mean,
-    lack_of_memory,
-)
-from gen_data.core.processes import SINGLE_THREADED
+from gen_data.core import errors, processes, version
 from gen_data.core.urls import is_url, needs_folder
-from gen_data.core.version import __version__
 
 FOLDERS_ONLY = frozenset(
     "adapt certify contact-sheet diff export match merge preview repair report repro".split()  # noqa: SIM905
@@ -124,11 +112,11 @@ class LazyCommands(click.Group):
             ConfigError: there is no such command, or it reads or writes folders only.
         """
         if args[0] not in self.modules:
-            raise ConfigError(_no_command(args, list(self.modules)))
+            raise errors.ConfigError(_no_command(args, list(self.modules)))
         name, command, rest = super().resolve_command(ctx, args)
         urls = [argument for argument in rest if is_url(argument)]
         if urls and name in FOLDERS_ONLY:
-            raise ConfigError(needs_folder(urls[0]))
+            raise errors.ConfigError(needs_folder(urls[0]))
         return name, command, rest
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
@@ -152,7 +140,7 @@ def _no_command(args: list[str], known: list[str]) -> str:
     if word in GENERATING or word.endswith((".yaml", ".yml")) or shipped.is_file():
         named = [*([] if "--config" in rest or "-c" in rest else ["--config"]), *rest]
         return f"there is no command '{word}'; did you mean: {shlex.join(['gen-data', *named])}"
-    hint = did_you_mean(word, known)
+    hint = errors.did_you_mean(word, known)
     return f"there is no command '{word}'{hint}; see: gen-data --help"
 
 
@@ -170,7 +158,7 @@ An interrupted run is resumed by the same command. Exit codes: 0 done, 2 configu
 
 
 @click.group(cls=LazyCommands, invoke_without_command=True, help=HELP)
-@click.version_option(__version__, prog_name="gen-data")
+@click.version_option(version.__version__, prog_name="gen-data")
 @click.option("--config", "-c", metavar="FILE", help="Configuration: a path, or a shipped name.")
 @click.option("--n", "-n", type=int, help="Number of samples.")
 @click.option(
@@ -226,21 +214,25 @@ def cli(
     given = _given_options(context)
     if context.invoked_subcommand is not None:
         if config is not None:
-            raise ConfigError(
+            raise errors.ConfigError(
                 f"--config cannot precede a command; expected: "
                 f"gen-data {context.invoked_subcommand} {config}"
             )
         if given:
             command = context.invoked_subcommand
-            raise ConfigError(f"{given[0]} cannot precede a command; expected it after {command}")
+            raise errors.ConfigError(
+                f"{given[0]} cannot precede a command; expected it after {command}"
+            )
         return
     if config is None:
         if given:
-            raise ConfigError("--config is missing: a file, or the name of a shipped configuration")
+            raise errors.ConfigError(
+                "--config is missing: a file, or the name of a shipped configuration"
+            )
         click.echo(context.get_help())
         return
     if n is None:
-        raise ConfigError("--n is missing: how many samples?")
+        raise errors.ConfigError("--n is missing: how many samples?")
     from gen_data.cli.generate_command import generate_with_progress
 
     choice = ConfigurationOptions(config, seed, overrides, without)
@@ -270,7 +262,7 @@ def _given_options(context: click.Context) -> list[str]:
 
 def main() -> None:
     """Run the command line and exit with its code."""
-    for name in SINGLE_THREADED:
+    for name in processes.SINGLE_THREADED:
         os.environ[name] = "1"
     # A cluster that a run starts reports nothing to anybody.
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
@@ -278,7 +270,7 @@ def main() -> None:
     os.environ.setdefault("HF_HUB_OFFLINE", "1")
     warnings.showwarning = partial(_show_warning, warnings.showwarning)
     code = _exit_code()
-    if code == Interrupted.exit_code:
+    if code == errors.Interrupted.exit_code:
         ignore_stop_signals()
     sys.exit(code)
 
@@ -291,7 +283,7 @@ def _show_warning(
     **options: Any,
 ) -> None:
     """Print our own warnings as plain messages, and warnings of libraries as usual."""
-    if category in (FutureWarning, AssetWarning, ConfigWarning, CacheWarning):
+    if category in (FutureWarning, errors.AssetWarning, errors.ConfigWarning, errors.CacheWarning):
         click.echo(f"gen-data: warning: {message}", err=True)
     else:
         show_others(message, category, *place, **options)
@@ -305,15 +297,15 @@ def _exit_code() -> int:
         return leave.exit_code
     except click.ClickException as usage:
         click.echo(f"gen-data: {usage.format_message()}", err=True)
-        return ConfigError.exit_code
+        return errors.ConfigError.exit_code
     except (click.Abort, KeyboardInterrupt):
         click.echo("gen-data: interrupted", err=True)
-        return Interrupted.exit_code
+        return errors.Interrupted.exit_code
     except BrokenPipeError:
         # The reader of the output has closed it, as in `| head`.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
-    except GenDataError as error:
+    except errors.GenDataError as error:
         if os.environ.get("GEN_DATA_DEBUG"):
             raise
         click.echo(f"gen-data: {error}", err=True)
@@ -322,10 +314,10 @@ def _exit_code() -> int:
         # Libraries turn a KeyboardInterrupt in their imports or callbacks into other errors.
         if is_stop_requested():
             click.echo("gen-data: interrupted", err=True)
-            return Interrupted.exit_code
-        lacking = lack_of_memory(error)
+            return errors.Interrupted.exit_code
+        lacking = errors.lack_of_memory(error)
         if not lacking:
             raise
         click.echo(f"gen-data: {lacking}", err=True)
-        return OutOfMemory.exit_code
+        return errors.OutOfMemory.exit_code
     return 0

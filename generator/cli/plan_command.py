@@ -9,9 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from gen_data.cli.cost_estimate import Prices, Probe, estimate_rows
-from gen_data.cli.options import ConfigurationOptions, configuration_options
-from gen_data.cli.tables import print_facts
+from gen_data.cli import cost_estimate, options, tables
 from gen_data.core.errors import ConfigError, NoLabels
 from gen_data.core.system_calls import usable_cores
 
@@ -30,7 +28,7 @@ if TYPE_CHECKING:
 @click.option("--price-per-cpu-hour", type=float, help="Price of a core; needs --probe.")
 @click.option("--price-per-gpu-hour", type=float, help="Price of a GPU; needs --probe.")
 @click.option("--price-per-gb-month", type=float, help="Price of storage; needs --probe.")
-@configuration_options
+@options.configuration_options
 def plan(
     source: str,
     n: int,
@@ -48,17 +46,17 @@ def plan(
     and files are extrapolated from them; without it sizes are estimates from the sizes of images,
     and no time is printed. Costs are hours times the prices that you give.
     """
-    prices = Prices(price_per_cpu_hour, price_per_gpu_hour, price_per_gb_month)
-    if probe is None and prices != Prices():
+    prices = cost_estimate.Prices(price_per_cpu_hour, price_per_gpu_hour, price_per_gb_month)
+    if probe is None and prices != cost_estimate.Prices():
         raise ConfigError("--price-per-...: needs measured hours; expected --probe K with it")
     from rich.console import Console
 
-    choice = ConfigurationOptions(source, seed, overrides, without)
+    choice = options.ConfigurationOptions(source, seed, overrides, without)
     config = choice.config()
     facts = list(_rows(config, n))
     if probe is not None:
-        facts += estimate_rows(_measure(choice, probe), n, usable_cores(), prices)
-    print_facts(Console(), f"{config.name}: {n} samples", facts)
+        facts += cost_estimate.estimate_rows(_measure(choice, probe), n, usable_cores(), prices)
+    tables.print_facts(Console(), f"{config.name}: {n} samples", facts)
 
 
 def _rows(config: Config, n: int) -> Iterator[tuple[str, str]]:
@@ -118,7 +116,7 @@ def _product(scenes: int, views: int, steps: int) -> str:
     return " x ".join(f"{count:,} {noun}{'' if count == 1 else 's'}" for count, noun in counts)
 
 
-def _measure(choice: ConfigurationOptions, count: int) -> Probe:
+def _measure(choice: options.ConfigurationOptions, count: int) -> cost_estimate.Probe:
     """Generate ``count`` samples in a temporary folder, in this process."""
     from gen_data.api.generate import generate
     from gen_data.core.temporary_folders import temporary_folder
@@ -149,7 +147,7 @@ def _measure(choice: ConfigurationOptions, count: int) -> Probe:
         files = [p for p in (folder / "probe").rglob("*") if p.is_file() and "run" not in p.parts]
         # Hard links of exports take no space.
         size = sum({p.stat().st_ino: p.stat().st_size for p in files}.values())
-    return Probe(
+    return cost_estimate.Probe(
         summary.cpu_s,
         # The first sample includes the start of the engines.
         (done_s[count] - done_s[1]) / max(1, count - 1),

@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING
 import click
 
 from gen_data.cli.options import ConfigurationOptions, configuration_options
+from gen_data.core import optional_packages, sample
 from gen_data.core.capture import Channel
 from gen_data.core.errors import ConfigError
-from gen_data.core.optional_packages import missing_packages
-from gen_data.core.sample import Sample
 
 if TYPE_CHECKING:
     from gen_data.preview.overlay import Image
@@ -62,7 +61,7 @@ def preview(
     """
     from gen_data.assemble.pipeline_factory import open_pipeline
 
-    missing = missing_packages("rerun")
+    missing = optional_packages.missing_packages("rerun")
     if missing:
         raise ConfigError(f"gen-data preview {missing}; gen-data contact-sheet draws without it")
     from gen_data.preview.rerun_recording import save_recording, send_samples
@@ -149,8 +148,8 @@ def contact_sheet(
 
 
 def _samples(
-    sample_at: Callable[[int], Sample], first: int, n: int, step: int = 1
-) -> Iterator[Sample]:
+    sample_at: Callable[[int], sample.Sample], first: int, n: int, step: int = 1
+) -> Iterator[sample.Sample]:
     if n < 1 or first < 0 or step < 1:
         raise ConfigError("--n and --step must be at least 1, --first at least 0")
     for index in range(first, first + n * step, step):

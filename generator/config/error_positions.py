@@ -4,8 +4,7 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from gen_data.config.problems import refuse
-from gen_data.config.yaml_tree import Node
+from gen_data.config import problems, yaml_tree
 from gen_data.core.errors import ConfigError
 
 _FIELD = re.compile(
@@ -17,7 +16,7 @@ _PLUGIN = re.compile(r"(?P<list>sensor|exporter) '(?P<name>[\w-]+)': (?P<fact>.*
 
 
 @contextmanager
-def located_errors(document: Node) -> Iterator[None]:
+def located_errors(document: yaml_tree.Node) -> Iterator[None]:
     """Add ``file:line:column`` to a ConfigError of a plug-in of a document.
 
     Its message begins with ``elements.<name>.<field>:``, ``randomizers...``, ``sensors...``,
@@ -31,7 +30,7 @@ def located_errors(document: Node) -> Iterator[None]:
             value = document.get(*section["field"].split("."))
             if value is None:
                 raise
-            refuse(value.position, section["field"], section["fact"])
+            problems.refuse(value.position, section["field"], section["fact"])
         found = _FIELD.fullmatch(str(error)) or _PLUGIN.fullmatch(str(error))
         if found is None or type(error) is not ConfigError:
             raise
@@ -46,10 +45,10 @@ def located_errors(document: Node) -> Iterator[None]:
         path = f"{key}[{number}].{field}" if field else f"{key}[{number}]"
         # "elements.table.on" and "elements[2].on" are the same; "sensor 'left'" tells more.
         fact = parts["fact"] if key == parts["list"] else str(error)
-        refuse((node or item).position, path, fact)
+        problems.refuse((node or item).position, path, fact)
 
 
-def _find_item(document: Node, key: str, name: str) -> int | None:
+def _find_item(document: yaml_tree.Node, key: str, name: str) -> int | None:
     """Number of the first item of a list with this name, or else of this type or text."""
     items = document.entries[key].items if key in document.entries else ()
     for tag in ("name", "type"):

@@ -12,8 +12,7 @@ from pathlib import Path
 
 from gen_data.config.problems import Position, Problem
 from gen_data.config.yaml_scalars import abbreviate
-from gen_data.core.errors import ConfigError, did_you_mean
-from gen_data.core.urls import is_url
+from gen_data.core import errors, urls
 
 PLAN = "plan.json"
 """Record of a data set; its paths are relative to its configuration, which lies elsewhere."""
@@ -61,7 +60,7 @@ def find_path(
     if is_folder and (remembered := _remembered_folder(name, position)) is not None:
         return remembered
     fact = f"there is no {kind} '{abbreviate(name)}'; looked for '{abbreviate(str(path), 300)}'"
-    if is_url(name):
+    if urls.is_url(name):
         fact = (
             f"'{abbreviate(name)}' is a URL; expected a {kind} on this machine: copy it first, as "
             "with 'aws s3 cp --recursive'"
@@ -71,12 +70,12 @@ def find_path(
         fact = f"'{abbreviate(str(path), 300)}' is a folder; expected {expected}"
     elif by_name:
         expected = f"a file{also and f', {also}'} or a shipped name, which gen-data describe lists"
-        fact += f"{did_you_mean(name, by_name)}; expected {expected}"
+        fact += f"{errors.did_you_mean(name, by_name)}; expected {expected}"
     raise _error(position, field, fact)
 
 
-def _error(position: Position | None, field: str, fact: str) -> ConfigError:
-    return ConfigError(str(Problem(position, field, fact)) if position else fact)
+def _error(position: Position | None, field: str, fact: str) -> errors.ConfigError:
+    return errors.ConfigError(str(Problem(position, field, fact)) if position else fact)
 
 
 def _base_folder(position: Position | None) -> Path:

@@ -10,9 +10,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 
-from gen_data.config.data_files import load_data
-from gen_data.config.merging import merge_nodes
-from gen_data.config.paths import PLAN
+from gen_data.config import data_files, merging, paths
 from gen_data.config.problems import FieldPath, Position, Problem, Problems, format_path, refuse
 from gen_data.config.shared_values import SWITCH
 from gen_data.config.yaml_tree import Node
@@ -37,7 +35,7 @@ class Renames:
     values: Mapping[str, Words] = field(default_factory=dict)
 
 
-_TABLES = load_data(__package__, "renamed_keys")
+_TABLES = data_files.load_data(__package__, "renamed_keys")
 SELECTIONS: Words = _TABLES["selections"]
 TYPES: Mapping[str, Words] = _TABLES["types"]
 RANDOMIZERS: Words = _TABLES["randomizers"]
@@ -140,7 +138,7 @@ def _rename_keys(node: Node, path: FieldPath, words: Words) -> Node:
                 fact = f"is called '{new}' now, which is given, too; expected one of them"
                 refuse(place, (*path, key), fact)
             _warn(place, (*path, key), key, new)
-        content[new] = merge_nodes(content[new], value) if new in content else value
+        content[new] = merging.merge_nodes(content[new], value) if new in content else value
         positions[new] = place
     return replace(node, content=content, key_positions=positions)
 
@@ -159,7 +157,7 @@ def _rename_value(node: Node, path: FieldPath, words: Words) -> Node:
 
 
 def _warn(place: Position, path: FieldPath, old: str, new: str) -> None:
-    if Path(place.file).name == PLAN:
+    if Path(place.file).name == paths.PLAN:
         return  # The record of a data set, which nobody edits.
     fact = f"'{old}' is called '{new}' now; the old name will be refused by the next release"
     message = str(Problem(replace(place, source=""), format_path(path), fact))

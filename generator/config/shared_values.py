@@ -19,13 +19,11 @@ from dataclasses import replace
 from graphlib import CycleError, TopologicalSorter
 from typing import Any
 
-from gen_data.config.distributions import FLAG, NAME, NUMBER, WHOLE_NUMBER, Distribution
-from gen_data.config.distributions.base import Kind, Malformed, read_distribution
+from gen_data.config.distributions import FLAG, NAME, NUMBER, WHOLE_NUMBER, Distribution, base
 from gen_data.config.problems import FieldPath, Position, refuse
 from gen_data.config.yaml_scalars import abbreviate, quote_value, resolve_scalar
 from gen_data.config.yaml_tree import Node, is_distribution
-from gen_data.core.bounded_cache import ObjectCache
-from gen_data.core.errors import did_you_mean
+from gen_data.core import bounded_cache, errors
 from gen_data.core.scene import SharedValue
 from gen_data.core.streams import Streams
 
@@ -38,7 +36,7 @@ _SEARCHED_SCENES = 400
 
 Shared = Mapping[str, SharedValue]
 
-_ORDERS: ObjectCache[tuple[str, ...]] = ObjectCache(4)
+_ORDERS: bounded_cache.ObjectCache[tuple[str, ...]] = bounded_cache.ObjectCache(4)
 """Orders in which the values of the latest sections are drawn, for every scene."""
 
 
@@ -199,8 +197,8 @@ def _draw(name: str, node: Node, shared: Shared, streams: Streams) -> SharedValu
 def _read_entry(name: str, node: Node, shared: Shared) -> Distribution[Any]:
     entry = resolve_shared(node, shared, "shared", name)
     try:
-        return read_distribution(entry.plain(), _infer_kind(entry))
-    except Malformed as error:
+        return base.read_distribution(entry.plain(), _infer_kind(entry))
+    except base.Malformed as error:
         refuse(entry.position, f"shared.{name}", error.fact)
 
 
@@ -214,7 +212,7 @@ def names_in(node: Node) -> set[str]:
     return names
 
 
-def _infer_kind(node: Node) -> Kind[Any]:
+def _infer_kind(node: Node) -> base.Kind[Any]:
     """Infer the kind of a value from its notation."""
     outcomes = _outcomes(node)
     if not outcomes and isinstance(node.content, (str, int, float)):
@@ -267,5 +265,5 @@ def _look_up(name: str, shared: Shared, position: Position, path: FieldPath) -> 
     if name not in shared:
         known = ", ".join(shared) or "none"
         fact = f"there is no shared value '{abbreviate(name)}'; expected one of {known}"
-        refuse(position, path, fact + did_you_mean(name, shared))
+        refuse(position, path, fact + errors.did_you_mean(name, shared))
     return shared[name]

@@ -4,12 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
-from gen_data.core.asset_types import RobotModel
+from gen_data.core import asset_types, scene, se3
 from gen_data.core.kinematics import gripper_opening, link_poses
-from gen_data.core.scene import Articulation, Episode, Span
-from gen_data.core.se3 import SE3, Vec3
 
-AnySpan = TypeVar("AnySpan", bound=Span)
+AnySpan = TypeVar("AnySpan", bound=scene.Span)
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,20 +31,20 @@ class DemonstrationStep:
 
     positions: tuple[float, ...]
     action: tuple[float, ...]
-    T_base_grasp: SE3
+    T_base_grasp: se3.SE3
     opening: float
     opening_action: float
     phase: str
     held: str
     contacts: tuple[str, ...]
     contact_forces_n: tuple[float, ...]
-    contact_points_m: tuple[Vec3, ...]
+    contact_points_m: tuple[se3.Vec3, ...]
     succeeded: bool
     failure: str
 
 
 def demonstration_step(
-    arm: Articulation, robot: RobotModel, time_s: float, step_s: float
+    arm: scene.Articulation, robot: asset_types.RobotModel, time_s: float, step_s: float
 ) -> DemonstrationStep | None:
     """The step of an arm at an instant; None if it demonstrates nothing.
 
@@ -63,7 +61,7 @@ def demonstration_step(
     openings = [round(gripper_opening(robot, q), 6) for q in (positions, action)]
     if hand is not None and hand.cup is not None:
         openings = [0.0 if _spans_at(episode.held, t) else 1.0 for t in (at_s, next_s)]
-    poses = link_poses(robot, SE3(), positions)
+    poses = link_poses(robot, se3.SE3(), positions)
     T_base_grasp = poses[hand.link] @ hand.T_link_grasp if hand else poses[robot.links[0]]
     return DemonstrationStep(
         positions,
@@ -81,14 +79,14 @@ def demonstration_step(
     )
 
 
-def joint_positions(arm: Articulation, time_s: float) -> tuple[float, ...]:
+def joint_positions(arm: scene.Articulation, time_s: float) -> tuple[float, ...]:
     """Positions of all movable joints at an instant [rad or m]."""
     if arm.joint_track is None:
         return arm.joint_positions
     return arm.joint_track.positions(round(time_s, 9))
 
 
-def _end_s(episode: Episode) -> float:
+def _end_s(episode: scene.Episode) -> float:
     return max((span.end_s for span in episode.phases), default=0.0)
 
 

@@ -33,16 +33,7 @@ from typing import Any, Protocol, runtime_checkable
 
 from numpy.typing import NDArray
 
-from gen_data.core.asset_types import (
-    Asset,
-    ConvexParts,
-    Float32,
-    Keypoint,
-    Material,
-    MeshData,
-    RobotModel,
-    TextureData,
-)
+from gen_data.core import asset_types, errors, measurement_dtypes, plates, se3, streams
 from gen_data.core.capture import (
     PNG,
     Channel,
@@ -53,14 +44,9 @@ from gen_data.core.capture import (
     PointCloud,
     SensorReading,
 )
-from gen_data.core.errors import Rejection
 from gen_data.core.lens import LensModel
-from gen_data.core.measurement_dtypes import Column
-from gen_data.core.plates import Plate
 from gen_data.core.sample import EgoTruth, ImageTruth, ObjectTruth, Sample
 from gen_data.core.scene import Camera, Lane, Lidar, Scene, StageModel
-from gen_data.core.se3 import Vec3
-from gen_data.core.streams import Rng
 
 
 class Stage(str, Enum):
@@ -75,38 +61,38 @@ class Stage(str, Enum):
 class AssetIndex(Protocol):
     """Index of the assets: their properties and extents, no surfaces or images."""
 
-    def get(self, asset_id: str) -> Asset:
+    def get(self, asset_id: str) -> asset_types.Asset:
         """The asset of that id. Raises AssetError with the nearest ids if unknown."""
         ...
 
-    def find(self, tags: Iterable[str], kind: str = "object") -> tuple[Asset, ...]:
+    def find(self, tags: Iterable[str], kind: str = "object") -> tuple[asset_types.Asset, ...]:
         """All assets of a kind that have all tags, sorted by id; may be empty."""
         ...
 
-    def materials(self, asset_id: str) -> tuple[Material, ...]:
+    def materials(self, asset_id: str) -> tuple[asset_types.Material, ...]:
         """The asset's own materials, one per mesh slot."""
         ...
 
-    def bounds_m(self, asset_id: str) -> tuple[Vec3, Vec3]:
+    def bounds_m(self, asset_id: str) -> tuple[se3.Vec3, se3.Vec3]:
         """Smallest and largest coordinates of the asset's mesh in its own frame [m]."""
         ...
 
-    def body_bounds_m(self, asset_id: str) -> tuple[Vec3, Vec3] | None:
+    def body_bounds_m(self, asset_id: str) -> tuple[se3.Vec3, se3.Vec3] | None:
         """The same without a vehicle's exterior mirrors or a pole's cables; None without such."""
         ...
 
-    def vertices_m(self, asset_id: str) -> Float32:
+    def vertices_m(self, asset_id: str) -> asset_types.Float32:
         """Vertices of the asset's mesh in its own frame [m], float32 [n, 3]; not to be written to.
 
         Raises AssetError if a link has no visual geometry.
         """
         ...
 
-    def mean_color(self, texture_id: str) -> Vec3:
+    def mean_color(self, texture_id: str) -> se3.Vec3:
         """Mean reflectance of a texture, linear RGB."""
         ...
 
-    def keypoints(self, asset_id: str) -> tuple[Keypoint, ...]:
+    def keypoints(self, asset_id: str) -> tuple[asset_types.Keypoint, ...]:
         """Named points of the asset, in its own frame; empty if it has none."""
         ...
 
@@ -114,7 +100,7 @@ class AssetIndex(Protocol):
         """Lanes of a road network, in its own frame; empty for anything else."""
         ...
 
-    def robot(self, asset_id: str) -> RobotModel:
+    def robot(self, asset_id: str) -> asset_types.RobotModel:
         """Kinematics of a robot. Raises AssetError if the asset is no robot."""
         ...
 
@@ -122,7 +108,7 @@ class AssetIndex(Protocol):
         """Content of a stage file. Raises AssetError if the asset is no stage."""
         ...
 
-    def plate(self, asset_id: str) -> Plate:
+    def plate(self, asset_id: str) -> plates.Plate:
         """Camera, ground and light of a photograph. Raises AssetError if the asset is none.
 
         ``AssetLibrary.texture`` gives its pixels, ``AssetLibrary.environment`` the light around it.
@@ -137,19 +123,19 @@ class AssetLibrary(AssetIndex, Protocol):
         """Hash by identity, so that caches of derived geometry may use it as a key."""
         ...
 
-    def mesh(self, asset_id: str) -> MeshData:
+    def mesh(self, asset_id: str) -> asset_types.MeshData:
         """Visual geometry. Also for robot links: ``franka_panda/panda_link3``."""
         ...
 
-    def convex_parts(self, asset_id: str) -> ConvexParts:
+    def convex_parts(self, asset_id: str) -> asset_types.ConvexParts:
         """Collision geometry."""
         ...
 
-    def texture(self, texture_id: str) -> TextureData:
+    def texture(self, texture_id: str) -> asset_types.TextureData:
         """Images of a texture."""
         ...
 
-    def environment(self, environment_id: str) -> Float32:
+    def environment(self, environment_id: str) -> asset_types.Float32:
         """Equirectangular relative radiance, linear RGB, mean luminance 1, float32 [h, 2h, 3].
 
         Row 0 is the zenith; column 0 is the direction -X, the centre column is +X, and columns
@@ -162,7 +148,7 @@ class AssetLibrary(AssetIndex, Protocol):
 class FileFrames(Protocol):
     """An AssetLibrary with assets from files of the user."""
 
-    def file_shift_m(self, asset_id: str) -> Vec3 | None:
+    def file_shift_m(self, asset_id: str) -> se3.Vec3 | None:
         """What was added to the coordinates of a file, scaled and upright, on import [m].
 
         None for assets that are not of a user's file.
@@ -243,7 +229,7 @@ class Randomizer(Protocol):
         """
         ...
 
-    def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
+    def __call__(self, scene: Scene, assets: AssetIndex, rng: streams.Rng) -> Scene:
         """Return a new scene; the given one is unchanged.
 
         Raises:
@@ -263,7 +249,7 @@ class Settled:
     """
 
     scene: Scene
-    rejection: Rejection | None = None
+    rejection: errors.Rejection | None = None
 
 
 class PhysicsEngine(Protocol):
@@ -300,7 +286,7 @@ class Tones:
     brightest_cd_m2: float
 
 
-FindTones = Callable[[Float32], Tones]
+FindTones = Callable[[asset_types.Float32], Tones]
 """Finds the tones of an image of radiance [cd/m^2], linear RGB, float32 [h, w, 3]."""
 
 
@@ -377,7 +363,7 @@ class SensorInfo:
     kind: str = ""
     channels: tuple[Channel, ...] = ()
     lens: LensModel = "pinhole"
-    columns: tuple[Column, ...] = ()
+    columns: tuple[measurement_dtypes.Column, ...] = ()
     view: str = ""
     rate_hz: float | None = None
     time_offset_s: float = 0.0
@@ -406,7 +392,7 @@ class Sensor(Protocol):
         ...
 
     def capture(
-        self, scene: Scene, renderer: Renderer, channels: frozenset[Channel], rng: Rng
+        self, scene: Scene, renderer: Renderer, channels: frozenset[Channel], rng: streams.Rng
     ) -> SensorReading | PointCloud | Measurements:
         """Capture one reading, of the type of its modality.
 

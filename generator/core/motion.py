@@ -13,15 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.core.asset_types import Material
-from gen_data.core.se3 import (
-    SE3,
-    Array,
-    Vec3,
-    multiply_quaternions,
-    quaternions_to_rotations,
-    rotate_by_quaternion,
-)
+from gen_data.core import asset_types, se3
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,18 +25,18 @@ class Twist:
         angular_velocity_rad_s: Of the frame.
     """
 
-    velocity_m_s: Vec3 = (0.0, 0.0, 0.0)
-    acceleration_m_s2: Vec3 = (0.0, 0.0, 0.0)
-    angular_velocity_rad_s: Vec3 = (0.0, 0.0, 0.0)
+    velocity_m_s: se3.Vec3 = (0.0, 0.0, 0.0)
+    acceleration_m_s2: se3.Vec3 = (0.0, 0.0, 0.0)
+    angular_velocity_rad_s: se3.Vec3 = (0.0, 0.0, 0.0)
 
-    def seen_along(self, T_world_frame: SE3) -> Twist:
+    def seen_along(self, T_world_frame: se3.SE3) -> Twist:
         """The same motion, expressed in the axes of another frame."""
         w, x, y, z = T_world_frame.quaternion_wxyz
         inverse = (w, -x, -y, -z)
         return Twist(
-            rotate_by_quaternion(inverse, self.velocity_m_s),
-            rotate_by_quaternion(inverse, self.acceleration_m_s2),
-            rotate_by_quaternion(inverse, self.angular_velocity_rad_s),
+            se3.rotate_by_quaternion(inverse, self.velocity_m_s),
+            se3.rotate_by_quaternion(inverse, self.acceleration_m_s2),
+            se3.rotate_by_quaternion(inverse, self.angular_velocity_rad_s),
         )
 
 
@@ -73,7 +65,7 @@ class Trajectory:
 
     body: str
     step_s: float
-    knots: tuple[SE3, ...]
+    knots: tuple[se3.SE3, ...]
     start_s: float = 0.0
 
     def __post_init__(self) -> None:
@@ -90,7 +82,7 @@ class Trajectory:
         """Time of the last knot."""
         return self.start_s + (len(self.knots) - 1) * self.step_s
 
-    def pose(self, time_s: float) -> SE3:
+    def pose(self, time_s: float) -> se3.SE3:
         """``T_world_body`` at an instant."""
         k, f = self._place(time_s)
         if f == 0.0:
@@ -103,9 +95,9 @@ class Trajectory:
             f * f * (3.0 - 2.0 * f),
             f * f * (f - 1.0),
         )
-        return SE3(self._combine(k, weights), self._interpolate_rotation(k, f))
+        return se3.SE3(self._combine(k, weights), self._interpolate_rotation(k, f))
 
-    def poses(self, times_s: NDArray[np.floating]) -> tuple[Array, Array]:
+    def poses(self, times_s: NDArray[np.floating]) -> tuple[se3.Array, se3.Array]:
         """Rotation matrices [n, 3, 3] and translations [n, 3] at several instants, as ``pose``."""
         rotations, translations = interpolate_poses((self,), times_s)
         return rotations[0], translations[0]
@@ -128,7 +120,7 @@ class Trajectory:
             self._angular_velocity(k + f),
         )
 
-    def _acceleration(self, steps: float) -> Vec3:
+    def _acceleration(self, steps: float) -> se3.Vec3:
         """Acceleration [m/s^2] after a number of steps, from second differences at knots."""
         inner = len(self.knots) - 2
         if inner < 1:
@@ -140,12 +132,12 @@ class Trajectory:
             return one
         return _extrapolate(one, self._second_difference(k + 1), steps - 1.0 - k)
 
-    def _second_difference(self, k: int) -> Vec3:
+    def _second_difference(self, k: int) -> se3.Vec3:
         a, b, c = (self.knots[k + i].translation_m for i in range(3))
         x, y, z = ((a[i] - 2.0 * b[i] + c[i]) / (self.step_s * self.step_s) for i in range(3))
         return (x, y, z)
 
-    def _angular_velocity(self, steps: float) -> Vec3:
+    def _angular_velocity(self, steps: float) -> se3.Vec3:
         """Angular velocity [rad/s], outer axes: means over steps, at their middles, and between."""
         count = len(self.knots) - 1
         k = min(max(math.floor(steps - 0.5), 0), max(count - 2, 0))
@@ -163,7 +155,7 @@ class Trajectory:
         k = min(max(math.floor(steps), 0), last)
         return k, min(max(steps - k, 0.0), 1.0)
 
-    def _combine(self, k: int, weights: tuple[float, ...]) -> Vec3:
+    def _combine(self, k: int, weights: tuple[float, ...]) -> se3.Vec3:
         """Weighted sum of position and slope at knot k and at the next one."""
         a, b = self.knots[k].translation_m, self.knots[k + 1].translation_m
         from_, to = self._slope(k), self._slope(k + 1)
@@ -173,7 +165,7 @@ class Trajectory:
         )
         return (x, y, z)
 
-    def _slope(self, k: int) -> Vec3:
+    def _slope(self, k: int) -> se3.Vec3:
         """Displacement per step at a knot: that of the parabola through the nearest knots."""
         last = len(self.knots) - 1
         if last == 1:
@@ -195,7 +187,7 @@ class Trajectory:
 
 def interpolate_poses(
     tracks: Sequence[Trajectory], times_s: NDArray[np.floating]
-) -> tuple[Array, Array]:
+) -> tuple[se3.Array, se3.Array]:
     """Poses of several bodies at several instants, as ``Trajectory.pose``.
 
     Returns:
@@ -215,7 +207,7 @@ def interpolate_poses(
     return rotations, translations
 
 
-def _between(ways: Sequence[tuple[SE3, ...]], steps: Array) -> tuple[Array, Array]:
+def _between(ways: Sequence[tuple[se3.SE3, ...]], steps: se3.Array) -> tuple[se3.Array, se3.Array]:
     """Interpolate several trajectories with equal numbers of knots, as ``interpolate_poses``."""
     last = len(ways[0]) - 1
     k = np.clip(np.floor(steps), 0, last - 1).astype(np.intp)
@@ -243,7 +235,7 @@ def _between(ways: Sequence[tuple[SE3, ...]], steps: Array) -> tuple[Array, Arra
     a, b = turns[:, k], turns[:, k + 1]
     same = a[..., 0] * b[..., 0] + a[..., 1] * b[..., 1] + a[..., 2] * b[..., 2]
     sign = np.where(same + a[..., 3] * b[..., 3] >= 0.0, 1.0, -1.0)[..., None]
-    rotations = quaternions_to_rotations((g * a + f * sign * b).reshape(-1, 4))
+    rotations = se3.quaternions_to_rotations((g * a + f * sign * b).reshape(-1, 4))
     return rotations.reshape(*a.shape[:2], 3, 3), translations
 
 
@@ -288,20 +280,20 @@ class StateChange:
     time_s: float
     body: str
     asset: str = ""
-    materials: tuple[Material, ...] = ()
+    materials: tuple[asset_types.Material, ...] = ()
     attributes: tuple[tuple[str, str], ...] = ()
 
 
-def _extrapolate(one: Vec3, other: Vec3, share: float) -> Vec3:
+def _extrapolate(one: se3.Vec3, other: se3.Vec3, share: float) -> se3.Vec3:
     """The value at a share of the way from one to the other, or beyond them."""
     x, y, z = ((1.0 - share) * a + share * b for a, b in zip(one, other, strict=True))
     return (x, y, z)
 
 
-def _mean_angular_velocity(one: SE3, other: SE3, step_s: float) -> Vec3:
+def _mean_angular_velocity(one: se3.SE3, other: se3.SE3, step_s: float) -> se3.Vec3:
     """Mean angular velocity between two poses, in the outer frame's axes."""
     w, x, y, z = one.quaternion_wxyz
-    dw, dx, dy, dz = multiply_quaternions(other.quaternion_wxyz, (w, -x, -y, -z))
+    dw, dx, dy, dz = se3.multiply_quaternions(other.quaternion_wxyz, (w, -x, -y, -z))
     if dw < 0.0:
         dw, dx, dy, dz = -dw, -dx, -dy, -dz
     sine = math.sqrt(dx * dx + dy * dy + dz * dz)

@@ -10,12 +10,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import Literal, Protocol, TypeVar, get_args
 
-from gen_data.core.asset_types import Keypoint, Material
+from gen_data.core import asset_types, serialization
 from gen_data.core.boxes import OrientedBox
 from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.motion import STILL, JointTrajectory, StateChange, Trajectory, Twist
 from gen_data.core.se3 import IDENTITY, SE3, Vec3
-from gen_data.core.serialization import SPARSE
 from gen_data.core.shutter import INSTANT, Shutter
 
 SharedValue = str | float | int | bool
@@ -79,7 +78,7 @@ class Instance:
     box_max_m: Vec3 = (0.0, 0.0, 0.0)
     subcategory: str = ""
     attributes: tuple[tuple[str, str], ...] = ()
-    keypoints: tuple[Keypoint, ...] = ()
+    keypoints: tuple[asset_types.Keypoint, ...] = ()
     twist: Twist = STILL
     body_bounds_m: tuple[Vec3, Vec3] | None = None
 
@@ -120,7 +119,7 @@ class Body:
     mass_kg: float = 0.0
     friction: float = 0.6
     restitution: float = 0.05
-    materials: tuple[Material, ...] = ()
+    materials: tuple[asset_types.Material, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -485,7 +484,7 @@ class Environment:
     luminance_cd_m2: float = 100.0
     yaw_rad: float = 0.0
     visible: bool = True
-    volumes: tuple[IrradianceVolume, ...] = field(default=(), metadata={SPARSE: True})
+    volumes: tuple[IrradianceVolume, ...] = field(default=(), metadata={serialization.SPARSE: True})
 
 
 @dataclass(frozen=True, slots=True)

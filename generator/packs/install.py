@@ -12,18 +12,16 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from gen_data.assets.installed_packs import RECORD_NAME, Record, StoredFile, read_record
+from gen_data.core import serialization, system_calls
 from gen_data.core.errors import AssetError, GenDataError, StorageError, VerificationError
-from gen_data.core.serialization import canonical_json
-from gen_data.core.system_calls import try_lock, wait_for_lock
-from gen_data.packs.archives import extract
+from gen_data.packs import archives, pack_table
 from gen_data.packs.fetch import check_archive, fetch, file_digest
-from gen_data.packs.pack_table import Pack
 
 _SCRATCH = ".scratch-"
 _LOCK = ".lock"
 
 
-def install(pack: Pack, folder: Path, archive: Path | None = None) -> Record:
+def install(pack: pack_table.Pack, folder: Path, archive: Path | None = None) -> Record:
     """Fetch, convert and install a pack; replace an installed one.
 
     Args:
@@ -42,7 +40,7 @@ def install(pack: Pack, folder: Path, archive: Path | None = None) -> Record:
         return _install(pack, folder, archive, scratch)
 
 
-def install_once(pack: Pack, folder: Path, announce: Callable[[], object]) -> None:
+def install_once(pack: pack_table.Pack, folder: Path, announce: Callable[[], object]) -> None:
     """Install a pack unless it is installed; wait while another process installs one.
 
     Args:
@@ -60,13 +58,13 @@ def install_once(pack: Pack, folder: Path, announce: Callable[[], object]) -> No
             _install(pack, folder, None, scratch)
 
 
-def _install(pack: Pack, folder: Path, archive: Path | None, scratch: Path) -> Record:
+def _install(pack: pack_table.Pack, folder: Path, archive: Path | None, scratch: Path) -> Record:
     """Fetch, convert and install a pack, by way of an empty folder."""
     if archive is None:
         archive = fetch(pack, _make_folder(scratch / "archive"))
     check_archive(pack, archive)
     source, target = _make_folder(scratch / "source"), _make_folder(scratch / "target")
-    extract(archive, pack.wanted, source)
+    archives.extract(archive, pack.wanted, source)
     pack.convert(source, target)
     record = Record(
         name=pack.name,
@@ -77,7 +75,7 @@ def _install(pack: Pack, folder: Path, archive: Path | None, scratch: Path) -> R
         source=pack.source,
         files=_list_files(target),
     )
-    (target / RECORD_NAME).write_text(canonical_json(record) + "\n", encoding="utf-8")
+    (target / RECORD_NAME).write_text(serialization.canonical_json(record) + "\n", encoding="utf-8")
     # Without a sync, a power cut after the rename may leave a pack of empty files.
     if hasattr(os, "sync"):
         os.sync()
@@ -85,7 +83,7 @@ def _install(pack: Pack, folder: Path, archive: Path | None, scratch: Path) -> R
     return record
 
 
-def is_installed(pack: Pack, folder: Path) -> bool:
+def is_installed(pack: pack_table.Pack, folder: Path) -> bool:
     """Whether the pack is installed in the table's version and revision."""
     if not (folder / pack.name / RECORD_NAME).exists():
         return False
@@ -156,8 +154,8 @@ def _scratch(folder: Path, wait: bool = False) -> Iterator[Path]:
     folder.mkdir(parents=True, exist_ok=True)
     with (folder / _LOCK).open("a") as lock:
         if wait:
-            wait_for_lock(lock.fileno())
-        elif not try_lock(lock.fileno()):
+            system_calls.wait_for_lock(lock.fileno())
+        elif not system_calls.try_lock(lock.fileno()):
             raise StorageError(
                 f"{folder}: another process is installing or removing packs; wait for it"
             )

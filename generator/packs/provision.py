@@ -4,15 +4,14 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from gen_data.assets.file_library import PYBULLET
-from gen_data.assets.library import Library, open_library
+from gen_data.assets import file_library, library
 from gen_data.assets.paths import OFFLINE, may_fetch
 from gen_data.core.errors import AssetError
 
 
-def open_assets(user_roots: Sequence[Path] = ()) -> Library:
+def open_assets(user_roots: Sequence[Path] = ()) -> library.Library:
     """Open the library with the user's folders; it provides the files of pybullet."""
-    return open_library(user_roots, provide=provide_pybullet)
+    return library.open_library(user_roots, provide=provide_pybullet)
 
 
 def provide_pybullet(folder: Path) -> None:
@@ -31,7 +30,7 @@ def provide_pybullet(folder: Path) -> None:
     from gen_data.packs.install import install_once
     from gen_data.packs.pack_table import find_pack
 
-    pack = find_pack(PYBULLET)
+    pack = find_pack(file_library.PYBULLET)
 
     def announce() -> None:
         sys.stderr.write(

@@ -10,21 +10,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from gen_data.core.processes import silence_stdio
-from gen_data.core.scene import BodyJoint
+from gen_data.core import processes, scene, temporary_folders
 from gen_data.core.se3 import IDENTITY, SE3, Array, Vec3
-from gen_data.core.temporary_folders import TemporaryFolder
-from gen_data.physics.collision_shapes import CollisionShape, scale_step
-from gen_data.physics.world import (
-    ANGULAR_DAMPING_PER_S,
-    GRAVITY_M_S2,
-    ROLLING_FRICTION_SHARE,
-    Contact,
-    joint_position,
-    jointed_pose,
-)
+from gen_data.physics import collision_shapes, world
 
-with silence_stdio():  # it prints its build time
+with processes.silence_stdio():  # it prints its build time
     import pybullet
 
 _HULL_FILES = 4096
@@ -34,12 +24,12 @@ _HULL_FILES = 4096
 @dataclass(frozen=True, eq=False, slots=True)
 class _Solid:
     number: int
-    shape: CollisionShape
+    shape: collision_shapes.CollisionShape
     scale: float
     T_body_center: SE3
     mass_kg: float
     friction: float
-    joint: BodyJoint | None = None
+    joint: scene.BodyJoint | None = None
     T_world_home: SE3 = IDENTITY
 
     @property
@@ -65,7 +55,7 @@ class BulletWorld:
             # pybullet never drops cached files: 16 kB for each shape at each scale.
             "enableFileCaching": 0,
         }
-        folder = TemporaryFolder("physics")
+        folder = temporary_folders.TemporaryFolder("physics")
         self._folder, self._hull_files = folder.path, 0
         # Also when a program ends, or drops the world, without closing it.
         self._remove_folder = weakref.finalize(self, folder.remove)
@@ -91,13 +81,13 @@ class BulletWorld:
         """Remove all bodies and restore the parameters."""
         self._solids, self._names, self._bounds = {}, {}, {}
         pybullet.resetSimulation(**self._here)
-        pybullet.setGravity(0.0, 0.0, -GRAVITY_M_S2, **self._here)
+        pybullet.setGravity(0.0, 0.0, -world.GRAVITY_M_S2, **self._here)
         pybullet.setPhysicsEngineParameter(**self._here, **self._parameters)
 
     def add(
         self,
         name: str,
-        shape: CollisionShape,
+        shape: collision_shapes.CollisionShape,
         T_world_body: SE3,
         *,
         scale: float = 1.0,
@@ -119,7 +109,7 @@ class BulletWorld:
         )
         rolling = 0.0
         if mass_kg > 0.0:
-            rolling = ROLLING_FRICTION_SHARE * float(shape.half_extents_m.min()) * scale
+            rolling = world.ROLLING_FRICTION_SHARE * float(shape.half_extents_m.min()) * scale
         pybullet.changeDynamics(
             number,
             -1,
@@ -127,7 +117,7 @@ class BulletWorld:
             restitution=restitution,
             rollingFriction=rolling,
             spinningFriction=rolling,
-            angularDamping=ANGULAR_DAMPING_PER_S,
+            angularDamping=world.ANGULAR_DAMPING_PER_S,
             **self._here,
         )
         self._solids[name] = _Solid(number, shape, scale, T_body_center, mass_kg, friction)
@@ -136,9 +126,9 @@ class BulletWorld:
     def add_jointed(
         self,
         name: str,
-        shape: CollisionShape,
+        shape: collision_shapes.CollisionShape,
         T_world_body: SE3,
-        joint: BodyJoint,
+        joint: scene.BodyJoint,
         *,
         mass_kg: float,
         friction: float = 0.6,
@@ -183,7 +173,7 @@ class BulletWorld:
         )
         self._names[number] = name
 
-    def hinge(self, name: str, joint: BodyJoint) -> None:
+    def hinge(self, name: str, joint: scene.BodyJoint) -> None:
         """Let a loose body move along a joint only, from its present pose on, at rest."""
         solid, pose = self._solids[name], self.pose(name)
         self.remove(name)
@@ -225,7 +215,7 @@ class BulletWorld:
         solid = self._solids[name]
         self._bounds.pop(name, None)
         if solid.joint is not None:
-            at = joint_position(solid.joint, solid.T_world_home, T_world_body)
+            at = world.joint_position(solid.joint, solid.T_world_home, T_world_body)
             pybullet.resetJointState(solid.number, 0, at, **self._here)
             return
         position, orientation = _bullet_pose(T_world_body @ solid.T_body_center)
@@ -284,24 +274,26 @@ class BulletWorld:
         solid = self._solids[name]
         return solid.shape.hits_m(self._center(solid), solid.scale, origins_m, direction)
 
-    def contacts(self) -> list[Contact]:
+    def contacts(self) -> list[world.Contact]:
         """All points at which bodies touch, one of which can move."""
         pybullet.performCollisionDetection(**self._here)
         return [
-            Contact(self._names[p[1]], self._names[p[2]], float(p[8]), float(p[9]), tuple(p[6]))
+            world.Contact(
+                self._names[p[1]], self._names[p[2]], float(p[8]), float(p[9]), tuple(p[6])
+            )
             for p in pybullet.getContactPoints(**self._here)
         ]
 
     def _center(self, solid: _Solid) -> SE3:
         if solid.joint is not None:
-            pose = jointed_pose(solid.joint, solid.T_world_home, self._position(solid))
+            pose = world.jointed_pose(solid.joint, solid.T_world_home, self._position(solid))
             return pose @ solid.T_body_center
         pose = pybullet.getBasePositionAndOrientation(solid.number, **self._here)
         (px, py, pz), (x, y, z, w) = pose
         return SE3((px, py, pz), (w, x, y, z))
 
     def _collision_shape(
-        self, shape: CollisionShape, scale: float, center_m: Vec3 = (0.0, 0.0, 0.0)
+        self, shape: collision_shapes.CollisionShape, scale: float, center_m: Vec3 = (0.0, 0.0, 0.0)
     ) -> int:
         """The number of a shape, with its centre of mass at a point of the frame that has it."""
         if shape.boxes:
@@ -317,14 +309,14 @@ class BulletWorld:
             return int(number)
         number = pybullet.createCollisionShape(
             pybullet.GEOM_MESH,
-            fileName=str(self._hull_file(shape, scale_step(scale))),
+            fileName=str(self._hull_file(shape, collision_shapes.scale_step(scale))),
             meshScale=[scale, scale, scale],
             collisionFramePosition=center_m,
             **self._here,
         )
         return int(number)
 
-    def _hull_file(self, shape: CollisionShape, step: int) -> Path:
+    def _hull_file(self, shape: collision_shapes.CollisionShape, step: int) -> Path:
         """The file of a shape: pybullet takes compounds of hulls only from files, read at once."""
         path = self._folder / f"{shape.key}_{step}.obj"
         if not path.exists():

@@ -19,8 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.core.asset_types import ConvexParts
-from gen_data.core.code_digests import code_digest
+from gen_data.core import asset_types, code_digests
 from gen_data.core.se3 import SE3, Array, Vec3
 
 if TYPE_CHECKING:
@@ -173,7 +172,7 @@ def shape_version() -> str:
     """Everything but the parts that a shape depends on: code and libraries."""
     import scipy
 
-    return code_digest((__file__,), np.__version__, scipy.__version__)
+    return code_digests.code_digest((__file__,), np.__version__, scipy.__version__)
 
 
 def scale_step(scale: float) -> int:
@@ -181,7 +180,7 @@ def scale_step(scale: float) -> int:
     return round(math.log(scale) / math.log(_SCALE_STEP))
 
 
-def collision_shape(parts: ConvexParts) -> CollisionShape:
+def collision_shape(parts: asset_types.ConvexParts) -> CollisionShape:
     """The collision shape of an asset's convex parts."""
     measured = _measure(parts.parts_m)
     volumes_m3 = np.array([part.volume_m3 for part in measured])

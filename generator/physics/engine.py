@@ -10,21 +10,13 @@ from gen_data.core.errors import Rejection
 from gen_data.core.interfaces import AssetLibrary, DerivedArrays, Settled
 from gen_data.core.kinematics import make_link_bodies
 from gen_data.core.scene import Articulation, Body, BodyJoint, Episode, Scene
-from gen_data.physics.collision_shapes import (
-    CollisionShape,
-    collision_shape,
-    pack_shape,
-    shape_version,
-    unpack_shape,
-)
+from gen_data.physics import collision_shapes, physics_config, settling
 from gen_data.physics.manipulation.arm_goals import Arm, ArmState
 from gen_data.physics.manipulation.arm_simulation import ArmSimulation, Servo, SimulatedBodies
 from gen_data.physics.manipulation.demonstration import demonstrate
 from gen_data.physics.manipulation.joint_trajectories import TrajectoryRecording
 from gen_data.physics.manipulation.manipulation_planner import TaskPlanner
 from gen_data.physics.open_world import open_world
-from gen_data.physics.physics_config import PhysicsConfig
-from gen_data.physics.settling import Settling, candidate_surfaces
 
 _SHAPES = 512
 """Capacity of the cache of collision shapes, about 20 kB each."""
@@ -40,11 +32,11 @@ class Engine:
         config: Times, thresholds and accuracy.
     """
 
-    def __init__(self, assets: AssetLibrary, config: PhysicsConfig) -> None:
+    def __init__(self, assets: AssetLibrary, config: physics_config.PhysicsConfig) -> None:
         self._assets = assets
         self._config = config
         self._world = open_world(config)
-        self._shapes: CountCache[CollisionShape] = CountCache(_SHAPES)
+        self._shapes: CountCache[collision_shapes.CollisionShape] = CountCache(_SHAPES)
 
     def __enter__(self) -> Engine:
         """Return the engine, ready to settle."""
@@ -150,17 +142,19 @@ class Engine:
             restitution=body.restitution,
         )
 
-    def _shape(self, asset_id: str) -> CollisionShape:
+    def _shape(self, asset_id: str) -> collision_shapes.CollisionShape:
         return self._shapes.get(asset_id, lambda: self._load_shape(asset_id))
 
-    def _load_shape(self, asset_id: str) -> CollisionShape:
-        def compute() -> CollisionShape:
-            return collision_shape(self._assets.convex_parts(asset_id))
+    def _load_shape(self, asset_id: str) -> collision_shapes.CollisionShape:
+        def compute() -> collision_shapes.CollisionShape:
+            return collision_shapes.collision_shape(self._assets.convex_parts(asset_id))
 
         if not isinstance(self._assets, DerivedArrays):
             return compute()
-        name = f"collision shape {shape_version()}"
-        return unpack_shape(self._assets.derived(asset_id, name, lambda: pack_shape(compute())))
+        name = f"collision shape {collision_shapes.shape_version()}"
+        return collision_shapes.unpack_shape(
+            self._assets.derived(asset_id, name, lambda: collision_shapes.pack_shape(compute()))
+        )
 
     def _place(
         self, scene: Scene, falling: list[Body], fixed: list[str]
@@ -181,9 +175,9 @@ class Engine:
         return arms
 
     def _let_fall(self, scene: Scene, falling: list[Body], fixed: list[str]) -> Rejection | None:
-        surfaces = {body.name: candidate_surfaces(scene, body) for body in falling}
+        surfaces = {body.name: settling.candidate_surfaces(scene, body) for body in falling}
         links = [name for name in self._world.names if name not in fixed and name not in surfaces]
-        return Settling(self._world, falling, surfaces, self._config).settle(fixed, links)
+        return settling.Settling(self._world, falling, surfaces, self._config).settle(fixed, links)
 
     def _arm(self, articulation: Articulation) -> Arm:
         robot = self._assets.robot(articulation.asset)

@@ -1,17 +1,16 @@
 """The simulator of a configuration."""
 
 from gen_data.core.errors import ConfigError
-from gen_data.physics.physics_config import PhysicsConfig, missing_engine
-from gen_data.physics.world import World
+from gen_data.physics import physics_config, world
 
 
-def open_world(config: PhysicsConfig) -> World:
+def open_world(config: physics_config.PhysicsConfig) -> world.World:
     """Open an empty world of the configured simulator.
 
     Raises:
         ConfigError: it is not installed.
     """
-    missing = missing_engine(config.engine)
+    missing = physics_config.missing_engine(config.engine)
     if missing:
         raise ConfigError(f"physics.engine: {missing}")
     if config.engine == "mujoco":

@@ -6,10 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from gen_data.core.asset_types import Keypoint
+from gen_data.core import asset_types, scene_time
 from gen_data.core.interfaces import AssetLibrary
 from gen_data.core.scene import Body, Box3dExtent, Instance, Scene
-from gen_data.core.scene_time import add_twists, scene_at
 from gen_data.core.se3 import SE3, Array, Vec3
 
 
@@ -35,7 +34,7 @@ class Timeline:
         if time_s == self.view.time_s:
             return self.view
         if time_s not in self._scenes:
-            moved = scene_at(self.view, time_s)
+            moved = scene_time.scene_at(self.view, time_s)
             ids = self.category_ids
             self._scenes[time_s] = finalize_scene(moved, self.assets, ids, before=self.view)
         return self._scenes[time_s]
@@ -72,7 +71,7 @@ def finalize_scene(
         return replace(instance, **found)
 
     instances = tuple(map(finalize, scene.instances))
-    return add_twists(replace(scene, instances=instances))
+    return scene_time.add_twists(replace(scene, instances=instances))
 
 
 def _describe(
@@ -101,7 +100,7 @@ def _measure(
             "box_max_m": _scale(high, body.scale),
             "body_bounds_m": _body_bounds(body, assets) if box3d == "body" else None,
             "keypoints": tuple(
-                Keypoint(
+                asset_types.Keypoint(
                     point.name,
                     _scale(point.position_m, body.scale),
                     point.radius_m * body.scale,

@@ -9,13 +9,11 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from gen_data.core import intrinsics, serialization, streams
 from gen_data.core.capture import Channel
 from gen_data.core.interfaces import PhysicsEngine, Renderer
-from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.scene import Body, Camera, Instance, Light, Scene
 from gen_data.core.se3 import SE3, look_at
-from gen_data.core.serialization import canonical_json
-from gen_data.core.streams import Streams
 
 SIZE_PX = 64
 CHANNELS = frozenset({Channel.RADIANCE, Channel.Z_DEPTH, Channel.NORMALS, Channel.INSTANCE})
@@ -33,7 +31,7 @@ def numerics_digests(renderer: Renderer, physics: PhysicsEngine | None) -> Mappi
     if physics is not None:
         settled = physics.settle(scene)
         poses = [body.T_world_body.rounded() for body in settled.scene.bodies]
-        digests["physics"] = _digest(canonical_json(poses).encode())
+        digests["physics"] = _digest(serialization.canonical_json(poses).encode())
     reading = renderer.render(scene, scene.cameras[0], CHANNELS)
     images = (reading.channels[channel] for channel in sorted(CHANNELS, key=str))
     digests["render"] = _digest(*(np.ascontiguousarray(image).tobytes() for image in images))
@@ -59,13 +57,13 @@ def _canary_scene() -> Scene:
     )
     things = tuple(Instance(b.instance_id, b.name, "canary", 1, b.asset) for b in bodies)
     eye = look_at((0.5, 0.3, 0.4), (0.0, 0.0, 0.2))
-    camera = Camera("canary", eye, Intrinsics.from_hfov(SIZE_PX, SIZE_PX, hfov_rad=1.0))
+    camera = Camera("canary", eye, intrinsics.Intrinsics.from_hfov(SIZE_PX, SIZE_PX, hfov_rad=1.0))
     sun = Light("sun", "sun", direction=(0.0, -0.6, -0.8), illuminance_lux=500.0)
     return Scene("canary", bodies=bodies, instances=things, lights=(sun,), cameras=(camera,))
 
 
 def _draws() -> bytes:
-    rng = Streams(7, 0).rng("canary")
+    rng = streams.Streams(7, 0).rng("canary")
     drawn = [rng.uniform(size=64), rng.normal(size=64), rng.exponential(size=64)]
     return b"".join(a.tobytes() for a in drawn) + rng.permutation(64).tobytes()
 

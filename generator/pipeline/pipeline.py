@@ -28,10 +28,9 @@ from gen_data.core.sample import EgoTruth, ImageTruth, Sample
 from gen_data.core.scene import LABEL_IDS_MAX, Scene
 from gen_data.core.scene_time import place_sensors
 from gen_data.core.streams import Streams
-from gen_data.pipeline.checked_renderer import CheckedRenderer
+from gen_data.pipeline import checked_renderer, splits
 from gen_data.pipeline.finalize_scene import Timeline, finalize_scene
 from gen_data.pipeline.numerics import numerics_digests
-from gen_data.pipeline.splits import Assignment, split_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -69,7 +68,7 @@ class PipelineConfig:
     exporters: Mapping[str, Exporter]
     strides: Mapping[str, int] = field(default_factory=dict)
     frame_truth: Callable[[Mapping[str, Scene]], EgoTruth | None] | None = None
-    split_assignment: Assignment = "random"
+    split_assignment: splits.Assignment = "random"
     located_errors: Callable[[], AbstractContextManager[None]] = nullcontext
 
 
@@ -133,7 +132,7 @@ class Pipeline:
     @cached_property
     def renderer(self) -> Renderer:
         """The renderer, opened by the context or on first use; merging shards needs none."""
-        return CheckedRenderer(self._open_renderer())
+        return checked_renderer.CheckedRenderer(self._open_renderer())
 
     def __enter__(self) -> Pipeline:
         """Start the engines."""
@@ -261,7 +260,7 @@ class Pipeline:
     def split(self, scene_index: int) -> str:
         """Split of a scene and all of its views."""
         shares, assignment = self.config.split_shares, self.config.split_assignment
-        return split_of(scene_index, shares, assignment, self.info.seed)
+        return splits.split_of(scene_index, shares, assignment, self.info.seed)
 
     def _accept(self, scene_index: int) -> AcceptedScene:
         """Draw and settle a scene."""

@@ -18,23 +18,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.annotations.amodal_masks import AmodalMasks
+from gen_data.annotations import amodal_masks, boxes2d, instance_extents, instance_masks
 from gen_data.annotations.annotate import Thresholds, is_listed
-from gen_data.annotations.boxes2d import Boxes2d
-from gen_data.annotations.instance_extents import find_extents
-from gen_data.annotations.instance_masks import InstanceMasks
 from gen_data.annotations.lanes import runs
 from gen_data.annotations.oriented_boxes2d import OrientedBoxes2d
 from gen_data.annotations.part_masks import PartMasks
 from gen_data.annotations.visibility import Visibility
+from gen_data.core import errors, lens, se3
 from gen_data.core.boxes import BoxPx, tight_box
 from gen_data.core.capture import Channel, SensorReading, Silhouette
-from gen_data.core.errors import ConfigError
 from gen_data.core.intrinsics import Intrinsics
-from gen_data.core.lens import PINHOLE
 from gen_data.core.sample import BorderTruth, ImageTruth, KeypointTruth, MaskPx, ObjectTruth
 from gen_data.core.scene import Scene
-from gen_data.core.se3 import Array
 from gen_data.exporters.base import Rectify
 
 WIDEST_DEG = 150.0
@@ -83,12 +78,12 @@ def rectified_intrinsics(source: Intrinsics, wanted: Rectify) -> Intrinsics:
         hfov_rad = math.radians(wanted.hfov_deg)
         return Intrinsics.from_hfov(source.width_px, source.height_px, hfov_rad)
     if wanted.keep_focal:
-        return replace(source, lens=PINHOLE)
+        return replace(source, lens=lens.PINHOLE)
     widest_px = 0.5 * source.width_px / math.tan(math.radians(0.5 * WIDEST_DEG))
     low, high = widest_px, 64.0 * source.width_px
     whole = source.lens.model != "equirectangular"
     if not whole or _is_covered(source, low) or not _is_covered(source, high):
-        raise ConfigError(
+        raise errors.ConfigError(
             f"rectify: the lens '{source.lens.model}' sees too much for one pinhole, whose image "
             f"would be wider than {WIDEST_DEG:g} degrees; expected rectify: {{hfov_deg: 90}}, the "
             "horizontal field of the rectified image, or a list cameras: without this camera"
@@ -159,11 +154,11 @@ class Rectification:
             return NO_MASK
         return MaskPx(box.x_min, box.y_min, seen[box.window(area.x_min, area.y_min)])
 
-    def points(self, points_px: Array) -> Array:
+    def points(self, points_px: se3.Array) -> se3.Array:
         """Image points [..., 2] in the new image, also beside it; NaN where it has none."""
         return self.target.project(self.source.rays(points_px))
 
-    def shows(self, points_px: Array) -> NDArray[np.bool_]:
+    def shows(self, points_px: se3.Array) -> NDArray[np.bool_]:
         """Whether points [..., 2] are inside the new image."""
         size = (self.target.width_px, self.target.height_px)
         return np.asarray(((points_px >= 0.0) & (points_px < size)).all(axis=-1))
@@ -185,7 +180,7 @@ class Rectification:
         return BoxPx(-width, -height, 2 * width, 2 * height)
 
     @cached_property
-    def _inside(self) -> Array:
+    def _inside(self) -> se3.Array:
         """Original coordinates of the centres of the new pixels, [height, width, 2]; NaN = none."""
         return self._sources(self._window)
 
@@ -209,13 +204,13 @@ class Rectification:
             places[first:last] = np.where(seen, rows * self.source.width_px + columns, -1)
         return places
 
-    def _sources(self, area: BoxPx) -> Array:
+    def _sources(self, area: BoxPx) -> se3.Array:
         u = np.arange(area.x_min, area.x_max) + 0.5
         v = np.arange(area.y_min, area.y_max) + 0.5
         centres = np.stack(np.meshgrid(u, v), axis=-1)
         return np.asarray(np.round(self.source.project(self.target.rays(centres)), _DECIMALS))
 
-    def _edge(self, box: BoxPx) -> Array:
+    def _edge(self, box: BoxPx) -> se3.Array:
         """New places of points along the edge of a box, [n, 2]."""
         u = np.linspace(box.x_min, box.x_max, EDGE_POINTS)
         v = np.linspace(box.y_min, box.y_max, EDGE_POINTS)
@@ -245,7 +240,7 @@ class Rectification:
         return np.asarray(mixed)
 
 
-def _around(points_px: Array, margin_px: int = 0) -> BoxPx:
+def _around(points_px: se3.Array, margin_px: int = 0) -> BoxPx:
     """Whole pixels around points [n, 2]."""
     # Far beyond the canvas, numbers need not fit into integers.
     points = np.clip(points_px, -1e6, 1e6)
@@ -298,7 +293,7 @@ def rectified_truth(
         if t.amodal_mask is not None
     }
     reading = SensorReading(camera.name, camera, channels, whole)
-    seen = find_extents(ids)
+    seen = instance_extents.find_extents(ids)
     objects = []
     for thing in truth.objects:
         number = thing.instance.instance_id
@@ -333,7 +328,7 @@ def rectified_truth(
 
 def _pixel_labels(thing: ObjectTruth, scene: Scene, reading: SensorReading) -> ObjectTruth:
     """Labels of visible pixels, by the annotators that made them."""
-    thing = InstanceMasks().annotate(scene, reading, thing)
+    thing = instance_masks.InstanceMasks().annotate(scene, reading, thing)
     if thing.oriented_box is not None:
         thing = OrientedBoxes2d().annotate(scene, reading, replace(thing, oriented_box=None))
     if thing.part_px is not None:
@@ -357,9 +352,9 @@ def _silhouette_labels(
     """Labels of the whole silhouette; ``visible`` is the visible mask on the canvas."""
     cut = thing.truncation or 0.0
     if thing.amodal_mask is not None:
-        again = AmodalMasks().annotate(scene, reading, again)
+        again = amodal_masks.AmodalMasks().annotate(scene, reading, again)
     if thing.amodal_mask is not None and thing.amodal_mask.pixels.any():
-        again = Boxes2d().annotate(scene, reading, again)
+        again = boxes2d.Boxes2d().annotate(scene, reading, again)
         shares = Visibility().annotate(scene, reading, again)
         visible_fraction = (shares.visible_fraction or 0.0) * (1.0 - cut)
         inside, occlusion = 1.0 - (shares.truncation or 0.0), shares.occlusion

@@ -10,8 +10,7 @@ from typing import Any, Literal
 from pydantic import Field, model_validator
 
 from gen_data.config.base_model import Strict
-from gen_data.core.errors import ConfigWarning
-from gen_data.core.streams import Streams
+from gen_data.core import errors, streams
 
 Assignment = Literal["random", "round_robin"]
 """``random``: every scene draws its split. ``round_robin``: splits take turns by their shares."""
@@ -78,7 +77,7 @@ def split_of(
         while count <= scene_index:
             count *= 2
         return _turns(tuple(shares.items()), count)[scene_index]
-    draw = Streams(seed, scene_index).rng("split").uniform()
+    draw = streams.Streams(seed, scene_index).rng("split").uniform()
     for name, share in shares.items():
         if draw < share:
             return name
@@ -113,7 +112,7 @@ def warn_of_empty_splits(
         f"splits: {scene_count} {'scene leaves' if scene_count == 1 else 'scenes leave'} {empty} "
         f"empty; expected more scenes{remedy}, or other shares"
     )
-    warnings.warn(message, ConfigWarning, stacklevel=2)
+    warnings.warn(message, errors.ConfigWarning, stacklevel=2)
 
 
 @lru_cache(maxsize=8)

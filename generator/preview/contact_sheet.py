@@ -9,11 +9,8 @@ from types import MappingProxyType
 import cv2
 import numpy as np
 
-from gen_data.core.capture import Channel
-from gen_data.core.errors import ConfigError, StorageError
-from gen_data.core.plugins import loaded
+from gen_data.core import capture, errors, plugins, whole_files
 from gen_data.core.sample import Sample
-from gen_data.core.whole_files import write_whole
 from gen_data.preview.overlay import Image, channel_image, draw_labels
 from gen_data.preview.sensor_views import range_view, top_view
 from gen_data.sensors.lidar import pseudo_lidar
@@ -35,7 +32,7 @@ class Tile:
 
 def make_tiles(
     samples: Iterable[Sample],
-    channels: Mapping[str, Sequence[Channel]],
+    channels: Mapping[str, Sequence[capture.Channel]],
     *,
     labels: bool,
     views: Mapping[str, str] = MappingProxyType({}),
@@ -57,7 +54,7 @@ def make_tiles(
             shown = [c for c in channels[name] if c in reading.channels]
             for channel in shown:
                 caption = name if len(shown) == 1 else f"{name} {channel.value}"
-                if labels and channel is Channel.RGB:
+                if labels and channel is capture.Channel.RGB:
                     unit = reading.camera.intrinsics.width_px / width_px if width_px else 1.0
                     yield Tile(caption, draw_labels(reading, sample.truth[name], unit))
                 else:
@@ -70,7 +67,7 @@ def make_tiles(
             yield Tile(f"{name} range, intensity, class", range_view(cloud))
         for name, table in sorted(sample.capture.tables.items()):
             if name in views:
-                draw = loaded(views[name], f"view of '{name}'")
+                draw = plugins.loaded(views[name], f"view of '{name}'")
                 yield Tile(name, draw(table, sample.scene, aspect))
 
 
@@ -91,7 +88,7 @@ def arrange_tiles(images: Sequence[Image], columns: int) -> Image:
         ConfigError: there is no tile.
     """
     if not images:
-        raise ConfigError("a contact sheet needs at least one sample")
+        raise errors.ConfigError("a contact sheet needs at least one sample")
     height = max(image.shape[0] for image in images)
     width = max(image.shape[1] for image in images)
     columns = columns or max(1, round(math.sqrt(len(images) * 4.0 / 3.0 * height / width)))
@@ -117,11 +114,11 @@ def write_sheet(sheet: Image, path: Path) -> None:
     """
     done, encoded = cv2.imencode(".png", sheet[..., ::-1])
     if not done:
-        raise StorageError(f"{path}: the contact sheet could not be encoded")
+        raise errors.StorageError(f"{path}: the contact sheet could not be encoded")
     try:
-        write_whole({path: encoded.tobytes()})
+        whole_files.write_whole({path: encoded.tobytes()})
     except OSError as error:
-        raise StorageError(f"{path}: {error.strerror}") from error
+        raise errors.StorageError(f"{path}: {error.strerror}") from error
 
 
 def _add_caption(image: Image, caption: str) -> Image:

@@ -5,9 +5,7 @@ import math
 import cv2
 import numpy as np
 
-from gen_data.core.asset_types import UInt8
-from gen_data.core.plates import Plate, ground_points, horizon_px
-from gen_data.core.se3 import Array
+from gen_data.core import asset_types, plates, se3
 from gen_data.preview.overlay import Image
 
 _HORIZON, _CORNERS, _GRID, _LANE = (255, 60, 60), (255, 220, 0), (0, 220, 255), (120, 255, 80)
@@ -18,7 +16,7 @@ _SHIFT = 4
 """Fractional bits of drawn coordinates."""
 
 
-def plate_overlay(plate: Plate, rgb: UInt8) -> Image:
+def plate_overlay(plate: plates.Plate, rgb: asset_types.UInt8) -> Image:
     """The photograph, uint8 [h, w, 3], with its estimated or given geometry drawn on it."""
     image = rgb.copy()
     width = max(1, round(max(plate.size_px) / 500))
@@ -28,13 +26,13 @@ def plate_overlay(plate: Plate, rgb: UInt8) -> Image:
     _draw(image, corners, _CORNERS, width)
     for lane in plate.lanes:
         _draw(image, _project(plate, np.array(lane.center_m)), _LANE, width)
-    _draw(image, np.array(horizon_px(plate)), _HORIZON, width)
+    _draw(image, np.array(plates.horizon_px(plate)), _HORIZON, width)
     return np.asarray(image, np.uint8)
 
 
-def _grid_lines(plate: Plate) -> list[Array]:
+def _grid_lines(plate: plates.Plate) -> list[se3.Array]:
     """Image points of lines 1 m (or more) apart on the ground, around its corners."""
-    corners = ground_points(plate, np.array(plate.ground_px))
+    corners = plates.ground_points(plate, np.array(plate.ground_px))
     low, high = corners.min(axis=0), corners.max(axis=0)
     step = max(1, math.ceil(float((high - low).max()) / _LINES_MAX))
     lines = []
@@ -48,12 +46,12 @@ def _grid_lines(plate: Plate) -> list[Array]:
     return lines
 
 
-def _project(plate: Plate, points_m: Array) -> Array:
+def _project(plate: plates.Plate, points_m: se3.Array) -> se3.Array:
     """Image coordinates of points of the plate's world; NaN behind the camera."""
     return plate.intrinsics.project(plate.T_world_camera.inverse().apply(points_m))
 
 
-def _draw(image: Image, points_px: Array, color: tuple[int, int, int], width: int) -> None:
+def _draw(image: Image, points_px: se3.Array, color: tuple[int, int, int], width: int) -> None:
     """Draw a line through image points, without those that have none."""
     shown = points_px[np.isfinite(points_px).all(axis=1)]
     # OpenCV puts pixel centres at integers, and takes 16 bits before the point.

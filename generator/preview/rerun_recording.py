@@ -15,20 +15,12 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
-from gen_data.core.asset_types import MeshData
+from gen_data.core import asset_types, errors, interfaces, intrinsics, se3, skeletons, whole_files
 from gen_data.core.boxes import OrientedBox
 from gen_data.core.capture import Channel, PointCloud, SensorReading
-from gen_data.core.errors import StorageError
-from gen_data.core.interfaces import AssetLibrary, DatasetInfo
-from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.sample import ImageTruth, Sample
 from gen_data.core.scene import Body, Instance, Scene
-from gen_data.core.se3 import SE3
-from gen_data.core.skeletons import Skeleton, find_skeleton
-from gen_data.core.whole_files import whole_file
-from gen_data.preview.overlay import channel_image
-from gen_data.preview.palette import id_color
-from gen_data.preview.sensor_views import PointColors, point_colors
+from gen_data.preview import overlay, palette, sensor_views
 
 TIMELINE = "sample"
 TIME = "time"
@@ -62,11 +54,11 @@ class Recorder:
     """
 
     stream: rr.RecordingStream
-    assets: AssetLibrary
-    info: DatasetInfo
-    points: PointColors = "class"
+    assets: interfaces.AssetLibrary
+    info: interfaces.DatasetInfo
+    points: sensor_views.PointColors = "class"
     _sent: dict[str, tuple[Any, ...]] = field(default_factory=dict)
-    _skeletons: dict[int, Skeleton] = field(default_factory=dict)
+    _skeletons: dict[int, skeletons.Skeleton] = field(default_factory=dict)
     _sequence: int = -1
     _is_open: bool = False
 
@@ -80,13 +72,13 @@ class Recorder:
         background = rr.AnnotationInfo(id=0, label="background", color=(60, 60, 60))
         described = [rr.ClassDescription(info=background)]
         for k, name in enumerate(self.info.categories, 1):
-            info = rr.AnnotationInfo(id=k, label=name, color=id_color(k))
-            skeleton = self._skeletons.get(k, Skeleton(()))
+            info = rr.AnnotationInfo(id=k, label=name, color=palette.id_color(k))
+            skeleton = self._skeletons.get(k, skeletons.Skeleton(()))
             described.append(
                 rr.ClassDescription(
                     info=info,
                     keypoint_annotations=[
-                        rr.AnnotationInfo(id=i, label=label, color=id_color(k))
+                        rr.AnnotationInfo(id=i, label=label, color=palette.id_color(k))
                         for i, label in enumerate(skeleton.names)
                     ],
                     keypoint_connections=skeleton.bones,
@@ -99,9 +91,9 @@ class Recorder:
         known = dict(self._skeletons)
         for instance in instances:
             if instance.keypoints and instance.category_id:
-                before = known.get(instance.category_id, Skeleton(()))
+                before = known.get(instance.category_id, skeletons.Skeleton(()))
                 names = (*before.names, *(point.name for point in instance.keypoints))
-                known[instance.category_id] = find_skeleton(names)
+                known[instance.category_id] = skeletons.find_skeleton(names)
         if known != self._skeletons:
             self._skeletons = known
             self._name_classes()
@@ -151,7 +143,7 @@ class Recorder:
 
     def _record_frames(self, scene: Scene) -> None:
         """Log the poses of rigs and devices; cameras and scanners are logged per reading."""
-        frames: dict[str, SE3] = {
+        frames: dict[str, se3.SE3] = {
             f"world/rigs/{rig.name}": scene.rig_pose(rig.name) for rig in scene.rigs
         } | {f"world/devices/{device.name}": device.T_world_device for device in scene.devices}
         for path, pose in frames.items():
@@ -166,7 +158,7 @@ class Recorder:
             until_s = sample.scene.time_s + remaining * self.info.step_s
             self.stream.log("world/ways", trajectory_strips(sample.scene, until_s))
 
-    def _slot_colors(self, body: Body, mesh: MeshData) -> NDArray[np.uint8]:
+    def _slot_colors(self, body: Body, mesh: asset_types.MeshData) -> NDArray[np.uint8]:
         """SRGB colour per material slot: base colour times the texture's mean."""
         colors = []
         for material in body.materials or mesh.materials:
@@ -192,7 +184,7 @@ class Recorder:
             elif channel is Channel.CATEGORY:
                 self.stream.log(f"channels/{name}/category", rr.SegmentationImage(data))
             else:
-                colored = rr.Image(channel_image(reading, channel)).compress(90)
+                colored = rr.Image(overlay.channel_image(reading, channel)).compress(90)
                 self.stream.log(f"channels/{name}/{channel.value}", colored)
         self.stream.log(f"{path}/image/boxes", boxes_2d(truth))
         self._record_keypoints(f"{path}/image/keypoints", truth)
@@ -217,7 +209,7 @@ class Recorder:
     def _record_cloud(self, name: str, cloud: PointCloud) -> None:
         path = f"world/lidars/{name}"
         self.stream.log(path, transform(cloud.lidar.T_world_lidar))
-        colors = point_colors(cloud, self.points)
+        colors = sensor_views.point_colors(cloud, self.points)
         points = rr.Points3D(
             cloud.points["position_m"], colors=colors, radii=rr.Radius.ui_points(1.5)
         )
@@ -227,10 +219,10 @@ class Recorder:
 def save_recording(
     path: Path,
     samples: Iterable[Sample],
-    assets: AssetLibrary,
+    assets: interfaces.AssetLibrary,
     *,
-    info: DatasetInfo,
-    points: PointColors = "class",
+    info: interfaces.DatasetInfo,
+    points: sensor_views.PointColors = "class",
 ) -> None:
     """Write samples to a ``.rrd`` file.
 
@@ -238,23 +230,23 @@ def save_recording(
         StorageError: the file cannot be written.
     """
     try:
-        with whole_file(path) as unfinished:
+        with whole_files.whole_file(path) as unfinished:
             unfinished.touch()
             stream = rr.RecordingStream(APPLICATION)
             stream.save(unfinished)
             _record_all(Recorder(stream, assets, info, points), samples)
             stream.disconnect()
     except OSError as error:
-        raise StorageError(f"{path}: {error.strerror or error}") from error
+        raise errors.StorageError(f"{path}: {error.strerror or error}") from error
 
 
 def send_samples(
     url: str,
     samples: Iterable[Sample],
-    assets: AssetLibrary,
+    assets: interfaces.AssetLibrary,
     *,
-    info: DatasetInfo,
-    points: PointColors = "class",
+    info: interfaces.DatasetInfo,
+    points: sensor_views.PointColors = "class",
 ) -> None:
     """Send samples to the viewer at ``url``, one by one as they are generated."""
     stream = rr.RecordingStream(APPLICATION)
@@ -269,7 +261,7 @@ def _record_all(recorder: Recorder, samples: Iterable[Sample]) -> None:
         recorder.record(sample)
 
 
-def _layout(info: DatasetInfo, first: Sample) -> rrb.Blueprint:
+def _layout(info: interfaces.DatasetInfo, first: Sample) -> rrb.Blueprint:
     world = rrb.Spatial3DView(origin="world", name="scene", eye_controls=_eye(first))
     cameras = rrb.Vertical(*(_camera_view(info, name) for name in info.cameras))
     return rrb.Blueprint(rrb.Horizontal(world, cameras), collapse_panels=True)
@@ -285,7 +277,7 @@ def _eye(sample: Sample) -> rrb.EyeControls3D | None:
     return rrb.EyeControls3D(position=position, look_target=target, eye_up=(0.0, 0.0, 1.0))
 
 
-def _camera_view(info: DatasetInfo, name: str) -> rrb.Spatial2DView | rrb.Tabs:
+def _camera_view(info: interfaces.DatasetInfo, name: str) -> rrb.Spatial2DView | rrb.Tabs:
     """View of a camera's image, with tabs for its other channels."""
     image = rrb.Spatial2DView(origin=f"world/cameras/{name}/image", name=name)
     others = [
@@ -296,7 +288,7 @@ def _camera_view(info: DatasetInfo, name: str) -> rrb.Spatial2DView | rrb.Tabs:
     return rrb.Tabs(image, *others) if others else image
 
 
-def transform(pose: SE3, scale: float = 1.0) -> rr.Transform3D:
+def transform(pose: se3.SE3, scale: float = 1.0) -> rr.Transform3D:
     """Convert a pose, with an optional scale of its children."""
     return rr.Transform3D(
         translation=pose.translation_m,
@@ -305,7 +297,7 @@ def transform(pose: SE3, scale: float = 1.0) -> rr.Transform3D:
     )
 
 
-def pinhole(camera: Intrinsics) -> rr.Pinhole:
+def pinhole(camera: intrinsics.Intrinsics) -> rr.Pinhole:
     """Convert a pinhole camera: X right, Y down, Z forward."""
     return rr.Pinhole(
         image_from_camera=camera.matrix(),
@@ -316,7 +308,7 @@ def pinhole(camera: Intrinsics) -> rr.Pinhole:
     )
 
 
-def mesh_3d(mesh: MeshData, slot_colors: NDArray[np.uint8]) -> rr.Mesh3D:
+def mesh_3d(mesh: asset_types.MeshData, slot_colors: NDArray[np.uint8]) -> rr.Mesh3D:
     """Convert a mesh with one sRGB colour per material slot, [slots, 3]."""
     corners = mesh.faces.reshape(-1)
     slots = np.repeat(mesh.face_slots, 3)
@@ -371,10 +363,10 @@ def trajectory_strips(scene: Scene, until_s: float) -> rr.LineStrips3D:
         category_id = categories.get(scene.body(track.body).instance_id, 0)
         strips.append(np.add(places_m, (0.0, 0.0, LIFT_M)))
         carries = track.body in carriers or not category_id
-        colors.append((255, 255, 255) if carries else id_color(category_id))
+        colors.append((255, 255, 255) if carries else palette.id_color(category_id))
     return rr.LineStrips3D(strips, colors=colors, radii=rr.Radius.ui_points(1.5))
 
 
-def _xyzw(pose: SE3) -> tuple[float, float, float, float]:
+def _xyzw(pose: se3.SE3) -> tuple[float, float, float, float]:
     w, x, y, z = pose.quaternion_wxyz
     return (x, y, z, w)

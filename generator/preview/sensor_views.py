@@ -9,11 +9,9 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from gen_data.core.asset_types import SURFACES
-from gen_data.core.boxes import OrientedBox
+from gen_data.core import asset_types, boxes, se3
 from gen_data.core.capture import Measurements, PointCloud
 from gen_data.core.scene import Scene
-from gen_data.core.se3 import SE3
 from gen_data.preview.overlay import BOX_EDGES, Image
 from gen_data.preview.palette import color_shares, id_color
 
@@ -54,7 +52,7 @@ def point_colors(cloud: PointCloud, by: PointColors = "class") -> NDArray[np.uin
         return color_shares(np.sqrt(points["intensity"]))
     categories = points["category_id"]
     of_category = [id_color(k) for k in range(int(categories.max(initial=0)) + 1)]
-    of_surface = [COLORS.get(name, UNLABELLED) for name in SURFACES]
+    of_surface = [COLORS.get(name, UNLABELLED) for name in asset_types.SURFACES]
     colors: NDArray[np.uint8] = np.array(of_surface, np.uint8)[points["surface"]]
     labelled = categories > 0
     colors[labelled] = np.array(of_category, np.uint8)[categories[labelled]]
@@ -88,7 +86,7 @@ def empty_view(aspect: float) -> Image:
     return np.zeros((max(8, round(PANEL_PX / aspect)), PANEL_PX, 3), np.uint8)
 
 
-def outline_things(image: Image, scene: Scene, T_world_sensor: SE3) -> None:
+def outline_things(image: Image, scene: Scene, T_world_sensor: se3.SE3) -> None:
     """Draw the boxes of annotated instances around a sensor from above, in place."""
     T_sensor_world = T_world_sensor.inverse()
     for thing in scene.instances:
@@ -135,7 +133,7 @@ def pixels_from_above(
     return column, row
 
 
-def _outline(image: Image, box: OrientedBox, color: tuple[int, int, int]) -> None:
+def _outline(image: Image, box: boxes.OrientedBox, color: tuple[int, int, int]) -> None:
     column, row = pixels_from_above(box.corners(), image)
     far = max(image.shape) * 4
     if max(np.abs(column).max(), np.abs(row).max()) > far:

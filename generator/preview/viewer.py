@@ -12,8 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import quote
 
-from gen_data.core.errors import ConfigError
-from gen_data.core.processes import tie
+from gen_data.core import errors, processes
 
 LOOPBACK = "127.0.0.1"
 GRPC_PORT = 9876
@@ -64,7 +63,7 @@ def serve_web(host: str) -> Viewer:
     port, web_port = _find_free_port(host, GRPC_PORT), _find_free_port(host, WEB_PORT)
     listening = ("--bind", host, "--port", str(port), "--web-viewer-port", str(web_port))
     command = (str(_executable()), "--serve-web", *listening)
-    process = subprocess.Popen(tie(command), stdout=subprocess.DEVNULL)
+    process = subprocess.Popen(processes.tie(command), stdout=subprocess.DEVNULL)
     _wait_until_listening(process, host, port)
     _wait_until_listening(process, host, web_port)
     # A wildcard is no address to connect to.
@@ -93,11 +92,11 @@ def _find_free_port(host: str, first: int) -> int:
             except OSError as error:
                 if error.errno == errno.EADDRINUSE:
                     continue
-                raise ConfigError(
+                raise errors.ConfigError(
                     f"--host {host}: {error.strerror}; expected an IPv4 address of this machine"
                 ) from error
             return port
-    raise ConfigError(f"--host {host}: ports {first} to {port} are all in use")
+    raise errors.ConfigError(f"--host {host}: ports {first} to {port} are all in use")
 
 
 def _wait_until_listening(process: subprocess.Popen[bytes], host: str, port: int) -> None:
@@ -111,7 +110,7 @@ def _wait_until_listening(process: subprocess.Popen[bytes], host: str, port: int
         else:
             return
     process.kill()
-    raise ConfigError(
+    raise errors.ConfigError(
         f"the Rerun viewer did not start (exit code {process.wait()}; see above); a desktop window "
         "takes a display: without one use --web, or --save and open the file elsewhere"
     )

@@ -20,9 +20,8 @@ from pydantic import BaseModel
 from gen_data.assemble.config import Config, load_config
 from gen_data.assemble.pipeline_factory import scene_source
 from gen_data.assets.library import Library
+from gen_data.config import shared_values, yaml_scalars
 from gen_data.config.distributions import Constant, Distribution, Numeric
-from gen_data.config.shared_values import Shared, read_shared
-from gen_data.config.yaml_scalars import to_flow_yaml
 from gen_data.core.errors import LayoutRejected
 from gen_data.core.interfaces import PhysicsEngine, Randomizer, Stage
 from gen_data.core.scene import Scene
@@ -32,8 +31,7 @@ from gen_data.core.streams import Rng, Streams
 from gen_data.packs.provision import open_assets
 from gen_data.physics import open_engine
 from gen_data.pipeline.finalize_scene import finalize_scene
-from gen_data.runner.plan import differences
-from gen_data.runner.provenance import KeptScene
+from gen_data.runner import plan, provenance
 from gen_data.runner.stored import StoredSamples
 
 ROUNDING = 1e-5
@@ -240,10 +238,10 @@ class Replay:
 
     def _shared_draws(self, scene: Scene) -> Iterator[Draw]:
         """Values of the section ``shared``."""
-        values: Shared = dict(scene.shared)
+        values: shared_values.Shared = dict(scene.shared)
         if values:
             section = self._config.document.entries["shared"]
-            for name, distribution in read_shared(section, values).items():
+            for name, distribution in shared_values.read_shared(section, values).items():
                 yield f"shared.{name}", distribution, values[name]
 
     def _keep(self, draws: Sequence[Draw], samples: range) -> None:
@@ -251,7 +249,7 @@ class Replay:
             if isinstance(distribution, Constant):
                 continue
             self.draws.append(Drawn(name, distribution, value, samples))
-            text = to_flow_yaml(distribution.to_yaml())
+            text = yaml_scalars.to_flow_yaml(distribution.to_yaml())
             self.distributions.setdefault((name, text), distribution)
             parameter = self._parameter(name)
             parameter.values.append(value)
@@ -267,12 +265,12 @@ class Replay:
         return self.parameters.setdefault(name, Parameter(name))
 
 
-def _first_difference(kept: KeptScene, drawn: Scene) -> str:
+def _first_difference(kept: provenance.KeptScene, drawn: Scene) -> str:
     """The first difference of a scene from the one that was drawn again; empty if equal."""
     if canonical_json(drawn) == canonical_json(kept.scene):
         return ""
     was, now = to_plain(kept.scene), to_plain(drawn)
-    found = next((line for line in differences("", was, _snap(was, now))), "")
+    found = next((line for line in plan.differences("", was, _snap(was, now))), "")
     return found and f"sample {kept.index}, drawn again: {found}"
 
 

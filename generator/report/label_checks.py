@@ -6,9 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from gen_data.core import intrinsics, scene
 from gen_data.core.boxes import OrientedBox, tight_box
-from gen_data.core.intrinsics import Intrinsics
-from gen_data.core.scene import Instance
 from gen_data.core.se3 import SE3
 from gen_data.core.serialization import from_plain
 from gen_data.report.stored_labels import ImageLabels, decode_mask
@@ -170,7 +169,7 @@ def _box_in_space(image: ImageLabels, item: Item) -> Iterator[str | None]:
     corners_m = _box_of_all(image, item).corners()
     if corners_m[:, 2].min() <= 0.0:
         return
-    corners_px = from_plain(Intrinsics, camera["intrinsics"]).project(corners_m)
+    corners_px = from_plain(intrinsics.Intrinsics, camera["intrinsics"]).project(corners_m)
     low, high = corners_px.min(axis=0), corners_px.max(axis=0)
     beyond = np.array(
         [*(low - (box["x_min"], box["y_min"])), *((box["x_max"], box["y_max"]) - high)]
@@ -183,7 +182,7 @@ def _box_of_all(image: ImageLabels, item: Item) -> OrientedBox:
     """The 3D box in the camera's frame, around the mirrors too where labels leave them out."""
     if item["instance"].get("body_bounds_m") is None:
         return from_plain(OrientedBox, item["box3d_camera"])
-    whole = replace(from_plain(Instance, item["instance"]), body_bounds_m=None)
+    whole = replace(from_plain(scene.Instance, item["instance"]), body_bounds_m=None)
     return whole.box3d.seen_from(from_plain(SE3, image.truth["camera"]["T_world_camera"]).inverse())
 
 

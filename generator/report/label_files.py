@@ -13,9 +13,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from gen_data.core import scene, se3
 from gen_data.core.errors import StorageError, no_folder
-from gen_data.core.scene import Instance
-from gen_data.core.se3 import Vec3
 from gen_data.exporters.kitti import occlusion_level, official_type
 
 INSTANCES = "instances_"
@@ -46,7 +45,7 @@ class Label:
     truncation: float | None = None
     visible_fraction: float | None = None
     distance_m: float | None = None
-    size_lwh_m: Vec3 | None = None
+    size_lwh_m: se3.Vec3 | None = None
     asset: str = ""
 
 
@@ -141,7 +140,7 @@ def _rows(path: Path) -> Iterator[tuple[str, dict[str, Any]]]:
 
 def _label(split: str, category: str, row: dict[str, Any]) -> Label:
     facts = {k: v for k, v in row.get("attributes", {}).items() if isinstance(v, str)}
-    instance = Instance(
+    instance = scene.Instance(
         row["id"], "", category, row["category_id"], "", attributes=tuple(sorted(facts.items()))
     )
     hidden = row.get("occlusion")

@@ -10,32 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.core.capture import Channel
-from gen_data.core.errors import GenDataError
-from gen_data.core.interfaces import media_path
-from gen_data.core.system_calls import usable_cores
+from gen_data.core import capture, errors, interfaces, system_calls
+from gen_data.report import image_statistics, label_checks, report_tables, sample_browser
 from gen_data.report.drawn_parameters import DrawnParameters, Parameter, draw_parameters
-from gen_data.report.image_statistics import (
-    DISTANCE_MAX,
-    DuplicateGroup,
-    ImageFile,
-    Look,
-    group_duplicates,
-    measure_images,
-)
-from gen_data.report.label_checks import CheckResult, LabelChecks
 from gen_data.report.label_files import read_records, read_scans
 from gen_data.report.label_gaps import count_objects, find_label_gaps, read_label_map
 from gen_data.report.label_statistics import Column, Survey, collect_statistics
-from gen_data.report.report_tables import (
-    Histogram,
-    Table,
-    count_values,
-    make_histograms,
-    make_scan_tables,
-    make_tables,
-)
-from gen_data.report.sample_browser import browser_images, thumbnail
 from gen_data.report.stored_labels import ObjectStatistics, read_images
 from gen_data.runner.layout import LICENCES_NAME, MANIFEST_NAME, RUN_NAME
 from gen_data.runner.stored import StoredSamples
@@ -66,7 +46,10 @@ def describe_folder(folder: Path) -> Json:
         StorageError: no labels are found, or a file does not have the expected layout.
     """
     survey = collect_statistics(read_records(folder))
-    tables = (*make_tables(survey), *make_scan_tables(tuple(read_scans(folder))))
+    tables = (
+        *report_tables.make_tables(survey),
+        *report_tables.make_scan_tables(tuple(read_scans(folder))),
+    )
     return {"name": folder.resolve().name, **_counts(survey), **_statistics(survey, tables)}
 
 
@@ -93,18 +76,18 @@ def describe_dataset(
     stored = StoredSamples(folder)
     progress("labels")
     objects = ObjectStatistics(stored.info.cameras, stored.categories)
-    checks = LabelChecks()
+    checks = label_checks.LabelChecks()
     for image in read_images(stored):
         objects.add(image)
         checks.add(image)
-    scans = make_scan_tables(tuple(read_scans(folder)))
-    tables = (*_label_tables(stored), *make_tables(objects.survey), *scans)
+    scans = report_tables.make_scan_tables(tuple(read_scans(folder)))
+    tables = (*_label_tables(stored), *report_tables.make_tables(objects.survey), *scans)
     progress("images")
     files, looks = _measure(stored, objects.splits)
     progress("parameters")
     drawn, problem = _draw(stored, scenes_max)
     progress("sample browser")
-    images = browser_images(stored, browser_bytes_max)
+    images = sample_browser.browser_images(stored, browser_bytes_max)
     columns = objects.columns()
     return {
         "name": folder.resolve().name,
@@ -127,17 +110,19 @@ def describe_dataset(
     }
 
 
-def _label_tables(stored: StoredSamples) -> Iterator[Table]:
+def _label_tables(stored: StoredSamples) -> Iterator[report_tables.Table]:
     """What has no label, and the classes of exports, if they are not the categories."""
     gaps = tuple((line,) for line in find_label_gaps(stored).lines())
     if gaps:
-        yield Table("Without labels", ("what",), gaps)
+        yield report_tables.Table("Without labels", ("what",), gaps)
     classes = read_label_map(stored.config).classes_of
     if classes:
         counts = count_objects(stored)
         rows = [(name, str(counts[name]), ", ".join(own)) for name, own in classes.items()]
         note = "Visible objects in all images, before the limits of the label map."
-        yield Table("Exported classes", ("class", "objects", "categories"), tuple(rows), note)
+        yield report_tables.Table(
+            "Exported classes", ("class", "objects", "categories"), tuple(rows), note
+        )
 
 
 def without_pictures(report: Json) -> Json:
@@ -187,10 +172,10 @@ def _counts(survey: Survey) -> Json:
     return {"counts": total, "splits": splits}
 
 
-def _statistics(survey: Survey, tables: Iterable[Table]) -> Json:
+def _statistics(survey: Survey, tables: Iterable[report_tables.Table]) -> Json:
     return {
         "tables": [asdict(table) for table in tables],
-        "histograms": [_plain_histogram(h) for h in make_histograms(survey)],
+        "histograms": [_plain_histogram(h) for h in report_tables.make_histograms(survey)],
     }
 
 
@@ -207,7 +192,7 @@ def _category_counts(objects: ObjectStatistics, columns: Mapping[str, Column]) -
 
 def _label_histograms(
     objects: ObjectStatistics, columns: Mapping[str, Column]
-) -> tuple[Histogram, ...]:
+) -> tuple[report_tables.Histogram, ...]:
     areas = [0, 8, 16, 32, 64, 96, 128, 192, 256, 384, 512, 1024]
     points = [0, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000]
     shares = np.linspace(0.0, 1.0, 11)
@@ -224,11 +209,13 @@ def _label_histograms(
             name: column[columns["category"] == number]
             for number, name in enumerate(objects.categories)
         }
-        made.append(count_values(title, edges, split))
+        made.append(report_tables.count_values(title, edges, split))
     return tuple(h for h in made if any(counts.any() for counts in h.counts.values()))
 
 
-def _image_histograms(files: Sequence[ImageFile], looks: Sequence[Look]) -> list[Histogram]:
+def _image_histograms(
+    files: Sequence[image_statistics.ImageFile], looks: Sequence[image_statistics.Look]
+) -> list[report_tables.Histogram]:
     cameras = np.array([file.camera for file in files])
     made = []
     for title, values, top in (
@@ -241,27 +228,29 @@ def _image_histograms(files: Sequence[ImageFile], looks: Sequence[Look]) -> list
     ):
         column = np.array(values, float)
         split = {str(name): column[cameras == name] for name in np.unique(cameras)}
-        made.append(count_values(title, np.linspace(0.0, top, 21), split))
+        made.append(report_tables.count_values(title, np.linspace(0.0, top, 21), split))
     return made
 
 
 def _measure(
     stored: StoredSamples, splits: Mapping[int, str]
-) -> tuple[list[ImageFile], list[Look]]:
+) -> tuple[list[image_statistics.ImageFile], list[image_statistics.Look]]:
     info = stored.info
     per_scene = info.views_per_scene * info.steps_per_scene
     files = []
     for index in stored.indices:
         folder = stored.shard_dir(index // stored.plan.shard_size)
         for camera, channels in info.media.items():
-            path = media_path(folder, camera, Channel.RGB, index)
+            path = interfaces.media_path(folder, camera, capture.Channel.RGB, index)
             # A camera with a lower rate has no image at most steps.
-            if Channel.RGB in channels and path.is_file():
+            if capture.Channel.RGB in channels and path.is_file():
                 files.append(
-                    ImageFile(index, camera, index // per_scene, splits.get(index, ""), path)
+                    image_statistics.ImageFile(
+                        index, camera, index // per_scene, splits.get(index, ""), path
+                    )
                 )
-    workers = usable_cores()
-    return files, [look for _, look in measure_images(files, workers)]
+    workers = system_calls.usable_cores()
+    return files, [look for _, look in image_statistics.measure_images(files, workers)]
 
 
 def _viewpoints(objects: ObjectStatistics, columns: Mapping[str, Column]) -> Json:
@@ -281,25 +270,27 @@ def _viewpoints(objects: ObjectStatistics, columns: Mapping[str, Column]) -> Jso
     return {"azimuths": AZIMUTHS, "elevations": ELEVATIONS, "counts": counts}
 
 
-def _plain_histogram(histogram: Histogram) -> Json:
+def _plain_histogram(histogram: report_tables.Histogram) -> Json:
     counts = {name: c.tolist() for name, c in histogram.counts.items() if c.any()}
     return {"title": histogram.title, "edges": histogram.edges.tolist(), "counts": counts}
 
 
-def _plain_check(result: CheckResult) -> Json:
+def _plain_check(result: label_checks.CheckResult) -> Json:
     return {**asdict(result), "examples": [asdict(example) for example in result.examples]}
 
 
-def _plain_duplicates(files: Sequence[ImageFile], looks: Sequence[Look]) -> Json:
-    groups = group_duplicates(files, [look.hash for look in looks])
+def _plain_duplicates(
+    files: Sequence[image_statistics.ImageFile], looks: Sequence[image_statistics.Look]
+) -> Json:
+    groups = image_statistics.group_duplicates(files, [look.hash for look in looks])
 
-    def plain(group: DuplicateGroup) -> Json:
+    def plain(group: image_statistics.DuplicateGroup) -> Json:
         shown = [files[k] for k in group.members[:MEMBERS_MAX]]
         members = [
             {
                 "index": file.index,
                 "camera": file.camera,
-                "picture": thumbnail(file.path, THUMBNAIL_PX),
+                "picture": sample_browser.thumbnail(file.path, THUMBNAIL_PX),
             }
             for file in shown
         ]
@@ -312,7 +303,7 @@ def _plain_duplicates(files: Sequence[ImageFile], looks: Sequence[Look]) -> Json
 
     return {
         "images": len(files),
-        "bits": DISTANCE_MAX,
+        "bits": image_statistics.DISTANCE_MAX,
         "groups": len(groups),
         "grouped": sum(len(group.members) for group in groups),
         "shown": [plain(group) for group in groups[:GROUPS_MAX]],
@@ -327,7 +318,7 @@ def _draw(stored: StoredSamples, scenes_max: int) -> tuple[DrawnParameters | Non
         return None, "The scenes of another data set were rendered again: see its report."
     try:
         drawn = draw_parameters(stored, scenes_max)
-    except GenDataError as error:
+    except errors.GenDataError as error:
         return None, f"Parameters cannot be drawn again on this machine: {error}"
     note = (
         f"Every draw of {drawn.scenes} scenes, chosen evenly, and of all their views; values that "

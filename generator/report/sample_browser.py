@@ -10,13 +10,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.core.boxes import OrientedBox
-from gen_data.core.capture import Channel, SensorReading
+from gen_data.core import boxes, capture, skeletons
 from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.sample import ImageTruth, KeypointTruth, ObjectTruth
-from gen_data.core.skeletons import find_skeleton
-from gen_data.preview.overlay import BOX_EDGES
-from gen_data.preview.palette import color_depth, color_shares
+from gen_data.preview import overlay, palette
 from gen_data.runner.stored import LabelledImages, StoredSamples
 
 WIDTH_PX = 640
@@ -34,7 +31,7 @@ NEAR_M = 0.01
 FAR_LOG_M = (1.0, 100.0)
 """Ends of the logarithmic colour scale of laser points."""
 
-DEPTHS = (Channel.Z_DEPTH, Channel.RANGE, Channel.MEASURED_DEPTH)
+DEPTHS = (capture.Channel.Z_DEPTH, capture.Channel.RANGE, capture.Channel.MEASURED_DEPTH)
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +67,7 @@ def browser_images(stored: StoredSamples, bytes_max: int) -> list[BrowserImage]:
     Raises:
         StorageError: a file of an image is missing or damaged.
     """
-    cameras = [c for c in stored.info.cameras if Channel.RGB in stored.info.media[c]]
+    cameras = [c for c in stored.info.cameras if capture.Channel.RGB in stored.info.media[c]]
     taken: list[BrowserImage] = []
     size = 0
     for number in evenly_spread(stored.n * len(cameras)):
@@ -109,11 +106,11 @@ def thumbnail(path: Any, width_px: int) -> str:
 
 def _browser_image(sample: LabelledImages, camera: str) -> BrowserImage:
     reading, truth = sample.capture.readings[camera], sample.truth[camera]
-    rgb = np.asarray(reading.channels[Channel.RGB], np.uint8)
+    rgb = np.asarray(reading.channels[capture.Channel.RGB], np.uint8)
     pictures = {"rgb": _jpeg(_shrink(rgb[..., ::-1], WIDTH_PX, cv2.INTER_AREA), JPEG_QUALITY)}
     depth = next((c for c in DEPTHS if c in reading.channels), None)
     if depth is not None:
-        grey = color_depth(reading.channels[depth])
+        grey = palette.color_depth(reading.channels[depth])
         pictures["depth"] = _jpeg(_shrink(grey, WIDTH_PX, cv2.INTER_NEAREST), JPEG_QUALITY)
     masks = _mask_image(reading, truth)
     if masks is not None:
@@ -158,19 +155,19 @@ def _object(item: ObjectTruth, intrinsics: Intrinsics) -> dict[str, Any]:
 def _keypoints(points: Sequence[KeypointTruth]) -> tuple[list[list[float]], list[list[int]]]:
     """Image coordinates and visibility of all points, and pairs of numbers of joined ones."""
     numbers = {point.name: k for k, point in enumerate(points)}
-    skeleton = find_skeleton(numbers)
+    skeleton = skeletons.find_skeleton(numbers)
     ends = [(skeleton.names[a], skeleton.names[b]) for a, b in skeleton.bones]
     bones = [[numbers[a], numbers[b]] for a, b in ends if a in numbers and b in numbers]
     places = [[*(round(v, 1) for v in p.image_px), p.visibility] for p in points]
     return places, bones
 
 
-def _edges(box: OrientedBox, intrinsics: Intrinsics) -> list[list[int]]:
+def _edges(box: boxes.OrientedBox, intrinsics: Intrinsics) -> list[list[int]]:
     """Polylines [x, y, x, y, ...] of the visible parts of a box's edges, in whole pixels."""
     corners_m = box.corners()
     share = np.linspace(0.0, 1.0, PIECES + 1)[:, None]
     lines: list[list[int]] = []
-    for a, b in BOX_EDGES:
+    for a, b in overlay.BOX_EDGES:
         places_m = corners_m[a] + (corners_m[b] - corners_m[a]) * share
         if intrinsics.straight:
             places_m = places_m[places_m[:, 2] > NEAR_M]
@@ -195,14 +192,14 @@ def _polylines(places_px: NDArray[np.float64], longest_px: float) -> Iterator[li
         yield line
 
 
-def _mask_image(reading: SensorReading, truth: ImageTruth) -> NDArray[np.uint8] | None:
+def _mask_image(reading: capture.SensorReading, truth: ImageTruth) -> NDArray[np.uint8] | None:
     """Number of each pixel's object, uint8 [h, w]; None without masks and instance ids."""
     height, width = truth.camera.intrinsics.height_px, truth.camera.intrinsics.width_px
     image: NDArray[np.uint8] = np.zeros((height, width), np.uint8)
     masked = False
     ids = None
-    if Channel.INSTANCE in reading.channels:
-        ids = np.asarray(reading.channels[Channel.INSTANCE])
+    if capture.Channel.INSTANCE in reading.channels:
+        ids = np.asarray(reading.channels[capture.Channel.INSTANCE])
     for number, item in enumerate(truth.objects[:MASKS_MAX], 1):
         if item.mask is not None:
             rows, columns = item.mask.pixels.shape
@@ -235,7 +232,7 @@ def _laser_points(sample: LabelledImages, truth: ImageTruth) -> str:
     shown = shown[:: -(-shown.size // POINTS_MAX)]
     low, high = np.log(FAR_LOG_M)
     share = (np.log(np.maximum(range_m[shown], 1e-3)) - low) / (high - low)
-    red, green, blue = (color_shares(share) >> 4).astype(np.uint16).T
+    red, green, blue = (palette.color_shares(share) >> 4).astype(np.uint16).T
     rows = np.column_stack([place[shown].astype(np.uint16), red << 8 | green << 4 | blue])
     return base64.b64encode(rows.astype("<u2").tobytes()).decode()
 

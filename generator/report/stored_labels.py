@@ -16,10 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.core.errors import StorageError
-from gen_data.core.scene import Instance
-from gen_data.core.se3 import SE3
-from gen_data.core.serialization import from_plain
+from gen_data.core import errors, scene, se3, serialization
 from gen_data.exporters.kitti import occlusion_level, official_type
 from gen_data.report.label_files import Label, Picture, Points
 from gen_data.report.label_statistics import Column, Survey, add_record
@@ -124,7 +121,7 @@ def read_images(stored: StoredSamples) -> Iterator[ImageLabels]:
                 for line in file:
                     yield from _parse_line(line)
         except (OSError, ValueError, KeyError, TypeError) as error:
-            raise StorageError(
+            raise errors.StorageError(
                 f"{path}: its labels cannot be read ({error}); check the data set with:\n"
                 f"    gen-data verify {stored.folder} --full"
             ) from error
@@ -142,7 +139,7 @@ def _parse_line(line: str) -> Iterator[ImageLabels]:
 
 def decode_mask(mask: Mapping[str, Any]) -> NDArray[np.bool_]:
     """Pixels of a plain ``MaskPx``, bool [h, w]."""
-    pixels: NDArray[np.bool_] = from_plain(np.ndarray[Any, Any], mask["pixels"])
+    pixels: NDArray[np.bool_] = serialization.from_plain(np.ndarray[Any, Any], mask["pixels"])
     return pixels
 
 
@@ -161,7 +158,7 @@ def _viewpoint(item: Mapping[str, Any]) -> tuple[float, float]:
     pose = item.get("T_camera_object") or (box and box["T_frame_box"])
     if pose is None:
         return math.nan, math.nan
-    x, y, z = from_plain(SE3, pose).inverse().translation_m
+    x, y, z = serialization.from_plain(se3.SE3, pose).inverse().translation_m
     return math.atan2(y, x), math.atan2(z, math.hypot(x, y))
 
 
@@ -175,7 +172,7 @@ def _records(image: ImageLabels, item: Mapping[str, Any]) -> Iterator[Label | Po
     if box is None:
         return
     attributes = tuple((name, value) for name, value in plain["attributes"])
-    instance = Instance(0, "", plain["category"], 0, "", attributes=attributes)
+    instance = scene.Instance(0, "", plain["category"], 0, "", attributes=attributes)
     hidden, box3d = item.get("occlusion"), item.get("box3d_camera")
     center_m = box3d and box3d["T_frame_box"]["translation_m"]
     yield Label(

@@ -12,10 +12,9 @@ from gen_data.core.interfaces import AssetIndex
 from gen_data.core.members import free_instance_ids
 from gen_data.core.scene import Body, Instance, Scene
 from gen_data.core.se3 import SE3, Vec3
+from gen_data.rooms import layout, rules
 from gen_data.rooms.floor_plan import WALL_M, Opening, Room, direction, walls_of
-from gen_data.rooms.layout import Piece
 from gen_data.rooms.outlook import Outlook
-from gen_data.rooms.rules import find_room_type
 
 OUTSIDE = "outside"
 LEADS_OUT = "leads_out"
@@ -92,7 +91,7 @@ def keypoint_m(assets: AssetIndex, asset: str, name: str) -> Vec3 | None:
     return next((k.position_m for k in assets.keypoints(asset) if k.name == name), None)
 
 
-def find_splashback(room: Room, wall: int, pieces: Sequence[Piece]) -> tuple[float, ...]:
+def find_splashback(room: Room, wall: int, pieces: Sequence[layout.Piece]) -> tuple[float, ...]:
     """The place of a wall's ``splashback``: behind its worktops, up to the lowest window there.
 
     Empty if there is no worktop.
@@ -220,7 +219,7 @@ class Builder:
         self,
         rooms: Sequence[Room],
         looks: Mapping[str, Looks],
-        pieces: Mapping[str, Sequence[Piece]] | None = None,
+        pieces: Mapping[str, Sequence[layout.Piece]] | None = None,
     ) -> None:
         """Add floors, ceilings, walls, doors, windows and blinds.
 
@@ -241,7 +240,7 @@ class Builder:
         for k, (asset, pose) in enumerate(outlook.things):
             self._bodies.append(Body(f"{name}_{k}", asset, pose, collides=False))
 
-    def _add_shell(self, room: Room, looks: Looks, pieces: Sequence[Piece]) -> None:
+    def _add_shell(self, room: Room, looks: Looks, pieces: Sequence[layout.Piece]) -> None:
         x, y, z = room.size_m
         at, kind = room.center_m, room.kind
         base = room.name
@@ -286,7 +285,7 @@ class Builder:
         pose = SE3.about_z(0.5 * math.pi * (wall - 1), (*room.at_wall(wall, 0.0, 0.0), 0.0))
         asset = _id("wall", **parameters)
         surface, skirting = looks.of_wall(wall), self._assets.materials(asset)[1]
-        if not find_room_type(room.kind, "").skirting:
+        if not rules.find_room_type(room.kind, "").skirting:
             skirting = surface
         self.add(
             f"{room.name}/wall_{wall}",
@@ -332,7 +331,7 @@ class Builder:
         self.add(f"{room.name}/blind_{k}", asset, pose, room.kind)
 
     def add_pieces(
-        self, room: Room, pieces: Sequence[Piece], parts: Mapping[str, tuple[str, str]]
+        self, room: Room, pieces: Sequence[layout.Piece], parts: Mapping[str, tuple[str, str]]
     ) -> None:
         """Add furniture and things.
 

@@ -5,26 +5,23 @@ from collections import Counter
 from gen_data.core.errors import ConfigError
 from gen_data.core.interfaces import AssetIndex
 from gen_data.core.streams import Rng
-from gen_data.rooms import TABLE
+from gen_data.rooms import TABLE, places, reachability, small_objects
 from gen_data.rooms.floor_plan import Room, direction, draw_count
 from gen_data.rooms.layout import Conflict, Layout, Options, Piece
-from gen_data.rooms.places import Place
-from gen_data.rooms.reachability import find_unreachable
 from gen_data.rooms.rules import RoomType
-from gen_data.rooms.small_objects import put_small_objects
 
 DOOR_ZONE_M = 0.95
 """Depth of the floor before doors that stays free: the swing of a leaf."""
 
 
-def find_place(name: str) -> Place:
+def find_place(name: str) -> places.Place:
     """The place of that name.
 
     Raises:
         ConfigError: there is none, or a third-party object is not a Place.
     """
     place: object = TABLE.load(name)
-    if not isinstance(place, Place):
+    if not isinstance(place, places.Place):
         raise ConfigError(f"{TABLE.kind} '{name}': is not a gen_data.rooms.places.Place")
     return place
 
@@ -67,10 +64,12 @@ def furnish(
         if placed < low and related and required:
             reason = layout.refused.most_common(1)
             raise Conflict(rule.piece, reason[0][0] if reason else "no place")
-    unreachable = find_unreachable(layout, {rule.piece for rule in rules.pieces if rule.movable})
+    unreachable = reachability.find_unreachable(
+        layout, {rule.piece for rule in rules.pieces if rule.movable}
+    )
     if unreachable:
         raise Conflict(unreachable, "cannot be reached from a door")
     for rule in rules.pieces:
         if rule.things or rule.inside:
-            put_small_objects(layout, rule, options, clutter)
+            small_objects.put_small_objects(layout, rule, options, clutter)
     return layout.pieces

@@ -14,14 +14,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from gen_data.assets.families import declared
-from gen_data.core.bounded_cache import ObjectCache
+from gen_data.core import bounded_cache, interfaces, streams
 from gen_data.core.boxes import Rectangle, overlap_of
-from gen_data.core.interfaces import AssetIndex
 from gen_data.core.se3 import SE3, Array, Quaternion, Vec3
-from gen_data.core.streams import Rng
+from gen_data.rooms import resting, rules
 from gen_data.rooms.floor_plan import Opening, Room, direction
-from gen_data.rooms.resting import UPRIGHT, turn_to_rest
-from gen_data.rooms.rules import Rule
 
 Options = Mapping[str, Sequence[str]]
 """Ids of assets by family."""
@@ -37,8 +34,8 @@ _OFF_SILLS_M = 0.005
 _TOP_M = 0.003
 """Depth of the rounded border of tops."""
 _EDGE_OF_TOP_M = 0.008
-_TOPS: ObjectCache[dict[str, Array]] = ObjectCache(2)
-_SHAPES: ObjectCache[dict[str, Shape]] = ObjectCache(2)
+_TOPS: bounded_cache.ObjectCache[dict[str, Array]] = bounded_cache.ObjectCache(2)
+_SHAPES: bounded_cache.ObjectCache[dict[str, Shape]] = bounded_cache.ObjectCache(2)
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +60,7 @@ class Piece:
     low_m: float
     high_m: float
     on: int = -1
-    rest: Quaternion = UPRIGHT
+    rest: Quaternion = resting.UPRIGHT
 
     @property
     def pose(self) -> SE3:
@@ -129,12 +126,12 @@ def _free_above_m(family: str) -> float:
     return float(declared(family, "free_above_m", 0.0))
 
 
-def _find_shape(assets: AssetIndex, asset: str) -> Shape:
+def _find_shape(assets: interfaces.AssetIndex, asset: str) -> Shape:
     low, high = assets.bounds_m(asset)
-    rest: Quaternion | None = UPRIGHT
+    rest: Quaternion | None = resting.UPRIGHT
     if declared(asset, "loose", False):
         points_m = np.asarray(assets.vertices_m(asset), np.float64)
-        rest = turn_to_rest(points_m)
+        rest = resting.turn_to_rest(points_m)
         if rest is not None:
             turned_m = SE3(quaternion_wxyz=rest).apply(points_m)
             low, high = turned_m.min(axis=0).tolist(), turned_m.max(axis=0).tolist()
@@ -143,7 +140,7 @@ def _find_shape(assets: AssetIndex, asset: str) -> Shape:
     return Shape(*middle, *half, z0, z1, rest)
 
 
-def _find_top(assets: AssetIndex, asset: str) -> Array:
+def _find_top(assets: interfaces.AssetIndex, asset: str) -> Array:
     """Sides of the convex outline of a piece's top, [n, 3]: ``a x + b y + c < 0`` inside [m]."""
     from scipy.spatial import ConvexHull
 
@@ -162,8 +159,8 @@ class Layout:
     """
 
     room: Room
-    assets: AssetIndex
-    rng: Rng
+    assets: interfaces.AssetIndex
+    rng: streams.Rng
     look: float = 0.0
     pieces: list[Piece] = field(default_factory=list)
     zones: list[tuple[Rectangle, int]] = field(default_factory=list)
@@ -202,7 +199,7 @@ class Layout:
 
     def put(
         self,
-        rule: Rule,
+        rule: rules.Rule,
         drawn: Drawn,
         at: tuple[float, float],
         yaw_rad: float,

@@ -4,8 +4,7 @@ from dataclasses import dataclass
 from functools import cache
 
 from gen_data.config.data_files import load_table
-from gen_data.core.errors import ConfigError, did_you_mean
-from gen_data.core.plugins import loaded, third_party
+from gen_data.core import errors, plugins
 
 Range = tuple[float, float]
 KIND = "room_type"
@@ -118,10 +117,10 @@ def room_types() -> dict[str, RoomType]:
         ConfigError: an entry point is not a RoomType.
     """
     found: dict[str, RoomType] = {}
-    for name, entry in third_party(KIND).items():
-        room_type: object = loaded(entry.value, f"{KIND} '{name}'")
+    for name, entry in plugins.third_party(KIND).items():
+        room_type: object = plugins.loaded(entry.value, f"{KIND} '{name}'")
         if not isinstance(room_type, RoomType):
-            raise ConfigError(f"{KIND} '{name}': {entry.value} is not a {__name__}.RoomType")
+            raise errors.ConfigError(f"{KIND} '{name}': {entry.value} is not a {__name__}.RoomType")
         found[name] = room_type
     return {**found, **load_table(__name__.rpartition(".")[0], "room_types", RoomType)}
 
@@ -134,8 +133,8 @@ def find_room_type(name: str, field: str) -> RoomType:
     """
     known = room_types()
     if name not in known:
-        raise ConfigError(
+        raise errors.ConfigError(
             f"{field}: there is no room type '{name}'; expected one of "
-            f"{', '.join((*known, APARTMENT))}{did_you_mean(name, known)}"
+            f"{', '.join((*known, APARTMENT))}{errors.did_you_mean(name, known)}"
         )
     return known[name]

@@ -8,10 +8,8 @@ from gen_data.assets.families import declared
 from gen_data.core.boxes import Rectangle, overlap_of
 from gen_data.core.interfaces import AssetIndex
 from gen_data.core.keypoint_names import INSIDE, SUPPORT
-from gen_data.rooms.floor_plan import between, draw_count
+from gen_data.rooms import floor_plan, resting, rules
 from gen_data.rooms.layout import Layout, Options, Piece, Shape, cos_sin
-from gen_data.rooms.resting import UPRIGHT
-from gen_data.rooms.rules import Rule
 
 _BORDER_M = (0.05, 0.05)
 """Width of the border of surfaces that stays free, in depth and width."""
@@ -81,7 +79,7 @@ def _insides(piece: Piece, assets: AssetIndex) -> list[Support]:
     return made
 
 
-def put_small_objects(layout: Layout, rule: Rule, options: Options, clutter: float) -> None:
+def put_small_objects(layout: Layout, rule: rules.Rule, options: Options, clutter: float) -> None:
     """Small things on the surfaces of all pieces of a rule, apart from one another."""
     for k, piece in enumerate(list(layout.pieces)):
         if piece.role != rule.piece or piece.on >= 0 or piece.family not in rule.assets:
@@ -99,7 +97,7 @@ def put_small_objects(layout: Layout, rule: Rule, options: Options, clutter: flo
             if rule.filled[1]:
                 _fill_board(layout, rule, options, k, support, near, clutter)
                 continue
-            for _ in range(round(draw_count(layout.rng, rule.how_many) * clutter)):
+            for _ in range(round(floor_plan.draw_count(layout.rng, rule.how_many) * clutter)):
                 placed = _put_thing(layout, rule.things, options, k, support, near)
                 if placed is not None:
                     layout.pieces.append(placed)
@@ -141,7 +139,7 @@ def _put_thing(
 
 def _fill_board(
     layout: Layout,
-    rule: Rule,
+    rule: rules.Rule,
     options: Options,
     k: int,
     support: Support,
@@ -149,7 +147,7 @@ def _fill_board(
     clutter: float,
 ) -> None:
     """Things side by side on a board, from one end on, near its front edge."""
-    share = min(between(layout.rng, rule.filled) * clutter, _FULL)
+    share = min(floor_plan.between(layout.rng, rule.filled) * clutter, _FULL)
     end = support.half_m[1] * (2.0 * share - 1.0)
     side = 1.0 if layout.rng.random() < 0.5 else -1.0
     at, failed = -support.half_m[1], 0
@@ -206,7 +204,7 @@ def _thing_at(
     footprint: Rectangle = (mx, my, c2, s2, s.half_x, s.half_y)
     px, py = mx - c2 * s.x + s2 * s.y, my - s2 * s.x - c2 * s.y
     position = (round(px, 5), round(py, 5), round(height - s.low, 5))
-    rest = UPRIGHT if s.rest is None else s.rest
+    rest = resting.UPRIGHT if s.rest is None else s.rest
     top = height + s.high - s.low
     return Piece("thing", family, asset, position, yaw, footprint, height, top, k, rest)
 

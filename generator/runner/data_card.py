@@ -26,12 +26,9 @@ from gen_data.exporters.croissant_metadata import (
     record_set,
     title_of,
 )
+from gen_data.runner import layout, licence_table, provenance, shard_record
 from gen_data.runner.labels import LABELS_NAME
-from gen_data.runner.layout import PLAN_NAME
-from gen_data.runner.licence_table import licences_in
 from gen_data.runner.plan import Plan, plan_bytes
-from gen_data.runner.provenance import SCENES_NAME
-from gen_data.runner.shard_record import SplitCount
 
 CARD_NAME = "README.md"
 CROISSANT_NAME = "croissant.json"
@@ -53,7 +50,7 @@ class DatasetFacts:
 
     plan: Plan
     info: DatasetInfo
-    splits: Sequence[SplitCount]
+    splits: Sequence[shard_record.SplitCount]
     scenes: int
     formats: Sequence[str]
     asset_licences: str | None = None
@@ -61,7 +58,7 @@ class DatasetFacts:
     @property
     def licences(self) -> list[str]:
         """Names of the licences of its assets, sorted."""
-        return licences_in(self.asset_licences or "")
+        return licence_table.licences_in(self.asset_licences or "")
 
 
 def croissant_json(facts: DatasetFacts) -> str:
@@ -73,7 +70,7 @@ def croissant_json(facts: DatasetFacts) -> str:
     plan = plan_bytes(facts.plan)
     digest = hashlib.sha256(plan).hexdigest()
     distribution = [
-        file_object(PLAN_NAME, len(plan), digest, "application/json"),
+        file_object(layout.PLAN_NAME, len(plan), digest, "application/json"),
         *_file_sets(facts),
     ]
     cameras = [s for s in facts.info.sensors if Channel.RGB in s.channels]
@@ -87,7 +84,7 @@ def _file_sets(facts: DatasetFacts) -> Iterator[dict[str, Any]]:
     labels = "All annotations; a line per sample."
     yield file_set(LABELS_ID, labels, lines, f"shards/*/{LABELS_NAME}")
     scenes = "Final scenes, from which the images can be rendered again; a line per sample."
-    yield file_set("scenes", scenes, lines, f"shards/*/{SCENES_NAME}")
+    yield file_set("scenes", scenes, lines, f"shards/*/{provenance.SCENES_NAME}")
     for sensor in facts.info.sensors:
         name = sensor.name
         for channel in sensor.channels:

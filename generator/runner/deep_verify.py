@@ -11,17 +11,14 @@ from pathlib import Path
 
 from gen_data.annotations.sample_checks import sample_faults
 from gen_data.core.errors import GenDataError
-from gen_data.runner.labels import LABELS_NAME
-from gen_data.runner.layout import SHARDS_NAME
+from gen_data.runner import labels, layout, provenance, verify
 from gen_data.runner.plan import load_plan
-from gen_data.runner.provenance import SCENES_NAME
 from gen_data.runner.regeneration import compare_regenerated, plan_regeneration
 from gen_data.runner.store import LocalStore
 from gen_data.runner.stored import StoredSamples
-from gen_data.runner.verify import Finding
 
 
-def find_invalid_samples(folder: Path) -> Iterator[Finding]:
+def find_invalid_samples(folder: Path) -> Iterator[verify.Finding]:
     """Decode every sample of a finished data set, and check it as before it was written.
 
     Raises:
@@ -32,26 +29,26 @@ def find_invalid_samples(folder: Path) -> Iterator[Finding]:
         yield from _lax_json(stored, shard)
         absent = {failure.index for failure in stored.failed}
         for index in (i for i in stored.plan.samples_of(shard) if i not in absent):
-            where = f"{SHARDS_NAME}/{stored.shard_dir(shard).name}"
+            where = f"{layout.SHARDS_NAME}/{stored.shard_dir(shard).name}"
             samples = f"sample {index}"
             try:
                 for field, fact in sample_faults(stored.info, stored.sample(index)):
-                    yield Finding("invalid", where, f"{field}: {fact}", samples)
+                    yield verify.Finding("invalid", where, f"{field}: {fact}", samples)
             except GenDataError as error:
-                yield Finding("unreadable", where, str(error), samples)
+                yield verify.Finding("unreadable", where, str(error), samples)
             except (ValueError, KeyError, TypeError, IndexError) as error:
                 text = f"does not fit the data set ({type(error).__name__}: {error})"
-                yield Finding("unreadable", where, text, samples)
+                yield verify.Finding("unreadable", where, text, samples)
         stored.close()
 
 
-def _lax_json(stored: StoredSamples, shard: int) -> Iterator[Finding]:
+def _lax_json(stored: StoredSamples, shard: int) -> Iterator[verify.Finding]:
     """Lines that are no strict JSON: Python also reads NaN and Infinity."""
 
     def refuse(name: str) -> None:
         raise ValueError(f"{name} is no JSON")
 
-    for name in (SCENES_NAME, LABELS_NAME):
+    for name in (provenance.SCENES_NAME, labels.LABELS_NAME):
         path = stored.shard_dir(shard) / name
         lines = path.read_bytes().splitlines() if path.is_file() else []
         for number, line in enumerate(lines, 1):
@@ -62,7 +59,7 @@ def _lax_json(stored: StoredSamples, shard: int) -> Iterator[Finding]:
                 json.loads(line, parse_constant=refuse)
             except ValueError as error:
                 where = path.relative_to(stored.folder).as_posix()
-                yield Finding("invalid", where, f"line {number}: {error}")
+                yield verify.Finding("invalid", where, f"line {number}: {error}")
 
 
 def choose_samples(folder: Path, count: int) -> list[int]:
@@ -89,7 +86,7 @@ def find_irreproducible_samples(
     indices: Sequence[int],
     semantic: bool = False,
     source: Path | None = None,
-) -> Iterator[Finding]:
+) -> Iterator[verify.Finding]:
     """Generate samples again, and compare them with the stored ones.
 
     Args:
@@ -106,8 +103,8 @@ def find_irreproducible_samples(
     store = LocalStore(folder)
     found = compare_regenerated(store, plan, regeneration, indices, semantic)
     for difference in found:
-        where = f"{SHARDS_NAME}/{store.shard_dir(difference.index // plan.shard_size).name}"
+        where = f"{layout.SHARDS_NAME}/{store.shard_dir(difference.index // plan.shard_size).name}"
         text = f"generated again, it differs in stage {difference.stage}: {difference.text}"
         if regeneration.changes:
             text += f" (this installation differs: {'; '.join(regeneration.changes[:3])})"
-        yield Finding("irreproducible", where, text, f"sample {difference.index}")
+        yield verify.Finding("irreproducible", where, text, f"sample {difference.index}")

@@ -7,15 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from gen_data.core.errors import StorageError
-from gen_data.runner.durable_files import tree_sizes
-from gen_data.runner.labels import LABELS_NAME
+from gen_data.runner import durable_files, labels, provenance, seal, shard_record, store
 from gen_data.runner.layout import MANIFEST_NAME, PLAN_NAME, SHARDS_NAME
 from gen_data.runner.plan import Plan, compare_plans, load_plan
-from gen_data.runner.provenance import SCENES_NAME
 from gen_data.runner.sample_stages import Difference, SampleFiles, compare_samples
-from gen_data.runner.seal import read_sums
-from gen_data.runner.shard_record import ShardRecord
-from gen_data.runner.store import LocalStore
 
 
 @dataclass(frozen=True)
@@ -54,7 +49,7 @@ def compare(one: Path, other: Path, semantic: bool = False) -> Comparison:
     if (one / PLAN_NAME).is_file() and (other / PLAN_NAME).is_file():
         return _compare_datasets(one, other, semantic)
     for folder in (one, other):
-        if not (folder / SCENES_NAME).is_file():
+        if not (folder / provenance.SCENES_NAME).is_file():
             raise StorageError(
                 f"{folder}: no data set and no folder of a shard; expected two of the same kind"
             )
@@ -79,7 +74,7 @@ def _compare_datasets(one: Path, other: Path, semantic: bool) -> Comparison:
             text = f"only {owner} has it; in the other it failed"
             return Comparison(n, changes, sample=Difference(index, "sample", text))
         files = [
-            SampleFiles(LocalStore(folder).shard_dir(index // plan.shard_size), index)
+            SampleFiles(store.LocalStore(folder).shard_dir(index // plan.shard_size), index)
             for folder, plan in zip((one, other), plans, strict=True)
         ]
         found = compare_samples(files[0], files[1], semantic)
@@ -87,7 +82,7 @@ def _compare_datasets(one: Path, other: Path, semantic: bool) -> Comparison:
             return Comparison(n, changes, sample=found)
     if semantic:
         return Comparison(n, changes)
-    was, now = read_sums(one).digests, read_sums(other).digests
+    was, now = seal.read_sums(one).digests, seal.read_sums(other).digests
     for path in sorted({*was, *now}):
         exported = path.partition("/")[0] not in (SHARDS_NAME, PLAN_NAME, MANIFEST_NAME)
         differs = was.get(path) != now.get(path) or not _are_equal(one / path, other / path)
@@ -102,19 +97,19 @@ def _samples_to_compare(one: Path, other: Path, plans: tuple[Plan, Plan], n: int
         yield from range(n)
         return
     for shard in range(-(-n // plans[0].shard_size)):
-        records = [LocalStore(folder).record(shard) for folder in (one, other)]
-        folders = [LocalStore(folder).shard_dir(shard) for folder in (one, other)]
+        records = [store.LocalStore(folder).record(shard) for folder in (one, other)]
+        folders = [store.LocalStore(folder).shard_dir(shard) for folder in (one, other)]
         if records[0] is None or records[0] != records[1] or _differ(records[0], *folders):
             yield from (i for i in plans[0].samples_of(shard) if i < n)
 
 
-def _differ(record: ShardRecord, one: Path, other: Path) -> bool:
+def _differ(record: shard_record.ShardRecord, one: Path, other: Path) -> bool:
     """Whether a file differs on the disk, although both records of its shard are equal."""
     return not all(_are_equal(one / file.path, other / file.path) for file in record.files)
 
 
 def _first_differing_file(one: Path, other: Path) -> str:
-    paths = sorted({*tree_sizes(one), *tree_sizes(other)})
+    paths = sorted({*durable_files.tree_sizes(one), *durable_files.tree_sizes(other)})
     return next((path for path in paths if not _are_equal(one / path, other / path)), "")
 
 
@@ -127,14 +122,14 @@ def _are_equal(one: Path, other: Path) -> bool:
 
 def _failed(folder: Path, plan: Plan) -> set[int]:
     """Indices of the samples that a data set does not have."""
-    records = filter(None, map(LocalStore(folder).record, range(plan.shard_count)))
+    records = filter(None, map(store.LocalStore(folder).record, range(plan.shard_count)))
     return {failure.index for record in records for failure in record.failed}
 
 
 def _indices(folder: Path) -> list[int]:
     """Indices of the samples in the folder of a shard."""
     try:
-        with (folder / LABELS_NAME).open("rb") as file:
+        with (folder / labels.LABELS_NAME).open("rb") as file:
             return [int(json.loads(line)["index"]) for line in file]
     except (OSError, ValueError, KeyError, TypeError) as error:
-        raise StorageError(f"{folder / LABELS_NAME}: cannot be read ({error})") from None
+        raise StorageError(f"{folder / labels.LABELS_NAME}: cannot be read ({error})") from None

@@ -16,17 +16,11 @@ from typing import TYPE_CHECKING
 from gen_data.core.interfaces import DatasetInfo, Exporter, cloud_path, table_path
 from gen_data.core.sample import Sample
 from gen_data.exporters.image_files import link_or_copy
-from gen_data.runner.durable_files import Inode, get_inode
-from gen_data.runner.labels import LABELS_NAME
-from gen_data.runner.layout import LICENCES_NAME, SUMS_NAME
-from gen_data.runner.plan import FORMAT_VERSION
+from gen_data.runner import durable_files, labels, layout, plan, seal, shard_record, verify
 from gen_data.runner.progress import RunProgress, Summary
 from gen_data.runner.provenance import SCENES_NAME
 from gen_data.runner.run import Settings, run
-from gen_data.runner.seal import read_sums
-from gen_data.runner.shard_record import FileRecord
 from gen_data.runner.stored import RECORDED, CheckedSamples, StoredSamples, check_digest
-from gen_data.runner.verify import check_source
 
 NEW_BYTES = 8_000.0
 """Least size of what exports add to a sample: labels, and entries in records and sums."""
@@ -112,10 +106,10 @@ class LinkedFiles:
         """Link the scenes and labels of the whole shard, with its first sample."""
         del base
         if not (shard_dir / SCENES_NAME).exists():
-            for name in (SCENES_NAME, LABELS_NAME):
+            for name in (SCENES_NAME, labels.LABELS_NAME):
                 link_or_copy(self._source_dir(sample.index) / name, shard_dir / name)
 
-    def digests(self, shard: int) -> Mapping[Inode, str]:
+    def digests(self, shard: int) -> Mapping[durable_files.Inode, str]:
         """Digests by inode of the files of a shard that exports link.
 
         Raises:
@@ -131,7 +125,7 @@ class LinkedFiles:
                 self.stored.check(path)
             else:
                 check_digest(path, file.sha256, self.stored.folder, RECORDED)
-            found[get_inode(path)] = file.sha256
+            found[durable_files.get_inode(path)] = file.sha256
         return found
 
     def _source_dir(self, index: int) -> Path:
@@ -145,13 +139,13 @@ def _linked_sample_bytes(stored: CheckedSamples) -> float:
     return sum(sizes) / max(record.samples if record else 0, 1)
 
 
-def _linked_files(stored: CheckedSamples, shard: int) -> list[FileRecord]:
+def _linked_files(stored: CheckedSamples, shard: int) -> list[shard_record.FileRecord]:
     record = stored.record(shard)
     sensors = {sensor.name for sensor in stored.info.sensors}
     return [
         file
         for file in (record.files if record else ())
-        if file.path in (SCENES_NAME, LABELS_NAME) or file.path.partition("/")[0] in sensors
+        if file.path in (SCENES_NAME, labels.LABELS_NAME) or file.path.partition("/")[0] in sensors
     ]
 
 
@@ -161,8 +155,8 @@ def _read_licences(path: Path) -> str:
     Raises:
         StorageError: the file is damaged.
     """
-    expected = read_sums(path.parent).digests.get(path.name)
-    check_digest(path, expected, path.parent, f"the one in {SUMS_NAME}")
+    expected = seal.read_sums(path.parent).digests.get(path.name)
+    check_digest(path, expected, path.parent, f"the one in {layout.SUMS_NAME}")
     return path.read_text("utf-8")
 
 
@@ -200,15 +194,15 @@ def export(  # noqa: PLR0913  (keywords of one front door)
     Raises:
         GenDataError: see ``run``.
     """
-    check_source(stored.folder)
+    verify.check_source(stored.folder)
     source = CheckedSamples(stored.folder)
-    licences = stored.folder / LICENCES_NAME
+    licences = stored.folder / layout.LICENCES_NAME
     text = _read_licences(licences) if licences.exists() else None
     files = LinkedFiles(source)
     linked_bytes = _linked_sample_bytes(source)
     linked = _is_same_disk(stored.folder, out.absolute())
     return run(
-        replace(stored.plan, config=config.resolved, format_version=FORMAT_VERSION),
+        replace(stored.plan, config=config.resolved, format_version=plan.FORMAT_VERSION),
         StoredPipeline(source, exporters, config.asset_folders),
         out,
         workers=workers,

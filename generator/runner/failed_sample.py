@@ -4,18 +4,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from gen_data.core.errors import (
-    DeterminismError,
-    GenDataError,
-    Interrupted,
-    OutOfMemory,
-    SampleError,
-    StorageError,
-    WorkerLost,
-    stage_of,
-)
+from gen_data.core import errors
 
-NOT_OF_A_SAMPLE = (DeterminismError, Interrupted, OutOfMemory, StorageError, WorkerLost)
+NOT_OF_A_SAMPLE = (
+    errors.DeterminismError,
+    errors.Interrupted,
+    errors.OutOfMemory,
+    errors.StorageError,
+    errors.WorkerLost,
+)
 """Errors of the machine or the run, which leaving out a sample does not mend."""
 
 TEXT_MAX = 300
@@ -51,16 +48,16 @@ def parse_failed(manifest: Mapping[str, Any]) -> tuple[FailedSample, ...]:
         raise ValueError(f"failed: {error}") from None
 
 
-def may_be_skipped(error: GenDataError) -> bool:
+def may_be_skipped(error: errors.GenDataError) -> bool:
     """Whether an error concerns its sample alone."""
     return not isinstance(error, NOT_OF_A_SAMPLE)
 
 
-def describe_failure(index: int, error: GenDataError) -> FailedSample:
+def describe_failure(index: int, error: errors.GenDataError) -> FailedSample:
     """Describe the failure of a sample by the error that ``explain_errors`` made of it."""
     cause = error.__cause__ or error
     text = type(cause).__name__
     lines = str(cause).splitlines()
-    if isinstance(cause, SampleError) and lines:
+    if isinstance(cause, errors.SampleError) and lines:
         text = f"{text}: {lines[0]}"[:TEXT_MAX]
-    return FailedSample(index, stage_of(error), text)
+    return FailedSample(index, errors.stage_of(error), text)

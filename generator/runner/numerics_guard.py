@@ -12,8 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gen_data.core.errors import NumericsError
-from gen_data.core.serialization import canonical_json
+from gen_data.core import errors, serialization
 from gen_data.runner.durable_files import write_durably
 from gen_data.runner.seal import read_or_empty
 
@@ -37,14 +36,14 @@ def admit_numerics(job: Job, pipeline: PipelineLike) -> None:
         return
     digests: Mapping[str, str] = compute()
     entry = {"digests": dict(digests), "machine": platform.machine(), "processor": processor_name()}
-    line = (canonical_json(entry) + "\n").encode()
+    line = (serialization.canonical_json(entry) + "\n").encode()
     with job.store.errors():
         job.store.create_run_file(NUMERICS_NAME, line)
         known = _parse(job.store.read_run_file(NUMERICS_NAME))
         if not known or any(dict(digests) == one.get("digests") for one in known):
             return
         if not job.allow_mixed_numerics:
-            raise NumericsError(_describe(known[0], entry))
+            raise errors.NumericsError(_describe(known[0], entry))
         job.store.append_run_file(NUMERICS_NAME, line)
 
 
@@ -66,11 +65,11 @@ def gather_numerics(run_dirs: Sequence[Path], store: LocalStore, allow_mixed: bo
     classes: dict[str, dict[str, object]] = {}
     for folder in run_dirs:
         for entry in _parse(read_or_empty(folder / NUMERICS_NAME)):
-            classes.setdefault(canonical_json(entry.get("digests")), entry)
+            classes.setdefault(serialization.canonical_json(entry.get("digests")), entry)
     entries = list(classes.values())
     if len(entries) > 1 and not allow_mixed:
-        raise NumericsError(_describe(entries[0], entries[1]))
-    lines = "".join(canonical_json(entry) + "\n" for entry in entries)
+        raise errors.NumericsError(_describe(entries[0], entries[1]))
+    lines = "".join(serialization.canonical_json(entry) + "\n" for entry in entries)
     if lines:
         with store.errors():
             write_durably(store.run_dir / NUMERICS_NAME, lines.encode(), store.scratch_root)

@@ -23,6 +23,7 @@ from gen_data.core.distribution import install_command
 from gen_data.core.errors import ConfigError, GenDataError, StorageError
 from gen_data.core.path_names import check_inner_path
 from gen_data.core.urls import is_url
+from gen_data.runner import failed_sample, layout, seal
 from gen_data.runner.durable_files import (
     Inode,
     format_bytes,
@@ -32,18 +33,7 @@ from gen_data.runner.durable_files import (
     make_folder,
     tree_sizes,
 )
-from gen_data.runner.failed_sample import FailedSample
-from gen_data.runner.layout import (
-    CERTIFICATE_NAME,
-    CERTIFICATE_NAMES,
-    MANIFEST_NAME,
-    PLAN_NAME,
-    RUN_NAME,
-    SHARDS_NAME,
-    SUMS_NAME,
-)
 from gen_data.runner.plan import Plan, parse_plan, plan_bytes
-from gen_data.runner.seal import parse_object, parse_sums
 from gen_data.runner.shard_record import FileRecord, ShardRecord, parse_record
 from gen_data.runner.store import FolderState, LocalStore, Scan
 
@@ -274,11 +264,11 @@ class ObjectStore(LocalStore):
     def state(self, plan: Plan) -> FolderState:
         """Determine the state of the URL; changes nothing."""
         names = self.objects.names()
-        if PLAN_NAME in names or self._was_sealed_with(plan):
+        if layout.PLAN_NAME in names or self._was_sealed_with(plan):
             grows = self._check_plan(plan)
-            is_finished = MANIFEST_NAME in names and not grows
+            is_finished = layout.MANIFEST_NAME in names and not grows
             return FolderState.FINISHED if is_finished else FolderState.STARTED
-        if {*names} - {RUN_NAME, ""}:
+        if {*names} - {layout.RUN_NAME, ""}:
             raise StorageError(
                 f"{self.place}: not empty and not a gen-data data set; nothing was changed. "
                 "Choose another URL with --out, or empty this one."
@@ -287,14 +277,14 @@ class ObjectStore(LocalStore):
 
     def _was_sealed_with(self, plan: Plan) -> bool:
         """Whether the sums are those of this plan, although ``plan.json`` may be damaged."""
-        sums = parse_sums(self.read_documents([SUMS_NAME])[SUMS_NAME])
-        return sums.digests.get(PLAN_NAME) == hashlib.sha256(plan_bytes(plan)).hexdigest()
+        sums = seal.parse_sums(self.read_documents([layout.SUMS_NAME])[layout.SUMS_NAME])
+        return sums.digests.get(layout.PLAN_NAME) == hashlib.sha256(plan_bytes(plan)).hexdigest()
 
     def _check_plan(self, plan: Plan) -> bool:
         return not self._was_sealed_with(plan) and super()._check_plan(plan)
 
     def _stored_plan(self) -> Plan:
-        data = self.objects.read([PLAN_NAME])[PLAN_NAME]
+        data = self.objects.read([layout.PLAN_NAME])[layout.PLAN_NAME]
         return parse_plan(data, Path(self.place))
 
     def prepare(self, plan: Plan) -> None:
@@ -303,16 +293,16 @@ class ObjectStore(LocalStore):
         self._clear_staging()
         super().prepare(plan)
         names = self.objects.names()
-        sealed = [MANIFEST_NAME, *CERTIFICATE_NAMES]
+        sealed = [layout.MANIFEST_NAME, *layout.CERTIFICATE_NAMES]
         if not self._was_sealed_with(plan):
-            sealed.append(SUMS_NAME)
+            sealed.append(layout.SUMS_NAME)
         self.objects.remove(name for name in sealed if name in names)
-        self.objects.put(PLAN_NAME, plan_bytes(plan))
+        self.objects.put(layout.PLAN_NAME, plan_bytes(plan))
 
     def _clear_staging(self) -> None:
         with self.errors():
             for entry in self.root.iterdir():
-                if entry.name == RUN_NAME:
+                if entry.name == layout.RUN_NAME:
                     continue
                 if entry.is_dir():
                     shutil.rmtree(entry)
@@ -329,7 +319,7 @@ class ObjectStore(LocalStore):
         if full:
             for shard in self._drop_damaged(records):
                 del records[shard]
-        failed: list[FailedSample] = []
+        failed: list[failed_sample.FailedSample] = []
         missing, samples, size, rejections = [], 0, 0, 0
         for shard in range(plan.shard_count):
             record = records.get(shard)
@@ -352,7 +342,7 @@ class ObjectStore(LocalStore):
 
     def _pull_records(self, plan: Plan) -> dict[int, ShardRecord]:
         """Copy the records that are not staged; returns all that belong to the plan."""
-        listed = {name for name in self.objects.names(SHARDS_NAME) if name.endswith(".json")}
+        listed = {name for name in self.objects.names(layout.SHARDS_NAME) if name.endswith(".json")}
         wanted = [
             shard
             for shard in range(plan.shard_count)
@@ -386,7 +376,7 @@ class ObjectStore(LocalStore):
         if committed is not None and committed.end == record.end:
             self._expect_equal(committed, record, folder)
         else:
-            prefix = f"{SHARDS_NAME}/{record.shard:06d}"
+            prefix = f"{layout.SHARDS_NAME}/{record.shard:06d}"
             self.objects.upload({f"{prefix}/{f.path}": folder / f.path for f in record.files})
             self.objects.put(name, record.to_bytes())
 
@@ -402,7 +392,7 @@ class ObjectStore(LocalStore):
 
     def _drop_damaged(self, records: Mapping[int, ShardRecord]) -> list[int]:
         """Remove the records of shards whose objects differ from them; returns the shards."""
-        sizes = self.objects.tree(SHARDS_NAME)
+        sizes = self.objects.tree(layout.SHARDS_NAME)
         whole = {s: record for s, record in records.items() if _has_sizes(record, sizes)}
         wanted = {
             name: file.bytes
@@ -446,19 +436,19 @@ class ObjectStore(LocalStore):
     def publish(self) -> None:
         """Store the merged files, then the manifest; empties the staging folder."""
         with self.errors():
-            names = [n for n in tree_sizes(self.root, without=RUN_NAME) if not _is_shard(n)]
+            names = [n for n in tree_sizes(self.root, without=layout.RUN_NAME) if not _is_shard(n)]
             linked = {
                 get_inode(path): path.relative_to(self.root).as_posix()
-                for path in (self.root / SHARDS_NAME).rglob("*")
+                for path in (self.root / layout.SHARDS_NAME).rglob("*")
                 if path.is_file()
             }
             copies = {n: linked.get(get_inode(self.root / n), "") for n in names}
         self.objects.copy({name: source for name, source in copies.items() if source})
-        others = (n for n, source in copies.items() if not source and n != MANIFEST_NAME)
+        others = (n for n, source in copies.items() if not source and n != layout.MANIFEST_NAME)
         self.objects.upload({name: self.root / name for name in others})
         stale = {n for n in self.objects.tree() if not _is_shard(n)} - {*names}
-        self.objects.remove(sorted(n for n in stale if not n.startswith(f"{RUN_NAME}/")))
-        self.objects.put(MANIFEST_NAME, self.manifest_path.read_bytes())
+        self.objects.remove(sorted(n for n in stale if not n.startswith(f"{layout.RUN_NAME}/")))
+        self.objects.put(layout.MANIFEST_NAME, self.manifest_path.read_bytes())
         self._clear_staging()
 
     def is_intact(self, extra_matters: bool, on_progress: Callable[[float], None]) -> bool:
@@ -470,7 +460,7 @@ class ObjectStore(LocalStore):
         try:
             outline = folder / "outline"
             copy_outline(self.objects, outline)
-            sizes = tree_sizes(outline, without=RUN_NAME)
+            sizes = tree_sizes(outline, without=layout.RUN_NAME)
             digests = self.objects.digests(sizes, folder, on_progress)
             found = find_deviations(outline, full=True, digests=digests)
         finally:
@@ -479,7 +469,7 @@ class ObjectStore(LocalStore):
 
     def read_manifest(self) -> bytes:
         """The bytes of the manifest of a finished data set."""
-        return self.objects.read([MANIFEST_NAME])[MANIFEST_NAME]
+        return self.objects.read([layout.MANIFEST_NAME])[layout.MANIFEST_NAME]
 
     def read_documents(self, names: Iterable[str]) -> dict[str, bytes]:
         """``{name: bytes}`` of objects at the root of the data set; none of missing ones."""
@@ -488,16 +478,16 @@ class ObjectStore(LocalStore):
 
     def read_run_file(self, name: str) -> bytes:
         """The bytes of an object about the run, which all machines share."""
-        path = f"{RUN_NAME}/{name}"
+        path = f"{layout.RUN_NAME}/{name}"
         return self.objects.read([path]).get(path, b"")
 
     def create_run_file(self, name: str, data: bytes) -> None:
         """Write an object about the run unless it exists."""
-        self.objects.create(f"{RUN_NAME}/{name}", data)
+        self.objects.create(f"{layout.RUN_NAME}/{name}", data)
 
     def append_run_file(self, name: str, data: bytes) -> None:
         """Append to an object about the run."""
-        self.objects.put(f"{RUN_NAME}/{name}", self.read_run_file(name) + data)
+        self.objects.put(f"{layout.RUN_NAME}/{name}", self.read_run_file(name) + data)
 
     def reproduce_command(self, index: int) -> str:
         """Command that generates one sample by itself."""
@@ -510,7 +500,7 @@ def fetch_shard(objects: ObjectFolder, record: ShardRecord, folder: Path) -> Non
     Raises:
         StorageError: an object does not have the digest of its record.
     """
-    prefix = f"{SHARDS_NAME}/{record.shard:06d}"
+    prefix = f"{layout.SHARDS_NAME}/{record.shard:06d}"
     paths = {f"{prefix}/{file.path}": folder / file.path for file in record.files}
     for inner in record.empty_folders:
         (folder / inner).mkdir(parents=True, exist_ok=True)
@@ -529,8 +519,8 @@ def copy_outline(objects: ObjectFolder, folder: Path) -> None:
     Plan, sums, manifest and records are copied; all other files have the right size and no
     contents (they are sparse). ``verify`` without ``full`` reads nothing else.
     """
-    sizes = {n: s for n, s in objects.tree().items() if not n.startswith(f"{RUN_NAME}/")}
-    documents = (PLAN_NAME, MANIFEST_NAME, SUMS_NAME, CERTIFICATE_NAME)
+    sizes = {n: s for n, s in objects.tree().items() if not n.startswith(f"{layout.RUN_NAME}/")}
+    documents = (layout.PLAN_NAME, layout.MANIFEST_NAME, layout.SUMS_NAME, layout.CERTIFICATE_NAME)
     read = {n for n in sizes if n in documents or _is_record(n)}
     found = objects.read(sorted(read))
     for name, size in sizes.items():
@@ -544,7 +534,7 @@ def copy_outline(objects: ObjectFolder, folder: Path) -> None:
         if record is not None:
             for inner in record.empty_folders:
                 (folder / name.removesuffix(".json") / inner).mkdir(parents=True)
-    manifest = parse_object(found.get(MANIFEST_NAME, b"")) or {}
+    manifest = seal.parse_object(found.get(layout.MANIFEST_NAME, b"")) or {}
     for inner in manifest.get("empty_folders", []):
         (folder / objects.check_name(str(inner))).mkdir(parents=True, exist_ok=True)
 
@@ -554,16 +544,16 @@ def _has_sizes(record: ShardRecord, sizes: dict[str, int]) -> bool:
 
 
 def _objects_of(record: ShardRecord) -> dict[str, FileRecord]:
-    prefix = f"{SHARDS_NAME}/{record.shard:06d}"
+    prefix = f"{layout.SHARDS_NAME}/{record.shard:06d}"
     return {f"{prefix}/{file.path}": file for file in record.files}
 
 
 def _record_name(shard: int) -> str:
-    return f"{SHARDS_NAME}/{shard:06d}.json"
+    return f"{layout.SHARDS_NAME}/{shard:06d}.json"
 
 
 def _is_shard(name: str) -> bool:
-    return name.startswith(f"{SHARDS_NAME}/")
+    return name.startswith(f"{layout.SHARDS_NAME}/")
 
 
 def _is_record(name: str) -> bool:

@@ -23,22 +23,9 @@ from pathlib import Path
 from socket import socket
 from typing import IO, TYPE_CHECKING, Protocol
 
-from gen_data.core.errors import GenDataError
-from gen_data.core.processes import SINGLE_THREADED, interrupts_blocked
-from gen_data.core.system_calls import KILLED, anonymous_file
+from gen_data.core import errors, processes, system_calls
+from gen_data.runner import termination_signals, worker_events
 from gen_data.runner.supervisor import Supervisor
-from gen_data.runner.termination_signals import Interruption
-from gen_data.runner.worker_events import (
-    Abort,
-    Action,
-    Assign,
-    Dismiss,
-    Event,
-    Exited,
-    Kill,
-    Spawn,
-    Tick,
-)
 
 if TYPE_CHECKING:
     from gen_data.runner.shard import Job
@@ -53,7 +40,7 @@ must not block the run; its parent-death signal is pending."""
 
 START_WORKER = (
     "import os, sys; sys.path[:] = sys.argv[5:]; "
-    f"os.environ.update(dict.fromkeys({SINGLE_THREADED!r}, '1')); "
+    f"os.environ.update(dict.fromkeys({processes.SINGLE_THREADED!r}, '1')); "
     "from gen_data.runner.worker import main; main(*map(int, sys.argv[1:5]))"
 )
 """Program of a worker; it has the module search path of this process, and so its plug-ins.
@@ -68,7 +55,7 @@ class _Child:
     connection: Connection
     connected: bool = True
 
-    def messages(self) -> Iterator[Event]:
+    def messages(self) -> Iterator[worker_events.Event]:
         """Receive all messages of the worker; a message cut off by its death is dropped."""
         try:
             while self.connected and self.connection.poll():
@@ -88,11 +75,11 @@ class Pool(Protocol):
         """End the remaining workers."""
         ...
 
-    def execute(self, action: Action) -> None:
+    def execute(self, action: worker_events.Action) -> None:
         """Execute one action; actions on a worker that has ended do nothing."""
         ...
 
-    def events(self, wake: socket, timeout_s: float) -> Iterator[Event]:
+    def events(self, wake: socket, timeout_s: float) -> Iterator[worker_events.Event]:
         """Wait for an event, ``wake`` or the timeout; yield all events since the last call."""
         ...
 
@@ -107,9 +94,9 @@ class StandbyWorker:
     """
 
     def __init__(self) -> None:
-        self._job_fd = anonymous_file("gen-data job")
+        self._job_fd = system_calls.anonymous_file("gen-data job")
         # The folder of logs is not known yet.
-        with os.fdopen(anonymous_file("gen-data standby log"), "wb") as log:
+        with os.fdopen(system_calls.anonymous_file("gen-data standby log"), "wb") as log:
             child = _start_worker(STANDBY, self._job_fd, log)
         self.process = child.process
         self._child: _Child | None = child
@@ -144,7 +131,7 @@ class WorkerPool:
     def __init__(self, job: Job, logs: Path, standby: StandbyWorker | None = None) -> None:
         self._standby: _Child | None = None
         if standby is None:
-            self._job_fd = anonymous_file("gen-data job")
+            self._job_fd = system_calls.anonymous_file("gen-data job")
         else:
             self._standby, self._job_fd = standby.take()
         with open(self._job_fd, "wb", closefd=False) as file:
@@ -164,23 +151,30 @@ class WorkerPool:
         self._children.clear()
         os.close(self._job_fd)
 
-    def execute(self, action: Action) -> None:
+    def execute(self, action: worker_events.Action) -> None:
         """Execute one action; actions on a process that has ended do nothing.
 
         Raises:
             OSError: No process can be started, or its log cannot be opened.
         """
-        if isinstance(action, Spawn):
+        if isinstance(action, worker_events.Spawn):
             self._children[action.worker] = self._spawn(action.worker)
-        elif isinstance(action, (Assign, Dismiss)) and action.worker in self._children:
+        elif (
+            isinstance(action, (worker_events.Assign, worker_events.Dismiss))
+            and action.worker in self._children
+        ):
             # The end of a worker arrives as Exited.
             with suppress(BrokenPipeError, ConnectionResetError):
-                work = (action.shard, action.failed) if isinstance(action, Assign) else None
+                work = (
+                    (action.shard, action.failed)
+                    if isinstance(action, worker_events.Assign)
+                    else None
+                )
                 self._children[action.worker].connection.send(work)
-        elif isinstance(action, Kill) and action.worker in self._children:
+        elif isinstance(action, worker_events.Kill) and action.worker in self._children:
             self._children[action.worker].process.kill()
 
-    def events(self, wake: socket, timeout_s: float) -> Iterator[Event]:
+    def events(self, wake: socket, timeout_s: float) -> Iterator[worker_events.Event]:
         """Wait for an event, ``wake`` or the timeout; yield all events since the last call."""
         connections = [c.connection for c in self._children.values() if c.connected]
         some_end = len(connections) < len(self._children)
@@ -191,7 +185,7 @@ class WorkerPool:
             yield from child.messages()
             if exit_code is not None:
                 yield self._on_exit(number, exit_code)
-        yield Tick()
+        yield worker_events.Tick()
 
     def _spawn(self, number: int) -> _Child:
         log_path = self._logs / f"worker-{number}.log"
@@ -204,18 +198,18 @@ class WorkerPool:
                 child.connection.send((number, str(log_path)))
             return child
 
-    def _on_exit(self, number: int, exit_code: int) -> Exited:
+    def _on_exit(self, number: int, exit_code: int) -> worker_events.Exited:
         self._children.pop(number).connection.close()
         kills = _count_out_of_memory_kills()
-        out_of_memory = exit_code == KILLED and kills > self._out_of_memory_kills
+        out_of_memory = exit_code == system_calls.KILLED and kills > self._out_of_memory_kills
         self._out_of_memory_kills = kills
-        return Exited(number, exit_code, out_of_memory)
+        return worker_events.Exited(number, exit_code, out_of_memory)
 
 
 def _start_worker(number: int, job_fd: int, log: IO[bytes]) -> _Child:
     ours, theirs = Pipe(duplex=True)
     arguments = (number, theirs.fileno(), job_fd, os.getpid())
-    with theirs, interrupts_blocked():
+    with theirs, processes.interrupts_blocked():
         process = subprocess.Popen(
             [sys.executable, "-c", START_WORKER, *map(str, arguments), *sys.path],
             stdin=subprocess.DEVNULL,
@@ -246,8 +240,8 @@ def run_supervisor(
     job: Job,
     open_pool: Callable[[Job], Pool],
     supervisor: Supervisor,
-    interruption: Interruption,
-    observe: Callable[[Event | Action], GenDataError | None],
+    interruption: termination_signals.Interruption,
+    observe: Callable[[worker_events.Event | worker_events.Action], errors.GenDataError | None],
     clock: Callable[[], float] = time.monotonic,
 ) -> None:
     """Run the supervisor with real workers until it is finished.
@@ -260,7 +254,7 @@ def run_supervisor(
     """
     deadline_s = float("inf")
 
-    def execute(actions: list[Action]) -> None:
+    def execute(actions: list[worker_events.Action]) -> None:
         for action in actions:
             observe(action)
             with job.store.errors():
@@ -273,10 +267,10 @@ def run_supervisor(
                 objection = observe(event)
                 execute(supervisor.handle(event, clock()))
                 if objection is not None:
-                    execute(supervisor.handle(Abort(objection), clock()))
+                    execute(supervisor.handle(worker_events.Abort(objection), clock()))
             if interruption.pending:
                 deadline_s = clock() + JOIN_S
-                execute(supervisor.handle(Abort(interruption.take()), clock()))
+                execute(supervisor.handle(worker_events.Abort(interruption.take()), clock()))
 
 
 def _count_out_of_memory_kills() -> int:

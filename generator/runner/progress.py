@@ -8,22 +8,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from gen_data.core.errors import CacheWarning, GenDataError
-from gen_data.core.serialization import canonical_json
-from gen_data.runner.durable_files import format_bytes
-from gen_data.runner.free_space import SpaceCheck
-from gen_data.runner.layout import LOG_NAME
-from gen_data.runner.worker_events import (
-    Action,
-    Event,
-    Exited,
-    Note,
-    Ready,
-    SampleDone,
-    SampleSkipped,
-    ShardDone,
-    Spawn,
-)
+from gen_data.core import errors, serialization
+from gen_data.runner import durable_files, free_space, layout, worker_events
 
 if TYPE_CHECKING:
     from gen_data.runner.failed_sample import FailedSample
@@ -111,7 +97,7 @@ class Summary:
             ("rejected layouts", str(self.rejections)),
             (
                 "size",
-                f"{format_bytes(self.bytes)} in shards/, linked files included, "
+                f"{durable_files.format_bytes(self.bytes)} in shards/, linked files included, "
                 f"{mean_bytes / 1e3:.0f} kB/sample",
             ),
         ]
@@ -147,7 +133,7 @@ class RunMonitor:
         scan: Scan,
         total: int,
         report: Callable[[RunProgress], None],
-        space: SpaceCheck,
+        space: free_space.SpaceCheck,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._store = store
@@ -173,25 +159,27 @@ class RunMonitor:
         """Wall-clock time since the start [s]."""
         return self._clock() - self._started_s
 
-    def observe(self, event: Event | Action) -> GenDataError | None:
+    def observe(
+        self, event: worker_events.Event | worker_events.Action
+    ) -> errors.GenDataError | None:
         """Record an event or action; a returned error is a reason to abort the run."""
         objection = None
-        if isinstance(event, SampleDone):
+        if isinstance(event, worker_events.SampleDone):
             self._on_sample(event)
-        elif isinstance(event, SampleSkipped):
+        elif isinstance(event, worker_events.SampleSkipped):
             self._count_in_flight(event)
             self.log({"skipped": event.failure, "text": event.text})
-        elif isinstance(event, ShardDone):
+        elif isinstance(event, worker_events.ShardDone):
             objection = self._on_shard(event)
-        elif isinstance(event, Note):
+        elif isinstance(event, worker_events.Note):
             self.log({"note": event.text})
-        elif isinstance(event, Ready):
+        elif isinstance(event, worker_events.Ready):
             for text in event.warnings:
                 self.log({"warning": text})
-                warnings.warn(text, CacheWarning, stacklevel=2)
-        elif isinstance(event, Spawn):
+                warnings.warn(text, errors.CacheWarning, stacklevel=2)
+        elif isinstance(event, worker_events.Spawn):
             self._workers.add(event.worker)
-        elif isinstance(event, Exited):
+        elif isinstance(event, worker_events.Exited):
             self._workers.discard(event.worker)
             self._in_flight.pop(event.worker, None)
         else:
@@ -216,8 +204,8 @@ class RunMonitor:
 
     def log(self, entry: Mapping[str, object]) -> None:
         """Append one line to the run's log."""
-        line = canonical_json({"at_s": round(self.seconds, 3), **entry})
-        with self._store.errors(), (self._store.run_dir / LOG_NAME).open("a") as file:
+        line = serialization.canonical_json({"at_s": round(self.seconds, 3), **entry})
+        with self._store.errors(), (self._store.run_dir / layout.LOG_NAME).open("a") as file:
             file.write(f"{line}\n")
 
     def mean_cpu_s(self) -> dict[str, float]:
@@ -225,12 +213,14 @@ class RunMonitor:
         measured = max(self._measured, 1)
         return {stage: total / measured for stage, total in self._cpu_s.items()}
 
-    def _on_sample(self, event: SampleDone) -> None:
+    def _on_sample(self, event: worker_events.SampleDone) -> None:
         self._count_in_flight(event)
         self._measured += 1
         self._add_cpu_time(event.timings_s)
 
-    def _count_in_flight(self, event: SampleDone | SampleSkipped) -> None:
+    def _count_in_flight(
+        self, event: worker_events.SampleDone | worker_events.SampleSkipped
+    ) -> None:
         _, before = self._in_flight.get(event.worker, (event.shard, 0))
         self._in_flight[event.worker] = (event.shard, before + 1)
 
@@ -238,7 +228,7 @@ class RunMonitor:
         for stage, seconds in timings_s.items():
             self._cpu_s[stage] = self._cpu_s.get(stage, 0.0) + seconds
 
-    def _on_shard(self, event: ShardDone) -> GenDataError | None:
+    def _on_shard(self, event: worker_events.ShardDone) -> errors.GenDataError | None:
         self._in_flight.pop(event.worker, None)
         self.made += event.samples
         self.bytes += event.bytes

@@ -10,11 +10,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 
-from gen_data.core.bounded_cache import ObjectCache
-from gen_data.core.path_names import check_name
+from gen_data.core import bounded_cache, path_names, serialization
 from gen_data.core.sample import Sample
 from gen_data.core.scene import Scene
-from gen_data.core.serialization import canonical_json, fields_from_plain, from_plain
 
 SCENES_NAME = "scenes.jsonl"
 
@@ -44,7 +42,7 @@ def scene_line(sample: Sample, base: Sample | None) -> str:
     if base is not None:
         fields = {k: v for k, v in fields.items() if not _same(v, getattr(base.scene, k))}
     texts = {
-        name: _list_text(value) if name in _RECURRING else canonical_json(value)
+        name: _list_text(value) if name in _RECURRING else serialization.canonical_json(value)
         for name, value in fields.items()
     }
     facts = {
@@ -57,18 +55,18 @@ def scene_line(sample: Sample, base: Sample | None) -> str:
         "view_attempts": sample.view_attempts,
         "base": None if base is None else base.index,
     }
-    plain = {name: canonical_json(value) for name, value in facts.items()}
+    plain = {name: serialization.canonical_json(value) for name, value in facts.items()}
     return _object_text({**plain, "scene": _object_text(texts)})
 
 
 _RECURRING = ("bodies", "instances")
 """Fields most of whose items are the same objects at all steps of a sequence."""
-_texts: ObjectCache[str] = ObjectCache(2048)
+_texts: bounded_cache.ObjectCache[str] = bounded_cache.ObjectCache(2048)
 """Canonical JSON of the latest of these items, half a kilobyte each."""
 
 
 def _list_text(items: Sequence[object]) -> str:
-    texts = (_texts.get(item, partial(canonical_json, item)) for item in items)
+    texts = (_texts.get(item, partial(serialization.canonical_json, item)) for item in items)
     return f"[{','.join(texts)}]"
 
 
@@ -89,10 +87,10 @@ def parse_scene(line: bytes | str, scene_of: Callable[[int], Scene]) -> KeptScen
     """
     row = json.loads(line)
     base, own = row.pop("base"), row.pop("scene")
-    check_name(row["split"])
+    path_names.check_name(row["split"])
     if base is None:
-        return KeptScene(**row, scene=from_plain(Scene, own))
-    scene = dataclasses.replace(scene_of(base), **fields_from_plain(Scene, own))
+        return KeptScene(**row, scene=serialization.from_plain(Scene, own))
+    scene = dataclasses.replace(scene_of(base), **serialization.fields_from_plain(Scene, own))
     return KeptScene(**row, scene=scene)
 
 

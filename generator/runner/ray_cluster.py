@@ -9,8 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from gen_data.core.distribution import install_command
-from gen_data.core.errors import ConfigError
+from gen_data.core import distribution, errors
 from gen_data.runner.termination_signals import SIGNALS
 
 if TYPE_CHECKING:
@@ -36,12 +35,12 @@ class RayCluster:
     def __post_init__(self) -> None:
         """Check the numbers."""
         if self.cpus < 0 or self.gpus < 0:
-            raise ConfigError(
+            raise errors.ConfigError(
                 f"resources of a worker: {self.cpus:g} CPUs and {self.gpus:g} GPUs; "
                 "expected numbers of 0 or more"
             )
         if self.address.startswith("ray://"):
-            raise ConfigError(
+            raise errors.ConfigError(
                 f"address: '{self.address}' is a Ray Client; expected auto or HOST:PORT: run the "
                 "command on a machine of the cluster, for example by 'ray job submit'"
             )
@@ -56,8 +55,8 @@ class RayCluster:
         try:
             import ray
         except ImportError:
-            raise ConfigError(
-                f"runner ray: Ray is not installed; expected: {install_command('ray')}"
+            raise errors.ConfigError(
+                f"runner ray: Ray is not installed; expected: {distribution.install_command('ray')}"
             ) from None
         if ray.is_initialized():
             yield
@@ -71,7 +70,7 @@ class RayCluster:
                     **({} if self.address else {"include_dashboard": False}),
                 )
         except (ConnectionError, ValueError, RuntimeError) as error:
-            raise ConfigError(
+            raise errors.ConfigError(
                 f"address: no Ray cluster at '{self.address or 'this machine'}' "
                 f"({str(error).splitlines()[0]}); expected auto on a machine of a cluster "
                 "('ray start --head'), or HOST:PORT"

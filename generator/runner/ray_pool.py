@@ -14,8 +14,7 @@ from dataclasses import dataclass
 from socket import socket
 from typing import TYPE_CHECKING, Any
 
-from gen_data.core.processes import SINGLE_THREADED
-from gen_data.core.system_calls import KILLED
+from gen_data.core import processes, system_calls
 from gen_data.runner.ray_worker import Placed, ShardWorker
 from gen_data.runner.worker_events import (
     Action,
@@ -68,7 +67,7 @@ class RayPool:
             num_gpus=gpus,
             max_restarts=0,
             max_task_retries=0,
-            runtime_env={"env_vars": dict.fromkeys(SINGLE_THREADED, "1")},
+            runtime_env={"env_vars": dict.fromkeys(processes.SINGLE_THREADED, "1")},
         )
         self._actors: dict[int, _Actor] = {}
         self._ended: list[Exited] = []
@@ -100,7 +99,7 @@ class RayPool:
             actor.is_leaving = True
             actor.stream = actor.handle.leave.remote()
         else:
-            self._end(Exited(action.worker, KILLED))
+            self._end(Exited(action.worker, system_calls.KILLED))
 
     def events(self, wake: socket, timeout_s: float) -> Iterator[Event]:
         """Wait for an event or the timeout; yield all events since the last call.
@@ -164,7 +163,7 @@ class RayPool:
     def _describe_end(self, number: int, actor: _Actor, error: Exception) -> Exited:
         exceptions = self._ray.exceptions
         if isinstance(error, exceptions.OutOfMemoryError):
-            return Exited(number, KILLED, out_of_memory=True)
+            return Exited(number, system_calls.KILLED, out_of_memory=True)
         living = {node["NodeID"] for node in self._ray.nodes() if node["Alive"]}
         # A machine that lives reports the death of its worker. Ray notices the loss of a
         # machine after seconds only; until then, the worker is unavailable.

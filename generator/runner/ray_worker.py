@@ -19,11 +19,8 @@ from pathlib import Path
 
 from gen_data.core.errors import NumericsError
 from gen_data.core.sample import Sample
-from gen_data.runner.durable_files import make_folder
+from gen_data.runner import durable_files, identity, numerics_guard, resident_memory
 from gen_data.runner.failed_sample import FailedSample
-from gen_data.runner.identity import installation_differences
-from gen_data.runner.numerics_guard import admit_numerics
-from gen_data.runner.resident_memory import release_memory
 from gen_data.runner.shard import Job, PipelineLike, make_shard
 from gen_data.runner.worker import done_event, make_sendable
 from gen_data.runner.worker_events import Event, Failed, Ready, SampleDone, SampleSkipped
@@ -104,15 +101,15 @@ class ShardWorker:
     def _start(self) -> None:
         self._job: Job = pickle.loads(self._job_bytes)
         store = self._job.store
-        make_folder(store.scratch_root)
+        durable_files.make_folder(store.scratch_root)
         _redirect_output(store.run_dir / f"worker-{self._number}.log")
-        differences = installation_differences(self._job.plan)
+        differences = identity.installation_differences(self._job.plan)
         if differences:
             raise NumericsError(f"another installation: {'; '.join(differences[:3])}")
         self._pipeline: PipelineLike = self._engines.enter_context(self._job.make_pipeline())
         gc.collect()
         gc.freeze()
-        admit_numerics(self._job, self._pipeline)
+        numerics_guard.admit_numerics(self._job, self._pipeline)
         self._events.put(Ready(self._number))
 
     def _make(self, shard: int, failed: tuple[FailedSample, ...]) -> None:
@@ -124,7 +121,7 @@ class ShardWorker:
 
         made = make_shard(self._job, self._pipeline, shard, report, report_failure, failed)
         self._events.put(done_event(self._number, made))
-        release_memory()
+        resident_memory.release_memory()
 
 
 def _redirect_output(log: Path) -> None:

@@ -12,11 +12,10 @@ from pathlib import Path
 from gen_data.assemble.config import parse_config
 from gen_data.assemble.pipeline_factory import PipelineFactory
 from gen_data.core.errors import ConfigError, StorageError
-from gen_data.runner.finalize import LicencesOf
+from gen_data.runner import finalize, rerender
 from gen_data.runner.identity import format_licences, make_plan
 from gen_data.runner.layout import PLAN_NAME
 from gen_data.runner.plan import Plan, compare_plans
-from gen_data.runner.rerender import rerender_plan
 from gen_data.runner.sample_stages import Difference, SampleFiles, compare_samples
 from gen_data.runner.shard import EnteredPipeline, PipelineLike, write_images, write_records
 from gen_data.runner.store import LocalStore
@@ -37,7 +36,7 @@ class Regeneration:
 
     plan: Plan
     make_pipeline: Callable[[], EnteredPipeline]
-    licences: LicencesOf
+    licences: finalize.LicencesOf
     changes: tuple[str, ...]
 
 
@@ -75,7 +74,7 @@ def plan_regeneration(folder: Path, plan: Plan, source: Path | None = None) -> R
     was = parse_config(
         json.dumps(stored.plan.config, ensure_ascii=False), str(source / PLAN_NAME), plan.name
     )
-    made, maker = rerender_plan(stored, was, config, ast.literal_eval(redrawn))
+    made, maker = rerender.rerender_plan(stored, was, config, ast.literal_eval(redrawn))
     licences = partial(format_licences, maker.factory)
     return Regeneration(made, maker, licences, tuple(compare_plans(plan, made)))
 

@@ -16,12 +16,10 @@ from gen_data.assemble.config import Config
 from gen_data.assemble.pipeline_factory import PipelineFactory
 from gen_data.assemble.size_estimate import estimate_sample_bytes
 from gen_data.config.shared_values import REFERENCE
-from gen_data.core.errors import ConfigError, ConfigWarning, did_you_mean
+from gen_data.core import errors, scene_time, serialization
 from gen_data.core.interfaces import DatasetInfo, Exporter, Randomizer, Sensor, Stage
 from gen_data.core.sample import Sample
 from gen_data.core.scene import Scene
-from gen_data.core.scene_time import place_sensors
-from gen_data.core.serialization import canonical_json
 from gen_data.core.streams import Streams
 from gen_data.pipeline import Pipeline
 from gen_data.pipeline.finalize_scene import finalize_scene
@@ -115,7 +113,7 @@ class RerenderedScenes:
             ids = {name: number for number, name in enumerate(self.info.categories, 1)}
             scene = replace(scene, box3d=nominal.box3d)
             scene = finalize_scene(scene, self.pipeline.assets, ids)
-        view = DrawnView(view_streams.index, place_sensors(scene), view_streams)
+        view = DrawnView(view_streams.index, scene_time.place_sensors(scene), view_streams)
         return replace(
             self.pipeline.read_sensors(view, sensors, step_index),
             split=first.split,
@@ -160,7 +158,7 @@ class RerenderedScenes:
                     rng = streams[stage].rng(f"randomizer/{randomizer.name}")
                     scene = randomizer(scene, self.pipeline.assets, rng)
                     if _geometry(scene) != before:
-                        raise ConfigError(
+                        raise errors.ConfigError(
                             f"randomizers.{randomizer.name}: moves, adds or removes objects, but "
                             "rerender keeps the scenes of the data set; generate a new data set "
                             "instead"
@@ -257,7 +255,7 @@ def rerender_plan(
         warnings.warn(
             f"shared.{name}: a randomizer that referred to it has a value of its own now, so that "
             f"images no longer have the attribute '{name}'; to change it: --set shared.{name}=...",
-            ConfigWarning,
+            errors.ConfigWarning,
             stacklevel=2,
         )
     factory = PipelineFactory(now, stored.plan.n, known_categories=stored.categories)
@@ -333,34 +331,34 @@ class Changes:
         was, now = self.was.resolved, self.now.resolved
         for key in sorted({*was, *now} - CHANGEABLE):
             if was.get(key) != now.get(key):
-                raise ConfigError(
+                raise errors.ConfigError(
                     f"{key}: cannot change, as rerender keeps the scenes of the data set; expected "
                     f"changes of {', '.join(sorted(CHANGEABLE))} only"
                 )
         listed = _randomizers(self.now).keys()
         gone = sorted(_randomizers(self.was).keys() - listed)
         if gone:
-            raise ConfigError(
+            raise errors.ConfigError(
                 f"randomizers.{gone[0]}: was drawn into the scenes of the data set, so that it "
                 "cannot be left out; change its settings instead"
             )
         unknown = sorted(set(redraw) - listed)
         if unknown:
-            raise ConfigError(
+            raise errors.ConfigError(
                 f"--redraw {unknown[0]}: there is no such randomizer; expected some of "
-                f"{', '.join(sorted(listed))}{did_you_mean(unknown[0], listed)}"
+                f"{', '.join(sorted(listed))}{errors.did_you_mean(unknown[0], listed)}"
             )
 
 
 def _sensors(config: Config) -> dict[str, str]:
     """Entries of the configuration by name, as JSON."""
     pairs = zip(config.sensors, config.resolved["sensors"], strict=True)
-    return {sensor.name: canonical_json(entry) for sensor, entry in pairs}
+    return {sensor.name: serialization.canonical_json(entry) for sensor, entry in pairs}
 
 
 def _randomizers(config: Config) -> dict[str, str]:
     pairs = zip(config.probes[0].randomizers, config.resolved["randomizers"], strict=True)
-    return {randomizer.name: canonical_json(entry) for randomizer, entry in pairs}
+    return {randomizer.name: serialization.canonical_json(entry) for randomizer, entry in pairs}
 
 
 def _changed_entries(was: Mapping[str, str], now: Mapping[str, str]) -> frozenset[str]:

@@ -24,21 +24,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.core.capture import Channel
-from gen_data.core.errors import StorageError
-from gen_data.core.serialization import canonical_json
-from gen_data.runner.durable_files import hash_file
+from gen_data.core import capture, errors, serialization
+from gen_data.runner import durable_files, plan, provenance
 from gen_data.runner.labels import LABELS_NAME
-from gen_data.runner.plan import differences
-from gen_data.runner.provenance import SCENES_NAME
 
 STAGES = ("scene", "geometry", "render", "labels", "encode")
 SENSED = frozenset(
     {
-        Channel.RGB.value,
-        Channel.RADIANCE.value,
-        Channel.MEASURED_DEPTH.value,
-        Channel.INFRARED.value,
+        capture.Channel.RGB.value,
+        capture.Channel.RADIANCE.value,
+        capture.Channel.MEASURED_DEPTH.value,
+        capture.Channel.INFRARED.value,
     }
 )
 """Images that are rendered or measured; all other images are labels of geometry."""
@@ -81,10 +77,10 @@ class SampleFiles:
     @cached_property
     def scene(self) -> dict[str, Any]:
         """Its line of ``scenes.jsonl``, complete."""
-        plain = self._parse(SCENES_NAME, self.index)
+        plain = self._parse(provenance.SCENES_NAME, self.index)
         base = plain.pop("base")
         if base is not None:
-            shared = self._parse(SCENES_NAME, base)["scene"]
+            shared = self._parse(provenance.SCENES_NAME, base)["scene"]
             plain["scene"] = {**shared, **plain["scene"]}
         return plain
 
@@ -119,7 +115,7 @@ class SampleFiles:
             "geometry": _digest_arrays(self.images(sensed=False)),
             "render": _digest_arrays(self.images(sensed=True)),
             "labels": _digest_json(self.labels),
-            "encode": _digest_json({n: hash_file(p) for n, p in self.media.items()}),
+            "encode": _digest_json({n: durable_files.hash_file(p) for n, p in self.media.items()}),
         }
 
     def _parse(self, name: str, index: int) -> dict[str, Any]:
@@ -135,7 +131,7 @@ class SampleFiles:
             if plain["index"] != index:
                 raise ValueError(f"line {number + 1} is of sample {plain['index']}")
         except (OSError, ValueError, KeyError, TypeError, IndexError) as error:
-            raise StorageError(f"{path}: sample {index} cannot be read ({error})") from None
+            raise errors.StorageError(f"{path}: sample {index} cannot be read ({error})") from None
         return plain
 
 
@@ -153,9 +149,9 @@ def read_array(path: Path) -> NDArray[Any]:
             return array
         decoded = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
     except (OSError, ValueError) as error:
-        raise StorageError(f"{path}: cannot be decoded ({error})") from None
+        raise errors.StorageError(f"{path}: cannot be decoded ({error})") from None
     if decoded is None:
-        raise StorageError(f"{path}: cannot be decoded")
+        raise errors.StorageError(f"{path}: cannot be decoded")
     return np.asarray(decoded)
 
 
@@ -173,10 +169,10 @@ def compare_samples(
         StorageError: a file is missing or damaged.
     """
     comparisons: Mapping[str, Callable[[], Iterator[str]]] = {
-        "scene": lambda: differences("", one.scene, other.scene),
+        "scene": lambda: plan.differences("", one.scene, other.scene),
         "geometry": lambda: _differing_arrays(one.images(sensed=False), other.images(sensed=False)),
         "render": lambda: _differing_arrays(one.images(sensed=True), other.images(sensed=True)),
-        "labels": lambda: differences("", one.labels, other.labels),
+        "labels": lambda: plan.differences("", one.labels, other.labels),
         "encode": lambda: _differing_bytes(one.media, other.media),
     }
     for stage in STAGES:
@@ -218,7 +214,7 @@ def _differing_bytes(one: Mapping[str, Path], other: Mapping[str, Path]) -> Iter
 
 
 def _digest_json(plain: Any) -> str:
-    return hashlib.sha256(canonical_json(plain).encode()).hexdigest()
+    return hashlib.sha256(serialization.canonical_json(plain).encode()).hexdigest()
 
 
 def _digest_arrays(arrays: Mapping[str, NDArray[Any]]) -> str:

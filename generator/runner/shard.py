@@ -12,13 +12,12 @@ from gen_data.core.errors import GenDataError, SampleError, in_stage
 from gen_data.core.interfaces import DatasetInfo, Exporter
 from gen_data.core.sample import Sample
 from gen_data.core.serialization import find_not_finite, to_plain
-from gen_data.runner.durable_files import Inode
+from gen_data.runner import durable_files, resident_memory
 from gen_data.runner.error_context import explain_errors
 from gen_data.runner.failed_sample import FailedSample, describe_failure, may_be_skipped
 from gen_data.runner.labels import LABELS_NAME, labels_line
 from gen_data.runner.plan import Plan
 from gen_data.runner.provenance import SCENES_NAME, scene_line
-from gen_data.runner.resident_memory import HeapTrimmer
 from gen_data.runner.shard_record import ShardRecord, describe_shard
 from gen_data.runner.store import LocalStore
 
@@ -28,7 +27,7 @@ MediaWriter = Callable[[DatasetInfo, Sample, Path], object]
 RecordWriter = Callable[[Sample, Sample | None, Path], object]
 """Adds scene and labels of a sample to a shard folder; the second is the scene's first sample."""
 
-LinkedDigests = Callable[[int], Mapping[Inode, str]]
+LinkedDigests = Callable[[int], Mapping[durable_files.Inode, str]]
 """Digests by inode of the files that a shard shares with another data set, by shard."""
 
 
@@ -66,7 +65,7 @@ class EnteredPipeline(PipelineLike, Protocol):
         ...
 
 
-def no_digests(shard: int) -> Mapping[Inode, str]:
+def no_digests(shard: int) -> Mapping[durable_files.Inode, str]:
     """No file is shared with another data set."""
     del shard
     return {}
@@ -168,7 +167,7 @@ def make_shard(
         folder = job.store.scratch_dir()
     try:
         samples: list[Sample] = []
-        heap = HeapTrimmer()
+        heap = resident_memory.HeapTrimmer()
         for index in (i for i in indices if i not in absent):
             try:
                 samples.append(_make_sample(job, pipeline, index, folder, samples, on_sample))

@@ -18,22 +18,15 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from gen_data.core import measurement_dtypes, path_names, serialization, urls
 from gen_data.core.capture import POINT, Capture, Channel, Measurements, PointCloud, SensorReading
 from gen_data.core.errors import SampleIndexError, StorageError
 from gen_data.core.interfaces import DatasetInfo, cloud_path, table_path
-from gen_data.core.measurement_dtypes import columns_dtype
-from gen_data.core.path_names import check_name
 from gen_data.core.sample import EgoTruth, ImageTruth, Sample
 from gen_data.core.scene import Camera, Scene
-from gen_data.core.serialization import from_plain
-from gen_data.core.urls import is_url, needs_folder
-from gen_data.runner.durable_files import hash_file
-from gen_data.runner.failed_sample import FailedSample, parse_failed
+from gen_data.runner import durable_files, failed_sample, layout, plan, store
 from gen_data.runner.labels import LABELS_NAME, Labels, parse_labels
-from gen_data.runner.layout import MANIFEST_NAME, SHARDS_NAME
-from gen_data.runner.plan import DAMAGE, load_plan
 from gen_data.runner.provenance import SCENES_NAME, KeptScene, parse_scene
-from gen_data.runner.store import LocalStore
 
 T = TypeVar("T")
 
@@ -77,14 +70,14 @@ class StoredSamples:
     """
 
     def __init__(self, folder: str | PathLike[str]) -> None:
-        if is_url(folder):
-            raise StorageError(needs_folder(folder))
+        if urls.is_url(folder):
+            raise StorageError(urls.needs_folder(folder))
         self.folder = Path(folder)
-        self.plan = load_plan(self.folder)
+        self.plan = plan.load_plan(self.folder)
         manifest = self._read_manifest()
         self.info: DatasetInfo = manifest[0]
         self.dataset_id: str = manifest[1]
-        self.failed: tuple[FailedSample, ...] = manifest[2]
+        self.failed: tuple[failed_sample.FailedSample, ...] = manifest[2]
         self._absent = sorted(failure.index for failure in self.failed)
         self._lines = lru_cache(2 * SHARDS_KEPT)(self._open_lines)
         # Views of one scene follow each other, and share most of it.
@@ -190,7 +183,7 @@ class StoredSamples:
         """Turn errors of a damaged file into a StorageError with a remedy."""
         try:
             yield
-        except DAMAGE as error:
+        except plan.DAMAGE as error:
             fact = error.strerror if isinstance(error, OSError) else error
             raise StorageError(
                 f"{path}: cannot be read ({fact}); check the data set with:"
@@ -226,7 +219,7 @@ class StoredSamples:
         def table(name: str) -> Measurements:
             info = labels.tables[name]
             columns = self.info.sensor(name).columns
-            rows = _load(table_path(folder, name, index), columns_dtype(columns))
+            rows = _load(table_path(folder, name, index), measurement_dtypes.columns_dtype(columns))
             return Measurements(name, info.device, rows, info.time_s)
 
         return Capture(
@@ -235,23 +228,23 @@ class StoredSamples:
 
     def shard_dir(self, shard: int) -> Path:
         """Folder of the files of a shard."""
-        return self.folder / SHARDS_NAME / f"{shard:06d}"
+        return self.folder / layout.SHARDS_NAME / f"{shard:06d}"
 
-    def _read_manifest(self) -> tuple[DatasetInfo, str, tuple[FailedSample, ...]]:
+    def _read_manifest(self) -> tuple[DatasetInfo, str, tuple[failed_sample.FailedSample, ...]]:
         """Facts about the data set, its id, and the samples that it does not have."""
-        path = self.folder / MANIFEST_NAME
+        path = self.folder / layout.MANIFEST_NAME
         try:
             manifest = json.loads(path.read_bytes())
-            info = from_plain(DatasetInfo, manifest["info"])
-            check_name(info.name)
+            info = serialization.from_plain(DatasetInfo, manifest["info"])
+            path_names.check_name(info.name)
             for name in (*info.categories, *(sensor.name for sensor in info.sensors)):
-                check_name(name)
-            return info, parse_dataset_id(manifest, path), parse_failed(manifest)
+                path_names.check_name(name)
+            return info, parse_dataset_id(manifest, path), failed_sample.parse_failed(manifest)
         except FileNotFoundError:
             raise StorageError(
                 f"{path}: missing; the data set is unfinished: run the command that began it again"
             ) from None
-        except DAMAGE as error:
+        except plan.DAMAGE as error:
             raise StorageError(
                 f"{path}: damaged ({error}); restore the file from a copy, or remove it and run "
                 "the command that made the data set again"
@@ -274,7 +267,7 @@ class CheckedSamples(StoredSamples):
 
     def __init__(self, folder: str | PathLike[str]) -> None:
         super().__init__(folder)
-        self.record = lru_cache(SHARDS_KEPT)(LocalStore(self.folder).record)
+        self.record = lru_cache(SHARDS_KEPT)(store.LocalStore(self.folder).record)
         """Record of a shard; None if it is missing or damaged."""
         self._checked: set[Path] = set()
 
@@ -305,7 +298,7 @@ def check_digest(path: Path, sha256: str | None, folder: Path, source: str) -> N
     Raises:
         StorageError: the file does not have that digest, or none is known (None).
     """
-    if hash_file(path) != sha256:
+    if durable_files.hash_file(path) != sha256:
         raise StorageError(
             f"{path}: its sha256 is not {source}.\n  Repair: "
             f"gen-data repair {shlex.quote(str(folder))}"

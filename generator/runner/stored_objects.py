@@ -8,18 +8,14 @@ from pathlib import Path
 from tempfile import mkdtemp
 from typing import Any
 
-from gen_data.core.errors import StorageError
-from gen_data.core.urls import is_url
+from gen_data.core import errors, urls
+from gen_data.runner import object_store, seal, shard_record, stored
 from gen_data.runner.layout import MANIFEST_NAME, PLAN_NAME, SHARDS_NAME
-from gen_data.runner.object_store import ObjectFolder, fetch_shard
-from gen_data.runner.seal import parse_object
-from gen_data.runner.shard_record import parse_unchecked_record
-from gen_data.runner.stored import StoredSamples, parse_dataset_id
 
 
-def open_stored(place: str | os.PathLike[str]) -> StoredSamples:
+def open_stored(place: str | os.PathLike[str]) -> stored.StoredSamples:
     """Open a finished data set in a folder or at a URL."""
-    return StoredObjects(os.fspath(place)) if is_url(place) else StoredSamples(place)
+    return StoredObjects(os.fspath(place)) if urls.is_url(place) else stored.StoredSamples(place)
 
 
 def url_cache_dir() -> Path:
@@ -29,7 +25,7 @@ def url_cache_dir() -> Path:
     return Path(platformdirs.user_cache_path("gen-data")) / "data-sets"
 
 
-class StoredObjects(StoredSamples):
+class StoredObjects(stored.StoredSamples):
     """Samples of a data set at a URL.
 
     The cache has one folder per data set, named by its id, which many processes may fill.
@@ -40,17 +36,17 @@ class StoredObjects(StoredSamples):
 
     def __init__(self, url: str) -> None:
         self.url = url.rstrip("/")
-        self._objects = ObjectFolder(self.url)
+        self._objects = object_store.ObjectFolder(self.url)
         documents = self._objects.read([PLAN_NAME, MANIFEST_NAME])
-        manifest = parse_object(documents.get(MANIFEST_NAME, b"")) or {}
+        manifest = seal.parse_object(documents.get(MANIFEST_NAME, b"")) or {}
         if PLAN_NAME not in documents or "dataset_id" not in manifest:
-            raise StorageError(
+            raise errors.StorageError(
                 f"{self.url}: no finished data set: {PLAN_NAME} or {MANIFEST_NAME} is missing; "
                 "run the command that began it again"
             )
         self._record_digests: Sequence[str] = manifest.get("shards", [])
         cache = url_cache_dir()
-        folder = cache / parse_dataset_id(manifest, self.url)
+        folder = cache / stored.parse_dataset_id(manifest, self.url)
         try:
             (folder / SHARDS_NAME).mkdir(parents=True, exist_ok=True)
             for name, data in documents.items():
@@ -59,7 +55,7 @@ class StoredObjects(StoredSamples):
                 unfinished.replace(folder / name)
                 unfinished.parent.rmdir()
         except OSError as error:
-            raise StorageError(
+            raise errors.StorageError(
                 f"{error.filename or cache}: {error.strerror}; shards of {self.url} are copied "
                 "there. Point XDG_CACHE_HOME to a folder with room"
             ) from error
@@ -75,16 +71,16 @@ class StoredObjects(StoredSamples):
     def _fetch(self, shard: int, folder: Path) -> None:
         name = f"{SHARDS_NAME}/{shard:06d}.json"
         data = self._objects.read([name]).get(name, b"")
-        record = parse_unchecked_record(data)
+        record = shard_record.parse_unchecked_record(data)
         expected = self._record_digests[shard : shard + 1]
         if record is None or [hashlib.sha256(data).hexdigest()] != list(expected):
-            raise StorageError(
+            raise errors.StorageError(
                 f"{self.url}/{name}: missing, or its sha256 is not the one in the manifest; check "
                 f"the data set with:\n    gen-data verify {self.url}"
             )
         unfinished = Path(mkdtemp(dir=self.folder))
         try:
-            fetch_shard(self._objects, record, unfinished / "shard")
+            object_store.fetch_shard(self._objects, record, unfinished / "shard")
             (unfinished / "shard").rename(folder)
         except OSError:
             # Another process may have been faster.

@@ -10,14 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 
-from gen_data.core.errors import (
-    DeterminismError,
-    GenDataError,
-    NumericsError,
-    StorageError,
-    WorkerLost,
-)
-from gen_data.core.system_calls import KILLED
+from gen_data.core import errors, system_calls
 from gen_data.runner.failed_sample import FailedSample
 from gen_data.runner.worker_events import (
     Abort,
@@ -111,7 +104,7 @@ class Supervisor:
     describe_sample: Callable[[int], str]
     limits: Limits = field(default_factory=Limits)
     skip_failed: bool = False
-    error: GenDataError | None = None
+    error: errors.GenDataError | None = None
     given_up: list[int] = field(default_factory=list)
     deaths: int = 0
 
@@ -241,7 +234,7 @@ class Supervisor:
         makes_sample = worker.state is State.BUSY and self._current_sample(worker) is not None
         return makes_sample and self.limits.sample_s is not None
 
-    def _abort(self, error: GenDataError) -> list[Action]:
+    def _abort(self, error: errors.GenDataError) -> list[Action]:
         self._drain(error)
         actions: list[Action] = []
         for number, worker in sorted(self._alive.items()):
@@ -249,23 +242,23 @@ class Supervisor:
             actions.append(Kill(number))
         return actions
 
-    def _report(self, error: GenDataError, worker: _Worker) -> list[Action]:
+    def _report(self, error: errors.GenDataError, worker: _Worker) -> list[Action]:
         worker.state = State.LEAVING
-        if isinstance(error, NumericsError):
+        if isinstance(error, errors.NumericsError):
             return self._refuse(error)
-        if isinstance(error, (StorageError, DeterminismError)):
+        if isinstance(error, (errors.StorageError, errors.DeterminismError)):
             # The other workers would fail in the same way.
             return self._abort(error)
         return self._drain(error)
 
-    def _refuse(self, error: NumericsError) -> list[Action]:
+    def _refuse(self, error: errors.NumericsError) -> list[Action]:
         """Go on without a worker that computes differently, unless it was the last one."""
         if all(worker.state is State.LEAVING for worker in self._alive.values()):
             return self._drain(error)
         self.workers = max(1, self.workers - 1)
         return [Note(f"a worker takes no work: {error}")]
 
-    def _drain(self, error: GenDataError) -> list[Action]:
+    def _drain(self, error: errors.GenDataError) -> list[Action]:
         """Assign no more shards; those in progress are finished.
 
         The first error that ends the run precedes that of an abandoned shard, which does not.
@@ -289,7 +282,7 @@ class Supervisor:
             self._failed_starts += 1
             if self._failed_starts >= self.limits.failed_starts:
                 self._drain(
-                    WorkerLost(
+                    errors.WorkerLost(
                         f"worker processes end while they start: {cause}; "
                         f"see run/worker-{event.worker}.log in the output folder"
                     )
@@ -317,7 +310,7 @@ class Supervisor:
             return [note, Note(f"sample {index} is skipped: {error}")]
         self.given_up.append(shard)
         suspect = self.samples_of(shard)[-1] if index is None else index
-        lost = WorkerLost(
+        lost = errors.WorkerLost(
             f"shard {shard}: its worker process died {_times(counts[key])}, "
             f"at last in {place}: {cause}.\n"
             f"  Reproduce: {self.describe_sample(suspect)}"
@@ -364,4 +357,4 @@ def describe_exit(event: Exited) -> str:
     text = f"killed by signal {number} ({name})"
     if event.out_of_memory:
         return f"{text}; the kernel was out of memory"
-    return f"{text}; out of memory?" if number == -KILLED else text
+    return f"{text}; out of memory?" if number == -system_calls.KILLED else text

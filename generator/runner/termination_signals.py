@@ -8,10 +8,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from types import FrameType
 
-from gen_data.core.errors import Interrupted
-from gen_data.core.system_calls import stop_signals, wake_channel
+from gen_data.core import errors, system_calls
 
-SIGNALS = stop_signals()
+SIGNALS = system_calls.stop_signals()
 
 
 class Interruption:
@@ -28,7 +27,7 @@ class Interruption:
         self._name = ""
         self._immediate = 0
         self._before: dict[signal.Signals, object] = {}
-        self.wake, self._writer = wake_channel()
+        self.wake, self._writer = system_calls.wake_channel()
 
     def __enter__(self) -> Interruption:
         """Install the signal handlers."""
@@ -51,9 +50,9 @@ class Interruption:
         """Whether there is a request that ``take`` has not returned."""
         return bool(self._name)
 
-    def take(self) -> Interrupted:
+    def take(self) -> errors.Interrupted:
         """Return the error for the pending request, and clear the request."""
-        error = Interrupted(f"{self._name}: {self._message}")
+        error = errors.Interrupted(f"{self._name}: {self._message}")
         self._name = ""
         try:
             self.wake.recv(4096)

@@ -25,8 +25,7 @@ from typing import TYPE_CHECKING, Any
 
 from gen_data.core.errors import CacheWarning, ConfigWarning, GenDataError
 from gen_data.core.processes import end_with_parent, forbid_core_dumps, ignore_interrupts
-from gen_data.runner.error_context import unexpected_error
-from gen_data.runner.resident_memory import release_memory, resident_bytes
+from gen_data.runner import error_context, resident_memory
 from gen_data.runner.worker_events import Failed, Ready, SampleDone, SampleSkipped, ShardDone
 
 if TYPE_CHECKING:
@@ -117,7 +116,7 @@ def _set_temporary_folder(folder: Path) -> None:
 def make_sendable(error: Exception) -> GenDataError:
     """Convert an error to one that can be pickled and has a message for users."""
     if not isinstance(error, GenDataError):
-        return unexpected_error(error, "a worker could not start")
+        return error_context.unexpected_error(error, "a worker could not start")
     try:
         pickle.loads(pickle.dumps(error))
     except Exception:
@@ -141,7 +140,7 @@ def _make_shards(number: int, connection: Connection, job: Job, notices: list[st
         # Existing objects live until the end. Collecting the others between shards suffices;
         # automatic collection takes 2 % of the run.
         gc.freeze()
-        release_memory()
+        resident_memory.release_memory()
         # Imports numpy, therefore only after ``end_with_parent``.
         from gen_data.runner.numerics_guard import admit_numerics
 
@@ -149,7 +148,7 @@ def _make_shards(number: int, connection: Connection, job: Job, notices: list[st
         connection.send(Ready(number, tuple(notices)))
         while (assigned := connection.recv()) is not None:
             _make_shard(number, connection, job, pipeline, *assigned)
-            release_memory()
+            resident_memory.release_memory()
 
 
 def _show_warning(
@@ -196,7 +195,7 @@ def done_event(number: int, made: MadeShard) -> ShardDone:
         record.samples,
         record.size_bytes,
         record.rejections,
-        resident_bytes(),
+        resident_memory.resident_bytes(),
         made.timings_s,
         hashlib.sha256(record.to_bytes()).hexdigest(),
         record.failed,

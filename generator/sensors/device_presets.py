@@ -5,13 +5,11 @@ from importlib.resources import files
 from pathlib import Path
 from typing import TypeVar
 
-from gen_data.config.base_model import Strict
+from gen_data.config import base_model, validation, yaml_tree
 from gen_data.config.problems import Problems
-from gen_data.config.validation import validate
-from gen_data.config.yaml_tree import load_yaml
 from gen_data.core.errors import ConfigError, did_you_mean
 
-M = TypeVar("M", bound=Strict)
+M = TypeVar("M", bound=base_model.Strict)
 
 
 @cache
@@ -37,7 +35,7 @@ def load_preset(package: str, name: str, kind: type[M]) -> M:
     except ValueError as error:
         raise ConfigError(f"{package} has no preset '{name}'; {error}") from None
     problems = Problems()
-    preset = validate(load_yaml(preset_path(package, name)), kind, problems)
+    preset = validation.validate(yaml_tree.load_yaml(preset_path(package, name)), kind, problems)
     problems.raise_if_any()
     assert preset is not None
     return preset

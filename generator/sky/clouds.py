@@ -10,9 +10,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from gen_data.core import noise, streams
 from gen_data.core.asset_types import Float32
-from gen_data.core.noise import fbm, perlin, smoothstep
-from gen_data.core.streams import Rng
 from gen_data.core.variant_rng import variant_rng
 
 Array = NDArray[np.float64]
@@ -74,14 +73,14 @@ def _layer(cloudiness: float, sun_altitude_rad: float, seed: int) -> tuple[Float
 
 
 def _seen_from_below(
-    cloudiness: float, sun_altitude_rad: float, rng: Rng
+    cloudiness: float, sun_altitude_rad: float, rng: streams.Rng
 ) -> tuple[Float32, Float32]:
     """Cover and brightness of the layer: thin rims shine, thick middles are dark below."""
     field = _heaps(rng)
     rank = int((1.0 - min(cloudiness, 1.0)) * (field.size - 1))
     threshold = float(np.partition(field, rank, axis=None)[rank])
     depth = np.maximum(field - np.float32(threshold), np.float32(0.0))
-    cover = smoothstep(0.0, 0.16, depth)
+    cover = noise.smoothstep(0.0, 0.16, depth)
     # The way of the light through the layer, towards the sun: a lower one passes more cloud.
     reach_px = min(3.0 / max(math.tan(max(sun_altitude_rad, 0.0)), 0.15), 14.0)
     passed = sum(
@@ -94,12 +93,12 @@ def _seen_from_below(
     return cover, light
 
 
-def _heaps(rng: Rng) -> Float32:
+def _heaps(rng: streams.Rng) -> Float32:
     """Density of clouds: large masses with billows on them, in about [-1, 1]."""
-    masses = fbm((3, 3), _OCTAVES, rng, 0.52, _TILE_PX)
+    masses = noise.fbm((3, 3), _OCTAVES, rng, 0.52, _TILE_PX)
     billows = np.zeros_like(masses)
     for k, cells in enumerate((12, 24, 48)):
-        bumps = 1.0 - 2.0 * np.abs(perlin((cells, cells), rng, _TILE_PX))
+        bumps = 1.0 - 2.0 * np.abs(noise.perlin((cells, cells), rng, _TILE_PX))
         billows += np.float32(0.5**k) * bumps.astype(np.float32)
     heaps: Float32 = masses + np.float32(0.22) * billows
     return heaps

@@ -22,9 +22,8 @@ from gen_data.config.data_files import load_table
 from gen_data.core.asset_types import Float32
 from gen_data.core.colorimetry import REC709_FROM_XYZ, REC709_LUMINANCE, luminance
 from gen_data.core.noise import smoothstep
-from gen_data.sky import daylight
+from gen_data.sky import daylight, equirectangular
 from gen_data.sky.clouds import cloud_layer
-from gen_data.sky.equirectangular import normalize_luminance, pixel_directions
 
 Array = NDArray[np.float64]
 Image = TypeVar("Image", NDArray[np.float64], NDArray[np.float32])
@@ -94,7 +93,7 @@ def sky(
         ValueError: a parameter is outside its range.
     """
     known = SkyModel(seed, sun_altitude_deg, turbidity, cloudiness, ground_albedo, model)
-    return normalize_luminance(luminance_cd_m2(known, _ROWS))
+    return equirectangular.normalize_luminance(luminance_cd_m2(known, _ROWS))
 
 
 def sun_lux(model: SkyModel) -> float:
@@ -119,7 +118,7 @@ def luminance_cd_m2(model: SkyModel, rows: int) -> Float32:
         ValueError: a parameter is outside its range.
     """
     _check(model)
-    above = pixel_directions(rows, rows // 2)
+    above = equirectangular.pixel_directions(rows, rows // 2)
     if model.model == "preetham":
         zenith = daylight.preetham_zenith_cd_m2(model.sun_altitude_rad, model.turbidity)
         half = preetham_sky(above[:, :rows], model.sun_altitude_rad, model.turbidity)

@@ -2,8 +2,7 @@
 
 from dataclasses import dataclass
 
-from gen_data.core.interfaces import AssetIndex
-from gen_data.core.se3 import SE3
+from gen_data.core import interfaces, se3
 
 _OVERHANG = 0.2
 """Overhang beyond either axle, as a fraction of the length, without wheel keypoints."""
@@ -20,14 +19,14 @@ class Axles:
         width_m: Overall width.
     """
 
-    T_body_rear: SE3
+    T_body_rear: se3.SE3
     wheelbase_m: float
     front_m: float
     rear_m: float
     width_m: float
 
 
-def find_axles(assets: AssetIndex, asset: str, scale: float) -> Axles:
+def find_axles(assets: interfaces.AssetIndex, asset: str, scale: float) -> Axles:
     """Locate axles by the keypoints ``wheel_front...`` and ``wheel_rear...``, else by length."""
     (x0, y0, z0), (x1, y1, _) = assets.bounds_m(asset)
     points = assets.keypoints(asset)
@@ -36,6 +35,6 @@ def find_axles(assets: AssetIndex, asset: str, scale: float) -> Axles:
     over = _OVERHANG * (x1 - x0)
     x_rear = sum(rear) / len(rear) if rear else x0 + over
     x_front = sum(front) / len(front) if front else x1 - over
-    place = SE3((scale * x_rear, scale * 0.5 * (y0 + y1), scale * z0)).rounded()
+    place = se3.SE3((scale * x_rear, scale * 0.5 * (y0 + y1), scale * z0)).rounded()
     sizes = (scale * v for v in (x_front - x_rear, x1 - x_rear, x_rear - x0, y1 - y0))
     return Axles(place, *sizes)

@@ -9,11 +9,7 @@ from itertools import accumulate, pairwise
 
 import numpy as np
 
-from gen_data.core.errors import ConfigError, did_you_mean
-from gen_data.core.lane_geometry import LaneLine
-from gen_data.core.scene import Lane
-from gen_data.core.se3 import Array
-from gen_data.core.streams import Rng
+from gen_data.core import errors, lane_geometry, scene, se3, streams
 
 STATION_M = 0.5
 """Distance between stations."""
@@ -28,15 +24,15 @@ class LaneGraph:
         segments: Segments of all centre lines [k, 6]: start, vector, station, number of the lane.
     """
 
-    lines: Mapping[str, LaneLine]
+    lines: Mapping[str, lane_geometry.LaneLine]
     predecessors: Mapping[str, tuple[str, ...]]
     names: tuple[str, ...]
-    segments: Array
+    segments: se3.Array
 
     @classmethod
-    def of(cls, lanes: Iterable[Lane], *kinds: str) -> LaneGraph:
+    def of(cls, lanes: Iterable[scene.Lane], *kinds: str) -> LaneGraph:
         """Build the graph of all lanes of some kinds."""
-        lines = {lane.name: LaneLine(lane) for lane in lanes if lane.kind in kinds}
+        lines = {lane.name: lane_geometry.LaneLine(lane) for lane in lanes if lane.kind in kinds}
         before: dict[str, list[str]] = {}
         for name, line in lines.items():
             for after in line.lane.successors:
@@ -95,19 +91,19 @@ class Route:
     dead_end: bool
 
 
-def project_on_lane(line: LaneLine, x_m: float, y_m: float) -> LanePosition:
+def project_on_lane(line: lane_geometry.LaneLine, x_m: float, y_m: float) -> LanePosition:
     """Nearest position on one lane to a point."""
     _, at_m, left_m, away_m = _nearest(_segments(line, 0), x_m, y_m)
     return LanePosition(line.lane.name, at_m, left_m, away_m)
 
 
-def _segments(line: LaneLine, number: int) -> Array:
+def _segments(line: lane_geometry.LaneLine, number: int) -> se3.Array:
     points = np.asarray(line.lane.center_m)[:, :2]
     at = np.asarray(line.at_m[:-1])
     return np.column_stack([points[:-1], np.diff(points, axis=0), at, np.full(len(at), number)])
 
 
-def _nearest(segments: Array, x_m: float, y_m: float) -> tuple[int, float, float, float]:
+def _nearest(segments: se3.Array, x_m: float, y_m: float) -> tuple[int, float, float, float]:
     """Number of the nearest lane, station, offset to its left, and distance."""
     x, y, sx, sy, at, number = segments.T
     dx, dy = x_m - x, y_m - y
@@ -122,7 +118,7 @@ def _nearest(segments: Array, x_m: float, y_m: float) -> tuple[int, float, float
     return int(number[k]), float(at[k] + share[k] * span), left, away
 
 
-def draw_route(graph: LaneGraph, given: Sequence[str], length_m: float, rng: Rng) -> Route:
+def draw_route(graph: LaneGraph, given: Sequence[str], length_m: float, rng: streams.Rng) -> Route:
     """Extend the given lanes by drawn ones to a length, or to the end of the network."""
     lanes = list(given)
     ends = list(accumulate(graph.lines[name].length_m for name in lanes))
@@ -134,7 +130,7 @@ def draw_route(graph: LaneGraph, given: Sequence[str], length_m: float, rng: Rng
     return Route(tuple(lanes), (0.0, *ends[:-1]), ends[-1], dead_end=not ways)
 
 
-def points_at(graph: LaneGraph, route: Route, stations_m: Array) -> Array:
+def points_at(graph: LaneGraph, route: Route, stations_m: se3.Array) -> se3.Array:
     """Points [k, 3] of a route at stations [k]; beyond its ends it is straight."""
     lines = [graph.lines[name] for name in route.lanes]
     joined = np.concatenate(
@@ -177,7 +173,7 @@ def lanes_through_point(
         way = _shortest_path(graph, one, other)
         if not way:
             after = ", ".join(graph.successors(one)) or "none: the network ends there"
-            raise ConfigError(
+            raise errors.ConfigError(
                 f"{where}[{k}]: the route leaves the lanes: none lead from '{one}' to '{other}'; "
                 f"after '{one}' comes {after}"
             )
@@ -189,16 +185,16 @@ def _find_lane(graph: LaneGraph, stop: str | tuple[float, float], where: str) ->
     if isinstance(stop, str):
         if stop not in graph.lines:
             known = sorted(graph.lines)
-            raise ConfigError(
+            raise errors.ConfigError(
                 f"{where}: there is no driving lane '{stop}'; expected one of {', '.join(known)}"
-                f"{did_you_mean(stop, known)}"
+                f"{errors.did_you_mean(stop, known)}"
             )
         return stop
     place = graph.nearest(*stop)
     if place is None:
-        raise ConfigError(f"{where}: the scene has no driving lanes")
+        raise errors.ConfigError(f"{where}: the scene has no driving lanes")
     if place.away_m > 0.5 * graph.lines[place.lane].lane.width_m:
-        raise ConfigError(
+        raise errors.ConfigError(
             f"{where}: the route leaves the road: ({stop[0]:g}, {stop[1]:g}) is "
             f"{place.away_m:.1f} m from the middle of the nearest driving lane, '{place.lane}'; "
             "expected a point on a lane"

@@ -7,14 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.core.boxes import rectangles_overlap
-from gen_data.core.motion import Trajectory
+from gen_data.core import boxes, motion
 from gen_data.core.se3 import SE3, Array, Vec3
-from gen_data.traffic.lane_routes import STATION_M
+from gen_data.traffic import lane_routes, signal_cycles, vehicle_model, vehicles
 from gen_data.traffic.pedestrians import Pedestrian, Pedestrians
-from gen_data.traffic.signal_cycles import Approach
-from gen_data.traffic.vehicle_model import VehicleModel
-from gen_data.traffic.vehicles import Vehicles
 
 STEP_S = 0.05
 KNOT_S = 0.1
@@ -53,10 +49,10 @@ class SimulatedMotion:
 
 
 def simulate(
-    fleet: Vehicles | None,
+    fleet: vehicles.Vehicles | None,
     walkers: Sequence[Pedestrian],
     obstacles: Array,
-    approaches: Mapping[str, Approach],
+    approaches: Mapping[str, signal_cycles.Approach],
     duration_s: float,
 ) -> SimulatedMotion:
     """Simulate from time 0 to the first knot at or after ``duration_s``.
@@ -69,7 +65,7 @@ def simulate(
         duration_s: Simulated time.
     """
     steps = _PER_KNOT * math.ceil(duration_s / KNOT_S - 1e-9)
-    driving = VehicleModel(fleet, approaches) if fleet is not None else None
+    driving = vehicle_model.VehicleModel(fleet, approaches) if fleet is not None else None
     walking = Pedestrians(walkers, approaches, obstacles)
     if driving is not None:
         driving.settle(walking.crossers())
@@ -96,7 +92,7 @@ def _always(crosswalk: str) -> bool:
 
 
 def _collect_motion(
-    fleet: Vehicles | None,
+    fleet: vehicles.Vehicles | None,
     cars: Sequence[tuple[Array, Array, Array]],
     people: Sequence[tuple[Array, ...]],
 ) -> SimulatedMotion:
@@ -116,9 +112,9 @@ def _collect_motion(
     )
 
 
-def _vehicle_poses(fleet: Vehicles, station_m: Array) -> tuple[Array, Array, Array]:
+def _vehicle_poses(fleet: vehicles.Vehicles, station_m: Array) -> tuple[Array, Array, Array]:
     """Compute rear axles [t, n, 3], directions [t, n, 2] and rises [t, n] at stations [t, n]."""
-    along = (station_m - fleet.first_m) / STATION_M
+    along = (station_m - fleet.first_m) / lane_routes.STATION_M
     xy, ahead = fleet.courses.poses(along)
     low, high = _interpolate(fleet.height_m, along)
     return np.concatenate([xy, low[..., None]], axis=2), ahead, high - low
@@ -158,7 +154,7 @@ def first_overlap(
         near = np.flatnonzero(
             d[:, 0] * d[:, 0] + d[:, 1] * d[:, 1] < (reach[i] + reach[j]) * (reach[i] + reach[j])
         )
-        hit = rectangles_overlap(moving[near, i], half_m[i], every[near, j], others[j])
+        hit = boxes.rectangles_overlap(moving[near, i], half_m[i], every[near, j], others[j])
         if hit.any():
             first = int(near[int(np.argmax(hit))])
             if found is None or first < found[0]:
@@ -183,7 +179,7 @@ def make_upright_trajectories(
     ahead: Array,
     climb: Array,
     offsets_m: Sequence[Vec3],
-) -> list[Trajectory | None]:
+) -> list[motion.Trajectory | None]:
     """Make trajectories of bodies on the ground; None for bodies that never move.
 
     Args:
@@ -207,7 +203,7 @@ def make_upright_trajectories(
         axis=2,
     )
     origin, quaternions = np.round(origin, 6) + 0.0, np.round(quaternions, 8) + 0.0
-    tracks: list[Trajectory | None] = []
+    tracks: list[motion.Trajectory | None] = []
     for k, name in enumerate(names):
         moved = np.abs(origin[:, k] - origin[0, k]).max() > STILL_M
         knots = tuple(
@@ -216,7 +212,7 @@ def make_upright_trajectories(
                 origin[:, k].tolist(), quaternions[:, k].tolist(), strict=True
             )
         )
-        tracks.append(Trajectory(name, KNOT_S, knots) if moved else None)
+        tracks.append(motion.Trajectory(name, KNOT_S, knots) if moved else None)
     return tracks
 
 

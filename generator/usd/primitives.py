@@ -9,15 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from gen_data.core.errors import AssetError
-from gen_data.core.se3 import Array
+from gen_data.core import errors, se3
 
 KINDS = ("Cube", "Sphere", "Cylinder", "Cone", "Capsule", "Plane")
 SEGMENTS = 32
 _QUADS = ((0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5))
 
 
-def primitive_corners(prim: Any, place: str) -> Array:
+def primitive_corners(prim: Any, place: str) -> se3.Array:
     """Triangles [m, 3, 3] of a primitive, in its own frame and unit.
 
     Raises:
@@ -28,7 +27,7 @@ def primitive_corners(prim: Any, place: str) -> Array:
     def length(name: str) -> float:
         value = float(prim.GetAttribute(name).Get())
         if not 0.0 < value < math.inf:
-            raise AssetError(f"{place}: {prim.GetPath()}: {name} is {value:g}; correct it")
+            raise errors.AssetError(f"{place}: {prim.GetPath()}: {name} is {value:g}; correct it")
         return value
 
     if kind == "Cube":
@@ -49,7 +48,7 @@ def primitive_corners(prim: Any, place: str) -> Array:
     return np.asarray(np.roll(corners, {"Z": 0, "X": 1, "Y": 2}[str(axis)], axis=2))
 
 
-def _box(size: float) -> Array:
+def _box(size: float) -> se3.Array:
     half = 0.5 * size
     points = np.array([(i * half, j * half, k * half)
                        for k in (-1, 1) for j in (-1, 1) for i in (-1, 1)])  # fmt: skip
@@ -57,7 +56,7 @@ def _box(size: float) -> Array:
     return np.asarray(points[triangles], np.float64)
 
 
-def _plane(width: float, length: float) -> Array:
+def _plane(width: float, length: float) -> se3.Array:
     x, y = 0.5 * width, 0.5 * length
     a, b, c, d = (-x, -y, 0.0), (x, -y, 0.0), (x, y, 0.0), (-x, y, 0.0)
     return np.array([(a, b, c), (a, c, d)])
@@ -72,7 +71,7 @@ def _arc(
     return [(radius * max(math.cos(t), 0.0), height + radius * math.sin(t)) for t in turns]
 
 
-def _revolve(profile: list[tuple[float, float]]) -> Array:
+def _revolve(profile: list[tuple[float, float]]) -> se3.Array:
     """Triangles of a profile (radius, height), bottom to top, revolved about Z."""
     turns = [2.0 * math.pi * k / SEGMENTS for k in range(SEGMENTS + 1)]
     ring = [(math.cos(t), math.sin(t)) for t in turns[:-1]]

@@ -14,9 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from gen_data.core.errors import AssetError
-from gen_data.core.optional_packages import missing_packages
-from gen_data.core.scene import Light
+from gen_data.core import errors, optional_packages, scene
 from gen_data.core.se3 import SE3, Array
 from gen_data.usd.cameras import read_camera_pose
 from gen_data.usd.lights import check_light, read_light
@@ -77,7 +75,7 @@ class OpenStage:
             with _collect_warnings():
                 self._stage = Usd.Stage.Open(str(path))
         except Tf.ErrorException as error:
-            raise AssetError(
+            raise errors.AssetError(
                 f"{place}: unreadable USD, or it refers to a layer that is"
                 f"{_reason(error)}; export it again"
             ) from None
@@ -110,7 +108,7 @@ class OpenStage:
             elif prim.IsA(UsdGeom.Gprim):
                 self._remark(f"{prim.GetTypeName()} is not read, such as {prim.GetPath()}")
         if not found:
-            raise AssetError(f"{self.place}: holds no mesh; export it with its meshes")
+            raise errors.AssetError(f"{self.place}: holds no mesh; export it with its meshes")
         return tuple(found)
 
     def _remark(self, text: str) -> None:
@@ -135,7 +133,7 @@ class OpenStage:
         stage = prim.GetStage()
         roots = [stage.GetPrimAtPath(p) for p in instancer.GetPrototypesRel().GetTargets()]
         if len(kinds) > _MAX_INSTANCES or any(not 0 <= k < len(roots) for k in kinds):
-            raise AssetError(
+            raise errors.AssetError(
                 f"{self.place}: {prim.GetPath()} has {len(kinds)} copies of {len(roots)} "
                 f"prototypes; at most {_MAX_INSTANCES} copies are read, correct it"
             )
@@ -164,7 +162,7 @@ class OpenStage:
             read = read_primitive if piece.prim.GetTypeName() in KINDS else read_mesh_prim
             return read(piece.prim, self.place)
 
-    def lights(self) -> tuple[Light, ...]:
+    def lights(self) -> tuple[scene.Light, ...]:
         """Sphere, panel and distant lights; domes and other kinds are skipped.
 
         Raises:
@@ -210,9 +208,9 @@ class OpenStage:
 
 def check_usd(place: str) -> None:
     """Raise AssetError, which begins with ``place``, if OpenUSD is not installed."""
-    missing = missing_packages("pxr")
+    missing = optional_packages.missing_packages("pxr")
     if missing:
-        raise AssetError(f"{place}: {missing}")
+        raise errors.AssetError(f"{place}: {missing}")
 
 
 def layer_references(path: Path) -> Sequence[str]:

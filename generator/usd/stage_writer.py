@@ -23,16 +23,9 @@ from typing import Any
 from gen_data.core.asset_types import Material
 from gen_data.core.scene import Body, Instance, Scene
 from gen_data.core.se3 import IDENTITY, SE3
+from gen_data.usd import cameras, prims
 from gen_data.usd.asset_layer import MESH, TextureFinder, bind_materials
-from gen_data.usd.cameras import define_camera
 from gen_data.usd.lights import define_light, define_sky
-from gen_data.usd.prims import (
-    open_stage_for_writing,
-    scale_pose,
-    set_transforms,
-    set_values,
-    unique_name,
-)
 
 WORLD = "/World"
 Look = tuple[str, tuple[Material, ...]]
@@ -75,7 +68,7 @@ def write_stage(
     Raises:
         StorageError: if it cannot be written.
     """
-    with open_stage_for_writing(path, WORLD) as stage:
+    with prims.open_stage_for_writing(path, WORLD) as stage:
         codes = [round(scene.time_s / step_s, 9) for scene in instants]
         if len(codes) > 1:
             stage.SetStartTimeCode(codes[0])
@@ -88,7 +81,7 @@ def write_stage(
             at = [scene.camera(camera.name) for scene in instants]
             offset = round(offsets_s.get(camera.name, 0.0) / step_s, 9)
             place = writer.path(f"{WORLD}/Cameras", camera.name)
-            define_camera(stage, place, at, codes, offset)
+            cameras.define_camera(stage, place, at, codes, offset)
 
 
 class _Writer:
@@ -105,7 +98,7 @@ class _Writer:
         """Unused path for a new child; a missing parent is created."""
         if not self._stage.GetPrimAtPath(parent):
             self._stage.DefinePrim(parent, "Scope")
-        return f"{parent}/{unique_name(name, self._taken.setdefault(parent, set()))}"
+        return f"{parent}/{prims.unique_name(name, self._taken.setdefault(parent, set()))}"
 
     def bodies(self, steps: Sequence[Scene]) -> None:
         """Define every instance with its bodies, and the background."""
@@ -129,7 +122,7 @@ class _Writer:
 
         path = self.path(WORLD, instance.name)
         prim = self._stage.DefinePrim(path, "Xform")
-        set_transforms(prim, [pose.matrix() for pose in poses], self._codes)
+        prims.set_transforms(prim, [pose.matrix() for pose in poses], self._codes)
         labels = {"instance_id": str(instance.instance_id)}
         if instance.annotated:
             labels["category"] = instance.category
@@ -150,8 +143,8 @@ class _Writer:
         poses = [
             (T_world_parent.inverse() @ b.T_world_body, b.scale) for T_world_parent, b in placed
         ]
-        matrices = [scale_pose(pose, scale) for pose, scale in poses]
-        set_transforms(prim, matrices, self._codes)
+        matrices = [prims.scale_pose(pose, scale) for pose, scale in poses]
+        prims.set_transforms(prim, matrices, self._codes)
         looks = [self._find_look(body) for body in steps]
         for look in dict.fromkeys(looks):
             child = self._stage.DefinePrim(self.path(path, "look"), "Xform")
@@ -161,7 +154,7 @@ class _Writer:
                 tokens = UsdGeom.Tokens
                 shown = [tokens.inherited if one == look else tokens.invisible for one in looks]
                 visibility = UsdGeom.Imageable(child).CreateVisibilityAttr()
-                set_values(visibility, shown, self._codes)
+                prims.set_values(visibility, shown, self._codes)
 
     def _find_look(self, body: Body) -> Look:
         """Mesh and materials of a body, with texture scales adapted to the body's scale."""

@@ -8,24 +8,14 @@ from dataclasses import asdict, dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from gen_data.core.errors import (
-    AssetError,
-    ConfigError,
-    GenDataError,
-    StorageError,
-    VerificationError,
-    is_refused,
-)
-from gen_data.core.serialization import from_plain
+from gen_data.core import errors, serialization
 from gen_data.core.version import __version__
 from gen_data.lab.certificate.claims import CLAIMS, FILES, Claim
 from gen_data.lab.certificate.examined import Examined, Scope
 from gen_data.lab.certificate.finding import Finding, Status, not_checked
 from gen_data.lab.certificate.readers import READERS
-from gen_data.runner.layout import CERTIFICATE_NAME, MANIFEST_NAME
-from gen_data.runner.plan import DAMAGE
+from gen_data.runner import layout, plan, verify
 from gen_data.runner.stored import StoredSamples
-from gen_data.runner.verify import scan_finished
 
 FORMAT_VERSION = 1
 """Of the layout of ``CERTIFICATE.json``."""
@@ -120,7 +110,7 @@ def examine(
         VerificationError: the folder has no finished data set.
         StorageError: its manifest or plan is damaged, or the file system refused to read or write.
     """
-    scan_finished(folder)
+    verify.scan_finished(folder)
     examined = Examined(StoredSamples(folder), scope)
     claims: list[CheckedClaim] = []
     damaged = ""
@@ -135,7 +125,7 @@ def examine(
 
 def identify(stored: StoredSamples) -> Identity:
     """The identity of a data set."""
-    manifest = (stored.folder / MANIFEST_NAME).read_bytes()
+    manifest = (stored.folder / layout.MANIFEST_NAME).read_bytes()
     digest = hashlib.sha256(manifest).hexdigest()
     return Identity(stored.plan.name, stored.dataset_id, digest, stored.n)
 
@@ -147,24 +137,24 @@ def load_certificate(folder: Path) -> Certificate | None:
         VerificationError: it is damaged, or that of another data set.
         StorageError: the manifest is damaged.
     """
-    path = folder / CERTIFICATE_NAME
+    path = folder / layout.CERTIFICATE_NAME
     try:
         plain = json.loads(path.read_bytes())
         holds = plain.pop("holds")
-        certificate = from_plain(Certificate, plain)
+        certificate = serialization.from_plain(Certificate, plain)
         if certificate.format_version != FORMAT_VERSION or certificate.holds != holds:
             raise ValueError("its parts contradict each other")
     except FileNotFoundError:
         return None
-    except DAMAGE as error:
-        raise VerificationError(
+    except plan.DAMAGE as error:
+        raise errors.VerificationError(
             f"{path}: is no certificate of this version of gen-data ({error}); {_REMEDY}"
         ) from None
     identity = identify(StoredSamples(folder))
     if certificate.dataset != identity:
-        raise VerificationError(
+        raise errors.VerificationError(
             f"{path}: certifies the data set {certificate.dataset.dataset_id[:16]}; expected "
-            f"{identity.dataset_id[:16]}, which {MANIFEST_NAME} names; {_REMEDY}"
+            f"{identity.dataset_id[:16]}, which {layout.MANIFEST_NAME} names; {_REMEDY}"
         )
     return certificate
 
@@ -225,11 +215,11 @@ def _check(claim: Claim, examined: Examined) -> tuple[Finding, ...]:
     """
     try:
         return tuple(claim.check(examined))
-    except (GenDataError, OSError, ValueError, KeyError, TypeError, IndexError) as error:
-        if is_refused(error):
+    except (errors.GenDataError, OSError, ValueError, KeyError, TypeError, IndexError) as error:
+        if errors.is_refused(error):
             fact = f"claim '{claim.name}' was not checked: {error}"
-            raise StorageError(f"{examined.stored.folder}: {fact}") from error
-        if isinstance(error, ConfigError | AssetError):
+            raise errors.StorageError(f"{examined.stored.folder}: {fact}") from error
+        if isinstance(error, errors.ConfigError | errors.AssetError):
             return (not_checked("", f"not possible on this machine: {error}"),)
         text = f"the data set cannot be read: {type(error).__name__}: {error}"
         return (Finding("", Status.FAILED, evidence=(text,)),)

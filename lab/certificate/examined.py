@@ -9,14 +9,11 @@ from numpy.typing import NDArray
 
 from gen_data.assemble.config import Config, load_config
 from gen_data.assets.library import Library
-from gen_data.core.capture import Channel
-from gen_data.core.errors import GenDataError, is_refused
+from gen_data.core import capture, errors, streams
 from gen_data.core.sample import Sample
-from gen_data.core.streams import Rng, Streams
 from gen_data.packs.provision import open_assets
 from gen_data.pipeline.finalize_scene import Timeline
-from gen_data.report.drawn_parameters import Replay, replay_scenes
-from gen_data.report.stored_labels import ImageLabels, read_images
+from gen_data.report import drawn_parameters, stored_labels
 from gen_data.runner.exports import StoredPipeline
 from gen_data.runner.regeneration import Regeneration, plan_regeneration
 from gen_data.runner.stored import StoredSamples
@@ -63,13 +60,13 @@ class Examined:
         return open_assets(self.config.asset_folders)
 
     @cached_property
-    def replay(self) -> Replay:
+    def replay(self) -> drawn_parameters.Replay:
         """Some of its scenes, drawn again.
 
         Raises:
             ConfigError, AssetError: the configuration or an asset is not available here.
         """
-        return replay_scenes(self.stored, self.scope.scenes)
+        return drawn_parameters.replay_scenes(self.stored, self.scope.scenes)
 
     @cached_property
     def changes(self) -> str:
@@ -79,8 +76,8 @@ class Examined:
             return f"the scenes are those of the data set {plan.scenes_of[:16]}: certify that one"
         try:
             changes = self.regeneration.changes
-        except GenDataError as error:
-            if is_refused(error):
+        except errors.GenDataError as error:
+            if errors.is_refused(error):
                 raise
             return f"the scenes cannot be drawn on this machine: {error}"
         listed = "; ".join(changes[:3]) + ("; ..." if len(changes) > 3 else "")
@@ -95,18 +92,18 @@ class Examined:
         """
         return plan_regeneration(self.stored.folder, self.stored.plan)
 
-    def images(self) -> Iterator[ImageLabels]:
+    def images(self) -> Iterator[stored_labels.ImageLabels]:
         """The labels of every image, in order."""
-        return read_images(self.stored)
+        return stored_labels.read_images(self.stored)
 
     def photograph(self, index: int, camera: str) -> NDArray[np.uint8]:
         """The photograph of a camera in a sample, uint8 [h, w, 3]."""
         reading = self.stored.labelled(index).capture.readings[camera]
-        return np.asarray(reading.channels[Channel.RGB], np.uint8)
+        return np.asarray(reading.channels[capture.Channel.RGB], np.uint8)
 
-    def rng(self, name: str) -> Rng:
+    def rng(self, name: str) -> streams.Rng:
         """A stream for choosing what is sampled: the same for the same data set."""
-        return Streams(0, 0).rng(f"certificate/{self.stored.dataset_id}/{name}")
+        return streams.Streams(0, 0).rng(f"certificate/{self.stored.dataset_id}/{name}")
 
     def chosen_indices(self) -> list[int]:
         """Numbers of random samples, ascending; all if there are few."""

@@ -8,8 +8,7 @@ import warnings
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from gen_data.core.errors import is_refused
-from gen_data.core.interfaces import Exporter
+from gen_data.core import errors, interfaces
 from gen_data.exporters.sensor_selection import rgb_cameras
 from gen_data.lab.certificate.examined import Examined
 from gen_data.lab.certificate.finding import Contradictions, Figure, Finding, not_checked
@@ -41,7 +40,7 @@ def check_exports(examined: Examined) -> Iterator[Finding]:
         yield _check_export(examined, root, reader, stated)
 
 
-def _unable(examined: Examined, exporter: Exporter, reader: Reader | None) -> str:
+def _unable(examined: Examined, exporter: interfaces.Exporter, reader: Reader | None) -> str:
     """Why an export cannot be checked; empty if it can."""
     if reader is None:
         return "no reader of this format is known to gen-data"
@@ -71,7 +70,7 @@ def _check_export(
         return not_checked(root.name, f"{reader.package} cannot be loaded: {error}")
     # A reader may refuse a damaged file with an exception of any kind.
     except Exception as error:
-        if is_refused(error):
+        if errors.is_refused(error):
             raise
         contradictions.add(f"{reader.package} refuses it: {type(error).__name__}: {error}")
         return contradictions.judge(root.name, figures)

@@ -9,10 +9,8 @@ from collections.abc import Iterator
 from gen_data.assemble.pipeline_factory import ready_exporters
 from gen_data.lab.certificate.examined import Examined
 from gen_data.lab.certificate.finding import Contradictions, Finding, not_checked
-from gen_data.runner.durable_files import make_folder
+from gen_data.runner import durable_files, layout, seal
 from gen_data.runner.exports import export
-from gen_data.runner.layout import MANIFEST_NAME
-from gen_data.runner.seal import read_sums
 from gen_data.runner.store import LocalStore
 
 
@@ -27,17 +25,17 @@ def check_written_again(examined: Examined) -> Iterator[Finding]:
     stored, config = examined.stored, examined.config
     store = LocalStore(stored.folder)
     # On the same file system, so that images can be linked.
-    make_folder(store.scratch_root)
+    durable_files.make_folder(store.scratch_root)
     scratch = store.scratch_dir()
     try:
         exporters = ready_exporters(config, stored.info, examined.library)
         export(stored, config, exporters, scratch / "again", workers=0, resume_command="certify")
-        again = read_sums(scratch / "again").digests
+        again = seal.read_sums(scratch / "again").digests
     finally:
         shutil.rmtree(scratch)
-    found = read_sums(stored.folder).digests
+    found = seal.read_sums(stored.folder).digests
     contradictions = Contradictions()
-    for path in sorted({*found, *again} - {MANIFEST_NAME}):
+    for path in sorted({*found, *again} - {layout.MANIFEST_NAME}):
         if path not in again:
             contradictions.add(f"{path}: is extra: the samples give no such file")
         elif path not in found:

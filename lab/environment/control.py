@@ -16,13 +16,7 @@ from gen_data.core.asset_types import RobotModel
 from gen_data.core.kinematics import arm_joints, position_limits
 from gen_data.core.se3 import SE3, Quaternion, Vec3, multiply_quaternions
 from gen_data.lab.environment.settings import EnvSettings, refuse_field
-from gen_data.physics.manipulation.inverse_kinematics import (
-    Chain,
-    grasp_pose,
-    make_chain,
-    solve_all,
-    solve_near,
-)
+from gen_data.physics.manipulation import inverse_kinematics
 
 Action = NDArray[np.float32]
 
@@ -87,7 +81,7 @@ class PoseControl:
         low_m, high_m: Corners of the box.
     """
 
-    chain: Chain
+    chain: inverse_kinematics.Chain
     low_m: Vec3
     high_m: Vec3
 
@@ -101,8 +95,8 @@ class PoseControl:
         x, y, z = _spread(action[:3], self.low_m, self.high_m)
         turn = quaternion_of([math.pi * float(v) for v in action[3:6]])
         T_base_grasp = SE3((x, y, z), multiply_quaternions(turn, HAND_DOWN))
-        found = solve_near(self.chain, T_base_grasp, before.positions)
-        found = found or next(solve_all(self.chain, T_base_grasp), None)
+        found = inverse_kinematics.solve_near(self.chain, T_base_grasp, before.positions)
+        found = found or next(inverse_kinematics.solve_all(self.chain, T_base_grasp), None)
         return None if found is None else Command(found, _opening(action))
 
     def encode(
@@ -125,7 +119,7 @@ class DeltaControl:
         step_rad: Largest rotation about each axis.
     """
 
-    chain: Chain
+    chain: inverse_kinematics.Chain
     step_m: float
     step_rad: float
 
@@ -136,13 +130,13 @@ class DeltaControl:
 
     def command(self, action: Action, before: Command) -> Command | None:
         """The solution of inverse kinematics next to the latest targets."""
-        pose = grasp_pose(self.chain, before.positions)
+        pose = inverse_kinematics.grasp_pose(self.chain, before.positions)
         x, y, z = (
             a + self.step_m * float(b) for a, b in zip(pose.translation_m, action[:3], strict=True)
         )
         turn = quaternion_of([self.step_rad * float(v) for v in action[3:6]])
         target = SE3((x, y, z), multiply_quaternions(turn, pose.quaternion_wxyz))
-        found = solve_near(self.chain, target, before.positions)
+        found = inverse_kinematics.solve_near(self.chain, target, before.positions)
         return None if found is None else Command(found, _opening(action))
 
     def encode(
@@ -163,7 +157,7 @@ def make_control(robot: RobotModel, settings: EnvSettings, document: Node) -> Co
         low, high = zip(*(position_limits(j, robot) for j in arm_joints(robot)), strict=True)
         return JointControl(low, high)
     assert robot.gripper is not None
-    chain = make_chain(robot, robot.gripper)
+    chain = inverse_kinematics.make_chain(robot, robot.gripper)
     if len(chain.solved) < _JOINTS_MIN:
         fact = (
             f"'{settings.control}' needs an arm with {_JOINTS_MIN} joints, this one has "

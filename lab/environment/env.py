@@ -11,13 +11,9 @@ from numpy.typing import NDArray
 
 from gen_data.api.config import ConfigLike, load_config, read_document, read_model
 from gen_data.api.dataset import GeneratedSamples
-from gen_data.core.capture import SensorReading
+from gen_data.core import capture, interfaces, optional_packages, streams
 from gen_data.core.errors import ConfigError
-from gen_data.core.interfaces import Renderer, Sensor
-from gen_data.core.optional_packages import missing_packages
-from gen_data.core.streams import Streams
-from gen_data.lab.environment.choices import choose_arm, choose_camera
-from gen_data.lab.environment.control import Action, make_control
+from gen_data.lab.environment import choices, control
 from gen_data.lab.environment.observations import CHANNELS, Observation, observation_space, observe
 from gen_data.lab.environment.rollout import Rollout
 from gen_data.lab.environment.settings import DrawnDynamics, EnvSettings
@@ -27,7 +23,9 @@ from gen_data.physics.engine import Engine
 try:
     import gymnasium
 except ModuleNotFoundError as error:
-    raise ConfigError(f"gen_data.Env {missing_packages('gymnasium') or error}") from error
+    raise ConfigError(
+        f"gen_data.Env {optional_packages.missing_packages('gymnasium') or error}"
+    ) from error
 
 ENV_ID = "gen_data/Arm-v0"
 """Name for ``gymnasium.make``, registered when this module is imported."""
@@ -36,7 +34,7 @@ _SCENES = 2**31
 _WITHOUT_LABELS = ("annotations=[]", "exporters=[]")
 
 
-class Env(gymnasium.Env[Observation, Action]):
+class Env(gymnasium.Env[Observation, control.Action]):
     """A robot arm in the scenes of a configuration.
 
     ``reset(seed=i)`` begins in scene ``i`` of the configuration's data set; without a seed, in a
@@ -89,11 +87,11 @@ class Env(gymnasium.Env[Observation, Action]):
         self.render_mode = render_mode
         self._samples = GeneratedSamples(loaded, CHANNELS)
         factory = self._samples.make_pipeline
-        arm = choose_arm(factory, self.settings.arm, document)
+        arm = choices.choose_arm(factory, self.settings.arm, document)
         robot = factory.library.robot(arm.asset)
         self._arm = arm.name
-        self._camera, image = choose_camera(factory, self.settings.camera, document)
-        self.control = make_control(robot, self.settings, document)
+        self._camera, image = choices.choose_camera(factory, self.settings.camera, document)
+        self.control = control.make_control(robot, self.settings, document)
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (self.control.size,), np.float32)
         self._space = observation_space(robot, image, self.settings)
         self.observation_space = self._space
@@ -102,8 +100,8 @@ class Env(gymnasium.Env[Observation, Action]):
         self._resources = ExitStack()
         self.rollout: Rollout | None = None
         self._drawn: DrawnDynamics | None = None
-        self._sensor: Sensor | None = None
-        self._streams = Streams(0, 0)
+        self._sensor: interfaces.Sensor | None = None
+        self._streams = streams.Streams(0, 0)
         self._photo: NDArray[np.uint8] | None = None
 
     def reset(
@@ -147,7 +145,7 @@ class Env(gymnasium.Env[Observation, Action]):
             "latency_steps": drawn.latency_steps,
         }
 
-    def step(self, action: Action) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+    def step(self, action: control.Action) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Act, and observe ``settings.step_s`` later.
 
         ``info`` has ``success``, ``held`` (name of the body in the hand), ``feasible`` (whether the
@@ -193,12 +191,12 @@ class Env(gymnasium.Env[Observation, Action]):
             self._engine = self._resources.enter_context(open_engine(library, self._physics))
         return self._engine
 
-    def _observe(self, renderer: Renderer) -> Observation:
+    def _observe(self, renderer: interfaces.Renderer) -> Observation:
         assert self.rollout is not None
         assert self._sensor is not None
         rng = replace(self._streams, step=self.rollout.steps).rng(f"sensor/{self._camera}")
         reading = self._sensor.capture(self.rollout.scene, renderer, CHANNELS, rng)
-        assert isinstance(reading, SensorReading)
+        assert isinstance(reading, capture.SensorReading)
         observation = observe(self.rollout, reading, self._space, self.settings)
         self._photo = observation["rgb"].copy()
         return observation

@@ -5,9 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from gen_data.core import scene_time, se3
 from gen_data.core.scene import Articulation, Scene
-from gen_data.core.scene_time import place_sensors, scene_at
-from gen_data.core.se3 import Vec3
 from gen_data.lab.environment.control import Action, Command, Control
 from gen_data.lab.environment.settings import DrawnDynamics, EnvSettings
 from gen_data.physics.engine import Engine
@@ -82,7 +81,7 @@ class Rollout:
         self.scene = self._observed()
         self.succeeded = self._judge()
 
-    def target_m(self, which: str) -> Vec3:
+    def target_m(self, which: str) -> se3.Vec3:
         """Middle of a body of the first condition of success, in the frame of the arm's base [m].
 
         ``which`` is ``body`` or ``other``; the latter is the former where there is none. Zeros
@@ -117,7 +116,7 @@ class Rollout:
     def _observed(self) -> Scene:
         """The scene now; what has not moved is identical, so that it is not packed again."""
         poses = self.simulation.poses()
-        scene = scene_at(self._start, self._time_s)
+        scene = scene_time.scene_at(self._start, self._time_s)
         moved = [
             replace(body, T_world_body=poses[body.name])
             for body in scene.bodies
@@ -129,4 +128,4 @@ class Rollout:
             else a
             for a in scene.articulations
         )
-        return place_sensors(replace(scene.with_bodies(*moved), articulations=arms))
+        return scene_time.place_sensors(replace(scene.with_bodies(*moved), articulations=arms))

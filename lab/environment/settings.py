@@ -5,10 +5,8 @@ from typing import Literal, NoReturn
 
 from pydantic import Field, field_validator
 
+from gen_data.config import base_model, problems, yaml_tree
 from gen_data.config import distributions as dist
-from gen_data.config.base_model import Strict
-from gen_data.config.problems import refuse
-from gen_data.config.yaml_tree import Node
 from gen_data.core.scene import Articulation, Scene
 from gen_data.core.se3 import Vec3
 from gen_data.core.streams import Rng, Streams
@@ -32,7 +30,7 @@ class DrawnDynamics:
     latency_steps: int
 
 
-class Dynamics(Strict):
+class Dynamics(base_model.Strict):
     """Dynamics, drawn anew at every reset; constants switch the variation off.
 
     Attributes:
@@ -71,7 +69,7 @@ class Dynamics(Strict):
         return DrawnDynamics(replace(scene, bodies=bodies, articulations=arms), servo, latency)
 
 
-class EnvSettings(Strict):
+class EnvSettings(base_model.Strict):
     """Settings of an environment.
 
     Attributes:
@@ -111,9 +109,9 @@ class EnvSettings(Strict):
         return corners
 
 
-def refuse_field(document: Node, field: str, fact: str) -> NoReturn:
+def refuse_field(document: yaml_tree.Node, field: str, fact: str) -> NoReturn:
     """Raise a ConfigError at a field of a document; a default has the document's position."""
-    refuse((document.get(field) or document).position, field, fact)
+    problems.refuse((document.get(field) or document).position, field, fact)
 
 
 def _vary_joints(arm: Articulation, factor: dist.Numeric[float], rng: Rng) -> Articulation:

@@ -8,24 +8,13 @@ from typing import Any
 import numpy as np
 
 from gen_data.core.se3 import Array
+from gen_data.lab.matching import indirect_inference, recordings, results
 from gen_data.lab.matching.descriptions import PICTURES
-from gen_data.lab.matching.indirect_inference import Estimate, direct_estimate, fit
 from gen_data.lab.matching.picture import Picture
 from gen_data.lab.matching.quantities import CAMERA, CameraQuantity, jpeg_quality
 from gen_data.lab.matching.quantities.base import FieldChange, round_digits, typical
 from gen_data.lab.matching.quantities.noise import NOISE
 from gen_data.lab.matching.quantities.read_noise import READ_NOISE
-from gen_data.lab.matching.recordings import Photo
-from gen_data.lab.matching.results import (
-    ComparedStatistic,
-    FittedField,
-    FittedQuantity,
-    Part,
-    fitted_quantity,
-    interval,
-    not_fitted,
-    spread_of,
-)
 from gen_data.lab.matching.simulation import Exposure, map_in_threads, measure_exposures, photograph
 from gen_data.sensors.camera.image_pipeline import ImagePipeline
 
@@ -54,7 +43,7 @@ class MeasuredPhoto:
     jpeg_quality: float
 
 
-def measure_photo(photo: Photo) -> MeasuredPhoto:
+def measure_photo(photo: recordings.Photo) -> MeasuredPhoto:
     """Measure everything in a photograph."""
     picture = Picture(photo.rgb)
     return MeasuredPhoto(
@@ -66,7 +55,9 @@ def measure_photo(photo: Photo) -> MeasuredPhoto:
     )
 
 
-def fit_camera(exposures: Sequence[Exposure], photos: Sequence[MeasuredPhoto], sensor: int) -> Part:
+def fit_camera(
+    exposures: Sequence[Exposure], photos: Sequence[MeasuredPhoto], sensor: int
+) -> results.Part:
     """Fit a camera's image pipeline.
 
     Args:
@@ -75,7 +66,7 @@ def fit_camera(exposures: Sequence[Exposure], photos: Sequence[MeasuredPhoto], s
         sensor: Position of the camera among the sensors.
     """
     if not exposures or not photos:
-        return Part(not_fitted(CAMERA, "no camera" if photos else "no photographs"))
+        return results.Part(results.not_fitted(CAMERA, "no camera" if photos else "no photographs"))
     pipeline = exposures[0].pipeline
     real = np.array([photo.statistics for photo in photos])
     jpeg = _fit_jpeg(pipeline, np.array([photo.jpeg_quality for photo in photos]))
@@ -90,27 +81,29 @@ def fit_camera(exposures: Sequence[Exposure], photos: Sequence[MeasuredPhoto], s
         quantities = [CAMERA[k] for k in positions]
         return measure_exposures(exposures, quantities, coordinates, count, prepare)
 
-    found = fit(real, simulate, axes, start, used)
-    rows: list[FittedQuantity] = [jpeg]
+    found = indirect_inference.fit(real, simulate, axes, start, used)
+    rows: list[results.FittedQuantity] = [jpeg]
     fields = [_field(sensor, "jpeg_quality", jpeg.value, jpeg)]
     for k, quantity in enumerate(CAMERA):
         if k not in found:
-            rows += not_fitted([quantity], reasons[k])
+            rows += results.not_fitted([quantity], reasons[k])
             continue
         value = _distribution(quantity, found[k])
-        row = fitted_quantity(quantity, found[k], float(start[k]), value, quantity.path)
+        row = results.fitted_quantity(quantity, found[k], float(start[k]), value, quantity.path)
         rows.append(row)
         if row.is_fitted:
             fields += [_field(sensor, key, v, row) for key, v in quantity.fields(value).items()]
     fitted = [(CAMERA[k], one) for k, one in found.items() if one.determined]
-    return Part(tuple(rows), _compare(exposures, photos, prepare, fitted), tuple(fields))
+    return results.Part(tuple(rows), _compare(exposures, photos, prepare, fitted), tuple(fields))
 
 
-def _field(sensor: int, key: str, value: Any, row: FittedQuantity) -> FittedField:
-    return FittedField(FieldChange("sensors", sensor, f"image_pipeline.{key}", value), (row,))
+def _field(sensor: int, key: str, value: Any, row: results.FittedQuantity) -> results.FittedField:
+    return results.FittedField(
+        FieldChange("sensors", sensor, f"image_pipeline.{key}", value), (row,)
+    )
 
 
-def _fit_jpeg(pipeline: ImagePipeline, qualities: Array) -> FittedQuantity:
+def _fit_jpeg(pipeline: ImagePipeline, qualities: Array) -> results.FittedQuantity:
     """Quality of compression; its value is None if most photographs show none."""
     known = qualities[np.isfinite(qualities)]
     named = (jpeg_quality.NAME, jpeg_quality.UNIT, jpeg_quality.PATH, jpeg_quality.STATISTIC)
@@ -119,17 +112,17 @@ def _fit_jpeg(pipeline: ImagePipeline, qualities: Array) -> FittedQuantity:
     missing = len(qualities) - len(known)
     note = f"no compression found in {missing} of {len(qualities)}" if missing else ""
     if 2 * len(known) <= len(qualities):
-        return FittedQuantity(*named, before, None, True, n=len(qualities), note=note)
-    found = direct_estimate(known, jpeg_quality.AXIS)
+        return results.FittedQuantity(*named, before, None, True, n=len(qualities), note=note)
+    found = indirect_inference.direct_estimate(known, jpeg_quality.AXIS)
     value = jpeg_quality.distribution(known)
-    return FittedQuantity(
+    return results.FittedQuantity(
         *named,
         before,
         value,
         True,
         found.mean,
-        *interval(found, float),
-        spread_of(found, float),
+        *results.interval(found, float),
+        results.spread_of(found, float),
         found.n,
         found.n_enough,
         note,
@@ -171,10 +164,10 @@ def _unmeasurable(
     return reasons
 
 
-def _distribution(quantity: CameraQuantity, found: Estimate) -> Any:
+def _distribution(quantity: CameraQuantity, found: indirect_inference.Estimate) -> Any:
     """YAML of a fitted parameter: a number, or a clipped normal distribution."""
     mean = quantity.to_value(found.mean)
-    stddev = round_digits(spread_of(found, quantity.to_value))
+    stddev = round_digits(results.spread_of(found, quantity.to_value))
     if not quantity.axis.varies or stddev <= 0.0:
         return round_digits(mean)
     lowest, highest = (quantity.to_value(v) for v in (quantity.axis.low, quantity.axis.high))
@@ -187,8 +180,8 @@ def _compare(
     exposures: Sequence[Exposure],
     photos: Sequence[MeasuredPhoto],
     prepare: Prepare,
-    fitted: Sequence[tuple[CameraQuantity, Estimate]],
-) -> tuple[ComparedStatistic, ...]:
+    fitted: Sequence[tuple[CameraQuantity, indirect_inference.Estimate]],
+) -> tuple[results.ComparedStatistic, ...]:
     """Statistics of real photographs, and of simulated ones before and after."""
     measures = [*(q.measure for q in CAMERA), *(measure for _, measure in PICTURES)]
 
@@ -211,5 +204,6 @@ def _compare(
     real = np.array([(*photo.statistics, *photo.descriptions) for photo in photos])
     names = [*(q.statistic for q in CAMERA), *(name for name, _ in PICTURES)]
     return tuple(
-        ComparedStatistic(name, real[:, k], old[:, k], new[:, k]) for k, name in enumerate(names)
+        results.ComparedStatistic(name, real[:, k], old[:, k], new[:, k])
+        for k, name in enumerate(names)
     )

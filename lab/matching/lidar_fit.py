@@ -5,27 +5,18 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from gen_data.core.se3 import Array
-from gen_data.lab.matching.descriptions import SCANS
+from gen_data.lab.matching import descriptions, recordings, results
 from gen_data.lab.matching.indirect_inference import Estimate, fit, trimmed_mean
-from gen_data.lab.matching.quantities import LIDAR, LidarQuantity
-from gen_data.lab.matching.quantities.base import FieldChange, round_digits
+from gen_data.lab.matching.quantities import LIDAR, LidarQuantity, base, lidar_range
 from gen_data.lab.matching.quantities.dark_returns import DARK_RETURNS, LEAST
-from gen_data.lab.matching.quantities.lidar_range import RANGE
-from gen_data.lab.matching.recordings import Scan
-from gen_data.lab.matching.results import (
-    ComparedStatistic,
-    FittedField,
-    FittedQuantity,
-    Part,
-    fitted_quantity,
-    not_fitted,
-)
 from gen_data.lab.matching.simulation import Illumination, measure_illuminations, rescan
 from gen_data.sensors.lidar.lidar_sensor import LidarSensor
 from gen_data.sensors.lidar.scan_pattern import LidarModel
 
 
-def fit_lidar(illuminations: Sequence[Illumination], scans: Sequence[Scan], sensor: int) -> Part:
+def fit_lidar(
+    illuminations: Sequence[Illumination], scans: Sequence[recordings.Scan], sensor: int
+) -> results.Part:
     """Fit a laser scanner.
 
     Args:
@@ -34,10 +25,10 @@ def fit_lidar(illuminations: Sequence[Illumination], scans: Sequence[Scan], sens
         sensor: Position of the scanner among the sensors.
     """
     if not illuminations or not scans:
-        return Part(not_fitted(LIDAR, "no laser scanner" if scans else "no scans"))
+        return results.Part(results.not_fitted(LIDAR, "no laser scanner" if scans else "no scans"))
     scanner = illuminations[0].sensor
     if scanner.ideal:
-        return Part(not_fitted(LIDAR, "the scanner is ideal"))
+        return results.Part(results.not_fitted(LIDAR, "the scanner is ideal"))
     real = np.array([[quantity.measure(scan) for quantity in LIDAR] for scan in scans])
     axes = [quantity.axis for quantity in LIDAR]
     own = np.array([quantity.start(scanner) for quantity in LIDAR])
@@ -55,22 +46,24 @@ def fit_lidar(illuminations: Sequence[Illumination], scans: Sequence[Scan], sens
         for quantity, before in zip(LIDAR, own, strict=True)
     )
     statistics = _compare(illuminations, scans, found)
-    return Part(rows, statistics, _fields(_with(scanner, found), rows, sensor))
+    return results.Part(rows, statistics, _fields(_with(scanner, found), rows, sensor))
 
 
-def _row(quantity: LidarQuantity, found: Estimate | None, before: float) -> FittedQuantity:
+def _row(quantity: LidarQuantity, found: Estimate | None, before: float) -> results.FittedQuantity:
     if found is None:
-        (row,) = not_fitted([quantity], "the data sheet has no response: no point has intensity 0")
+        (row,) = results.not_fitted(
+            [quantity], "the data sheet has no response: no point has intensity 0"
+        )
         return row
-    value = round_digits(quantity.to_value(found.mean))
-    return fitted_quantity(quantity, found, before, value, quantity.path)
+    value = base.round_digits(quantity.to_value(found.mean))
+    return results.fitted_quantity(quantity, found, before, value, quantity.path)
 
 
 def _start(own: Array, real: Array) -> Array:
     """First parameters: limits show only if they are near what there is to see."""
     start: Array = own.copy()
-    reach, dark = LIDAR.index(RANGE), LIDAR.index(DARK_RETURNS)
-    start[reach] = min(own[reach], real[reach] + 0.5 * RANGE.axis.step)
+    reach, dark = LIDAR.index(lidar_range.RANGE), LIDAR.index(DARK_RETURNS)
+    start[reach] = min(own[reach], real[reach] + 0.5 * lidar_range.RANGE.axis.step)
     start[dark] = max(own[dark], LEAST)
     return start
 
@@ -84,8 +77,8 @@ def _with(sensor: LidarSensor, found: Mapping[LidarQuantity, Estimate]) -> Lidar
 
 
 def _fields(
-    fitted: LidarSensor, rows: Sequence[FittedQuantity], sensor: int
-) -> tuple[FittedField, ...]:
+    fitted: LidarSensor, rows: Sequence[results.FittedQuantity], sensor: int
+) -> tuple[results.FittedField, ...]:
     """Changed fields; a data sheet is written whole, as its name stands for all of its values."""
     made = []
     for key in dict.fromkeys(quantity.key for quantity in LIDAR):
@@ -94,21 +87,23 @@ def _fields(
             value = getattr(fitted, key)
             if isinstance(value, LidarModel):
                 value = value.model_dump(mode="json", exclude_defaults=True)
-            made.append(FittedField(FieldChange("sensors", sensor, key, value), stated))
+            made.append(
+                results.FittedField(base.FieldChange("sensors", sensor, key, value), stated)
+            )
     return tuple(made)
 
 
 def _compare(
     illuminations: Sequence[Illumination],
-    scans: Sequence[Scan],
+    scans: Sequence[recordings.Scan],
     found: Mapping[LidarQuantity, Estimate],
-) -> tuple[ComparedStatistic, ...]:
+) -> tuple[results.ComparedStatistic, ...]:
     """Statistics of real scans, and of simulated ones before and after."""
     before = [rescan(one, one.sensor) for one in illuminations]
     after = [rescan(one, _with(one.sensor, found)) for one in illuminations]
-    measures = [*((q.statistic, q.measure) for q in LIDAR), *SCANS]
+    measures = [*((q.statistic, q.measure) for q in LIDAR), *descriptions.SCANS]
     return tuple(
-        ComparedStatistic(
+        results.ComparedStatistic(
             name, *(np.array([measure(scan) for scan in group]) for group in (scans, before, after))
         )
         for name, measure in measures

@@ -8,13 +8,9 @@ from pathlib import Path
 from typing import TypeVar
 
 from gen_data.assemble.config import Config, load_config
-from gen_data.core.capture import Channel
-from gen_data.core.errors import ConfigError, StorageError, did_you_mean
-from gen_data.core.interfaces import Sensor
-from gen_data.core.system_calls import usable_cores
+from gen_data.core import capture, errors, interfaces, system_calls
+from gen_data.lab.matching import label_fit, lidar_fit, recordings, results, simulation
 from gen_data.lab.matching.camera_fit import MeasuredPhoto, fit_camera, measure_photo
-from gen_data.lab.matching.label_fit import fit_labels, with_fields
-from gen_data.lab.matching.lidar_fit import fit_lidar
 from gen_data.lab.matching.real_files import (
     Inventory,
     RealFiles,
@@ -23,9 +19,6 @@ from gen_data.lab.matching.real_files import (
     read_photos,
     read_scans,
 )
-from gen_data.lab.matching.recordings import Photo
-from gen_data.lab.matching.results import Match
-from gen_data.lab.matching.simulation import map_in_threads, scenes_in_memory, simulate_scenes
 from gen_data.sensors.camera.rgb_camera import RgbCamera
 from gen_data.sensors.lidar.lidar_sensor import LidarSensor
 
@@ -46,7 +39,7 @@ def match_recordings(  # noqa: PLR0913  (keywords of one front door)
     camera: str = "",
     lidar: str = "",
     progress: Progress = lambda _: None,
-) -> Match:
+) -> results.Match:
     """Fit the sensors of a configuration to a folder of recordings.
 
     Args:
@@ -65,7 +58,7 @@ def match_recordings(  # noqa: PLR0913  (keywords of one front door)
     """
     for name, number in (("images", images), ("scans", scans), ("scenes", scenes)):
         if number < LEAST:
-            raise ConfigError(f"{name}: {number} is too few; expected at least {LEAST}")
+            raise errors.ConfigError(f"{name}: {number} is too few; expected at least {LEAST}")
     config = load_config(source)
     eye = _find_sensor(config, RgbCamera, camera, "camera")
     scanner = _find_sensor(config, LidarSensor, lidar, "lidar")
@@ -76,14 +69,14 @@ def match_recordings(  # noqa: PLR0913  (keywords of one front door)
     swept = list(read_scans(files, scans, inventory))
     if not photos and not swept:
         reasons = "; ".join(f"{n} {kind}: {why}" for (kind, why), n in inventory.skipped.items())
-        raise StorageError(f"{folder}: nothing in it can be read: {reasons}")
+        raise errors.StorageError(f"{folder}: nothing in it can be read: {reasons}")
     labels = read_labels(files, {photo.name: photo.size_px for photo in photos}, inventory)
     eye = eye if photos else None
     scanner = scanner if swept else None
-    placed = fit_labels(source, eye, labels, scenes, progress)
-    scenes = scenes if eye is None else scenes_in_memory(eye, scenes)
-    simulated = simulate_scenes(
-        with_fields(source, placed.fields),
+    placed = label_fit.fit_labels(source, eye, labels, scenes, progress)
+    scenes = scenes if eye is None else simulation.scenes_in_memory(eye, scenes)
+    simulated = simulation.simulate_scenes(
+        label_fit.with_fields(source, placed.fields),
         "" if eye is None else eye.name,
         "" if scanner is None else scanner.name,
         scenes,
@@ -93,9 +86,9 @@ def match_recordings(  # noqa: PLR0913  (keywords of one front door)
     seen = fit_camera(simulated.exposures, photos, _position(config, eye))
     seen = replace(seen, remarks=_other_sizes(eye, photos))
     progress("fitting the laser scanner")
-    reached = fit_lidar(simulated.illuminations, swept, _position(config, scanner))
+    reached = lidar_fit.fit_lidar(simulated.illuminations, swept, _position(config, scanner))
     parts = (placed, seen, reached)
-    return Match(folder, source, config.resolved, inventory, scenes, parts)
+    return results.Match(folder, source, config.resolved, inventory, scenes, parts)
 
 
 def _find_sensor(config: Config, kind: type[S], name: str, option: str) -> S | None:
@@ -108,17 +101,17 @@ def _find_sensor(config: Config, kind: type[S], name: str, option: str) -> S | N
         sensor.name: sensor
         for sensor in config.sensors
         if isinstance(sensor, kind)
-        and (not isinstance(sensor, RgbCamera) or Channel.RGB in sensor.media)
+        and (not isinstance(sensor, RgbCamera) or capture.Channel.RGB in sensor.media)
     }
     if name and name not in known:
-        raise ConfigError(
+        raise errors.ConfigError(
             f"--{option}: there is no such sensor '{name}'; expected one of"
-            f" {', '.join(known) or 'none'}{did_you_mean(name, known)}"
+            f" {', '.join(known) or 'none'}{errors.did_you_mean(name, known)}"
         )
     return known[name] if name else next(iter(known.values()), None)
 
 
-def _position(config: Config, sensor: Sensor | None) -> int:
+def _position(config: Config, sensor: interfaces.Sensor | None) -> int:
     """Position of a sensor in the configuration; -1 for none."""
     names = [None if sensor is None else one.name for one in config.sensors]
     return -1 if sensor is None else names.index(sensor.name)
@@ -127,12 +120,12 @@ def _position(config: Config, sensor: Sensor | None) -> int:
 def _measure_photos(files: RealFiles, limit: int, inventory: Inventory) -> list[MeasuredPhoto]:
     """Measure photographs, of which a few are in memory at a time."""
     measured: list[MeasuredPhoto] = []
-    for batch in _batches(read_photos(files, limit, inventory), 4 * usable_cores()):
-        measured += map_in_threads(measure_photo, batch)
+    for batch in _batches(read_photos(files, limit, inventory), 4 * system_calls.usable_cores()):
+        measured += simulation.map_in_threads(measure_photo, batch)
     return measured
 
 
-def _batches(items: Iterator[Photo], size: int) -> Iterator[list[Photo]]:
+def _batches(items: Iterator[recordings.Photo], size: int) -> Iterator[list[recordings.Photo]]:
     while batch := list(islice(items, size)):
         yield batch
 

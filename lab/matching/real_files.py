@@ -14,13 +14,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.assets.image_decoding import decode_image
-from gen_data.assets.sandbox import run_sandboxed
+from gen_data.assets import image_decoding, sandbox
 from gen_data.core.asset_types import UInt8
 from gen_data.core.capture import POINT, Channel
 from gen_data.core.errors import AssetError, StorageError
-from gen_data.lab.matching.label_files import RealObject, read_coco, read_kitti
-from gen_data.lab.matching.point_files import read_point_file
+from gen_data.lab.matching import label_files, point_files
 from gen_data.lab.matching.recordings import ImageLabels, Photo, Scan
 
 PHOTO_ENDINGS = frozenset({".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp"})
@@ -119,7 +117,7 @@ def read_photos(files: RealFiles, limit: int, inventory: Inventory) -> Iterator[
     for path in choose_evenly(files.photos, limit):
         name = str(path.relative_to(files.folder))
         try:
-            arrays = run_sandboxed(decode_photo, files.folder, {name: ""})
+            arrays = sandbox.run_sandboxed(decode_photo, files.folder, {name: ""})
         except AssetError as error:
             inventory.skip("photographs", _reason(error, path), name)
             continue
@@ -155,7 +153,7 @@ def decode_photo(root: Path, files: Mapping[str, str]) -> dict[str, NDArray[Any]
     (name,) = files
     path = root / name
     data = path.read_bytes()
-    rgb = decode_image(data, str(path))
+    rgb = image_decoding.decode_image(data, str(path))
     height, width = rgb.shape[:2]
     if min(width, height) < SIDE_MIN_PX:
         raise AssetError(f"{path}: smaller than {SIDE_MIN_PX} px; leave it out")
@@ -172,7 +170,7 @@ def decode_photo(root: Path, files: Mapping[str, str]) -> dict[str, NDArray[Any]
 
 def read_rgb(path: Path) -> UInt8:
     """A whole image as RGB [h, w, 3]. Raises AssetError if it cannot be decoded."""
-    return run_sandboxed(_decode_rgb, path.parent, {path.name: ""})["rgb"]
+    return sandbox.run_sandboxed(_decode_rgb, path.parent, {path.name: ""})["rgb"]
 
 
 def _decode_rgb(root: Path, files: Mapping[str, str]) -> dict[str, NDArray[Any]]:
@@ -183,7 +181,7 @@ def _decode_rgb(root: Path, files: Mapping[str, str]) -> dict[str, NDArray[Any]]
         data = path.read_bytes()
     except OSError as error:
         raise AssetError(f"{path}: {error.strerror}") from None
-    return {"rgb": decode_image(data, str(path))}
+    return {"rgb": image_decoding.decode_image(data, str(path))}
 
 
 def _middle(rgb: UInt8) -> UInt8:
@@ -229,7 +227,7 @@ def _read_scan(path: Path) -> tuple[NDArray[Any], NDArray[np.float64]]:
             if points.dtype != POINT:
                 raise AssetError("a NumPy file without laser points")
             return points["position_m"], points["intensity"].astype(np.float64)
-        rows = read_point_file(path)
+        rows = point_files.read_point_file(path)
     except (OSError, ValueError) as error:
         raise AssetError(f"unreadable ({error})") from None
     if not np.isfinite(rows).all():
@@ -256,7 +254,7 @@ def _read_coco(paths: Iterable[Path], inventory: Inventory) -> Iterator[ImageLab
     for path in paths:
         inventory.found["label files"] += 1
         try:
-            images = read_coco(path).images
+            images = label_files.read_coco(path).images
         except StorageError as error:
             inventory.skip("label files", str(error).removeprefix(f"{path}: "), path.name)
             continue
@@ -279,7 +277,7 @@ def _read_kitti(
             inventory.skip("label files", "no photograph states the size of its image", path.name)
             continue
         try:
-            objects = read_kitti(path)
+            objects = label_files.read_kitti(path)
         except StorageError as error:
             inventory.skip("label files", "not labels in KITTI's format", error)
             continue
@@ -287,7 +285,7 @@ def _read_kitti(
         yield _labels_of(size, objects)
 
 
-def _labels_of(size_px: tuple[int, int], objects: Iterable[RealObject]) -> ImageLabels:
+def _labels_of(size_px: tuple[int, int], objects: Iterable[label_files.RealObject]) -> ImageLabels:
     """Boxes as position and size, without regions of many objects."""
     boxes = tuple(
         (thing.name, x0, y0, x1 - x0, y1 - y0)

@@ -5,8 +5,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from gen_data.core.asset_types import UInt8
-from gen_data.core.se3 import Array
+from gen_data.core import asset_types, se3
 
 Box = tuple[str, float, float, float, float]
 """Category, left, top, width and height [px]."""
@@ -24,7 +23,7 @@ class Photo:
     """
 
     name: str
-    rgb: UInt8
+    rgb: asset_types.UInt8
     size_px: tuple[int, int]
     quantisation: NDArray[Any] | None
 
@@ -40,8 +39,8 @@ class Scan:
     """
 
     name: str
-    range_m: Array
-    intensity: Array
+    range_m: se3.Array
+    intensity: se3.Array
 
 
 @dataclass(frozen=True, slots=True)

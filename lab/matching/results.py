@@ -8,8 +8,7 @@ from typing import Any
 
 from gen_data.core.se3 import Array
 from gen_data.lab.matching.indirect_inference import SPREAD_N, Estimate
-from gen_data.lab.matching.quantities import CameraQuantity, LabelQuantity, LidarQuantity
-from gen_data.lab.matching.quantities.base import FieldChange
+from gen_data.lab.matching.quantities import CameraQuantity, LabelQuantity, LidarQuantity, base
 from gen_data.lab.matching.real_files import Inventory
 
 NOT_DETERMINED = "the recordings do not determine it"
@@ -65,7 +64,7 @@ class ComparedStatistic:
 class FittedField:
     """A field of the configuration with its new value, and the quantities that it states."""
 
-    change: FieldChange
+    change: base.FieldChange
     quantities: tuple[FittedQuantity, ...]
 
 

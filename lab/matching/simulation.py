@@ -15,13 +15,11 @@ import numpy as np
 
 from gen_data.assemble.config import Config
 from gen_data.assemble.pipeline_factory import open_pipeline
-from gen_data.core.asset_types import Float32
+from gen_data.core import asset_types, se3, system_calls
 from gen_data.core.boxes import BoxPx
 from gen_data.core.capture import Channel, LidarHits
 from gen_data.core.scene import Camera, Scene, Weather
-from gen_data.core.se3 import Array
 from gen_data.core.streams import Streams
-from gen_data.core.system_calls import usable_cores
 from gen_data.lab.matching.picture import Picture
 from gen_data.lab.matching.quantities import CameraQuantity, LidarQuantity
 from gen_data.lab.matching.recordings import Box, ImageLabels, Scan
@@ -48,8 +46,8 @@ class Exposure:
         pipeline: Settings of the scene's camera.
     """
 
-    radiance: Float32
-    depth_m: Float32 | None
+    radiance: asset_types.Float32
+    depth_m: asset_types.Float32 | None
     camera: Camera
     weather: Weather
     pipeline: ImagePipeline
@@ -170,10 +168,10 @@ def photograph(exposure: Exposure, pipeline: ImagePipeline) -> Picture:
 def measure_exposures(
     exposures: Sequence[Exposure],
     quantities: Sequence[CameraQuantity],
-    coordinates: Array,
+    coordinates: se3.Array,
     count: int,
     prepare: Callable[[ImagePipeline], ImagePipeline],
-) -> Array:
+) -> se3.Array:
     """Statistics [scenes, k] of photographs.
 
     Args:
@@ -185,7 +183,7 @@ def measure_exposures(
     """
     used = exposures[:count]
 
-    def measure(exposure: Exposure, own: Array) -> list[float]:
+    def measure(exposure: Exposure, own: se3.Array) -> list[float]:
         pipeline = prepare(exposure.pipeline)
         for quantity, coordinate in zip(quantities, own, strict=True):
             pipeline = quantity.apply(pipeline, float(coordinate))
@@ -197,7 +195,7 @@ def measure_exposures(
     return np.array(list(map_in_threads(measure, used, rows)))
 
 
-def _dither(scenes: int, grids: Sequence[float]) -> Array:
+def _dither(scenes: int, grids: Sequence[float]) -> se3.Array:
     """Offsets [scenes, k] of parameters that the pipeline rounds to multiples; 0 = it does not.
 
     They are spread evenly over a step, so that the mean of the rounded values is the parameter, and
@@ -212,9 +210,9 @@ def _dither(scenes: int, grids: Sequence[float]) -> Array:
 def measure_illuminations(
     illuminations: Sequence[Illumination],
     quantities: Sequence[LidarQuantity],
-    coordinates: Array,
+    coordinates: se3.Array,
     count: int,
-) -> Array:
+) -> se3.Array:
     """Statistics [scenes, k] of scans with parameters [k], of so many scenes at most."""
     rows = []
     for one in illuminations[:count]:
@@ -256,5 +254,5 @@ def _box(category: str, box: BoxPx) -> Box:
 
 def map_in_threads(function: Callable[..., T], *items: Iterable[Any]) -> Iterator[T]:
     """Results in order, as of ``map``; most of the time goes to libraries that let threads run."""
-    with ThreadPoolExecutor(usable_cores()) as pool:
+    with ThreadPoolExecutor(system_calls.usable_cores()) as pool:
         yield from pool.map(function, *items)

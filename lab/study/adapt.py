@@ -25,9 +25,8 @@ from gen_data.config.yaml_scalars import to_flow_yaml
 from gen_data.core.errors import ConfigError, StorageError, VerificationError
 from gen_data.core.serialization import canonical_json
 from gen_data.lab.matching.label_files import Box, RealObject
+from gen_data.lab.study import experiment, findings
 from gen_data.lab.study.evaluation import check_results, evaluate
-from gen_data.lab.study.experiment import require_torch
-from gen_data.lab.study.findings import Table
 from gen_data.lab.study.real_pictures import RealPicture, RealSet
 from gen_data.lab.study.reweighting import ALPHA, Dependence, Tally, find_dependences
 from gen_data.report.drawn_parameters import replay_scenes
@@ -188,7 +187,7 @@ def _read_checked(path: Path, judged: StoredSamples, truth: RealSet) -> list[dic
 
 
 def _detect(path: Path, samples: SampleSequence, truth: RealSet) -> list[dict[str, Any]]:
-    require_torch("adapt")
+    experiment.require_torch("adapt")
     from gen_data.lab.study.detector import Detector
     from gen_data.lab.study.training import detect_in_images
 
@@ -317,7 +316,7 @@ def _to_yaml(value: Any) -> str:
     return text
 
 
-def tabulate(made: Round, strength: float) -> Table:
+def tabulate(made: Round, strength: float) -> findings.Table:
     """The parameters that misses depend on, and those nearest to it."""
     shown = [d for d in made.dependences if d.p < ALPHA] or list(made.dependences[:5])
     rows = []

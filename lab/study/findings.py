@@ -3,9 +3,8 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from gen_data.lab.study import evaluation, failures
 from gen_data.lab.study.comparison import Interval, adjust, interval, score
-from gen_data.lab.study.evaluation import Evaluation
-from gen_data.lab.study.failures import count_groups
 
 ALPHA = 0.05
 """False alarm rate of all verdicts of a study together."""
@@ -24,7 +23,7 @@ Table = dict[str, Any]
 """``title``, ``header``, ``rows`` of texts, ``note``."""
 
 
-def describe(runs: Mapping[str, Sequence[Evaluation]]) -> dict[str, Any]:
+def describe(runs: Mapping[str, Sequence[evaluation.Evaluation]]) -> dict[str, Any]:
     """Compare variants.
 
     Args:
@@ -65,7 +64,7 @@ def describe(runs: Mapping[str, Sequence[Evaluation]]) -> dict[str, Any]:
         "groups": {
             name: [
                 {"kind": kind, "group": group, "found": share.found, "objects": share.count}
-                for (kind, group), share in count_groups(runs[name]).items()
+                for (kind, group), share in failures.count_groups(runs[name]).items()
             ]
             for name in names
         },

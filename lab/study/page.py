@@ -6,15 +6,14 @@ from html import escape
 
 import cv2
 
+from gen_data.lab.study import failures, findings
 from gen_data.lab.study.evaluation import Evaluation
-from gen_data.lab.study.failures import draw_faults, worst_pictures
-from gen_data.lab.study.findings import BY_CLASS, Table
 from gen_data.report.html_page import format_document, format_table
 
 PICTURES_MAX = 12
 """Pictures of faults per variant."""
 
-LAST = (BY_CLASS,)
+LAST = (findings.BY_CLASS,)
 """Titles of the tables that are below the pictures, as they may be long."""
 
 _LEGEND = (
@@ -25,7 +24,7 @@ _LEGEND = (
 
 
 def format_page(
-    title: str, tables: Sequence[Table], runs: Mapping[str, Sequence[Evaluation]]
+    title: str, tables: Sequence[findings.Table], runs: Mapping[str, Sequence[Evaluation]]
 ) -> str:
     """Format the HTML document: tables, and the pictures of each variant with most faults."""
     first, last = (
@@ -43,12 +42,12 @@ def _pictures(name: str, runs: Sequence[Evaluation]) -> str:
         f'<figure><img alt="" src="{_data_url(runs[0], number)}"><figcaption>'
         f"{escape(runs[0].pictures[number].path.name)}: {count} faults in "
         f"{len(runs)} {'run' if len(runs) == 1 else 'runs'}</figcaption></figure>"
-        for number, count in worst_pictures(runs, PICTURES_MAX)
+        for number, count in failures.worst_pictures(runs, PICTURES_MAX)
     )
     shown = f'<div class="grid">{figures}</div>' if figures else "<p>There are none.</p>"
     return f"<h2>{escape(name)}: pictures with most faults</h2>{shown}"
 
 
 def _data_url(run: Evaluation, number: int) -> str:
-    encoded = cv2.imencode(".jpg", draw_faults(run, number)[..., ::-1])[1]
+    encoded = cv2.imencode(".jpg", failures.draw_faults(run, number)[..., ::-1])[1]
     return "data:image/jpeg;base64," + base64.b64encode(encoded.tobytes()).decode()

@@ -12,8 +12,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from gen_data.config.data_files import load_table
-from gen_data.content.procedural import bottles, packaging
-from gen_data.content.procedural.material_presets import hex_to_srgb8
+from gen_data.content.procedural import bottles, material_presets, packaging
 from gen_data.content.procedural.textures import artwork as art
 from gen_data.content.procedural.textures.artwork import Box, Color, Place
 from gen_data.core.asset_types import TextureData
@@ -169,7 +168,7 @@ def _small_print(rng: VariantRng) -> list[str]:
 
 def _design(seed: int, rng: VariantRng, sizes: Sequence[str] = _WORDS["weights"]) -> _Design:
     scheme = in_turn(_WORDS["schemes"], seed)
-    ground, second, accent, ink = (hex_to_srgb8(code) for code in scheme.split())
+    ground, second, accent, ink = (material_presets.hex_to_srgb8(code) for code in scheme.split())
     if rng.chance(0.3):
         second, accent = accent, second
     name = rng.choose(_WORDS["starts"]) + rng.choose(_WORDS["ends"])

@@ -3,15 +3,14 @@
 import numpy as np
 
 from gen_data.content.procedural.textures.texture_images import color, mix_colors, texture
-from gen_data.core import noise
-from gen_data.core.asset_types import TextureData
+from gen_data.core import asset_types, noise
 from gen_data.core.variant_rng import variant_rng
 
 PLASTER_WIDTH_M = 8.0
 """One repeat of ``weathered_plaster`` along a wall."""
 
 
-def weathered_plaster(seed: int) -> TextureData:
+def weathered_plaster(seed: int) -> asset_types.TextureData:
     """A whole wall from its foot to its eaves; repeats to the sides only.
 
     Rain leaves streaks below the eaves, splashes darken and green the foot, patches have another
@@ -51,7 +50,7 @@ def weathered_plaster(seed: int) -> TextureData:
     return texture(albedo.astype(np.float32), None, height.astype(np.float32), 0.8)
 
 
-def wall_boards(seed: int) -> TextureData:
+def wall_boards(seed: int) -> asset_types.TextureData:
     """Painted boards; upright for odd seeds, else weatherboarding. 2 m per repeat."""
     rng = variant_rng("wall_boards", seed)
     count = rng.choose((12, 14, 16))
@@ -71,7 +70,7 @@ def wall_boards(seed: int) -> TextureData:
     return texture(albedo.astype(np.float32), None, height.astype(np.float32), 0.7)
 
 
-def profiled_sheet(seed: int) -> TextureData:
+def profiled_sheet(seed: int) -> asset_types.TextureData:
     """Trapezoidal or standing-seam sheet, ribs upright, with streaks of rain. 2 m per repeat."""
     rng = variant_rng("profiled_sheet", seed)
     count = rng.choose((4, 8, 10, 16))
@@ -90,7 +89,7 @@ def profiled_sheet(seed: int) -> TextureData:
     return texture(albedo.astype(np.float32), None, 6.0 * noise.blur_image(rib, 2), 1.0)
 
 
-def slates(seed: int) -> TextureData:
+def slates(seed: int) -> asset_types.TextureData:
     """Slates or bitumen shingles, the eaves below; 1.8 m per repeat."""
     rng = variant_rng("slates", seed)
     courses, per_course = rng.choose(((9, 6), (10, 8), (12, 8)))

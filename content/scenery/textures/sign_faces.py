@@ -16,8 +16,7 @@ import numpy as np
 
 from gen_data.content.procedural.textures import artwork as art
 from gen_data.content.scenery.signs import SIGNS, Shape, plate_outline, sign_name
-from gen_data.core.asset_types import TextureData
-from gen_data.core.noise import fbm, smoothstep
+from gen_data.core import asset_types, noise
 from gen_data.core.variant_rng import variant_rng
 
 if TYPE_CHECKING:
@@ -158,13 +157,13 @@ class Face:
         return ((p[0] + 0.5) * _DRAWN_PX, (0.5 - p[1]) * _DRAWN_PX)
 
 
-def traffic_sign(seed: int, sign: str) -> TextureData:
+def traffic_sign(seed: int, sign: str) -> asset_types.TextureData:
     """The face of a sign of ``signs.SIGNS``, a little dirty; the plate cuts its outline out."""
     made = SIGNS[sign_name(seed, sign)]
     face = Face(art.canvas(_DRAWN_PX, _DRAWN_PX, COLORS["white"]), made.shape)
     face.draw(made.face)
     clean = art.resize_texture(face.image, SIZE_PX, SIZE_PX).albedo.astype(np.float32)
     rng = variant_rng("traffic_sign/dirt", seed)
-    streaks = smoothstep(0.1, 0.9, fbm((3, 24), 4, rng, size_px=SIZE_PX))
+    streaks = noise.smoothstep(0.1, 0.9, noise.fbm((3, 24), 4, rng, size_px=SIZE_PX))
     dirt = 1.0 - rng.between(0.02, 0.1) * streaks
-    return TextureData(np.round(clean * dirt[..., None]).astype(np.uint8))
+    return asset_types.TextureData(np.round(clean * dirt[..., None]).astype(np.uint8))

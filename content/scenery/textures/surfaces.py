@@ -3,12 +3,11 @@
 import numpy as np
 
 from gen_data.content.procedural.textures.texture_images import texture
-from gen_data.core import noise
-from gen_data.core.asset_types import TextureData
+from gen_data.core import asset_types, noise
 from gen_data.core.variant_rng import variant_rng
 
 
-def roof_tiles(seed: int) -> TextureData:
+def roof_tiles(seed: int) -> asset_types.TextureData:
     """Clay or concrete tiles, the eaves below; 1.8 m per repeat."""
     rng = variant_rng("roof_tiles", seed)
     courses, per_course = (6, 8) if seed % 2 == 0 else (8, 10)
@@ -34,7 +33,7 @@ def roof_tiles(seed: int) -> TextureData:
     )
 
 
-def ashlar(seed: int) -> TextureData:
+def ashlar(seed: int) -> asset_types.TextureData:
     """Dressed stone blocks with thin joints; 2.4 m per repeat."""
     rng = variant_rng("ashlar", seed)
     courses, per_course = 6, 4
@@ -55,7 +54,7 @@ def ashlar(seed: int) -> TextureData:
     return texture(albedo.astype(np.float32), None, height.astype(np.float32))
 
 
-def bark(seed: int) -> TextureData:
+def bark(seed: int) -> asset_types.TextureData:
     """Furrowed bark, the trunk upright; 0.8 m per repeat."""
     rng = variant_rng("bark", seed)
     bend = 14.0 * noise.fbm((5, 4), 4, rng)
@@ -69,7 +68,7 @@ def bark(seed: int) -> TextureData:
     return texture(albedo.astype(np.float32), None, noise.blur_image(height.astype(np.float32)))
 
 
-def foliage(seed: int) -> TextureData:
+def foliage(seed: int) -> asset_types.TextureData:
     """Dense small leaves, as of a clipped hedge; 0.8 m per repeat."""
     rng = variant_rng("foliage", seed)
     shade = np.full((512, 512), 0.12, dtype=np.float32)
@@ -85,7 +84,7 @@ def foliage(seed: int) -> TextureData:
     return texture(albedo.astype(np.float32), None, noise.blur_image(height))
 
 
-def produce(seed: int) -> TextureData:
+def produce(seed: int) -> asset_types.TextureData:
     """Round fruit or vegetables of one size beside each other in a heap; 0.56 m per repeat."""
     rng = variant_rng("produce", seed)
     across = (8, 10, 7, 12)[seed % 4]

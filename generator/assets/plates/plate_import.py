@@ -19,22 +19,7 @@ from gen_data.assets.plates.vanishing_points import (
     estimate_camera,
     find_edges,
 )
-from gen_data.core.asset_types import UInt8
-from gen_data.core.colorimetry import srgb_decode
-from gen_data.core.errors import AssetError
-from gen_data.core.intrinsics import Intrinsics
-from gen_data.core.plates import (
-    FARTHEST_M,
-    Plate,
-    PlateSun,
-    ground_points,
-    ground_rectangle,
-    is_inside,
-    upright_pose,
-    zenith_from_horizon,
-)
-from gen_data.core.scene import Lane
-from gen_data.core.se3 import Vec3
+from gen_data.core import asset_types, colorimetry, errors, intrinsics, plates, scene, se3
 
 _EXIF_IFD, _FOCAL_35MM = 0x8769, 0xA405
 _FILM_DIAGONAL_MM = math.hypot(36.0, 24.0)
@@ -43,7 +28,7 @@ _SMALL_PX = 512
 _LANE_STEP_M = 2.0
 
 
-def import_plate(folder: Folder, entry: PlateEntry) -> Plate:
+def import_plate(folder: Folder, entry: PlateEntry) -> plates.Plate:
     """Plate of a photograph.
 
     Raises:
@@ -56,11 +41,11 @@ def import_plate(folder: Folder, entry: PlateEntry) -> Plate:
     focal_px = _focal_px(entry, data, width_px, height_px)
     try:
         zenith, focal_px, estimate = _find_zenith(entry, rgb, focal_px)
-        pose = upright_pose(zenith, entry.camera_height_m)
+        pose = plates.upright_pose(zenith, entry.camera_height_m)
     except ValueError as error:
         fact = "hfov_deg" if focal_px is None and entry.horizon is not None else "horizon"
-        raise AssetError(f"{place}: {fact}: {error}") from None
-    plate = Plate(
+        raise errors.AssetError(f"{place}: {fact}: {error}") from None
+    plate = plates.Plate(
         size_px=(width_px, height_px),
         focal_px=round(focal_px, 6),
         T_world_camera=pose,
@@ -93,7 +78,7 @@ def _focal_px(entry: PlateEntry, data: bytes, width_px: int, height_px: int) -> 
 
 
 def _find_zenith(
-    entry: PlateEntry, rgb: UInt8, focal_px: float | None
+    entry: PlateEntry, rgb: asset_types.UInt8, focal_px: float | None
 ) -> tuple[NDArray[np.float64], float, CameraEstimate | None]:
     """Zenith in the camera frame, focal length, and the estimate if the horizon is one.
 
@@ -118,67 +103,69 @@ def _find_zenith(
         rise = math.tan(math.radians(horizon.roll_deg)) * 0.5 * width_px
         horizon = ((0.0, horizon.height_px - rise), (float(width_px), horizon.height_px + rise))
     center = (0.5 * width_px, 0.5 * height_px)
-    camera = Intrinsics(width_px, height_px, focal_px, focal_px, *center)
-    return zenith_from_horizon(camera, *horizon), focal_px, None
+    camera = intrinsics.Intrinsics(width_px, height_px, focal_px, focal_px, *center)
+    return plates.zenith_from_horizon(camera, *horizon), focal_px, None
 
 
-def _sun(entry: PlateEntry) -> PlateSun | None:
+def _sun(entry: PlateEntry) -> plates.PlateSun | None:
     sun = entry.sun
     if sun is None:
         return None
     angles = (math.radians(sun.azimuth_deg), math.radians(sun.elevation_deg))
-    return PlateSun(*angles, sun.share)
+    return plates.PlateSun(*angles, sun.share)
 
 
-def _check_ground(plate: Plate, place: str) -> None:
+def _check_ground(plate: plates.Plate, place: str) -> None:
     """Refuse a ground with a corner outside the photograph or not on the ground plane."""
     width_px, height_px = plate.size_px
-    points = ground_points(plate, np.array(plate.ground_px))
+    points = plates.ground_points(plate, np.array(plate.ground_px))
     for (x, y), point in zip(plate.ground_px, points, strict=True):
         if not (0.0 <= x <= width_px and 0.0 <= y <= height_px):
             fault = f"is outside the photograph of {width_px} x {height_px} px"
         elif not np.isfinite(point).all():
-            fault = f"is above the horizon, or farther away than {FARTHEST_M:g} m"
+            fault = f"is above the horizon, or farther away than {plates.FARTHEST_M:g} m"
         else:
             continue
-        raise AssetError(f"{place}: ground: corner ({x:g}, {y:g}) {fault}; move it")
+        raise errors.AssetError(f"{place}: ground: corner ({x:g}, {y:g}) {fault}; move it")
     try:
-        ground_rectangle(plate)
+        plates.ground_rectangle(plate)
     except ValueError as error:
-        raise AssetError(f"{place}: ground: {error}; move its corners") from None
+        raise errors.AssetError(f"{place}: ground: {error}; move its corners") from None
 
 
-def _read_mask(folder: Folder, entry: PlateEntry, plate: Plate) -> NDArray[np.bool_] | None:
+def _read_mask(folder: Folder, entry: PlateEntry, plate: plates.Plate) -> NDArray[np.bool_] | None:
     """Pixels of the foreground; None if there is no mask."""
     if not entry.mask:
         return None
     place = str(folder.root / entry.mask)
     pixels = decode_image(folder.read(entry.mask), place)
     if pixels.shape[1::-1] != plate.size_px:
-        raise AssetError(
+        raise errors.AssetError(
             f"{place}: {pixels.shape[1]} x {pixels.shape[0]} px; expected the size of its "
             f"photograph, {plate.size_px[0]} x {plate.size_px[1]} px"
         )
     return np.asarray(pixels[..., 0] >= 128)
 
 
-def _lane(plate: Plate, entry: PlateLane, number: int, place: str) -> Lane:
+def _lane(plate: plates.Plate, entry: PlateLane, number: int, place: str) -> scene.Lane:
     """A lane on the ground, with points at most 2 m apart."""
-    corners = ground_points(plate, np.array(entry.center_px))
+    corners = plates.ground_points(plate, np.array(entry.center_px))
     if not np.isfinite(corners).all():
-        raise AssetError(
+        raise errors.AssetError(
             f"{place}: lanes[{number}].center_px: a point is above the horizon, or farther away "
-            f"than {FARTHEST_M:g} m; move it"
+            f"than {plates.FARTHEST_M:g} m; move it"
         )
     points = [corners[0]]
     for a, b in itertools.pairwise(corners):
         steps = max(math.ceil(math.hypot(*(b - a)) / _LANE_STEP_M), 1)
         points += [a + (b - a) * (k / steps) for k in range(1, steps + 1)]
     center = tuple((round(float(x), 6), round(float(y), 6), 0.0) for x, y in points)
-    return Lane(str(number), entry.kind, center, entry.width_m)
+    return scene.Lane(str(number), entry.kind, center, entry.width_m)
 
 
-def _ground_color(plate: Plate, rgb: UInt8, hidden: NDArray[np.bool_] | None, place: str) -> Vec3:
+def _ground_color(
+    plate: plates.Plate, rgb: asset_types.UInt8, hidden: NDArray[np.bool_] | None, place: str
+) -> se3.Vec3:
     """Median colour of the visible ground, linear RGB."""
     width_px, height_px = plate.size_px
     scale = min(_SMALL_PX / max(plate.size_px), 1.0)
@@ -186,11 +173,11 @@ def _ground_color(plate: Plate, rgb: UInt8, hidden: NDArray[np.bool_] | None, pl
     small = cv2.resize(rgb, size, interpolation=cv2.INTER_AREA)
     u = (np.arange(size[0]) + 0.5) * width_px / size[0]
     v = (np.arange(size[1]) + 0.5) * height_px / size[1]
-    inside = is_inside(np.array(plate.ground_px), np.stack(np.meshgrid(u, v), axis=-1))
+    inside = plates.is_inside(np.array(plate.ground_px), np.stack(np.meshgrid(u, v), axis=-1))
     if hidden is not None:
         inside &= ~hidden[v.astype(int)[:, None], u.astype(int)[None]]
     if not inside.any():
-        raise AssetError(f"{place}: ground: the mask hides all of it, or it is too small")
-    linear = srgb_decode(small[inside].astype(np.float64) / 255.0)
+        raise errors.AssetError(f"{place}: ground: the mask hides all of it, or it is too small")
+    linear = colorimetry.srgb_decode(small[inside].astype(np.float64) / 255.0)
     red, green, blue = (round(max(float(part), 1e-4), 6) for part in np.median(linear, axis=0))
     return (red, green, blue)

@@ -17,10 +17,7 @@ import numpy as np
 from gen_data.assets.asset_folder import Folder
 from gen_data.assets.readers.mesh_source import MeshSource, locate_file, srgb_to_linear
 from gen_data.assets.triangle_soup import Float64, MaterialSlot, TriangleSoup, join_soups
-from gen_data.core.asset_types import Material
-from gen_data.core.errors import AssetError
-from gen_data.core.safe_xml import parse_xml
-from gen_data.core.se3 import Vec3
+from gen_data.core import asset_types, errors, safe_xml, se3
 
 _MAX_ELEMENTS = 1_000_000
 _UP = {"X_UP": "x", "Y_UP": "y", "Z_UP": "z"}
@@ -36,7 +33,7 @@ def read_dae(folder: Folder, relative: str, materials: bool) -> MeshSource:
     """
     data, place = folder.read(relative), str(folder.root / relative)
     # Checked first, because pycollada's parser would expand entities.
-    parse_xml(data, place, "COLLADA", "a COLLADA file", _MAX_ELEMENTS)
+    safe_xml.parse_xml(data, place, "COLLADA", "a COLLADA file", _MAX_ELEMENTS)
     from collada import Collada
     from collada.common import DaeBrokenRefError, DaeError, DaeIncompleteError, DaeUnsupportedError
 
@@ -58,10 +55,10 @@ def read_dae(folder: Folder, relative: str, materials: bool) -> MeshSource:
             ]
     except (DaeError, ValueError, LookupError, TypeError, AttributeError) as error:
         reason = str(error).strip().split("\n")[0][:200] or type(error).__name__
-        raise AssetError(f"{place}: malformed COLLADA ({reason}); export it again") from None
+        raise errors.AssetError(f"{place}: malformed COLLADA ({reason}); export it again") from None
     parts = [soup for group in soups for soup in group]
     if not parts:
-        raise AssetError(f"{place}: holds no triangles; export it again with its faces")
+        raise errors.AssetError(f"{place}: holds no triangles; export it again with its faces")
     up = _UP.get(str(document.assetInfo.upaxis), "y")
     return MeshSource(join_soups(parts), remarks=tuple(dict.fromkeys(remarks)), up=up)
 
@@ -167,7 +164,7 @@ def _read_material(
     """Diffuse colour or image, and opacity, of a material."""
     effect = target.effect
     name = str(target.name or target.id or "")
-    material = Material(opacity=_read_opacity(effect))
+    material = asset_types.Material(opacity=_read_opacity(effect))
     image = getattr(effect.diffuse, "sampler", None)
     if image is not None:
         path = unquote(image.surface.image.path.removeprefix("file://"))
@@ -175,7 +172,7 @@ def _read_material(
         material = replace(material, base_color=(1.0, 1.0, 1.0), texture=texture)
     elif isinstance(effect.diffuse, tuple):
         red, green, blue = (round(min(max(float(c), 0.0), 1.0), 6) for c in effect.diffuse[:3])
-        color: Vec3 = (red, green, blue)
+        color: se3.Vec3 = (red, green, blue)
         material = replace(material, base_color=color if linear else srgb_to_linear(color))
     return MaterialSlot(name, material, from_file=True)
 

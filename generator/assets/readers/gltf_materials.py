@@ -16,12 +16,11 @@ import numpy as np
 
 from gen_data.assets.readers.mesh_source import EVEN, clamp_min, fraction
 from gen_data.assets.texture_maps import TextureMaps
-from gen_data.core.asset_types import Material, UInt8
-from gen_data.core.colorimetry import srgb_decode
+from gen_data.core import asset_types, colorimetry
 
 _MIN_COVERAGE = 8
 """Texels of a blended image with less coverage [1/255] are holes."""
-_LINEAR = np.array([srgb_decode(level / 255.0) for level in range(256)])
+_LINEAR = np.array([colorimetry.srgb_decode(level / 255.0) for level in range(256)])
 """Linear values of sRGB in eight bits."""
 
 
@@ -35,12 +34,12 @@ class Images:
     """
 
     name: Callable[[Mapping[str, Any]], str]
-    pixels: Callable[[str], UInt8]
+    pixels: Callable[[str], asset_types.UInt8]
 
 
 def gltf_material(
     description: Mapping[str, Any], images: Images
-) -> tuple[Material, tuple[str, ...]]:
+) -> tuple[asset_types.Material, tuple[str, ...]]:
     """Convert a glTF material, and list what of it is not used.
 
     Raises:
@@ -78,7 +77,7 @@ def gltf_material(
         emission=glow,
         cutoff=cutoff,
     )
-    material = Material(
+    material = asset_types.Material(
         base_color=(red, green, blue),
         roughness=roughness,
         metallic=metallic,

@@ -10,10 +10,8 @@ import numpy as np
 from gen_data.assets.asset_folder import Folder
 from gen_data.assets.robot_files import resolve_uri
 from gen_data.assets.triangle_soup import Int64, TriangleSoup
+from gen_data.core import colorimetry, errors, se3
 from gen_data.core.asset_types import Material
-from gen_data.core.colorimetry import srgb_decode
-from gen_data.core.errors import AssetError
-from gen_data.core.se3 import Vec3
 
 MAX_FACES = 5_000_000
 WHITE = Material(base_color=(1.0, 1.0, 1.0))
@@ -43,7 +41,7 @@ class MeshSource:
 def check_face_count(count: int, place: str) -> None:
     """Raise AssetError if a file has more than ``MAX_FACES`` triangles."""
     if count > MAX_FACES:
-        raise AssetError(f"{place}: {count} triangles, at most {MAX_FACES}; decimate it")
+        raise errors.AssetError(f"{place}: {count} triangles, at most {MAX_FACES}; decimate it")
 
 
 def split_fans(sizes: Int64) -> Int64:
@@ -69,7 +67,7 @@ def locate_file(folder: Folder, base: str, reference: str, remarks: list[str] | 
     path, refusal = "", None
     try:
         path = resolve_uri(folder, base, reference)
-    except AssetError as error:
+    except errors.AssetError as error:
         refusal = error
     if not path or not folder.exists(path):
         beside = next((p for p in _candidates(folder, base, path, name) if folder.exists(p)), "")
@@ -91,7 +89,7 @@ def _candidates(folder: Folder, base: str, path: str, name: str) -> Iterator[str
         parent = PurePosixPath(wanted).parent
         try:
             entries = sorted(path.name for path in folder.path(str(parent)).iterdir())
-        except (OSError, AssetError):
+        except (OSError, errors.AssetError):
             continue
         key = PurePosixPath(wanted).name.casefold()
         yield from (str(parent / entry) for entry in entries if entry.casefold() == key)
@@ -120,7 +118,7 @@ def _parse_number(value: object, name: str) -> float:
     return float(value)
 
 
-def srgb_to_linear(color: Vec3) -> Vec3:
+def srgb_to_linear(color: se3.Vec3) -> se3.Vec3:
     """Convert sRGB in [0, 1] to linear RGB (IEC 61966-2-1)."""
     red, green, blue = (_linear(min(max(c, 0.0), 1.0)) for c in color)
     return (red, green, blue)
@@ -137,4 +135,4 @@ def shininess_to_roughness(exponent: float) -> float:
 
 def _linear(c: float) -> float:
     # Rounded, because pow() may differ in the last bit between C libraries.
-    return round(srgb_decode(float(c)), 6)
+    return round(colorimetry.srgb_decode(float(c)), 6)

@@ -32,9 +32,7 @@ from gen_data.assets.readers.mesh_source import (
 )
 from gen_data.assets.texture_maps import TextureMaps
 from gen_data.assets.triangle_soup import Float64, Int64, MaterialSlot, TriangleSoup
-from gen_data.core.asset_types import Material
-from gen_data.core.colorimetry import srgb_decode
-from gen_data.core.errors import AssetError, did_you_mean
+from gen_data.core import asset_types, colorimetry, errors
 
 
 @dataclass
@@ -72,7 +70,7 @@ def read_obj(folder: Folder, relative: str, materials: bool) -> MeshSource:
         slots, transforms, remarks = _read_slots(folder, relative, statements)
         soup = _build_soup(statements, slots)
     except ValueError as error:
-        raise AssetError(
+        raise errors.AssetError(
             f"{folder.root / relative}: malformed OBJ ({error}); export it again"
         ) from None
     if not materials:
@@ -216,7 +214,7 @@ def _parse_positions(lines: list[str]) -> tuple[Float64, Float64 | None]:
         # Some exporters count to 255.
         srgb = srgb / 255.0
     colors = np.ones((len(rows), 3))
-    colors[colored] = srgb_decode(np.clip(srgb, 0.0, 1.0))
+    colors[colored] = colorimetry.srgb_decode(np.clip(srgb, 0.0, 1.0))
     return table.reshape(-1, 3), colors
 
 
@@ -321,7 +319,7 @@ def _why_missing(name: str, missing: str, found: list[str], defined: Iterable[st
         return f"belongs to the missing file {missing}"
     if not found:
         return ""
-    return f"is not defined in {', '.join(found)}{did_you_mean(name, defined)}"
+    return f"is not defined in {', '.join(found)}{errors.did_you_mean(name, defined)}"
 
 
 _NO_MATERIAL = frozenset({"", "none", "(null)", "null"})
@@ -372,12 +370,12 @@ _UNPLACED: UvTransform = ((1.0, 1.0), (0.0, 0.0))
 class _Definition:
     """Definition of one material in an MTL file."""
 
-    material: Material = field(default_factory=Material)
+    material: asset_types.Material = field(default_factory=asset_types.Material)
     maps: TextureMaps = field(default_factory=TextureMaps)
     dissolved: bool = False
     placement: UvTransform = _UNPLACED
 
-    def build_material(self) -> Material:
+    def build_material(self) -> asset_types.Material:
         maps = self.maps
         if maps.alpha:
             # The coverage is in the alpha channel if colour and coverage share an image.
@@ -406,7 +404,7 @@ def _read_mtl(folder: Folder, relative: str, remarks: list[str]) -> dict[str, _D
                 _apply_statement(definitions[name], words[0], rest, folder, relative, remarks)
             except (ValueError, IndexError) as error:
                 reason = f" ({error})" if str(error).startswith(f"{words[0]} is") else ""
-                raise AssetError(
+                raise errors.AssetError(
                     f"{folder.root / relative}: material '{name}': malformed '{words[0]}'{reason}; "
                     "export it again"
                 ) from None
@@ -512,6 +510,6 @@ def _is_number(token: str) -> bool:
         return False
 
 
-def _drop_tint(material: Material) -> Material:
+def _drop_tint(material: asset_types.Material) -> asset_types.Material:
     """Make a textured material white: exporters write arbitrary greys beside an image."""
     return replace(material, base_color=(1.0, 1.0, 1.0)) if material.texture else material

@@ -15,9 +15,7 @@ import numpy as np
 from gen_data.assets.asset_folder import Folder
 from gen_data.assets.readers.mesh_source import MAX_FACES, WHITE, MeshSource
 from gen_data.assets.triangle_soup import Float64, MaterialSlot, TriangleSoup, join_soups
-from gen_data.core.colorimetry import srgb_decode
-from gen_data.core.errors import AssetError
-from gen_data.core.safe_xml import parse_xml
+from gen_data.core import colorimetry, errors, safe_xml
 
 _METRES = {
     "micron": 1e-6, "millimeter": 1e-3, "centimeter": 1e-2, "inch": 0.0254, "foot": 0.3048,
@@ -89,12 +87,12 @@ def read_3mf(folder: Folder, relative: str, materials: bool) -> MeshSource:
                 _collect(package, model, item.attrib["objectid"], _transform(item), _MAX_DEPTH)
             scale = _METRES[root.unit]
     except (zipfile.BadZipFile, NotImplementedError, RuntimeError, OSError, EOFError):
-        raise AssetError(f"{place}: unreadable 3MF archive; export it again") from None
+        raise errors.AssetError(f"{place}: unreadable 3MF archive; export it again") from None
     except (KeyError, ValueError, IndexError) as error:
         reason = f"missing {error}" if isinstance(error, KeyError) else str(error)[:120]
-        raise AssetError(f"{place}: malformed 3MF ({reason}); export it again") from None
+        raise errors.AssetError(f"{place}: malformed 3MF ({reason}); export it again") from None
     if not package.soups:
-        raise AssetError(f"{place}: builds no object; export it again with its mesh")
+        raise errors.AssetError(f"{place}: builds no object; export it again with its mesh")
     whole = join_soups(package.soups)
     colors = whole.colors if materials else None
     whole = replace(whole, corners=whole.corners * scale, colors=colors)
@@ -107,7 +105,7 @@ def _parse_model(package: _Package, name: str) -> _Model:
         raise ValueError(f"a model of {size} bytes, at most {_MAX_BYTES}")
     data = package.archive.read(name)
     place = f"{package.place}: {name}"
-    root = parse_xml(data, place, "model", "a 3MF model", _MAX_ELEMENTS)
+    root = safe_xml.parse_xml(data, place, "model", "a 3MF model", _MAX_ELEMENTS)
     objects: dict[str, Element] = {}
     colors: dict[str, Float64] = {}
     items: list[Element] = []
@@ -142,7 +140,7 @@ def _find(element: Element, name: str) -> list[Element]:
 def _linear_colors(values: list[str]) -> Float64:
     """Linear RGB [n, 3] of texts ``#RRGGBB`` or ``#RRGGBBAA``."""
     rows = [[int(v.strip()[k : k + 2], 16) / 255.0 for k in (1, 3, 5)] for v in values]
-    return srgb_decode(np.array(rows, np.float64).reshape(-1, 3))
+    return colorimetry.srgb_decode(np.array(rows, np.float64).reshape(-1, 3))
 
 
 def _transform(element: Element) -> Float64:

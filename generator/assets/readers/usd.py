@@ -14,14 +14,11 @@ from pathlib import Path, PurePosixPath
 
 import numpy as np
 
+from gen_data.assets import image_decoding, texture_maps
 from gen_data.assets.asset_folder import Folder
-from gen_data.assets.image_decoding import decode_image
 from gen_data.assets.readers.mesh_source import EVEN, MeshSource
-from gen_data.assets.texture_maps import TextureMaps
 from gen_data.assets.triangle_soup import MaterialSlot, TriangleSoup, join_soups
-from gen_data.core.asset_types import Material, UInt8
-from gen_data.core.errors import AssetError
-from gen_data.core.temporary_folders import temporary_folder
+from gen_data.core import asset_types, errors, temporary_folders
 from gen_data.usd.material_reader import BoundMaterial
 from gen_data.usd.stage_reader import SUFFIXES, OpenStage, StagePart, layer_references
 
@@ -86,7 +83,7 @@ class StageFile:
         )
         metallic, metal_map = self._factor_or_channel(bound.material.metallic, bound.metallic_image)
         material = self._apply_opacity_image(bound)
-        maps = TextureMaps(
+        maps = texture_maps.TextureMaps(
             albedo=self._relative_name(bound.texture),
             alpha=self._channel_name(bound.alpha_image),
             normal=self._relative_name(bound.normal_image),
@@ -110,7 +107,7 @@ class StageFile:
             return round(value * float(channel.mean()) / 255.0, 4), ""
         return value, self._channel_name(image)
 
-    def _apply_opacity_image(self, bound: BoundMaterial) -> Material:
+    def _apply_opacity_image(self, bound: BoundMaterial) -> asset_types.Material:
         """Multiply the opacity by the mean of its image."""
         if not bound.opacity_image[0]:
             return bound.material
@@ -118,11 +115,11 @@ class StageFile:
         opacity = round(bound.material.opacity * kept, 4)
         return replace(bound.material, opacity=opacity, transmission=0.0)
 
-    def _pixels(self, image: tuple[str, int]) -> UInt8:
+    def _pixels(self, image: tuple[str, int]) -> asset_types.UInt8:
         """One channel of an image; white if the image lacks it."""
         path, channel = image
         data = self.folder.read(self._relative_name(path))
-        pixels = decode_image(data, f"{self.stage.place}: {path}", alpha=True)
+        pixels = image_decoding.decode_image(data, f"{self.stage.place}: {path}", alpha=True)
         whole = channel < pixels.shape[2]
         return pixels[..., channel] if whole else np.full(pixels.shape[:2], 255, np.uint8)
 
@@ -140,7 +137,7 @@ class StageFile:
         root = self.folder.root.resolve()
         resolved = Path(path).resolve()
         if not resolved.is_relative_to(root):
-            raise AssetError(
+            raise errors.AssetError(
                 f"{self.stage.place}: refers to the image '{path[:80]}' outside its folder; put it "
                 "beside the layer"
             )
@@ -159,7 +156,7 @@ def open_stage(folder: Folder, relative: str) -> Iterator[StageFile]:
         _check_layers(folder, relative)
         yield StageFile(_open_composed(folder, relative, place), folder, packed=False)
         return
-    with temporary_folder("usdz") as unpacked:
+    with temporary_folders.temporary_folder("usdz") as unpacked:
         inside = Folder(unpacked)
         first = _unpack(folder.read(relative), inside, place)
         _check_layers(inside, first)
@@ -170,7 +167,7 @@ def _open_composed(folder: Folder, relative: str, place: str) -> OpenStage:
     stage = OpenStage(folder.path(relative), place)
     root = folder.root.resolve()
     if not all(Path(layer).resolve().is_relative_to(root) for layer in stage.layers()):
-        raise AssetError(f"{place}: uses layers outside its folder; put them beside it")
+        raise errors.AssetError(f"{place}: uses layers outside its folder; put them beside it")
     return stage
 
 
@@ -201,14 +198,14 @@ def _unpack(data: bytes, target: Folder, place: str) -> str:
             entries = [entry for entry in archive.infolist() if not entry.is_dir()]
             for entry in entries:
                 if entry.compress_type != zipfile.ZIP_STORED or entry.file_size > len(data):
-                    raise AssetError(
+                    raise errors.AssetError(
                         f"{place}: its files are compressed; pack it again with usdzip"
                     )
                 path = target.path(entry.filename)
                 path.parent.mkdir(parents=True, exist_ok=True)
                 path.write_bytes(archive.read(entry))
     except (zipfile.BadZipFile, OSError, NotImplementedError):
-        raise AssetError(f"{place}: unreadable usdz archive; export it again") from None
+        raise errors.AssetError(f"{place}: unreadable usdz archive; export it again") from None
     if not entries:
-        raise AssetError(f"{place}: an empty usdz archive; export it again")
+        raise errors.AssetError(f"{place}: an empty usdz archive; export it again")
     return entries[0].filename

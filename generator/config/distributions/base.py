@@ -18,8 +18,7 @@ from pydantic.dataclasses import dataclass as pydantic_dataclass
 from typing_extensions import dataclass_transform
 
 from gen_data.config.yaml_scalars import abbreviate, format_number, quote_value, resolve_scalar
-from gen_data.core.errors import did_you_mean
-from gen_data.core.plugins import PluginTable
+from gen_data.core import errors, plugins
 
 if TYPE_CHECKING:
     from pydantic.fields import FieldInfo
@@ -30,7 +29,7 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 T_co = TypeVar("T_co", covariant=True)
 
-DISTRIBUTIONS: PluginTable[Distribution[Any]] = PluginTable(
+DISTRIBUTIONS: plugins.PluginTable[Distribution[Any]] = plugins.PluginTable(
     "distribution",
     {
         "constant": "gen_data.config.distributions.discrete:Constant",
@@ -275,7 +274,7 @@ def read_distribution(value: Any, kind: Kind[T]) -> Distribution[T]:
         known = distribution_names(kind.name)
         if value in known and distribution(value).bare:
             return distribution(value).from_yaml(None, kind)
-        if did_you_mean(value, known):
+        if errors.did_you_mean(value, known):
             raise _unknown(value, kind)
     if kind.of_number and isinstance(value, (int, float)) and not isinstance(value, bool):
         return distribution(kind.of_number).from_yaml(value, kind)
@@ -314,7 +313,7 @@ def _unknown(name: str, kind: Kind[Any], path: tuple[str, ...] = ()) -> Malforme
     else:
         fact = f"unknown distribution '{abbreviate(name)}'"
     return Malformed(
-        f"{fact}; expected one of {', '.join(known)}{did_you_mean(name, known)}",
+        f"{fact}; expected one of {', '.join(known)}{errors.did_you_mean(name, known)}",
         path,
         at_key=bool(path),
     )
@@ -381,7 +380,7 @@ def _malformed(error: ValidationError, cls: type[Distribution[Any]] | None = Non
         key = str(path[-1])
         return Malformed(
             f"unknown key {quote_value(key)} of {cls.name}; expected {', '.join(known)}"
-            f"{did_you_mean(key, known)}",
+            f"{errors.did_you_mean(key, known)}",
             path,
             at_key=True,
         )

@@ -6,19 +6,7 @@ from enum import Enum
 
 import numpy as np
 
-from gen_data.core.asset_types import RobotModel
-from gen_data.core.errors import Rejection
-from gen_data.core.kinematics import (
-    all_positions,
-    finger_links,
-    is_arm_joint,
-    is_within_limits,
-    link_poses,
-    rigid_group,
-    round_positions,
-)
-from gen_data.core.scene import ArmGoal, Articulation
-from gen_data.core.se3 import SE3
+from gen_data.core import asset_types, errors, kinematics, scene, se3
 from gen_data.physics.collision_shapes import CollisionShape
 from gen_data.physics.manipulation.grasping import Grasp, Hand
 from gen_data.physics.manipulation.inverse_kinematics import make_chain, solve_all
@@ -43,7 +31,7 @@ class ArmState:
     """
 
     positions: tuple[float, ...]
-    T_world_held: SE3 | None = None
+    T_world_held: se3.SE3 | None = None
 
 
 class Arm:
@@ -59,21 +47,23 @@ class Arm:
 
     def __init__(
         self,
-        articulation: Articulation,
-        robot: RobotModel,
+        articulation: scene.Articulation,
+        robot: asset_types.RobotModel,
         shapes: dict[str, CollisionShape],
         world: World,
     ) -> None:
         self.articulation = articulation
         self.robot = robot
         self.links = [link for link in robot.links if link in shapes]
-        base = rigid_group(robot, robot.links[0])
+        base = kinematics.rigid_group(robot, robot.links[0])
         self.moving = [link for link in self.links if link not in base]
         self.bodies = [self.body(link) for link in self.links]
         self._world = world
         self._shapes = shapes
-        self._fingers = finger_links(robot)
-        poses = link_poses(robot, articulation.T_world_base, articulation.joint_positions)
+        self._fingers = kinematics.finger_links(robot)
+        poses = kinematics.link_poses(
+            robot, articulation.T_world_base, articulation.joint_positions
+        )
         for link in self.links:
             world.add(self.body(link), shapes[link], poses[link])
 
@@ -89,19 +79,19 @@ class Arm:
 
     def show(self, positions: Sequence[float]) -> None:
         """Pose the links in the world at these joint positions [rad or m]."""
-        poses = link_poses(self.robot, self.articulation.T_world_base, positions)
+        poses = kinematics.link_poses(self.robot, self.articulation.T_world_base, positions)
         for link in self.moving:
             self._world.place(self.body(link), poses[link])
 
-    def grasp_pose(self, positions: Sequence[float]) -> SE3:
+    def grasp_pose(self, positions: Sequence[float]) -> se3.SE3:
         """``T_world_grasp`` at these joint positions; ``T_world_root`` without a gripper."""
-        poses = link_poses(self.robot, self.articulation.T_world_base, positions)
+        poses = kinematics.link_poses(self.robot, self.articulation.T_world_base, positions)
         gripper = self.robot.gripper
         if gripper is None:
             return poses[self.robot.links[0]]
         return poses[gripper.link] @ gripper.T_link_grasp
 
-    def solve(self, fixed: Sequence[str], placed: Sequence[str]) -> ArmState | Rejection:
+    def solve(self, fixed: Sequence[str], placed: Sequence[str]) -> ArmState | errors.Rejection:
         """Solve the articulation's goal: pose the arm at the first candidate without collision.
 
         Args:
@@ -110,7 +100,7 @@ class Arm:
         """
         goal = self.articulation.goal
         if goal is None:
-            state = ArmState(round_positions(self.articulation.joint_positions))
+            state = ArmState(kinematics.round_positions(self.articulation.joint_positions))
             self._show_state(state, "")
             collides = self._touches_any(self.moving, fixed)
             return self._reject(Failure.COLLIDES, goal) if collides else state
@@ -127,7 +117,7 @@ class Arm:
         # The candidate that got farthest says most about what to change.
         return self._reject(next(f for f in Failure if f in failures), goal)
 
-    def _candidates(self, goal: ArmGoal) -> Iterator[ArmState | Failure]:
+    def _candidates(self, goal: scene.ArmGoal) -> Iterator[ArmState | Failure]:
         """Candidates in order, or why one of them fails before collisions are checked."""
         if goal.kind == "joints":
             yield from self._joint_candidates(goal)
@@ -146,22 +136,22 @@ class Arm:
                 yield Failure.DOES_NOT_FIT
                 continue
             for arm_positions in solve_all(chain, T_base_world @ T_world_grasp):
-                positions = all_positions(self.robot, arm_positions, grasp.opening)
+                positions = kinematics.all_positions(self.robot, arm_positions, grasp.opening)
                 yield ArmState(positions, self._held_pose(positions, grasp))
 
-    def _joint_candidates(self, goal: ArmGoal) -> Iterator[ArmState | Failure]:
-        count = sum(is_arm_joint(joint, self.robot) for joint in self.robot.movable)
+    def _joint_candidates(self, goal: scene.ArmGoal) -> Iterator[ArmState | Failure]:
+        count = sum(kinematics.is_arm_joint(joint, self.robot) for joint in self.robot.movable)
         for candidate in goal.joint_candidates:
             if len(candidate) != count:
                 raise ValueError(
                     f"{self.articulation.name}: a joint candidate has {len(candidate)} "
                     f"positions, the arm has {count} joints"
                 )
-            positions = all_positions(self.robot, candidate, goal.gripper_opening)
-            ok = is_within_limits(self.robot, positions)
+            positions = kinematics.all_positions(self.robot, candidate, goal.gripper_opening)
+            ok = kinematics.is_within_limits(self.robot, positions)
             yield ArmState(positions) if ok else Failure.CANNOT_REACH
 
-    def _held_pose(self, positions: tuple[float, ...], grasp: Grasp) -> SE3 | None:
+    def _held_pose(self, positions: tuple[float, ...], grasp: Grasp) -> se3.SE3 | None:
         if grasp.T_grasp_held is None:
             return None
         return (self.grasp_pose(positions) @ grasp.T_grasp_held).rounded()
@@ -196,7 +186,7 @@ class Arm:
     def _touches(self, name: str, others: Sequence[str]) -> bool:
         return any(self._world.gap_m(name, other, limit_m=0.0) < 0.0 for other in others)
 
-    def _reject(self, failure: Failure, goal: ArmGoal | None) -> Rejection:
+    def _reject(self, failure: Failure, goal: scene.ArmGoal | None) -> errors.Rejection:
         name = self.articulation.name
         if failure is Failure.DOES_NOT_FIT:
             remedy = f"let arm '{name}' hold smaller objects, or lower their scale"
@@ -207,4 +197,4 @@ class Arm:
                 f"more candidates for arm '{name}', a smaller workspace, "
                 "or fewer objects around it (count)"
             )
-        return Rejection(failure.value, remedy)
+        return errors.Rejection(failure.value, remedy)

@@ -20,10 +20,9 @@ from gen_data.core.kinematics import (
 )
 from gen_data.core.scene import BodyJoint
 from gen_data.core.se3 import SE3, Array
+from gen_data.physics.manipulation import demonstration, measures
 from gen_data.physics.manipulation.arm_goals import Arm
-from gen_data.physics.manipulation.demonstration import has_moved
 from gen_data.physics.manipulation.joint_trajectories import speed_max
-from gen_data.physics.manipulation.measures import Measures
 from gen_data.physics.world import World
 
 _TOUCH_M = 0.0005
@@ -108,7 +107,7 @@ class ArmSimulation:
         self.held, self.is_blocked = bodies.held, False
         self._T_grasp_held = SE3()
         self._poses = {name: world.pose(name) for name in (*bodies.loose, *bodies.joints)}
-        self.measures = Measures(world, self._poses, bodies.joints)
+        self.measures = measures.Measures(world, self._poses, bodies.joints)
         if self.held:
             self._T_grasp_held = self.T_world_grasp.inverse() @ world.pose(self.held)
 
@@ -150,7 +149,7 @@ class ArmSimulation:
         """
         for name, before in self._poses.items():
             now = self._world.pose(name).rounded()
-            if name == self.held or has_moved(before, now):
+            if name == self.held or demonstration.has_moved(before, now):
                 self._poses = {**self._poses, name: now}
         arm = self._arm
         links = link_poses(arm.robot, arm.articulation.T_world_base, self.joint_positions)

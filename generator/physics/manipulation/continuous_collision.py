@@ -9,10 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gen_data.core.asset_types import RobotModel
-from gen_data.core.kinematics import finger_links, rigid_group
-from gen_data.physics.manipulation.arm_goals import Arm
-from gen_data.physics.manipulation.joint_trajectories import Held, Leg
+from gen_data.core import asset_types, kinematics
+from gen_data.physics.manipulation import arm_goals, joint_trajectories
 from gen_data.physics.world import World
 
 CLEARANCE_M = 0.003
@@ -64,7 +62,7 @@ class _Pair:
 class CollisionSweep:
     """Moves the links of an arm, and the body it holds, along legs and finds collisions."""
 
-    def __init__(self, arm: Arm, world: World) -> None:
+    def __init__(self, arm: arm_goals.Arm, world: World) -> None:
         self._arm = arm
         self._world = world
         self._levers = _levers(arm.robot)
@@ -72,10 +70,10 @@ class CollisionSweep:
         self._prismatic = {j.name for j in arm.robot.movable if j.kind == "prismatic"}
         gripper = arm.robot.gripper
         self._hand = gripper.link if gripper else ""
-        holding = rigid_group(arm.robot, self._hand) if gripper else frozenset()
-        self._holding = holding | set(finger_links(arm.robot))
+        holding = kinematics.rigid_group(arm.robot, self._hand) if gripper else frozenset()
+        self._holding = holding | set(kinematics.finger_links(arm.robot))
 
-    def first_collision(self, leg: Leg, obstacles: Obstacles) -> str | None:
+    def first_collision(self, leg: joint_trajectories.Leg, obstacles: Obstacles) -> str | None:
         """Name of the first body hit along a leg, or ``ITSELF``; None if it is free."""
         self._show(leg, 0.0)
         pairs = list(self._pairs(leg, obstacles))
@@ -93,7 +91,7 @@ class CollisionSweep:
                 return None
             share = min(1.0, share + advance)
 
-    def _show(self, leg: Leg, share: float) -> None:
+    def _show(self, leg: joint_trajectories.Leg, share: float) -> None:
         """Pose the arm and the held body after a share of a leg in [0, 1]."""
         positions = leg.at(share)
         self._arm.show(positions)
@@ -101,7 +99,7 @@ class CollisionSweep:
             pose = self._arm.grasp_pose(positions) @ leg.held.T_grasp_held
             self._world.place(leg.held.body, pose)
 
-    def _pairs(self, leg: Leg, obstacles: Obstacles) -> Iterator[_Pair]:
+    def _pairs(self, leg: joint_trajectories.Leg, obstacles: Obstacles) -> Iterator[_Pair]:
         """All pairs of bodies that may collide on a leg."""
         changes = {
             joint.name: abs(b - a)
@@ -137,7 +135,7 @@ class CollisionSweep:
                     yield _Pair(a, b, -_TOUCH_M, travel_m, ITSELF)
 
     def _held_pairs(
-        self, held: Held, obstacles: Obstacles, changes: Mapping[str, float]
+        self, held: joint_trajectories.Held, obstacles: Obstacles, changes: Mapping[str, float]
     ) -> Iterator[_Pair]:
         """Pairs of the held body with obstacles and with links that it is not held by."""
         low, high = self._world.bounds_m(held.body)
@@ -169,7 +167,7 @@ class CollisionSweep:
         )
 
 
-def _levers(robot: RobotModel) -> dict[str, dict[str, float]]:
+def _levers(robot: asset_types.RobotModel) -> dict[str, dict[str, float]]:
     """``{link: {joint that moves it: largest distance of its origin from the joint [m]}}``."""
     levers: dict[str, dict[str, float]] = {robot.links[0]: {}}
     for joint in robot.joints:

@@ -18,11 +18,8 @@ from gen_data.core.errors import Rejection
 from gen_data.core.kinematics import finger_links
 from gen_data.core.scene import BodyJoint, Condition, ContactSpan, Episode, Span
 from gen_data.core.se3 import SE3, Vec3
-from gen_data.physics.manipulation.arm_goals import Arm
+from gen_data.physics.manipulation import arm_goals, manipulation_planner, measures, suction
 from gen_data.physics.manipulation.joint_trajectories import STEP_S, Held, Leg, smooth_step
-from gen_data.physics.manipulation.manipulation_planner import TaskPlanner
-from gen_data.physics.manipulation.measures import Measures
-from gen_data.physics.manipulation.suction import is_sealed, needed_force_n
 from gen_data.physics.world import Contact, World
 
 _TOUCH_M = 0.0005
@@ -40,7 +37,7 @@ _SETTLE_S = 0.6
 
 
 def demonstrate(
-    planner: TaskPlanner, arm: Arm, world: World, time_step_s: float
+    planner: manipulation_planner.TaskPlanner, arm: arm_goals.Arm, world: World, time_step_s: float
 ) -> Demonstration | Rejection:
     """Plan and carry out the task of an arm goal by goal; each plan starts from what physics left.
 
@@ -110,7 +107,7 @@ class Demonstration:
     """
 
     def __init__(
-        self, arm: Arm, world: World, loose: Mapping[str, SE3], time_step_s: float
+        self, arm: arm_goals.Arm, world: World, loose: Mapping[str, SE3], time_step_s: float
     ) -> None:
         assignment = arm.articulation.assignment
         assert assignment is not None
@@ -118,7 +115,7 @@ class Demonstration:
         self._steps = max(1, round(STEP_S / time_step_s))
         joints = {joint.body: joint for joint in assignment.joints}
         self._start = {**loose, **{name: world.pose(name) for name in joints}}
-        self._measures = Measures(world, self._start, joints)
+        self._measures = measures.Measures(world, self._start, joints)
         self._values: list[tuple[float, ...]] = []
         self._phases: list[str] = []
         self._held: list[str] = []
@@ -218,12 +215,12 @@ class Demonstration:
             return False
         if self._held[-1:] != [held.body]:
             T_world_grasp = self._world.pose(held.body) @ held.T_grasp_held.inverse()
-            return not is_sealed(self._world, held.body, T_world_grasp, gripper.cup)
+            return not suction.is_sealed(self._world, held.body, T_world_grasp, gripper.cup)
         if self._held[-3:] != [held.body] * 3:
             return False
         one, two, three = (np.array(p[held.body].translation_m) for p in self.poses[-3:])
         acceleration = (one - 2.0 * two + three) / STEP_S**2
-        needed_n = needed_force_n(self._world.mass_kg(held.body), acceleration)
+        needed_n = suction.needed_force_n(self._world.mass_kg(held.body), acceleration)
         return needed_n > gripper.cup.force_n
 
     def _record(self, phase: str, held: str, positions: Sequence[float]) -> None:

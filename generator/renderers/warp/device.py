@@ -20,17 +20,8 @@ from typing import Any
 
 import warp as wp
 
-from gen_data.core.errors import CacheWarning, ConfigError
-from gen_data.core.processes import interrupts_blocked, silence_stdio, tie
-from gen_data.core.system_calls import keep_freed_memory, usable_cores, wait_for_lock
-from gen_data.renderers.warp.kernel_cache import (
-    copy_modules,
-    fill_cache,
-    no_private_folder,
-    private_folder,
-    remove_damaged_modules,
-    require_space,
-)
+from gen_data.core import errors, processes, system_calls
+from gen_data.renderers.warp import kernel_cache
 
 # Not -march=native: fused multiply-adds would change bytes between machines. The inlining threshold
 # saves a quarter of all ray time.
@@ -50,7 +41,7 @@ def open_device(name: str) -> wp.Device:
     known = ["cpu", *(device.alias for device in wp.get_cuda_devices())]
     if name not in known:
         reason = why_no_gpu()
-        raise ConfigError(
+        raise errors.ConfigError(
             f"render.device: '{name}' does not exist on this machine; it has {', '.join(known)}"
             f"{reason and f' ({reason})'}. Choose 'auto' or 'cpu'."
         )
@@ -58,7 +49,7 @@ def open_device(name: str) -> wp.Device:
     if name == "cpu" or toolkit is None or toolkit < _CUDA_13:
         return device
     if device.arch < _ARCH_MIN_OF_CUDA_13:
-        raise ConfigError(
+        raise errors.ConfigError(
             f"render.device: '{name}' ({device.name}, sm_{device.arch}) is too old for this build"
             f" of warp-lang; expected sm_{_ARCH_MIN_OF_CUDA_13} or newer. Choose 'cpu', or install"
             " a build of warp-lang for CUDA 12."
@@ -105,13 +96,13 @@ def _start() -> None:
     wp.config.cpu_compiler_flags = _COMPILER_FLAGS
     # Machine code instead of PTX, which each driver would compile again, in its own way.
     wp.config.cuda_output = "cubin"
-    keep_freed_memory()
-    with silence_stdio():  # Warp warns about a missing CUDA driver
+    system_calls.keep_freed_memory()
+    with processes.silence_stdio():  # Warp warns about a missing CUDA driver
         try:
             wp.init()
         except OSError:  # It creates the folder of its cache.
-            with no_private_folder():
-                wp.config.kernel_cache_dir = str(private_folder())
+            with kernel_cache.no_private_folder():
+                wp.config.kernel_cache_dir = str(kernel_cache.private_folder())
                 wp.init()
 
 
@@ -161,30 +152,30 @@ def compile_kernels(device: str) -> None:
     folder = Path(wp.config.kernel_cache_dir)
     # Set afterwards, in any case: Warp compiles there what is missing when it is first used.
     wp.config.kernel_cache_dir = str(
-        fill_cache(folder, stamp, lambda chosen: _fill(chosen, stamp, device))
+        kernel_cache.fill_cache(folder, stamp, lambda chosen: _fill(chosen, stamp, device))
     )
 
 
 def _fill(folder: Path, stamp_name: str, device: str) -> None:
-    cores = usable_cores()
+    cores = system_calls.usable_cores()
     stamp = folder / stamp_name
     with (folder / "gen-data.lock").open("a") as lock:
-        wait_for_lock(lock.fileno())
-        damaged = remove_damaged_modules(folder)
+        system_calls.wait_for_lock(lock.fileno())
+        damaged = kernel_cache.remove_damaged_modules(folder)
         if damaged:
             fact = f"{folder}: {len(damaged)} compiled kernel module(s) were damaged"
-            warnings.warn(f"{fact} and are compiled again", CacheWarning, stacklevel=2)
+            warnings.warn(f"{fact} and are compiled again", errors.CacheWarning, stacklevel=2)
         if stamp.exists() and not damaged:
             return
-        require_space(folder)
+        kernel_cache.require_space(folder)
         bundle = bundle_folder()
         if bundle.is_dir():
-            copy_modules(bundle, folder)
+            kernel_cache.copy_modules(bundle, folder)
         bundled = device == "cpu" and bundle.is_dir()
         if not bundled and (cores < 2 or not compile_in_parallel(device, EVERY_FRAME, folder)):
             return
         stamp.touch()
-        remove_damaged_modules(folder)
+        kernel_cache.remove_damaged_modules(folder)
 
 
 def bundle_folder() -> Path:
@@ -235,9 +226,9 @@ def compile_in_parallel(device: str, names: Sequence[str], folder: Path) -> bool
     try:
         with os.fdopen(feed, "wb") as file:
             file.writelines(name.encode().ljust(_RECORD_BYTES) for name in names)
-        for _ in range(min(usable_cores(), len(names))):
-            command = tie([sys.executable, "-m", __name__, device, str(folder)])
-            with interrupts_blocked():
+        for _ in range(min(system_calls.usable_cores(), len(names))):
+            command = processes.tie([sys.executable, "-m", __name__, device, str(folder)])
+            with processes.interrupts_blocked():
                 running.append(subprocess.Popen(command, stdin=queue, stdout=subprocess.DEVNULL))
         codes = [process.wait() for process in running]
     finally:

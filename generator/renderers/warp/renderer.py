@@ -12,24 +12,15 @@ from gen_data.core.interfaces import AssetLibrary, FindTones
 from gen_data.core.scene import Camera, Lidar, Scene
 from gen_data.renderers.warp.device import compile_kernels, open_device
 from gen_data.renderers.warp.lidar.lidar_tracing import trace_scan
-from gen_data.renderers.warp.realtime.realtime_shading import (
-    add_precipitation,
-    radiance_image,
-    render_bare_ground,
-    shade_pixels,
-    smooth_edges,
-)
-from gen_data.renderers.warp.scene.device_cache import DeviceCache
-from gen_data.renderers.warp.scene.scene_packing import pack_view, pack_world
+from gen_data.renderers.warp.realtime import realtime_shading
+from gen_data.renderers.warp.scene import device_cache, scene_packing
 from gen_data.renderers.warp.settings import RenderSettings
 from gen_data.renderers.warp.shutter_integration import expose_shutter
-from gen_data.renderers.warp.visibility.amodal import render_silhouettes
+from gen_data.renderers.warp.visibility import amodal, plates, reprojection
 from gen_data.renderers.warp.visibility.frame_context import CameraState, CameraView, RenderContext
 from gen_data.renderers.warp.visibility.gbuffer import find_visible
 from gen_data.renderers.warp.visibility.label_images import label_images
 from gen_data.renderers.warp.visibility.optical_flow import FLOW, flow_images
-from gen_data.renderers.warp.visibility.plates import open_backdrop
-from gen_data.renderers.warp.visibility.reprojection import copy_gbuffer
 
 Images = Mapping[Channel, NDArray[Any]]
 
@@ -63,7 +54,7 @@ class WarpRenderer:
                 " choose 'auto' or 'rays'."
             )
         compile_kernels(self._device.alias)
-        self._cache = DeviceCache(assets, self._device)
+        self._cache = device_cache.DeviceCache(assets, self._device)
         self._labels = _LatestLabels()
         self._context = RenderContext(self._cache, self._settings)
         if self._settings.tier == "pathtraced":
@@ -101,11 +92,11 @@ class WarpRenderer:
         self, scene: Scene, camera: Camera, channels: frozenset[Channel]
     ) -> RenderContext:
         """The context with the photograph behind the scene, if there is one."""
-        backdrop = open_backdrop(scene, camera, self._cache.assets)
+        backdrop = plates.open_backdrop(scene, camera, self._cache.assets)
         if backdrop is None:
             return self._context
         if Channel.RADIANCE in channels:
-            bare = render_bare_ground(CameraState.of(scene, camera), self._context)
+            bare = realtime_shading.render_bare_ground(CameraState.of(scene, camera), self._context)
             backdrop = replace(backdrop, unshaded=bare)
         return replace(self._context, backdrop=backdrop)
 
@@ -117,24 +108,24 @@ class WarpRenderer:
         context: RenderContext,
     ) -> SensorReading:
         """The image of a single instant."""
-        world = pack_world(scene, camera, self._cache)
-        view = pack_view(camera, self._cache)
+        world = scene_packing.pack_world(scene, camera, self._cache)
+        view = scene_packing.pack_view(camera, self._cache)
         gbuffer = find_visible(world, view, self._cache, self._settings.visibility)
         frame = CameraView(CameraState(scene, camera), world, view, gbuffer, context)
         if Channel.AMODAL in channels:
             channels = channels | {Channel.INSTANCE}
         images = label_images(frame, channels)
         if Channel.RADIANCE in channels:
-            shading = shade_pixels(frame)
-            smooth_edges(shading)
-            add_precipitation(frame, gbuffer.z_m, shading.radiance)
-            images[Channel.RADIANCE] = radiance_image(shading.radiance, view)
+            shading = realtime_shading.shade_pixels(frame)
+            realtime_shading.smooth_edges(shading)
+            realtime_shading.add_precipitation(frame, gbuffer.z_m, shading.radiance)
+            images[Channel.RADIANCE] = realtime_shading.radiance_image(shading.radiance, view)
         outlines = {}
         if Channel.AMODAL in channels:
-            outlines = render_silhouettes(frame, images[Channel.INSTANCE])
+            outlines = amodal.render_silhouettes(frame, images[Channel.INSTANCE])
         if channels & FLOW:
             reference = replace(frame, state=CameraState.of(scene, camera))
-            images |= flow_images(reference, copy_gbuffer(reference), channels)
+            images |= flow_images(reference, reprojection.copy_gbuffer(reference), channels)
         return SensorReading(camera.name, camera, images, outlines, scene.time_s)
 
     def scan(self, scene: Scene, lidar: Lidar, beams: LidarRays) -> LidarHits:

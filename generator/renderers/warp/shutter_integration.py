@@ -18,33 +18,10 @@ from numpy.typing import NDArray
 from gen_data.core.asset_types import Float32
 from gen_data.core.capture import Channel, SensorReading, Silhouette
 from gen_data.core.scene import Camera, Scene
-from gen_data.renderers.warp.realtime.light_selection import main_lamp_numbers
-from gen_data.renderers.warp.realtime.realtime_shading import (
-    add_precipitation,
-    radiance_image,
-    shade_pixels,
-    smooth_edges,
-)
+from gen_data.renderers.warp.realtime import light_selection, realtime_shading
 from gen_data.renderers.warp.scene.scene_packing import copy_world, repack_moved
-from gen_data.renderers.warp.visibility.amodal import rolling_silhouettes
-from gen_data.renderers.warp.visibility.frame_context import (
-    CameraState,
-    CameraView,
-    RenderContext,
-    RowBand,
-    is_moving,
-    render_view,
-)
+from gen_data.renderers.warp.visibility import amodal, frame_context, optical_flow, reprojection
 from gen_data.renderers.warp.visibility.kernels.exposure import add_rows
-from gen_data.renderers.warp.visibility.optical_flow import FLOW, flow_images
-from gen_data.renderers.warp.visibility.reprojection import (
-    BandedGBuffer,
-    ShutterSampling,
-    add_margin,
-    plan_sampling,
-    render_bands,
-    split_bands,
-)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -56,62 +33,62 @@ class Slice:
         weights: Share of each row's exposure that falls into the slice, shape [rows].
     """
 
-    band: RowBand
+    band: frame_context.RowBand
     weights: Float32
 
 
 def expose_shutter(
-    scene: Scene, camera: Camera, channels: frozenset[Channel], context: RenderContext
+    scene: Scene, camera: Camera, channels: frozenset[Channel], context: frame_context.RenderContext
 ) -> SensorReading | None:
     """Image of a camera with a finite exposure; None if nothing moves during it."""
     open_s = camera.shutter.open_s
     if not open_s > 0.0:
         return None
-    state = CameraState.of(scene, camera)
-    if not is_moving(state, open_s):
+    state = frame_context.CameraState.of(scene, camera)
+    if not frame_context.is_moving(state, open_s):
         return None
-    reference = render_view(state, context)
-    sampling = plan_sampling(reference)
-    bands = split_bands(reference, sampling)
+    reference = frame_context.render_view(state, context)
+    sampling = reprojection.plan_sampling(reference)
+    bands = reprojection.split_bands(reference, sampling)
     if len(bands) == 1 and sampling.samples == 1:
         return None
     reference = _keep_main_lamps(reference)
-    drawn = channels - FLOW - {Channel.AMODAL}
+    drawn = channels - optical_flow.FLOW - {Channel.AMODAL}
     if Channel.AMODAL in channels:
         drawn = drawn | {Channel.INSTANCE}
     gbuffer, images = _render_images(reference, bands, drawn, sampling)
     outlines: dict[int, Silhouette] = {}
     if Channel.AMODAL in channels:
-        outlines = rolling_silhouettes(bands, images[Channel.INSTANCE], reference)
-    images |= flow_images(reference, gbuffer, channels)
+        outlines = amodal.rolling_silhouettes(bands, images[Channel.INSTANCE], reference)
+    images |= optical_flow.flow_images(reference, gbuffer, channels)
     return SensorReading(camera.name, camera, images, outlines, scene.time_s)
 
 
 def _render_images(
-    reference: CameraView,
-    bands: Sequence[RowBand],
+    reference: frame_context.CameraView,
+    bands: Sequence[frame_context.RowBand],
     channels: frozenset[Channel],
-    sampling: ShutterSampling,
-) -> tuple[BandedGBuffer, dict[Channel, NDArray[Any]]]:
+    sampling: reprojection.ShutterSampling,
+) -> tuple[reprojection.BandedGBuffer, dict[Channel, NDArray[Any]]]:
     """G-buffer, label images and, if requested, radiance."""
     labels = channels - {Channel.RADIANCE}
     if Channel.RADIANCE not in channels:
-        drawn = render_bands(bands, labels, reference)
+        drawn = reprojection.render_bands(bands, labels, reference)
         return drawn.gbuffer, drawn.images
     if sampling.samples > 1:
-        drawn = render_bands(bands, labels, reference)
+        drawn = reprojection.render_bands(bands, labels, reference)
         slices = split_slices(reference.state, sampling.samples, sampling.blurred)
         radiance = _average_slices(slices, reference)
     else:
-        drawn = render_bands(bands, labels, reference, integrate_light)
+        drawn = reprojection.render_bands(bands, labels, reference, integrate_light)
         radiance = drawn.radiance
-    add_precipitation(reference, drawn.gbuffer.depths, radiance)
-    image = radiance_image(radiance, reference.view)
+    realtime_shading.add_precipitation(reference, drawn.gbuffer.depths, radiance)
+    image = realtime_shading.radiance_image(radiance, reference.view)
     return drawn.gbuffer, drawn.images | {Channel.RADIANCE: image}
 
 
 def split_slices(
-    middle: CameraState, samples: int, blurred: NDArray[np.bool_] | None = None
+    middle: frame_context.CameraState, samples: int, blurred: NDArray[np.bool_] | None = None
 ) -> list[Slice]:
     """Time slices that together cover every row's exposure once, some per exposure.
 
@@ -137,19 +114,21 @@ def split_slices(
         rows = np.flatnonzero(share)
         if len(rows):
             first, end = int(rows[0]), int(rows[-1]) + 1
-            band = RowBand(first, end, middle.later(float(offset_s)))
+            band = frame_context.RowBand(first, end, middle.later(float(offset_s)))
             slices.append(Slice(band, share[first:end].astype(np.float32)))
     return slices
 
 
-def _average_slices(slices: Sequence[Slice], reference: CameraView) -> wp.array:
+def _average_slices(slices: Sequence[Slice], reference: frame_context.CameraView) -> wp.array:
     """Mean radiance over slices [cd/m^2], flat."""
     lens, device = reference.state.camera.intrinsics, reference.cache.device
     mean = wp.zeros(lens.height_px * lens.width_px, dtype=wp.vec3, device=device)
     for part in slices:
         band = part.band
-        first, end = add_margin(band, lens.height_px)
-        rendered = reference = render_view(band.state, reference.context, (first, end), reference)
+        first, end = reprojection.add_margin(band, lens.height_px)
+        rendered = reference = frame_context.render_view(
+            band.state, reference.context, (first, end), reference
+        )
         weights = wp.array(part.weights, dtype=float, device=device)
         places = [lens.width_px, band.first - first, band.first, weights]
         shape = (band.end - band.first, lens.width_px)
@@ -157,21 +136,21 @@ def _average_slices(slices: Sequence[Slice], reference: CameraView) -> wp.array:
     return mean
 
 
-def integrate_light(rendered: CameraView) -> wp.array:
+def integrate_light(rendered: frame_context.CameraView) -> wp.array:
     """Radiance of every pixel, anti-aliased, flat; valid until the next call."""
     # Shading changes the world's record, from which other instants start.
     rendered = replace(rendered, world=copy_world(rendered.world))
-    shading = shade_pixels(rendered)
-    smooth_edges(shading)
+    shading = realtime_shading.shade_pixels(rendered)
+    realtime_shading.smooth_edges(shading)
     return shading.radiance
 
 
-def _keep_main_lamps(reference: CameraView) -> CameraView:
+def _keep_main_lamps(reference: frame_context.CameraView) -> frame_context.CameraView:
     """The view with only the lamps that matter at the middle of the exposure."""
-    chosen = main_lamp_numbers(reference)
+    chosen = light_selection.main_lamp_numbers(reference)
     if chosen is None:
         return reference
     scene, camera = reference.state.scene, reference.state.camera
     scene = replace(scene, lights=tuple(scene.lights[k] for k in chosen))
     world = repack_moved(reference.world, scene, camera, reference.cache)
-    return replace(reference, state=CameraState(scene, camera), world=world)
+    return replace(reference, state=frame_context.CameraState(scene, camera), world=world)

@@ -6,13 +6,9 @@ from typing import NoReturn
 
 import numpy as np
 
-from gen_data.config.problems import Position, refuse
-from gen_data.config.yaml_scalars import quote_value
+from gen_data.config import problems, yaml_scalars
 from gen_data.config.yaml_tree import Node
-from gen_data.core.errors import did_you_mean
-from gen_data.core.lens import LensModel
-from gen_data.core.scene_time import RIG_AXES
-from gen_data.core.se3 import IDENTITY, SE3, Array
+from gen_data.core import errors, lens, scene_time, se3
 
 ROTATION_ERROR_MAX = 1e-2
 """Largest entry of ``R R^T - 1`` of matrices that were printed with few digits."""
@@ -31,10 +27,10 @@ class CalibratedCamera:
             Kalibr, KITTI) or halves (COLMAP).
     """
 
-    position: Position
+    position: problems.Position
     focal_px: tuple[float, float]
     center_px: tuple[float, float]
-    model: LensModel = "pinhole"
+    model: lens.LensModel = "pinhole"
     coefficients: tuple[float, ...] = ()
     size_px: tuple[int, int] | None = None
     pixel_centers: str = "integers"
@@ -51,7 +47,7 @@ class Frame:
     """
 
     parent: str = ""
-    T_parent_frame: SE3 = IDENTITY
+    T_parent_frame: se3.SE3 = se3.IDENTITY
     optical: bool = False
 
 
@@ -83,7 +79,7 @@ class Calibration:
             return next(iter(self.cameras.values()))
         return self.cameras[self._known(name, list(self.cameras), "camera")]
 
-    def mount(self, frame: str, relative_to: str = "", *, optical: bool | None = None) -> SE3:
+    def mount(self, frame: str, relative_to: str = "", *, optical: bool | None = None) -> se3.SE3:
         """``T_rig_sensor`` of a frame, both X forward, Y left, Z up.
 
         Args:
@@ -105,12 +101,12 @@ class Calibration:
             raise ValueError(f"{self.file} does not connect the frames '{base}' and '{frame}'")
         is_optical = self.frames[frame].optical if optical is None else optical
         T_base_frame = T_root_base.inverse() @ T_root_frame
-        before = RIG_AXES.inverse() if self.frames[base].optical else SE3()
-        return before @ T_base_frame @ (RIG_AXES if is_optical else SE3())
+        before = scene_time.RIG_AXES.inverse() if self.frames[base].optical else se3.SE3()
+        return before @ T_base_frame @ (scene_time.RIG_AXES if is_optical else se3.SE3())
 
-    def _from_root(self, name: str) -> tuple[str, SE3]:
+    def _from_root(self, name: str) -> tuple[str, se3.SE3]:
         """The root above a frame, and ``T_root_frame``."""
-        pose, seen = SE3(), {name}
+        pose, seen = se3.SE3(), {name}
         while self.frames[name].parent:
             pose = self.frames[name].T_parent_frame @ pose
             name = self.frames[name].parent
@@ -125,13 +121,13 @@ class Calibration:
         what = f"has no {kind} '{name}'" if name else f"has several {kind}s, or none: name one"
         raise ValueError(
             f"{self.file}, {self.kind}, {what}; expected one of {', '.join(known) or 'none'}"
-            f"{did_you_mean(name, known)}"
+            f"{errors.did_you_mean(name, known)}"
         )
 
 
 def fail(node: Node, field_name: str, fact: str) -> NoReturn:
     """Raise a ConfigError at a node of a file."""
-    refuse(node.position, field_name, fact)
+    problems.refuse(node.position, field_name, fact)
 
 
 def numbers(node: Node, count: Sequence[int], name: str) -> list[float]:
@@ -157,7 +153,7 @@ def numbers(node: Node, count: Sequence[int], name: str) -> list[float]:
     values = []
     for leaf in leaves:
         if isinstance(leaf.content, bool) or not isinstance(leaf.content, (int, float)):
-            fail(leaf, name, f"expected a number, got {quote_value(leaf.plain())}")
+            fail(leaf, name, f"expected a number, got {yaml_scalars.quote_value(leaf.plain())}")
         values.append(float(leaf.content))
     if len(leaves) not in count:
         wanted = " or ".join(str(n) for n in sorted(count))
@@ -179,7 +175,7 @@ def camera_matrix(node: Node, name: str, columns: int = 3) -> tuple[float, float
     return (float(K[0, 0]), float(K[1, 1]), float(K[0, 2]), float(K[1, 2]))
 
 
-def rigid(values: Sequence[float], node: Node, name: str) -> SE3:
+def rigid(values: Sequence[float], node: Node, name: str) -> se3.SE3:
     """Pose of 12 or 16 numbers, the rows of a matrix.
 
     Raises:
@@ -187,10 +183,10 @@ def rigid(values: Sequence[float], node: Node, name: str) -> SE3:
     """
     matrix = np.array(values).reshape(-1, 4)
     check_rotation(matrix[:3, :3], node, name)
-    return SE3.from_matrix(matrix)
+    return se3.SE3.from_matrix(matrix)
 
 
-def check_rotation(R: Array, node: Node, name: str) -> None:
+def check_rotation(R: se3.Array, node: Node, name: str) -> None:
     """Raise ConfigError unless a matrix [3, 3] is a rotation, to a few digits."""
     if np.abs(R @ R.T - np.eye(3)).max() > ROTATION_ERROR_MAX or np.linalg.det(R) < 0.0:
         fail(node, name, "is no rotation: its rows are not orthonormal and right-handed")

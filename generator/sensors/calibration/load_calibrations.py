@@ -9,20 +9,17 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, TypeVar
 
-from gen_data.config.base_model import Strict
-from gen_data.config.paths import find_path
+from gen_data.config import base_model, paths, validation
 from gen_data.config.problems import Position, Problems, refuse
-from gen_data.config.validation import validate
 from gen_data.config.yaml_tree import Node
-from gen_data.core.errors import ConfigWarning
+from gen_data.core import errors, se3
 from gen_data.core.lens import COEFFICIENTS
-from gen_data.core.se3 import SE3, turns_of
 from gen_data.sensors.calibration.calibration import CalibratedCamera, Calibration
 from gen_data.sensors.calibration.read_calibration import read_calibration
 from gen_data.sensors.camera.lens_models import CalibratedLens
 from gen_data.sensors.mounting import Mounting
 
-M = TypeVar("M", bound=Strict)
+M = TypeVar("M", bound=base_model.Strict)
 _UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 _EXCLUDED = {
     "lens": ("hfov_deg", "intrinsics"),
@@ -89,9 +86,9 @@ def _load_mounting(sensor: Node, mounting: Node, field: str) -> dict[str, Node]:
     }
 
 
-def place_of(T_rig_sensor: SE3, unit_m: float = 1.0) -> dict[str, Any]:
+def place_of(T_rig_sensor: se3.SE3, unit_m: float = 1.0) -> dict[str, Any]:
     """A pose on a rig as the fields of a sensor."""
-    angles = (round(math.degrees(a), 9) + 0.0 for a in turns_of(T_rig_sensor))
+    angles = (round(math.degrees(a), 9) + 0.0 for a in se3.turns_of(T_rig_sensor))
     offset_m = [round(unit_m * v, 9) + 0.0 for v in T_rig_sensor.translation_m]
     return {
         "offset_m": offset_m,
@@ -101,12 +98,12 @@ def place_of(T_rig_sensor: SE3, unit_m: float = 1.0) -> dict[str, Any]:
 
 def _read(file: Node, field: str, *, fisheye: bool = False, rectified: bool = False) -> Calibration:
     """Read a file that a configuration names, and warn of entries without effect."""
-    path = find_path(file.text, file.position, field, "file")
+    path = paths.find_path(file.text, file.position, field, "file")
     calibration = read_calibration(path, fisheye=fisheye, rectified=rectified)
     if calibration.unused:
         listed = ", ".join(calibration.unused)
         message = f"{path}: {calibration.kind}; not used: {listed}"
-        warnings.warn(message, ConfigWarning, stacklevel=2)
+        warnings.warn(message, errors.ConfigWarning, stacklevel=2)
     return calibration
 
 
@@ -119,7 +116,7 @@ def _check_alone(sensor: Node, key: str, field: str) -> None:
 
 def _validated(node: Node, model: type[M], field: str) -> M:
     problems = Problems()
-    found = validate(node, model, problems, field)
+    found = validation.validate(node, model, problems, field)
     problems.raise_if_any()
     assert found is not None
     return found

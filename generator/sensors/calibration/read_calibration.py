@@ -5,19 +5,13 @@ import re
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
-from gen_data.config.problems import Position
-from gen_data.config.yaml_scalars import resolve_scalar
+from gen_data.config import problems, yaml_scalars
 from gen_data.config.yaml_tree import Node, parse_yaml
 from gen_data.core.errors import AssetError, ConfigError
 from gen_data.core.safe_xml import PlacedElement, parse_xml
+from gen_data.sensors.calibration import frame_formats
 from gen_data.sensors.calibration.calibration import Calibration
 from gen_data.sensors.calibration.camera_formats import camera_file, colmap_cameras, kalibr_chain
-from gen_data.sensors.calibration.frame_formats import (
-    kitti_calibration,
-    nuscenes_frames,
-    tf_frames,
-    urdf_frames,
-)
 
 MAX_BYTES = 64 << 20
 _MAX_ELEMENTS = 100_000
@@ -42,18 +36,18 @@ def read_calibration(path: Path, *, fisheye: bool = False, rectified: bool = Fal
         return _read_xml(text, path, fisheye=fisheye, rectified=rectified)
     if start.startswith("["):
         try:
-            return nuscenes_frames(json.loads(text), path)
+            return frame_formats.nuscenes_frames(json.loads(text), path)
         except ValueError as error:
             raise ConfigError(f"{path}: is no valid JSON ({error})") from None
     if path.suffix.lower() == ".txt":
         if _KITTI.search(text):
-            return kitti_calibration(text, file, rectified=rectified)
+            return frame_formats.kitti_calibration(text, file, rectified=rectified)
         return colmap_cameras(text, file)
     root = parse_yaml(_plain_yaml(text), file)
     if any(node.get("camera_model") for node in root.entries.values()):
         return kalibr_chain(root)
     if root.get("transforms") or root.get("child_frame_id"):
-        return tf_frames(root)
+        return frame_formats.tf_frames(root)
     return camera_file(root, fisheye=fisheye, rectified=rectified)
 
 
@@ -89,14 +83,14 @@ def _read_xml(text: str, path: Path, *, fisheye: bool, rectified: bool) -> Calib
     except AssetError as error:
         raise ConfigError(str(error)) from None
     if is_urdf:
-        return urdf_frames(root, str(path))
+        return frame_formats.urdf_frames(root, str(path))
     return camera_file(_storage(root, str(path)), fisheye=fisheye, rectified=rectified)
 
 
 def _storage(element: Element, file: str) -> Node:
     """The tree of an element of OpenCV's XML: its children by name, or its numbers."""
     assert isinstance(element, PlacedElement)
-    place = Position(file, element.line, element.column)
+    place = problems.Position(file, element.line, element.column)
     if len(element):
         return Node(place, {child.tag: _storage(child, file) for child in element})
     text = (element.text or "").strip()
@@ -108,10 +102,10 @@ def _storage(element: Element, file: str) -> Node:
 
 def _is_number(word: str) -> bool:
     try:
-        return isinstance(resolve_scalar(word), (int, float))
+        return isinstance(yaml_scalars.resolve_scalar(word), (int, float))
     except ValueError:
         return False
 
 
-def _scalar(place: Position, text: str) -> Node:
-    return Node(place, resolve_scalar(text) if _is_number(text) else text, text=text)
+def _scalar(place: problems.Position, text: str) -> Node:
+    return Node(place, yaml_scalars.resolve_scalar(text) if _is_number(text) else text, text=text)

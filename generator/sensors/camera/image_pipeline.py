@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from gen_data.config.base_model import Strict
+from gen_data.config import base_model, yaml_tree
 from gen_data.config.distributions import (
     Bounds,
     Constant,
@@ -21,15 +21,12 @@ from gen_data.config.distributions import (
     Scalar,
     UnitInterval,
 )
-from gen_data.config.yaml_tree import load_yaml
+from gen_data.core import errors, interfaces, se3
 from gen_data.core.asset_types import Float32
 from gen_data.core.capture import Channel, SensorReading
-from gen_data.core.errors import SampleError
-from gen_data.core.interfaces import FindTones, Renderer, Tones
 from gen_data.core.scene import Camera, Scene, Weather
-from gen_data.core.se3 import Array
 from gen_data.core.streams import Rng
-from gen_data.sensors.camera import isp, optics
+from gen_data.sensors.camera import isp, local_tone, optics
 from gen_data.sensors.camera.denoising import denoise, is_noisy
 from gen_data.sensors.camera.exposure import (
     EV100_DARKEST,
@@ -52,7 +49,6 @@ from gen_data.sensors.camera.image_sensor import (
 )
 from gen_data.sensors.camera.isp import Tone, tone_to_bytes, tone_to_display
 from gen_data.sensors.camera.lens_drops import lens_drops, refract_in_drops
-from gen_data.sensors.camera.local_tone import fuse_exposures
 from gen_data.sensors.camera.optics import add_flare, add_glare
 from gen_data.sensors.device_presets import check_preset, preset_path
 
@@ -65,7 +61,7 @@ PRESETS = "gen_data.sensors.camera.presets"
 Row = tuple[float, float, float]
 
 
-class Focus(Strict):
+class Focus(base_model.Strict):
     """Focus of a lens with a finite depth of field.
 
     Attributes:
@@ -77,7 +73,7 @@ class Focus(Strict):
     pixel_um: float = Field(3.0, gt=0, le=100)
 
 
-class ImagePipeline(Strict):
+class ImagePipeline(base_model.Strict):
     """Stages from radiance to a photograph; a stage that is left out has no effect.
 
     Distributions are drawn once per view: all images of a sequence have the same values.
@@ -245,7 +241,7 @@ class Photograph:
 
 def capture_photograph(
     scene: Scene,
-    renderer: Renderer,
+    renderer: interfaces.Renderer,
     camera: Camera,
     channels: frozenset[Channel],
     pipeline: ImagePipeline,
@@ -272,12 +268,12 @@ def capture_photograph(
     return replace(reading, channels={**images, Channel.RGB: photo.rgb}, ev100=photo.ev100)
 
 
-def _tones_of(camera: Camera, pipeline: ImagePipeline) -> FindTones:
+def _tones_of(camera: Camera, pipeline: ImagePipeline) -> interfaces.FindTones:
     """Range of the photosites that each pixel is the mean of."""
 
-    def find(radiance: Float32) -> Tones:
+    def find(radiance: Float32) -> interfaces.Tones:
         white = saturation_cd_m2(_set_or_metered(radiance, camera, pipeline))
-        return Tones(white, pipeline.headroom * white)
+        return interfaces.Tones(white, pipeline.headroom * white)
 
     return find
 
@@ -312,7 +308,7 @@ def develop(
         light = stage(light, shot)
     if not np.isfinite(light.values).all():
         # The tone curve makes a bound of it.
-        raise SampleError(
+        raise errors.SampleError(
             f"{camera.name}.image_pipeline: a stage makes NaN or infinite values of finite "
             f"radiance (exposure value {exposure.ev100:g}, gain {exposure.gain:g})"
         )
@@ -345,7 +341,7 @@ def _draw(pipeline: ImagePipeline, field: str, rng: Rng) -> float:
     """Draw a setting. Raises SampleError if it is no finite number, as of a faulty plug-in."""
     drawn: float = getattr(pipeline, field).draw(rng)
     if not math.isfinite(drawn):
-        raise SampleError(f"image_pipeline.{field}: drew {drawn}; expected a finite number")
+        raise errors.SampleError(f"image_pipeline.{field}: drew {drawn}; expected a finite number")
     return drawn
 
 
@@ -453,7 +449,7 @@ def _white_balance(light: Light, shot: Shot) -> Light:
     return Light(isp.transform_colors(image, srgb_from_camera * gains), 1.0)
 
 
-def _illuminant(image: Float32, pipeline: ImagePipeline) -> Array:
+def _illuminant(image: Float32, pipeline: ImagePipeline) -> se3.Array:
     """Estimated colour of the light in a linear image, [3], both in the camera's colours."""
     estimate = isp.estimate_illuminant(image, pipeline.white_balance_norm)
     if pipeline.white_balance_tint_ev is None:
@@ -507,7 +503,7 @@ def _tone(light: Light, shot: Shot) -> NDArray[np.uint8]:
     radius_px = pipeline.sharpening_px / pipeline.reduction
     is_sharpened = amount > 0.0 and radius_px >= _LEAST_SHARPENED_PX
     if pipeline.tone == "local":
-        display = fuse_exposures(light.values, scale, pipeline.headroom, contrast)
+        display = local_tone.fuse_exposures(light.values, scale, pipeline.headroom, contrast)
     elif is_sharpened:
         display = tone_to_display(light.values, scale, pipeline.tone, pipeline.headroom, contrast)
     else:
@@ -522,7 +518,7 @@ def _compress(image: NDArray[np.uint8], shot: Shot) -> NDArray[np.uint8]:
     return image if quality is None else isp.compress_jpeg(image, round(quality.draw(shot.rng)))
 
 
-def _color_matrices(pipeline: ImagePipeline) -> tuple[Array, Array]:
+def _color_matrices(pipeline: ImagePipeline) -> tuple[se3.Array, se3.Array]:
     """Matrices from linear sRGB to camera colours and back, [3, 3] each."""
     back = np.eye(3) if pipeline.color_matrix is None else np.array(pipeline.color_matrix)
     return np.linalg.inv(back), back
@@ -539,7 +535,7 @@ def _centre_m(depth_m: NDArray[np.floating]) -> float:
 @cache
 def _preset(name: str) -> dict[str, Any]:
     """The values of a preset, as plain data; ValueError if there is no such preset."""
-    plain = load_yaml(preset_path(PRESETS, check_preset(PRESETS, name))).plain()
+    plain = yaml_tree.load_yaml(preset_path(PRESETS, check_preset(PRESETS, name))).plain()
     assert isinstance(plain, dict)
     return plain
 

@@ -12,8 +12,7 @@ import numpy as np
 from pydantic import Field
 
 from gen_data.config.base_model import Strict
-from gen_data.config.distributions import NonNegative
-from gen_data.config.distributions.discrete import Constant
+from gen_data.config.distributions import NonNegative, discrete
 from gen_data.core.asset_types import Float32
 from gen_data.core.colorimetry import luminance
 from gen_data.core.streams import Rng, Streams
@@ -47,8 +46,8 @@ class ImageSensor(Strict):
 
     pattern: Pattern = "rggb"
     full_well_e: float = Field(10_000.0, gt=0)
-    read_noise_e: NonNegative = Constant(3.0)
-    dark_current_e_s: NonNegative = Constant(5.0)
+    read_noise_e: NonNegative = discrete.Constant(3.0)
+    dark_current_e_s: NonNegative = discrete.Constant(5.0)
     prnu: Share = 0.005
     dsnu_e: float = Field(0.5, ge=0)
     hot_pixels: Share = 0.0

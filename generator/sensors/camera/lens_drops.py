@@ -5,10 +5,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.core.asset_types import Float32
-from gen_data.core.scene import Camera, Weather
+from gen_data.core import asset_types, scene, streams
 from gen_data.core.se3 import Array
-from gen_data.core.streams import Streams
 from gen_data.sensors.camera.optics import blur, halve
 
 _RADII = (0.004, 0.022)
@@ -19,12 +17,12 @@ _REACH = 1.4
 _HALVINGS = 3
 
 
-def lens_drops(weather: Weather, camera: Camera) -> Array:
+def lens_drops(weather: scene.Weather, camera: scene.Camera) -> Array:
     """Drops as (x, y, radius) [px] and seed of the shape, [n, 4]; their number is Poisson."""
     k = camera.intrinsics
     if weather.lens_drops <= 0.0:
         return np.zeros((0, 4))
-    rng = Streams(seed=weather.seed, scene=0).rng(f"lens {camera.name}")
+    rng = streams.Streams(seed=weather.seed, scene=0).rng(f"lens {camera.name}")
     low, high = (share * k.width_px for share in _RADII)
     # Expected area of a drop: radii are log-uniform, so the mean square has a closed form.
     area = math.pi * 0.9 * (high**2 - low**2) / (2.0 * math.log(high / low))
@@ -36,11 +34,11 @@ def lens_drops(weather: Weather, camera: Camera) -> Array:
     return np.stack([u[0] * k.width_px, u[1] * k.height_px, radius, np.floor(1e4 * u[3])], axis=-1)
 
 
-def refract_in_drops(image: Float32, drops: Array) -> Float32:
+def refract_in_drops(image: asset_types.Float32, drops: Array) -> asset_types.Float32:
     """Draw drops over a linear image in order, float32 [h, w, 3]; drops as of ``lens_drops``."""
     height, width = image.shape[:2]
     small = blur(halve(image, _HALVINGS))
-    out: Float32 = image.copy()
+    out: asset_types.Float32 = image.copy()
     for x_px, y_px, radius_px, seed in drops:
         rows = _span(y_px, radius_px, height)
         columns = _span(x_px, radius_px, width)
@@ -68,7 +66,7 @@ def _span(center_px: float, radius_px: float, size: int) -> NDArray[np.int64]:
     return np.arange(max(first, 0), min(end, size))
 
 
-def _bilinear_at(image: Float32, u: Array, v: Array) -> Array:
+def _bilinear_at(image: asset_types.Float32, u: Array, v: Array) -> Array:
     """Bilinear samples of an image at coordinates in [0, 1] x [0, 1], [..., 3]."""
     height, width = image.shape[:2]
     x, y = np.clip(u, 0.0, 1.0) * (width - 1), np.clip(v, 0.0, 1.0) * (height - 1)

@@ -8,8 +8,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from gen_data.config.base_model import Strict
-from gen_data.config.data_files import load_table
+from gen_data.config import base_model, data_files
 from gen_data.core.errors import did_you_mean
 from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.lens import COEFFICIENTS, Lens, LensModel
@@ -17,7 +16,7 @@ from gen_data.core.lens import COEFFICIENTS, Lens, LensModel
 FieldDeg = Annotated[float, Field(gt=0, le=360)]
 
 
-class _LensModel(Strict):
+class _LensModel(base_model.Strict):
     """Base of the models of ``gen_data.core.lens``; fields are their coefficients."""
 
     model: LensModel
@@ -82,7 +81,7 @@ class Equirectangular(_LensModel):
     model: Literal["equirectangular"]
 
 
-class CalibratedLens(Strict):
+class CalibratedLens(base_model.Strict):
     """The calibration of a real camera, scaled to the image's width and cropped to its height.
 
     It defines the field of view: hfov_deg must be left out. The content of a ``file`` replaces its
@@ -137,7 +136,7 @@ class CalibratedLens(Strict):
         return measured.at_size(width_px, height_px, known.lens, decimals=6)
 
 
-class MeasuredIntrinsics(Strict):
+class MeasuredIntrinsics(base_model.Strict):
     """Focal lengths and principal point of a real camera.
 
     Attributes:
@@ -207,5 +206,5 @@ class Calibration:
     lens: Lens
 
 
-CALIBRATIONS = load_table(__package__, "calibrations", Calibration)
+CALIBRATIONS = data_files.load_table(__package__, "calibrations", Calibration)
 """Calibrations by their name in configurations."""

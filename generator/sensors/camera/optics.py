@@ -12,9 +12,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gen_data.core import intrinsics, se3
 from gen_data.core.asset_types import Float32
-from gen_data.core.intrinsics import Intrinsics
-from gen_data.core.se3 import Array
 
 _BLUR_LEVELS = (0.0, 1.0, 1.6, 2.5, 4.0, 6.3, 10.0, 16.0)
 """Radii of the layers that a defocused image is composed of [px]."""
@@ -78,7 +77,7 @@ def scale_pixels(image: Float32, gain: Float32) -> Float32:
     return scaled
 
 
-def natural_falloff(camera: Intrinsics, pupil_power: float) -> Float32:
+def natural_falloff(camera: intrinsics.Intrinsics, pupil_power: float) -> Float32:
     """Relative illumination of every pixel, float32 [h, w]: 1 on the axis, 0 outside the field.
 
     Rectilinear lenses follow the fourth power of the cosine of the ray's angle to the axis: one
@@ -109,7 +108,7 @@ def natural_falloff(camera: Intrinsics, pupil_power: float) -> Float32:
     return np.asarray(np.nan_to_num(falloff, nan=0.0), np.float32)
 
 
-def _fisheye_gain(cosine: Array, coefficients: Sequence[float]) -> Array:
+def _fisheye_gain(cosine: se3.Array, coefficients: Sequence[float]) -> se3.Array:
     """``sin(theta) / (r r')`` for Kannala and Brandt's ``r = theta + k1 theta^3 + ...``."""
     theta = np.arccos(np.clip(cosine, -1.0, 1.0))
     square = theta * theta
@@ -144,7 +143,7 @@ def apply_chromatic_aberration(image: Float32, corner_px: float) -> Float32:
     return np.asarray(cv2.merge([red, green, blue]), np.float32)
 
 
-def _scale_about_middle(scale: float, width: int, height: int) -> Array:
+def _scale_about_middle(scale: float, width: int, height: int) -> se3.Array:
     """Affine map of pixel indices, [2, 3]."""
     x, y = ((1.0 - scale) * 0.5 * (size - 1) for size in (width, height))
     return np.array([[scale, 0.0, x], [0.0, scale, y]])

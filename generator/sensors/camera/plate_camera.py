@@ -7,12 +7,10 @@ from typing import Literal
 
 from pydantic import model_validator
 
-from gen_data.core.errors import ConfigError
-from gen_data.core.plates import EV100, fitted_intrinsics, has_plate
+from gen_data.core import errors, plates
 from gen_data.core.scene import Scene
-from gen_data.sensors.camera.exposure import make_shutter
+from gen_data.sensors.camera import exposure, rgb_camera
 from gen_data.sensors.camera.image_pipeline import ImagePipeline
-from gen_data.sensors.camera.rgb_camera import RgbCamera
 
 _GIVEN_BY_THE_PHOTOGRAPH = (
     "hfov_deg", "intrinsics", "lens", "rig", "offset_m", "yaw_deg", "pitch_deg", "roll_deg",
@@ -20,7 +18,7 @@ _GIVEN_BY_THE_PHOTOGRAPH = (
 )  # fmt: skip
 
 
-class PlateCamera(RgbCamera):
+class PlateCamera(rgb_camera.RgbCamera):
     """A camera with the place, direction and lens of the photograph behind the scene.
 
     Its images show the largest centred part of the photograph that has their shape.
@@ -33,7 +31,7 @@ class PlateCamera(RgbCamera):
     """
 
     type: Literal["plate_camera"] = "plate_camera"  # type: ignore[assignment]
-    ev100: float | None = EV100
+    ev100: float | None = plates.EV100
     image_pipeline: ImagePipeline = ImagePipeline(preset="photograph")
 
     @model_validator(mode="after")
@@ -55,16 +53,16 @@ class PlateCamera(RgbCamera):
             ConfigError: the scene has no plate, or its camera has another name.
         """
         known = [camera.name for camera in scene.cameras]
-        if not has_plate(scene) or self.name not in known:
-            raise ConfigError(
+        if not plates.has_plate(scene) or self.name not in known:
+            raise errors.ConfigError(
                 f"sensor '{self.name}': there is no photograph with this camera; add an element "
                 f"{{type: plate, camera: {self.name}}}, or use an rgb_camera"
             )
-        shutter = make_shutter(self.exposure, self.rolling_shutter)
+        shutter = exposure.make_shutter(self.exposure, self.rolling_shutter)
         cameras = []
         for camera in scene.cameras:
             if camera.name == self.name:
-                lens = fitted_intrinsics(camera.intrinsics, *self.size_px)
+                lens = plates.fitted_intrinsics(camera.intrinsics, *self.size_px)
                 camera = replace(camera, intrinsics=lens, ev100=self.ev100, shutter=shutter)  # noqa: PLW2901
             cameras.append(camera)
         return replace(scene, cameras=tuple(cameras))

@@ -11,24 +11,16 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from gen_data.config.base_model import NAME_PATTERN
+from gen_data.core import errors, scene_time, se3, streams
 from gen_data.core.capture import Channel, SensorReading
-from gen_data.core.errors import ConfigError, SampleError, did_you_mean
 from gen_data.core.interfaces import Modality, Renderer, SensorInfo
 from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.scene import Camera, Region, Scene
-from gen_data.core.scene_time import RIG_AXES
-from gen_data.core.se3 import SE3, look_at
 from gen_data.core.shutter import INSTANT, Shutter
 from gen_data.core.stereo import baseline_m, disparity_px, is_seen_by_both
-from gen_data.core.streams import Rng
+from gen_data.sensors.camera import lens_models
 from gen_data.sensors.camera.exposure import ExposureTime, RollingShutter, make_shutter
 from gen_data.sensors.camera.image_pipeline import ImagePipeline, capture_photograph
-from gen_data.sensors.camera.lens_models import (
-    CalibratedLens,
-    LensConfig,
-    MeasuredIntrinsics,
-    Pinhole,
-)
 from gen_data.sensors.camera.rgb_encoding import RgbEncoding
 from gen_data.sensors.mounting import Mounted, check_rig
 
@@ -82,8 +74,8 @@ class RgbCamera(Mounted):
     name: str = Field("color", pattern=NAME_PATTERN)
     size_px: tuple[SidePx, SidePx] = (640, 480)
     hfov_deg: float = Field(60.0, ge=1, le=360)
-    lens: LensConfig = Pinhole()
-    intrinsics: MeasuredIntrinsics | None = None
+    lens: lens_models.LensConfig = lens_models.Pinhole()
+    intrinsics: lens_models.MeasuredIntrinsics | None = None
     channels: tuple[Image, ...] = Field(
         (Channel.RGB, Channel.Z_DEPTH, Channel.INSTANCE, Channel.CATEGORY), min_length=1
     )
@@ -103,12 +95,12 @@ class RgbCamera(Mounted):
 
     @model_validator(mode="after")
     def _has_a_lens(self) -> RgbCamera:
-        if isinstance(self.lens, Pinhole) and self.hfov_deg > PINHOLE_MAX_DEG:
+        if isinstance(self.lens, lens_models.Pinhole) and self.hfov_deg > PINHOLE_MAX_DEG:
             raise ValueError(
                 f"hfov_deg {self.hfov_deg:g} is too wide for a pinhole; expected at most "
                 f"{PINHOLE_MAX_DEG:g}, or another lens, such as {{model: kannala_brandt}}"
             )
-        calibrated = isinstance(self.lens, CalibratedLens)
+        calibrated = isinstance(self.lens, lens_models.CalibratedLens)
         if calibrated and "hfov_deg" in self.model_fields_set:
             raise ValueError("a calibrated lens has its own field of view: leave out hfov_deg")
         if self.intrinsics is not None:
@@ -131,7 +123,7 @@ class RgbCamera(Mounted):
             ValueError: the lens's field is narrower than ``hfov_deg``.
         """
         width_px, height_px = self.size_px
-        if isinstance(self.lens, CalibratedLens):
+        if isinstance(self.lens, lens_models.CalibratedLens):
             return self.lens.intrinsics(width_px, height_px)
         if self.intrinsics is not None:
             return self.intrinsics.at_size(width_px, height_px, self.lens.lens())
@@ -159,7 +151,7 @@ class RgbCamera(Mounted):
         )
 
     def capture(
-        self, scene: Scene, renderer: Renderer, channels: frozenset[Channel], rng: Rng
+        self, scene: Scene, renderer: Renderer, channels: frozenset[Channel], rng: streams.Rng
     ) -> SensorReading:
         """Capture its own channels and the requested ones; RGB passes the image pipeline.
 
@@ -176,7 +168,7 @@ class RgbCamera(Mounted):
         )
         return self._add_disparity(scene, renderer, reading) if paired else reading
 
-    def _settings_rng(self, scene: Scene, rng: Rng) -> Rng:
+    def _settings_rng(self, scene: Scene, rng: streams.Rng) -> streams.Rng:
         """Stream of the camera whose settings it has."""
         if not self.settings_of:
             return rng
@@ -194,7 +186,7 @@ class RgbCamera(Mounted):
         try:
             scale = left.intrinsics.fx_px * baseline_m(left, right)
         except ValueError as error:
-            raise SampleError(
+            raise errors.SampleError(
                 f"sensors '{left.name}' and '{right.name}' are no rectified pair: {error}; mount"
                 " them on one rig with the same size, field of view, lens and angles, the right one"
                 " beside the left, and vary neither alone by a randomizer"
@@ -212,9 +204,9 @@ class RgbCamera(Mounted):
 def check_camera(name: str, field: str, other: str, known: Collection[str]) -> None:
     """Raise ConfigError if the camera that a camera's field names is not among the known ones."""
     if other not in known:
-        raise ConfigError(
+        raise errors.ConfigError(
             f"sensor '{name}': {field}: there is no camera '{other}'; "
-            f"expected one of {', '.join(known)}{did_you_mean(other, known)}"
+            f"expected one of {', '.join(known)}{errors.did_you_mean(other, known)}"
         )
 
 
@@ -236,8 +228,8 @@ def add_camera(
         return scene
     if mounted.rig:
         rig = check_rig(scene, name, mounted.rig)
-        T_rig_camera = mounted.T_rig_sensor @ RIG_AXES.inverse()
-        camera = Camera(name, SE3(), intrinsics, ev100, rig, T_rig_camera, shutter)
+        T_rig_camera = mounted.T_rig_sensor @ scene_time.RIG_AXES.inverse()
+        camera = Camera(name, se3.SE3(), intrinsics, ev100, rig, T_rig_camera, shutter)
     else:
         pose = _nominal_pose(scene.focus, _narrower_half_rad(intrinsics))
         camera = Camera(name, pose, intrinsics, ev100, shutter=shutter)
@@ -254,7 +246,7 @@ def _narrower_half_rad(intrinsics: Intrinsics) -> float:
     return min(seen_rad, intrinsics.lens.half_field_rad, 0.5 * math.pi)
 
 
-def _nominal_pose(focus: Region, half_angle_rad: float) -> SE3:
+def _nominal_pose(focus: Region, half_angle_rad: float) -> se3.SE3:
     """``T_world_camera`` with the whole focus in view."""
     radius_m = 0.5 * math.hypot(*focus.size_m)
     distance_m = radius_m / math.sin(min(half_angle_rad, math.radians(45.0)))
@@ -265,4 +257,4 @@ def _nominal_pose(focus: Region, half_angle_rad: float) -> SE3:
         y + level_m * math.sin(NOMINAL_AZIMUTH_RAD),
         z + distance_m * math.sin(NOMINAL_ELEVATION_RAD),
     )
-    return look_at(eye, focus.center_m).rounded()
+    return se3.look_at(eye, focus.center_m).rounded()

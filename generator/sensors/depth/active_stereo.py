@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from gen_data.config.base_model import Strict
+from gen_data.core import stereo, streams
 from gen_data.core.asset_types import Float32
-from gen_data.core.stereo import disparity_px, is_seen_by_both
-from gen_data.core.streams import Rng
 from gen_data.sensors.depth.structured_light import Dots
 from gen_data.sensors.depth.view import Measured, View
 
@@ -66,7 +65,7 @@ class ActiveStereo(Strict):
     full_well: float = Field(8000.0, gt=0)
     read_noise: float = Field(6.0, ge=0)
 
-    def measure(self, view: View, rng: Rng) -> Measured:
+    def measure(self, view: View, rng: streams.Rng) -> Measured:
         """Measure the depth image and the left infrared image of a view."""
         lights = [self._light(view, right_m) for right_m in (0.0, self.baseline_m)]
         white = max(float(np.quantile(lights[0], WHITE_QUANTILE)), 1e-6)
@@ -95,11 +94,11 @@ class ActiveStereo(Strict):
         if away_m != 0.0:
             focal_baseline = view.focal_px * away_m
             depths_m = (z_m, view.z_depth_m(self.projector_m))
-            pair_px = (disparity_px(depth_m, focal_baseline) for depth_m in depths_m)
-            lux *= is_seen_by_both(*pair_px, beyond=True)
+            pair_px = (stereo.disparity_px(depth_m, focal_baseline) for depth_m in depths_m)
+            lux *= stereo.is_seen_by_both(*pair_px, beyond=True)
         return np.asarray(light + lux * hits.reflectance[..., 0] / np.float32(np.pi), np.float32)
 
-    def _expose(self, exposed: Float32, rng: Rng) -> UInt8:
+    def _expose(self, exposed: Float32, rng: streams.Rng) -> UInt8:
         """Eight-bit image with noise; input of 1 becomes ``WHITE``."""
         electrons = np.minimum(exposed * np.float32(WHITE / 255.0), 1.0) * self.full_well
         noise = rng.standard_normal(exposed.shape, dtype=np.float32)

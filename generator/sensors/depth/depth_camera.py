@@ -11,16 +11,14 @@ from numpy.typing import NDArray
 from pydantic import Field, field_validator, model_validator
 
 from gen_data.config.base_model import NAME_PATTERN, Strict
+from gen_data.core import errors, streams
 from gen_data.core.capture import Channel, SensorReading
-from gen_data.core.errors import SampleError
 from gen_data.core.interfaces import Modality, Renderer, SensorInfo
 from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.lens import PINHOLE
 from gen_data.core.scene import Scene
-from gen_data.core.streams import Rng
+from gen_data.sensors.camera import lens_models, rgb_camera
 from gen_data.sensors.camera.image_pipeline import ImagePipeline, capture_photograph
-from gen_data.sensors.camera.lens_models import MeasuredIntrinsics
-from gen_data.sensors.camera.rgb_camera import add_camera
 from gen_data.sensors.depth.active_stereo import ActiveStereo
 from gen_data.sensors.depth.structured_light import StructuredLight
 from gen_data.sensors.depth.time_of_flight import TimeOfFlight
@@ -36,7 +34,7 @@ class Ideal(Strict):
 
     kind: Literal["ideal"] = "ideal"
 
-    def measure(self, view: View, rng: Rng) -> Measured:
+    def measure(self, view: View, rng: streams.Rng) -> Measured:
         """Measure true depth; white surfaces have an infrared value of 1000 at 1 m."""
         del rng
         hits = view.trace()
@@ -101,7 +99,7 @@ class DepthCamera(Mounted):
     model: str | DepthModel = "kinect_v2"
     size_px: tuple[SidePx, SidePx] | None = None
     hfov_deg: float | None = Field(None, ge=1, le=150)
-    intrinsics: MeasuredIntrinsics | None = None
+    intrinsics: lens_models.MeasuredIntrinsics | None = None
     channels: tuple[DepthImage, ...] = Field(
         (Channel.MEASURED_DEPTH, Channel.INFRARED, Channel.Z_DEPTH), min_length=1
     )
@@ -150,10 +148,10 @@ class DepthCamera(Mounted):
         Raises:
             ConfigError: the scene has no such rig.
         """
-        return add_camera(scene, self.name, self, self.nominal_intrinsics())
+        return rgb_camera.add_camera(scene, self.name, self, self.nominal_intrinsics())
 
     def capture(
-        self, scene: Scene, renderer: Renderer, channels: frozenset[Channel], rng: Rng
+        self, scene: Scene, renderer: Renderer, channels: frozenset[Channel], rng: streams.Rng
     ) -> SensorReading:
         """Capture its own channels and the requested ones; labels are ground truth.
 
@@ -163,7 +161,7 @@ class DepthCamera(Mounted):
         requested = channels | set(self.media)
         camera = scene.camera(self.name)
         if not camera.intrinsics.straight:
-            raise SampleError(
+            raise errors.SampleError(
                 f"sensor '{self.name}': a depth camera is a pinhole, got the lens "
                 f"{camera.intrinsics.lens.model}; exclude it from randomizers of lenses"
             )

@@ -6,13 +6,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.core.asset_types import Float32
-from gen_data.core.capture import Channel, LidarRays
+from gen_data.core import asset_types, capture, interfaces, se3, streams
 from gen_data.core.colorimetry import luminance
-from gen_data.core.interfaces import Renderer
 from gen_data.core.scene import Camera, Lidar, Scene
-from gen_data.core.se3 import SE3
-from gen_data.core.streams import Rng
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -24,7 +20,7 @@ class Measured:
         infrared: Infrared image of its own light, uint16 [h, w].
     """
 
-    z_m: Float32
+    z_m: asset_types.Float32
     infrared: NDArray[np.uint16]
 
 
@@ -39,10 +35,10 @@ class Hits:
         cosine: Of the angle of incidence; 0.
     """
 
-    range_m: Float32
-    z_m: Float32
-    reflectance: Float32
-    cosine: Float32
+    range_m: asset_types.Float32
+    z_m: asset_types.Float32
+    reflectance: asset_types.Float32
+    cosine: asset_types.Float32
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -50,7 +46,7 @@ class View:
     """A scene and the camera whose depth is measured."""
 
     scene: Scene
-    renderer: Renderer
+    renderer: interfaces.Renderer
     camera: Camera
 
     @property
@@ -60,7 +56,7 @@ class View:
 
     def beside(self, right_m: float) -> Camera:
         """The same camera, shifted to its right."""
-        pose = self.camera.T_world_camera @ SE3((right_m, 0.0, 0.0))
+        pose = self.camera.T_world_camera @ se3.SE3((right_m, 0.0, 0.0))
         return replace(self.camera, T_world_camera=pose)
 
     def trace(self, right_m: float = 0.0, subrays: int = 1) -> Hits:
@@ -72,27 +68,27 @@ class View:
         shape = (lens.height_px, lens.width_px)
         rays = np.nan_to_num(lens.pixel_rays()).reshape(-1, 3).astype(np.float32)
         pose = self.beside(right_m).T_world_camera
-        beams = LidarRays(rays, 1.0 / lens.fx_px, subrays, np.inf)
-        hits = self.renderer.scan(self.scene, Lidar(self.camera.name, "", SE3(), pose), beams)
+        beams = capture.LidarRays(rays, 1.0 / lens.fx_px, subrays, np.inf)
+        hits = self.renderer.scan(self.scene, Lidar(self.camera.name, "", se3.SE3(), pose), beams)
         shape3 = (*shape, subrays)
         z_m = hits.range_m * rays[:, 2:]
         images = (hits.range_m, z_m, hits.reflectance, hits.incidence_cos)
         return Hits(*(np.asarray(image, np.float32).reshape(shape3) for image in images))
 
-    def z_depth_m(self, right_m: float) -> Float32:
+    def z_depth_m(self, right_m: float) -> asset_types.Float32:
         """Depth image from beside the camera, float32 [h, w]; inf = nothing."""
-        return self._render(right_m, Channel.Z_DEPTH)
+        return self._render(right_m, capture.Channel.Z_DEPTH)
 
-    def luminance_cd_m2(self, right_m: float) -> Float32:
+    def luminance_cd_m2(self, right_m: float) -> asset_types.Float32:
         """Luminance of the scene in ambient light, float32 [h, w]."""
-        return luminance(self._render(right_m, Channel.RADIANCE))
+        return luminance(self._render(right_m, capture.Channel.RADIANCE))
 
-    def _render(self, right_m: float, channel: Channel) -> Float32:
+    def _render(self, right_m: float, channel: capture.Channel) -> asset_types.Float32:
         seen = self.renderer.render(self.scene, self.beside(right_m), frozenset({channel}))
         return np.asarray(seen.channels[channel], np.float32)
 
 
-def smooth_noise(rng: Rng, shape: tuple[int, int], sigma_px: float) -> Float32:
+def smooth_noise(rng: streams.Rng, shape: tuple[int, int], sigma_px: float) -> asset_types.Float32:
     """Gaussian noise of variance 1 with correlated neighbours, float32 [h, w]."""
     reach = int(np.ceil(3.0 * sigma_px))
     height, width = shape

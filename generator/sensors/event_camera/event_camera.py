@@ -21,13 +21,12 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from gen_data.config.base_model import NAME_PATTERN
+from gen_data.core import intrinsics, scene_time
 from gen_data.core.capture import Channel, Measurements
 from gen_data.core.colorimetry import luminance
 from gen_data.core.interfaces import Modality, Renderer, SensorInfo
-from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.measurement_dtypes import TIME, Column, table_rows
 from gen_data.core.scene import Camera, Device, Scene
-from gen_data.core.scene_time import RIG_AXES, scene_at
 from gen_data.core.se3 import Array
 from gen_data.core.streams import Rng
 from gen_data.sensors.mounting import Mounted, check_rate, check_rig, find_camera, window_s
@@ -284,17 +283,17 @@ class EventCamera(Mounted):
         A frame that equals the one before is not rendered again.
         """
         width_px, height_px = self.size_px
-        lens = Intrinsics.from_hfov(width_px, height_px, math.radians(self.hfov_deg))
+        lens = intrinsics.Intrinsics.from_hfov(width_px, height_px, math.radians(self.hfov_deg))
         luminances: list[Array] = []
         ids: list[np.ndarray] = []
         before: Scene | None = None
         for time_s in times_s:
-            then = scene_at(scene, float(time_s))
+            then = scene_time.scene_at(scene, float(time_s))
             if before is not None and _is_same_view(before, then, self.name):
                 luminances.append(luminances[-1])
                 ids.append(ids[-1])
                 continue
-            pose = then.device(self.name).T_world_device @ RIG_AXES.inverse()
+            pose = then.device(self.name).T_world_device @ scene_time.RIG_AXES.inverse()
             images = renderer.render(then, Camera(self.name, pose, lens), CHANNELS).channels
             luminances.append(luminance(images[Channel.RADIANCE].astype(np.float64)))
             ids.append(images[Channel.INSTANCE])

@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from gen_data.config.base_model import NAME_PATTERN
+from gen_data.core import errors, interfaces
 from gen_data.core.capture import Channel, Measurements
-from gen_data.core.errors import SampleError
-from gen_data.core.interfaces import Renderer
 from gen_data.core.measurement_dtypes import TIME, Column, table_rows
 from gen_data.core.scene import Scene
 from gen_data.core.se3 import Array
@@ -90,7 +89,7 @@ class EventDetector(Instrument):
     resolution_s: float = Field(0.01, gt=0, le=1)
 
     def capture(
-        self, scene: Scene, renderer: Renderer, channels: frozenset[Channel], rng: Rng
+        self, scene: Scene, renderer: interfaces.Renderer, channels: frozenset[Channel], rng: Rng
     ) -> Measurements:
         """Report the events since the last reading.
 
@@ -119,7 +118,7 @@ class EventDetector(Instrument):
         boxes = {box.instance.instance_id: box for box in find_obstacles(scene)}
         own = boxes.pop(body.instance_id, None)
         if own is None:
-            raise SampleError(
+            raise errors.SampleError(
                 f"sensor '{self.name}': '{body.name}', which carries rig '{self.rig}', has no box;"
                 " mount it on the rig of a labelled object"
             )

@@ -7,9 +7,8 @@ errors name the file, line and column they come from.
 from collections.abc import Mapping
 from pathlib import Path
 
-from gen_data.config.paths import find_path
+from gen_data.config import paths, validation
 from gen_data.config.problems import Position, Problem, Problems
-from gen_data.config.validation import validate
 from gen_data.config.yaml_tree import MAX_FILE_BYTES, Node, load_yaml
 from gen_data.core.errors import ConfigError, did_you_mean
 from gen_data.sensors.device_presets import preset_names, preset_path
@@ -93,7 +92,7 @@ def _checked(sheet: Node, field: str) -> Node:
         ConfigError: it is not.
     """
     problems = Problems()
-    validate(sheet, LidarModel, problems, field)
+    validation.validate(sheet, LidarModel, problems, field)
     problems.raise_if_any()
     return sheet
 
@@ -140,7 +139,7 @@ def _names(node: Node, endings: tuple[str, ...]) -> bool:
 
 def _find_file(node: Node) -> Path:
     """Path of the file that a node names, relative to the node's document."""
-    return find_path(node.text, node.position, "", "file")
+    return paths.find_path(node.text, node.position, "", "file")
 
 
 def _cells(file: str, line: int, text: str) -> list[Node]:

@@ -22,9 +22,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.core.asset_types import SURFACES
-from gen_data.core.scene import Weather
-from gen_data.core.streams import Rng
+from gen_data.core import asset_types, scene, streams
 from gen_data.sensors.lidar.lidar_detection import Float32, Pulses, join_pulses, received_light
 from gen_data.sensors.lidar.scan_pattern import LidarModel
 
@@ -75,7 +73,7 @@ def snow_extinction_per_m(snow_mm_h: float, wavelength_nm: float) -> float:
 
 
 def optical_depth(
-    weather: Weather, model: LidarModel, height_m: float, up: Float32, range_m: Float32
+    weather: scene.Weather, model: LidarModel, height_m: float, up: Float32, range_m: Float32
 ) -> Float32:
     """One-way optical depth along beams, float32 [n, candidates]; light falls by its double.
 
@@ -102,7 +100,7 @@ def attenuate(pulses: Pulses, depth: Float32 | np.float32) -> Pulses:
 
 
 def add_atmosphere(
-    pulses: Pulses, weather: Weather, model: LidarModel, height_m: float, rng: Rng
+    pulses: Pulses, weather: scene.Weather, model: LidarModel, height_m: float, rng: streams.Rng
 ) -> Pulses:
     """Add returns of fog, drops and flakes in front of the targets."""
     count = len(pulses.range_m)
@@ -149,7 +147,7 @@ def fog_peak(extinction_per_m: float) -> tuple[float, float]:
     return float(r[k]), float(SOFT_GAIN * math.pi * beta * response[k])
 
 
-def _fog_returns(count: int, extinction: float, model: LidarModel, rng: Rng) -> Pulses:
+def _fog_returns(count: int, extinction: float, model: LidarModel, rng: streams.Rng) -> Pulses:
     """Returns of fog; their range varies by a factor of up to two, as Hahner et al. observed."""
     peak_m, strength = fog_peak(extinction)
     range_m = np.float32(peak_m) * np.exp2(rng.uniform(-1.0, 1.0, (count, 1))).astype(np.float32)
@@ -158,7 +156,7 @@ def _fog_returns(count: int, extinction: float, model: LidarModel, rng: Rng) -> 
     return _in_air(range_m, light, np.float32(strength) * range_m * range_m)
 
 
-def _particle_returns(count: int, kind: Particles, model: LidarModel, rng: Rng) -> Pulses:
+def _particle_returns(count: int, kind: Particles, model: LidarModel, rng: streams.Rng) -> Pulses:
     """Return of the first detectable drop or flake in each beam; inf = none."""
     r = np.linspace(0.0, model.range_m[1], RANGE_STEPS)
     across_m = APERTURE_M + 1e-3 * model.divergence_mrad * r
@@ -186,5 +184,5 @@ def _per_range(model: LidarModel, kind: Particles) -> float:
 def _in_air(range_m: Float32, light: Float32, reflectance: Float32) -> Pulses:
     """Candidates that belong to the air: without ids."""
     nothing: NDArray[np.uint16] = np.zeros(range_m.shape, np.uint16)
-    air = np.full(range_m.shape, SURFACES.index("air"), np.uint8)
+    air = np.full(range_m.shape, asset_types.SURFACES.index("air"), np.uint8)
     return Pulses(range_m, light, reflectance, nothing, nothing, air)

@@ -11,19 +11,12 @@ from numpy.typing import NDArray
 from pydantic import Field, WithJsonSchema, field_validator
 
 from gen_data.config.base_model import NAME_PATTERN
-from gen_data.core.asset_types import SURFACES
+from gen_data.core import asset_types, errors, interfaces
 from gen_data.core.capture import POINT, Channel, LidarHits, LidarRays, PointCloud, SecondaryHits
-from gen_data.core.errors import did_you_mean
-from gen_data.core.interfaces import Modality, Renderer, SensorInfo
 from gen_data.core.scene import Lidar, Scene, Weather
 from gen_data.core.streams import Rng
-from gen_data.sensors.device_presets import preset_names
-from gen_data.sensors.lidar.lidar_atmosphere import (
-    add_atmosphere,
-    attenuate,
-    optical_depth,
-    rain_noise_m,
-)
+from gen_data.sensors import device_presets, mounting
+from gen_data.sensors.lidar import lidar_atmosphere
 from gen_data.sensors.lidar.lidar_detection import (
     FIELDS,
     LABELS,
@@ -49,7 +42,6 @@ from gen_data.sensors.lidar.scan_pattern import (
     lidar_model,
     make_sweep,
 )
-from gen_data.sensors.mounting import Mounted, add_lidar
 
 SUBRAYS = 7
 """Rays that sample a beam with divergence."""
@@ -69,7 +61,7 @@ BEAMS_SCHEMA = {
 """A file name is replaced by the file's content before validation: see ``datasheets``."""
 
 
-class LidarSensor(Mounted):
+class LidarSensor(mounting.Mounted):
     """A laser scanner on a rig, or mounted beside a camera.
 
     Attributes:
@@ -111,11 +103,11 @@ class LidarSensor(Mounted):
     @field_validator("model")
     @classmethod
     def _is_known(cls, model: str | LidarModel) -> str | LidarModel:
-        known = preset_names(PRESETS)
+        known = device_presets.preset_names(PRESETS)
         if isinstance(model, str) and model not in known:
             raise ValueError(
                 f"expected one of {', '.join(known)}, or the name of a .yaml file"
-                f"{did_you_mean(model, known)}"
+                f"{errors.did_you_mean(model, known)}"
             )
         return model
 
@@ -132,9 +124,9 @@ class LidarSensor(Mounted):
         del size_px
         return len(make_sweep(self.device, 0.0).ring)
 
-    def describe(self) -> SensorInfo:
+    def describe(self) -> interfaces.SensorInfo:
         """Describe a laser scanner."""
-        return self._info(self.name, Modality.LIDAR)
+        return self._info(self.name, interfaces.Modality.LIDAR)
 
     def mount(self, scene: Scene) -> Scene:
         """Add this scanner to its rig, or to its camera.
@@ -145,10 +137,10 @@ class LidarSensor(Mounted):
         name = self.model if isinstance(self.model, str) else self.model.name
         sweep_s = round(1.0 / self.device.rotation_hz, 9)
         lidar = Lidar(self.name, self.camera, self.T_rig_sensor, model=name, sweep_s=sweep_s)
-        return add_lidar(scene, self, lidar)
+        return mounting.add_lidar(scene, self, lidar)
 
     def capture(
-        self, scene: Scene, renderer: Renderer, channels: frozenset[Channel], rng: Rng
+        self, scene: Scene, renderer: interfaces.Renderer, channels: frozenset[Channel], rng: Rng
     ) -> PointCloud:
         """Capture one sweep."""
         del channels
@@ -174,7 +166,7 @@ class LidarSensor(Mounted):
         if weather != CLEAR:
             pulses = _apply_weather(pulses, weather, model, lidar, shots, rng)
         if self.window < 1.0 and not self.ideal:
-            pulses = attenuate(pulses, np.float32(-math.log(self.window)))
+            pulses = lidar_atmosphere.attenuate(pulses, np.float32(-math.log(self.window)))
         pulses = clip_range(pulses, model)
         detected = pulses.light > 0.0 if self.ideal else is_detected(pulses, rng)
         returns = Returns.select(pulses, *select_returns(pulses, detected, self.returns))
@@ -212,7 +204,7 @@ def _without_mirrored(hits: LidarHits) -> LidarHits:
     """The hits without those by way of a mirror, where nothing is at the place of the point."""
     if hits.detours is None:
         return hits
-    real = hits.detours.surface != SURFACES.index("mirrored")
+    real = hits.detours.surface != asset_types.SURFACES.index("mirrored")
     kept = (getattr(hits.detours, field.name)[real] for field in fields(SecondaryHits))
     return replace(hits, detours=SecondaryHits(*kept) if real.any() else None)
 
@@ -224,13 +216,17 @@ def _apply_weather(
     height_m = lidar.T_world_lidar.translation_m[2]
     up = shots.directions @ lidar.T_world_lidar.rotation()[2].astype(np.float32)
     finite = np.where(np.isfinite(pulses.range_m), pulses.range_m, np.float32(model.range_m[1]))
-    depth = optical_depth(weather, model, height_m, up[:, None], finite)
-    return add_atmosphere(attenuate(pulses, depth), weather, model, height_m, rng)
+    depth = lidar_atmosphere.optical_depth(weather, model, height_m, up[:, None], finite)
+    return lidar_atmosphere.add_atmosphere(
+        lidar_atmosphere.attenuate(pulses, depth), weather, model, height_m, rng
+    )
 
 
 def _add_range_noise(returns: Returns, model: LidarModel, weather: Weather, rng: Rng) -> Returns:
     """Add the device's noise and quantisation to ranges."""
-    spread_m = np.float32(model.range_noise_m) + rain_noise_m(weather.rain_mm_h, returns.range_m)
+    spread_m = np.float32(model.range_noise_m) + lidar_atmosphere.rain_noise_m(
+        weather.rain_mm_h, returns.range_m
+    )
     noise = rng.standard_normal(len(returns.range_m), dtype=np.float32)
     range_m = np.clip(returns.range_m + spread_m * noise, *model.range_m)
     if model.range_step_m > 0.0:

@@ -12,14 +12,10 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from gen_data.config.base_model import NAME_PATTERN
+from gen_data.core import errors, intrinsics, se3, shutter, streams
 from gen_data.core.capture import POINT, Channel, PointCloud
-from gen_data.core.errors import ConfigError
 from gen_data.core.interfaces import Modality, Renderer, SensorInfo
-from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.scene import Lidar, Scene
-from gen_data.core.se3 import Vec3
-from gen_data.core.shutter import INSTANT
-from gen_data.core.streams import Rng
 from gen_data.sensors.mounting import Mounted, add_lidar, find_camera
 
 MODEL = "pseudo_lidar"
@@ -47,7 +43,7 @@ class PseudoLidar(Mounted):
     type: Literal["pseudo_lidar"] = "pseudo_lidar"
     name: str = Field("pseudo_lidar", pattern=NAME_PATTERN)
     camera: str = "color"
-    offset_m: Vec3 = (0.0, 0.0, 0.3)
+    offset_m: se3.Vec3 = (0.0, 0.0, 0.3)
     stride_px: int = Field(8, ge=1, le=256)
     range_max_m: float = Field(120.0, gt=0, le=10_000)
 
@@ -74,21 +70,21 @@ class PseudoLidar(Mounted):
         lidar = Lidar(self.name, self.camera, self.T_rig_sensor, model=MODEL)
         image = find_camera(scene, self.name, self.camera).intrinsics
         if self.stride_px > min(image.width_px, image.height_px):
-            raise ConfigError(
+            raise errors.ConfigError(
                 f"sensor '{self.name}': stride_px {self.stride_px} is larger than the image of "
                 f"camera '{self.camera}', {image.width_px} x {image.height_px} px"
             )
         return add_lidar(scene, self, lidar)
 
     def capture(
-        self, scene: Scene, renderer: Renderer, channels: frozenset[Channel], rng: Rng
+        self, scene: Scene, renderer: Renderer, channels: frozenset[Channel], rng: streams.Rng
     ) -> PointCloud:
         """Capture the points at the scene's instant, row by row of the image."""
         del channels, rng
         lidar, camera = scene.lidar(self.name), scene.camera(self.camera)
         if camera.shutter.open_s > 0.0:
             # A cloud has a single pose: all its rays leave at one instant.
-            camera = replace(camera, shutter=INSTANT)
+            camera = replace(camera, shutter=shutter.INSTANT)
         # What most cameras have just rendered: a renderer returns it once more without work.
         straight = camera.intrinsics.straight
         depth = Channel.Z_DEPTH if straight else Channel.RANGE
@@ -112,7 +108,7 @@ class PseudoLidar(Mounted):
         return PointCloud(self.name, lidar, points, scene.time_s)
 
 
-def every_nth_pixel(camera: Intrinsics, stride_px: int) -> Intrinsics:
+def every_nth_pixel(camera: intrinsics.Intrinsics, stride_px: int) -> intrinsics.Intrinsics:
     """Intrinsics whose pixel centres are every n-th one of another camera's, from ``n // 2`` on.
 
     Its rays are those of the selected pixels.

@@ -18,10 +18,9 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from gen_data.config.base_model import Strict
+from gen_data.core import scene_time, se3
 from gen_data.core.asset_types import Float32
 from gen_data.core.scene import Lidar, Scene
-from gen_data.core.scene_time import RIG_AXES
-from gen_data.core.se3 import SE3
 from gen_data.sensors.device_presets import load_preset
 
 PRESETS = "gen_data.sensors.lidar.presets"
@@ -400,14 +399,14 @@ def _rotate_runs(R: Float32, vectors: Float32, count: NDArray[np.intp]) -> Float
     return rotated
 
 
-def carrier(scene: Scene, lidar: Lidar) -> tuple[str, SE3]:
+def carrier(scene: Scene, lidar: Lidar) -> tuple[str, se3.SE3]:
     """Name of the body that carries a scanner, and ``T_body_lidar``; empty name = none."""
     if lidar.rig:
         rig = scene.rig(lidar.rig)
         return rig.body, rig.T_body_rig @ lidar.T_rig_lidar
     camera = scene.camera(lidar.camera)
     if not camera.rig:
-        return "", SE3()
+        return "", se3.SE3()
     rig = scene.rig(camera.rig)
     T_body_camera = rig.T_body_rig @ camera.T_rig_camera
-    return rig.body, T_body_camera @ RIG_AXES @ lidar.T_rig_lidar
+    return rig.body, T_body_camera @ scene_time.RIG_AXES @ lidar.T_rig_lidar

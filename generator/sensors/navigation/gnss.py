@@ -30,12 +30,11 @@ from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
 from gen_data.config.base_model import NAME_PATTERN, Strict
+from gen_data.core import geodesy, scene_time
 from gen_data.core.capture import Channel, LidarRays, Measurements
-from gen_data.core.geodesy import GeodeticOrigin, to_geodetic
 from gen_data.core.interfaces import Renderer
 from gen_data.core.measurement_dtypes import TIME, Column, table_rows
 from gen_data.core.scene import Lidar, Scene
-from gen_data.core.scene_time import scene_at
 from gen_data.core.se3 import SE3, Array
 from gen_data.core.streams import Rng
 from gen_data.sensors.device_presets import check_preset, load_preset
@@ -160,8 +159,8 @@ class Gnss(Instrument):
         slow_scale = np.array([across.slow_m, across.slow_m, up.slow_m])
         errors_m = growth * (white * rng.standard_normal(slow.shape) + slow_scale * slow)
         positions_m = np.array([motion.pose(float(t)).translation_m for t in times_s])
-        origin = GeodeticOrigin(*self.origin_deg, self.origin_altitude_m)
-        geodetic = np.round(to_geodetic(positions_m + errors_m, origin), 10)
+        origin = geodesy.GeodeticOrigin(*self.origin_deg, self.origin_altitude_m)
+        geodetic = np.round(geodesy.to_geodetic(positions_m + errors_m, origin), 10)
         velocities = np.array([motion.velocity_m_s(float(t)) for t in times_s])
         velocities += growth * model.velocity_m_s * rng.standard_normal(slow.shape)
         sigma_m = growth[:, 1:] * np.hypot(white, slow_scale)[1:]
@@ -210,7 +209,7 @@ def _is_visible(
 ) -> NDArray[np.bool_]:
     """Whether each satellite is visible from the antenna, [satellites]."""
     antenna = Lidar("antenna", "", T_world_lidar=SE3(motion.pose(time_s).translation_m))
-    around = remove_carrier(scene_at(scene, float(time_s)), rig)
+    around = remove_carrier(scene_time.scene_at(scene, float(time_s)), rig)
     rays = LidarRays(sky.astype(np.float32), 0.0, 1, OCCLUSION_RANGE_M)
     return np.asarray(~np.isfinite(renderer.scan(around, antenna, rays).range_m[:, 0]))
 

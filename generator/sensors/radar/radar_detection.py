@@ -21,17 +21,15 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from gen_data.config.base_model import Strict
-from gen_data.config.data_files import load_table
-from gen_data.core.asset_types import SURFACES
-from gen_data.core.scene import Instance
+from gen_data.config import base_model, data_files
+from gen_data.core import asset_types, scene
 from gen_data.core.se3 import Array
 
 Curve = tuple[tuple[float, float], ...]
 """Pairs of azimuth [deg] and value, linearly interpolated, symmetric about 0."""
 
 
-class Fineness(Strict):
+class Fineness(base_model.Strict):
     """Resolutions or standard deviations of the four quantities; elevation 0 = not measured."""
 
     range_m: float = Field(gt=0)
@@ -40,7 +38,7 @@ class Fineness(Strict):
     elevation_deg: float = Field(0.0, ge=0)
 
 
-class Look(Strict):
+class Look(base_model.Strict):
     """One of the scans that make up a reading.
 
     Attributes:
@@ -194,20 +192,20 @@ class Target:
     fill: float
 
 
-TARGETS = load_table(__package__, "targets", Target)
+TARGETS = data_files.load_table(__package__, "targets", Target)
 """By category."""
 METAL = frozenset(
     {"barrier", "bollard", "fence", "street_light", "traffic_light", "traffic_sign", "pole"}
 )
 """Categories made of sheet metal and posts."""
 
-GAMMA_DB = load_table(__package__, "surfaces", float)
+GAMMA_DB = data_files.load_table(__package__, "surfaces", float)
 """RCS per area that faces the radar, by surface."""
 
 METAL_DB = 0.0
 
 
-def cross_section_m2(target: Target, instance: Instance, towards_radar: Array) -> float:
+def cross_section_m2(target: Target, instance: scene.Instance, towards_radar: Array) -> float:
     """Mean RCS [m^2] of a road user seen from a direction (unit, world)."""
     x, y, _ = instance.T_world_instance.inverse().rotate(towards_radar)
     level2 = float(x * x + y * y)
@@ -216,7 +214,7 @@ def cross_section_m2(target: Target, instance: Instance, towards_radar: Array) -
     return float(10.0 ** (0.1 * (target.mean_dbsm + target.swing_db * fourfold)))
 
 
-def silhouette_m2(instance: Instance, towards_radar: Array) -> float:
+def silhouette_m2(instance: scene.Instance, towards_radar: Array) -> float:
     """Area [m^2] of a box's silhouette seen from a direction (unit, world)."""
     a, b, c = np.subtract(instance.box_max_m, instance.box_min_m)
     x, y, z = np.abs(instance.T_world_instance.inverse().rotate(towards_radar))
@@ -230,5 +228,5 @@ def area_factor(category: str, surface: NDArray[np.uint8]) -> Array:
     """
     if category in METAL:
         return np.full(len(surface), 10.0 ** (0.1 * METAL_DB))
-    table = np.array([GAMMA_DB[name] for name in SURFACES])
+    table = np.array([GAMMA_DB[name] for name in asset_types.SURFACES])
     return np.asarray(10.0 ** (0.1 * table[surface]))

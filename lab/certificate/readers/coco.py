@@ -7,16 +7,11 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from gen_data.lab.certificate.labelled_images import (
-    LabelledImage,
-    LabelledObject,
-    Loaded,
-    digest_pixels,
-)
+from gen_data.lab.certificate import labelled_images
 from gen_data.runner.stored import StoredSamples
 
 
-def load_coco(root: Path, stored: StoredSamples) -> Loaded:
+def load_coco(root: Path, stored: StoredSamples) -> labelled_images.Loaded:
     """Read the instances and pictures of every split."""
     from pycocotools.coco import COCO
 
@@ -33,10 +28,12 @@ def load_coco(root: Path, stored: StoredSamples) -> Loaded:
                 x, y, width, height = item["bbox"]
                 mask = coco.annToRLE(item) if item["segmentation"] else None
                 box = (x, y, x + width, y + height)
-                objects.append(LabelledObject(names[item["category_id"]], box, mask))
+                objects.append(
+                    labelled_images.LabelledObject(names[item["category_id"]], box, mask)
+                )
             split, size_px = path.stem.removeprefix("instances_"), (row["width"], row["height"])
             images.append(
-                LabelledImage(
+                labelled_images.LabelledImage(
                     row["sample"],
                     row["sensor"],
                     split,
@@ -45,9 +42,9 @@ def load_coco(root: Path, stored: StoredSamples) -> Loaded:
                     _digest_picture(root / split / row["file_name"]),
                 )
             )
-    return Loaded(images, {"files": len(paths)})
+    return labelled_images.Loaded(images, {"files": len(paths)})
 
 
 def _digest_picture(path: Path) -> str:
     with Image.open(path) as image:
-        return digest_pixels(np.asarray(image.convert("RGB")))
+        return labelled_images.digest_pixels(np.asarray(image.convert("RGB")))

@@ -5,16 +5,11 @@ from pathlib import Path
 import numpy as np
 
 from gen_data.core.temporary_folders import temporary_folder
-from gen_data.lab.certificate.labelled_images import (
-    LabelledImage,
-    LabelledObject,
-    Loaded,
-    digest_pixels,
-)
+from gen_data.lab.certificate import labelled_images
 from gen_data.runner.stored import StoredSamples
 
 
-def load_huggingface(root: Path, stored: StoredSamples) -> Loaded:
+def load_huggingface(root: Path, stored: StoredSamples) -> labelled_images.Loaded:
     """Read every split by the card of the data set; images are decoded."""
     import datasets
 
@@ -32,12 +27,14 @@ def load_huggingface(root: Path, stored: StoredSamples) -> Loaded:
                     box = (x, y, x + width, y + height)
                     runs = things["rle"] and things["rle"][k]
                     mask = {"size": [size_px[1], size_px[0]], "counts": runs} if runs else None
-                    objects.append(LabelledObject(names[things["category"][k]], box, mask))
-                pixels = digest_pixels(np.asarray(row["image"].convert("RGB")))
-                image = LabelledImage(
+                    objects.append(
+                        labelled_images.LabelledObject(names[things["category"][k]], box, mask)
+                    )
+                pixels = labelled_images.digest_pixels(np.asarray(row["image"].convert("RGB")))
+                image = labelled_images.LabelledImage(
                     row["sample"], row["sensor"], split, size_px, tuple(objects), pixels
                 )
                 images.append(image)
                 if row["image"].size != size_px:
                     raise ValueError(f"{image}: its picture has {row['image'].size} px")
-    return Loaded(images)
+    return labelled_images.Loaded(images)

@@ -7,19 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from gen_data.lab.certificate.labelled_images import (
-    LabelledImage,
-    LabelledObject,
-    Loaded,
-    digest_pixels,
-)
+from gen_data.lab.certificate import labelled_images
 from gen_data.runner.stored import StoredSamples
 
 
-def load_webdataset(root: Path, stored: StoredSamples) -> Loaded:
+def load_webdataset(root: Path, stored: StoredSamples) -> labelled_images.Loaded:
     """Read all tar files of every split; images are decoded."""
     del stored
-    images: list[LabelledImage] = []
+    images: list[labelled_images.LabelledImage] = []
     tars = 0
     for folder in sorted(path for path in root.iterdir() if path.is_dir()):
         paths = sorted(folder.glob("*.tar"))
@@ -31,7 +26,7 @@ def load_webdataset(root: Path, stored: StoredSamples) -> Loaded:
                 for camera, row in labels["cameras"].items()
                 if (photograph := _find_photograph(sample, camera)) is not None
             )
-    return Loaded(images, {"files": tars})
+    return labelled_images.Loaded(images, {"files": tars})
 
 
 def _samples(paths: list[Path]) -> Iterator[Mapping[str, Any]]:
@@ -52,13 +47,15 @@ def _find_photograph(sample: Mapping[str, Any], camera: str) -> Any:
 
 def _image(
     index: int, camera: str, split: str, row: Mapping[str, Any], photograph: Any
-) -> LabelledImage:
+) -> labelled_images.LabelledImage:
     objects = []
     for item in row["annotations"]:
         x, y, width, height = item["bbox"]
         box = (x, y, x + width, y + height)
-        objects.append(LabelledObject(item["category"], box, item["segmentation"] or None))
-    pixels = digest_pixels(np.asarray(photograph.convert("RGB")))
-    return LabelledImage(
+        objects.append(
+            labelled_images.LabelledObject(item["category"], box, item["segmentation"] or None)
+        )
+    pixels = labelled_images.digest_pixels(np.asarray(photograph.convert("RGB")))
+    return labelled_images.LabelledImage(
         index, camera, split, (row["width"], row["height"]), tuple(objects), pixels
     )

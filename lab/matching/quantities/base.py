@@ -8,9 +8,7 @@ from typing import Any
 
 from gen_data.assemble.config import Config
 from gen_data.core.streams import Streams
-from gen_data.lab.matching.indirect_inference import Axis
-from gen_data.lab.matching.picture import Picture
-from gen_data.lab.matching.recordings import ImageLabels, Scan
+from gen_data.lab.matching import indirect_inference, picture, recordings
 from gen_data.sensors.camera.image_pipeline import ImagePipeline
 from gen_data.sensors.lidar.lidar_sensor import LidarSensor
 
@@ -43,11 +41,11 @@ class CameraQuantity:
     unit: str
     statistic: str
     path: str
-    measure: Callable[[Picture], float]
+    measure: Callable[[picture.Picture], float]
     start: Callable[[ImagePipeline], float]
     apply: Callable[[ImagePipeline, float], ImagePipeline]
     fields: Callable[[Any], Mapping[str, Any]]
-    axis: Axis
+    axis: indirect_inference.Axis
     to_value: Coordinate = identity
 
 
@@ -59,10 +57,10 @@ class LidarQuantity:
     unit: str
     statistic: str
     path: str
-    measure: Callable[[Scan], float]
+    measure: Callable[[recordings.Scan], float]
     start: Callable[[LidarSensor], float]
     apply: Callable[[LidarSensor, float], LidarSensor]
-    axis: Axis
+    axis: indirect_inference.Axis
     to_value: Coordinate = identity
 
     @property
@@ -85,10 +83,10 @@ class LabelQuantity:
     name: str
     unit: str
     statistic: str
-    measure: Callable[[ImageLabels], float]
+    measure: Callable[[recordings.ImageLabels], float]
     slope: Callable[[float], float]
     change: Callable[[Config, str, float], FieldChange]
-    axis: Axis
+    axis: indirect_inference.Axis
     to_value: Coordinate = identity
 
 

@@ -9,19 +9,18 @@ import math
 import numpy as np
 
 from gen_data.assemble.config import Config
-from gen_data.lab.matching.indirect_inference import Axis
+from gen_data.lab.matching import indirect_inference, recordings
 from gen_data.lab.matching.quantities.base import (
     FieldChange,
     LabelQuantity,
     NoParameter,
     map_numbers,
 )
-from gen_data.lab.matching.recordings import ImageLabels
 from gen_data.randomizers.camera_on_lane import CameraOnLane
 from gen_data.sensors.mounting import Mounted
 
 
-def measure(labels: ImageLabels) -> float:
+def measure(labels: recordings.ImageLabels) -> float:
     """Mean centre below the middle, in heights of the image; NaN without boxes."""
     if not labels.boxes:
         return float("nan")
@@ -54,5 +53,5 @@ def _slope(focal_heights: float) -> float:
 BOX_POSITIONS = LabelQuantity(
     "box positions", "degrees", "mean height of the centres of boxes",
     measure, _slope, _change,
-    Axis(-20.0, 20.0, step=1.0, plausible=5.0, enough=0.5, varies=False),
+    indirect_inference.Axis(-20.0, 20.0, step=1.0, plausible=5.0, enough=0.5, varies=False),
 )  # fmt: skip

@@ -10,18 +10,17 @@ import numpy as np
 
 from gen_data.assemble.config import Config
 from gen_data.config.distributions import Distribution
-from gen_data.lab.matching.indirect_inference import Axis
+from gen_data.lab.matching import indirect_inference, recordings
 from gen_data.lab.matching.quantities.base import (
     FieldChange,
     LabelQuantity,
     NoParameter,
     map_numbers,
 )
-from gen_data.lab.matching.recordings import ImageLabels
 from gen_data.randomizers.camera_pose import CameraPose
 
 
-def measure(labels: ImageLabels) -> float:
+def measure(labels: recordings.ImageLabels) -> float:
     """Mean logarithm, base 2, of the square root of the share of the image; NaN without boxes."""
     pixels = labels.width_px * labels.height_px
     areas = np.array([width * height for *_, width, height in labels.boxes if width * height > 0])
@@ -59,6 +58,6 @@ def to_factor(coordinate: float) -> float:
 BOX_SIZES = LabelQuantity(
     "box sizes", "factor", "mean log2 of the size of boxes over that of the image",
     measure, _slope, _change,
-    Axis(-3.0, 3.0, step=0.25, plausible=1.0, enough=0.15, varies=False),
+    indirect_inference.Axis(-3.0, 3.0, step=0.25, plausible=1.0, enough=0.15, varies=False),
     to_value=to_factor,
 )  # fmt: skip

@@ -3,16 +3,15 @@
 Statistic: the share of the points of a sweep whose intensity is 0.
 """
 
-from gen_data.lab.matching.indirect_inference import Axis
+from gen_data.lab.matching import indirect_inference, recordings
 from gen_data.lab.matching.quantities.base import LidarQuantity, identity, round_digits, with_model
-from gen_data.lab.matching.recordings import Scan
 from gen_data.sensors.lidar.lidar_sensor import LidarSensor
 
 LEAST = 0.1
 """Smallest signal at which the search begins: one below all surfaces shows in no scan."""
 
 
-def measure(scan: Scan) -> float:
+def measure(scan: recordings.Scan) -> float:
     """Share of the points with intensity 0."""
     return float((scan.intensity <= 0.0).mean())
 
@@ -32,6 +31,6 @@ def _apply(sensor: LidarSensor, dark: float) -> LidarSensor:
 DARK_RETURNS = LidarQuantity(
     "dark returns", "signal that reads 0", "share of points with intensity 0",
     "model.response.dark", measure, _start, _apply,
-    Axis(0.0, 1.0, step=0.05, plausible=0.3, enough=0.03, varies=False),
+    indirect_inference.Axis(0.0, 1.0, step=0.05, plausible=0.3, enough=0.03, varies=False),
     to_value=identity,
 )  # fmt: skip

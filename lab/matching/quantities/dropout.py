@@ -6,13 +6,12 @@ are lost first.
 
 import math
 
-from gen_data.lab.matching.indirect_inference import Axis
+from gen_data.lab.matching import indirect_inference, recordings
 from gen_data.lab.matching.quantities.base import LidarQuantity, round_digits
-from gen_data.lab.matching.recordings import Scan
 from gen_data.sensors.lidar.lidar_sensor import LidarSensor
 
 
-def measure(scan: Scan) -> float:
+def measure(scan: recordings.Scan) -> float:
     """Logarithm, base 2, of the number of points."""
     return math.log2(len(scan.range_m))
 
@@ -32,6 +31,6 @@ def to_transmittance(coordinate: float) -> float:
 
 DROPOUT = LidarQuantity(
     "dropout", "transmittance", "log2 of points per sweep", "window", measure, _start, _apply,
-    Axis(-4.0, 0.0, step=0.25, plausible=1.0, enough=0.05, varies=False),
+    indirect_inference.Axis(-4.0, 0.0, step=0.25, plausible=1.0, enough=0.05, varies=False),
     to_value=to_transmittance,
 )  # fmt: skip

@@ -16,15 +16,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.core.asset_types import Float32
-from gen_data.core.se3 import Array
-from gen_data.lab.matching.indirect_inference import Axis
+from gen_data.core import asset_types, se3
+from gen_data.lab.matching import indirect_inference, recordings
 from gen_data.lab.matching.picture import Picture
-from gen_data.lab.matching.recordings import Photo
 
 NAME, UNIT, PATH = "JPEG quality", "libjpeg", "image_pipeline.jpeg_quality"
 STATISTIC = "quantisation steps of the file, or of the coefficients of its blocks"
-AXIS = Axis(1.0, 100.0, step=1.0, plausible=20.0, enough=2.0)
+AXIS = indirect_inference.Axis(1.0, 100.0, step=1.0, plausible=20.0, enough=2.0)
 _STEPS = np.array([
     16, 11, 10, 16, 24, 40, 51, 61, 12, 12, 14, 19, 26, 58, 60, 55, 14, 13, 16, 24, 40, 57, 69, 56,
     14, 17, 22, 29, 51, 87, 80, 62, 18, 22, 37, 56, 68, 109, 103, 77, 24, 35, 55, 64, 81, 104, 113,
@@ -45,7 +43,7 @@ EVIDENCE = 0.15
 """Mean log-likelihood per coefficient, above that of no compression, that counts as found."""
 
 
-def measure(photo: Photo) -> float:
+def measure(photo: recordings.Photo) -> float:
     """Quality of the last compression; NaN if none is found."""
     if photo.quantisation is not None:
         return table_quality(photo.quantisation)
@@ -65,7 +63,7 @@ def table_quality(steps: NDArray[Any]) -> float:
 
 
 @cache
-def _tables() -> tuple[Array, ...]:
+def _tables() -> tuple[se3.Array, ...]:
     """Luma steps of the qualities 1 to 100, [8, 8] each."""
     made = []
     for quality in range(1, 101):
@@ -95,7 +93,7 @@ def pixel_quality(picture: Picture) -> float:
     return float(QUALITIES[best]) if scores[best] > EVIDENCE else float("nan")
 
 
-def _coefficients(grey: Float32) -> Float32:
+def _coefficients(grey: asset_types.Float32) -> asset_types.Float32:
     """Discrete cosine transform of at most ``BLOCKS_MAX`` blocks, spread evenly, [n, 8, 8]."""
     rows, columns = (side // 8 for side in grey.shape)
     blocks = grey[: 8 * rows, : 8 * columns].reshape(rows, 8, columns, 8).swapaxes(1, 2)
@@ -105,7 +103,7 @@ def _coefficients(grey: Float32) -> Float32:
     return np.asarray(basis @ blocks @ basis.T, np.float32)
 
 
-def distribution(qualities: Array) -> Any:
+def distribution(qualities: se3.Array) -> Any:
     """YAML for qualities found in pictures, [n]: a number, a choice, or a uniform range."""
     values, counts = np.unique(np.rint(qualities).astype(int), return_counts=True)
     if len(values) == 1:

@@ -7,15 +7,14 @@ import math
 
 import numpy as np
 
-from gen_data.lab.matching.indirect_inference import Axis
+from gen_data.lab.matching import indirect_inference, recordings
 from gen_data.lab.matching.quantities.base import LidarQuantity, round_digits, with_model
-from gen_data.lab.matching.recordings import Scan
 from gen_data.sensors.lidar.lidar_sensor import LidarSensor
 
 SHARE = 99.9
 
 
-def measure(scan: Scan) -> float:
+def measure(scan: recordings.Scan) -> float:
     """Logarithm, base 2, of the range that 99.9 % of the points are within."""
     return float(np.log2(max(float(np.percentile(scan.range_m, SHARE)), 1e-3)))
 
@@ -39,6 +38,6 @@ def to_range_m(coordinate: float) -> float:
 RANGE = LidarQuantity(
     "range", "m", "log2 of the range of 99.9 % of the points", "model.range_m",
     measure, _start, _apply,
-    Axis(0.0, 10.0, step=0.1, plausible=1.0, enough=0.05, varies=False),
+    indirect_inference.Axis(0.0, 10.0, step=0.1, plausible=1.0, enough=0.05, varies=False),
     to_value=to_range_m,
 )  # fmt: skip

@@ -8,13 +8,12 @@ import math
 
 import numpy as np
 
-from gen_data.lab.matching.indirect_inference import Axis
+from gen_data.lab.matching import indirect_inference, recordings
 from gen_data.lab.matching.quantities.base import LidarQuantity, round_digits, with_model
-from gen_data.lab.matching.recordings import Scan
 from gen_data.sensors.lidar.lidar_sensor import LidarSensor
 
 
-def measure(scan: Scan) -> float:
+def measure(scan: recordings.Scan) -> float:
     """Logarithm, base 2, of the interquartile mean of intensities; NaN if all are 0."""
     lit = np.sort(scan.intensity[scan.intensity > 0.0])
     middle = lit[len(lit) // 4 : len(lit) - len(lit) // 4]
@@ -37,6 +36,6 @@ def to_intensity(coordinate: float) -> float:
 REFLECTANCE = LidarQuantity(
     "reflectance gain", "intensity of white", "log2 of mean intensity of the middle half",
     "model.white_intensity", measure, _start, _apply,
-    Axis(-7.0, 0.0, step=0.3, plausible=1.5, enough=0.1, varies=False),
+    indirect_inference.Axis(-7.0, 0.0, step=0.3, plausible=1.5, enough=0.1, varies=False),
     to_value=to_intensity,
 )  # fmt: skip

@@ -16,11 +16,10 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from gen_data.core import intrinsics, streams
 from gen_data.core.colorimetry import MIDDLE_GREY, luminance
-from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.scene import Camera, Weather
 from gen_data.core.se3 import SE3, Array
-from gen_data.core.streams import Rng, Streams
 from gen_data.renderers.warp.atmosphere.kernels import precipitation
 from gen_data.renderers.warp.visibility.frame_context import CameraView
 
@@ -162,7 +161,7 @@ def _draw_particles(
 ) -> tuple[Array, Array, Array, Array]:
     """Uniform numbers [5, n], distances, diameters and motion in the camera frame [n, 3]."""
     T = camera.T_world_camera
-    rng = Streams(seed=weather.seed, scene=0).rng(
+    rng = streams.Streams(seed=weather.seed, scene=0).rng(
         f"{name} {camera.name} {T.translation_m} {T.quaternion_wxyz}"
     )
     u = rng.random((5, min(poisson(expected, rng), count_max)))
@@ -226,7 +225,7 @@ def trace_through_lens(
     return _streak_records(T, ends[kept], p[kept], range_m[kept], diameter_m[kept], px_per_rad)
 
 
-def _rim_cosine(k: Intrinsics) -> float:
+def _rim_cosine(k: intrinsics.Intrinsics) -> float:
     """Cosine of the widest angle to the axis in the image; -1 if its corners are dark."""
     u, v = (np.linspace(0.0, size, 65) for size in (k.width_px, k.height_px))
     sides = [np.stack(np.broadcast_arrays(u, end), axis=-1) for end in (0.0, float(k.height_px))]
@@ -235,7 +234,7 @@ def _rim_cosine(k: Intrinsics) -> float:
     return -1.0 if np.isnan(cosines).any() else float(max(cosines.min() - 1e-3, -1.0))
 
 
-def _px_per_rad(k: Intrinsics, places_px: Array) -> Array:
+def _px_per_rad(k: intrinsics.Intrinsics, places_px: Array) -> Array:
     """Side in pixels of the image of a small square angle, per radian, [n]."""
     right, below = np.array([0.5, 0.0]), np.array([0.0, 0.5])
     across = k.rays(places_px + right) - k.rays(places_px - right)
@@ -246,7 +245,7 @@ def _px_per_rad(k: Intrinsics, places_px: Array) -> Array:
     return np.asarray(1.0 / np.maximum(angles, 0.05 * usual))
 
 
-def poisson(expected: float, rng: Rng) -> int:
+def poisson(expected: float, rng: streams.Rng) -> int:
     """A Poisson-distributed number, by the normal limit for large means."""
     if expected > 64.0:
         u1, u2 = (float(v) for v in rng.random(2))
@@ -261,7 +260,7 @@ def poisson(expected: float, rng: Rng) -> int:
 
 def _velocity(name: str, diameter_m: Array, u: Array, seed: int) -> Array:
     """World velocities [m/s], [n, 3]: fall, and drift with the wind."""
-    wind = Streams(seed=seed, scene=0).rng("wind").random(2)
+    wind = streams.Streams(seed=seed, scene=0).rng("wind").random(2)
     angle, gust = 2.0 * math.pi * wind[0], 3.0 * wind[1]
     drift = gust * (0.8 + 0.4 * u)
     if name == "rain":

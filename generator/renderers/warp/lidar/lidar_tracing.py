@@ -16,21 +16,18 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from gen_data.core.asset_types import SURFACES
+from gen_data.core import asset_types, intrinsics, se3
 from gen_data.core.capture import LidarHits, LidarRays, SecondaryHits
-from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.motion import interpolate_poses
 from gen_data.core.scene import Body, Camera, Lidar, Scene
-from gen_data.core.se3 import Array
 from gen_data.renderers.warp.atmosphere.weather import ground_record
 from gen_data.renderers.warp.device import launch
 from gen_data.renderers.warp.lidar.infrared_materials import infrared_surfaces
 from gen_data.renderers.warp.lidar.kernels import lidar_rays as kernels
 from gen_data.renderers.warp.lidar.kernels.ray_packets import LISTED_MAX, Boxes
 from gen_data.renderers.warp.readback import Readback
-from gen_data.renderers.warp.scene.bvh import group_boxes
+from gen_data.renderers.warp.scene import bvh, material_packing
 from gen_data.renderers.warp.scene.device_cache import DeviceCache
-from gen_data.renderers.warp.scene.material_packing import BodyMaterials, body_materials
 from gen_data.renderers.warp.scene.scene_packing import PackedWorld, pack_world
 from gen_data.renderers.warp.visibility.label_images import category_ids
 
@@ -47,8 +44,8 @@ class Mover:
 
     number: int
     body: Body
-    R_world_mesh: Array
-    t_world_mesh: Array
+    R_world_mesh: se3.Array
+    t_world_mesh: se3.Array
 
 
 def pack_moving_bodies(
@@ -154,7 +151,7 @@ class HitLabels:
     surfaces: NDArray[np.uint8]
 
     @classmethod
-    def of(cls, scene: Scene, per_body: Sequence[BodyMaterials]) -> HitLabels:
+    def of(cls, scene: Scene, per_body: Sequence[material_packing.BodyMaterials]) -> HitLabels:
         """Tables of a scene with the given materials of its bodies."""
         instances = [0, *(body.instance_id for body in scene.bodies)]
         nothing = np.zeros(1, np.uint8)
@@ -232,7 +229,7 @@ def trace_secondary(
     instances, categories, surfaces = labels.at(hits[there])
     mirrored = there[: len(panes)].sum()
     instances[mirrored:], categories[mirrored:] = 0, 0
-    surfaces[mirrored:] = SURFACES.index("mirrored")
+    surfaces[mirrored:] = asset_types.SURFACES.index("mirrored")
     rays = selected[there].astype(np.int64)
     return SecondaryHits(
         rays, ranges_m[there], reflectances[there], instances, categories, surfaces
@@ -268,10 +265,10 @@ RUN_CUDA, THREADS_CUDA = 32, 16384
 
 def trace_scan(scene: Scene, lidar: Lidar, beams: LidarRays, cache: DeviceCache) -> LidarHits:
     """First hits of all beams' rays, and secondary hits of some."""
-    eye = Camera(lidar.name, lidar.T_world_lidar, Intrinsics(1, 1, 1.0, 1.0, 0.5, 0.5))
+    eye = Camera(lidar.name, lidar.T_world_lidar, intrinsics.Intrinsics(1, 1, 1.0, 1.0, 0.5, 0.5))
     world, motion = pack_moving_bodies(scene, lidar, beams, pack_world(scene, eye, cache), cache)
     world.record.ground = ground_record(scene.weather)
-    per_body = body_materials(scene.bodies, cache)
+    per_body = material_packing.body_materials(scene.bodies, cache)
     device = cache.device
     shape = (len(beams.directions), beams.subrays)
     count = shape[0] * shape[1]
@@ -312,7 +309,7 @@ def _boxes(world: PackedWorld, threads: int, cache: DeviceCache) -> Boxes:
     boxes = Boxes()
     boxes.lows_m, boxes.highs_m = world.lows_m, world.highs_m
     low_m, high_m = (np.ascontiguousarray(world.body_records[k]) for k in ("low_m", "high_m"))
-    boxes.groups = cache.latest("box groups", group_boxes(low_m, high_m), float)
+    boxes.groups = cache.latest("box groups", bvh.group_boxes(low_m, high_m), float)
     shape = (threads, int(LISTED_MAX))
     boxes.listed = cache.scratch("listed bodies", shape, int)
     boxes.enters_m = cache.scratch("listed distances", shape, float)

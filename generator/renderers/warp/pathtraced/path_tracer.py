@@ -10,21 +10,15 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from gen_data.core import bounded_cache, distribution, errors, se3, streams
 from gen_data.core.asset_types import Float32
-from gen_data.core.bounded_cache import ByteCache
 from gen_data.core.colorimetry import luminance
-from gen_data.core.distribution import install_command
-from gen_data.core.errors import ConfigError
 from gen_data.core.scene import Camera, Scene
-from gen_data.core.se3 import Array
-from gen_data.core.streams import Streams
 from gen_data.renderers.warp.atmosphere.weather import fill_fog, ground_record
 from gen_data.renderers.warp.device import launch
-from gen_data.renderers.warp.pathtraced.kernels import integrator
-from gen_data.renderers.warp.pathtraced.kernels.emitters import SkyTable
+from gen_data.renderers.warp.pathtraced.kernels import emitters, integrator
 from gen_data.renderers.warp.realtime.realtime_shading import darken_outside
-from gen_data.renderers.warp.scene.brdf_albedo_lut import smith_albedo
-from gen_data.renderers.warp.scene.device_cache import DeviceCache
+from gen_data.renderers.warp.scene import brdf_albedo_lut, device_cache
 from gen_data.renderers.warp.scene.environment_maps import irradiance_coefficients
 from gen_data.renderers.warp.scene.kernels import records
 from gen_data.renderers.warp.scene.scene_packing import PackedWorld, lamp_records
@@ -41,9 +35,9 @@ def require_denoiser() -> None:
     try:
         import pyoidn  # noqa: F401
     except ImportError as error:
-        raise ConfigError(
+        raise errors.ConfigError(
             f"render.denoise needs the package 'pyoidn', which cannot be loaded ({error}). "
-            f"Install it with: {install_command('denoise')}, or switch it off."
+            f"Install it with: {distribution.install_command('denoise')}, or switch it off."
         ) from error
 
 
@@ -77,7 +71,7 @@ def denoise(light: Float32, albedo: Float32, normal: Float32) -> Float32:
             chosen.execute()
         fault = device.get_error()
     if fault is not None:
-        raise ConfigError(f"render.denoise: Open Image Denoise reports: {fault}")
+        raise errors.ConfigError(f"render.denoise: Open Image Denoise reports: {fault}")
     return np.asarray(result * np.float32(1.0 / scale))
 
 
@@ -92,7 +86,7 @@ _IRRADIANCE_SIZE = (64, 32)
 class _SkyLight:
     """An environment for the path tracer: its table, and its irradiance as of EnvironmentRecord."""
 
-    table: SkyTable
+    table: emitters.SkyTable
     irradiance: wp.array
     nbytes: int
 
@@ -105,13 +99,13 @@ class PathTracer:
         settings: Settings of the renderer.
     """
 
-    def __init__(self, cache: DeviceCache, settings: RenderSettings) -> None:
+    def __init__(self, cache: device_cache.DeviceCache, settings: RenderSettings) -> None:
         self._cache = cache
         self._settings = settings
         if settings.denoise:
             require_denoiser()
-        self._lobes = wp.array(smith_albedo(), dtype=wp.vec2, device=cache.device)
-        self._skies: ByteCache[_SkyLight] = ByteCache(_TABLE_BYTES)
+        self._lobes = wp.array(brdf_albedo_lut.smith_albedo(), dtype=wp.vec2, device=cache.device)
+        self._skies: bounded_cache.ByteCache[_SkyLight] = bounded_cache.ByteCache(_TABLE_BYTES)
 
     def light(self, frame: CameraView) -> wp.array:
         """As ``radiance``, denoised and through fog, at the depths of the pixel centres."""
@@ -173,7 +167,7 @@ class PathTracer:
     def _budget(
         self, scene: Scene, camera: Camera, world: PackedWorld, seed: int, lights: int
     ) -> integrator.Budget:
-        rng = Streams(seed=seed, scene=0).rng(f"paths {camera.name} {scene.time_s!r}")
+        rng = streams.Streams(seed=seed, scene=0).rng(f"paths {camera.name} {scene.time_s!r}")
         surfaces = world.record.surfaces.numpy()
         budget = integrator.Budget()
         budget.whole = self._settings.samples
@@ -191,7 +185,7 @@ class PathTracer:
             device = self._cache.device
             image = self._cache.assets.environment(environment_id)
             part, rows, columns = sky_shares(image, whole=whole)
-            table = SkyTable()
+            table = emitters.SkyTable()
             table.part = part
             table.rows = wp.array(rows, dtype=float, device=device)
             table.columns = wp.array(columns, dtype=float, device=device)
@@ -233,7 +227,7 @@ def sky_shares(image: Float32, *, whole: bool) -> tuple[float, Float32, Float32]
     return part, _cumulate(taken.sum(axis=1)), _cumulate(taken)
 
 
-def _mean_of_texels(values: Array) -> Array:
+def _mean_of_texels(values: se3.Array) -> se3.Array:
     """Means of the bilinear interpolation over each texel; columns wrap around."""
     beside = np.roll(values, 1, axis=1) + np.roll(values, -1, axis=1)
     values = 0.75 * values + 0.125 * beside
@@ -241,7 +235,7 @@ def _mean_of_texels(values: Array) -> Array:
     return np.asarray(0.75 * values + 0.125 * (padded[:-2] + padded[2:]))
 
 
-def _cumulate(light: Array) -> NDArray[np.float32]:
+def _cumulate(light: se3.Array) -> NDArray[np.float32]:
     """Cumulative shares at each edge along the last axis; uniform where there is no light."""
     total = light.sum(axis=-1, keepdims=True)
     share = np.where(total > 0.0, light / np.maximum(total, 1e-300), 1.0 / light.shape[-1])

@@ -14,14 +14,8 @@ from gen_data.core.colorimetry import luminance
 from gen_data.core.scene import LIGHT_KINDS, PANEL_KINDS, Environment, Light, Scene
 from gen_data.core.se3 import Array
 from gen_data.renderers.warp.realtime.kernels.soft_shadows import count_free_paths
-from gen_data.renderers.warp.scene.environment_maps import SkyLamp
+from gen_data.renderers.warp.scene import environment_maps, scene_packing
 from gen_data.renderers.warp.scene.kernels import analytic_lights, records
-from gen_data.renderers.warp.scene.scene_packing import (
-    PackedWorld,
-    copy_world,
-    lamp_records,
-    sky_record,
-)
 from gen_data.renderers.warp.scene.struct_dtypes import take_rows, to_device
 from gen_data.renderers.warp.visibility.frame_context import CameraView
 from gen_data.renderers.warp.visibility.gbuffer import GBuffer
@@ -140,7 +134,7 @@ _SHARE = 0.1
 _FAR_M = 1e3
 
 
-def extract_sky_lights(frame: CameraView) -> PackedWorld:
+def extract_sky_lights(frame: CameraView) -> scene_packing.PackedWorld:
     """The world with lamps for the brightest parts of its panorama.
 
     Unchanged if the scene has a sun, which its panorama then lacks; if walls block the panorama,
@@ -160,17 +154,17 @@ def extract_sky_lights(frame: CameraView) -> PackedWorld:
     towards = np.array([np.negative(sun.direction) for sun in suns])
     if not _is_open(frame, points, towards):
         return world
-    lit = copy_world(world)
-    lit.record.sky = sky_record(environment, split)
-    added = lamp_records(suns)
+    lit = scene_packing.copy_world(world)
+    lit.record.sky = scene_packing.sky_record(environment, split)
+    added = scene_packing.lamp_records(suns)
     # Reflected rays hit them in the panorama itself.
     added["shown"] = 1
-    lamps = np.concatenate([lamp_records(scene.lights), added])
+    lamps = np.concatenate([scene_packing.lamp_records(scene.lights), added])
     lit.record.lamps = to_device(lamps, records.LightRecord, cache.device)
     return lit
 
 
-def _sun(lamp: SkyLamp, environment: Environment) -> Light:
+def _sun(lamp: environment_maps.SkyLamp, environment: Environment) -> Light:
     """The lamp as a light in the world."""
     x, y, z = lamp.towards
     c, s = math.cos(environment.yaw_rad), math.sin(environment.yaw_rad)
@@ -187,7 +181,7 @@ def _sun(lamp: SkyLamp, environment: Environment) -> Light:
     )
 
 
-def _is_significant(lamp: SkyLamp, scene: Scene) -> bool:
+def _is_significant(lamp: environment_maps.SkyLamp, scene: Scene) -> bool:
     """Whether a part of the panorama contributes noticeably to the light at the focus."""
     lux = float(luminance(np.asarray(lamp.power))) * scene.environment.luminance_cd_m2
     others = sum(

@@ -15,8 +15,7 @@ import warp as wp
 from gen_data.core.asset_types import Float32
 from gen_data.core.interfaces import Tones
 from gen_data.core.se3 import Array
-from gen_data.renderers.warp.atmosphere.precipitation import draw_precipitation
-from gen_data.renderers.warp.atmosphere.weather import expose_ground, fill_air
+from gen_data.renderers.warp.atmosphere import precipitation, weather
 from gen_data.renderers.warp.device import launch
 from gen_data.renderers.warp.realtime.kernels import (
     lattice_interpolation,
@@ -28,13 +27,13 @@ from gen_data.renderers.warp.realtime.light_selection import extract_sky_lights,
 from gen_data.renderers.warp.scene.kernels import distortion, ray_queries, records
 from gen_data.renderers.warp.scene.kernels.lattice import Lattice, sample_lattice
 from gen_data.renderers.warp.scene.struct_dtypes import take_rows
+from gen_data.renderers.warp.visibility import gbuffer, plates
 from gen_data.renderers.warp.visibility.frame_context import (
     CameraState,
     CameraView,
     RenderContext,
     render_view,
 )
-from gen_data.renderers.warp.visibility.gbuffer import GBuffer
 from gen_data.renderers.warp.visibility.kernels import edge_antialiasing, rasterizer
 from gen_data.renderers.warp.visibility.kernels import msaa as mixing
 from gen_data.renderers.warp.visibility.kernels.edge_detection import (
@@ -43,14 +42,6 @@ from gen_data.renderers.warp.visibility.kernels.edge_detection import (
     write_mixed,
 )
 from gen_data.renderers.warp.visibility.multisampling import draw_samples
-from gen_data.renderers.warp.visibility.plates import (
-    cover_by_foreground,
-    mix_photo,
-    restore_photo,
-    show_photo,
-    things_in,
-    without_things,
-)
 
 _PARTS = 2
 """Positions of further samples of pixels on edges in reflections or behind glass."""
@@ -100,15 +91,15 @@ def shade_pixels(frame: CameraView) -> Shading:
     if backdrop is None:
         return shading
     if frame.context.paths is None:
-        show_photo(frame, backdrop, shading.radiance)
+        plates.show_photo(frame, backdrop, shading.radiance)
     else:
-        mix_photo(frame, backdrop, _coverage(frame), shading.radiance)
+        plates.mix_photo(frame, backdrop, _coverage(frame), shading.radiance)
     return shading
 
 
 def render_bare_ground(state: CameraState, context: RenderContext) -> wp.array:
     """Radiance of the ground of a photograph without the things on it, flat."""
-    bare = CameraState.of(without_things(state.scene), state.camera)
+    bare = CameraState.of(plates.without_things(state.scene), state.camera)
     frame = render_view(bare, replace(context, backdrop=None))
     return _copy(shade_pixels(frame).radiance)
 
@@ -121,10 +112,10 @@ def _shade_world(frame: CameraView) -> Shading:
         frame = replace(frame, world=extract_sky_lights(frame))
     keep_main_lamps(frame)
     lattice = make_lattice(frame)
-    expose_ground(frame, lattice)
+    weather.expose_ground(frame, lattice)
     around = find_light_visibility(frame, lattice)
     radiance = _shade(frame, lattice, around)
-    fill_air(frame, lattice, radiance)
+    weather.fill_air(frame, lattice, radiance)
     darken_outside(frame.view, radiance)
     return Shading(frame, radiance, lattice, around)
 
@@ -145,13 +136,13 @@ def smooth_edges(shading: Shading) -> None:
         else:
             _average_tones(shading, samples, find(radiance_image(radiance, frame.view)))
     if backdrop is not None and centres is not None:
-        restore_photo(frame, centres, radiance)
-        cover_by_foreground(frame, backdrop, radiance)
+        plates.restore_photo(frame, centres, radiance)
+        plates.cover_by_foreground(frame, backdrop, radiance)
 
 
 def _coverage(frame: CameraView) -> Float32:
     """Share of each pixel that is not background or a photograph's ground, float32 [h, w]."""
-    things = np.repeat(things_in(frame).reshape(-1, 1), 3, axis=1).astype(np.float32)
+    things = np.repeat(plates.things_in(frame).reshape(-1, 1), 3, axis=1).astype(np.float32)
     values = wp.array(things, dtype=wp.vec3, device=frame.cache.device)
     _average_samples(frame, values, max(frame.settings.antialias, _COVERAGE_SAMPLES))
     return np.ascontiguousarray(radiance_image(values, frame.view)[..., 0])
@@ -220,7 +211,7 @@ def _shade_thin(
     frame, cache, n = shading.frame, shading.frame.cache, shading.frame.pixels
     layers = cache.scratch("thin layers", (_THIN_LAYERS, n), wp.vec2i)
     radiance = cache.scratch("thin radiance", (_THIN_LAYERS, n), wp.vec3)
-    thin = GBuffer(
+    thin = gbuffer.GBuffer(
         cache.scratch("thin hits", n, wp.vec2i),
         cache.scratch("thin z", n, float),
         cache.scratch("thin weights", n, wp.vec2),
@@ -243,7 +234,7 @@ def _shade_thin(
 
 def add_precipitation(frame: CameraView, z_m: wp.array, radiance: wp.array) -> None:
     """Draw falling rain and snow in front of the surfaces, in place; depths as of GBuffer."""
-    if draw_precipitation(frame, z_m, radiance):
+    if precipitation.draw_precipitation(frame, z_m, radiance):
         darken_outside(frame.view, radiance)
 
 

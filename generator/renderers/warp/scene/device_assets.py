@@ -10,18 +10,13 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from gen_data.core import colorimetry
+from gen_data.core import code_digests, colorimetry, mapped_files, se3
 from gen_data.core.asset_types import Material, MeshData, TextureData, UInt8
-from gen_data.core.code_digests import code_digest
 from gen_data.core.colorimetry import srgb_decode
-from gen_data.core.mapped_files import owned_bytes
-from gen_data.core.se3 import Array
 from gen_data.renderers.warp.native_code import native
-from gen_data.renderers.warp.scene import bvh
+from gen_data.renderers.warp.scene import bvh, struct_dtypes
 from gen_data.renderers.warp.scene.bvh import face_boxes, group_boxes, mesh_tree
-from gen_data.renderers.warp.scene.kernels import bvh_build
-from gen_data.renderers.warp.scene.kernels.records import Geometry, TextureRecord
-from gen_data.renderers.warp.scene.struct_dtypes import struct_dtype
+from gen_data.renderers.warp.scene.kernels import bvh_build, records
 
 Arrays = dict[str, NDArray[Any]]
 
@@ -46,7 +41,7 @@ _CONVEXITY_FACES_MAX = 2000
 def arrays_version() -> str:
     """Everything but the asset that prepared arrays depend on: code and libraries."""
     modules = (__file__, bvh.__file__, bvh_build.__file__, colorimetry.__file__)
-    return code_digest(
+    return code_digests.code_digest(
         modules, native("scene/kernels/grow.h"), cv2.__version__, np.__version__, wp.__version__
     )
 
@@ -63,8 +58,8 @@ class DeviceMesh:
 
     record: NDArray[np.void]
     keep: tuple[object, ...]
-    low_m: Array
-    high_m: Array
+    low_m: se3.Array
+    high_m: se3.Array
     vertex_count: int
     materials: tuple[Material, ...]
     nbytes: int
@@ -108,7 +103,7 @@ def upload_mesh(data: MeshData, prepared: Arrays, device: wp.Device) -> DeviceMe
     fields: dict[str, object] = {name: array.field for name, array in arrays.items()}
     fields |= {"low_m": low, "high_m": high, "convex": prepared["convex"][0]}
     return DeviceMesh(
-        _make_record(Geometry, fields),
+        _make_record(records.Geometry, fields),
         tuple(array.held for array in arrays.values()),
         np.array(low),
         np.array(high),
@@ -141,7 +136,7 @@ def _upload(values: NDArray[Any], dtype: Any, device: wp.Device) -> _Uploaded:
     values = np.ascontiguousarray(values, _HOST_DTYPES[dtype])
     if device.is_cpu:
         held, address = values, values.__array_interface__["data"][0]
-        nbytes = owned_bytes(values)
+        nbytes = mapped_files.owned_bytes(values)
     else:
         held = wp.array(values, dtype=dtype, device=device)
         address, nbytes = held.ptr or 0, values.nbytes
@@ -152,7 +147,7 @@ def _upload(values: NDArray[Any], dtype: Any, device: wp.Device) -> _Uploaded:
 
 def _make_record(struct: Any, fields: Mapping[str, object]) -> NDArray[np.void]:
     """A record [1] of a Warp struct from the values of all its fields."""
-    dtype = struct_dtype(struct)
+    dtype = struct_dtypes.struct_dtype(struct)
     assert dtype.names is not None
     return np.array([tuple(fields[name] for name in dtype.names)], dtype)
 
@@ -273,7 +268,7 @@ def upload_texture(prepared: Arrays, device: wp.Device) -> DeviceTexture:
     if device.is_cpu:
         texels = wp.array(texels, dtype=wp.uint32, device=device, copy=False)
     return DeviceTexture(
-        _make_record(TextureRecord, fields),
+        _make_record(records.TextureRecord, fields),
         tuple(array.held for array in arrays.values()),
         texels,
         nbytes,

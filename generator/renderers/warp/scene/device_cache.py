@@ -8,28 +8,11 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from gen_data.core.asset_types import Material
+from gen_data.core import asset_types, interfaces, mapped_files
 from gen_data.core.bounded_cache import ByteCache, CountCache, ObjectCache
-from gen_data.core.interfaces import AssetLibrary, DerivedArrays
 from gen_data.core.intrinsics import Intrinsics
-from gen_data.core.mapped_files import PageLimiter
-from gen_data.renderers.warp.scene.brdf_albedo_lut import lobe_albedo
-from gen_data.renderers.warp.scene.device_assets import (
-    Arrays,
-    DeviceMesh,
-    DeviceTexture,
-    arrays_version,
-    prepare_mesh,
-    prepare_texture,
-    upload_mesh,
-    upload_texture,
-)
+from gen_data.renderers.warp.scene import brdf_albedo_lut, device_assets, environment_maps
 from gen_data.renderers.warp.scene.distortion_lut import DeviceOptics, upload_optics
-from gen_data.renderers.warp.scene.environment_maps import (
-    DeviceEnvironment,
-    upload_environment,
-    upload_split,
-)
 from gen_data.renderers.warp.scene.struct_dtypes import to_device
 
 _MESH_BYTES, _TEXTURE_BYTES = 176 << 20, 384 << 20
@@ -82,14 +65,14 @@ class DeviceCache:
         shares_memory: Whether the device is the CPU, so that nothing has to cross.
     """
 
-    def __init__(self, assets: AssetLibrary, device: wp.Device) -> None:
+    def __init__(self, assets: interfaces.AssetLibrary, device: wp.Device) -> None:
         self.assets = assets
         # Asked once: it takes as long as loading a small mesh.
-        self._store = assets if isinstance(assets, DerivedArrays) else None
+        self._store = assets if isinstance(assets, interfaces.DerivedArrays) else None
         self.device = device
         self.shares_memory = bool(device.is_cpu)
-        self.pages = PageLimiter()
-        self.lobes = wp.array(lobe_albedo(), dtype=wp.vec2, device=device)
+        self.pages = mapped_files.PageLimiter()
+        self.lobes = wp.array(brdf_albedo_lut.lobe_albedo(), dtype=wp.vec2, device=device)
         self.bodies: ObjectCache[Any] = ObjectCache(1)
         self.scenes: ObjectCache[Any] = ObjectCache(1)
         self.material_records: ObjectCache[Any] = ObjectCache(_BODIES)
@@ -97,63 +80,71 @@ class DeviceCache:
         self.coarsest: CountCache[NDArray[np.uint32]] = CountCache(_TEXTURES)
         mesh_bytes = _OWN_MESH_BYTES if device.is_cpu else _MESH_BYTES
         texture_bytes = _OWN_TEXTURE_BYTES if device.is_cpu else _TEXTURE_BYTES
-        self._meshes: ByteCache[DeviceMesh] = ByteCache(mesh_bytes, _MESHES)
-        self._textures: ByteCache[DeviceTexture] = ByteCache(texture_bytes, _TEXTURES)
-        self._environments: ByteCache[DeviceEnvironment] = ByteCache(_ENVIRONMENT_BYTES)
+        self._meshes: ByteCache[device_assets.DeviceMesh] = ByteCache(mesh_bytes, _MESHES)
+        self._textures: ByteCache[device_assets.DeviceTexture] = ByteCache(texture_bytes, _TEXTURES)
+        self._environments: ByteCache[environment_maps.DeviceEnvironment] = ByteCache(
+            _ENVIRONMENT_BYTES
+        )
         self._optics: ByteCache[DeviceOptics] = ByteCache(_OPTICS_BYTES, _LENSES)
         self._scratch: dict[str, _Scratch] = {}
         self._constants: dict[tuple[object, ...], wp.array] = {}
         self._latest: dict[str, list[_Latest]] = {}
 
-    def mesh(self, asset_id: str) -> DeviceMesh:
+    def mesh(self, asset_id: str) -> device_assets.DeviceMesh:
         """Geometry of an asset on the device."""
 
-        def make() -> DeviceMesh:
+        def make() -> device_assets.DeviceMesh:
             data = self.assets.mesh(asset_id)
             # The sizes, too: a tree of another mesh would lead rays out of its arrays, if somebody
             # changed a family and not its version.
             sizes = f"{len(data.vertices_m)} {len(data.faces)}"
-            prepared = self._derived(asset_id, f"device mesh {sizes}", lambda: prepare_mesh(data))
-            return upload_mesh(data, prepared, self.device)
+            prepared = self._derived(
+                asset_id, f"device mesh {sizes}", lambda: device_assets.prepare_mesh(data)
+            )
+            return device_assets.upload_mesh(data, prepared, self.device)
 
         return self._meshes.get(asset_id, make)
 
-    def materials(self, asset_id: str) -> tuple[Material, ...]:
+    def materials(self, asset_id: str) -> tuple[asset_types.Material, ...]:
         """An asset's own materials, one per slot."""
         return self.mesh(asset_id).materials
 
-    def texture(self, texture_id: str) -> DeviceTexture:
+    def texture(self, texture_id: str) -> device_assets.DeviceTexture:
         """A texture on the device."""
 
-        def make() -> DeviceTexture:
+        def make() -> device_assets.DeviceTexture:
             prepared = self._derived(
                 texture_id,
                 "device texture",
-                lambda: prepare_texture(self.assets.texture(texture_id)),
+                lambda: device_assets.prepare_texture(self.assets.texture(texture_id)),
             )
-            return upload_texture(prepared, self.device)
+            return device_assets.upload_texture(prepared, self.device)
 
         return self._textures.get(texture_id, make)
 
-    def _derived(self, asset_id: str, name: str, compute: Callable[[], Arrays]) -> Arrays:
+    def _derived(
+        self, asset_id: str, name: str, compute: Callable[[], device_assets.Arrays]
+    ) -> device_assets.Arrays:
         """Arrays computed from an asset by the present code; stored if the library can do so."""
         if self._store is None:
             return compute()
-        return self._store.derived(asset_id, f"{name} {arrays_version()}", compute)
+        return self._store.derived(asset_id, f"{name} {device_assets.arrays_version()}", compute)
 
-    def environment(self, environment_id: str) -> DeviceEnvironment:
+    def environment(self, environment_id: str) -> environment_maps.DeviceEnvironment:
         """Light of an environment, as an image."""
         return self._environments.get(
             environment_id,
-            lambda: upload_environment(self.assets.environment(environment_id), self.device),
+            lambda: environment_maps.upload_environment(
+                self.assets.environment(environment_id), self.device
+            ),
         )
 
-    def split_environment(self, environment_id: str) -> DeviceEnvironment:
+    def split_environment(self, environment_id: str) -> environment_maps.DeviceEnvironment:
         """Light of an environment whose brightest parts are lamps."""
         whole = self.environment(environment_id)
         return self._environments.get(
             f"split {environment_id}",
-            lambda: upload_split(self.assets.environment(environment_id), whole),
+            lambda: environment_maps.upload_split(self.assets.environment(environment_id), whole),
         )
 
     def optics(self, intrinsics: Intrinsics) -> DeviceOptics:

@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from gen_data.core.asset_types import SURFACES, Material
 from gen_data.core.scene import Body
-from gen_data.renderers.warp.scene.device_assets import DeviceTexture
-from gen_data.renderers.warp.scene.device_cache import DeviceCache
+from gen_data.renderers.warp.scene import device_assets, device_cache
 from gen_data.renderers.warp.scene.kernels import records
 from gen_data.renderers.warp.scene.struct_dtypes import stack_records, struct_dtype
 
@@ -42,7 +41,7 @@ class BodyMaterials:
     roles: NDArray[np.uint8]
 
 
-def body_materials(bodies: Sequence[Body], cache: DeviceCache) -> list[BodyMaterials]:
+def body_materials(bodies: Sequence[Body], cache: device_cache.DeviceCache) -> list[BodyMaterials]:
     """Materials of every body, packed once and cached."""
     own = [body.materials or cache.materials(body.asset) for body in bodies]
     return [
@@ -76,7 +75,7 @@ def _pack_transmission(material: Material, record: np.void) -> None:
 
 
 def surface_records(
-    per_body: Sequence[BodyMaterials], textures: Mapping[str, DeviceTexture]
+    per_body: Sequence[BodyMaterials], textures: Mapping[str, device_assets.DeviceTexture]
 ) -> NDArray[np.void]:
     """Material records of all bodies, body after body; at least one.
 
@@ -103,7 +102,7 @@ def surface_records(
 
 
 def cutout_slots(
-    surfaces: NDArray[np.void], textures: Mapping[str, DeviceTexture]
+    surfaces: NDArray[np.void], textures: Mapping[str, device_assets.DeviceTexture]
 ) -> NDArray[np.int32]:
     """Per material: HOLES if its texture has any, and CLEAR if it casts no shadow."""
     holes = np.array([*(texture.has_cutouts for texture in textures.values()), False])

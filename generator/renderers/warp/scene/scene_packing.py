@@ -8,7 +8,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from gen_data.core.lens import LensModel
+from gen_data.core import lens, scene_time, se3
 from gen_data.core.scene import (
     LIGHT_KINDS,
     PANEL_KINDS,
@@ -20,19 +20,9 @@ from gen_data.core.scene import (
     Scene,
     Weather,
 )
-from gen_data.core.scene_time import moving_bodies
-from gen_data.core.se3 import Array, unit_quaternions_to_rotations
-from gen_data.renderers.warp.scene.bvh import body_tree, group_boxes
-from gen_data.renderers.warp.scene.device_assets import DeviceMesh
+from gen_data.renderers.warp.scene import bvh, device_assets, environment_maps, material_packing
 from gen_data.renderers.warp.scene.device_cache import DeviceCache
-from gen_data.renderers.warp.scene.environment_maps import DeviceEnvironment
 from gen_data.renderers.warp.scene.kernels import records
-from gen_data.renderers.warp.scene.material_packing import (
-    body_materials,
-    cutout_bodies,
-    cutout_slots,
-    surface_records,
-)
 from gen_data.renderers.warp.scene.struct_dtypes import (
     copy_struct,
     stack_records,
@@ -40,7 +30,7 @@ from gen_data.renderers.warp.scene.struct_dtypes import (
     to_device,
 )
 
-_LENSES: dict[LensModel, int] = {
+_LENSES: dict[lens.LensModel, int] = {
     "pinhole": records.PINHOLE,
     "brown_conrady": records.BROWN_CONRADY,
     "kannala_brandt": records.KANNALA_BRANDT,
@@ -84,9 +74,9 @@ class _Placement:
     """
 
     body_records: NDArray[np.void]
-    R_world_mesh: Array
-    t_world_mesh: Array
-    scale: Array
+    R_world_mesh: se3.Array
+    t_world_mesh: se3.Array
+    scale: se3.Array
     vertex_count: int
     lows_m: wp.array
     highs_m: wp.array
@@ -176,7 +166,7 @@ def _pack_scene(scene: Scene, cache: DeviceCache) -> _PackedScene:
     world.sky = sky_record(scene.environment, environment)
     _fill_volumes(world, scene.environment.volumes, cache.device)
     placement = replace(bodies.placement, body_records=bodies.placement.body_records.copy())
-    moving = moving_bodies(scene)
+    moving = scene_time.moving_bodies(scene)
     moves = np.array([body.name in moving for body in scene.bodies], dtype=bool)
     placement.body_records["cutouts"][moves] |= int(records.MOVES)
     assets = (*bodies.assets, environment)
@@ -188,15 +178,17 @@ def _pack_bodies(bodies: tuple[Body, ...], cache: DeviceCache) -> _PackedScene:
     asset_ids = sorted({body.asset for body in bodies})
     place = {asset_id: k for k, asset_id in enumerate(asset_ids)}
     meshes = [cache.mesh(asset_id) for asset_id in asset_ids]
-    per_body = body_materials(bodies, cache)
+    per_body = material_packing.body_materials(bodies, cache)
     texture_ids = sorted({texture_id for entry in per_body for texture_id in entry.textures})
     textures = {texture_id: cache.texture(texture_id) for texture_id in texture_ids}
-    surfaces = surface_records(per_body, textures)
+    surfaces = material_packing.surface_records(per_body, textures)
     body_records = np.zeros(len(bodies), dtype=struct_dtype(records.BodyRecord))
     body_records["geometry"] = [place[body.asset] for body in bodies]
     counts = np.array([len(entry.materials) for entry in per_body], dtype=np.int64)
     body_records["first_material"] = np.cumsum(counts) - counts
-    body_records["cutouts"] = cutout_bodies(cutout_slots(surfaces, textures), counts)
+    body_records["cutouts"] = material_packing.cutout_bodies(
+        material_packing.cutout_slots(surfaces, textures), counts
+    )
     body_meshes = [meshes[place[body.asset]] for body in bodies]
     world = records.World()
     placement = _place_bodies(world, body_records, bodies, body_meshes, cache)
@@ -215,7 +207,7 @@ def _place_bodies(
     record: records.World,
     body_records: NDArray[np.void],
     bodies: Sequence[Body],
-    meshes: Sequence[DeviceMesh],
+    meshes: Sequence[device_assets.DeviceMesh],
     cache: DeviceCache,
 ) -> _Placement:
     """Fill in the bodies' poses, and the hierarchies of the World record over them."""
@@ -241,8 +233,8 @@ def _build_hierarchies(
     cutouts = np.flatnonzero(body_records["cutouts"] & cut).astype(np.int32)
     corners = (wp.array(of[cutouts], dtype=wp.vec3, device=device) for of in (low, high))
     cutout_hierarchy = wp.Bvh(*corners) if len(cutouts) else None
-    record.boxes = wp.array(group_boxes(low, high), dtype=wp.float32, device=device)
-    record.tree = wp.array(body_tree(low, high), dtype=wp.float32, device=device)
+    record.boxes = wp.array(bvh.group_boxes(low, high), dtype=wp.float32, device=device)
+    record.tree = wp.array(bvh.body_tree(low, high), dtype=wp.float32, device=device)
     record.cutouts = wp.array(cutouts, dtype=wp.int32, device=device)
     record.cutout_hierarchy = cutout_hierarchy.id if cutout_hierarchy else 0
     return cutout_hierarchy
@@ -267,12 +259,12 @@ def pack_view(camera: Camera, cache: DeviceCache) -> records.View:
 
 
 def _fill_poses(
-    values: NDArray[np.void], bodies: Sequence[Body], meshes: Sequence[DeviceMesh]
-) -> tuple[Array, Array, Array, int]:
+    values: NDArray[np.void], bodies: Sequence[Body], meshes: Sequence[device_assets.DeviceMesh]
+) -> tuple[se3.Array, se3.Array, se3.Array, int]:
     """Fill in poses and vertex ranges; returns rotations, positions, scales, vertex count."""
     if not bodies:
         return np.zeros((0, 3, 3)), np.zeros((0, 3)), np.zeros(0), 0
-    R = unit_quaternions_to_rotations(
+    R = se3.unit_quaternions_to_rotations(
         np.array([body.T_world_body.quaternion_wxyz for body in bodies])
     )
     t = np.array([body.T_world_body.translation_m for body in bodies])
@@ -304,7 +296,7 @@ def _fill_camera_poses(values: NDArray[np.void], placement: _Placement, camera: 
 
 
 def _world_boxes(
-    body_records: NDArray[np.void], meshes: Sequence[DeviceMesh]
+    body_records: NDArray[np.void], meshes: Sequence[device_assets.DeviceMesh]
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     if not meshes:
         return np.zeros((0, 3), np.float32), np.zeros((0, 3), np.float32)
@@ -321,7 +313,9 @@ def _world_boxes(
     return (centre - half).astype(np.float32), (centre + half).astype(np.float32)
 
 
-def sky_record(environment: Environment, light: DeviceEnvironment) -> records.EnvironmentRecord:
+def sky_record(
+    environment: Environment, light: environment_maps.DeviceEnvironment
+) -> records.EnvironmentRecord:
     """The EnvironmentRecord of an environment."""
     sky = records.EnvironmentRecord()
     sky.irradiance, sky.glossy = light.irradiance, light.glossy

@@ -16,28 +16,19 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from gen_data.core.asset_types import Float32
+from gen_data.core import asset_types, se3
 from gen_data.core.boxes import BoxPx, tight_box
 from gen_data.core.capture import Silhouette
 from gen_data.core.scene import Scene
-from gen_data.core.se3 import Array
 from gen_data.renderers.warp.device import launch
 from gen_data.renderers.warp.native_code import LANES
 from gen_data.renderers.warp.scene.distortion_lut import NODE_STRIDE_PX
 from gen_data.renderers.warp.scene.kernels import records
 from gen_data.renderers.warp.scene.scene_packing import pack_view
+from gen_data.renderers.warp.visibility import gbuffer, reprojection
 from gen_data.renderers.warp.visibility.frame_context import CameraView, RowBand, pack_state
-from gen_data.renderers.warp.visibility.gbuffer import (
-    CORNERS,
-    Projected,
-    box_corners,
-    canvas_box,
-    project_vertices,
-)
-from gen_data.renderers.warp.visibility.kernels.amodal import draw_silhouettes, pack_bits
-from gen_data.renderers.warp.visibility.kernels.amodal_lens import trace_silhouettes
+from gen_data.renderers.warp.visibility.kernels import amodal, amodal_lens
 from gen_data.renderers.warp.visibility.kernels.rasterizer import Z_NEAR_M, Outline
-from gen_data.renderers.warp.visibility.reprojection import make_bands
 
 _NOTHING = np.zeros((0, 0), np.bool_)
 _UNSNAPPED = -(2**31)
@@ -72,7 +63,7 @@ def render_silhouettes(frame: CameraView, seen_ids: NDArray[np.uint16]) -> dict[
 def _rasterize_masks(frame: CameraView) -> tuple[dict[int, BoxPx], NDArray[np.bool_]]:
     """A bounding box of each annotated instance's silhouette, and the masks of all boxes."""
     scene, world, view, cache = frame.state.scene, frame.world, frame.view, frame.cache
-    projected = frame.gbuffer.projected or project_vertices(world, view, cache)
+    projected = frame.gbuffer.projected or gbuffer.project_vertices(world, view, cache)
     boxes = _boxes_px(frame, projected)
     whole = {
         number: boxes.get(scene.bodies[number].instance_id, EMPTY)
@@ -85,7 +76,7 @@ def _rasterize_masks(frame: CameraView) -> tuple[dict[int, BoxPx], NDArray[np.bo
     # On the CPU, threads run one after another anyway; on a GPU, a few bodies need thousands.
     parts = _PARTS if shared else 1
     inputs = [view, world.record, projected.p_camera, projected.xy, listed, parts]
-    frame.launch(draw_silhouettes, (len(outlines), parts), inputs, [mask.pixels])
+    frame.launch(amodal.draw_silhouettes, (len(outlines), parts), inputs, [mask.pixels])
     return boxes, mask.read()
 
 
@@ -111,14 +102,14 @@ class _Mask:
     def read(self) -> NDArray[np.bool_]:
         """All pixels on the host."""
         bits = wp.empty(self.words.size, dtype=wp.uint8, device=self.words.device)
-        launch(pack_bits, bits.size, [self.words], [bits], device=bits.device)
+        launch(amodal.pack_bits, bits.size, [self.words], [bits], device=bits.device)
         return np.unpackbits(bits.numpy(), bitorder="little").view(np.bool_)
 
 
-def _boxes_px(frame: CameraView, projected: Projected) -> dict[int, BoxPx]:
+def _boxes_px(frame: CameraView, projected: gbuffer.Projected) -> dict[int, BoxPx]:
     """Pixels of the canvas that each annotated instance's vertices span; may be empty."""
     scene, view = frame.state.scene, frame.view
-    canvas = canvas_box(view)
+    canvas = gbuffer.canvas_box(view)
     annotated = sorted(i.instance_id for i in scene.instances if i.annotated)
     boxes = dict.fromkeys(annotated, EMPTY)
     extents = projected.extents.numpy()
@@ -128,7 +119,7 @@ def _boxes_px(frame: CameraView, projected: Projected) -> dict[int, BoxPx]:
         instance_id = scene.bodies[number].instance_id
         if instance_id in boxes:
             if lows[k, 0] == _UNSNAPPED:
-                (corners_m,) = box_corners(frame.world.body_records[[number]], view)
+                (corners_m,) = gbuffer.box_corners(frame.world.body_records[[number]], view)
                 reached = clipped_box_px(corners_m, view)
             else:
                 reached = BoxPx(*(lows[k] >> 8).tolist(), *((highs[k] >> 8) + 1).tolist())
@@ -136,7 +127,7 @@ def _boxes_px(frame: CameraView, projected: Projected) -> dict[int, BoxPx]:
     return boxes
 
 
-def clipped_box_px(corners_m: Array, view: records.View) -> BoxPx:
+def clipped_box_px(corners_m: se3.Array, view: records.View) -> BoxPx:
     """Pixels that a box may cover which reaches behind a pinhole's plane.
 
     ``corners_m`` are its corners in the camera frame, [3, 8], in the order of CORNERS.
@@ -150,7 +141,7 @@ def clipped_box_px(corners_m: Array, view: records.View) -> BoxPx:
     front = corners_m[2] >= near_m
     if not front.any():
         # Rounding: a vertex that lies in the plane itself.
-        return canvas_box(view)
+        return gbuffer.canvas_box(view)
     x, y, z = np.concatenate([corners_m[:, front], crossings_m], axis=1)
     u, v = view.fx * x / z + view.cx, view.fy * y / z + view.cy
     return BoxPx(
@@ -222,7 +213,7 @@ def _trace_masks(frame: CameraView) -> tuple[dict[int, BoxPx], NDArray[np.bool_]
             cosines = optics.nodes @ (R_camera_world @ axis).astype(np.float32)
             # Every visible pixel has a node within the diagonal of a cell.
             near = cosines >= math.cos(min(half_rad + 1.5 * step_rad, math.pi))
-            of_bodies[number] = _box_around(near, view).intersection(canvas_box(view))
+            of_bodies[number] = _box_around(near, view).intersection(gbuffer.canvas_box(view))
             boxes[body.instance_id] = boxes[body.instance_id].union(of_bodies[number])
     windows, size = _outline_records(scene, boxes, of_bodies, None)
     mask = _Mask.allocate(size, cache.device)
@@ -230,11 +221,11 @@ def _trace_masks(frame: CameraView) -> tuple[dict[int, BoxPx], NDArray[np.bool_]
         shape = (len(windows), int(windows["window"]["height"].max()))
         records_ = wp.array(windows, dtype=Outline, device=cache.device)
         inputs = [view, world.record, optics.nodes_on_device, NODE_STRIDE_PX, Z_NEAR_M, records_]
-        frame.launch(trace_silhouettes, shape, inputs, [mask.pixels])
+        frame.launch(amodal_lens.trace_silhouettes, shape, inputs, [mask.pixels])
     return boxes, mask.read()
 
 
-def bounding_cone(ends_m: Array) -> tuple[Array, float]:
+def bounding_cone(ends_m: se3.Array) -> tuple[se3.Array, float]:
     """Axis and half angle of a cone from the origin around a box; pi if it contains the origin.
 
     ``ends_m`` are its low and high corner, [2, 3].
@@ -245,7 +236,7 @@ def bounding_cone(ends_m: Array) -> tuple[Array, float]:
     if distance_m <= radius_m:
         return np.array([0.0, 0.0, 1.0]), math.pi
     axis = centre / distance_m
-    corners = ends_m[CORNERS, [0, 1, 2]]
+    corners = ends_m[gbuffer.CORNERS, [0, 1, 2]]
     cosines = corners @ axis / np.sqrt((corners * corners).sum(axis=1))
     least = float(cosines.min())
     # Cones below 90 degrees are convex: one that contains all corners contains the box.
@@ -265,7 +256,7 @@ def _box_around(marked: NDArray[np.bool_], view: records.View) -> BoxPx:
     )
 
 
-def _widest_step(nodes: Float32) -> float:
+def _widest_step(nodes: asset_types.Float32) -> float:
     """Largest angle between neighbouring visible nodes [rad]."""
     widest = 0.0
     for a, b in ((nodes[1:], nodes[:-1]), (nodes[:, 1:], nodes[:, :-1])):
@@ -284,7 +275,7 @@ def rolling_silhouettes(
     """
     if len(bands) > _BANDS:
         starts = [band.first for band in bands][:: -(-len(bands) // _BANDS)]
-        bands = make_bands(reference.state, starts)
+        bands = reprojection.make_bands(reference.state, starts)
     pieces: dict[int, list[Silhouette]] = {}
     height = reference.state.camera.intrinsics.height_px
     none, unseen = np.zeros_like(ids), replace(reference.gbuffer, projected=None)

@@ -10,20 +10,11 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from gen_data.core.asset_types import Float32
-from gen_data.core.interfaces import FindTones
+from gen_data.core import asset_types, interfaces, scene_time
 from gen_data.core.scene import Camera, Scene
-from gen_data.core.scene_time import scene_at
 from gen_data.renderers.warp.device import launch
-from gen_data.renderers.warp.scene.device_cache import DeviceCache
+from gen_data.renderers.warp.scene import device_cache, scene_packing, struct_dtypes
 from gen_data.renderers.warp.scene.kernels import records
-from gen_data.renderers.warp.scene.scene_packing import (
-    PackedWorld,
-    pack_view,
-    pack_world,
-    repack_moved,
-)
-from gen_data.renderers.warp.scene.struct_dtypes import copy_struct
 from gen_data.renderers.warp.settings import RenderSettings
 from gen_data.renderers.warp.visibility.gbuffer import GBuffer, find_visible
 
@@ -40,8 +31,8 @@ class Backdrop:
             is rendered.
     """
 
-    photo: Float32
-    mask: Float32 | None
+    photo: asset_types.Float32
+    mask: asset_types.Float32 | None
     ground: NDArray[np.bool_]
     unshaded: wp.array | None = None
 
@@ -71,11 +62,11 @@ class RenderContext:
         find_tones: Finds the range in which pixels on edges are means of tones; None = of radiance.
     """
 
-    cache: DeviceCache
+    cache: device_cache.DeviceCache
     settings: RenderSettings
     paths: LightTracer | None = None
     backdrop: Backdrop | None = None
-    find_tones: FindTones | None = None
+    find_tones: interfaces.FindTones | None = None
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -92,7 +83,7 @@ class CameraState:
 
     def later(self, delay_s: float) -> CameraState:
         """State of the same world and camera at another instant."""
-        scene = scene_at(self.scene, round(self.scene.time_s + delay_s, 9))
+        scene = scene_time.scene_at(self.scene, round(self.scene.time_s + delay_s, 9))
         return CameraState(scene, scene.cameras[0])
 
 
@@ -110,13 +101,13 @@ class CameraView:
     """A rendered image or band of rows; ``gbuffer`` is valid until the next is rendered."""
 
     state: CameraState
-    world: PackedWorld
+    world: scene_packing.PackedWorld
     view: records.View
     gbuffer: GBuffer
     context: RenderContext
 
     @property
-    def cache(self) -> DeviceCache:
+    def cache(self) -> device_cache.DeviceCache:
         """Assets and scratch memory."""
         return self.context.cache
 
@@ -161,7 +152,7 @@ def render_view(
     ``reference`` is the same world at another instant, whose assets need not be packed again.
     """
     world = pack_state(state, context, reference)
-    view = pack_view(state.camera, context.cache)
+    view = scene_packing.pack_view(state.camera, context.cache)
     if rows is not None:
         view = crop_rows(view, *rows)
     gbuffer = find_visible(world, view, context.cache, context.settings.visibility)
@@ -170,11 +161,11 @@ def render_view(
 
 def pack_state(
     state: CameraState, context: RenderContext, reference: CameraView | None = None
-) -> PackedWorld:
+) -> scene_packing.PackedWorld:
     """Pack the world onto the device; arguments as for ``render_view``."""
     if reference is not None and _has_same_assets(reference.state.scene, state.scene):
-        return repack_moved(reference.world, state.scene, state.camera, context.cache)
-    return pack_world(state.scene, state.camera, context.cache)
+        return scene_packing.repack_moved(reference.world, state.scene, state.camera, context.cache)
+    return scene_packing.pack_world(state.scene, state.camera, context.cache)
 
 
 def _has_same_assets(one: Scene, other: Scene) -> bool:
@@ -187,7 +178,7 @@ def _has_same_assets(one: Scene, other: Scene) -> bool:
 
 def crop_rows(view: records.View, first: int, end: int) -> records.View:
     """The view of a band of an image's rows."""
-    part = copy_struct(view, records.View)
+    part = struct_dtypes.copy_struct(view, records.View)
     part.height = end - first
     part.cy = view.cy - first
     if view.lens != records.PINHOLE:

@@ -7,8 +7,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from gen_data.core.boxes import BoxPx
-from gen_data.core.se3 import Array
+from gen_data.core import boxes, se3
 from gen_data.renderers.warp.device import launch
 from gen_data.renderers.warp.native_code import LANES
 from gen_data.renderers.warp.scene.device_cache import DeviceCache
@@ -51,12 +50,12 @@ def list_drawn(
     return wp.array(values[order], dtype=rasterizer.DrawnBody, device=device)
 
 
-def canvas_box(view: records.View) -> BoxPx:
+def canvas_box(view: records.View) -> boxes.BoxPx:
     """The canvas of three by three images, in image coordinates."""
-    return BoxPx(-view.width, -view.height, 2 * view.width, 2 * view.height)
+    return boxes.BoxPx(-view.width, -view.height, 2 * view.width, 2 * view.height)
 
 
-def box_corners(body_records: NDArray[np.void], view: records.View) -> Array:
+def box_corners(body_records: NDArray[np.void], view: records.View) -> se3.Array:
     """Corners of the boxes of bodies [n] in the camera frame, [n, 3, 8]."""
     ends = np.stack([body_records["low_m"], body_records["high_m"]], axis=1).astype(np.float64)
     corners = ends[:, CORNERS, np.arange(3)] - np.array(view.eye_m, dtype=np.float64)
@@ -66,7 +65,7 @@ def box_corners(body_records: NDArray[np.void], view: records.View) -> Array:
 
 def project_windows(
     body_records: NDArray[np.void], view: records.View
-) -> tuple[NDArray[np.int64], Array]:
+) -> tuple[NDArray[np.int64], se3.Array]:
     """Pixels that bodies may cover before a pinhole, and their least depths [m].
 
     Returns:

@@ -9,29 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.core.asset_types import Float32
+from gen_data.core import asset_types, intrinsics
 from gen_data.core.capture import Channel
-from gen_data.core.intrinsics import Intrinsics
-from gen_data.renderers.warp.visibility.frame_context import (
-    CameraState,
-    CameraView,
-    RowBand,
-    render_view,
-)
-from gen_data.renderers.warp.visibility.plates import hide_flow
-from gen_data.renderers.warp.visibility.reprojection import (
-    BandedGBuffer,
-    ReprojectedPoints,
-    ScenePoints,
-    deform_points,
-    find_carriers,
-    full_band,
-    gather_points,
-    make_bands,
-    render_bands,
-    reproject,
-    split_bands,
-)
+from gen_data.renderers.warp.visibility import frame_context, plates, reprojection
 
 FORWARD = frozenset({Channel.FLOW_FORWARD, Channel.FLOW_OCCLUDED_FORWARD, Channel.SCENE_FLOW})
 BACKWARD = frozenset({Channel.FLOW_BACKWARD, Channel.FLOW_OCCLUDED_BACKWARD})
@@ -42,8 +22,8 @@ _NEARER = 2e-3
 
 
 def flow_images(
-    reference: CameraView,
-    gbuffer: BandedGBuffer,
+    reference: frame_context.CameraView,
+    gbuffer: reprojection.BandedGBuffer,
     channels: frozenset[Channel],
 ) -> dict[Channel, NDArray[Any]]:
     """All requested flow channels, as documented at Channel.
@@ -55,8 +35,8 @@ def flow_images(
         return images
     middle = reference.state
     step_s = middle.scene.step_s
-    carriers = find_carriers(middle.scene)
-    points = gather_points(gbuffer, carriers)
+    carriers = reprojection.find_carriers(middle.scene)
+    points = reprojection.gather_points(gbuffer, carriers)
     if channels & FORWARD:
         images |= _flow_channels(
             points, gbuffer, middle.later(step_s), channels & FORWARD, reference
@@ -68,26 +48,26 @@ def flow_images(
             points, gbuffer, middle.later(-step_s), channels & BACKWARD, reference
         )
     if reference.context.backdrop is not None:
-        hide_flow(reference.context.backdrop, images)
+        plates.hide_flow(reference.context.backdrop, images)
     return images
 
 
 def _flow_channels(
-    points: ScenePoints,
-    gbuffer: BandedGBuffer,
-    then: CameraState,
+    points: reprojection.ScenePoints,
+    gbuffer: reprojection.BandedGBuffer,
+    then: frame_context.CameraState,
     channels: frozenset[Channel],
-    reference: CameraView,
+    reference: frame_context.CameraView,
 ) -> dict[Channel, NDArray[Any]]:
     """Channels of one direction."""
     images: dict[Channel, NDArray[Any]] = {}
-    carriers = find_carriers(then.scene)
-    bands: Sequence[RowBand] = (full_band(then),)
+    carriers = reprojection.find_carriers(then.scene)
+    bands: Sequence[frame_context.RowBand] = (reprojection.full_band(then),)
     if then.camera.shutter.rolls:
-        reference = render_view(then, reference.context, None, reference)
-        bands = split_bands(reference)
-    points = deform_points(points, gbuffer, then.scene, reference.cache.assets)
-    found = reproject(points, bands, carriers)
+        reference = frame_context.render_view(then, reference.context, None, reference)
+        bands = reprojection.split_bands(reference)
+    points = reprojection.deform_points(points, gbuffer, then.scene, reference.cache.assets)
+    found = reprojection.reproject(points, bands, carriers)
     for channel in sorted(channels, key=lambda c: c.value):
         if channel in (Channel.FLOW_FORWARD, Channel.FLOW_BACKWARD):
             images[channel] = _flow(found)
@@ -97,7 +77,9 @@ def _flow_channels(
             seen = frozenset({Channel.RANGE, Channel.NORMALS})
             # Bands four times as high allow one pixel of motion: as accurate as the occlusion test.
             starts = [band.first for band in bands[::4]]
-            other = render_bands(make_bands(then, starts), seen, reference).images
+            other = reprojection.render_bands(
+                reprojection.make_bands(then, starts), seen, reference
+            ).images
             if reference.context.backdrop is not None:
                 # The foreground is nearer than everything.
                 other[Channel.RANGE][reference.context.backdrop.hidden] = 0.0
@@ -105,22 +87,24 @@ def _flow_channels(
     return images
 
 
-def _flow(found: ReprojectedPoints) -> Float32:
+def _flow(found: reprojection.ReprojectedPoints) -> asset_types.Float32:
     height, width = found.image_px.shape[:2]
     centres = np.stack(np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5), axis=-1)
     return np.asarray((found.image_px - centres).astype(np.float32))
 
 
-def _scene_flow(points: ScenePoints, found: ReprojectedPoints) -> Float32:
+def _scene_flow(
+    points: reprojection.ScenePoints, found: reprojection.ReprojectedPoints
+) -> asset_types.Float32:
     there = (points.places[..., 3] > 0.0)[..., None]
     return np.asarray(np.where(there, found.p_camera - points.p_camera, np.nan).astype(np.float32))
 
 
 def find_occluded(
-    points: ScenePoints,
-    found: ReprojectedPoints,
+    points: reprojection.ScenePoints,
+    found: reprojection.ReprojectedPoints,
     then: Mapping[Channel, NDArray[Any]],
-    camera: Intrinsics,
+    camera: intrinsics.Intrinsics,
 ) -> NDArray[np.uint8]:
     """Occlusion of points in another image, uint8 [h, w]: 1 if hidden or outside it.
 

@@ -16,28 +16,16 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from gen_data.core import colorimetry, errors, interfaces, plates, se3
 from gen_data.core.asset_types import Float32
 from gen_data.core.capture import Channel
-from gen_data.core.colorimetry import srgb_decode
-from gen_data.core.errors import SampleError
-from gen_data.core.interfaces import AssetLibrary
-from gen_data.core.plates import (
-    WHITE_CD_M2,
-    Plate,
-    crop_to,
-    fit_camera,
-    has_plate,
-    is_catcher,
-    is_inside,
-)
 from gen_data.core.scene import Camera, Scene, Weather
-from gen_data.core.se3 import Array
 from gen_data.renderers.warp.visibility.frame_context import Backdrop, CameraView
 from gen_data.renderers.warp.visibility.kernels import photographs as kernels
 
 _RATIO_MAX = 16.0
 """Headlights on dark ground multiply its light; more is an error of a nearly black ratio."""
-_DARKEST_CD_M2 = np.float32(1e-6 * WHITE_CD_M2)
+_DARKEST_CD_M2 = np.float32(1e-6 * plates.WHITE_CD_M2)
 """Radiance without things below which the ground has no ratio."""
 _FIREFLY = np.float32(1.3)
 """Largest ratio of a path-traced pixel over the median around it."""
@@ -46,21 +34,21 @@ _FLOW = frozenset({Channel.FLOW_FORWARD, Channel.FLOW_BACKWARD})
 _OCCLUDED = frozenset({Channel.FLOW_OCCLUDED_FORWARD, Channel.FLOW_OCCLUDED_BACKWARD})
 
 
-def open_backdrop(scene: Scene, camera: Camera, assets: AssetLibrary) -> Backdrop | None:
+def open_backdrop(scene: Scene, camera: Camera, assets: interfaces.AssetLibrary) -> Backdrop | None:
     """The photograph behind a scene, without ``unshaded``; None if there is none.
 
     Raises:
         SampleError: the camera or the light is not the photograph's.
     """
-    if not has_plate(scene):
+    if not plates.has_plate(scene):
         return None
     photo_id = scene.environment.image
     if scene.weather != Weather():
-        raise SampleError(
+        raise errors.SampleError(
             "the scene has weather, but a photograph has its own; remove the randomizer weather"
         )
     if assets.get(photo_id).kind != "plate":
-        raise SampleError(
+        raise errors.SampleError(
             f"environment '{photo_id}': the scene has the ground of a photograph, but other light; "
             "remove the randomizers that change the environment (environment, time_of_day, weather)"
         )
@@ -69,7 +57,9 @@ def open_backdrop(scene: Scene, camera: Camera, assets: AssetLibrary) -> Backdro
     size = (camera.intrinsics.width_px, camera.intrinsics.height_px)
     # The scale of the environment and of the photograph is the same.
     white = scene.environment.luminance_cd_m2 / plate.sky_mean
-    photo = srgb_decode(assets.texture(photo_id).albedo.astype(np.float32) / np.float32(255.0))
+    photo = colorimetry.srgb_decode(
+        assets.texture(photo_id).albedo.astype(np.float32) / np.float32(255.0)
+    )
     mask = None
     if plate.mask:
         image = assets.texture(f"{photo_id}#{plate.mask}").albedo[..., 0]
@@ -79,7 +69,7 @@ def open_backdrop(scene: Scene, camera: Camera, assets: AssetLibrary) -> Backdro
 
 def without_things(scene: Scene) -> Scene:
     """The ground of a photograph under its own light: no other bodies, and no lamps on them."""
-    bodies = tuple(body for body in scene.bodies if is_catcher(body))
+    bodies = tuple(body for body in scene.bodies if plates.is_catcher(body))
     kept = {body.name for body in bodies}
     lights = tuple(light for light in scene.lights if not light.body or light.body in kept)
     tracks = tuple(track for track in scene.tracks if track.body in kept)
@@ -147,7 +137,7 @@ def cover_by_foreground(frame: CameraView, backdrop: Backdrop, radiance: wp.arra
 def things_in(frame: CameraView) -> NDArray[np.bool_]:
     """Pixels whose centres show neither background nor the photograph's ground, bool [h, w]."""
     body = frame.gbuffer.hits.numpy().reshape(frame.view.height, frame.view.width, 2)[..., 0]
-    catchers = [k for k, b in enumerate(frame.state.scene.bodies) if is_catcher(b)]
+    catchers = [k for k, b in enumerate(frame.state.scene.bodies) if plates.is_catcher(b)]
     return np.asarray((body >= 0) & ~np.isin(body, catchers))
 
 
@@ -166,7 +156,7 @@ def hide_labels(frame: CameraView, backdrop: Backdrop, image: wp.array, nothing:
 def _kinds(frame: CameraView) -> wp.array:
     """What the body of each number is to the photograph, beginning with none."""
     bodies = frame.state.scene.bodies
-    kinds = [kernels.GROUND if is_catcher(body) else kernels.THING for body in bodies]
+    kinds = [kernels.GROUND if plates.is_catcher(body) else kernels.THING for body in bodies]
     values = np.array([kernels.EMPTY, *kinds], np.int32)
     return frame.cache.latest("photo kinds", values, int)
 
@@ -229,9 +219,9 @@ def _without_fireflies(ratio: Float32) -> Float32:
     return np.asarray(np.minimum(ratio, _FIREFLY * np.moveaxis(around, 0, -1)))
 
 
-def _fit(image: Float32, plate: Plate, size: tuple[int, int]) -> Float32:
+def _fit(image: Float32, plate: plates.Plate, size: tuple[int, int]) -> Float32:
     """The part of an image of the photograph's size that the camera shows, at its size."""
-    part = crop_to(plate.size_px, *size)
+    part = plates.crop_to(plate.size_px, *size)
     shown = image[part.y_px : part.y_px + part.height_px, part.x_px : part.x_px + part.width_px]
     if shown.shape[1::-1] == size:
         return np.ascontiguousarray(shown)
@@ -240,27 +230,27 @@ def _fit(image: Float32, plate: Plate, size: tuple[int, int]) -> Float32:
     return np.asarray(np.maximum(cv2.resize(shown, size, interpolation=method), 0.0))
 
 
-def _ground(plate: Plate, size: tuple[int, int]) -> NDArray[np.bool_]:
+def _ground(plate: plates.Plate, size: tuple[int, int]) -> NDArray[np.bool_]:
     """Pixels of an image whose centres are inside the ground's corners."""
-    part = crop_to(plate.size_px, *size)
+    part = plates.crop_to(plate.size_px, *size)
     u = part.x_px + (np.arange(size[0]) + 0.5) * part.width_px / size[0]
     v = part.y_px + (np.arange(size[1]) + 0.5) * part.height_px / size[1]
-    return is_inside(np.array(plate.ground_px), np.stack(np.meshgrid(u, v), axis=-1))
+    return plates.is_inside(np.array(plate.ground_px), np.stack(np.meshgrid(u, v), axis=-1))
 
 
-def _check_camera(camera: Camera, plate: Plate) -> None:
+def _check_camera(camera: Camera, plate: plates.Plate) -> None:
     """Refuse a camera that another randomizer moved: the photograph cannot follow it."""
-    expected = fit_camera(camera, plate)
+    expected = plates.fit_camera(camera, plate)
     given, wanted = (_numbers(c) for c in (camera, expected))
     if not np.allclose(given, wanted, rtol=_SAME_PLACE, atol=_SAME_PLACE):
-        raise SampleError(
+        raise errors.SampleError(
             f"sensor '{camera.name}': it is not where the photograph was taken from, or has "
             "another lens; remove the randomizers that change cameras (camera_pose, "
             "camera_intrinsics, camera_on_lane, rig_calibration)"
         )
 
 
-def _numbers(camera: Camera) -> Array:
+def _numbers(camera: Camera) -> se3.Array:
     lens, pose = camera.intrinsics, camera.T_world_camera
     inner = (lens.fx_px, lens.fy_px, lens.cx_px, lens.cy_px)
     return np.array([*inner, *pose.translation_m, *pose.rotation().reshape(-1)])

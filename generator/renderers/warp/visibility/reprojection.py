@@ -14,9 +14,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from gen_data.core.asset_types import Float32, Int32
-from gen_data.core.capture import Channel
-from gen_data.core.interfaces import AssetLibrary
+from gen_data.core import asset_types, capture, interfaces
 from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.scene import Scene
 from gen_data.core.se3 import Array
@@ -63,17 +61,17 @@ class BandedGBuffer:
         return [image.reshape(*shape, *image.shape[1:]) for image in self.memory.numpy()]
 
     @property
-    def hits(self) -> Int32:
+    def hits(self) -> asset_types.Int32:
         """As of GBuffer, [h, w, 2]."""
         return self._images[0]
 
     @property
-    def z_m(self) -> Float32:
+    def z_m(self) -> asset_types.Float32:
         """As of GBuffer, [h, w]."""
         return self._images[1]
 
     @property
-    def weights(self) -> Float32:
+    def weights(self) -> asset_types.Float32:
         """As of GBuffer, [h, w, 2]."""
         return self._images[2]
 
@@ -120,13 +118,13 @@ class RenderedBands:
     """
 
     gbuffer: BandedGBuffer
-    images: dict[Channel, NDArray[Any]]
+    images: dict[capture.Channel, NDArray[Any]]
     radiance: wp.array | None
 
 
 def render_bands(
     bands: Sequence[RowBand],
-    channels: frozenset[Channel],
+    channels: frozenset[capture.Channel],
     reference: CameraView,
     light: RadianceFunction | None = None,
 ) -> RenderedBands:
@@ -249,7 +247,7 @@ def reproject(
 
 
 def deform_points(
-    points: ScenePoints, gbuffer: BandedGBuffer, then: Scene, assets: AssetLibrary
+    points: ScenePoints, gbuffer: BandedGBuffer, then: Scene, assets: interfaces.AssetLibrary
 ) -> ScenePoints:
     """The points on the bodies' shapes at another instant, where the triangles are the same."""
     places = points.places.copy()
@@ -294,7 +292,7 @@ def _carrier_transforms(bands: Sequence[RowBand], carriers: Mapping[int, int]) -
     return ways
 
 
-def _interpolate(corners: Array, weights: Float32) -> Array:
+def _interpolate(corners: Array, weights: asset_types.Float32) -> Array:
     """Interpolation over triangle corners [n, 3, 3] by stored barycentric weights [n, 2]."""
     u = np.where(weights[:, 0] > 1.5, weights[:, 0] - 2.0, weights[:, 0]).astype(np.float64)
     v = weights[:, 1].astype(np.float64)
