@@ -175,7 +175,6 @@ class Bop(base.AssetExporter):
         write_text(dataset_dir / "test_targets_bop19.json", canonical_json(targets) + "\n")
 
     def _folder_size(self, info: DatasetInfo) -> int:
-        """Samples per folder."""
         return CHUNK if self.folders == "thousand" else info.views_per_scene * info.steps_per_scene
 
     def _link_image(
@@ -226,7 +225,6 @@ class _ModelFiles:
         return (x, y, z)
 
     def rows(self) -> list[dict[str, Any]]:
-        """JSON lines of all models, by key."""
         return [self._rows[key] for key in sorted(self._rows)]
 
 
@@ -388,7 +386,6 @@ def _numbered(row: Mapping[str, Any], size: int, ids: Mapping[str, int]) -> dict
 
 
 def _write_scene(info: DatasetInfo, folder: Path, images: Sequence[Mapping[str, Any]]) -> None:
-    """Write the JSON files of one folder."""
     for name, key in (("camera", "camera"), ("gt", "gt"), ("gt_info", "info")):
         rows = [(image["im_id"], image[key]) for image in images]
         write_text(folder / f"scene_{name}.json", _numbered_json(rows))

@@ -110,7 +110,6 @@ class _Model:
         self.images: list[str] = []
 
     def add(self, images: Sequence[Mapping[str, str]]) -> None:
-        """Add the photographs of a sample."""
         for image in images:
             camera = self.cameras.setdefault(image["camera"], len(self.cameras) + 1)
             number = len(self.images) + 1
@@ -118,7 +117,6 @@ class _Model:
             self.images.append(f"{number} {image['pose']} {camera} {image['name']}\n\n")
 
     def write(self, folder: Path) -> None:
-        """Write its three files."""
         cameras = "".join(f"{k} {text}\n" for text, k in self.cameras.items())
         write_text(folder / "cameras.txt", f"# CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]\n{cameras}")
         head = "# IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME, then POINTS2D[] on a line\n"

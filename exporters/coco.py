@@ -251,7 +251,6 @@ def image_labels(info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, An
 
 
 def _optional_keys(thing: ObjectTruth) -> dict[str, Any]:
-    """Keys of the enabled annotations of an object."""
     keys: dict[str, Any] = {
         name: round(share, DECIMALS)
         for name in ("visible_fraction", "occlusion", "truncation")
@@ -293,7 +292,6 @@ def scene_graph(scene: Scene, truth: ImageTruth) -> dict[str, Any]:
 
 
 def _image_keys(scene: Scene, truth: ImageTruth, camera: intrinsics.Intrinsics) -> dict[str, Any]:
-    """Keys of the enabled annotations of the whole image."""
     keys: dict[str, Any] = {}
     if truth.borders is not None:
         keys["lane_borders"] = [
@@ -353,7 +351,6 @@ def _shutter(shutter: Shutter) -> dict[str, Any]:
 
 
 def _weather(weather: Weather) -> dict[str, float]:
-    """Values other than zero, without the seed of the patterns."""
     values = ((f.name, getattr(weather, f.name)) for f in fields(weather) if f.name != "seed")
     return {name: round(value, DECIMALS) for name, value in values if value}
 

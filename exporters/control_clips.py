@@ -189,7 +189,6 @@ class ControlClips(base.ExporterBase):
 
     @property
     def _ids(self) -> Channel:
-        """Channel that is painted."""
         return Channel.INSTANCE if self.segmentation == "instance" else Channel.CATEGORY
 
     def _range(self) -> Range | None:
@@ -209,7 +208,6 @@ class ControlClips(base.ExporterBase):
         return np.asarray(cv2.Canny(grey, self.canny_low, self.canny_high), np.uint8)
 
     def _source(self, info: DatasetInfo, frame: Frame, kind: str, camera: str) -> Path:
-        """File of one image in its shard."""
         if kind == "rgb":
             return info.media_path(frame.shard_dir, camera, Channel.RGB, frame.index)
         return frame.shard_dir / self.type / kind / f"{frame.index:09d}.png"
@@ -217,7 +215,6 @@ class ControlClips(base.ExporterBase):
     def _describe(
         self, info: DatasetInfo, camera: str, folder: Path, frames: Sequence[Frame]
     ) -> None:
-        """Write caption, facts and, on request, videos with their parameters."""
         text = frames[0].row["text"]
         rate_hz = frame_rate_hz(info, frames)
         write_text(folder / "caption.txt", f"{text}\n")

@@ -146,7 +146,6 @@ class Croissant(AssetExporter):
         write_text(dataset_dir / "croissant.json", text)
 
     def _asset_licences(self, shard_dirs: Sequence[Path]) -> list[str]:
-        """Licences of the assets in all scenes, sorted."""
         used = {row["asset"] for _, row in fragment_rows(shard_dirs, self.type, ASSETS)}
         return sorted({self.library.get(asset).licence for asset in used})
 
@@ -160,17 +159,14 @@ class _CsvFile:
         self._bytes = 0
 
     def __enter__(self) -> _CsvFile:
-        """Open the file and write the header."""
         self._file = self._path.open("wb")
         self.write({name: name for name in self._columns})
         return self
 
     def __exit__(self, *exception: object) -> None:
-        """Close the file."""
         self._file.close()
 
     def write(self, row: Mapping[str, Any]) -> None:
-        """Append a line."""
         text = io.StringIO()
         csv.writer(text, lineterminator="\n").writerow(row[name] for name in self._columns)
         data = text.getvalue().encode()
@@ -179,7 +175,6 @@ class _CsvFile:
         self._bytes += len(data)
 
     def write_all(self, rows: Iterable[Mapping[str, Any]]) -> None:
-        """Append lines."""
         for row in rows:
             self.write(row)
 
@@ -189,7 +184,6 @@ class _CsvFile:
 
 
 def _row(info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
-    """Lines of both tables for one image."""
     camera = sample.truth[sensor].camera.intrinsics
     image_id = sample.image_id(sensor)
     image = {
@@ -244,7 +238,6 @@ def _image_files(info: DatasetInfo) -> dict[str, Any]:
 
 
 def _record_sets(info: DatasetInfo) -> list[dict[str, Any]]:
-    """Images with their pixels, objects and categories."""
     images = record_set(
         "images",
         "Images with the intrinsics of their cameras.",
@@ -267,7 +260,6 @@ def _record_sets(info: DatasetInfo) -> list[dict[str, Any]]:
 
 
 def _columns(table: str, columns: Mapping[str, str]) -> dict[str, tuple[str, dict[str, Any]]]:
-    """Fields of the columns of a CSV file."""
     return {
         name: (kind, extract(f"{table}.csv", {"column": name}, is_set=False))
         for name, kind in columns.items()

@@ -187,7 +187,6 @@ class _SplitFiles:
     _writer: ParquetWriter | None = None
 
     def add(self, row: dict[str, Any]) -> None:
-        """Append a row."""
         self._group.append(row)
         self._group_bytes += sum(_png_size(value) for value in row.values())
         is_full = len(self._group) == GROUP_ROWS or self._group_bytes >= GROUP_BYTES
@@ -198,12 +197,10 @@ class _SplitFiles:
             self._close_file()
 
     def close(self) -> None:
-        """Write the remaining rows."""
         self._write_group()
         self._close_file()
 
     def size_bytes(self) -> int:
-        """Size of the files."""
         return sum(path.stat().st_size for path in self.folder.glob(f"{self.split}-*"))
 
     def _write_group(self) -> None:
@@ -279,7 +276,6 @@ def object_features(info: DatasetInfo) -> dict[str, Any]:
 
 
 def _row(info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
-    """Row of an image without its pixels."""
     camera = sample.truth[sensor].camera
     visible = [thing for thing in sample.truth[sensor].objects if thing.box is not None]
     objects = [
@@ -310,7 +306,6 @@ def _lens(lens: Lens) -> dict[str, Any] | None:
 
 
 def _object(sample: Sample, sensor: str, thing: ObjectTruth) -> dict[str, Any]:
-    """Values of a visible object by column, but its id."""
     assert thing.box is not None, "invisible objects are not listed"
     assert thing.mask is not None, "the annotation instance_masks is in `needs`"
     camera, box = sample.truth[sensor].camera.intrinsics, thing.box

@@ -162,7 +162,6 @@ class KittiRaw(base.ExporterBase):
         write_text(dataset_dir / "drives.txt", "".join(drives))
 
     def _cameras(self, info: DatasetInfo) -> dict[str, str]:
-        """Existing sensors by KITTI's number."""
         known = sensor_selection.rgb_cameras(info)
         asked = {
             number: getattr(self, f"image_{number}") or _if_known(known, f"image_{number}")

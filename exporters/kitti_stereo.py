@@ -113,7 +113,6 @@ class KittiStereo(base.ExporterBase):
         write_text(dataset_dir / "README.txt", readme)
 
     def _pair(self, info: DatasetInfo) -> dict[str, str]:
-        """Sensors by KITTI's numbers."""
         known = sensor_selection.rgb_cameras(info)
         matched = [name for name in known if Channel.DISPARITY in info.media[name]]
         left = self.left or (matched[0] if matched else "")

@@ -132,7 +132,6 @@ class KittiTracking(base.ExporterBase):
             write_text(folder / f"evaluate_tracking.seqmap.{split}", "".join(lines))
 
     def _cameras(self, info: DatasetInfo) -> dict[str, str]:
-        """Sensors by KITTI's number."""
         cameras = {"02": pinhole_camera(info, self.camera, self.type)}
         if self.right_camera:
             cameras["03"] = pinhole_camera(info, self.right_camera, self.type)

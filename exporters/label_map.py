@@ -248,7 +248,6 @@ class AppliedLabelMap:
 
     @cached_property
     def _class_of(self) -> Mapping[str, tuple[str, int]]:
-        """Class and its id by category."""
         listed = enumerate(self.label_map.classes_of.items(), 1)
         return {category: (name, k) for k, (name, own) in listed for category in own}
 

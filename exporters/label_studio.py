@@ -149,7 +149,6 @@ def object_regions(
 
 
 def _shape_value(thing: ObjectTruth, camera: Intrinsics, shapes: Shape) -> dict[str, Any]:
-    """Coordinates of the shape of an object."""
     width, height, box = camera.width_px, camera.height_px, thing.box
     assert box is not None, "invisible objects are not listed"
     assert thing.mask is not None, "the annotation instance_masks is in `needs`"

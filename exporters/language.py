@@ -78,7 +78,6 @@ class LanguageJsonl(ImageRowsExporter):
 
 
 def _utterances(sample: Sample, sensor: str) -> list[tuple[str, Utterance]]:
-    """Text about an image, each with its kind."""
     said = sample.truth[sensor].utterances
     assert said is not None, "the annotation language is in `needs`"
     scene = Utterance("caption", caption(sample, sensor))

@@ -307,7 +307,6 @@ class FilesV30(RobotFiles):
         return self._data
 
     def _flush_episodes(self) -> None:
-        """Write the episodes that are in memory as one row group."""
         import pyarrow
 
         if not self._episode_rows:
@@ -329,7 +328,6 @@ def _column(dtype: str, length: int) -> dict[str, Any]:
 
 
 def _table_column(name: str) -> dict[str, Any]:
-    """Feature of a column of the table of episodes."""
     if name == "tasks":
         return list_feature(value_feature("string"))
     if not name.startswith("stats/"):
@@ -375,7 +373,6 @@ def _image_paths(info: interfaces.DatasetInfo, frame: Frame) -> dict[str, Path]:
 
 
 def _image_bytes(info: interfaces.DatasetInfo, frames: Sequence[Frame]) -> int:
-    """Size of the image files of an episode."""
     paths = (path for frame in frames for path in _image_paths(info, frame).values())
     return sum(path.stat().st_size for path in paths)
 

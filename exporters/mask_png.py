@@ -127,7 +127,6 @@ def _tokens() -> tuple[NDArray[np.uint8], NDArray[np.int64]]:
 
 
 def _literal(value: int) -> Bits:
-    """Fixed code of a byte."""
     return f"{0x30 + value:08b}" if value < 144 else f"{0x190 + value - 144:09b}"
 
 

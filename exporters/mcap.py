@@ -268,7 +268,6 @@ def _events(frame: Frame) -> Iterator[_Event]:
 
 
 def _write_file(info: DatasetInfo, path: Path, sequence: Sequence[Frame], exporter: Mcap) -> None:
-    """Write all messages of a sequence in order of time."""
     from mcap.writer import CompressionType, Writer
 
     # Sorting is stable: transforms stay before the messages that need them.
@@ -297,7 +296,6 @@ class _Channels:
         self._schemas: dict[str, int] = {}
 
     def write(self, topic: str, message: Message, time_ns: int) -> None:
-        """Append a message."""
         if topic not in self._ids:
             schema = self._schema(message)
             self._ids[topic] = self._writer.register_channel(topic, "protobuf", schema)
@@ -316,7 +314,6 @@ class _Channels:
 def _messages(
     info: DatasetInfo, event: _Event, point_time: PointTime
 ) -> Iterator[tuple[str, Message]]:
-    """Yield topic and message of everything that an event stands for."""
     row = event.frame.row
     if event.kind == "transform":
         yield "/tf", _transform_message(row["transforms"][event.key])

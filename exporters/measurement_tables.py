@@ -123,7 +123,6 @@ def csv_bytes(rows: NDArray[np.void]) -> bytes:
 
 
 def _choose_format(kind: np.dtype[Any]) -> Any:
-    """Function that formats the values of a column."""
     if kind.kind != "f":
         return str
     return repr if kind.itemsize == 8 else "{:.7g}".format
@@ -154,7 +153,6 @@ def _readings(shard_dirs: Sequence[Path], sensor: str) -> Iterator[tuple[int, Pa
 
 
 def _add_index(rows: NDArray[np.void], index: int) -> NDArray[Any]:
-    """Prepend the index of the sample to every row."""
     numbered: NDArray[Any] = np.zeros(len(rows), [(INDEX, "<u4"), *rows.dtype.descr])
     numbered[INDEX] = index
     for name in rows.dtype.names or ():

@@ -105,7 +105,6 @@ class Recording:
         return start_us + round(time_s * 1e6)
 
     def _reading_rows(self, channel: str) -> Iterator[tuple[str, Row]]:
-        """Rows of all readings of one channel."""
         read = [k for k, frame in enumerate(self.frames) if channel in frame.row["readings"]]
         tokens = ["", *(self.token("sample_data", self.frames[k].index, channel) for k in read), ""]
         for n, k in enumerate(read, 1):

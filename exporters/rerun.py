@@ -229,7 +229,6 @@ def _box_chunk(info: DatasetInfo, rows: Sequence[Row]) -> Any:
 
 
 def _describe_classes(info: DatasetInfo, skeletons: Mapping[int, Skeleton]) -> list[Any]:
-    """Names, colours and skeletons of the categories."""
     import rerun as rr
 
     palette = label_colors.voc_palette()
@@ -347,7 +346,6 @@ def _lidar_chunks(info: DatasetInfo, name: str, rows: Sequence[Row]) -> Iterator
 
 
 def _poses(info: DatasetInfo, path: str, rows: Sequence[Row]) -> Any:
-    """Chunk of the poses of an entity."""
     import rerun as rr
 
     poses = np.array([row["pose"] for row in rows], np.float64)
@@ -356,7 +354,6 @@ def _poses(info: DatasetInfo, path: str, rows: Sequence[Row]) -> Any:
 
 
 def _chunk(info: DatasetInfo, path: str, rows: Sequence[Row], columns: Any) -> Any:
-    """Chunk of an entity with a row per sample."""
     import rerun as rr
     from rerun.chunk import Chunk
 

@@ -107,13 +107,11 @@ class Rlds(lerobot.LeRobot):
 
 
 def _data_set(episode: Sequence[Frame]) -> tuple[str, str]:
-    """Split and robot of an episode."""
     row = episode[0].row
     return row["split"], row["robot"]
 
 
 def _features(info: DatasetInfo, frames: Sequence[Frame]) -> dict[str, Feature]:
-    """Lists of an episode by key."""
     rows = [{**frame.row, **frame.row["labels"]} for frame in frames]
     first, last = rows[0], len(rows) - 1
     succeeded = bool(first.get("annotation.succeeded"))

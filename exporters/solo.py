@@ -170,7 +170,6 @@ class _Counter:
 
 
 def _capture(info: DatasetInfo, sample: Sample, name: str) -> dict[str, Any]:
-    """Facts of one image, without file names."""
     truth = sample.truth[name]
     camera = truth.camera
     T_world_camera = camera.T_world_camera
@@ -224,7 +223,6 @@ def _rgba(number: int) -> list[int]:
 
 
 def _head(annotation: str, sensor: str) -> dict[str, Any]:
-    """Keys that all annotations have."""
     return {
         "@type": PREFIX + TYPES[annotation],
         "id": annotation,
@@ -345,7 +343,6 @@ def _link_images(
 
 
 def _write_definitions(info: DatasetInfo, folder: Path, counter: _Counter) -> None:
-    """Write the files that describe the whole data set."""
     documents = {
         "metadata": {
             "unityVersion": "",

@@ -150,7 +150,6 @@ class TfRecord(base.ExporterBase):
         write_text(dataset_dir / "label_map.pbtxt", label_map(info.categories))
 
     def _labels(self, info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Feature]:
-        """Labels of one image by key, without its pixels."""
         truth = sample.truth[sensor]
         visible = [thing for thing in truth.objects if thing.box is not None]
         things = list(ignored_regions.each_class(info, visible))
@@ -230,7 +229,6 @@ def _mask_png(truth: ImageTruth, thing: ObjectTruth) -> bytes:
 
 
 def _images(info: DatasetInfo, shard_dir: Path, sensor: str, index: int) -> dict[str, Feature]:
-    """Image files of a camera by key."""
     images: dict[str, Feature] = {}
     for channel in info.media[sensor]:
         data = info.media_path(shard_dir, sensor, channel, index).read_bytes()

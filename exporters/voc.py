@@ -269,5 +269,4 @@ def _list_lines(info: DatasetInfo, row: dict[str, Any]) -> Iterable[tuple[str, s
 
 @lru_cache(maxsize=1024)
 def _file_word(category: str) -> str:
-    """A category in names of files."""
     return "".join(c if c.isalnum() else "-" for c in category)

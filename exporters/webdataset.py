@@ -185,7 +185,6 @@ class _TarFiles:
         self._tar: tarfile.TarFile | None = None
 
     def add(self, key: str, fields: Iterable[tuple[str, bytes]]) -> None:
-        """Append a sample."""
         if self._samples % self._samples_per_tar == 0:
             self._open_next()
         assert self._tar is not None, "opened with the first sample"
@@ -197,7 +196,6 @@ class _TarFiles:
             self._tar.addfile(member, io.BytesIO(data))
 
     def close(self) -> None:
-        """Finish the open tar file."""
         if self._tar is not None:
             self._tar.close()
 

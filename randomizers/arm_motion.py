@@ -228,5 +228,4 @@ def _pose_on_surface(stop: Stop, yaw_rad: float, scene: Scene, field: str) -> SE
 
 
 def _narrowest_m(body: Body, assets: AssetIndex) -> float:
-    """Smallest extent of an object."""
     return 2.0 * min(half_extents_m(*assets.bounds_m(body.asset), body.scale))

@@ -176,7 +176,6 @@ class ArmTask(RandomizerBase):
         return names
 
     def _table(self) -> dict[str, Task]:
-        """The shipped tasks and the user's own, by name."""
         return {**tasks(), **self.tasks}
 
     def _find_group(self, scene: Scene) -> ObjectGroup:

@@ -52,7 +52,6 @@ class Backdrop(base.RandomizerBase):
         )
 
     def _find_options(self, assets: AssetIndex) -> tuple[tuple[str, ...], tuple[str, ...]]:
-        """Ids of the textures for floors and for walls."""
         field = f"randomizers.{self.name}"
         return (
             base.find_textures(assets, self.floor, f"{field}.floor"),

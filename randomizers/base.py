@@ -159,7 +159,6 @@ def find_texture_files(assets: AssetIndex, textures: tuple[str, ...]) -> tuple[s
 
 
 def _by_word(textures: tuple[asset_types.Asset, ...]) -> Mapping[str, tuple[str, ...]]:
-    """Ids of textures by id, tag and family."""
     by_word: dict[str, list[str]] = {}
     for texture in textures:
         for word in {texture.asset_id, _family(texture.asset_id), *texture.tags}:

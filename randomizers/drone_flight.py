@@ -101,7 +101,6 @@ class DroneFlight(RandomizerBase):
         raise self.reject("no free way for the drone", remedy)
 
     def _select_stretches(self, scene: Scene) -> list[Stretch]:
-        """Select the stretches of lanes to look at."""
         lanes = [lane for lane in scene.lanes if lane.kind == "driving" and not lane.junction]
         chosen = [lane for lane in lanes if not self.roads or lane.road in self.roads]
         if not chosen:

@@ -210,7 +210,6 @@ class _Boxes:
 
     @classmethod
     def of(cls, bodies: list[Body], assets: AssetIndex, point_m: Vec3) -> _Boxes:
-        """Collect the boxes of bodies."""
         bounds_m = {name: standing_bounds_m(assets, name) for name in {b.asset for b in bodies}}
         scales = np.array([body.scale for body in bodies])
         boxes_m = np.array([bounds_m[body.asset] for body in bodies]).reshape(-1, 2, 3)

@@ -235,7 +235,6 @@ def _moving_parts(assets: AssetIndex) -> dict[str, tuple[str, str]]:
 
 
 def _interior(rooms: tuple[Room, ...]) -> tuple[Vec3, Vec3]:
-    """The box around all rooms."""
     low, high = [math.inf, math.inf], [-math.inf, -math.inf]
     for room in rooms:
         for axis in (0, 1):

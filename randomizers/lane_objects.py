@@ -122,7 +122,6 @@ class LaneObjects(GroupRandomizer):
         return add_members(scene, group, members, assets)
 
     def _select_lanes(self, scene: Scene, group: ObjectGroup) -> list[LaneLine]:
-        """Select the lanes of the wanted kinds and roads."""
         kinds = self.lanes or group.lanes
         return [
             LaneLine(lane)
@@ -187,7 +186,6 @@ class LaneObjects(GroupRandomizer):
         bounds_of: BoundsOf,
         rng: Rng,
     ) -> Iterator[Member]:
-        """Scatter objects over the bounding rectangle of the lanes."""
         del group
         points = [point for line in lines for point in line.lane.center_m]
         low = [min(point[k] for point in points) for k in range(3)]
@@ -216,7 +214,6 @@ class LaneObjects(GroupRandomizer):
     def _draw_run(
         self, at_m: float, weights: CategoryWeights, bounds_of: BoundsOf, rng: Rng
     ) -> _Run:
-        """Draw the next object, or run of equal ones."""
         thing = self._draw_thing(weights, bounds_of, rng)
         reach_m = self.run_m.draw(rng)
         return _Run(thing, at_m + reach_m, self.occupancy.draw(rng) if reach_m > 0.0 else None)
@@ -247,6 +244,5 @@ def _land_fall_m(behind_m: float) -> float:
 
 
 def _extent_m(bounds_m: Bounds, facing: str) -> tuple[float, float]:
-    """Extents along and across the lane."""
     x, y = bounds_m[1][0] - bounds_m[0][0], bounds_m[1][1] - bounds_m[0][1]
     return (x, y) if facing == "along" else (y, x)

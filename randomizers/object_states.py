@@ -189,7 +189,6 @@ def _stream(piece: Body, mouth_m: Vec3, assets: AssetIndex) -> Body:
 
 
 def _find_parts(scene: Scene) -> Iterator[tuple[Body, Body, Joint]]:
-    """Yield every moving part, its piece and its joint."""
     bodies = {body.name: body for body in scene.bodies}
     for body in scene.bodies:
         piece, _, part = body.name.rpartition("/")

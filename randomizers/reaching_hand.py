@@ -271,7 +271,6 @@ def _is_behind_edge(member: Member, surface: SupportSurface, assets: AssetIndex)
 
 
 def _is_free(member: Member, scene: Scene, assets: AssetIndex) -> bool:
-    """Whether the arm ends inside the room."""
     rear, _ = _ends(member, assets)
     low, high = (np.array(corner) for corner in scene.interior_m)
     return bool((rear > low + _WALL_M).all() and (rear < high - _WALL_M).all())

@@ -102,7 +102,6 @@ class RoomCamera(base.RandomizerBase):
         return max(found, key=lambda one: one[0])[1]
 
     def _find(self, scene: Scene) -> tuple[list[Body], list[Body]]:
-        """Floors of the rooms, and pieces to look at."""
         own = [b for b in scene.bodies if b.name.partition("/")[0] == self.room]
         floors = [b for b in own if b.name.endswith("/floor")]
         return floors, [b for b in own if b.group == self.room and b.part_id < 2]
@@ -153,7 +152,6 @@ def _is_hidden(sight: free_space.Sight, near_m: float) -> bool:
 
 
 def _is_large(body: Body, assets: AssetIndex) -> bool:
-    """Whether a piece is furniture rather than a small object."""
     low, high = assets.bounds_m(body.asset)
     return max(b - a for a, b in zip(low, high, strict=True)) > _LARGE_M
 

@@ -44,5 +44,4 @@ class Textures(SurfaceRandomizer):
         return self.change_targets(scene, assets, draw, self.slots)
 
     def _find_options(self, assets: interfaces.AssetIndex) -> tuple[str, ...]:
-        """Ids of the textures to draw from."""
         return find_textures(assets, self.textures, f"randomizers.{self.name}.textures")

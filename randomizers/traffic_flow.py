@@ -125,7 +125,6 @@ class TrafficFlow(base.RandomizerBase):
     def _draw_signal_cycles(
         self, scene: Scene, assets: AssetIndex, rng: Rng
     ) -> list[tuple[traffic_lights.Signal, Approach]]:
-        """Draw one cycle per junction for all traffic lights."""
         roles = frozenset(traffic_lights.COLORS)
         lights = [
             traffic_lights.read_signal(body)
@@ -150,7 +149,6 @@ class TrafficFlow(base.RandomizerBase):
         standing: traffic_actors.Standing,
         streets: Streets,
     ) -> dict[str, tuple[str, ...]]:
-        """Expand the configured routes to names of lanes, by vehicle."""
         places = {driver.body.name: driver.place for driver in drivers}
         planned = {}
         for name, stops in sorted(self.routes.items()):

@@ -110,7 +110,6 @@ def dipped_beam(name: str, T_world_lens: SE3, beam_cd: float) -> Light:
 
 
 def _beams(name: str, body: Body, assets: AssetIndex, beam_cd: float) -> list[Light]:
-    """One spot per headlight, just in front of its lens."""
     lights = []
     for point in assets.keypoints(body.asset):
         if point.name.startswith("headlight"):

@@ -125,7 +125,6 @@ class Weather(base.RandomizerBase):
     @field_validator("preset")
     @classmethod
     def _check_preset(cls, preset: dist.Name) -> dist.Name:
-        """Reject unknown presets."""
         for name in preset.outcomes():
             if name not in PRESETS:
                 raise ValueError(

@@ -192,8 +192,6 @@ class Objects(element.Element):
 
 
 def _group_by_family(every: tuple[Asset, ...]) -> Mapping[str, list[Asset]]:
-    """Assets by the part of their ids before the parameters."""
-
     def group() -> Mapping[str, list[Asset]]:
         families: dict[str, list[Asset]] = {}
         for asset in every:

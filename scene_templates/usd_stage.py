@@ -61,7 +61,6 @@ class UsdStage(PlacedElement):
         )
 
     def _make_instances(self, stage: StageModel, first_id: int) -> dict[str, Instance]:
-        """Instances by the name of their labelled prim."""
         first: dict[str, StagePiece] = {}
         for piece in stage.pieces:
             if piece.thing:

@@ -177,7 +177,6 @@ def _mutate_tree(rng: random.Random) -> bytes:
 
 
 def _change(tree: Any, rng: random.Random) -> None:
-    """Change one node, or one of the keys, of a tree."""
     node = tree
     while True:
         keys = list(node) if isinstance(node, dict) else list(range(len(node)))

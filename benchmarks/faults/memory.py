@@ -106,7 +106,6 @@ def _enter_and_run(group: Path, folder: Path, message: Path) -> None:
 
 
 def _remove(group: Path) -> None:
-    """Remove a cgroup as soon as its last process has ended."""
     for _ in range(100):
         with suppress(OSError):
             group.rmdir()

@@ -111,7 +111,6 @@ def _work_together(
 
 
 def _mean_stages(answers: Sequence[Answer]) -> dict[str, float]:
-    """CPU ms per sample by stage."""
     made = sum(a["n"] for a in answers)
     stages = sorted({stage for a in answers for stage in a["cpu_s"]})
     return {s: 1e3 * sum(a["cpu_s"].get(s, 0.0) for a in answers) / made for s in stages}
@@ -162,7 +161,6 @@ class _Worker:
         return answer
 
     def end(self) -> None:
-        """End the process."""
         self.process.kill()
         self.process.wait()
         self._listener.join()
@@ -172,7 +170,6 @@ class _Worker:
                 pipe.close()
 
     def last_words(self) -> str:
-        """End of its error output."""
         return " | ".join(self._log.read_text().strip().splitlines()[-4:]) or "still at work"
 
 

@@ -55,7 +55,6 @@ def _shade(rng: VariantRng) -> Material:
 
 
 def _tube(r0: float, r1: float, z0: float, z1: float, slot: int) -> Patch:
-    """A shade, open above and below."""
     t = 0.003
     profile = [(r0, z0), (r1, z1), (r1 - t, z1), (r0 - t, z0), (r0, z0)]
     return shapes.lathe(profile, 40, slot)

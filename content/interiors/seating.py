@@ -130,7 +130,6 @@ def _pillows(rng: VariantRng, places: int, corner: Vec3) -> list[Patch]:
 
 
 def _sagged(patch: Patch, depth_m: float) -> Patch:
-    """A cushion whose middle has been sat on."""
     p = patch.corners_m.copy()
     low, high = patch.bounds_m()
     u, v, w = (2.0 * (p[..., i] - low[i]) / (high[i] - low[i]) - 1.0 for i in range(3))

@@ -30,10 +30,7 @@ _DARK = painted_material("#1d1e20", 0.5)
 
 
 class _Group:
-    """Solids put side by side in one."""
-
     def __init__(self) -> None:
-        """Empty."""
         self.patches: list[Patch] = []
         self.looks: list[Material] = []
 
@@ -50,7 +47,6 @@ class _Group:
 
 
 def _plates(rng: VariantRng, radius_m: float, count: int, slot: int) -> list[Patch]:
-    """Plates on one another."""
     r, made = radius_m, []
     for k in range(count):
         profile = [
@@ -68,7 +64,6 @@ def _plates(rng: VariantRng, radius_m: float, count: int, slot: int) -> list[Pat
 
 
 def _bowls(radius_m: float, count: int, slot: int) -> list[Patch]:
-    """Bowls in one another."""
     r, made = radius_m, []
     outer = [(0.0, 0.0), (0.5 * r, 0.0), (0.85 * r, 0.3 * r), (r, 0.62 * r)]
     profile = [*outer, (0.96 * r, 0.62 * r), (0.8 * r, 0.32 * r), (0.45 * r, 0.03), (0.0, 0.03)]
@@ -158,7 +153,6 @@ def _packets(rng: VariantRng) -> list[Patch]:
 
 
 def _packet_looks(rng: VariantRng) -> list[Material]:
-    """Materials of packets and tins."""
     return [Material(draw_linear(PLASTICS, 0.1, rng), 0.45) for _ in range(4)]
 
 

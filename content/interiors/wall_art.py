@@ -237,7 +237,6 @@ def _landscape(w: int, h: int, rng: VariantRng, *, painted: bool) -> UInt8:
 def _tree(
     image: Float32, x: Float32, y: Float32, foot: tuple[float, float], rng: VariantRng
 ) -> None:
-    """A crown on a trunk, in the shade below."""
     h, w = image.shape[:2]
     high = rng.between(0.14, 0.28)
     dx, dy = (x - foot[0]) * w / h, y - foot[1]
@@ -265,17 +264,14 @@ def _photograph(image: Float32, rng: VariantRng, *, grey: bool | None = None) ->
 
 
 def _hills_painted(w: int, h: int, rng: VariantRng) -> UInt8:
-    """A landscape in oils."""
     return _landscape(w, h, rng, painted=True)
 
 
 def _hills_taken(w: int, h: int, rng: VariantRng) -> UInt8:
-    """A photograph of a landscape."""
     return _landscape(w, h, rng, painted=False)
 
 
 def _sea(w: int, h: int, rng: VariantRng) -> UInt8:
-    """The sea under a sky, some with a sail."""
     x, y = _axes(w, h)
     horizon = rng.between(0.38, 0.6)
     image = _sky(y, w, h, horizon, rng, evening=rng.chance(0.5))
@@ -332,7 +328,6 @@ def _town(w: int, h: int, rng: VariantRng) -> UInt8:
 
 
 def _forest(w: int, h: int, rng: VariantRng) -> UInt8:
-    """A photograph of trunks in mist."""
     x, y = _axes(w, h)
     mist = color(rng.choose(("#dde4e4", "#e6e2d2", "#cfd8dc")))
     image = np.broadcast_to(mist, (h, w, 3)).astype(np.float32).copy()

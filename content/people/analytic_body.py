@@ -237,7 +237,6 @@ def _arm(bones: Bones, side: str) -> tuple[Array, Indices]:
 
 
 def _hand(bones: Bones, side: str) -> tuple[Array, Indices]:
-    """A mitten with a thumb."""
     share, thick, broad = np.array(OUTLINES["hand"]).T
     halves = np.stack([broad, thick], axis=1)
     values, faces = _along_arm(bones, _WRIST, share * _HAND_M, halves, (f"hand_{side}",))

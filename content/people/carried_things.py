@@ -309,7 +309,6 @@ _UMBRELLAS = ("#15161a", "#1c2438", "#15161a", "#7d1f26", "#20242a", "#2d5a4a", 
 
 
 def _rod(start: Array, end: Array) -> Sheet:
-    """A thin rod of three sides."""
     axes = _axes_along(end - start)
     turn = 2.0 * math.pi * np.arange(3) / 3.0
     ring = np.stack([np.cos(turn), np.sin(turn), 0.0 * turn], axis=1) @ axes.T
@@ -343,7 +342,6 @@ _SHOULDER_STRAP = ((-0.06, -0.08, 0.5), (0.0, -0.085, 0.57), (0.08, -0.07, 0.5),
 
 
 def _shoulder_bag(carrier: Carrier) -> list[Sheet]:
-    """A bag at the left hip whose strap crosses the chest."""
     scale = carrier.scale
     middle = carrier.at("thigh_l") + np.array([-0.05, 0.15, 0.03]) * scale
     material = carrier.person.outfit.bag_material
@@ -474,7 +472,6 @@ def _wheel(middle: Array, diameter_m: float, width_m: float) -> Sheet:
 
 
 def _bar(start: Array, end: Array, width_m: float, material: Material) -> Sheet:
-    """A straight bar between two points."""
     length = math.sqrt(float(((end - start) ** 2).sum()))
     size = np.array([width_m, width_m, length])
     return pillow(0.5 * (start + end), size, _axes_along(end - start), material, steps=2)

@@ -194,7 +194,6 @@ def _read(folder: Path) -> _Base:
 
 
 def _targets() -> Iterator[str]:
-    """Names of the shapes, made of the words of a figure."""
     for sex, age in product(_SEXES, _AGES):
         yield from (f"{origin}-{sex}-{age}" for origin in _ORIGINS)
         for muscle, weight in product(("min", "average", "max"), repeat=2):

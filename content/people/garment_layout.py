@@ -77,7 +77,6 @@ def texel_places(size_px: int) -> tuple[Float32, Float32]:
 
 
 def _fields(template_m: Array, faces: Indices, zones: Sequence[str], slots: Indices) -> Indices:
-    """The field of each triangle."""
     behind = template_m[faces, 0].mean(axis=1) < _SPINE_X_M
     kinds = np.array([_ARM if z in _ARMS else _LEG if z in _LEGS else -1 for z in zones])[slots]
     fields: Indices = np.where(kinds >= 0, kinds, np.where(behind, _TRUNK_BACK, _TRUNK_FRONT))

@@ -78,7 +78,6 @@ def jacket_cloth(seed: int) -> TextureData:
 
 
 def _buttons() -> Float32:
-    """A row of buttons from the neck to the thighs."""
     pitch_m, radius_m = 0.105, 0.011
     down = np.abs((_Z_M - 0.3) / pitch_m - np.rint((_Z_M - 0.3) / pitch_m)) * pitch_m
     away = np.hypot(_COLUMN_M - FRONT_M, down)
@@ -280,7 +279,6 @@ def _ridges(cells: tuple[int, int], rng: VariantRng) -> Float32:
 
 
 def _pockets() -> Float32:
-    """Slanted front pockets and two patches behind."""
     front = _IS_FRONT * _line(_Z_M - 0.7 * (_FROM_FRONT_M - 0.13), 0.05, 0.005)
     front = front * ((_FROM_FRONT_M > 0.1) & (_FROM_FRONT_M < 0.17))
     aside, down = np.abs(_FROM_BACK_M - 0.085), np.abs(_Z_M - 0.01)
@@ -290,7 +288,6 @@ def _pockets() -> Float32:
 
 
 def _print(albedo: Float32, middle_m: float, ink: Float32, rng: VariantRng) -> Float32:
-    """The albedo with a print between chest and waist."""
     width_m = rng.choose((0.1, 0.2, 0.26))
     height_m = width_m * rng.choose((0.3, 0.6, 1.0))
     top_m = TOP_Z_M - rng.between(0.4, 0.44)
@@ -327,7 +324,6 @@ def _shaded(albedo: Float32, height_px: Float32, depth: float = 0.07) -> Texture
 
 
 def _pair(palette: str, seed: int) -> tuple[Float32, Float32]:
-    """Ground and ink of a pattern."""
     ground, ink = (color(code) for code in in_turn(_INKS[palette], seed).split())
     return ground, ink
 

@@ -181,7 +181,6 @@ def stance(pose: str, step: int) -> Stance:
 
 
 def _adapted(gait: _Gait, row: _Pose) -> _Gait:
-    """The gait with the arms of a pose."""
     if row.arm is None and row.swing == 1.0:
         return gait
     swing, elbow = row.swing * gait.arm_swing, row.swing * gait.elbow_swing

@@ -142,7 +142,6 @@ def bottle(seed: int) -> Solid:
 def _bottle_materials(
     style: BottleStyle, choice: BottleChoice, seed: int, rng: VariantRng
 ) -> list[Material]:
-    """Body, label and cap."""
     color, gloss = material_presets.draw_linear(style.colors, 0.1, rng), rng.between(*style.gloss)
     body = Material(color, gloss)
     if style.clear:
@@ -213,7 +212,6 @@ class _Wall(NamedTuple):
     radii: list[float]
 
     def profile(self) -> list[Point2]:
-        """The outside without the label."""
         lower, rest = self.below(0.0), self.above(0.0)
         return [*lower, *rest]
 

@@ -223,7 +223,6 @@ def sliced_sandwich(seed: int, rng: VariantRng, *, half: bool = False) -> Dish:
 
 
 def _round_roll(seed: int, rng: VariantRng) -> Dish:
-    """A burger or a filled bun, with sesame."""
     radius = rng.between(0.045, 0.058, "radius_m")
     foot = puck(radius, rng.between(0.013, 0.018), rng, soft=0.12)
     thick = float(foot.bounds_m()[1][2])
@@ -255,7 +254,6 @@ def _round_roll(seed: int, rng: VariantRng) -> Dish:
 
 
 def _baguette(seed: int, rng: VariantRng) -> Dish:
-    """A filled length of baguette along X."""
     length, radius = rng.between(0.14, 0.2, "length_m"), rng.between(0.026, 0.033, "radius_m")
     return _long_roll(seed, rng, length, radius)
 

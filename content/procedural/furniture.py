@@ -338,7 +338,6 @@ def _bin_ribs(x: float, y: float, z: float, rim: float) -> list[Box]:
 
 
 def _rounded_loop(half_x: float, half_y: float, radius: float, z: float) -> Array:
-    """Counter-clockwise rounded rectangle, five points per corner."""
     points = []
     for quarter, (sx, sy) in enumerate(((1, 1), (-1, 1), (-1, -1), (1, -1))):
         x, y = sx * (half_x - radius), sy * (half_y - radius)

@@ -254,7 +254,6 @@ def _near(points: Array, chain: Array, margin: float) -> Indices:
 
 
 def _palm(points: Array, bones: Bones, stout: float) -> Array:
-    """Palm, ball of the thumb and arm."""
     feet = np.array(
         [
             [0.024, 0.0125, 0.0],

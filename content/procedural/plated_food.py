@@ -227,7 +227,6 @@ def _pizza(seed: int, _: float, rng: VariantRng) -> list[Helping]:
 
 
 def _breakfast(seed: int, radius: float, rng: VariantRng) -> list[Helping]:
-    """Fried eggs, beans, sausages, toast."""
     made: list[Helping] = []
     white = food_material("egg", seed, 0.3, 0.12)
     yolk = plain_food(("#f0a81e", "#f2b83a", "#e8941a"), 0.15, rng)
@@ -257,7 +256,6 @@ def _breakfast(seed: int, radius: float, rng: VariantRng) -> list[Helping]:
 
 
 def _roast(seed: int, radius: float, rng: VariantRng) -> list[Helping]:
-    """Meat with chips or potatoes, and peas or carrots."""
     steak = mound(0.045, rng.between(0.014, 0.02), rng, rough=0.1, flat=0.45).scaled(
         1.25, 0.85, 1.0
     )
@@ -322,7 +320,6 @@ def _pancakes(seed: int, radius: float, rng: VariantRng) -> list[Helping]:
 
 
 def _toast(seed: int, radius: float, rng: VariantRng) -> list[Helping]:
-    """Toast with jam, egg or avocado."""
     size, thick = rng.between(0.09, 0.105, "size_m"), rng.between(0.011, 0.014, "thickness_m")
     body = shapes.rounded_box((size, 0.96 * size, thick), 0.0035, 2).moved(z=0.5 * thick)
     made = [(body, food_material("toast", seed, 0.8, 0.13))]

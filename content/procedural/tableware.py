@@ -214,7 +214,6 @@ def _vessel(group: str, seed: int) -> Solid:
 
 
 def _wall_materials(choice: Choice, seed: int, rng: VariantRng) -> tuple[Material, Material]:
-    """Materials of the outside and of the inside."""
     outside = _FINISHES[choice.finish](rng)
     if choice.finish in (*_SEE_THROUGH, "wood", "steel"):
         return outside, outside
@@ -359,7 +358,6 @@ def _sleeve(_: Choice, walls: Walls, rng: VariantRng) -> Part:
 
 
 def _straw(choice: Choice, walls: Walls, rng: VariantRng) -> Part:
-    """A straw that leans on the rim, towards +X."""
     r, z = walls.outer[-1]
     top = z + rng.between(0.04, 0.065) + (0.02 if choice.lid else 0.0)
     foot = (-0.45 * radius_at(walls.inner[4:-1], walls.floor_m + 0.004), 0.0, walls.floor_m + 0.002)
@@ -457,7 +455,6 @@ def plate_symmetries(seed: int) -> tuple[Symmetry, ...]:
 
 
 def _plate_materials(seed: int, rng: VariantRng) -> list[Material]:
-    """Underside, well and rim."""
     decor = _plate_decor(seed)
     outside = ceramic_material(rng, PALETTES["glazes"][:2] if rng.chance(0.5) else GLAZES)
     if decor == "plain":

@@ -177,7 +177,6 @@ def _trolley(hard: bool, rng: VariantRng) -> tuple[list[Patch], float]:
 
 
 def _holdall(rng: VariantRng) -> tuple[list[Patch], float]:
-    """A soft round bag along Y with two handles and bands."""
     half, r = 0.5 * rng.between(0.5, 0.66, "width_m"), rng.between(0.14, 0.17, "radius_m")
     profile = [(0.0, -half), (0.8 * r, -half), (r, -0.85 * half), (r, 0.85 * half), (0.8 * r, half),
                (0.0, half)]  # fmt: skip
@@ -194,7 +193,6 @@ def _holdall(rng: VariantRng) -> tuple[list[Patch], float]:
 
 
 def _backpack(rng: VariantRng) -> tuple[list[Patch], float]:
-    """A backpack with a lid, pockets and shoulder straps behind."""
     high, wide, deep = rng.between(0.48, 0.6, "height_m"), 0.32, 0.2
     foot, neck = (
         Rectangle.about(0, 0, deep, wide),

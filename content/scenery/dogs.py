@@ -145,7 +145,6 @@ def _hind_leg(breed: _Breed, x: float, y: float, step: float) -> Patch:
 
 
 def _paws(legs: list[Patch]) -> list[Patch]:
-    """Paws at the lower ends of legs."""
     made = []
     for leg in legs:
         points = leg.corners_m.reshape(-1, 3)
@@ -156,7 +155,6 @@ def _paws(legs: list[Patch]) -> list[Patch]:
 
 
 def _neck_and_head(breed: _Breed, root: Vec3, head: Vec3) -> list[Patch]:
-    """Neck with collar, skull, muzzle, nose, eyes and ears."""
     h, (x, _, z) = breed.head, head
     middle = tuple(0.5 * (a + b) for a, b in zip(root, head, strict=True))
     neck = _limb([root, (middle[0], 0.0, middle[2]), head], [1.35 * h, 1.0 * h, 0.85 * h])
@@ -179,7 +177,6 @@ def _neck_and_head(breed: _Breed, root: Vec3, head: Vec3) -> list[Patch]:
 
 
 def _ear(breed: _Breed, at: Vec3, side: float) -> Patch:
-    """An upright triangle, a flap, or a folded flap."""
     h, (x, y, z) = breed.head, at
     if breed.ears == "upright":
         path = [(x, y, z - 0.1 * h), (x, y, z + 0.5 * h), (x + 0.02, y, z + 0.95 * h)]

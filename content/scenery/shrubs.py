@@ -101,7 +101,6 @@ def _core_material(greens: tuple[Material, ...]) -> Material:
 
 
 def _shell(x: float, y: float, z: float, r: float, count: int, rng: VariantRng) -> Array:
-    """Points on a ball."""
     points: Array = np.array([x, y, z]) + r * foliage.directions(count, rng)
     points[:, 2] = np.maximum(points[:, 2], 0.05)
     return points

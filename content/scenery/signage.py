@@ -48,7 +48,6 @@ def billboard_facts(seed: int) -> Facts:
 
 
 def _posters(seed: int, family: str) -> tuple[Material, Material]:
-    """Prints of both sides."""
     count = POSTERS if family == "poster" else WIDE_POSTERS
     front, back = (
         printed_material(f"texture/{family}?seed={(seed + k) % count}", 0.35) for k in (0, 5)

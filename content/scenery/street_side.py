@@ -163,7 +163,6 @@ def _lobby(plan: Design, part: Stretch, rng: VariantRng) -> Patch:
 
 
 def _gates(plan: Design, part: Stretch, rng: VariantRng) -> Patch:
-    """Roller gates, doors for people and high windows."""
     pitch = plan.width_m / plan.bays
     high = min(plan.ground_m - 0.7, rng.between(3.4, 4.4))
     kinds = rng.shuffled(("gate", "gate", "door", *("window" for _ in part.centres)))
@@ -311,7 +310,6 @@ def fitted_window(plan: Design, hole: Opening, rng: VariantRng, *, bare: bool = 
 
 
 def _bands(plan: Design, part: Stretch, rng: VariantRng) -> list[Patch]:
-    """String courses, cornice, corner stones and downpipes on the street side."""
     y0, y1 = part.y_m
     level, top = plan.ground_m - 0.02, plan.eaves_m
     boxes: list[Box] = []

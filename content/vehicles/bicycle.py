@@ -197,7 +197,6 @@ def _bars(style: str, frame: _Frame) -> list[Patch]:
 
 
 def _pedals(frame: _Frame, turn_rad: float) -> tuple[Vec3, Vec3]:
-    """Middles of the left and the right pedal."""
     x, z = frame.crank
     reach = (_CRANK_M * math.cos(turn_rad), _CRANK_M * math.sin(turn_rad))
     return (x + reach[0], 0.13, z + reach[1]), (x - reach[0], -0.13, z - reach[1])

@@ -110,7 +110,6 @@ def _open_bed(design: Design, lower: Patch) -> tuple[Patch, Patch]:
 
 
 def _collision(design: Design) -> list[Array]:
-    """Body and glass house as boxes."""
     x, y, axles = 0.5 * design.length_m, design.half_m, design.axles
     house = 0.5 * (1.0 + design.roof_share) * 0.92 * y
     front, rear = (
@@ -126,7 +125,6 @@ def _collision(design: Design) -> list[Array]:
 
 
 def _keypoints(design: Design) -> tuple[Keypoint, ...]:
-    """Hubs and lamps."""
     return design.axles.keypoints(*car_ends.lamp_points(design))
 
 
@@ -163,7 +161,6 @@ def _lower_paint(design: Design, ring: BodyOutline, patch: Patch) -> Patch:
 
 
 def _gaps(design: Design, plain: Patch) -> list[Patch]:
-    """The lines around the doors."""
     return [
         body_shell.gap(plain, design.x(share), 0.009, Slot.TRIM, row=(0.1, 0.99), y=(0.5, None))
         for share in design.seams
@@ -171,7 +168,6 @@ def _gaps(design: Design, plain: Patch) -> list[Patch]:
 
 
 def _house(design: Design) -> Patch:
-    """Glass house and roof."""
     ring = body_shell.plan(*design.house_ends, sides=10)
     crown, shoulder = 0.035, design.shoulder()
     wide = design.waist_share * design.half_m

@@ -65,7 +65,6 @@ def _body(x: float, top: float, axles: Axles, *, striped: bool) -> Patch:
 
 
 def _paint_body(half: Patch, ring: BodyOutline, top: float, *, striped: bool) -> Patch:
-    """Stripe, windows, lamps."""
     if striped:
         half = paint(half, Slot.SECOND_PAINT, z=(0.55, 0.95))
     half = paint(half, Slot.TRIM, row=(0.0, 0.5), z=(None, 0.36))
@@ -86,7 +85,6 @@ def _paint_body(half: Patch, ring: BodyOutline, top: float, *, striped: bool) ->
 
 
 def _doors(body: Patch, fronts_m: tuple[float, ...], top: float) -> Patch:
-    """Glazed double doors on the right side."""
     for front in fronts_m:
         for k in (0, 1):
             leaf = (front - 0.62 * (k + 1) + 0.03, front - 0.62 * k - 0.02)
@@ -95,7 +93,6 @@ def _doors(body: Patch, fronts_m: tuple[float, ...], top: float) -> Patch:
 
 
 def _fittings(x: float, top: float, *, mirrors: bool) -> list[Patch]:
-    """Pillars, display, plates, cooling unit, and exterior mirrors or none."""
     parts = [
         block((x - 0.35, -0.75, top - 0.37), (x - 0.105, 0.75, top - 0.15), 0.0, Slot.TRIM),
         block((x - 0.03, -0.26, 0.42), (x + 0.006, 0.26, 0.53), 0.0, Slot.PLATE),

@@ -56,7 +56,6 @@ def _linings(
 
 
 def _seat(x_m: float, y_m: float, floor_m: float, crown_m: float) -> Iterator[Patch]:
-    """A backrest, leaning back, and its head rest."""
     back = block((-0.07, -0.23, 0.0), (0.07, 0.23, crown_m - 0.2 - floor_m), 0.0, Slot.INTERIOR)
     yield back.rotated("y", -0.22).moved(x_m, y_m, floor_m)
     lean = 0.22 * (crown_m - floor_m)

@@ -84,7 +84,6 @@ def _is_ridden(seed: int) -> bool:
 
 
 def _running_gear(build: _Build, *, mirrors: bool) -> list[Patch]:
-    """Wheels, fork, swing arm, handlebar, and mirrors or none."""
     made = wheel(build.wheel_m, build.tyre_m, "six")
     both = [made, made.rotated("z", math.pi)]
     parts = [w.moved(sign * build.axle, 0.0, build.wheel_m) for sign in (1.0, -1.0) for w in both]
@@ -110,7 +109,6 @@ def _running_gear(build: _Build, *, mirrors: bool) -> list[Patch]:
 
 
 def _guard(build: _Build, sign: float, arc_rad: tuple[float, float]) -> Patch:
-    """A mudguard over a wheel."""
     turn = np.linspace(*arc_rad, 8)
     radius = build.wheel_m + 0.03
     x, z = sign * build.axle + radius * np.cos(turn), build.wheel_m + radius * np.sin(turn)

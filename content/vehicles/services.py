@@ -115,7 +115,6 @@ def _service_van(
 
 
 def _printed(kind: str, seed: int, rng: VariantRng) -> tuple[Material, ...]:
-    """Materials in the colours of a service."""
     second = hex_to_linear(rng.choose(COLORS["awnings"]))
     printed = Print(livery_id(kind, seed), fixed=True)
     return materials(rng, livery_ground(kind, seed), second, printed=printed)
@@ -137,7 +136,6 @@ def _roof_m(design: Design, share: float) -> float:
 
 
 def _light_bar(design: Design, x_m: float) -> list[Patch]:
-    """A bar of blue beacons across the roof."""
     half, top = 0.78 * design.roof_share * design.half_m, design.height_m
     lens: tuple[Point2, ...] = ((-half, -0.25 * half), (0.25 * half, half))
     return [

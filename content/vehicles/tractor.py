@@ -53,7 +53,6 @@ def tractor(seed: int) -> Solid:
 
 
 def _mirrors(x: float) -> list[Patch]:
-    """Mirrors on long arms beside the cab."""
     parts = []
     for sign in (1.0, -1.0):
         y = sorted((sign * 1.21, sign * 1.4))
@@ -78,7 +77,6 @@ def _wheels(rear_x: float, rear: float, front_x: float, front: float) -> list[Pa
 
 
 def _bonnet(rear_x: float, x: float, rng: VariantRng) -> list[Patch]:
-    """Engine, bonnet that falls to the front, grille, weights, exhaust."""
     low, high, nose = 1.0, rng.between(1.6, 1.75, "bonnet_m"), x - 0.3
     side = np.array([(low, 0.0), (high, 0.0), (high - 0.08, nose - rear_x - 0.25),
                      (high - 0.3, nose - rear_x), (low, nose - rear_x)])  # fmt: skip
@@ -117,7 +115,6 @@ def _cab(rear_x: float, front_x: float, top: float) -> list[Patch]:
 
 
 def _fenders(rear_x: float, radius: float) -> list[Patch]:
-    """Mudguards over the rear wheels, in flat pieces."""
     turns = np.linspace(0.12 * math.pi, 0.9 * math.pi, 7)
     reach = radius + 0.1
     parts = []
@@ -133,7 +130,6 @@ def _fenders(rear_x: float, radius: float) -> list[Patch]:
 
 
 def _lamps(x: float, rear_x: float, rear: float, top: float) -> list[Patch]:
-    """Headlights in the bonnet, lamps on the mudguards, plates."""
     nose, back = x - 0.28, rear_x - rear - 0.06
     parts = [
         block((nose - 0.02, -0.26, 1.0), (nose + 0.02, 0.26, 1.1), 0.0, Slot.PLATE),
@@ -157,7 +153,6 @@ def _lamps(x: float, rear_x: float, rear: float, top: float) -> list[Patch]:
 def _keypoints(
     x: float, rear: tuple[float, float], front: tuple[float, float]
 ) -> tuple[Keypoint, ...]:
-    """Hubs and lamps of both sides."""
     (rear_x, rear_r), (front_x, front_r) = rear, front
     places = (
         ("wheel_front", (front_x, _HALF_M - 0.21, front_r), 0.3),

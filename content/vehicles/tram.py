@@ -95,7 +95,6 @@ def _paint_ends(left: Patch, ring: BodyOutline, x: float) -> Patch:
 
 
 def _running_gear(x: float) -> list[Patch]:
-    """Bogies between the rails, behind skirts."""
     parts = []
     for at in (-x + 4.5, 0.0, x - 4.5):
         parts.append(block((at - 1.3, -0.8, 0.0), (at + 1.3, 0.8, 0.3), 0.0, Slot.UNDERBODY))
@@ -146,7 +145,6 @@ def _pantograph() -> list[Patch]:
 
 
 def _keypoints(half: float, x: float) -> tuple[Keypoint, ...]:
-    """Middles of the outer bogies, and lamps, of both sides."""
     places = (
         ("wheel_front", (x - 4.5, half, 0.3), 0.4),
         ("wheel_rear", (-x + 4.5, half, 0.3), 0.4),

@@ -280,7 +280,6 @@ def _lockers(x: float, cab: float, roof: float, top: float) -> list[Patch]:
 
 
 def _chassis(x: float, cab: float, axles: Axles) -> list[Patch]:
-    """Rails, tank, side guards, mudguards, bumper behind."""
     front, guard = x - cab - 0.2, (axles.rear_m + 0.65, axles.front_m - 0.75)
     parts = [
         block((-x + 0.1, sign * 0.42 - 0.05, 0.62), (x - 0.5, sign * 0.42 + 0.05, 0.9))
@@ -301,7 +300,6 @@ def _chassis(x: float, cab: float, axles: Axles) -> list[Patch]:
 
 
 def _lamps(x: float, *, mirrors: bool) -> list[Patch]:
-    """Lamps behind, plates, and exterior mirrors or none."""
     parts = [
         block((x - 0.04, -0.26, 0.46), (x + 0.006, 0.26, 0.57), 0.0, Slot.PLATE),
         block((-x + 0.02, -0.26, 0.66), (-x + 0.06, 0.26, 0.77), 0.0, Slot.REAR_PLATE),

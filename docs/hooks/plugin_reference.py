@@ -172,7 +172,6 @@ def _index() -> str:
 
 
 def _body(model: type, titles: Mapping[type, str]) -> str:
-    """Text of a class and the table of its fields."""
     parts = [_reflow(_without_sections(inspect.getdoc(model) or docstring_summary(model)))]
     if issubclass(model, BaseModel) and model.model_fields:
         parts.append(as_fields("\n".join(_field_table(model, titles))))
@@ -210,7 +209,6 @@ def _type_words(words: str, limits: str) -> str:
 
 
 def _example(kind: str, key: str, name: str, model: type) -> Iterator[str]:
-    """A YAML block with a valid entry."""
     if kind == "annotation":
         yield yaml_block(f"annotations: [{name}]")
         return
@@ -224,7 +222,6 @@ def _example(kind: str, key: str, name: str, model: type) -> Iterator[str]:
 
 
 def _strips(kind: str, name: str) -> Iterator[str]:
-    """Pictures of a plug-in."""
     for row in pictures.read_rows():
         if (row.kind, row.name) != (kind, name):
             continue
@@ -236,7 +233,6 @@ def _strips(kind: str, name: str) -> Iterator[str]:
 
 
 def _nested_models(model: type) -> Iterator[type[BaseModel]]:
-    """Models in the fields of a model, and in theirs."""
     if not issubclass(model, BaseModel):
         return
     for info in model.model_fields.values():
@@ -246,7 +242,6 @@ def _nested_models(model: type) -> Iterator[type[BaseModel]]:
 
 
 def _models_in(annotation: Any) -> Iterator[type[BaseModel]]:
-    """Models that a type contains."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         yield annotation
     for argument in get_args(annotation):
@@ -264,7 +259,6 @@ def _slug(heading: str) -> str:
 
 
 def _without_sections(text: str) -> str:
-    """A docstring without its sections of attributes."""
     return re.split(r"\n(?:Attributes|Args|Raises|Returns):\n", text)[0]
 
 
@@ -293,5 +287,4 @@ def _prose(text: str) -> str:
 
 
 def _cell(text: str) -> str:
-    """Text in a cell of a table."""
     return text.replace("|", "\\|")

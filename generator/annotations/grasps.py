@@ -100,7 +100,6 @@ class Grasps(Strict):
     def _grasps(
         self, instance: Instance, mesh: Array, points: Array, normals: Array, around: Array
     ) -> list[Grasp]:
-        """Grasps of one object, the best ones first."""
         hits = hits_by_rays(points, -normals, mesh)
         # Fingers come from outside: the last point within the opening is the second contact.
         widest_m = self.opening_m - 2.0 * self.clearance_m
@@ -171,7 +170,6 @@ class Grasps(Strict):
     def _suctions(
         self, instance: Instance, mesh: Array, points: Array, normals: Array, around: Array
     ) -> list[Suction]:
-        """Suction points of one object, the best ones first."""
         center = np.array(instance.box3d.T_frame_box.translation_m)
         levers_m = np.hypot(points[:, 0] - center[0], points[:, 1] - center[1])
         fit = (normals[:, 2] > 0.0) & (levers_m < self.lever_m)

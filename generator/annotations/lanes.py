@@ -60,7 +60,6 @@ class Lanes(Strict):
     def _project_border(
         self, border: LaneBorder, scene: Scene, reading: SensorReading
     ) -> Iterator[BorderTruth]:
-        """Yield the parts of a border that are in the image."""
         camera = reading.camera
         lens = camera.intrinsics
         p_world = resample_line(np.asarray(border.points_m), FINE_M)

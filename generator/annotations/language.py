@@ -94,7 +94,6 @@ class Language(base_model.Strict):
             yield Thing(number, category, box, clear, instance.annotated, color, diagonal_m)
 
     def _is_whole(self, scene: Scene, reading: SensorReading, truth: ObjectTruth) -> bool:
-        """Whether enough of an object's silhouette is visible."""
         share = truth.visible_fraction
         if share is None:
             share = visibility.Visibility().annotate(scene, reading, truth).visible_fraction

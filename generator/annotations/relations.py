@@ -298,7 +298,6 @@ def _away(T_world_camera: SE3) -> Array:
 def _views(
     boxes: Mapping[int, BoxPx], shapes: Mapping[int, Shape], away: Array
 ) -> Iterator[Relation]:
-    """Relations in an image."""
     depths: dict[int, tuple[float, float]] = {}
 
     def depth(number: int) -> tuple[float, float]:

@@ -125,7 +125,6 @@ def count_workers(workers: int | None) -> int:
 
 
 def _yaml_text(config: Mapping[str, Any]) -> str:
-    """Format a dictionary as a document, whose lines error messages quote."""
     import yaml
 
     try:

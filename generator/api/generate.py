@@ -137,7 +137,6 @@ def _run(
 def _settings(
     factory: PipelineFactory, skip_failed: bool, sample_timeout_s: float | None
 ) -> Settings:
-    """Settings that arguments and the configuration state together."""
     from gen_data.assemble.size_estimate import estimate_sample_bytes
     from gen_data.runner.run import Limits, Settings
 
@@ -181,7 +180,6 @@ def _folder(loaded: Config, out: str | PathLike[str] | None) -> Iterator[Path | 
 def _opened(
     cluster: RayCluster | None, workers: int | None, standby: StandbyWorker | None
 ) -> Iterator[tuple[Callable[[Job], Pool], int]]:
-    """Opener of the pool of workers, and their number."""
     from threadpoolctl import threadpool_limits
 
     from gen_data.runner.processes import open_worker_pool

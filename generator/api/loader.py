@@ -165,7 +165,6 @@ class Loader(Generic[T]):
         return [rng.permutation(block) for block in blocks] if self._shuffle else blocks
 
     def _targets(self) -> Iterator[T]:
-        """Targets of the epoch from the current position on."""
         left = self._position
         works: list[tuple[Indices, list[Indices]]] = []
         for block in self._blocks(self.epoch):
@@ -184,7 +183,6 @@ class Loader(Generic[T]):
                 yield ready.pop(position)
 
     def _make(self, items: Sequence[Indices]) -> Iterator[list[T]]:
-        """Targets of all work items, in order."""
         if self._workers == 0:
             for item in items:
                 yield [self._target(self._samples[k]) for k in item.tolist()]

@@ -201,11 +201,9 @@ class _ChannelNames(Mapping[str, NDArray[Any]]):
         self._images = images
 
     def __getitem__(self, name: str) -> NDArray[Any]:
-        """The image of that channel."""
         return self._images[Channel(name)]
 
     def __contains__(self, name: object) -> bool:
-        """Whether there is such a channel."""
         return any(channel.value == name for channel in self._images)
 
     def __iter__(self) -> Iterator[str]:
@@ -213,7 +211,6 @@ class _ChannelNames(Mapping[str, NDArray[Any]]):
         return (channel.value for channel in self._images)
 
     def __len__(self) -> int:
-        """Number of channels."""
         return len(self._images)
 
 
@@ -355,5 +352,4 @@ def _corners(box: boxes.BoxPx) -> tuple[int, int, int, int]:
 
 
 def _identity(item: ObjectTruth) -> tuple[str, int, int]:
-    """Category, category id and instance id."""
     return item.instance.category, item.instance.category_id, item.instance.instance_id

@@ -84,6 +84,5 @@ def _plugin(table: PluginTable[Any], name: str, definitions: dict[str, Any]) -> 
 
 
 def _hoist_definitions(schema: dict[str, Any], definitions: dict[str, Any]) -> dict[str, Any]:
-    """Move the definitions of a schema to the common ones."""
     definitions.update(schema.pop("$defs", {}))
     return schema

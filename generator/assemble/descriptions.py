@@ -144,7 +144,6 @@ def _sections() -> dict[str, type[BaseModel]]:
 
 
 def _models(annotation: Any) -> Iterator[type[BaseModel]]:
-    """Models in a type, in order."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         yield annotation
     for part in get_args(annotation):
@@ -152,7 +151,6 @@ def _models(annotation: Any) -> Iterator[type[BaseModel]]:
 
 
 def _fields(name: str, model: type[BaseModel]) -> Iterator[tuple[str, list[type[BaseModel]]]]:
-    """Paths and models of the fields that are mappings."""
     for field, info in model.model_fields.items():
         nested = list(_models(info.annotation))
         if nested:
@@ -176,7 +174,6 @@ def _tags(model: type[BaseModel]) -> list[str]:
 
 
 def _words() -> dict[str, dict[type[BaseModel], str]]:
-    """Nested models and their paths by the words that select them."""
     words: dict[str, dict[type[BaseModel], str]] = {}
     for kind in (*TABLES, SECTION):
         for path, model in described_models(kind):

@@ -136,7 +136,6 @@ def _complete(document: Node, chain: tuple[Path, ...]) -> Node:
 
 
 def _merge_into_base(base: Node, document: Node) -> Node:
-    """Merge a configuration into the one that it extends."""
     _check_outputs(document)
     content = dict(_mapping_of(_without(base, document.get("without"))))
     for key, node in _mapping_of(document).items():
@@ -204,7 +203,6 @@ def _without(base: Node, dropped: Node | None) -> Node:
 def _drop_items(
     section: Node | None, names: tuple[Node, ...], field: str, problems: Problems
 ) -> Node:
-    """Drop named items from a list or mapping of plug-ins."""
     section = section or Node(NOWHERE, ())
     kept = {**section.entries, **{node_name(item): item for item in section.items}}
     for name in names:
@@ -247,7 +245,6 @@ def _mapping_of(node: Node) -> Mapping[str, Node]:
 
 
 def _shipped_files(package: ModuleType) -> list[Path]:
-    """YAML files of a package."""
     return sorted(Path(str(files(package))).glob("*.yaml"))
 
 
@@ -304,7 +301,6 @@ def _merge_elements(document: Node, template: Node | None) -> Node:
 
 
 def _with_defaults(elements: Node, defaults: Node | None) -> Node:
-    """Apply a template's defaults to its elements of each type."""
     if defaults is None:
         return elements
     by_type, problems = _mapping_of(defaults), Problems()

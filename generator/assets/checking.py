@@ -104,7 +104,6 @@ def _open_images(one: IndexedAsset, library: Library) -> None:
 
 
 def _inspect_plate(one: IndexedAsset, library: Library, doubts: tuple[str, ...]) -> Finding:
-    """Estimate a photograph's camera."""
     plate = library.plate(one.asset_id)
     library.environment(one.asset_id)
     (_, left_px), (_, right_px) = plates.horizon_px(plate)
@@ -121,7 +120,6 @@ def _inspect_plate(one: IndexedAsset, library: Library, doubts: tuple[str, ...])
 
 
 def _measure_object(one: IndexedAsset, library: Library) -> tuple[int, se3.Vec3, se3.Vec3]:
-    """Number of triangles and bounding box of an object."""
     library.convex_parts(one.asset_id)
     return (len(library.mesh(one.asset_id).faces), *library.bounds_m(one.asset_id))
 
@@ -147,7 +145,6 @@ def _measure_robot(one: IndexedAsset, library: Library) -> tuple[int, se3.Vec3, 
 
 
 def _describe_unit(one: IndexedAsset) -> str:
-    """Source of an entry's scale to metres."""
     entry = one.entry
     if not isinstance(entry, MeshEntry):
         return "m"
@@ -171,7 +168,6 @@ def _describe_up(one: IndexedAsset) -> str:
 
 
 def _find_doubts(one: IndexedAsset, longest_m: float) -> Iterator[str]:
-    """Yield warnings about a possibly wrong unit."""
     if not isinstance(one.entry, MeshEntry) or one.entry.file.lower().endswith(".xodr"):
         return
     if longest_m > _LARGEST_M and _describe_unit(one) == "m (assumed)":

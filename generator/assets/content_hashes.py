@@ -101,7 +101,6 @@ def _hash(folder: Folder, file: str) -> list[Any]:
 
 
 def _is_current(folder: Folder, row: Any) -> bool:
-    """Whether a row's digest is still valid."""
     try:
         file, state, digest = row
         if digest == _MISSING:

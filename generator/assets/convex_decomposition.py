@@ -211,7 +211,6 @@ def _hull(points: Float64) -> Any:
 
 
 def _extent(points: Float64) -> float:
-    """Longest edge of the bounding box."""
     return float((points.max(axis=0) - points.min(axis=0)).max())
 
 

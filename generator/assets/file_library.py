@@ -462,7 +462,6 @@ def _list_everything(packs: Path, user_roots: Sequence[Path]) -> Iterator[Indexe
 
 @lru_cache(maxsize=1)
 def _list_rendered() -> tuple[IndexedAsset, ...]:
-    """Photographs that are installed with this package."""
     return tuple(list_assets(read_index(_RENDERED / INDEX_NAME), _RENDERED, "plate/"))
 
 

@@ -572,7 +572,6 @@ def _user_index(root: Path, path: Path) -> FolderIndex:
 
 
 def _check_files(index: FolderIndex, root: Path, document: Node, problems: Problems) -> None:
-    """Report every missing file and every pattern without a match."""
     folder, below = Folder(root), None
     for section in _SECTIONS.values():
         for number, entry in enumerate(getattr(index, section)):
@@ -601,7 +600,6 @@ def _count_by_suffix(files: tuple[str, ...]) -> str:
 
 
 def _index_files(root: Path) -> FolderIndex:
-    """Index a folder's files, except for meshes that a URDF uses."""
     suffixes = {name: PurePosixPath(name).suffix.lower() for name in list_files(root)}
     meshes = {*MESH_SUFFIXES, *robot_formats.LISTED_SUFFIXES, ROAD_SUFFIX}
     files = [
@@ -643,7 +641,6 @@ def _category(root: Path, name: str) -> str:
 
 
 def _is_mjcf(root: Path, file: str) -> bool:
-    """Whether an XML file is a whole MJCF with bodies."""
     data = Folder(root).read(file)
     return b"<mujoco" in data and b"<worldbody" in data
 
@@ -663,7 +660,6 @@ def _described_files(root: Path, description: str) -> tuple[str, ...]:
 
 
 def _unique_files(*parts: str | TextureMaps | None) -> tuple[str, ...]:
-    """Files and images of maps, sorted and without duplicates."""
     names: set[str] = set()
     for part in parts:
         names |= set(part.files()) if isinstance(part, TextureMaps) else {part or ""}
@@ -671,7 +667,6 @@ def _unique_files(*parts: str | TextureMaps | None) -> tuple[str, ...]:
 
 
 def _expand(entry: Entry, files: tuple[str, ...]) -> Iterator[Entry]:
-    """Yield one entry per file of a pattern or series."""
     if is_pattern(entry.file):
         for file in match_files(entry.file, files):
             yield entry.model_copy(update={"id": asset_id_from_path(file), "file": file})

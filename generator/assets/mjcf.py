@@ -209,7 +209,6 @@ class _Reader:
         self.remarks = self.source.remarks
 
     def describe(self) -> robot_description.RobotDescription:
-        """Links, joints and geometry of all bodies."""
         model = self.model
         if model.nbody + model.nsite > robot_description.MAX_LINKS:
             raise ValueError(f"more than {robot_description.MAX_LINKS} bodies and sites")
@@ -325,7 +324,6 @@ class _Reader:
     def _shapes(
         self, body: int
     ) -> tuple[tuple[robot_description.Shape, ...], tuple[robot_description.Shape, ...]]:
-        """Visual and collision shapes of a body."""
         model = self.model
         first = int(model.body_geomadr[body])
         geoms = range(first, first + int(model.body_geomnum[body])) if first >= 0 else range(0)
@@ -343,7 +341,6 @@ class _Reader:
         return tuple(visuals), tuple(collisions)
 
     def _geoms(self, body: int, geoms: range) -> Iterator[tuple[int, robot_description.Shape]]:
-        """Yield number and shape of every geom that has one."""
         kinds, model = self.mujoco.mjtGeom, self.model
         T_body_world = _pose(self.data.xpos[body], self.data.xquat[body]).inverse()
         for g in geoms:

@@ -105,7 +105,6 @@ def tool_gripper(tool: ToolEntry) -> Gripper:
 
 
 def _without(arm: RobotDescription, link: str) -> RobotDescription:
-    """The robot without a link and all below it."""
     gone = {link}
     for joint in arm.joints:
         if joint.parent in gone:

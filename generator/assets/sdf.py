@@ -70,8 +70,6 @@ def read_sdf(folder: asset_folder.Folder, relative: str) -> RobotDescription:
 
 
 class _Fault(ValueError):
-    """What is wrong with an element."""
-
     def __init__(self, element: Element, reason: str) -> None:
         super().__init__(reason)
         self.element = element
@@ -135,7 +133,6 @@ class _Reader:
     def add_file(
         self, file: str, prefix: str, depth: tuple[str, ...], placement: _Placement
     ) -> None:
-        """Add the model of a file."""
         place = str(self.folder.root / file)
         data = self.folder.read(file)
         root = parse_xml(data, place, "sdf", "an SDF file", _MAX_ELEMENTS)
@@ -184,7 +181,6 @@ class _Reader:
             self.frames[scope.frame] = (placement.frame, pose)
 
     def _add_part(self, element: Element, scope: _Scope, *, held: bool) -> None:
-        """Add one child of a model."""
         if element.tag == "include":
             self._include(element, scope)
             return
@@ -255,7 +251,6 @@ class _Reader:
         return self.folder.refer(config, names[-1] if names else "model.sdf")
 
     def _pose(self, element: Element, scope: _Scope, default: str) -> tuple[str, SE3]:
-        """Frame and pose of an element."""
         pose = element.find("pose")
         if pose is None:
             return default, SE3()
@@ -290,7 +285,6 @@ class _Reader:
         self.anchors[name] = (joint, frame, direction)
 
     def _moving(self, joint: Joint, kind: str, axis: Element, scope: _Scope) -> Joint:
-        """The joint with its kind, limits and leader."""
         lower, upper = (float(axis.findtext(f"limit/{k}") or s * 1e16)
                         for k, s in (("lower", -1), ("upper", 1)))  # fmt: skip
         if not lower <= upper:
@@ -390,7 +384,6 @@ class _Reader:
         return replace(look, opacity=round(min(max(opacity, 0.0), 1.0), 6))
 
     def describe(self) -> RobotDescription:
-        """The description of all that was added."""
         place = str(self.folder.root / self.relative)
         self.frames[_MODEL] = ("", SE3())
         try:

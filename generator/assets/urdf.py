@@ -30,8 +30,6 @@ _UNUSED = ("gazebo", "transmission", "sensor", "ros2_control")
 
 
 class _Fault(ValueError):
-    """What is wrong with an element."""
-
     def __init__(self, element: Element, reason: str) -> None:
         super().__init__(reason)
         self.element = element

@@ -85,7 +85,6 @@ def _textured(soup: TriangleSoup) -> bool:
 
 
 def _tint(soup: TriangleSoup, number: int, color: Float64) -> TriangleSoup:
-    """Multiply the base colour of a slot."""
     slots = list(soup.slots)
     slots[number] = _tinted(slots[number], color)
     return replace(soup, slots=tuple(slots))
@@ -100,7 +99,6 @@ def _tinted(slot: MaterialSlot, color: Float64) -> MaterialSlot:
 def _split(
     soup: TriangleSoup, chosen: np.ndarray, number: Int64, colors: Float64, slot: MaterialSlot
 ) -> TriangleSoup:
-    """Give the chosen faces one slot per colour."""
     face_slots = soup.face_slots.copy()
     face_slots[chosen] = len(soup.slots) + number
     added = tuple(_tinted(slot, color) for color in colors)

@@ -263,7 +263,6 @@ def _print_findings(findings: Sequence[Finding]) -> None:
 
 
 def _write_thumbnails(library: Library, asset_ids: Sequence[str], path: Path) -> None:
-    """Write one PNG with captioned pictures of assets."""
     from gen_data.preview.contact_sheet import Tile, arrange_tiles, render_tiles, write_sheet
     from gen_data.preview.thumbnails import thumbnail
     from gen_data.renderers.warp.renderer import WarpRenderer

@@ -33,7 +33,6 @@ def describe(name: str | None) -> None:
 
 
 def _shipped_texts() -> dict[str, dict[str, str]]:
-    """Texts of distributions, templates and configurations, by kind and name."""
     from importlib.resources import files
 
     from gen_data.config.distributions import DISTRIBUTIONS

@@ -72,7 +72,6 @@ def init(template: str, paths: tuple[Path, ...], categories: tuple[str, ...], ou
 
 
 def _echo_remarks(folder: Path) -> None:
-    """Print unused contents of the meshes."""
     from gen_data.assets.file_remarks import collect_remarks
     from gen_data.assets.folder_index import user_folder
     from gen_data.packs.provision import open_assets
@@ -83,7 +82,6 @@ def _echo_remarks(folder: Path) -> None:
 
 
 def _echo_command(*arguments: object) -> None:
-    """Print a command as a shell takes it."""
     click.echo(f"    {shlex.join(['gen-data', *map(str, arguments)])}")
 
 

@@ -72,7 +72,6 @@ def _print_whole(console: Console, table: Table) -> None:
 
 
 def _width(column: Sequence[str]) -> int:
-    """Columns of the terminal that a column of a table takes."""
     longest_word = max((len(word) for cell in column for word in cell.split()), default=1)
     return max(longest_word, min(max(map(len, column)), TEXT_WIDTH)) + GAP
 

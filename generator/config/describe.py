@@ -128,7 +128,6 @@ def _example_fields(model: FieldSchema) -> tuple[dict[str, Any], dict[str, Any]]
 
 
 def _example_value(schema: FieldSchema) -> Any:
-    """Generate a value of a type."""
     if "examples" in schema.schema or schema.choices:
         return (schema.schema.get("examples") or schema.choices)[0]
     if schema.branches:

@@ -79,7 +79,6 @@ def _error(position: Position | None, field: str, fact: str) -> errors.ConfigErr
 
 
 def _base_folder(position: Position | None) -> Path:
-    """Folder that relative paths of a document start from."""
     if position is None or not Path(position.file).is_file():
         return Path()
     file = Path(position.file)

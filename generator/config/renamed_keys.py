@@ -86,14 +86,12 @@ def _replace_in_section(node: Node, section: str) -> Node:
 
 
 def _rename_selections(node: Node, path: FieldPath) -> Node:
-    """Rename the keys of all selections in a value."""
     if "given" in node.entries:
         node = _rename_keys(node, path, SELECTIONS)
     return node.with_children(lambda part, child: _rename_selections(child, (*path, part)))
 
 
 def _rename_plugin(item: Node, section: str, path: FieldPath) -> Node:
-    """Rename the type, the fields and their values."""
     type_words = TYPES.get(section, {})
     item = _at(item, "type", path, partial(_rename_value, words=type_words))
     kind = item.get("type")

@@ -161,7 +161,6 @@ def with_shared_values(schema: dict[str, Any], constant: Collection[str] = ()) -
 
 
 def _allow_shared(schema: Any) -> Any:
-    """Allow references to shared values everywhere below a schema."""
     if not isinstance(schema, dict):
         return schema
     wrapped = dict(schema)

@@ -137,7 +137,6 @@ def probe_values(section: Node, seed: int) -> Iterator[dict[str, SharedValue]]:
 
 
 def _possible(node: Node) -> tuple[SharedValue, ...]:
-    """All values of a choice, sequence or constant."""
     constant = (node.content,) if isinstance(node.content, (str, int, float)) else ()
     return _outcomes(node) or constant
 
@@ -213,7 +212,6 @@ def names_in(node: Node) -> set[str]:
 
 
 def _infer_kind(node: Node) -> base.Kind[Any]:
-    """Infer the kind of a value from its notation."""
     outcomes = _outcomes(node)
     if not outcomes and isinstance(node.content, (str, int, float)):
         outcomes = (node.content,)
@@ -253,7 +251,6 @@ def _select_entry(node: Node, shared: Shared, path: FieldPath) -> tuple[str, Nod
 
 
 def _scalar(key: str) -> SharedValue:
-    """Parse a key as a scalar."""
     try:
         value = resolve_scalar(key)
     except ValueError:

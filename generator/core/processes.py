@@ -115,7 +115,6 @@ def _is_parent(pid: int) -> bool:
 
 
 def _is_running(pid: int) -> bool:
-    """Whether a process of Windows runs."""
     kernel = ctypes.windll.kernel32  # type: ignore[attr-defined]
     synchronize, timeout = 0x0010_0000, 0x102  # <winnt.h>, <winerror.h>
     handle = kernel.OpenProcess(synchronize, False, pid)

@@ -100,7 +100,6 @@ def extract(
 def _extract(
     archive: Path, file: IO[bytes], wanted: tuple[str, ...], target: Path, limits: Limits
 ) -> Iterator[str]:
-    """Write the wanted members and yield their names."""
     inflated = written = 0
     inflated_max = limits.ratio * archive.stat().st_size + _RATIO_MARGIN_BYTES
     for number, member in enumerate(_members(file, _containers(wanted))):

@@ -170,7 +170,6 @@ def _scratch(folder: Path, wait: bool = False) -> Iterator[Path]:
 
 @contextlib.contextmanager
 def _storage(folder: Path) -> Iterator[None]:
-    """Turn OSError into StorageError with a remedy."""
     try:
         yield
     except GenDataError:

@@ -402,7 +402,6 @@ def _thick(hull: Hull, scale: float) -> Array:
 
 
 def _load(world: _Compiled, solid: _Solid) -> None:
-    """Give a body of the model its pose and velocity."""
     pose, at, data = solid.T_world_center, solid.position_at, world.data
     if solid.joint is not None:
         T_world_body = pose @ solid.T_body_center.inverse()

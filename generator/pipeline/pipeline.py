@@ -263,7 +263,6 @@ class Pipeline:
         return splits.split_of(scene_index, shares, assignment, self.info.seed)
 
     def _accept(self, scene_index: int) -> AcceptedScene:
-        """Draw and settle a scene."""
         assert self._physics is not None, "use the pipeline as a context manager"
         physics = self._physics
         timings: dict[str, float] = {}
@@ -327,7 +326,6 @@ class Pipeline:
 def _count_lidar_points(
     truth: Mapping[str, ImageTruth], clouds: Mapping[str, PointCloud]
 ) -> Mapping[str, ImageTruth]:
-    """Add to each object its number of points in every scan."""
     if not clouds:
         return truth
     counts = {name: np.bincount(c.points["instance_id"]) for name, c in sorted(clouds.items())}

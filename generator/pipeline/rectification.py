@@ -327,7 +327,6 @@ def rectified_truth(
 
 
 def _pixel_labels(thing: ObjectTruth, scene: Scene, reading: SensorReading) -> ObjectTruth:
-    """Labels of visible pixels, by the annotators that made them."""
     thing = instance_masks.InstanceMasks().annotate(scene, reading, thing)
     if thing.oriented_box is not None:
         thing = OrientedBoxes2d().annotate(scene, reading, replace(thing, oriented_box=None))
@@ -415,7 +414,6 @@ def _keypoints(
 
 
 def _borders(borders: Sequence[BorderTruth], bent: Rectification) -> tuple[BorderTruth, ...]:
-    """Borders of lanes, cut at the edge of the new image."""
     cut = []
     for border in borders:
         places = bent.points(np.array(border.points_px))

@@ -207,7 +207,6 @@ def _tint(image: Image, item: ObjectTruth) -> None:
 
 
 def _outline(image: Image, item: ObjectTruth, width: int) -> None:
-    """Draw the edge of a mask inside it, in place."""
     if item.mask is None:
         return
     # Zeros around it: what is outside the mask's box is outside the mask.

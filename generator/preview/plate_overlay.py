@@ -52,7 +52,6 @@ def _project(plate: plates.Plate, points_m: se3.Array) -> se3.Array:
 
 
 def _draw(image: Image, points_px: se3.Array, color: tuple[int, int, int], width: int) -> None:
-    """Draw a line through image points, without those that have none."""
     shown = points_px[np.isfinite(points_px).all(axis=1)]
     # OpenCV puts pixel centres at integers, and takes 16 bits before the point.
     scaled = np.clip((shown - 0.5) * (1 << _SHIFT), -(1 << 24), 1 << 24).round().astype(np.int32)

@@ -68,7 +68,6 @@ class Recorder:
         self.stream.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
 
     def _name_classes(self) -> None:
-        """Log names, colours and known skeletons of categories."""
         background = rr.AnnotationInfo(id=0, label="background", color=(60, 60, 60))
         described = [rr.ClassDescription(info=background)]
         for k, name in enumerate(self.info.categories, 1):
@@ -150,7 +149,6 @@ class Recorder:
             self.stream.log(path, transform(pose), rr.TransformAxes3D(AXES_M))
 
     def _record_ways(self, sample: Sample) -> None:
-        """Log trajectories, once per sequence."""
         sequence = sample.index // self.info.steps_per_scene
         if self.info.steps_per_scene > 1 and sequence != self._sequence:
             self._sequence = sequence
@@ -278,7 +276,6 @@ def _eye(sample: Sample) -> rrb.EyeControls3D | None:
 
 
 def _camera_view(info: interfaces.DatasetInfo, name: str) -> rrb.Spatial2DView | rrb.Tabs:
-    """View of a camera's image, with tabs for its other channels."""
     image = rrb.Spatial2DView(origin=f"world/cameras/{name}/image", name=name)
     others = [
         rrb.Spatial2DView(origin=f"channels/{name}/{c.value}", name=f"{name} {c.value}")

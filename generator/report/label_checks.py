@@ -86,7 +86,6 @@ def _empty_box(_: ImageLabels, item: Item) -> Iterator[str | None]:
 
 
 def _outside(image: ImageLabels, item: Item) -> Iterator[str | None]:
-    """The box of visible pixels leaves the image."""
     box = item.get("box")
     if box is None:
         return
@@ -141,7 +140,6 @@ def _fractions(_: ImageLabels, item: Item) -> Iterator[str | None]:
 
 
 def _keypoints(image: ImageLabels, item: Item) -> Iterator[str | None]:
-    """A keypoint that is labelled as inside the image lies outside."""
     width, height = image.size_px
     points = item.get("keypoints")
     if not points:

@@ -103,7 +103,6 @@ def read_label_map(config: Mapping[str, object]) -> LabelMap:
 
 
 def _read_by(sample: LabelledImages, waiting: Mapping[str, int]) -> list[str]:
-    """Those of the sensors that read in a sample."""
     return [n for n in waiting if n in sample.labels.images or n in sample.labels.scans]
 
 

@@ -362,7 +362,6 @@ def _describe_parameter(parameter: Parameter) -> list[Json]:
 
 
 def _compare_names(parameter: Parameter, numeric: bool) -> Json:
-    """Shares of each value, drawn and declared."""
     values = {*parameter.values, *parameter.expected}
     ordered = sorted(values) if numeric else sorted(values, key=_name)
     names = [_name(value) for value in ordered]
@@ -376,7 +375,6 @@ def _compare_names(parameter: Parameter, numeric: bool) -> Json:
 
 
 def _compare_numbers(parameter: Parameter, name: str, drawn: Column, expected: Column) -> Json:
-    """Shares of bins, drawn and declared."""
     low, high = parameter.limits or (
         float(min(drawn.min(), expected.min())),
         float(max(drawn.max(), expected.max())),

@@ -319,7 +319,6 @@ class Builder:
         self.add(name, frame, pose, room.kind, part=part)
 
     def _add_blind(self, room: Room, k: int, opening: Opening, looks: Looks) -> None:
-        """A blind in the reveal of a window."""
         drop = looks.blind_drops[k] if k < len(looks.blind_drops) else 0.0
         if drop == 0.0:
             return

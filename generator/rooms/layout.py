@@ -351,7 +351,6 @@ def cos_sin(yaw_rad: float) -> tuple[float, float]:
 
 
 def _before(footprint: Rectangle, depth_m: float) -> Rectangle:
-    """The rectangle before the front of a footprint."""
     x, y, c, s, a, b = footprint
     ahead = a + 0.5 * depth_m
     return (x + c * ahead, y + s * ahead, c, s, 0.5 * depth_m, b)

@@ -95,7 +95,6 @@ def _at_wall(
 
 
 def _hanging_m(layout: Layout, rule: Rule, s: Shape) -> float:
-    """Height of the lowest point of what hangs on a wall."""
     if rule.middle_m[1]:
         return between(layout.rng, rule.middle_m) - 0.5 * (s.high - s.low)
     return between(layout.rng, rule.height_m)
@@ -190,7 +189,6 @@ def _at_side(layout: Layout, ref: Piece, s: Shape, gap_m: float) -> Placement:
 
 
 def _at_any_side(layout: Layout, ref: Piece, s: Shape, gap_m: float) -> Placement:
-    """At one of the four sides of a piece, facing it."""
     a, b = ref.footprint[4:]
     side = draw_count(layout.rng, (0, 3))
     c, sn = direction(side)
@@ -269,7 +267,6 @@ def _windows(layout: Layout) -> list[Opening]:
 
 
 def _at_windows(layout: Layout, rule: Rule, options: Options, wanted: int) -> int:
-    """Curtains at both sides of windows, in pairs."""
     placed = 0
     for opening in _windows(layout)[: (wanted + 1) // 2]:
         drawn = draw_asset(layout, rule, options)
@@ -287,7 +284,6 @@ def _at_windows(layout: Layout, rule: Rule, options: Options, wanted: int) -> in
 
 
 def _below_windows(layout: Layout, rule: Rule, options: Options, wanted: int) -> int:
-    """Under the middle of windows."""
     placed = 0
     for opening in _windows(layout)[:wanted]:
         drawn = draw_asset(layout, rule, options)
@@ -299,7 +295,6 @@ def _below_windows(layout: Layout, rule: Rule, options: Options, wanted: int) ->
 
 
 def _at_doors(layout: Layout, rule: Rule, options: Options, wanted: int) -> int:
-    """On the wall at a side of doors."""
     placed = 0
     doors = [o for o in layout.room.openings if o.kind == "door"]
     for opening in doors[:wanted]:

@@ -68,7 +68,6 @@ def supports(piece: Piece, assets: AssetIndex) -> list[Support]:
 
 
 def _insides(piece: Piece, assets: AssetIndex) -> list[Support]:
-    """Boards of a piece behind its doors."""
     corners = [k.position_m for k in assets.keypoints(piece.asset) if k.name == INSIDE]
     low, high = assets.bounds_m(piece.asset)
     made = []
@@ -210,7 +209,6 @@ def _thing_at(
 
 
 def _is_taken(thing: Piece, near: Sequence[Piece]) -> bool:
-    """Whether something is where a thing would be."""
     return any(
         p.low_m < thing.high_m
         and thing.low_m < p.high_m - 1e-6

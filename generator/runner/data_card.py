@@ -209,7 +209,6 @@ def _table(rows: Iterator[tuple[Any, ...]]) -> str:
 
 
 def _sensor_rows(info: DatasetInfo) -> Iterator[tuple[Any, ...]]:
-    """One row per channel of a camera, or per other sensor."""
     for sensor in info.sensors:
         rate = f"{sensor.rate_hz:g} Hz" if sensor.rate_hz is not None else "every step"
         for folder, meaning in _outputs(info, sensor):
@@ -218,7 +217,6 @@ def _sensor_rows(info: DatasetInfo) -> Iterator[tuple[Any, ...]]:
 
 
 def _outputs(info: DatasetInfo, sensor: SensorInfo) -> Iterator[tuple[str, str]]:
-    """Folders of a sensor with the meaning of their files."""
     for channel in sensor.channels:
         yield channel.value, _meaning(info, channel.value)
     if sensor.modality is Modality.LIDAR:
@@ -242,7 +240,6 @@ def _meanings() -> Mapping[str, Any]:
 
 
 def _settings(plan: Plan) -> Iterator[tuple[str, str]]:
-    """Sections of the configuration with the names of what they list."""
     for key, value in sorted(plan.config.items()):
         if isinstance(value, (list, tuple)):
             names = [_item_name(item) for item in value]

@@ -127,7 +127,6 @@ def _failed(folder: Path, plan: Plan) -> set[int]:
 
 
 def _indices(folder: Path) -> list[int]:
-    """Indices of the samples in the folder of a shard."""
     try:
         with (folder / labels.LABELS_NAME).open("rb") as file:
             return [int(json.loads(line)["index"]) for line in file]

@@ -351,7 +351,6 @@ class Changes:
 
 
 def _sensors(config: Config) -> dict[str, str]:
-    """Entries of the configuration by name, as JSON."""
     pairs = zip(config.sensors, config.resolved["sensors"], strict=True)
     return {sensor.name: serialization.canonical_json(entry) for sensor, entry in pairs}
 

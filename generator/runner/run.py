@@ -178,7 +178,6 @@ class _Run:
     interruption: Interruption
 
     def execute(self, licences: LicencesOf | None) -> Summary:
-        """Generate the missing shards, merge and seal them."""
         plan, store = self.job.plan, self.job.store
         with self.interruption.immediate():
             with store.errors():
@@ -221,7 +220,6 @@ class _Run:
         return self._summarize(dataset_id, scan, monitor)
 
     def _show_checked(self, share: float) -> None:
-        """Report how much of a finished data set was hashed."""
         n = self.job.plan.n
         self.progress(RunProgress("checking", int(share * n), n, 0.0, 0, 0))
 
@@ -238,7 +236,6 @@ class _Run:
         )
 
     def _count(self, shards: Sequence[int]) -> int:
-        """Number of samples of the shards that this run may generate."""
         chosen = Scan(shards).within(self.settings.shards).missing
         if not chosen:
             return 0

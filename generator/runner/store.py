@@ -437,7 +437,6 @@ class LocalStore:
                 raise StorageError(f"{path}: is not a folder; {REMEDY}")
 
     def _stored_plan(self) -> Plan:
-        """The plan of the data set in its place."""
         return load_plan(self.root)
 
     def _check_plan(self, plan: Plan) -> bool:

@@ -166,14 +166,12 @@ class Supervisor:
         return []
 
     def _hear(self, event: SampleDone | SampleSkipped | Queued, now_s: float) -> None:
-        """Note a sign of life."""
         worker = self._alive.get(event.worker)
         if worker is not None:
             worker.heard_s = now_s
             worker.done += not isinstance(event, Queued)
 
     def _dispatch(self, now_s: float) -> list[Action]:
-        """Assign shards to idle workers, start missing workers, dismiss superfluous ones."""
         actions: list[Action] = []
         for number, worker in self._workers_in(State.IDLE):
             if self._draining or self._waiting == 0:

@@ -207,7 +207,6 @@ class _Check:
         self._hashed: dict[Inode, str] = {}
 
     def run(self, full: bool) -> Iterator[Finding]:
-        """Yield all deviations."""
         manifest_bytes = read_or_empty(self._folder / MANIFEST_NAME)
         manifest = parse_object(manifest_bytes)
         if manifest is None or not _is_manifest(manifest):

@@ -74,7 +74,6 @@ def main(number: int, connection_fd: int, job_fd: int, parent_pid: int) -> None:
 
 
 def _prepare() -> None:
-    """Import and load what most jobs need."""
     from gen_data.assemble import pipeline_factory
     from gen_data.renderers.warp import renderer
     from gen_data.renderers.warp.device import prepare_device

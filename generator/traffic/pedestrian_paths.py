@@ -151,8 +151,6 @@ def _lateral_bounds(line: LaneLine, boxes: Array) -> tuple[Array, Array, Array]:
 
 @dataclass
 class _Line:
-    """A path under construction."""
-
     points: list[Vec3]
     right: list[float]
     left: list[float]
@@ -240,7 +238,6 @@ def _append_next(
 def _cross_road(
     line: _Line, walks: WalkNetwork, join: Join, passages: list[Passage], rng: Rng
 ) -> tuple[str, float, bool] | None:
-    """Append the path to a crosswalk and over it."""
     whole = walks.crosswalks.lines[join.crosswalk]
     start = 0.0 if join.begins else whole.length_m
     kerb = whole.pose(start).translation_m

@@ -220,7 +220,6 @@ class _Images:
             self._uvs = scale.CreateOutput("result", Sdf.ValueTypeNames.Float2)
 
     def add(self, name: str, file: str, space: str, factors: tuple[float, ...]) -> Any:
-        """Define a node that reads an image and scales it."""
         from pxr import Sdf, UsdShade
 
         node = UsdShade.Shader.Define(self._stage, f"{self._path}/{name}")

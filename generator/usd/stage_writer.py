@@ -101,7 +101,6 @@ class _Writer:
         return f"{parent}/{prims.unique_name(name, self._taken.setdefault(parent, set()))}"
 
     def bodies(self, steps: Sequence[Scene]) -> None:
-        """Define every instance with its bodies, and the background."""
         frames: dict[int, tuple[str, Sequence[SE3]]] = {}
         annotated = set()
         for k, instance in enumerate(steps[0].instances):
@@ -187,7 +186,6 @@ class _Writer:
         return path
 
     def lights(self, steps: Sequence[Scene]) -> None:
-        """Define the lamps, the sun and the sky."""
         parent = f"{WORLD}/Lights"
         for k, light in enumerate(steps[0].lights):
             path = self.path(parent, light.name)

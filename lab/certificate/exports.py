@@ -58,7 +58,6 @@ def _unable(examined: Examined, exporter: interfaces.Exporter, reader: Reader | 
 def _check_export(
     examined: Examined, root: Path, reader: Reader, stated: Sequence[LabelledImage]
 ) -> Finding:
-    """Read one export and compare it with the labels."""
     contradictions = Contradictions()
     figures: dict[str, Figure] = {"reader": " ".join(f"{k} {v}" for k, v in _releases(reader))}
     try:

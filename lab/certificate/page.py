@@ -61,7 +61,6 @@ def _claim(claim: CheckedClaim) -> Iterator[str]:
 
 
 def _facts(finding: Finding) -> Iterator[str]:
-    """Reason, figures and contradictions, in words."""
     if finding.reason:
         yield finding.reason
     if finding.figures:

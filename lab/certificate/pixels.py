@@ -51,7 +51,6 @@ def check_pixels(examined: Examined) -> Iterator[Finding]:
 
 
 def _compare(examined: Examined, sample: Sample, name: str, agreement: Agreement) -> None:
-    """Compare pixels of one image."""
     if has_plate(sample.scene):
         return
     reading = sample.capture.readings[name]

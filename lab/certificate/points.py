@@ -89,7 +89,6 @@ class Pulses:
 def _compare(
     examined: Examined, sample: Sample, cloud: PointCloud, sensor: Sensor, agreement: Agreement
 ) -> None:
-    """Compare points of one scan."""
     points = cloud.points
     there = ~np.isin(points["surface"], ELSEWHERE)
     agreement.readings += 1

@@ -141,7 +141,6 @@ def _probability(d: Probability, value: bool, rng: Rng) -> Scores:
 
 
 def _of_weights(weights: Mapping[Any, float], value: Any, rng: Rng) -> Scores:
-    """Score of one of several values in proportion to their weights."""
     if not weights.get(value, 0.0) > 0.0:
         return (math.nan,)
     if sum(weight > 0.0 for weight in weights.values()) == 1:

@@ -182,7 +182,6 @@ def _compare(
     prepare: Prepare,
     fitted: Sequence[tuple[CameraQuantity, indirect_inference.Estimate]],
 ) -> tuple[results.ComparedStatistic, ...]:
-    """Statistics of real photographs, and of simulated ones before and after."""
     measures = [*(q.measure for q in CAMERA), *(measure for _, measure in PICTURES)]
 
     def describe(exposure: Exposure, pipeline: ImagePipeline) -> list[float]:

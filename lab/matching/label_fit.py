@@ -132,5 +132,4 @@ def _of_common_classes(
 
 
 def _of_classes(image: ImageLabels, classes: set[str]) -> ImageLabels:
-    """The boxes of some classes, in lower case."""
     return replace(image, boxes=tuple(box for box in image.boxes if box[0].lower() in classes))

@@ -69,7 +69,6 @@ def _start(own: Array, real: Array) -> Array:
 
 
 def _with(sensor: LidarSensor, found: Mapping[LidarQuantity, Estimate]) -> LidarSensor:
-    """The scanner with all parameters that were determined."""
     for quantity, one in found.items():
         if one.determined:
             sensor = quantity.apply(sensor, one.mean)
@@ -98,7 +97,6 @@ def _compare(
     scans: Sequence[recordings.Scan],
     found: Mapping[LidarQuantity, Estimate],
 ) -> tuple[results.ComparedStatistic, ...]:
-    """Statistics of real scans, and of simulated ones before and after."""
     before = [rescan(one, one.sensor) for one in illuminations]
     after = [rescan(one, _with(one.sensor, found)) for one in illuminations]
     measures = [*((q.statistic, q.measure) for q in LIDAR), *descriptions.SCANS]

@@ -73,7 +73,6 @@ def _indent(depth: int) -> str:
 
 
 def _comment(row: FittedQuantity) -> str:
-    """What is known about a value, in a line."""
     if row.mean is None:
         return f"{row.name}: {row.note}; n = {row.n}"
     interval = "" if row.low is None else f" ({row.low:.4g} to {row.high:.4g})"
@@ -82,7 +81,6 @@ def _comment(row: FittedQuantity) -> str:
 
 
 def _flow(value: Any) -> str:
-    """YAML of a value in one line."""
     text = yaml.safe_dump(_whole(value), default_flow_style=True, width=WIDTH, allow_unicode=True)
     return text.removesuffix("\n").removesuffix("...").rstrip("\n")
 

@@ -79,7 +79,6 @@ class _RecordedHits:
         self.hits = hits
 
     def scan(self, *_: object) -> LidarHits:
-        """The recorded hits."""
         return self.hits
 
 
@@ -91,7 +90,6 @@ class _HitRecorder:
         self.hits: LidarHits | None = None
 
     def scan(self, *arguments: Any) -> LidarHits:
-        """Trace rays."""
         hits: LidarHits = self.renderer.scan(*arguments)
         self.hits = hits
         return hits

@@ -131,7 +131,6 @@ def _check_same(loaded: Config, data: Path) -> None:
 
 
 def _photographs(samples: SampleSequence) -> Iterator[tuple[Sample, str]]:
-    """Samples with each of their cameras that took a photograph."""
     for sample in samples:
         for name in sorted(sample.cameras):
             if "rgb" in sample.cameras[name].channels:
@@ -164,7 +163,6 @@ def _sides(box: NDArray[np.float32]) -> Box:
 
 
 def _read_checked(path: Path, judged: StoredSamples, truth: RealSet) -> list[dict[str, Any]]:
-    """Results of this data set."""
     identity = judged.dataset_id
     try:
         content = json.loads(path.read_text("utf-8"))

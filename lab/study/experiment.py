@@ -292,7 +292,6 @@ def _generate(
 
 
 def _train(prepared: Prepared, runs: Sequence[Run], report: Callable[[str], None]) -> None:
-    """Train and detect in one process per run, side by side."""
     started_s = time.monotonic()
     with _processes([_write_task(prepared, run) for run in runs]) as processes:
         for run, process in zip(runs, processes, strict=True):
@@ -329,7 +328,6 @@ def _write_task(prepared: Prepared, run: Run) -> Path:
 
 @contextmanager
 def _processes(tasks: Sequence[Path]) -> Iterator[list[subprocess.Popen[bytes]]]:
-    """Processes that perform tasks, which end with this block."""
     threads: Mapping[str, str] = dict.fromkeys(SINGLE_THREADED, "1")
     running: list[subprocess.Popen[bytes]] = []
     try:

@@ -82,7 +82,6 @@ def _home(rng: VariantRng) -> Image:
 
 
 def _lock(rng: VariantRng) -> Image:
-    """The time over a picture."""
     image = _wallpaper(rng)
     time = f"{int(rng.between(6, 23))}:{int(rng.between(10, 59))}"
     art.text(image, (0.15, 0.14, 0.85, 0.26), time, (250, 250, 250), 1)
@@ -91,7 +90,6 @@ def _lock(rng: VariantRng) -> Image:
 
 
 def _chat(rng: VariantRng) -> Image:
-    """Messages from both sides."""
     image = art.canvas(280, 600, rng.choose(((250, 250, 252), (18, 18, 20), (229, 221, 213))))
     pen, y = art.pen(image), 70
     pen.rectangle([0, 0, 280, 52], fill=rng.choose(((7, 94, 84), (240, 240, 244), (40, 60, 90))))
@@ -109,7 +107,6 @@ def _chat(rng: VariantRng) -> Image:
 
 
 def _map(rng: VariantRng) -> Image:
-    """Streets, water and a route."""
     image = art.canvas(280, 600, (240, 238, 230))
     pen = art.pen(image)
     water = [(rng.between(0, 280), rng.between(0, 600)) for _ in range(5)]
@@ -131,7 +128,6 @@ def _map(rng: VariantRng) -> Image:
 
 
 def _page(rng: VariantRng) -> Image:
-    """An article with a picture."""
     image = art.canvas(280, 600, (252, 252, 252))
     art.text(image, (0.06, 0.08, 0.9, 0.13), rng.choose(_WORDS), (20, 20, 20), 2)
     scene = art.canvas(250, 150, rng.choose(_BRIGHT))

@@ -263,7 +263,6 @@ def _ground(image: Image, design: _Design, rng: VariantRng) -> None:
 
 
 def _picture(image: Image, box: Box, design: _Design, rng: VariantRng) -> None:
-    """Draw a simple picture of the contents."""
     x0, y0, x1, y1 = art.pixels(image, box)
     radius = min(x1 - x0, y1 - y0) // 2
     draw = (_bowl, _fruits, _leaves, _landscape, _rings)[design.picture]
@@ -271,7 +270,6 @@ def _picture(image: Image, box: Box, design: _Design, rng: VariantRng) -> None:
 
 
 def _bowl(pen: ImageDraw, at: Place, r: float, design: _Design, rng: VariantRng) -> None:
-    """A bowl heaped with flakes."""
     cx, cy = at
     rim = art.blend(design.accent, (255, 255, 255), 0.5)
     pen.ellipse([cx - r, cy - 0.35 * r, cx + r, cy + 0.25 * r], fill=rim)
@@ -284,13 +282,11 @@ def _bowl(pen: ImageDraw, at: Place, r: float, design: _Design, rng: VariantRng)
 
 
 def _fruits(pen: ImageDraw, at: Place, r: float, _: _Design, rng: VariantRng) -> None:
-    """Three fruits in a heap."""
     for dx, dy in ((-0.42, 0.2), (0.4, 0.25), (0.0, -0.25)):
         art.fruit(pen, (at[0] + dx * r, at[1] + dy * r), 0.5 * r, rng.choose(_FRUIT))
 
 
 def _leaves(pen: ImageDraw, at: Place, r: float, _: _Design, rng: VariantRng) -> None:
-    """A rosette of leaves."""
     foot = at[0], at[1] + 0.5 * r
     for i in range(7):
         turn = math.pi * (i / 6 + 1)
@@ -299,7 +295,6 @@ def _leaves(pen: ImageDraw, at: Place, r: float, _: _Design, rng: VariantRng) ->
 
 
 def _landscape(pen: ImageDraw, at: Place, r: float, design: _Design, _: VariantRng) -> None:
-    """A sun over hills."""
     cx, cy = at
     pen.ellipse([cx - 0.5 * r, cy - 0.9 * r, cx + 0.5 * r, cy + 0.1 * r], fill=design.accent)
     for i in range(3):
@@ -313,7 +308,6 @@ def _landscape(pen: ImageDraw, at: Place, r: float, design: _Design, _: VariantR
 
 
 def _rings(pen: ImageDraw, at: Place, r: float, design: _Design, _: VariantRng) -> None:
-    """Concentric rings."""
     cx, cy = at
     for i in range(5, 0, -1):
         s = r * i / 5

@@ -72,7 +72,6 @@ def _ink(rng: VariantRng, ground: Color) -> Color:
 
 
 def _bands(rng: VariantRng, ground: Color) -> Image:
-    """Level stripes."""
     image = art.canvas(_WIDTH_PX, _HEIGHT_PX, ground)
     inks = [_ink(rng, ground) for _ in range(3)]
     y = rng.between(0.05, 0.35) * _HEIGHT_PX
@@ -110,7 +109,6 @@ def _speckled(rng: VariantRng, ground: Color) -> Image:
 
 
 def _dots(rng: VariantRng, ground: Color) -> Image:
-    """Dots in staggered rows."""
     image = art.canvas(_WIDTH_PX, _HEIGHT_PX, ground)
     inks = [_ink(rng, ground) for _ in range(rng.choose((1, 1, 3)))]
     count = rng.choose((8, 10, 12, 16))
@@ -342,7 +340,6 @@ def _figure(x: Float32, y: Float32, rng: VariantRng) -> Float32:
 
 
 def _bubbles(albedo: Float32, light: Float32, rng: VariantRng) -> Float32:
-    """Small bubbles, most of them near the wall."""
     made: Float32 = albedo.copy()
     for _ in range(int(rng.between(30, 160))):
         row = int(255 - 40 * rng.between(0.0, 1.0) ** 2)

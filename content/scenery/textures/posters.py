@@ -63,7 +63,6 @@ def _colors(schemes: Sequence[str], seed: int) -> tuple[Color, ...]:
 
 
 def _skyline(image: Image, colors: Sequence[Color], rng: VariantRng) -> None:
-    """Houses before an evening sky."""
     art.gradient(image, colors[0], colors[1])
     (w, h), x = image.size, 0.0
     while x < w:
@@ -74,7 +73,6 @@ def _skyline(image: Image, colors: Sequence[Color], rng: VariantRng) -> None:
 
 
 def _discs(image: Image, colors: Sequence[Color], rng: VariantRng) -> None:
-    """Discs one in another, or scattered."""
     w, h = image.size
     for k in range(7):
         r = (0.42 - 0.055 * k) * w
@@ -84,7 +82,6 @@ def _discs(image: Image, colors: Sequence[Color], rng: VariantRng) -> None:
 
 
 def _hills(image: Image, colors: Sequence[Color], rng: VariantRng) -> None:
-    """Hills one behind another under a sun."""
     w, h = image.size
     x, r = rng.between(0.2, 0.8) * w, 0.09 * w
     art.pen(image).ellipse([x - r, 0.36 * h - r, x + r, 0.36 * h + r], fill=colors[2])
@@ -99,7 +96,6 @@ def _hills(image: Image, colors: Sequence[Color], rng: VariantRng) -> None:
 
 
 def _bottle(image: Image, colors: Sequence[Color], rng: VariantRng) -> None:
-    """A bottle and fruit on a table."""
     w, h = image.size
     draw, x = art.pen(image), rng.between(0.35, 0.5) * w
     draw.rectangle([0, 0.66 * h, w, h], fill=art.blend(colors[0], (30, 20, 10), 0.35))

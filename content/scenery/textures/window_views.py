@@ -172,7 +172,6 @@ def _blind(view: View, rng: VariantRng) -> None:
 
 
 def _slats(view: View, rng: VariantRng) -> None:
-    """A Venetian blind."""
     white = color(rng.choose(_COLORS["nets"])) * rng.between(0.5, 0.75)
     foot, count = rng.choose((0.4, 0.7, 1.0)), rng.between(14.0, 22.0)
     lit = 0.6 + 0.4 * np.sin(6.28 * count * view.y)
@@ -181,7 +180,6 @@ def _slats(view: View, rng: VariantRng) -> None:
 
 
 def _drapes(view: View, rng: VariantRng) -> None:
-    """Curtains drawn across all of it."""
     cloth = color(rng.choose(_COLORS["cloth"])) * rng.between(0.45, 0.75)
     seam = np.where(np.abs(view.x - rng.between(0.4, 0.6)) < 0.012, 0.5, 1.0) + 0.0 * view.y
     view.pixels[:] = (_folds(view, rng) * seam)[..., None] * cloth
@@ -244,7 +242,6 @@ def _shop(view: View, rng: VariantRng) -> None:
 
 
 def _shelves(view: View, rng: VariantRng) -> None:
-    """Boxes and bottles in rows."""
     rows, tall = rng.choose((3, 4, 5)), rng.between(0.5, 0.9)
     colors = [color(rng.choose(_COLORS["goods"])) for _ in range(4)]
     for row in range(rows):
@@ -274,7 +271,6 @@ def _figures(view: View, rng: VariantRng) -> None:
 
 
 def _posters(view: View, rng: VariantRng) -> None:
-    """Sheets stuck to the pane."""
     for _ in range(rng.choose((2, 3, 4))):
         x, y = rng.between(0.05, 0.7), rng.between(0.15, 0.6)
         wide, high = rng.between(0.15, 0.3), rng.between(0.15, 0.35)
@@ -303,7 +299,6 @@ def _tables(view: View, rng: VariantRng) -> None:
 
 
 def _flowers(view: View, rng: VariantRng) -> None:
-    """Buckets and pots in steps."""
     for row in range(3):
         foot = 0.6 + 0.18 * row
         for k in range(7):

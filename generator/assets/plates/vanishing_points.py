@@ -190,7 +190,6 @@ def _level_directions(
 
 
 def _is_steep(edges: Edges) -> NDArray[np.bool_]:
-    """Whether each edge may be the image of a vertical."""
     run, rise = np.abs(edges.ends_px[:, 1] - edges.ends_px[:, 0]).T
     return np.asarray(run < _STEEP * rise)
 
@@ -263,7 +262,6 @@ class _Frame:
 
     @classmethod
     def around(cls, start: _Proposal, focal_px: float, *, is_focal_known: bool) -> _Frame:
-        """Frame around a proposal."""
         zenith = start.zenith
         x = _unit(np.cross(zenith, [0.0, 0.0, 1.0])[None])[0]
         axes = np.stack([x, np.cross(zenith, x), zenith])
@@ -276,7 +274,6 @@ class _Frame:
 
     @property
     def count(self) -> int:
-        """Number of parameters."""
         return 2 + len(self.azimuths) + (0 if self.is_focal_known else 1)
 
     def directions(self, parameters: Array) -> tuple[Array, Array, float]:

@@ -161,7 +161,6 @@ def _rows(table: Any, indices: Any) -> Float64:
 def _read_material(
     folder: Folder, relative: str, target: Any, remarks: list[str], *, linear: bool
 ) -> MaterialSlot:
-    """Diffuse colour or image, and opacity, of a material."""
     effect = target.effect
     name = str(target.name or target.id or "")
     material = asset_types.Material(opacity=_read_opacity(effect))

@@ -205,7 +205,6 @@ def _morph(
     positions: Float64,
     normals: Float64 | None,
 ) -> tuple[Float64, Float64 | None]:
-    """Add the morph targets by their weights at rest."""
     for weight, target in zip(weights, primitive.get("targets", ()), strict=False):
         if weight == 0.0 or "POSITION" not in target:
             continue
@@ -330,7 +329,6 @@ def _place_images(
 
 
 def _without(tree: Mapping[str, Any], path: tuple[str, ...]) -> dict[str, Any]:
-    """A copy of a tree without the value at a path."""
     if len(path) == 1:
         return {key: value for key, value in tree.items() if key != path[0]}
     return {**tree, path[0]: _without(tree[path[0]], path[1:])}

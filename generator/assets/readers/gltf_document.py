@@ -149,7 +149,6 @@ def _component_type(accessor: Mapping[str, Any], name: str) -> np.dtype[Any]:
 def _replace_sparse(
     document: Document, sparse: Mapping[str, Any], values: NDArray[Any], name: str
 ) -> NDArray[Any]:
-    """Replace single values of an accessor."""
     count, width = int(sparse["count"]), values.shape[1]
     kind = _component_type(sparse["indices"], f"{name}'s sparse indices")
     at = _read_values(document, sparse["indices"], kind, count, 1, name)[:, 0].astype(np.int64)

@@ -37,8 +37,6 @@ from gen_data.core import asset_types, colorimetry, errors
 
 @dataclass
 class _Statements:
-    """Statements of an OBJ file by kind."""
-
     positions: list[str] = field(default_factory=list)
     texcoords: list[str] = field(default_factory=list)
     normals: list[str] = field(default_factory=list)
@@ -150,7 +148,6 @@ _UNREAD = {
 
 
 def _unread(s: _Statements) -> tuple[str, ...]:
-    """Remarks on geometry that was skipped."""
     return tuple(sorted({f"{_UNREAD[key]} are not read" for key in s.others & set(_UNREAD)}))
 
 
@@ -368,8 +365,6 @@ _UNPLACED: UvTransform = ((1.0, 1.0), (0.0, 0.0))
 
 @dataclass
 class _Definition:
-    """Definition of one material in an MTL file."""
-
     material: asset_types.Material = field(default_factory=asset_types.Material)
     maps: TextureMaps = field(default_factory=TextureMaps)
     dissolved: bool = False

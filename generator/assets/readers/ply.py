@@ -143,7 +143,6 @@ def _parse_property(words: list[str], line: str) -> _Property:
 
 
 def _read_elements(header: _Header, data: bytes) -> Iterator[tuple[str, _Columns]]:
-    """Yield the columns of every element that has any."""
     if not header.order:
         # A text becomes binary numbers, in the same order.
         words = np.array(_ascii_words(header, data[header.end :]) or [b"0"])
@@ -231,7 +230,6 @@ def _list_sizes(
 
 
 def _number_at(data: NDArray[np.uint8], at: int, kind: str) -> int:
-    """Length of a list that begins at a byte."""
     dtype = np.dtype(kind)
     part = data[at : at + dtype.itemsize]
     if len(part) < dtype.itemsize:
@@ -257,7 +255,6 @@ def _row_type(
 def _read_uneven(
     data: NDArray[np.uint8], at: int, count: int, properties: tuple[_Property, ...], order: str
 ) -> tuple[_Columns, int]:
-    """Columns of rows whose lists differ in length."""
     raw = data.tobytes()
     kinds = [np.dtype(order + p.kind) for p in properties]
     counts = [np.dtype(order + p.counted) if p.counted else None for p in properties]
@@ -383,7 +380,6 @@ def _read_colors(
 
 
 def _varies(colors: Float64 | None) -> bool:
-    """Whether there is more than one colour."""
     return colors is not None and bool(np.ptp(colors, axis=0).any())
 
 

@@ -59,7 +59,6 @@ class _Package:
     soups: list[TriangleSoup] = field(default_factory=list)
 
     def model(self, name: str) -> _Model:
-        """A model file by its name in the archive."""
         name = name.lstrip("/")
         if name not in self.models:
             self.models[name] = _parse_model(self, name)
@@ -124,7 +123,6 @@ def _parse_model(package: _Package, name: str) -> _Model:
 
 
 def _local(element: Element) -> str:
-    """Name of an element without its prefix."""
     return element.tag.rpartition(":")[2]
 
 

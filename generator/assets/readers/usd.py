@@ -108,7 +108,6 @@ class StageFile:
         return value, self._channel_name(image)
 
     def _apply_opacity_image(self, bound: BoundMaterial) -> asset_types.Material:
-        """Multiply the opacity by the mean of its image."""
         if not bound.opacity_image[0]:
             return bound.material
         kept = float(self._pixels(bound.opacity_image).mean()) / 255.0

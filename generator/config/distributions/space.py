@@ -258,6 +258,5 @@ def _from_z(axis: Vec3) -> Quaternion:
 
 
 def _half_turn_deg(angle_deg: float) -> tuple[float, float]:
-    """Cosine and sine of half the angle."""
     half_rad = math.radians(0.5 * angle_deg)
     return round_significant(math.cos(half_rad)), round_significant(math.sin(half_rad))

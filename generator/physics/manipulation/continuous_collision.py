@@ -100,7 +100,6 @@ class CollisionSweep:
             self._world.place(leg.held.body, pose)
 
     def _pairs(self, leg: joint_trajectories.Leg, obstacles: Obstacles) -> Iterator[_Pair]:
-        """All pairs of bodies that may collide on a leg."""
         changes = {
             joint.name: abs(b - a)
             for joint, a, b in zip(self._arm.robot.movable, leg.start, leg.end, strict=True)

@@ -271,7 +271,6 @@ class TaskPlanner:
     # Grasping.
 
     def _plan_grasp(self, goal: ArmGoal, number: int) -> list[Leg] | Rejection:
-        """Legs that grasp and lift one of the goal's objects."""
         if self._hand is None or self._held is not None:
             return self._reject([], NOTHING_TO_GRASP, number)
         otherwise = NOTHING_TO_SUCK
@@ -335,7 +334,6 @@ class TaskPlanner:
         return sorted(grasps, key=lambda grasp: grasp.opening)
 
     def _plan_lift(self, held: Held, closed: Positions, lifted: Positions) -> list[Leg] | str:
-        """Legs that open the gripper, approach, close and lift."""
         motion = self._motion
         above, around = motion.with_opening(lifted, 1.0), motion.with_opening(closed, 1.0)
         approach, lift = Leg(above, around), Leg(closed, lifted, held=held)

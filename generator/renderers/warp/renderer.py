@@ -107,7 +107,6 @@ class WarpRenderer:
         channels: frozenset[Channel],
         context: RenderContext,
     ) -> SensorReading:
-        """The image of a single instant."""
         world = scene_packing.pack_world(scene, camera, self._cache)
         view = scene_packing.pack_view(camera, self._cache)
         gbuffer = find_visible(world, view, self._cache, self._settings.visibility)

@@ -165,7 +165,6 @@ class ImagePipeline(base_model.Strict):
     @model_validator(mode="before")
     @classmethod
     def _with_preset(cls, given: Any) -> Any:
-        """Complete the given values from the preset."""
         if not isinstance(given, Mapping):
             return given
         preset = given.get("preset", "ideal")
@@ -423,7 +422,6 @@ def _read_sensor(image: Float32, gains: Float32, sensor: ImageSensor, shot: Shot
 
 
 def _denoise(light: Light, shot: Shot) -> Light:
-    """Reduce the noise that an image sensor left visible."""
     pipeline, sensor = shot.pipeline, shot.pipeline.image_sensor
     if sensor is None or pipeline.denoise == 0.0:
         return light
@@ -437,7 +435,6 @@ def _denoise(light: Light, shot: Shot) -> Light:
 
 
 def _white_balance(light: Light, shot: Shot) -> Light:
-    """White balance of an ideal sensor, in the camera's colour space."""
     pipeline = shot.pipeline
     share = _draw(pipeline, "white_balance", shot.rng)
     warmth_ev = _draw(pipeline, "warmth_ev", shot.rng)
@@ -495,7 +492,6 @@ STAGES: tuple[Stage, ...] = (
 
 
 def _tone(light: Light, shot: Shot) -> NDArray[np.uint8]:
-    """Apply sharpening, on display values, and the tone curve."""
     pipeline, scale = shot.pipeline, 1.0 / light.white
     # On a grid, so that tables of bytes are used again.
     contrast = round(_draw(shot.pipeline, "contrast", shot.rng) * CONTRASTS) / CONTRASTS

@@ -22,7 +22,6 @@ class _LensModel(base_model.Strict):
     model: LensModel
 
     def lens(self) -> Lens:
-        """The lens as renderers use it."""
         values = tuple(float(getattr(self, name)) for name in COEFFICIENTS[self.model])
         field_deg = getattr(self, "field_deg", None)
         half_rad = math.pi if field_deg is None else math.radians(0.5 * field_deg)

@@ -169,7 +169,6 @@ class RgbCamera(Mounted):
         return self._add_disparity(scene, renderer, reading) if paired else reading
 
     def _settings_rng(self, scene: Scene, rng: streams.Rng) -> streams.Rng:
-        """Stream of the camera whose settings it has."""
         if not self.settings_of:
             return rng
         known = [camera.name for camera in scene.cameras]
@@ -179,7 +178,6 @@ class RgbCamera(Mounted):
     def _add_disparity(
         self, scene: Scene, renderer: Renderer, reading: SensorReading
     ) -> SensorReading:
-        """Add disparities to the camera on the right to a reading."""
         known = {camera.name: camera for camera in scene.cameras}
         check_camera(self.name, "stereo_with", self.stereo_with, known)
         left, right = known[self.name], known[self.stereo_with]

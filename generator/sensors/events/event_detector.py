@@ -113,7 +113,6 @@ class EventDetector(Instrument):
         return Measurements(self.name, scene.device(self.name), _table(rows), scene.time_s)
 
     def _find_boxes(self, scene: Scene) -> tuple[OrientedObstacle, list[OrientedObstacle]]:
-        """The carrier's box, and the boxes of all possible obstacles."""
         body = scene.body(scene.rig(self.rig).body)
         boxes = {box.instance.instance_id: box for box in find_obstacles(scene)}
         own = boxes.pop(body.instance_id, None)
@@ -136,20 +135,17 @@ class EventDetector(Instrument):
     def _obstacle(
         self, scene: Scene, own: OrientedObstacle, others: list[OrientedObstacle]
     ) -> list[Row]:
-        """The nearest obstacle straight ahead."""
         now_s = scene.time_s
         gaps = [(gap_ahead_m(own, b, now_s), b.instance.instance_id) for b in others]
         return _report_nearest("obstacle", now_s, gaps, self.obstacle_m)
 
     def _proximity(self, scene: Scene, others: list[OrientedObstacle]) -> list[Row]:
-        """The object nearest to the device."""
         now_s = scene.time_s
         position = np.asarray(scene.device(self.name).T_world_device.translation_m)
         gaps = [(distance_m(b, position, now_s), b.instance.instance_id) for b in others]
         return _report_nearest("proximity", now_s, gaps, self.proximity_m)
 
     def _light(self, scene: Scene, own: OrientedObstacle) -> list[Row]:
-        """State of the traffic light of the carrier's lane."""
         light = governing_light(scene, own.box(scene.time_s), self.light_m)
         if light is None:
             return []
@@ -211,7 +207,6 @@ def _report_nearest(
 
 
 def _table(rows: list[Row]) -> NDArray[np.void]:
-    """Rows sorted by time, event and instance."""
     columns = np.array(sorted(rows), dtype=np.float64).reshape(-1, 4).T
     names = tuple(column.name for column in COLUMNS)
     return table_rows(COLUMNS, len(rows), **dict(zip(names, columns, strict=True)))

@@ -157,7 +157,6 @@ def _cells(file: str, line: int, text: str) -> list[Node]:
 
 
 def _parse_header(cells: list[Node]) -> list[str]:
-    """Names of the columns."""
     names = [cell.text for cell in cells]
     for cell in cells:
         if cell.text not in COLUMNS:

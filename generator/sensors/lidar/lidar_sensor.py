@@ -212,7 +212,6 @@ def _without_mirrored(hits: LidarHits) -> LidarHits:
 def _apply_weather(
     pulses: Pulses, weather: Weather, model: LidarModel, lidar: Lidar, shots: SweepPulses, rng: Rng
 ) -> Pulses:
-    """Attenuate pulses by fog, rain and snow, and add their returns."""
     height_m = lidar.T_world_lidar.translation_m[2]
     up = shots.directions @ lidar.T_world_lidar.rotation()[2].astype(np.float32)
     finite = np.where(np.isfinite(pulses.range_m), pulses.range_m, np.float32(model.range_m[1]))
@@ -223,7 +222,6 @@ def _apply_weather(
 
 
 def _add_range_noise(returns: Returns, model: LidarModel, weather: Weather, rng: Rng) -> Returns:
-    """Add the device's noise and quantisation to ranges."""
     spread_m = np.float32(model.range_noise_m) + lidar_atmosphere.rain_noise_m(
         weather.rain_mm_h, returns.range_m
     )

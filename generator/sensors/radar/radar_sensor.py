@@ -117,7 +117,6 @@ class Radar(Instrument):
     def _scan(
         self, look: Look, model: RadarModel, scene: Scene, renderer: Renderer, rng: Rng
     ) -> Echo:
-        """The detections of one scan, with errors of measurement."""
         eye = scene.device(self.name).T_world_device
         rays = _make_rays(look, rng)
         beams = LidarRays(rays.directions.astype(np.float32), 0.0, 1, look.range_m[1])
@@ -200,7 +199,6 @@ def _directions(azimuth_rad: Array, elevation_rad: Array) -> Array:
 
 
 def _ray_echoes(scene: Scene, radar: str, rays: Rays, hits: LidarHits) -> Echo:
-    """Echoes of all rays that hit something, without errors of measurement."""
     (hit,) = np.nonzero(np.isfinite(hits.range_m[:, 0]))
     range_m = hits.range_m[hit, 0].astype(np.float64)
     ids = hits.instance_id[hit, 0].astype(np.int64)
@@ -272,7 +270,6 @@ def _draw_false_alarms(look: Look, model: RadarModel, mean: float, rng: Rng) -> 
 
 
 def _add_noise(echo: Echo, look: Look, factor: float, rng: Rng) -> Echo:
-    """Add errors of measurement to detections."""
     draws = factor * rng.standard_normal((4, len(echo.range_m)))
     noise = look.noise
     spread = np.radians(interpolate_curve(noise.azimuth_deg, echo.azimuth_rad))

@@ -46,7 +46,6 @@ def load_croissant(root: Path, stored: StoredSamples) -> labelled_images.Loaded:
 
 
 def _rows(dataset: Any, name: str) -> Iterator[Mapping[str, Any]]:
-    """Records of a set, by column."""
     for record in dataset.records(name):
         yield {key.removeprefix(f"{name}/"): value for key, value in record.items()}
 

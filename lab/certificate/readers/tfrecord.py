@@ -29,7 +29,6 @@ def load_tfrecord(root: Path, stored: StoredSamples) -> labelled_images.Loaded:
 
 
 def _features(record: bytes) -> Mapping[str, Any]:
-    """Values by key."""
     from tfrecord import example_pb2
 
     example = example_pb2.Example()

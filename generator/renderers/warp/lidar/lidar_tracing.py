@@ -79,7 +79,6 @@ def pack_moving_bodies(
 
 
 def _find_movers(scene: Scene, time_s: NDArray[np.float32] | None) -> list[Mover]:
-    """Bodies whose pose changes during the scan."""
     if time_s is None or not scene.tracks:
         return []
     keys_s = scene.time_s + np.linspace(float(time_s.min()), float(time_s.max()), KEYS)

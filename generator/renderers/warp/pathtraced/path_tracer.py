@@ -154,7 +154,6 @@ class PathTracer:
         return radiance
 
     def _denoise(self, frame: CameraView, radiance: wp.array) -> None:
-        """Denoise in place."""
         from gen_data.renderers.warp.pathtraced.kernels.denoise_aovs import trace_guides
 
         n, shape = frame.pixels, (frame.view.height, frame.view.width, 3)

@@ -244,7 +244,6 @@ def radiance_image(radiance: wp.array, view: records.View) -> Float32:
 
 
 def _copy(radiance: wp.array) -> wp.array:
-    """A copy of scratch memory."""
     copy = wp.empty_like(radiance)
     wp.copy(copy, radiance)
     return copy

@@ -63,7 +63,6 @@ def group_boxes(lows: Floats, highs: Floats) -> Floats:
 
 
 def _pack(nodes: Floats, codes: Ints, leaf_places: NDArray[np.integer], tail: Floats) -> Floats:
-    """Concatenate a tree into one array of groups."""
     if len(leaf_places):
         leaf_codes = -leaf_places[np.maximum(-1 - codes, 0)]
         codes = np.where(codes < 0, leaf_codes, 1 + _NODE_GROUPS * codes).astype(np.int32)

@@ -339,7 +339,6 @@ def _mean_levels(finest: Pixels) -> NDArray[np.uint32]:
 
 
 def _mip_levels(image: Pixels) -> list[Pixels]:
-    """An image and its halves down to one texel."""
     images = [image]
     while max(images[-1].shape[:2]) > 1:
         images.append(halve_image(images[-1]))
@@ -347,7 +346,6 @@ def _mip_levels(image: Pixels) -> list[Pixels]:
 
 
 def _append_channel(three: Pixels, fourth: Pixels) -> Pixels:
-    """Append a fourth channel to three."""
     return np.asarray(cv2.merge([*cv2.split(three), fourth]))
 
 

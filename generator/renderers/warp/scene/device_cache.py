@@ -48,7 +48,6 @@ class _Latest:
 
 
 def _is_same(one: NDArray[Any], other: NDArray[Any]) -> bool:
-    """Whether two arrays have the same bytes."""
     same_form = one.dtype == other.dtype and one.shape == other.shape
     return same_form and one.tobytes() == other.tobytes()
 

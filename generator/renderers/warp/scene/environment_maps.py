@@ -111,7 +111,6 @@ class _Sphere:
 
 
 def _search_luminance(image: Array | Float32) -> Array:
-    """Luminance at the resolution of detection."""
     height = image.shape[0]
     if height > _SEARCH_ROWS:
         size = (2 * _SEARCH_ROWS, _SEARCH_ROWS)
@@ -167,7 +166,6 @@ def _excess(image: Array, part: NDArray[np.bool_], floor: float) -> Array:
 
 
 def _fit_lamp(excess: Array, sphere: _Sphere) -> SkyLamp:
-    """The disk with the same vector irradiance."""
     weights = luminance(excess) * sphere.solid
     flow = np.array([float((weights * sphere.directions[..., k]).sum()) for k in range(3)])
     towards = flow / math.sqrt(float((flow * flow).sum()))

@@ -174,7 +174,6 @@ def _pack_scene(scene: Scene, cache: DeviceCache) -> _PackedScene:
 
 
 def _pack_bodies(bodies: tuple[Body, ...], cache: DeviceCache) -> _PackedScene:
-    """Pack a scene of bodies alone, without light."""
     asset_ids = sorted({body.asset for body in bodies})
     place = {asset_id: k for k, asset_id in enumerate(asset_ids)}
     meshes = [cache.mesh(asset_id) for asset_id in asset_ids]
@@ -329,7 +328,6 @@ def sky_record(
 def _fill_volumes(
     world: records.World, volumes: Sequence[IrradianceVolume], device: wp.Device
 ) -> None:
-    """Fill in the volumes of a World record, and their probes."""
     values = np.zeros(len(volumes), dtype=struct_dtype(records.VolumeRecord))
     probes = [np.array(volume.light_cd_m2, np.float32).reshape(-1, 6, 3) for volume in volumes]
     for value, volume in zip(values, volumes, strict=True):
@@ -362,7 +360,6 @@ def lamp_records(lights: Sequence[Light]) -> NDArray[np.void]:
 
 
 def _fill_panel(value: NDArray[np.void], light: Light) -> None:
-    """Fill in the fields that only panels have."""
     normal = np.asarray(light.direction, dtype=np.float64)
     if light.kind == "rectangle":
         half_m = 0.5 * np.asarray(light.size_m, dtype=np.float64)

@@ -100,7 +100,6 @@ class _Mask:
         return cls(words, pixels)
 
     def read(self) -> NDArray[np.bool_]:
-        """All pixels on the host."""
         bits = wp.empty(self.words.size, dtype=wp.uint8, device=self.words.device)
         launch(amodal.pack_bits, bits.size, [self.words], [bits], device=bits.device)
         return np.unpackbits(bits.numpy(), bitorder="little").view(np.bool_)
@@ -301,7 +300,6 @@ def _crop_rows(outline: Silhouette, top: int, end: int) -> Silhouette:
 
 
 def _merge(instance_id: int, parts: Sequence[Silhouette]) -> Silhouette:
-    """One silhouette from several bands of rows."""
     filled = [part for part in parts if part.mask.any()]
     if not filled:
         return Silhouette(instance_id, 0, 0, _NOTHING)

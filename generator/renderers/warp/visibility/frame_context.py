@@ -169,7 +169,6 @@ def pack_state(
 
 
 def _has_same_assets(one: Scene, other: Scene) -> bool:
-    """Whether the bodies have the same meshes and identical materials."""
     return all(
         a is b or (a.asset == b.asset and a.materials is b.materials)
         for a, b in zip(one.bodies, other.bodies, strict=True)

@@ -69,7 +69,6 @@ def draw_labels(frame: CameraView, channels: frozenset[Channel]) -> DrawnLabels:
 
 
 def _nothing(channel: Channel) -> Any:
-    """Value of a pixel that shows nothing."""
     return math.inf if channel in (Channel.Z_DEPTH, Channel.RANGE) else _DTYPES[channel](0)
 
 
@@ -95,7 +94,6 @@ def _draw_label(frame: CameraView, channel: Channel, image: wp.array) -> None:
 
 
 def _body_ids(scene: Scene, channel: Channel) -> list[int]:
-    """Ids of the bodies in a channel of ids."""
     if channel is Channel.CATEGORY:
         return category_ids(scene)
     name = "instance_id" if channel is Channel.INSTANCE else "part_id"

@@ -59,7 +59,6 @@ def _flow_channels(
     channels: frozenset[Channel],
     reference: frame_context.CameraView,
 ) -> dict[Channel, NDArray[Any]]:
-    """Channels of one direction."""
     images: dict[Channel, NDArray[Any]] = {}
     carriers = reprojection.find_carriers(then.scene)
     bands: Sequence[frame_context.RowBand] = (reprojection.full_band(then),)
@@ -131,7 +130,6 @@ def find_occluded(
 def _undefined_flow(
     shape: tuple[int, ...], channels: frozenset[Channel]
 ) -> dict[Channel, NDArray[Any]]:
-    """Backward flow at the beginning of a sequence."""
     values: dict[Channel, NDArray[Any]] = {
         Channel.FLOW_BACKWARD: np.full((*shape, 2), np.nan, np.float32),
         Channel.FLOW_OCCLUDED_BACKWARD: np.ones(shape, np.uint8),
