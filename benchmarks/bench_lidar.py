@@ -19,8 +19,7 @@ from gen_data.assemble.pipeline_factory import open_pipeline
 from gen_data.core import motion, se3, streams
 from gen_data.core.capture import LidarRays, PointCloud
 from gen_data.core.scene import Body, Rig, Scene
-from gen_data.sensors.lidar.lidar_sensor import LidarSensor
-from gen_data.sensors.lidar.scan_pattern import lidar_model, make_sweep
+from gen_data.sensors.lidar import lidar_sensor, scan_pattern
 
 
 def best_s(work: Callable[[], object], repeats: int) -> float:
@@ -63,8 +62,8 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=5)
     parser.add_argument("--model", default="HDL-64E")
     arguments = parser.parse_args()
-    model = lidar_model(arguments.model)
-    sweep = make_sweep(model, 0.0)
+    model = scan_pattern.lidar_model(arguments.model)
+    sweep = scan_pattern.make_sweep(model, 0.0)
     beams = LidarRays(sweep.directions, 0.0, 1, model.range_m[1], order=sweep.order)
     config = load_config("kitti_rig.yaml", overrides=["sensors[0].size_px=[64, 32]"])
     print(f"{machine()}; {arguments.model}, {len(sweep.ring)} pulses")
@@ -73,13 +72,13 @@ def main() -> None:
             scene = pipeline.sample(index).scene
             renderer, lidar = pipeline.renderer, scene.lidar("velodyne")
             for sensor in (
-                LidarSensor(name="velodyne", model=arguments.model),
-                LidarSensor(
+                lidar_sensor.LidarSensor(name="velodyne", model=arguments.model),
+                lidar_sensor.LidarSensor(
                     name="velodyne", model=arguments.model, divergence=True, returns="dual"
                 ),
             ):
 
-                def capture(sensor: LidarSensor = sensor) -> PointCloud:
+                def capture(sensor: lidar_sensor.LidarSensor = sensor) -> PointCloud:
                     rng = streams.Streams(0, 0).rng("sensor/velodyne")
                     anew = replace(scene)  # noqa: B023
                     return sensor.capture(anew, renderer, frozenset(), rng)  # noqa: B023
@@ -89,9 +88,9 @@ def main() -> None:
                 kind = "7 rays, dual" if sensor.divergence else "1 ray, strongest"
                 print(f"sample {index}, {kind}: {1e3 * spent:.0f} ms, {points} points")
             moving = set_in_motion(scene)
-            sensor = LidarSensor(name="velodyne", model=arguments.model)
+            sensor = lidar_sensor.LidarSensor(name="velodyne", model=arguments.model)
 
-            def capture_moving(sensor: LidarSensor = sensor) -> PointCloud:
+            def capture_moving(sensor: lidar_sensor.LidarSensor = sensor) -> PointCloud:
                 rng = streams.Streams(0, 0).rng("sensor/velodyne")
                 return sensor.capture(replace(moving), renderer, frozenset(), rng)  # noqa: B023
 

@@ -19,8 +19,7 @@ from functools import cache
 
 import numpy as np
 
-from benchmarks import bench_memory, bench_tabletop
-from benchmarks.bench_render import frame_ms, photograph
+from benchmarks import bench_memory, bench_render, bench_tabletop
 from benchmarks.bench_street_render import CHANNELS, Street, grid_mesh
 from benchmarks.runs import machine, measure_run
 from gen_data.assemble.pipeline_factory import PipelineFactory
@@ -122,8 +121,8 @@ def _frames(scenes: Iterator[tuple[float, Scene]], repeats: int) -> Points:
     renderer = WarpRenderer(Bumps(), "cpu")
     points = []
     for x, scene in scenes:
-        photograph(renderer, scene, CHANNELS)
-        points.append((x, frame_ms(renderer, [scene], CHANNELS, repeats)[0]))
+        bench_render.photograph(renderer, scene, CHANNELS)
+        points.append((x, bench_render.frame_ms(renderer, [scene], CHANNELS, repeats)[0]))
     return points
 
 

@@ -9,8 +9,7 @@ from typing import ClassVar, TypeVar, get_args
 from pydantic import Field, PrivateAttr, model_validator
 
 from gen_data.config.base_model import Strict
-from gen_data.core import capture, errors, optional_packages
-from gen_data.core.interfaces import AssetLibrary, DatasetInfo, Exporter
+from gen_data.core import capture, errors, interfaces, optional_packages
 from gen_data.core.scene import Scene
 from gen_data.exporters.conventions import Conventions
 
@@ -83,7 +82,7 @@ class ExporterBase(Strict):
         """Whether the format prescribes its classes; see ``Exporter``."""
         return self.own_classes
 
-    def check(self, info: DatasetInfo) -> None:
+    def check(self, info: interfaces.DatasetInfo) -> None:
         """Reject a data set that the format cannot represent.
 
         Raises:
@@ -99,7 +98,7 @@ class ExporterBase(Strict):
         """
         del scene
 
-    def with_assets(self: E, assets: AssetLibrary) -> E:
+    def with_assets(self: E, assets: interfaces.AssetLibrary) -> E:
         """Return the exporter for writing; formats with geometry keep the library."""
         del assets
         return self
@@ -108,22 +107,22 @@ class ExporterBase(Strict):
 class AssetExporter(ExporterBase):
     """An exporter that reads the library of assets while it writes."""
 
-    _assets: AssetLibrary | None = PrivateAttr(None)
+    _assets: interfaces.AssetLibrary | None = PrivateAttr(None)
 
-    def with_assets(self: A, assets: AssetLibrary) -> A:
+    def with_assets(self: A, assets: interfaces.AssetLibrary) -> A:
         """Return the exporter with a library."""
         bound = self.model_copy()
         bound._assets = assets
         return bound
 
     @property
-    def library(self) -> AssetLibrary:
+    def library(self) -> interfaces.AssetLibrary:
         """The library of ``with_assets``."""
         assert self._assets is not None, "call with_assets first"
         return self._assets
 
 
-def check_image_formats(exporter: Exporter, info: DatasetInfo) -> None:
+def check_image_formats(exporter: interfaces.Exporter, info: interfaces.DatasetInfo) -> None:
     """Reject photographs in files that a format cannot hold.
 
     Raises:

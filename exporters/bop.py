@@ -46,9 +46,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import PrivateAttr
 
-from gen_data.core import boxes, se3
-from gen_data.core.bounded_cache import ByteCache
-from gen_data.core.capture import Channel
+from gen_data.core import bounded_cache, boxes, capture, se3
 from gen_data.core.interfaces import AssetLibrary, DatasetInfo, media_path
 from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.sample import MaskPx, ObjectTruth, Sample
@@ -94,8 +92,8 @@ class Bop(base.AssetExporter):
     camera: str = ""
     folders: Literal["scene", "thousand"] = "scene"
 
-    _built: ByteCache[rigid_models.Model] = PrivateAttr(
-        default_factory=lambda: ByteCache(MODEL_CACHE_BYTES)
+    _built: bounded_cache.ByteCache[rigid_models.Model] = PrivateAttr(
+        default_factory=lambda: bounded_cache.ByteCache(MODEL_CACHE_BYTES)
     )
 
     def check(self, info: DatasetInfo) -> None:
@@ -111,7 +109,7 @@ class Bop(base.AssetExporter):
     def with_assets(self, assets: AssetLibrary) -> Bop:
         """Return the exporter with a library of meshes."""
         bound = super().with_assets(assets)
-        bound._built = ByteCache(MODEL_CACHE_BYTES)
+        bound._built = bounded_cache.ByteCache(MODEL_CACHE_BYTES)
         return bound
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
@@ -187,7 +185,7 @@ class Bop(base.AssetExporter):
     ) -> None:
         """Link the images and masks of one row into the folder of its scene."""
         name = f"{image['im_id']:06d}"
-        channels = {"rgb": Channel.RGB, "depth": Channel.Z_DEPTH}
+        channels = {"rgb": capture.Channel.RGB, "depth": capture.Channel.Z_DEPTH}
         for kind, channel in channels.items():
             if channel in info.media[camera]:
                 source = info.media_path(shard_dir, camera, channel, image["index"])
@@ -202,7 +200,7 @@ class _ModelFiles:
     """Models of a shard; each is built and written at its first use."""
 
     def __init__(
-        self, folder: Path, assets: AssetLibrary, built: ByteCache[rigid_models.Model]
+        self, folder: Path, assets: AssetLibrary, built: bounded_cache.ByteCache[rigid_models.Model]
     ) -> None:
         self._folder, self.library, self._built = folder, assets, built
         self._rows: dict[str, dict[str, Any]] = {}
@@ -287,9 +285,9 @@ def _read_depth(
     info: DatasetInfo, camera: str, shard_dir: Path, index: int
 ) -> NDArray[np.uint16] | None:
     """The depth image as stored, uint16 [h, w]; None if the camera writes none."""
-    if Channel.Z_DEPTH not in info.media[camera]:
+    if capture.Channel.Z_DEPTH not in info.media[camera]:
         return None
-    path = media_path(shard_dir, camera, Channel.Z_DEPTH, index)
+    path = media_path(shard_dir, camera, capture.Channel.Z_DEPTH, index)
     return np.asarray(read_pixels(path), np.uint16)
 
 

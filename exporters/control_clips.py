@@ -44,8 +44,7 @@ from gen_data.core.errors import ConfigError, StorageError
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.sample import Sample
 from gen_data.core.serialization import canonical_json
-from gen_data.exporters import base, image_files, label_png
-from gen_data.exporters.captions import caption
+from gen_data.exporters import base, captions, image_files, label_png
 from gen_data.exporters.conventions import ANY_LENS, Conventions
 from gen_data.exporters.id_colors import id_colors
 from gen_data.exporters.png import RowFilter, encode_png
@@ -163,7 +162,7 @@ class ControlClips(base.ExporterBase):
                 write_bytes(folder / kind / f"{sample.index:09d}.png", png)
             row = {
                 **frame_facts(info, sample),
-                "text": caption(sample, camera),
+                "text": captions.caption(sample, camera),
                 "near_m": near_m,
                 "far_m": far_m,
                 "size": [depth.shape[1], depth.shape[0]],

@@ -41,8 +41,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 import yaml
 from pydantic import Field
 
-from gen_data.core.boxes import OrientedBox
-from gen_data.core.capture import Channel
+from gen_data.core import boxes, capture
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.lens import Lens
 from gen_data.core.sample import ObjectTruth, Sample
@@ -70,10 +69,10 @@ GROUP_BYTES = 64_000_000
 """Image bytes of a row group after which the next one begins."""
 WIDE = frozenset(
     {
-        Channel.FLOW_FORWARD,
-        Channel.FLOW_BACKWARD,
-        Channel.SCENE_FLOW,
-        Channel.OBJECT_COORDINATES,
+        capture.Channel.FLOW_FORWARD,
+        capture.Channel.FLOW_BACKWARD,
+        capture.Channel.SCENE_FLOW,
+        capture.Channel.OBJECT_COORDINATES,
     }
 )
 """Channels with three 16-bit components, which Pillow cannot decode."""
@@ -238,7 +237,7 @@ LENS = {
 
 def table_features(info: DatasetInfo) -> dict[str, Any]:
     """Features by column, in the JSON form of ``datasets``."""
-    others = sorted({c for s in rgb_cameras(info) for c in info.media[s]} - {Channel.RGB})
+    others = sorted({c for s in rgb_cameras(info) for c in info.media[s]} - {capture.Channel.RGB})
     return {
         "image": IMAGE,
         **{c.value: value_feature("binary") if c in WIDE else IMAGE for c in others},
@@ -323,7 +322,7 @@ def _object(sample: Sample, sensor: str, thing: ObjectTruth) -> dict[str, Any]:
     }
 
 
-def _box3d(box: OrientedBox) -> list[float]:
+def _box3d(box: boxes.OrientedBox) -> list[float]:
     """Centre, full size, quaternion w x y z."""
     pose = box.T_frame_box
     return [*pose.translation_m, *box.size_m, *pose.quaternion_wxyz]
@@ -334,7 +333,7 @@ def _images(info: DatasetInfo, shard_dir: Path, row: Mapping[str, Any]) -> dict[
     columns: dict[str, Any] = {}
     for channel in info.media[row["sensor"]]:
         path = info.media_path(shard_dir, row["sensor"], channel, row["sample"])
-        name = "image" if channel is Channel.RGB else channel.value
+        name = "image" if channel is capture.Channel.RGB else channel.value
         file_name = f"{path.stem}_{row['sensor']}{path.suffix}"
         data = path.read_bytes()
         columns[name] = data if channel in WIDE else {"bytes": data, "path": file_name}

@@ -49,11 +49,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from gen_data.core import capture, intrinsics, scene
+from gen_data.core import capture, intrinsics, scene, se3
 from gen_data.core.boxes import BoxPx
 from gen_data.core.interfaces import DatasetInfo, media_path
 from gen_data.core.sample import ImageTruth, ObjectTruth, Sample
-from gen_data.core.se3 import Array
 from gen_data.exporters import base, image_files, point_cloud_io, sensor_selection
 from gen_data.exporters.conventions import PINHOLE, Conventions
 from gen_data.exporters.kitti_boxes import UprightBox, members_in_box, upright_box
@@ -187,7 +186,7 @@ class Kitti(base.ExporterBase):
     def _lidar(self, info: DatasetInfo) -> str:
         return sensor_selection.laser_scanner(info, self.lidar, self.type)
 
-    def _velodyne_pose(self, info: DatasetInfo, sample: Sample) -> Array:
+    def _velodyne_pose(self, info: DatasetInfo, sample: Sample) -> se3.Array:
         """``T_camera_velo`` of the velodyne folder's points, [3, 4]."""
         lidar = self._lidar(info)
         if lidar:
@@ -283,7 +282,7 @@ def point_members(
     points: NDArray[np.void],
     truth: ImageTruth,
     rows: Sequence[LabelRow],
-    T_camera_velo: Array,
+    T_camera_velo: se3.Array,
 ) -> tuple[NDArray[np.int64], frozenset[int]]:
     """Assign points to instances; also return the labelled instances without a point.
 
@@ -395,24 +394,24 @@ def occlusion_level(occlusion: float) -> int:
     return int(occlusion > PARTLY_OCCLUDED) + int(occlusion > LARGELY_OCCLUDED)
 
 
-def calib_text(camera: intrinsics.Intrinsics, T_camera_velo: Array = T_CAMERA_FORWARD) -> str:
+def calib_text(camera: intrinsics.Intrinsics, T_camera_velo: se3.Array = T_CAMERA_FORWARD) -> str:
     """Format the seven lines of a calibration file, in the order that readers expect."""
     return matrix_lines(calib_matrices(camera, T_camera_velo))
 
 
-def calib_matrices(camera: intrinsics.Intrinsics, T_camera_velo: Array) -> dict[str, Array]:
+def calib_matrices(camera: intrinsics.Intrinsics, T_camera_velo: se3.Array) -> dict[str, se3.Array]:
     """Matrices of a calibration file by name; pixel centres are integers."""
     projection = np.zeros((3, 4))
     projection[:, :3] = camera.matrix()
     projection[:2, 2] -= 0.5
-    rows: dict[str, Array] = {f"P{k}": projection for k in range(4)}
+    rows: dict[str, se3.Array] = {f"P{k}": projection for k in range(4)}
     rows["R0_rect"] = np.eye(3)
     rows["Tr_velo_to_cam"] = T_camera_velo
     rows["Tr_imu_to_velo"] = np.eye(3, 4)
     return rows
 
 
-def matrix_lines(rows: dict[str, Array]) -> str:
+def matrix_lines(rows: dict[str, se3.Array]) -> str:
     """Format matrices as lines of ``name: numbers``, row by row."""
     return "".join(
         f"{name}: " + " ".join(f"{value:.12e}" for value in matrix.ravel()) + "\n"

@@ -29,19 +29,16 @@ from gen_data.core.capture import Channel
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.sample import Sample, Utterance
 from gen_data.core.serialization import canonical_json
-from gen_data.exporters.captions import caption
+from gen_data.exporters import captions, image_files, image_rows, rle
 from gen_data.exporters.coco import box_xywh, image_name, scene_graph
 from gen_data.exporters.conventions import ANY_LENS, EDGES, Conventions
 from gen_data.exporters.fragments import fragment_rows, image_splits
-from gen_data.exporters.image_files import link_photograph
-from gen_data.exporters.image_rows import ImageRowsExporter
-from gen_data.exporters.rle import encode_rle
 
 UTTERANCE_STRIDE = 1_000
 """Ids of lines per image; more lines than this are left out."""
 
 
-class LanguageJsonl(ImageRowsExporter):
+class LanguageJsonl(image_rows.ImageRowsExporter):
     """Text about every photograph as JSON lines, with masks of its objects."""
 
     type: Literal["language"] = "language"
@@ -74,13 +71,15 @@ class LanguageJsonl(ImageRowsExporter):
                     for k, line in enumerate(row["lines"][:UTTERANCE_STRIDE]):
                         identity = {"id": number * UTTERANCE_STRIDE + k}
                         text.write(json.dumps(identity | head | line, ensure_ascii=False) + "\n")
-                    link_photograph(info, shard_dir, row, dataset_dir / image["file_name"])
+                    image_files.link_photograph(
+                        info, shard_dir, row, dataset_dir / image["file_name"]
+                    )
 
 
 def _utterances(sample: Sample, sensor: str) -> list[tuple[str, Utterance]]:
     said = sample.truth[sensor].utterances
     assert said is not None, "the annotation language is in `needs`"
-    scene = Utterance("caption", caption(sample, sensor))
+    scene = Utterance("caption", captions.caption(sample, sensor))
     return [("scene_caption", scene), *((u.kind, u) for u in said)]
 
 
@@ -105,7 +104,7 @@ def _image(info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
                 "annotation_id": sample.annotation_id(sensor, thing.instance.instance_id),
                 "category": thing.instance.category,
                 "bbox": box_xywh(thing.box),
-                "segmentation": encode_rle(thing.mask, *size),
+                "segmentation": rle.encode_rle(thing.mask, *size),
             }
         )
     listed = {thing["object_id"] for thing in objects}

@@ -40,13 +40,9 @@ from gen_data.core.errors import ConfigError
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.sample import Sample
 from gen_data.core.scene import Articulation, Scene
-from gen_data.exporters.base import ANY_FORMAT, AssetExporter, check_installed, select_names
+from gen_data.exporters import base, fragments, lerobot_files, lerobot_statistics, sequences
 from gen_data.exporters.conventions import ANY_LENS, Conventions
-from gen_data.exporters.fragments import fragment_rows
-from gen_data.exporters.lerobot_files import LABELS, LAYOUTS, RobotFiles
-from gen_data.exporters.lerobot_statistics import image_sums
 from gen_data.exporters.sensor_selection import rgb_camera, rgb_cameras
-from gen_data.exporters.sequences import FRAMES, Frame, frame_facts, unbroken_episodes, write_frames
 
 PHRASES = {
     "joints": "move to a posture",
@@ -58,7 +54,7 @@ PHRASES = {
 """Phrase for each kind of an arm's goals."""
 
 
-class LeRobot(AssetExporter):
+class LeRobot(base.AssetExporter):
     """LeRobot: joint positions and images of the episodes of one arm.
 
     Attributes:
@@ -71,7 +67,7 @@ class LeRobot(AssetExporter):
         lens=ANY_LENS, time="s from the episode's start"
     )
 
-    image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
+    image_formats: ClassVar[frozenset[str]] = base.ANY_FORMAT
     arm: str = ""
     version: Literal["v3.0", "v2.1"] = "v3.0"
 
@@ -82,7 +78,7 @@ class LeRobot(AssetExporter):
             ConfigError: there are no sequences, a camera is missing or skips steps, or a library
                 is missing.
         """
-        check_installed(self.type, "pyarrow")
+        base.check_installed(self.type, "pyarrow")
         if info.steps_per_scene < 2:
             raise ConfigError(
                 f"exporter '{self.type}': episodes are sequences, but steps_per_scene is 1; "
@@ -113,19 +109,19 @@ class LeRobot(AssetExporter):
         """
         self.check(info)
         rows = (self._row(info, sample, shard_dir) for sample in samples)
-        write_frames(shard_dir / self.type, rows)
+        sequences.write_frames(shard_dir / self.type, rows)
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Write the episodes of all shards, then the totals of each data set."""
-        lines = fragment_rows(shard_dirs, self.type, FRAMES)
-        frames = (Frame(shard_dir, row) for shard_dir, row in lines)
-        folders: dict[tuple[str, str], RobotFiles] = {}
-        for episode in unbroken_episodes(frames):
+        lines = fragments.fragment_rows(shard_dirs, self.type, sequences.FRAMES)
+        frames = (sequences.Frame(shard_dir, row) for shard_dir, row in lines)
+        folders: dict[tuple[str, str], lerobot_files.RobotFiles] = {}
+        for episode in sequences.unbroken_episodes(frames):
             first = episode[0].row
             key = (first["split"], first["robot"])
             if key not in folders:
                 folder = dataset_dir / key[0] / key[1].replace("/", "_")
-                folders[key] = LAYOUTS[self.version](info, folder, first)
+                folders[key] = lerobot_files.LAYOUTS[self.version](info, folder, first)
             folders[key].add_episode(episode)
         for files in folders.values():
             files.close()
@@ -133,19 +129,21 @@ class LeRobot(AssetExporter):
     def _cameras(self, info: DatasetInfo) -> tuple[str, ...]:
         if not self.cameras:
             return rgb_cameras(info) or (rgb_camera(info, "", self.type),)
-        names = select_names(self.cameras, info.cameras, f"exporter '{self.type}': cameras")
+        names = base.select_names(self.cameras, info.cameras, f"exporter '{self.type}': cameras")
         return tuple(rgb_camera(info, name, self.type) for name in names)
 
     def _row(self, info: DatasetInfo, sample: Sample, shard_dir: Path) -> dict[str, Any]:
         arm = self._find_arm(sample.scene)
         time_s = sample.scene.time_s
         images = {
-            camera: image_sums(info.media_path(shard_dir, camera, Channel.RGB, sample.index))
+            camera: lerobot_statistics.image_sums(
+                info.media_path(shard_dir, camera, Channel.RGB, sample.index)
+            )
             for camera in self._cameras(info)
         }
         robot = self.library.robot(arm.asset)
         step = demonstration_step(arm, robot, time_s, info.step_s)
-        return frame_facts(info, sample) | {
+        return sequences.frame_facts(info, sample) | {
             "labels": {} if step is None else _labels(step),
             "robot": arm.asset,
             "joints": [joint.name for joint in robot.movable],
@@ -176,7 +174,7 @@ def _labels(step: DemonstrationStep) -> dict[str, Any]:
     points = ", ".join(f"{x:g} {y:g} {z:g}" for x, y, z in step.contact_points_m)
     values = (pose, step.opening, step.opening_action, step.phase, step.held, contacts, forces,
               points, step.succeeded, step.failure)  # fmt: skip
-    return dict(zip(LABELS, values, strict=True))
+    return dict(zip(lerobot_files.LABELS, values, strict=True))
 
 
 def task_sentence(scene: Scene, arm: Articulation) -> str:

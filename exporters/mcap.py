@@ -42,9 +42,8 @@ from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
-from gen_data.core import errors, intrinsics, se3, serialization
+from gen_data.core import capture, errors, intrinsics, se3, serialization
 from gen_data.core.boxes import OrientedBox
-from gen_data.core.capture import POINT, Channel
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.sample import ImageTruth, Sample
 from gen_data.core.scene import Camera, Instance, Lidar
@@ -367,7 +366,7 @@ def _camera_messages(info: DatasetInfo, event: _Event) -> Iterator[tuple[str, Me
             **common, data=path.read_bytes(), format=FORMATS[info.encoding(name, channel).format]
         )
         yield f"/camera/{name}/{channel.value}", image
-    if Channel.RGB in info.media[name]:
+    if capture.Channel.RGB in info.media[name]:
         yield f"/camera/{name}/annotations", _annotations_message(row["boxes"], event.time_ns)
 
 
@@ -403,7 +402,7 @@ def _cloud_message(event: _Event, point_time: PointTime) -> Message:
         timestamp=_timestamp(event.time_ns),
         frame_id=f"lidar/{event.key}",
         pose={"position": {}, "orientation": {"w": 1.0}},
-        point_stride=POINT.itemsize,
+        point_stride=capture.POINT.itemsize,
         fields=list(point_fields()),
         data=points.tobytes(),
     )
@@ -411,8 +410,8 @@ def _cloud_message(event: _Event, point_time: PointTime) -> Message:
 
 def point_fields() -> Iterator[dict[str, Any]]:
     """Yield name, offset and type of each number of a ``POINT`` record."""
-    for name in POINT.names or ():
-        dtype, offset = POINT.fields[name][:2]  # type: ignore[index]
+    for name in capture.POINT.names or ():
+        dtype, offset = capture.POINT.fields[name][:2]  # type: ignore[index]
         if name == "position_m":
             for k, axis in enumerate("xyz"):
                 yield {"name": axis, "offset": offset + 4 * k, "type": NUMERIC_TYPES["<f4"]}

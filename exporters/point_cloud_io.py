@@ -10,15 +10,14 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.core import errors, interfaces, scene, se3
-from gen_data.core.capture import POINT, PointCloud
+from gen_data.core import capture, errors, interfaces, scene, se3
 from gen_data.core.sample import Sample
 
 PointTime = Literal["sweep_middle", "sweep_start"]
 """Instant from which times of points count."""
 
 
-def write_cloud(cloud: PointCloud, shard_dir: Path, index: int) -> None:
+def write_cloud(cloud: capture.PointCloud, shard_dir: Path, index: int) -> None:
     """Write one sweep to its ``cloud_path``."""
     path = interfaces.cloud_path(shard_dir, cloud.sensor, index)
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -45,7 +44,7 @@ def read_points(shard_dir: Path, sensor: str, index: int) -> NDArray[np.void]:
         raise errors.StorageError(
             f"{path}: cannot be read ({error}); generate the data set again"
         ) from error
-    if points.dtype != POINT:
+    if points.dtype != capture.POINT:
         raise errors.StorageError(f"{path}: contains no laser points; generate the data set again")
     return points
 

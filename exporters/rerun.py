@@ -33,16 +33,15 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from gen_data.core.capture import Channel
+from gen_data.core import capture, se3
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.sample import ObjectTruth, Sample
-from gen_data.core.se3 import SE3
 from gen_data.core.skeletons import Skeleton, find_skeleton
 from gen_data.exporters import base, image_files, label_colors, point_cloud_io, rrd_container
 from gen_data.exporters.conventions import READING, Conventions
 from gen_data.exporters.fragments import fragment_rows, write_fragment
 
-DEPTHS = (Channel.Z_DEPTH, Channel.MEASURED_DEPTH)
+DEPTHS = (capture.Channel.Z_DEPTH, capture.Channel.MEASURED_DEPTH)
 Row = Mapping[str, Any]
 """Facts about one sample, as ``_sample_row`` makes them, with the folder of its shard."""
 
@@ -166,7 +165,7 @@ def _image_row(sample: Sample, name: str) -> dict[str, Any]:
     }
 
 
-def _pose(pose: SE3) -> list[float]:
+def _pose(pose: se3.SE3) -> list[float]:
     """Position [m], and quaternion x y z w."""
     w, x, y, z = pose.quaternion_wxyz
     return [*pose.translation_m, x, y, z, w]
@@ -283,7 +282,7 @@ def _camera_chunks(
 
 
 def _channel_columns(
-    info: DatasetInfo, name: str, channel: Channel, rows: Sequence[Row]
+    info: DatasetInfo, name: str, channel: capture.Channel, rows: Sequence[Row]
 ) -> Any | None:
     """Columns of the images of a channel; None for channels that are left out."""
     import rerun as rr
@@ -292,12 +291,12 @@ def _channel_columns(
 
     paths = [info.media_path(row["shard"], name, channel, row["index"]) for row in rows]
     types = [f"image/{info.encoding(name, channel).format}"] * len(paths)
-    if channel is Channel.RGB:
+    if channel is capture.Channel.RGB:
         return rr.EncodedImage.columns(blob=_blobs(paths), media_type=types)
     if channel in DEPTHS:
         units_per_m = [1.0 / info.depth_scale_m] * len(paths)
         return rr.EncodedDepthImage.columns(blob=_blobs(paths), media_type=types, meter=units_per_m)
-    if channel is Channel.CATEGORY:
+    if channel is capture.Channel.CATEGORY:
         return rr.SegmentationImage.columns(
             buffer=[np.frombuffer(_read_ids(path).tobytes(), np.uint8) for path in paths],
             format=[

@@ -22,16 +22,10 @@ from gen_data.core.asset_types import Material, MeshData, Symmetry
 from gen_data.core.interfaces import AssetLibrary, FileFrames
 from gen_data.core.scene import Body, Instance, Scene
 from gen_data.core.se3 import IDENTITY, SE3, Array, Vec3
-from gen_data.exporters.symmetry_search import (
-    POINTS,
-    PROBES,
-    Samples,
-    find_symmetries,
-    sample_triangles,
-)
+from gen_data.exporters import symmetry_search
 
 MM_PER_M = 1000.0
-_SHARES = ((POINTS, 0.5), (PROBES, 0.25))
+_SHARES = ((symmetry_search.POINTS, 0.5), (symmetry_search.PROBES, 0.25))
 
 VERTEX = np.dtype(
     [(name, "<f4") for name in ("x", "y", "z", "nx", "ny", "nz")]
@@ -124,7 +118,9 @@ def build_model(pieces: Sequence[Piece], assets: AssetLibrary) -> Model:
     stated = assets.get(pieces[0].asset).symmetries if len(pieces) == 1 else ()
     symmetries = [_scaled(symmetry, pieces[0].scale) for symmetry in stated]
     if not symmetries:
-        symmetries += find_symmetries(*(_samples(pieces, assets, *share) for share in _SHARES))
+        symmetries += symmetry_search.find_symmetries(
+            *(_samples(pieces, assets, *share) for share in _SHARES)
+        )
     info = _size_info(rows) | _symmetry_info(symmetries, pieces[0].asset, center_m)
     if origin_m is not None:
         offset_mm = np.round((origin_m - center_m) * MM_PER_M, 6) + 0.0
@@ -138,14 +134,16 @@ def _scaled(symmetry: Symmetry, scale: float) -> Symmetry:
     return replace(symmetry, offset_m=(scale * x, scale * y, scale * z))
 
 
-def _samples(pieces: Sequence[Piece], assets: AssetLibrary, count: int, shift: float) -> Samples:
+def _samples(
+    pieces: Sequence[Piece], assets: AssetLibrary, count: int, shift: float
+) -> symmetry_search.Samples:
     """Points in the instance frame [m] on all pieces, with their colours."""
     meshes = [assets.mesh(piece.asset) for piece in pieces]
     placed = [
         p.T_instance_body.apply(m.vertices_m.astype(np.float64) * p.scale)[m.faces]
         for p, m in zip(pieces, meshes, strict=True)
     ]
-    chosen, weights = sample_triangles(np.concatenate(placed), count, shift)
+    chosen, weights = symmetry_search.sample_triangles(np.concatenate(placed), count, shift)
     points = np.einsum("nk,nkc->nc", weights, np.concatenate(placed)[chosen])
     colors = np.zeros((len(chosen), 3))
     first = 0
@@ -159,7 +157,7 @@ def _samples(pieces: Sequence[Piece], assets: AssetLibrary, count: int, shift: f
             found[here] = _colors(material, uvs[here], assets)
         colors[own] = found
         first += len(corners)
-    return Samples(points, colors)
+    return symmetry_search.Samples(points, colors)
 
 
 def _file_origin_m(pieces: Sequence[Piece], assets: AssetLibrary) -> Array | None:

@@ -34,12 +34,9 @@ from gen_data.core.capture import Channel, ImageEncoding
 from gen_data.core.interfaces import DatasetInfo, media_path
 from gen_data.core.sample import Sample
 from gen_data.core.se3 import Array
-from gen_data.exporters.base import PNG_OR_JPEG
+from gen_data.exporters import base, label_map, label_png, rgbd_sequences
 from gen_data.exporters.conventions import PINHOLE, Conventions
 from gen_data.exporters.image_files import encode_channel, link_or_copy, read_image, read_pixels
-from gen_data.exporters.label_map import public_classes
-from gen_data.exporters.label_png import encode_label_png
-from gen_data.exporters.rgbd_sequences import RgbdExporter, depth_png, opencv_pinhole
 from gen_data.exporters.sequences import (
     check_sequence_count,
     read_sequences,
@@ -56,7 +53,7 @@ SPLITS = ("train", "val", "test")
 IMAGES = {"color": ".jpg", "depth": ".png", "label-filt": ".png", "instance-filt": ".png"}
 
 
-class ScanNet(RgbdExporter):
+class ScanNet(rgbd_sequences.RgbdExporter):
     """ScanNet's exported frames of one camera, with a class and an instance per pixel.
 
     Attributes:
@@ -64,7 +61,7 @@ class ScanNet(RgbdExporter):
         classes: Public list of the labels: ``nyu40`` or ``ade20k``.
     """
 
-    image_formats: ClassVar[frozenset[str]] = PNG_OR_JPEG
+    image_formats: ClassVar[frozenset[str]] = base.PNG_OR_JPEG
     channels: ClassVar[tuple[Channel, ...]] = (Channel.Z_DEPTH, Channel.INSTANCE)
     type: Literal["scannet"] = "scannet"
     conventions: ClassVar[Conventions] = Conventions(pixel_centre="i", lens=PINHOLE)
@@ -92,7 +89,7 @@ class ScanNet(RgbdExporter):
         return {
             "pose": view.T_world_camera.matrix().tolist(),
             "size_px": [k.width_px, k.height_px],
-            "pinhole": opencv_pinhole(k),
+            "pinhole": rgbd_sequences.opencv_pinhole(k),
         }
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
@@ -126,9 +123,9 @@ class ScanNet(RgbdExporter):
         labels = classes_of_instances(sample, camera, self.classes, int(ids.max(initial=0)))
         instances = np.where(labels > 0, np.arange(len(labels)), 0).astype(np.uint16)
         images = {
-            "depth": depth_png(info, shard_dir, camera, sample.index, UNITS_PER_M),
-            "label-filt": encode_label_png(ids, labels),
-            "instance-filt": encode_label_png(ids, instances),
+            "depth": rgbd_sequences.depth_png(info, shard_dir, camera, sample.index, UNITS_PER_M),
+            "label-filt": label_png.encode_label_png(ids, labels),
+            "instance-filt": label_png.encode_label_png(ids, instances),
         }
         if not _has_jpeg(info, camera):
             photo = read_pixels(media_path(shard_dir, camera, Channel.RGB, sample.index))
@@ -154,14 +151,16 @@ def classes_of_instances(
 @lru_cache(maxsize=4)
 def class_numbers(classes: str) -> Mapping[str, int]:
     """Number, from 1, of the class of each category in a public list."""
-    listed = enumerate(public_classes(classes).items(), 1)
+    listed = enumerate(label_map.public_classes(classes).items(), 1)
     return {category: k for k, (name, own) in listed for category in own or (name,)}
 
 
 def label_table(classes: str) -> str:
     """A row per class, in the columns of ScanNet's table that its scripts read."""
     head = f"id\traw_category\tcategory\t{classes}id\t{classes}class\n"
-    rows = (f"{k}\t{n}\t{n}\t{k}\t{n}\n" for k, n in enumerate(public_classes(classes), 1))
+    rows = (
+        f"{k}\t{n}\t{n}\t{k}\t{n}\n" for k, n in enumerate(label_map.public_classes(classes), 1)
+    )
     return head + "".join(rows)
 
 

@@ -14,11 +14,9 @@ from itertools import chain, count, groupby, pairwise
 from pathlib import Path
 from typing import Any
 
-from gen_data.core import errors, scene_time
-from gen_data.core.interfaces import DatasetInfo
+from gen_data.core import errors, interfaces, scene_time, se3
 from gen_data.core.sample import Sample
 from gen_data.core.scene import Scene
-from gen_data.core.se3 import SE3, Array
 from gen_data.exporters.fragments import fragment_rows, write_fragment
 
 FRAMES = "frames"
@@ -43,17 +41,17 @@ class Frame:
         return int(self.row["index"])
 
 
-def sequence_number(info: DatasetInfo, index: int) -> int:
+def sequence_number(info: interfaces.DatasetInfo, index: int) -> int:
     """Number of the sequence that a sample belongs to, from 0."""
     return index // info.steps_per_scene
 
 
-def sequence_count(info: DatasetInfo) -> int:
+def sequence_count(info: interfaces.DatasetInfo) -> int:
     """Number of sequences; the last one may be incomplete."""
     return -(-info.n // info.steps_per_scene)
 
 
-def check_frame_names(info: DatasetInfo, exporter: str) -> None:
+def check_frame_names(info: interfaces.DatasetInfo, exporter: str) -> None:
     """Reject a data set with more samples than names of six digits.
 
     Raises:
@@ -66,7 +64,7 @@ def check_frame_names(info: DatasetInfo, exporter: str) -> None:
         )
 
 
-def check_sequence_count(info: DatasetInfo, limit: int, exporter: str) -> None:
+def check_sequence_count(info: interfaces.DatasetInfo, limit: int, exporter: str) -> None:
     """Reject a data set with more sequences than a format has names for.
 
     Raises:
@@ -79,7 +77,7 @@ def check_sequence_count(info: DatasetInfo, limit: int, exporter: str) -> None:
         )
 
 
-def frame_facts(info: DatasetInfo, sample: Sample) -> dict[str, Any]:
+def frame_facts(info: interfaces.DatasetInfo, sample: Sample) -> dict[str, Any]:
     """Keys of a frame's line that all formats have."""
     return {
         "index": sample.index,
@@ -103,7 +101,7 @@ def read_sequences(shard_dirs: Sequence[Path], exporter: str) -> dict[int, list[
 
 
 def even_sequences(
-    info: DatasetInfo, shard_dirs: Sequence[Path], exporter: str
+    info: interfaces.DatasetInfo, shard_dirs: Sequence[Path], exporter: str
 ) -> dict[int, list[Frame]]:
     """Read sequences of frames at even distances, in order; a gap ends a sequence.
 
@@ -136,7 +134,7 @@ def unbroken_episodes(frames: Iterable[Frame], steps: int = 1) -> Iterator[list[
         yield [frame for _, frame in run]
 
 
-def frame_rate_hz(info: DatasetInfo, frames: Sequence[Frame]) -> float:
+def frame_rate_hz(info: interfaces.DatasetInfo, frames: Sequence[Frame]) -> float:
     """Frame rate of a sequence; the rate of the steps if it has only one frame."""
     steps = frames[1].row["step"] - frames[0].row["step"] if len(frames) > 1 else 1
     return round(1.0 / (steps * info.step_s), 6)
@@ -158,7 +156,7 @@ class Mount:
     """
 
     rig: str
-    T_rig_sensor: SE3
+    T_rig_sensor: se3.SE3
 
 
 def camera_mount(scene: Scene, name: str) -> Mount:
@@ -181,7 +179,7 @@ def device_mount(scene: Scene, name: str) -> Mount:
     return _carried_mount(scene, device.rig, device.camera, device.T_rig_device)
 
 
-def _carried_mount(scene: Scene, rig: str, camera: str, T_rig_sensor: SE3) -> Mount:
+def _carried_mount(scene: Scene, rig: str, camera: str, T_rig_sensor: se3.SE3) -> Mount:
     """Mount of a sensor on a rig; on its camera if it has none."""
     if rig:
         return Mount(rig, T_rig_sensor)
@@ -189,19 +187,19 @@ def _carried_mount(scene: Scene, rig: str, camera: str, T_rig_sensor: SE3) -> Mo
     return Mount(carrier.rig, carrier.T_rig_sensor @ scene_time.RIG_AXES @ T_rig_sensor)
 
 
-def mounted_pose(scene: Scene, mount: Mount) -> SE3:
+def mounted_pose(scene: Scene, mount: Mount) -> se3.SE3:
     """``T_world_sensor`` at the scene's instant."""
     return _rig_pose(scene, mount.rig) @ mount.T_rig_sensor
 
 
-def relative_pose(scene: Scene, one: Mount, other: Mount) -> SE3:
+def relative_pose(scene: Scene, one: Mount, other: Mount) -> se3.SE3:
     """``T_one_other``; independent of world poses, and their rounding, on a common rig."""
     if one.rig == other.rig:
         return (one.T_rig_sensor.inverse() @ other.T_rig_sensor).rounded(9)
     return (mounted_pose(scene, one).inverse() @ mounted_pose(scene, other)).rounded()
 
 
-def matrix_numbers(matrix: Array) -> str:
+def matrix_numbers(matrix: se3.Array) -> str:
     """Format a matrix row by row, with enough digits for rotations."""
     return " ".join(f"{float(value) + 0.0:.12e}" for value in matrix.ravel())
 
@@ -220,7 +218,7 @@ def write_bytes(path: Path, data: bytes) -> None:
         path.write_bytes(data)
 
 
-def _rig_pose(scene: Scene, rig: str) -> SE3:
+def _rig_pose(scene: Scene, rig: str) -> se3.SE3:
     if rig.startswith("/"):
         return scene.camera(rig[1:]).T_world_camera @ scene_time.RIG_AXES
     return scene.rig_pose(rig)

@@ -17,8 +17,7 @@ import numpy as np
 
 from gen_data.core.boxes import OrientedBox
 from gen_data.core.sample import ImageTruth, ObjectTruth, Sample
-from gen_data.exporters.kitti import occlusion_level, official_type
-from gen_data.exporters.pointclouds import lidar_boxes
+from gen_data.exporters import kitti, pointclouds
 
 INTERPOLATED, LABELLED = 1, 2
 """States of a box: not visible in this frame; visible."""
@@ -46,12 +45,12 @@ def frame_boxes(sample: Sample, camera: str, lidar: str) -> list[dict[str, Any]]
     return [
         {
             "id": instance.instance_id,
-            "type": official_type(instance),
+            "type": kitti.official_type(instance),
             "size_m": [round(v, 6) for v in box.size_m],
             "pose": _pose(box),
             **_visibility(seen.get(instance.instance_id), box.seen_from(T_camera_lidar), truth),
         }
-        for instance, box in lidar_boxes(sample, lidar)
+        for instance, box in pointclouds.lidar_boxes(sample, lidar)
     ]
 
 
@@ -133,6 +132,6 @@ def _visibility(
     cut = TRUNCATED if thing.truncation > TRUNCATED_SHARE else IN_IMAGE
     return {
         "state": LABELLED,
-        "occlusion": occlusion_level(thing.occlusion),
+        "occlusion": kitti.occlusion_level(thing.occlusion),
         "truncation": cut,
     }

@@ -15,14 +15,7 @@ from gen_data.core.interfaces import AssetIndex
 from gen_data.core.scene import ArmGoal, Articulation, Body, Scene, SupportSurface
 from gen_data.core.se3 import SE3
 from gen_data.core.streams import Rng
-from gen_data.randomizers.arm_configuration import (
-    GRASP_MARGIN,
-    arm_joints,
-    draw_hand_pose,
-    hand_pose,
-)
-from gen_data.randomizers.base import RandomizerBase, check_known
-from gen_data.randomizers.placement import half_extents_m
+from gen_data.randomizers import arm_configuration, base, placement
 
 TASKS = ("pick_and_place", "reach")
 EDGE_M = 0.08
@@ -64,7 +57,7 @@ class Stop(Strict):
         return self
 
 
-class ArmMotion(RandomizerBase):
+class ArmMotion(base.RandomizerBase):
     """Draws a sequence of goals for every arm; physics plans collision-free trajectories.
 
     List it after arm_configuration, which draws the arms' poses at time 0.
@@ -115,10 +108,16 @@ class ArmMotion(RandomizerBase):
     def _draw_reach_goal(self, arm: Articulation, assets: AssetIndex, rng: Rng) -> ArmGoal:
         robot = assets.robot(arm.asset)
         if robot.gripper is not None:
-            poses = tuple(draw_hand_pose(arm, self.tilt_deg, rng) for _ in range(self.candidates))
+            poses = tuple(
+                arm_configuration.draw_hand_pose(arm, self.tilt_deg, rng)
+                for _ in range(self.candidates)
+            )
             return ArmGoal("reach", pose_candidates=poses)
         candidates = tuple(
-            tuple(round(float(rng.uniform(j.lower, j.upper)), 6) for j in arm_joints(robot))
+            tuple(
+                round(float(rng.uniform(j.lower, j.upper)), 6)
+                for j in arm_configuration.arm_joints(robot)
+            )
             for _ in range(self.candidates)
         )
         return ArmGoal("joints", joint_candidates=candidates)
@@ -143,8 +142,8 @@ class ArmMotion(RandomizerBase):
         gripper = assets.robot(arm.asset).gripper
         known = [group.name for group in scene.groups]
         for name in groups:
-            check_known(name, known, f"randomizers.{self.name}: there is no object group")
-        limit_m = GRASP_MARGIN * gripper.stroke_m if gripper else 0.0
+            base.check_known(name, known, f"randomizers.{self.name}: there is no object group")
+        limit_m = arm_configuration.GRASP_MARGIN * gripper.stroke_m if gripper else 0.0
         wanted = groups or tuple(known)
         held = arm.goal.grasped_object if arm.goal else ""
         fitting = [
@@ -183,9 +182,9 @@ class ArmMotion(RandomizerBase):
             return ArmGoal("place", pose_candidates=(pose,))
         if stop.reach_m:
             tilt_rad, towards_rad = math.radians(stop.tilt_deg), math.radians(stop.towards_deg)
-            pose = hand_pose(stop.reach_m, yaw_rad, tilt_rad, towards_rad)
+            pose = arm_configuration.hand_pose(stop.reach_m, yaw_rad, tilt_rad, towards_rad)
             return ArmGoal("reach", pose_candidates=(pose,), gripper_opening=stop.opening)
-        joints = arm_joints(assets.robot(arm.asset))
+        joints = arm_configuration.arm_joints(assets.robot(arm.asset))
         given = stop.joints_deg or ()
         if len(given) != len(joints):
             raise ConfigError(
@@ -228,4 +227,4 @@ def _pose_on_surface(stop: Stop, yaw_rad: float, scene: Scene, field: str) -> SE
 
 
 def _narrowest_m(body: Body, assets: AssetIndex) -> float:
-    return 2.0 * min(half_extents_m(*assets.bounds_m(body.asset), body.scale))
+    return 2.0 * min(placement.half_extents_m(*assets.bounds_m(body.asset), body.scale))

@@ -16,8 +16,7 @@ from typing import Literal
 from pydantic import Field, model_validator
 
 from gen_data.config import base_model, data_files, paths, yaml_tree
-from gen_data.core.scene import HAND, Measure
-from gen_data.core.se3 import Vec3
+from gen_data.core import scene, se3
 
 Span = tuple[float, float]
 
@@ -60,8 +59,8 @@ class Joint(base_model.Strict):
     """
 
     kind: Literal["prismatic", "revolute"]
-    axis: Vec3
-    anchor_m: Vec3 = (0.0, 0.0, 0.0)
+    axis: se3.Vec3
+    anchor_m: se3.Vec3 = (0.0, 0.0, 0.0)
     limits: Span
     friction: float = 1.0
     stiffness: float = 0.0
@@ -100,13 +99,13 @@ class Step(base_model.Strict):
     verb: Literal["reach", "move", "grasp", "place", "grip"]
     at: str = ""
     along: str = ""
-    offset_m: Vec3 = (0.0, 0.0, 0.0)
+    offset_m: se3.Vec3 = (0.0, 0.0, 0.0)
     yaw_deg: float = 0.0
     yaws: int = Field(0, ge=0)
-    by_m: tuple[Vec3, ...] = ()
+    by_m: tuple[se3.Vec3, ...] = ()
     turn_deg: float = 0.0
-    axis: Vec3 = (0.0, 0.0, 1.0)
-    pivot_m: Vec3 | None = None
+    axis: se3.Vec3 = (0.0, 0.0, 1.0)
+    pivot_m: se3.Vec3 | None = None
     opening: float = Field(1.0, ge=0, le=1)
     carries: bool = False
     touches: tuple[str, ...] = ()
@@ -128,7 +127,7 @@ class Success(base_model.Strict):
         at_least, at_most: Bounds, inclusive; null = unbounded.
     """
 
-    measure: Measure
+    measure: scene.Measure
     body: str
     other: str = ""
     ever: bool = False
@@ -168,7 +167,7 @@ class Task(base_model.Strict):
         used += [name for step in self.program for name in (*step.touches, step.along)]
         used += [name for c in self.success for name in (c.body, c.other)]
         used += [name or "" for _, name, _, _ in Formatter().parse(self.instruction)]
-        unknown = sorted({*used} - {*self.things, "", "own", HAND})
+        unknown = sorted({*used} - {*self.things, "", "own", scene.HAND})
         if unknown:
             raise ValueError(f"there is no object '{unknown[0]}'")
         return self

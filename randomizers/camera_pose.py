@@ -11,11 +11,10 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from gen_data.config import distributions as dist
+from gen_data.core import scene_time, se3
 from gen_data.core.errors import ConfigError, did_you_mean
 from gen_data.core.interfaces import AssetIndex
 from gen_data.core.scene import Camera, Scene
-from gen_data.core.scene_time import place_sensors
-from gen_data.core.se3 import SE3, Array, Vec3, look_at
 from gen_data.core.streams import Rng
 from gen_data.randomizers.base import RandomizerBase, check_known
 from gen_data.randomizers.framing import (
@@ -133,7 +132,7 @@ class CameraPose(RandomizerBase):
             )
         return meant[:1] if self.rig else meant
 
-    def _is_free(self, camera: Camera, pose: SE3, scene: Scene, assets: AssetIndex) -> bool:
+    def _is_free(self, camera: Camera, pose: se3.SE3, scene: Scene, assets: AssetIndex) -> bool:
         """Whether a camera, and the others on its rig, are clear of bodies at a pose."""
         T_world_rig = pose @ camera.T_rig_camera.inverse()
         others = [c for c in scene.cameras if self.rig and c.rig == self.rig and c != camera]
@@ -158,7 +157,7 @@ class CameraPose(RandomizerBase):
                 target[1] + level_m * math.sin(azimuth),
                 target[2] + distance_m * math.sin(elevation),
             )
-            pose = look_at(eye, target, roll)
+            pose = se3.look_at(eye, target, roll)
             if self._is_free(camera, pose, scene, assets):
                 return replace(camera, T_world_camera=pose.rounded())
         remedy = "other distance_m, azimuth_deg or elevation_deg"
@@ -243,7 +242,7 @@ class CameraPose(RandomizerBase):
                 "expected a smaller share, a smaller clearance_m or a longer lens"
             )
 
-    def _sizes_m(self, scene: Scene, assets: AssetIndex) -> Iterator[Vec3]:
+    def _sizes_m(self, scene: Scene, assets: AssetIndex) -> Iterator[se3.Vec3]:
         """Sizes of objects that may be aimed at, along their axes [m]."""
         groups = {group.name: group.assets for group in scene.groups}
         for name in self.aim.outcomes():
@@ -260,10 +259,10 @@ def _with_rig(scene: Scene, name: str, aimed: Camera) -> Scene:
     """The scene with a rig, and all its sensors, where one of its cameras has its new pose."""
     pose = (aimed.T_world_camera @ aimed.T_rig_camera.inverse()).rounded(9)
     rigs = tuple(replace(r, T_body_rig=pose) if r.name == name else r for r in scene.rigs)
-    return place_sensors(replace(scene, rigs=rigs))
+    return scene_time.place_sensors(replace(scene, rigs=rigs))
 
 
-def _extent_m(points_m: Array) -> Vec3:
+def _extent_m(points_m: se3.Array) -> se3.Vec3:
     """Extents of points along the axes [m]."""
     x, y, z = (float(side) for side in np.ptp(points_m, axis=0))
     return (x, y, z)

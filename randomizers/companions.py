@@ -6,11 +6,10 @@ from typing import Annotated, Literal
 
 from gen_data.assets.asset_ids import AssetId, parse_asset_id
 from gen_data.config import distributions as dist
+from gen_data.core import se3, streams
 from gen_data.core.interfaces import AssetIndex
 from gen_data.core.members import Member, add_members, change_assets
 from gen_data.core.scene import Body, Scene
-from gen_data.core.se3 import SE3
-from gen_data.core.streams import Rng
 from gen_data.randomizers.asset_groups import CategoryWeights, GroupRandomizer, draw_asset
 from gen_data.randomizers.free_space import Footprint, Ground, make_ground, standing_bodies
 from gen_data.randomizers.pedestrian_poses import moving_poses, talking_poses, walking_poses
@@ -50,7 +49,7 @@ class Companions(GroupRandomizer):
     radius_m: Annotated[dist.Scalar, dist.Bounds(0.2, 5.0)] = dist.Uniform(0.4, 0.6)
     min_clearance_m: float = 0.02
 
-    def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
+    def __call__(self, scene: Scene, assets: AssetIndex, rng: streams.Rng) -> Scene:
         """Return the scene with companions added to the group."""
         group, weights = self.find_group(scene, assets)
         leaders = [body for body in scene.bodies if body.group == group.name]
@@ -77,7 +76,7 @@ class Companions(GroupRandomizer):
         weights: CategoryWeights,
         ground: Ground,
         assets: AssetIndex,
-        rng: Rng,
+        rng: streams.Rng,
     ) -> list[Member]:
         """Companions to the left and right by turns, in the leader's direction."""
         made = []
@@ -89,7 +88,7 @@ class Companions(GroupRandomizer):
             ahead_m = _SWAY_M * float(rng.normal())
             if not _fits(drawn, walking_poses(), assets) and not _has_poses(drawn):
                 continue  # a mesh that stands cannot walk
-            place = leader.T_world_body @ SE3((ahead_m, aside_m, 0.0))
+            place = leader.T_world_body @ se3.SE3((ahead_m, aside_m, 0.0))
             made += self._place(_walking(drawn, assets), place, ground, assets)
         return made
 
@@ -100,20 +99,20 @@ class Companions(GroupRandomizer):
         weights: CategoryWeights,
         ground: Ground,
         assets: AssetIndex,
-        rng: Rng,
+        rng: streams.Rng,
     ) -> list[Member]:
         """Companions on a circle ahead of the leader; all look to its middle."""
         radius_m = self.radius_m.draw(rng) / math.sin(math.pi / (others + 1))
-        middle = leader.T_world_body @ SE3((radius_m, 0.0, 0.0))
+        middle = leader.T_world_body @ se3.SE3((radius_m, 0.0, 0.0))
         made = []
         for k in range(others):
             asset = _talking(draw_asset(weights, rng), assets)
             turn = 2.0 * math.pi * (k + 1) / (others + 1) + 0.15 * float(rng.normal())
-            place = middle @ SE3.about_z(turn) @ SE3((-radius_m, 0.0, 0.0))
+            place = middle @ se3.SE3.about_z(turn) @ se3.SE3((-radius_m, 0.0, 0.0))
             made += self._place(asset, place, ground, assets)
         return made
 
-    def _place(self, asset: str, pose: SE3, ground: Ground, assets: AssetIndex) -> list[Member]:
+    def _place(self, asset: str, pose: se3.SE3, ground: Ground, assets: AssetIndex) -> list[Member]:
         """The member, if its place is free; it then occupies that place."""
         footprint = Footprint.of(pose, assets.bounds_m(asset))
         if not ground.is_free(footprint.expand(self.min_clearance_m)):

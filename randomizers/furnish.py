@@ -15,9 +15,8 @@ from gen_data.core.se3 import Vec3
 from gen_data.core.streams import Rng
 from gen_data.randomizers.base import RandomizerBase, choose, find_texture_files, find_textures
 from gen_data.randomizers.color_space import hsv_to_linear
-from gen_data.rooms import bodies, layout, outlook
+from gen_data.rooms import bodies, furnishing, layout, outlook
 from gen_data.rooms.floor_plan import Room, between, draw_plan
-from gen_data.rooms.furnishing import furnish
 from gen_data.rooms.options import families_of, find_options
 from gen_data.rooms.rules import APARTMENT, Range, find_room_type
 
@@ -217,7 +216,7 @@ def _try_to_furnish(
     rules = find_room_type(room.kind, "")
     for _ in range(TRIES_PER_ROOM):
         try:
-            return furnish(room, rules, options, assets, rng, clutter)
+            return furnishing.furnish(room, rules, options, assets, rng, clutter)
         except layout.Conflict as conflict:
             conflicts[f"{room.kind}: {conflict.piece}", conflict.reason] += 1
     return None

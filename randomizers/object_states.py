@@ -17,8 +17,7 @@ from gen_data.core.kinematics import link_poses, position_limits, positions_of
 from gen_data.core.scene import Body, Instance, Scene
 from gen_data.core.se3 import SE3, Vec3
 from gen_data.core.streams import Rng
-from gen_data.randomizers.base import RandomizerBase, add_attributes, body_materials
-from gen_data.randomizers.free_space import Footprint
+from gen_data.randomizers import base, free_space
 from gen_data.rooms.bodies import JOINTS, LEADS_OUT, Joint, keypoint_m, part_pose
 
 SCREEN = "screen"
@@ -28,7 +27,7 @@ _STEPS = (1.0, 0.6, 0.3)
 """Shares of the drawn opening that are tried where something is in the way."""
 
 
-class ObjectStates(RandomizerBase):
+class ObjectStates(base.RandomizerBase):
     """Opens doors, drawers and lids as far as nothing is in their way, and switches devices on.
 
     Labels carry ``open``, from 0 to 1, ``joint``: the turn [rad] or way [m] of the part, and
@@ -80,7 +79,7 @@ class ObjectStates(RandomizerBase):
                     streams.append(_stream(body, mouth_m, assets))
                 state = ("state", "on" if runs else "off")
                 attributes.setdefault(body.instance_id, []).append(state)
-            slots = body_materials(body, assets)
+            slots = base.body_materials(body, assets)
             if not any(m.role == SCREEN for m in slots):
                 continue
             is_on, luminance = self.is_on.draw(rng), self.luminance_cd_m2.draw(rng)
@@ -98,7 +97,7 @@ class ObjectStates(RandomizerBase):
             attributes.setdefault(body.instance_id, []).append(state)
         scene = scene.with_bodies(*changed)
         scene = replace(scene, bodies=(*scene.bodies, *streams))
-        return add_attributes(scene, attributes)
+        return base.add_attributes(scene, attributes)
 
     def _move(
         self, scene: Scene, assets: AssetIndex, thing: Instance, rng: Rng
@@ -213,8 +212,8 @@ def _open(
 
 def _is_free(scene: Scene, assets: AssetIndex, part: Body, piece: Body, pose: SE3) -> bool:
     """Whether a part there overlaps nothing but its own piece, the piece's wall, and the floor."""
-    frame = Footprint.of(piece.T_world_body, assets.bounds_m(piece.asset)).rectangle
-    own = Footprint.of(pose, assets.bounds_m(part.asset)).rectangle
+    frame = free_space.Footprint.of(piece.T_world_body, assets.bounds_m(piece.asset)).rectangle
+    own = free_space.Footprint.of(pose, assets.bounds_m(part.asset)).rectangle
     low, high = _heights_m(pose, assets.bounds_m(part.asset))
     x, y, _ = pose.translation_m
     for body in scene.bodies:
@@ -227,7 +226,7 @@ def _is_free(scene: Scene, assets: AssetIndex, part: Body, piece: Body, pose: SE
         other_low, other_high = _heights_m(body.T_world_body, bounds)
         if other_low > high - 0.002 or other_high < low + 0.025:
             continue
-        there = Footprint.of(body.T_world_body, bounds, body.scale).rectangle
+        there = free_space.Footprint.of(body.T_world_body, bounds, body.scale).rectangle
         if overlap_of(own, there) and not ("/wall_" in body.name and overlap_of(frame, there)):
             return False
     return True

@@ -16,8 +16,7 @@ from gen_data.core.members import Member, add_members
 from gen_data.core.scene import Scene, SupportSurface
 from gen_data.core.se3 import SE3, Array, Vec3
 from gen_data.core.streams import Rng
-from gen_data.randomizers.asset_groups import GroupRandomizer, draw_asset
-from gen_data.randomizers.base import check_known, choose
+from gen_data.randomizers import asset_groups, base
 
 _TRIES = 24
 _RESTING = ("relaxed", "flat", "point", "fist", "relaxed")
@@ -47,7 +46,7 @@ class _Reach:
     yaw_rad: float
 
 
-class ReachingHand(GroupRandomizer):
+class ReachingHand(asset_groups.GroupRandomizer):
     """Adds a hand that reaches over the edge of a surface; it holds an object or rests.
 
     Hand and held object do not move in physics; the object stands within the hand, which bends to
@@ -82,7 +81,7 @@ class ReachingHand(GroupRandomizer):
         if not weights or not self.probability.draw(rng):
             return scene
         surface = scene.surface(group.surfaces[0])
-        hand = draw_asset(weights, rng)
+        hand = asset_groups.draw_asset(weights, rng)
         thing = self._draw_thing(scene, assets, rng) if self.holding.draw(rng) else ""
         for _ in range(_TRIES):
             reach = self._draw_reach(surface, rng)
@@ -104,7 +103,7 @@ class ReachingHand(GroupRandomizer):
     def _draw_thing(self, scene: Scene, assets: AssetIndex, rng: Rng) -> str:
         """Draw the asset to hold: a category and then one of its assets; empty if there is none."""
         groups = {group.name: group for group in scene.groups}
-        check_known(
+        base.check_known(
             self.things, groups, f"randomizers.{self.name}.things: there is no object group"
         )
         by_category: dict[str, list[str]] = {}
@@ -114,7 +113,7 @@ class ReachingHand(GroupRandomizer):
                 by_category.setdefault(category, []).append(asset_id)
         if not by_category:
             return ""
-        return choose(tuple(by_category[choose(tuple(sorted(by_category)), rng)]), rng)
+        return base.choose(tuple(by_category[base.choose(tuple(sorted(by_category)), rng)]), rng)
 
     def _draw_reach(self, surface: SupportSurface, rng: Rng) -> _Reach:
         half_x, half_y = 0.5 * surface.size_m[0], 0.5 * surface.size_m[1]
@@ -242,7 +241,7 @@ def _rest(
     hand: str, surface: SupportSurface, reach: _Reach, assets: AssetIndex, rng: Rng
 ) -> list[Member]:
     """A hand that lies on the surface with its fingertips at the place."""
-    asset, pose = hand, choose(_RESTING, rng)
+    asset, pose = hand, base.choose(_RESTING, rng)
     if assets.keypoints(hand):
         parsed = parse_asset_id(hand)
         asset = str(AssetId(parsed.name, {**parsed.parameters, "pose": pose}))

@@ -14,8 +14,7 @@ from gen_data.core.photometry import remove_lights, scale_to_flux
 from gen_data.core.scene import Body, Environment, Light, Scene
 from gen_data.core.se3 import Vec3
 from gen_data.core.streams import Rng
-from gen_data.randomizers.base import RandomizerBase, add_attributes, scale_emission, set_emission
-from gen_data.randomizers.color_space import Temperature, temperature_to_linear
+from gen_data.randomizers import base, color_space
 from gen_data.rooms import interreflection, lit_rooms, window_niches
 from gen_data.rooms.bodies import OUTSIDE, keypoint_m
 
@@ -32,7 +31,7 @@ _NIGHT_CD_M2 = 0.2
 """Assumed mean outdoors by night in towns: a lit street has 1 cd/m^2 (EN 13201-2), a sky 0.01."""
 
 
-class RoomLighting(RandomizerBase):
+class RoomLighting(base.RandomizerBase):
     """Replaces the lights of a furnished room: lamps, daylight from windows, and the sun.
 
     Each window is a panel with the luminance of the view outside; light between surfaces
@@ -58,7 +57,7 @@ class RoomLighting(RandomizerBase):
     night: dist.Flag = dist.Probability(0.2)
     is_on: dist.Flag = dist.Probability(0.6)
     luminous_flux_lm: dist.Positive = dist.LogUniform(500.0, 2500.0)
-    temperature_k: Temperature = dist.Uniform(2700.0, 5000.0)
+    temperature_k: color_space.Temperature = dist.Uniform(2700.0, 5000.0)
     sun: dist.Flag = dist.Probability(0.4)
     sun_lux: dist.NonNegative = dist.LogUniform(8000.0, 60000.0)
     sun_altitude_deg: Annotated[dist.Scalar, dist.Bounds(0, 90)] = dist.Uniform(40.0, 62.0)
@@ -100,7 +99,7 @@ class RoomLighting(RandomizerBase):
     def _switch_lamps(
         self, scene: Scene, own: Sequence[Body], assets: AssetIndex, rng: Rng, *, must: bool
     ) -> tuple[list[Light], Scene]:
-        color = temperature_to_linear(self.temperature_k.draw(rng))
+        color = color_space.temperature_to_linear(self.temperature_k.draw(rng))
         found = [(b, at_m) for b in own if (at_m := keypoint_m(assets, b.asset, LAMP)) is not None]
         lights, changed = [], []
         attributes: dict[int, list[tuple[str, str]]] = {}
@@ -113,12 +112,12 @@ class RoomLighting(RandomizerBase):
                 is_on, flux_lm = must or switches.setdefault(_room_of(body), is_on), shared_lm
             lit = flux_lm if is_on else 0.0
             # A lamp that is off shows its shade alone.
-            glow = scale_emission(color, lit / (math.pi * _SHADE_M2))
-            changed.append(set_emission(body, assets, {LAMP: glow}))
+            glow = base.scale_emission(color, lit / (math.pi * _SHADE_M2))
+            changed.append(base.set_emission(body, assets, {LAMP: glow}))
             attributes[body.instance_id] = [("state", "on" if is_on else "off")]
             if is_on:
                 lights.append(_lamp_light(f"{self.name}/{number}", body, at_m, flux_lm, color))
-        return lights, add_attributes(scene.with_bodies(*changed), attributes)
+        return lights, base.add_attributes(scene.with_bodies(*changed), attributes)
 
     def _draw_sun(self, windows: Sequence[Body], rng: Rng, *, shines: bool) -> tuple[Light, ...]:
         """The sun, from a direction in which it shines through one of the windows."""

@@ -7,8 +7,7 @@ from typing import Annotated, Literal
 import numpy as np
 
 from gen_data.config import distributions as dist
-from gen_data.core import asset_types, interfaces
-from gen_data.core.colorimetry import luminance
+from gen_data.core import asset_types, colorimetry, interfaces
 from gen_data.core.photometry import flux_to_intensity_cd
 from gen_data.core.scene import Body, Light, Scene
 from gen_data.core.se3 import Vec3
@@ -88,7 +87,7 @@ def white_balanced_color(temperature_k: float) -> Vec3:
     lamp = color_space.temperature_to_linear(temperature_k)
     white = color_space.temperature_to_linear(_WHITE_K)
     rgb = [part / reference**0.5 for part, reference in zip(lamp, white, strict=True)]
-    relative = float(luminance(np.array(rgb)))
+    relative = float(colorimetry.luminance(np.array(rgb)))
     red, green, blue = (round(part / relative, 6) for part in rgb)
     return (red, green, blue)
 

@@ -3,17 +3,16 @@
 from dataclasses import replace
 from typing import Literal
 
-from gen_data.core.interfaces import AssetIndex
+from gen_data.core import interfaces, se3
 from gen_data.core.scene import Rig, Scene
-from gen_data.core.se3 import SE3, Vec3
 from gen_data.scene_templates.element import Element, add_background
 
 GIMBAL_BELOW_M = 0.09
 """From the optical centre of the camera up to the airframe's centre (assumed)."""
 
 
-T_BODY_AIRFRAME = SE3((0.0, 0.0, 0.03))
-T_BODY_GIMBAL = SE3((0.037, 0.0, 0.02))
+T_BODY_AIRFRAME = se3.SE3((0.0, 0.0, 0.03))
+T_BODY_GIMBAL = se3.SE3((0.037, 0.0, 0.02))
 """Rigs on their bodies: the centre of the trunk, and the optical centre, before the lens."""
 
 
@@ -31,16 +30,16 @@ class Drone(Element):
 
     type: Literal["drone"] = "drone"
     asset: str = "drone?seed=0"
-    at_m: Vec3 = (0.0, 0.0, 50.0)
+    at_m: se3.Vec3 = (0.0, 0.0, 50.0)
 
-    def add(self, scene: Scene, assets: AssetIndex) -> Scene:
+    def add(self, scene: Scene, assets: interfaces.AssetIndex) -> Scene:
         """Add airframe and gimbal with their rigs."""
         x, y, z = self.at_m
         rigs = {
-            self.name: (self.asset, SE3(self.at_m), T_BODY_AIRFRAME),
+            self.name: (self.asset, se3.SE3(self.at_m), T_BODY_AIRFRAME),
             f"{self.name}_gimbal": (
                 "gimbal?seed=0",
-                SE3((x, y, z - GIMBAL_BELOW_M)),
+                se3.SE3((x, y, z - GIMBAL_BELOW_M)),
                 T_BODY_GIMBAL,
             ),
         }

@@ -12,13 +12,12 @@ from gen_data.core.scene import Lane, Scene
 from gen_data.roads.cross_section import non_default_fields
 from gen_data.roads.junction_shape import ABSENT, JunctionShape
 from gen_data.roads.roundabout_shape import RoundaboutShape
-from gen_data.scene_templates.element import Element, level_pose, name_relations, parametric_id
-from gen_data.scene_templates.road import RoadSurface, add_street, find_port
+from gen_data.scene_templates import element, road
 
 Shape = JunctionShape | RoundaboutShape
 
 
-class Intersection(RoadSurface, Element):
+class Intersection(road.RoadSurface, element.Element):
     """A level intersection of three or four arms, at whose ends roads start.
 
     Attributes:
@@ -57,7 +56,7 @@ class Intersection(RoadSurface, Element):
     @property
     def relations(self) -> Mapping[str, str]:
         """The road that leads to it."""
-        return name_relations(after=self.after)
+        return element.name_relations(after=self.after)
 
     @abstractmethod
     def shape(self) -> Shape:
@@ -72,10 +71,10 @@ class Intersection(RoadSurface, Element):
         shape = self.shape()
         pose = self._find_pose(scene, shape)
         given: dict[str, Any] = {} if self.crossings == "zebra" else {"crossings": self.crossings}
-        asset = parametric_id(
+        asset = element.parametric_id(
             self.FAMILY, **non_default_fields(shape), **given, **self.surface_parameters()
         )
-        return add_street(scene, assets, self.name, asset, pose, self._lanes(pose))
+        return road.add_street(scene, assets, self.name, asset, pose, self._lanes(pose))
 
     def arms(self) -> tuple[float, float, float, float]:
         """Directions of four arms; ``ABSENT`` for a missing one.
@@ -101,11 +100,11 @@ class Intersection(RoadSurface, Element):
 
     def _find_pose(self, scene: Scene, shape: Shape) -> se3.SE3:
         if not self.after:
-            return level_pose(self.at_m, self.yaw_deg)
+            return element.level_pose(self.at_m, self.yaw_deg)
         if 180.0 not in self.arms_deg:
             raise errors.ConfigError(
                 f"elements.{self.name}.after: no arm points at the road; expected 180 in arms_deg"
             )
-        return find_port(scene, self.after, f"elements.{self.name}.after") @ se3.SE3(
+        return road.find_port(scene, self.after, f"elements.{self.name}.after") @ se3.SE3(
             (shape.reach_m(), 0.0, 0.0)
         )

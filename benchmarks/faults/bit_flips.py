@@ -4,19 +4,18 @@ import random
 import shutil
 from pathlib import Path
 
-from benchmarks.faults.recorded_run import record, reference_digest, tree_digest
-from benchmarks.faults.results import Result, Scale
+from benchmarks.faults import recorded_run, results
 from gen_data.core.errors import GenDataError
 from gen_data.runner.verify import find_deviations
 
 
-def bit_flips(scale: Scale, folder: Path) -> Result:
+def bit_flips(scale: results.Scale, folder: Path) -> results.Result:
     """Flip a random bit of a random file, verify with all digests, and repair."""
-    result = Result()
+    result = results.Result()
     rng = random.Random(scale.seed)
-    digest = reference_digest(folder)
+    digest = recorded_run.reference_digest(folder)
     out = folder / "out"
-    record().make(out)
+    recorded_run.record().make(out)
     files = sorted(p for p in out.rglob("*") if p.is_file() and "run" not in p.parts)
     files = [path for path in files if path.stat().st_size]
     for _ in result.until_end(scale, range(scale.pick(1_000, 20))):
@@ -38,10 +37,10 @@ def _judge(out: Path, path: str, bit: int, digest: str) -> tuple[bool, str]:
     found = find_deviations(out, full=True)
     named = any(finding.path in (path, "SHA256SUMS", "manifest.json") for finding in found)
     try:
-        record().make(out, repair=True)
+        recorded_run.record().make(out, repair=True)
     except GenDataError as error:
         return False, f"{path}, bit {bit}: {error}"
     problem = "" if named else "not found"
-    if tree_digest(out) != digest:
+    if recorded_run.tree_digest(out) != digest:
         problem += " not repaired"
     return not problem, f"{path}, bit {bit}: {problem}"

@@ -7,8 +7,7 @@ import sys
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from benchmarks.faults.recorded_run import CONFIG, tree_digest
-from benchmarks.faults.results import Result, Scale
+from benchmarks.faults import recorded_run, results
 
 ROOT = Path(__file__).parents[2]
 N = 4
@@ -98,15 +97,15 @@ QUICK = "Turkish locale"
 """The one that a quick campaign has: lower and upper case are other letters there."""
 
 
-def environments(scale: Scale, folder: Path) -> Result:
+def environments(scale: results.Scale, folder: Path) -> results.Result:
     """Generate the tiny data set in every environment; the first one is this process's own."""
-    result = Result()
+    result = results.Result()
     names = list(ENVIRONMENTS)
     if not scale.is_full:
         names = [QUICK]
     folder.chmod(0o777)
     own = _generate(Environment(), folder / "own")
-    digest = tree_digest(folder / "own/out")
+    digest = recorded_run.tree_digest(folder / "own/out")
     result.add(not own, f"own: {own}")
     for number, name in enumerate(result.until_end(scale, names)):
         environment = ENVIRONMENTS[name]
@@ -119,7 +118,7 @@ def environments(scale: Scale, folder: Path) -> Result:
         place = folder / str(number)
         problem = _generate(environment, place)
         outs = [path.parent for path in place.rglob("manifest.json")]
-        if not problem and [tree_digest(out) for out in outs] != [digest]:
+        if not problem and [recorded_run.tree_digest(out) for out in outs] != [digest]:
             problem = "other bytes"
         result.add(not problem, f"{name}: {problem}")
         shutil.rmtree(place, ignore_errors=True)
@@ -153,7 +152,7 @@ def _generate(environment: Environment, folder: Path) -> str:
         if value is not None:
             variables[name] = value.format(**places)
     out = environment.out.format(**places)
-    command = [sys.executable, "-m", "gen_data.cli", "--config", str(CONFIG)]
+    command = [sys.executable, "-m", "gen_data.cli", "--config", str(recorded_run.CONFIG)]
     options = ["--n", str(N), "--out", out, *environment.options]
     old = os.umask(environment.umask)
     try:

@@ -7,15 +7,7 @@ from collections import Counter
 from contextlib import suppress
 from pathlib import Path
 
-from benchmarks.faults.recorded_run import (
-    CONFIG,
-    N,
-    open_factory,
-    record,
-    reference_digest,
-    tree_digest,
-)
-from benchmarks.faults.results import Result, Scale
+from benchmarks.faults import recorded_run, results
 from tests.runner.simulation import Run
 
 ROOT = Path(__file__).parents[2]
@@ -23,10 +15,10 @@ LONG_N = 16
 """Samples of a data set of eight shards."""
 
 
-def simulated_runs(scale: Scale, folder: Path) -> Result:
+def simulated_runs(scale: results.Scale, folder: Path) -> results.Result:
     """The production supervisor with virtual processes, pipes and clock, by seed."""
     del folder
-    result = Result()
+    result = results.Result()
     ends: Counter[str] = Counter()
     for seed in range(scale.seed, scale.seed + scale.pick(10_000, 300)):
         try:
@@ -40,14 +32,14 @@ def simulated_runs(scale: Scale, folder: Path) -> Result:
     return result
 
 
-def orders(scale: Scale, folder: Path) -> Result:
+def orders(scale: results.Scale, folder: Path) -> results.Result:
     """One to eight workers, shards in reversed and random order, and a prefix."""
-    result = Result()
-    recording, digest = record(LONG_N), reference_digest(folder, LONG_N)
+    result = results.Result()
+    recording, digest = recorded_run.record(LONG_N), recorded_run.reference_digest(folder, LONG_N)
     for workers in (1, 2, 3, 8) if scale.is_full else (2,):
         out = folder / f"workers-{workers}"
         recording.make(out, workers=workers)
-        result.add(tree_digest(out) == digest, f"{workers} workers")
+        result.add(recorded_run.tree_digest(out) == digest, f"{workers} workers")
     rng = random.Random(scale.seed)
     shards = list(range(LONG_N // 2))
     shuffled = [rng.sample(shards, len(shards)) for _ in range(scale.pick(20, 1))]
@@ -55,28 +47,31 @@ def orders(scale: Scale, folder: Path) -> Result:
         out = folder / f"order-{number}"
         for shard in order:
             recording.make(out, shards=range(shard, shard + 1))
-        result.add(tree_digest(out) == digest, f"order {order}")
-    record(N).make(folder / "prefix")
-    for shard in range(N // 2):
+        result.add(recorded_run.tree_digest(out) == digest, f"order {order}")
+    recorded_run.record(recorded_run.N).make(folder / "prefix")
+    for shard in range(recorded_run.N // 2):
         one, other = (folder / name / f"shards/{shard:06d}" for name in ("prefix", "reference"))
-        result.add(tree_digest(one) == tree_digest(other), f"shard {shard} of a prefix")
+        result.add(
+            recorded_run.tree_digest(one) == recorded_run.tree_digest(other),
+            f"shard {shard} of a prefix",
+        )
     result.notes.append(
         "1, 2, 3 and 8 workers; reversed and random order; a prefix" if scale.is_full else ""
     )
     return result
 
 
-def samples_alone(scale: Scale, folder: Path) -> Result:
+def samples_alone(scale: results.Scale, folder: Path) -> results.Result:
     """Samples in random order, whose engines have seen other ones before, and alone."""
     from gen_data.api.generate import generate
     from gen_data.core.errors import NoLabels
     from gen_data.runner.deep_verify import find_irreproducible_samples
 
-    result = Result()
+    result = results.Result()
     n = scale.pick(200, 10)
     out = folder / "out"
     with suppress(NoLabels):  # Tiny images show little.
-        generate(CONFIG, n, out=out, workers=0)
+        generate(recorded_run.CONFIG, n, out=out, workers=0)
     indices = random.Random(scale.seed).sample(range(n), n)
     found = list(find_irreproducible_samples(out, indices, False, None))
     for index in indices:
@@ -89,15 +84,15 @@ def samples_alone(scale: Scale, folder: Path) -> Result:
         )
         result.add(done.returncode == 0, f"sample {index} alone: {done.stderr[-300:]}")
     result.notes.append(f"{n} in random order, {len(alone)} of them also in processes of their own")
-    with open_factory(1)() as pipeline:
+    with recorded_run.open_factory(1)() as pipeline:
         assert pipeline.sample(0).index == 0
     return result
 
 
-def ray(scale: Scale, folder: Path) -> Result:
+def ray(scale: results.Scale, folder: Path) -> results.Result:
     """The tests of the Ray backend, if this version has one."""
     del scale, folder
-    result = Result()
+    result = results.Result()
     tests = sorted(str(path) for path in (ROOT / "tests/runner").glob("test_ray*.py"))
     if not tests:
         result.skip("all", "this version has no tests/runner/test_ray*.py")

@@ -18,8 +18,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from benchmarks.gpu.parts import Result, run_part
-from benchmarks.gpu.report import format_report
+from benchmarks.gpu import parts, report
 from gen_data.core.system_calls import usable_cores
 
 PARTS = ("card", "modules", "correct", "kernels", "sweeps", "paths", "rates")
@@ -39,7 +38,7 @@ class Measured:
         self.seconds: dict[str, float] = {}
         self._path = path
 
-    def add(self, result: Result, *place: str) -> None:
+    def add(self, result: parts.Result, *place: str) -> None:
         """Add the result of a part, at a place in the figures."""
         print(f"{result.seconds:6.1f} s {result.name}: {result.failure or 'done'}", flush=True)
         self.seconds[result.name] = result.seconds
@@ -63,7 +62,7 @@ def measure(arguments: argparse.Namespace) -> Measured:
     limit_s = arguments.limit_s
 
     def one(name: str, function: str, *place: str, **values: Any) -> None:
-        done.add(run_part(name, function, limit_s, **values), *place)
+        done.add(parts.run_part(name, function, limit_s, **values), *place)
 
     chosen = set(arguments.parts)
     if "card" in chosen:
@@ -105,13 +104,13 @@ def measure(arguments: argparse.Namespace) -> Measured:
 
 def _side_by_side(
     function: str, names: Sequence[str], limit_s: float, where: Mapping[str, str]
-) -> Sequence[Result]:
+) -> Sequence[parts.Result]:
     """Call a function for several configurations; all of them share the limit of time."""
     deadline_s = time.perf_counter() + limit_s
 
-    def call(name: str) -> Result:
+    def call(name: str) -> parts.Result:
         left_s = max(deadline_s - time.perf_counter(), 1.0)
-        return run_part(name, function, left_s, name=name, **where)
+        return parts.run_part(name, function, left_s, name=name, **where)
 
     with ThreadPoolExecutor(max(1, usable_cores() - 2)) as pool:
         return list(pool.map(call, names))
@@ -158,7 +157,7 @@ def main(words: Sequence[str] | None = None) -> int:
         path, names = arguments.make_references, arguments.configs or ()
         return int(not make_references(path, names, arguments.limit_s))
     done = measure(arguments)
-    print(format_report(done.figures, done.failures))
+    print(report.format_report(done.figures, done.failures))
     wrong = any(c["findings"] for c in done.figures.get("correct", {}).values())
     return int(bool(done.failures) or wrong)
 

@@ -5,9 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gen_data.content.people.body import Array
-from gen_data.content.people.edges import Tufts
-from gen_data.content.people.head_layout import lay_out_hair
+from gen_data.content.people import body, edges, head_layout
 from gen_data.content.people.layer import Layer, Profile
 from gen_data.content.people.person import Outfit, Person
 from gen_data.core import asset_types, se3
@@ -77,7 +75,7 @@ def hair_layers(person: Person) -> tuple[Layer, ...]:
         made.append(
             Layer(
                 tuple((zone, hair) for zone in zones), ((0.0, 0.001),), 0.006, 11.0,
-                layout=lay_out_hair, tufts=_hanging_ends(end_m),
+                layout=head_layout.lay_out_hair, tufts=_hanging_ends(end_m),
             )
         )  # fmt: skip
     if headwear:
@@ -94,7 +92,7 @@ def _shell(haircut: str, hair: asset_types.Material) -> Layer:
     profile: Profile = ((0.66, 0.8 * low), (0.76, low), (0.83, cut.thick_m), (0.85, cut.thick_m))
     shell = Layer(
         (("scalp", hair),), profile, cut.folds_m, cut.waves_per_m, tapered=True,
-        layout=lay_out_hair, tufts=_hairline_locks(cut),
+        layout=head_layout.lay_out_hair, tufts=_hairline_locks(cut),
     )  # fmt: skip
     if cut.side_part:
         shell = replace(shell, relief=_parting)
@@ -103,35 +101,35 @@ def _shell(haircut: str, hair: asset_types.Material) -> Layer:
     return shell
 
 
-def _parting(template_m: Array) -> Array:
+def _parting(template_m: body.Array) -> body.Array:
     """Share of the thickness that a parting leaves at positions in the template frame."""
     x, y, z = template_m.T
     groove = np.exp(-(((y - 0.032) / 0.009) ** 2)) * ((z > 0.78) & (x > -0.02))
     return np.asarray(1.0 - 0.85 * groove + 0.25 * np.exp(-(((y - 0.005) / 0.03) ** 2)) * (z > 0.8))
 
 
-def _below_the_crown(template_m: Array) -> Array:
+def _below_the_crown(template_m: body.Array) -> body.Array:
     """Where a bald crown leaves hair."""
     return np.asarray(template_m[:, 2] < _HORSESHOE_Z_M + 0.25 * np.minimum(0.0, -template_m[:, 0]))
 
 
-def _hairline_locks(cut: _Cut) -> Tufts:
-    def length_m(p: Array) -> Array:
+def _hairline_locks(cut: _Cut) -> edges.Tufts:
+    def length_m(p: body.Array) -> body.Array:
         front = (p[:, 0] > 0.08) & (p[:, 2] > 0.755)
         behind = p[:, 0] < 0.01
         return np.where(front, cut.fringe_m, np.where(behind, cut.nape_m, cut.sides_m))
 
-    return Tufts(length_m, lift_m=0.002 + 0.1 * cut.thick_m)
+    return edges.Tufts(length_m, lift_m=0.002 + 0.1 * cut.thick_m)
 
 
-def _hanging_ends(end_m: float) -> Tufts:
+def _hanging_ends(end_m: float) -> edges.Tufts:
     """Uneven ends of long hair, and single locks before the ears."""
 
-    def length_m(p: Array) -> Array:
+    def length_m(p: body.Array) -> body.Array:
         ends = p[:, 2] < end_m
         return np.where(ends, 0.035, np.where(p[:, 2] < 0.74, 0.012, 0.0))
 
-    return Tufts(length_m, lift_m=0.001, spread=0.35, down=0.6)
+    return edges.Tufts(length_m, lift_m=0.001, spread=0.35, down=0.6)
 
 
 def _hood(outfit: Outfit) -> tuple[Layer, ...]:

@@ -8,23 +8,13 @@ import numpy as np
 
 from gen_data.assets import family, paths
 from gen_data.config.data_files import load_table
-from gen_data.content.people.analytic_body import simple_body
+from gen_data.content.people import analytic_body, posing
 from gen_data.content.people.body import FILE, LANDMARKS, Array, BodyTemplate, Indices, load
 from gen_data.content.people.carried_things import STRAPPED, Carrier, Sheet, make_things
 from gen_data.content.people.clothes import displace_layer, layers
 from gen_data.content.people.garment_layout import lay_out
 from gen_data.content.people.layer import Layer
 from gen_data.content.people.person import Person, draw_person
-from gen_data.content.people.posing import (
-    BEHAVIOURS,
-    Stance,
-    bone_rotations,
-    bone_transforms,
-    shorten_stride,
-    skin_points,
-    stance,
-    vertex_normals,
-)
 from gen_data.content.procedural.collision_hulls import extreme
 from gen_data.core.asset_types import ConvexParts, Float32, Keypoint, Material, MeshData
 from gen_data.core.variant_rng import VariantRng, variant_rng
@@ -111,11 +101,13 @@ def build_person(person: Person, figure: Figure) -> family.Solid:
     """The mesh of a person; the origin is on the ground between the feet, +X is ahead."""
     body, points, scale = figure.body, figure.points_m, figure.scale
     bones = len(body.bones)
-    rotations = bone_rotations(body, points[:bones], _stance(person))
-    transforms = bone_transforms(body, points[:bones], rotations)
+    rotations = posing.bone_rotations(body, points[:bones], _stance(person))
+    transforms = posing.bone_transforms(body, points[:bones], rotations)
     sheets = [_pose_piece(piece, body, transforms) for piece in figure.pieces]
     marks = slice(0, bones + len(LANDMARKS))
-    posed = skin_points(points[marks], body.weight_bones[marks], body.weights[marks], transforms)
+    posed = posing.skin_points(
+        points[marks], body.weight_bones[marks], body.weights[marks], transforms
+    )
     surface = _surface(figure, sheets) if person.outfit.bag in STRAPPED else _NO_SURFACE
     ground_m = min(float(sheet.vertices_m[:, 2].min()) for sheet in sheets)
     sheets += make_things(Carrier(person, body, posed, transforms, scale, ground_m, surface))
@@ -142,13 +134,13 @@ def _surface(figure: Figure, sheets: list[Sheet]) -> tuple[Array, Array, Array]:
     return np.concatenate(template), np.concatenate(posed), np.concatenate(normals)
 
 
-def _stance(person: Person) -> Stance:
-    made = stance(person.pose, person.step)
+def _stance(person: Person) -> posing.Stance:
+    made = posing.stance(person.pose, person.step)
     outfit = person.outfit
     narrow = outfit.skirt_zones > 1 and (outfit.bottom in ("skirt", "none") or outfit.top == "coat")
     return (
-        shorten_stride(made, _NARROW_STRIDE)
-        if narrow and BEHAVIOURS[person.pose] != "sitting"
+        posing.shorten_stride(made, _NARROW_STRIDE)
+        if narrow and posing.BEHAVIOURS[person.pose] != "sitting"
         else made
     )
 
@@ -156,8 +148,8 @@ def _stance(person: Person) -> Stance:
 def _pose_piece(piece: _Piece, body: BodyTemplate, transforms: Array) -> Sheet:
     bones = body.weight_bones.take(piece.used, axis=0)
     weights = body.weights.take(piece.used, axis=0)
-    moved = skin_points(piece.vertices_m, bones, weights, transforms)
-    normals = vertex_normals(moved, piece.faces)
+    moved = posing.skin_points(piece.vertices_m, bones, weights, transforms)
+    normals = posing.vertex_normals(moved, piece.faces)
     # Normals come from the whole surface: fields of the texture must not show in its shading.
     return Sheet(
         moved.take(piece.corners, axis=0),
@@ -232,7 +224,7 @@ def simple_person(seed: int, pose: str, phase: float) -> family.Solid:
 @lru_cache(maxsize=_FIGURES)
 def _figure(seed: int, path: str) -> Figure:
     """Figure of a seed; someone who walks takes many poses in the same figure."""
-    return dress_person(draw_person(seed), _body(path) if path else simple_body())
+    return dress_person(draw_person(seed), _body(path) if path else analytic_body.simple_body())
 
 
 @lru_cache(maxsize=2)

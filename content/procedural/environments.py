@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gen_data.content.procedural.material_presets import hex_to_linear
-from gen_data.core.asset_types import Float32
-from gen_data.core.colorimetry import luminance
+from gen_data.core import asset_types, colorimetry
 from gen_data.core.noise import fbm, smoothstep, uniform
 from gen_data.core.variant_rng import VariantRng, variant_rng
 from gen_data.sky.equirectangular import normalize_luminance, pixel_directions
@@ -20,7 +19,7 @@ from gen_data.sky.equirectangular import normalize_luminance, pixel_directions
 Array = NDArray[np.float64]
 
 
-def neutral(seed: int) -> Float32:
+def neutral(seed: int) -> asset_types.Float32:
     """Grey, a little brighter from above: a light tent."""
     rng = variant_rng("neutral", seed)
     d = pixel_directions(64)
@@ -28,7 +27,7 @@ def neutral(seed: int) -> Float32:
     return normalize_luminance(np.repeat(1.0 + slope * d[..., 2:], 3, axis=2))
 
 
-def studio(seed: int) -> Float32:
+def studio(seed: int) -> asset_types.Float32:
     """A dim grey room with two to five soft boxes."""
     rng = variant_rng("studio", seed)
     d = pixel_directions(128)
@@ -41,7 +40,7 @@ def studio(seed: int) -> Float32:
     return normalize_luminance(image)
 
 
-def indoor(seed: int) -> Float32:
+def indoor(seed: int) -> asset_types.Float32:
     """A room with a window, ceiling lamps and a wooden floor, seen from its middle."""
     rng = variant_rng("indoor", seed)
     d = pixel_directions(128)
@@ -65,7 +64,7 @@ def indoor(seed: int) -> Float32:
     return normalize_luminance(image)
 
 
-def overcast(seed: int) -> Float32:
+def overcast(seed: int) -> asset_types.Float32:
     """A cloud deck over plain ground: three times brighter at the zenith than at the horizon.
 
     Moon and Spencer's overcast sky, CIE S 011/E:2003 type 1 in its traditional form.
@@ -79,7 +78,7 @@ def overcast(seed: int) -> Float32:
     return normalize_luminance(_over_ground(sky[..., None] * tint, d, rng))
 
 
-def clear_sky(seed: int) -> Float32:
+def clear_sky(seed: int) -> asset_types.Float32:
     """A blue sky without the sun's disc; add the sun as a light."""
     rng = variant_rng("clear_sky", seed)
     d = pixel_directions(128)
@@ -96,7 +95,7 @@ def clear_sky(seed: int) -> Float32:
     return normalize_luminance(_over_ground(sky, d, rng))
 
 
-def sunset(seed: int) -> Float32:
+def sunset(seed: int) -> asset_types.Float32:
     """A low sun's glow, its disc left out."""
     rng = variant_rng("sunset", seed)
     d = pixel_directions(128)
@@ -116,7 +115,7 @@ def sunset(seed: int) -> Float32:
     return normalize_luminance(_over_ground(sky, d, rng))
 
 
-def night_city(seed: int) -> Float32:
+def night_city(seed: int) -> asset_types.Float32:
     """A dark sky over a skyline of lit windows and street lamps."""
     rng = variant_rng("night_city", seed)
     d = pixel_directions(128)
@@ -209,7 +208,7 @@ def _over_ground(sky: Array, d: Array, rng: VariantRng) -> Array:
     soil = np.array(hex_to_linear(rng.choose(("#8c8a84", "#7d7f73", "#94866f", "#8b9094"))))
     # What lights the ground is the sky and a sun that is not in it: whiter than the sky.
     mean = sky[: sky.shape[0] // 2].mean(axis=(0, 1))
-    upper = 0.35 * mean + 0.65 * float(luminance(mean))
+    upper = 0.35 * mean + 0.65 * float(colorimetry.luminance(mean))
     ground = soil * upper * (1.0 - 0.25 * smoothstep(0.0, -1.0, d[..., 2:]))
     mixed: Array = sky * above + ground * (1 - above)
     return mixed

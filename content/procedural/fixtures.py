@@ -12,8 +12,7 @@ from gen_data.content.procedural import surface_shapes as shapes
 from gen_data.content.procedural.furniture import COLORS, Box, check_size
 from gen_data.content.procedural.material_presets import metal_material, painted_material
 from gen_data.content.procedural.patches import Patch, make_solid_in_place
-from gen_data.core.asset_types import Material
-from gen_data.core.se3 import Vec3
+from gen_data.core import asset_types, se3
 
 _WALL_M = 0.008
 _BAR_M = 0.012
@@ -24,7 +23,7 @@ _SIDES = 24
 _STEEL = ((0.55, 0.56, 0.57), 0.35)
 
 
-def open_cabinet(size_m: Vec3 = (0.2, 0.24, 0.115), color: str = "white") -> Solid:
+def open_cabinet(size_m: se3.Vec3 = (0.2, 0.24, 0.115), color: str = "white") -> Solid:
     """A box of boards, open towards -X. Slot: body.
 
     Args:
@@ -43,7 +42,7 @@ def open_cabinet(size_m: Vec3 = (0.2, 0.24, 0.115), color: str = "white") -> Sol
     return _boards(boards, (_paint("open_cabinet", color),))
 
 
-def drawer(size_m: Vec3 = (0.18, 0.2, 0.1), color: str = "brown") -> Solid:
+def drawer(size_m: se3.Vec3 = (0.18, 0.2, 0.1), color: str = "brown") -> Solid:
     """A drawer whose front is at x = 0, with a bar before it. Slots: body, handle.
 
     Args:
@@ -67,7 +66,7 @@ def drawer(size_m: Vec3 = (0.18, 0.2, 0.1), color: str = "brown") -> Solid:
     return _boards(boards, materials, [bar, *posts])
 
 
-def door_panel(size_m: Vec3 = (0.012, 0.22, 0.2), color: str = "brown") -> Solid:
+def door_panel(size_m: se3.Vec3 = (0.012, 0.22, 0.2), color: str = "brown") -> Solid:
     """A door whose hinge is the Z axis; it covers Y up to its width. Slots: body, handle.
 
     Args:
@@ -83,7 +82,7 @@ def door_panel(size_m: Vec3 = (0.012, 0.22, 0.2), color: str = "brown") -> Solid
     return _boards([panel], (_paint("door_panel", color), metal_material(*_STEEL)), [bar, *posts])
 
 
-def knob(size_m: Vec3 = (0.07, 0.014, 0.035), color: str = "black") -> Solid:
+def knob(size_m: se3.Vec3 = (0.07, 0.014, 0.035), color: str = "black") -> Solid:
     """A bar handle on a round foot, turned about Z. Slots: foot, handle.
 
     Args:
@@ -155,7 +154,7 @@ def hook_stand(height_m: float = 0.14, reach_m: float = 0.09, color: str = "grey
     return _boards([foot], (_paint("hook_stand", color), metal_material(*_STEEL)), bars)
 
 
-def plug(size_m: Vec3 = (0.04, 0.026, 0.045), color: str = "white") -> Solid:
+def plug(size_m: se3.Vec3 = (0.04, 0.026, 0.045), color: str = "white") -> Solid:
     """A plug that stands on its two pins. Slots: body, pins.
 
     Args:
@@ -167,7 +166,7 @@ def plug(size_m: Vec3 = (0.04, 0.026, 0.045), color: str = "white") -> Solid:
     return _boards([body], (_paint("plug", color), metal_material(*_STEEL)), _pins(0.0))
 
 
-def outlet(size_m: Vec3 = (0.1, 0.08, 0.03), color: str = "grey") -> Solid:
+def outlet(size_m: se3.Vec3 = (0.1, 0.08, 0.03), color: str = "grey") -> Solid:
     """A box with two slots from above for the pins of a plug, with 1.5 mm of play. Slot: body.
 
     Args:
@@ -198,7 +197,7 @@ def _pins(play_m: float) -> list[Box]:
 
 
 def _boards(
-    boards: Sequence[Box], materials: tuple[Material, ...], handles: Sequence[Box] = ()
+    boards: Sequence[Box], materials: tuple[asset_types.Material, ...], handles: Sequence[Box] = ()
 ) -> Solid:
     """Boards in slot 0 and handles in slot 1."""
     patches: list[Patch] = [shapes.block(low, high, 0.001) for low, high in boards]
@@ -206,6 +205,6 @@ def _boards(
     return make_solid_in_place(patches, materials, [hulls.box(*b) for b in (*boards, *handles)])
 
 
-def _paint(name: str, color: str) -> Material:
+def _paint(name: str, color: str) -> asset_types.Material:
     check_option(name, "color", color, tuple(COLORS))
     return painted_material(COLORS[color], 0.5)

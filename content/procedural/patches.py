@@ -14,8 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.assets.family import Solid
-from gen_data.assets.triangle_soup import face_crosses, first_occurrences
+from gen_data.assets import family, triangle_soup
 from gen_data.core.asset_types import ConvexParts, Material, MeshData
 from gen_data.core.se3 import Vec3
 
@@ -100,7 +99,7 @@ def make_centred_solid(
     materials: Sequence[Material],
     hulls_m: Iterable[Array],
     crease_deg: float = CREASE_DEG,
-) -> Solid:
+) -> family.Solid:
     """A solid whose origin is the centre of its bounding box."""
     patch = join_patches(patches)
     low, high = patch.bounds_m()
@@ -116,11 +115,11 @@ def make_solid_in_place(
     materials: Sequence[Material],
     hulls_m: Iterable[Array],
     crease_deg: float = CREASE_DEG,
-) -> Solid:
+) -> family.Solid:
     """A solid that keeps its frame (furniture: the centre of the footprint on the floor)."""
     mesh = finish_mesh(join_patches(patches), materials, crease_deg)
     parts = tuple(np.round(round_values(hull), 6) + 0.0 for hull in hulls_m)
-    return Solid(mesh, ConvexParts(parts))
+    return family.Solid(mesh, ConvexParts(parts))
 
 
 def grid_bounds_m(patches: Sequence[Patch]) -> tuple[Vec3, Vec3]:
@@ -136,11 +135,11 @@ def finish_mesh(patch: Patch, materials: Sequence[Material], crease_deg: float) 
     cells = np.round(round_values(patch.corners_m) / GRID_M).astype(np.int64)
     corners, keep = _whole_triangles(cells)
     cells, uvs, slots = cells[keep], round_values(patch.uvs[keep]), patch.slots[keep]
-    places, _ = first_occurrences(cells.reshape(-1, 3))
+    places, _ = triangle_soup.first_occurrences(cells.reshape(-1, 3))
     normals = round_values(_corner_normals(places, corners, crease_deg))
     shading = [np.round(normals * 2048), np.round(uvs.reshape(-1, 2) * 65536)]
     key = np.concatenate([places[:, None], *(s.astype(np.int64) for s in shading)], axis=1)
-    inverse, first = first_occurrences(key)
+    inverse, first = triangle_soup.first_occurrences(key)
     return MeshData(
         vertices_m=(cells.reshape(-1, 3)[first] * GRID_M).astype(np.float32),
         faces=inverse.reshape(-1, 3).astype(np.int32),
@@ -165,7 +164,7 @@ def round_values(values: Array) -> Array:
 def _whole_triangles(cells: Indices) -> tuple[Array, NDArray[np.bool_]]:
     """Corners of the triangles that have an area [grid cells], and which those are."""
     corners = cells.astype(np.float64)
-    cross = face_crosses(corners)
+    cross = triangle_soup.face_crosses(corners)
     longest = np.max([((corners[:, i] - corners[:, i - 1]) ** 2).sum(axis=1) for i in range(3)], 0)
     # Height below half a cell: a triangle that rounding has flattened to a line.
     keep = np.sqrt((cross**2).sum(axis=1)) > 0.5 * np.sqrt(longest) + 1e-9
@@ -179,7 +178,7 @@ def _corner_normals(vertex: Indices, corners: Array, crease_deg: float) -> Array
     normals from polygonal facets", J. Graphics Tools 3(1), 1998) and by its area, so that a flat
     face stays flat next to a small bevel.
     """
-    cross = face_crosses(corners)
+    cross = triangle_soup.face_crosses(corners)
     x, y, z = unit(cross).T
     weighted = np.repeat(cross.T, 3, axis=1) * _corner_angles(corners).reshape(-1)
     order = np.argsort(vertex, kind="stable")

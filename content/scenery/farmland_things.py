@@ -11,16 +11,8 @@ import numpy as np
 
 from gen_data.assets.family import Facts, Solid
 from gen_data.content.procedural import collision_hulls as hulls
+from gen_data.content.procedural import patches, surface_shapes
 from gen_data.content.procedural.material_presets import painted_material, patterned_material
-from gen_data.content.procedural.patches import Array, Patch
-from gen_data.content.procedural.surface_shapes import (
-    block,
-    circle,
-    cone,
-    lathe,
-    rounded_box,
-    sweep,
-)
 from gen_data.content.scenery import basic_shapes, clutter_shapes, street_furniture
 from gen_data.core import errors, se3
 from gen_data.core.variant_rng import variant_rng
@@ -53,11 +45,11 @@ def straw_bale(seed: int) -> Solid:
         edge = 0.12 if kind == "wrapped" else 0.04
         profile = [(0.0, -half), (radius - edge, -half), (radius, edge - half),
                    (radius, half - edge), (radius - edge, half), (0.0, half)]  # fmt: skip
-        barrel = lathe(profile, 20).rotated("x", 0.5 * math.pi).moved(z=radius)
+        barrel = surface_shapes.lathe(profile, 20).rotated("x", 0.5 * math.pi).moved(z=radius)
         # It sinks in a little where it lies.
         corners = barrel.corners_m.copy()
         corners[..., 2] = np.maximum(corners[..., 2], 0.02)
-        parts = [Patch(corners, barrel.uvs, barrel.slots).moved(z=-0.02)]
+        parts = [patches.Patch(corners, barrel.uvs, barrel.slots).moved(z=-0.02)]
         hull = [hulls.box((-radius, -half, 0.0), (radius, half, 2.0 * radius - 0.02))]
     else:
         rows = (3, 2) if kind == "stack" else (1,)
@@ -65,11 +57,13 @@ def straw_bale(seed: int) -> Solid:
         for level, count in enumerate(rows):
             for k in range(count):
                 y, z = (k - 0.5 * (count - 1)) * 1.22 + rng.between(-0.04, 0.04), 0.9 * level
-                body = rounded_box((2.3, 1.18, 0.9), 0.05, 1).rotated("z", rng.between(-0.02, 0.02))
+                body = surface_shapes.rounded_box((2.3, 1.18, 0.9), 0.05, 1).rotated(
+                    "z", rng.between(-0.02, 0.02)
+                )
                 parts.append(body.moved(rng.between(-0.06, 0.06), y, z + 0.45))
                 hull.append(hulls.box((-1.15, y - 0.59, z), (1.15, y + 0.59, z + 0.9)))
                 parts += [
-                    block(
+                    surface_shapes.block(
                         (x - 0.01, y - 0.595, z + 0.005), (x + 0.01, y + 0.595, z + 0.905), 0.0, 1
                     )
                     for x in np.linspace(-0.9, 0.9, 5).tolist()
@@ -108,7 +102,9 @@ def power_pylon(seed: int, span_m: float) -> Solid:
     parts = list(_mast(widths))
     for x in (-foot, foot):
         for y in (-foot, foot):
-            parts.append(block((x - 0.4, y - 0.4, 0.0), (x + 0.4, y + 0.4, 0.35), 0.0, 1))
+            parts.append(
+                surface_shapes.block((x - 0.4, y - 0.4, 0.0), (x + 0.4, y + 0.4, 0.35), 0.0, 1)
+            )
     grips: list[se3.Vec3] = []
     for share, reach in _ARMS[kind]:
         z, half = share * high, float(np.interp(share * high, widths[:, 0], widths[:, 1]))
@@ -140,7 +136,7 @@ def power_pylon_facts(seed: int, span_m: float) -> Facts:
     return Facts("power_pylon", {"kind": variant_rng("power_pylon", seed).turn(PYLONS, "kind")})
 
 
-def _widths(high_m: float, foot_m: float) -> Array:
+def _widths(high_m: float, foot_m: float) -> patches.Array:
     """Heights and half widths of the panels, rows (z, half), from the ground to the peak."""
     waist = 0.6 * high_m
     lower = np.linspace(0.3, waist, 6)
@@ -149,7 +145,7 @@ def _widths(high_m: float, foot_m: float) -> Array:
     return np.column_stack([np.concatenate([lower, upper]), half])
 
 
-def _mast(widths: Array) -> Iterator[Patch]:
+def _mast(widths: patches.Array) -> Iterator[patches.Patch]:
     """Four legs of angle steel with crossed bars on every side, and a peak."""
     for (z0, h0), (z1, h1) in pairwise(widths.tolist()):
         corners = ((1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0))
@@ -160,15 +156,15 @@ def _mast(widths: Array) -> Iterator[Patch]:
             yield clutter_shapes.wire((c * h0, d * h0, z0), (a * h1, b * h1, z1), 0.045)
             yield clutter_shapes.wire((a * h1, b * h1, z1), (c * h1, d * h1, z1), 0.045)
     z, half = widths[-1].tolist()
-    yield cone((1.2 * half, z), (0.04, z + 1.5), 4)
+    yield surface_shapes.cone((1.2 * half, z), (0.04, z + 1.5), 4)
 
 
-def _half_spans(grips: list[se3.Vec3], span_m: float) -> Iterator[Patch]:
+def _half_spans(grips: list[se3.Vec3], span_m: float) -> Iterator[patches.Patch]:
     """Conductors along X from the pylon to the middle of the span on both sides, as parabolas."""
     t = np.linspace(0.0, 1.0, 7)
     for _, y, z in grips:
         for side in (-1.0, 1.0):
             fall = _SAG * span_m * (1.0 - (1.0 - t) ** 2)
             path = np.column_stack([side * 0.5 * span_m * t, np.full(7, y), z - fall])
-            section = circle(_BUNDLE_M, 3)
-            yield sweep(path, section, up=(0.0, 1.0, 0.0), capped=False, slot=3)
+            section = surface_shapes.circle(_BUNDLE_M, 3)
+            yield surface_shapes.sweep(path, section, up=(0.0, 1.0, 0.0), capped=False, slot=3)

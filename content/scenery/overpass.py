@@ -9,8 +9,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from gen_data.assets.family import Facts, Solid, check_option
-from gen_data.content.procedural.material_presets import draw_linear
-from gen_data.content.procedural.patches import Array, Patch
+from gen_data.content.procedural import material_presets, patches
 from gen_data.content.procedural.surface_shapes import block, cone, grid, sweep
 from gen_data.content.scenery.basic_shapes import make_solid
 from gen_data.core.asset_types import Material
@@ -65,7 +64,7 @@ def overpass(
     return make_solid(parts, _materials(seed), [hull])
 
 
-def _slab(half_m: float, side_m: float, low_m: float, top_m: float) -> Patch:
+def _slab(half_m: float, side_m: float, low_m: float, top_m: float) -> patches.Patch:
     """A slab with cantilevered edges, drawn along Y."""
     z, edge = top_m - low_m, 0.28
     section = np.array([(z, side_m), (z - edge, side_m), (z - edge - 0.12, 0.62 * side_m),
@@ -76,7 +75,7 @@ def _slab(half_m: float, side_m: float, low_m: float, top_m: float) -> Patch:
     return sweep(path, section, up=(0.0, 0.0, 1.0), capped=False, slot=_CONCRETE)
 
 
-def _railing(x_m: float, half_m: float, top_m: float) -> Iterator[Patch]:
+def _railing(x_m: float, half_m: float, top_m: float) -> Iterator[patches.Patch]:
     """A kerb with a railing of posts and three rails."""
     yield block(
         (x_m - 0.15, -half_m, top_m - 0.05), (x_m + 0.15, half_m, top_m + 0.2), 0, _CONCRETE
@@ -134,19 +133,19 @@ def embankment(seed: int, length_m: float, width_m: float, height_m: float) -> S
     return make_solid(parts, _materials(seed), [hull])
 
 
-def _plane(corners: list[tuple[float, float]], z_m: float, slot: int) -> Patch:
+def _plane(corners: list[tuple[float, float]], z_m: float, slot: int) -> patches.Patch:
     points = np.array([[(*corners[0], z_m), (*corners[1], z_m)],
                        [(*corners[2], z_m), (*corners[3], z_m)]])  # fmt: skip
     return _textured(points, slot)
 
 
-def _facet(corners: list[tuple[float, ...]], slot: int) -> Patch:
+def _facet(corners: list[tuple[float, ...]], slot: int) -> patches.Patch:
     """A quad of a lower and an upper edge, seen from outside."""
     a, b, c, d = corners
     return _textured(np.array([[b, a], [d, c]]), slot)
 
 
-def _textured(points: Array, slot: int) -> Patch:
+def _textured(points: patches.Array, slot: int) -> patches.Patch:
     """A quad whose texture repeats every few metres along its own edges."""
     wide = np.sqrt(((points[0, 1] - points[0, 0]) ** 2).sum())
     high = np.sqrt(((points[1, 0] - points[0, 0]) ** 2).sum())
@@ -161,7 +160,7 @@ def _materials(seed: int) -> tuple[Material, ...]:
         (tone, tone, 0.97 * tone), roughness=0.9, texture="texture/concrete?seed=2", role="facade"
     )
     colors = ("#4e6b5a", "#5d6a73", "#6d4b3c", "#3f5a73", "#8d9091")
-    steel = Material(draw_linear(colors, 0.05, rng), roughness=0.5)
+    steel = Material(material_presets.draw_linear(colors, 0.05, rng), roughness=0.5)
     asphalt = Material(roughness=0.92, texture="texture/asphalt?seed=1", texture_scale_m=6.0)
     grass = Material(roughness=0.95, texture=f"texture/grass?seed={seed % 4}", role="grass")
     return (concrete, steel, asphalt, grass)

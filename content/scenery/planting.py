@@ -14,16 +14,7 @@ from gen_data.content.procedural import collision_hulls as hulls
 from gen_data.content.procedural.material_presets import hex_to_linear, patterned_material
 from gen_data.content.procedural.patches import Array, Indices, Patch, finish_mesh, join_patches
 from gen_data.content.procedural.surface_shapes import ball, block
-from gen_data.content.scenery.foliage import directions, merge_meshes
-from gen_data.content.scenery.leaf_cards import (
-    Cards,
-    card_mesh,
-    cards_about,
-    crown_shades,
-    drop_unused_slots,
-    join_cards,
-    leaf_material,
-)
+from gen_data.content.scenery import foliage, leaf_cards
 from gen_data.core.asset_types import ConvexParts, Material, MeshData
 from gen_data.core.noise import uniform
 from gen_data.core.variant_rng import VariantRng, in_turn, variant_rng
@@ -60,7 +51,7 @@ def hedge(seed: int) -> Solid:
     count = min(1400, round(4.5 * area / size**2))
     at, outward = _box_skin((wide, long, high), count, rng)
     sizes = size * (0.75 + 0.5 * uniform(count, rng))
-    cards = cards_about(at - 0.25 * sizes[:, None] * outward, outward, sizes,
+    cards = leaf_cards.cards_about(at - 0.25 * sizes[:, None] * outward, outward, sizes,
                         _shades(count, rng), 0.3, rng)  # fmt: skip
     return _planted([core.painted(0)], cards, in_turn(_GREENS, int(rng.between(0, 5.99))), rng)
 
@@ -104,16 +95,16 @@ def grass_tuft(seed: int) -> Solid:
     across /= np.sqrt((across**2).sum(axis=1, keepdims=True))
     length = high * (0.6 + 0.5 * uniform(count, rng))
     up = np.tile([0.0, 0.0, 1.0], (count, 1))
-    cards = Cards(foot, along, across, up, length, 0.9 * np.maximum(length, 0.2),
+    cards = leaf_cards.Cards(foot, along, across, up, length, 0.9 * np.maximum(length, 0.2),
                   _shades(count, rng))  # fmt: skip
     level = rng.between(1.0, 1.4)
     colors = rng.shuffled(_STRAW)[:3]
-    shades = [leaf_material("blades", code, level) for code in colors]
+    shades = [leaf_cards.leaf_material("blades", code, level) for code in colors]
     if seed % 4 == 1:
         # Dandelions and the like.
-        shades[2] = leaf_material("blossom", rng.choose(_PETALS[2:5]), 1.0)
+        shades[2] = leaf_cards.leaf_material("blossom", rng.choose(_PETALS[2:5]), 1.0)
     # Upright cards are seen from both sides: their normals are mostly their own.
-    mesh = drop_unused_slots(card_mesh(cards, shades, 0.25, rng))
+    mesh = leaf_cards.drop_unused_slots(leaf_cards.card_mesh(cards, shades, 0.25, rng))
     hull = hulls.box((-0.5 * wide, -0.5 * long, 0.0), (0.5 * wide, 0.5 * long, 0.5 * high))
     return Solid(mesh, ConvexParts((np.round(hull, 6),)))
 
@@ -140,9 +131,9 @@ def flower_bed(seed: int) -> Solid:
     bloom = uniform(count, rng) < 0.45
     slots = np.where(bloom, np.where(drift > 0.0, 3, 4), (uniform(count, rng) * 3).astype(np.int64))
     at[:, 2] += 0.1 * bloom
-    outward = directions(count, rng) * 0.5 + np.array([0.0, 0.0, 0.9])
-    cards = cards_about(at, outward, size, slots, 0.5, rng)
-    petals = [leaf_material("blossom", code, 1.0) for code in rng.shuffled(_PETALS)[:2]]
+    outward = foliage.directions(count, rng) * 0.5 + np.array([0.0, 0.0, 0.9])
+    cards = leaf_cards.cards_about(at, outward, size, slots, 0.5, rng)
+    petals = [leaf_cards.leaf_material("blossom", code, 1.0) for code in rng.shuffled(_PETALS)[:2]]
     stone = rng.choose((
         patterned_material("texture/concrete?seed=3", 1.5, 0.9),
         patterned_material("texture/brick?seed=4", 1.1, 0.92, (0.9, 0.88, 0.86)),
@@ -151,8 +142,8 @@ def flower_bed(seed: int) -> Solid:
     kind, *codes = _GREENS[int(rng.between(0, 1.99))]
     earth = Material(hex_to_linear("#4a3d32"), 0.95, specular=0.2)
     mesh = finish_mesh(join_patches([soil, *edging]), (earth, earth, stone), 40.0)
-    leafy = card_mesh(cards, (*_leaves(kind, codes, rng), *petals), _SOFTNESS, rng)
-    return _boxed(merge_meshes(mesh, leafy))
+    leafy = leaf_cards.card_mesh(cards, (*_leaves(kind, codes, rng), *petals), _SOFTNESS, rng)
+    return _boxed(foliage.merge_meshes(mesh, leafy))
 
 
 def ivy_wall(seed: int) -> Solid:
@@ -169,12 +160,14 @@ def ivy_wall(seed: int) -> Solid:
     # Thick below and near the middle, a single layer of leaves at its edges.
     bulge = 0.03 + 0.16 * (1.0 - z / top) * uniform(count, rng)
     at = np.stack([bulge, y, np.maximum(z, 0.2)], axis=1)
-    outward = np.array([1.0, 0.0, 0.25]) + 0.25 * directions(count, rng)
+    outward = np.array([1.0, 0.0, 0.25]) + 0.25 * foliage.directions(count, rng)
     size = 0.5 + 0.25 * uniform(count, rng)
-    cards = cards_about(at, outward, size, _shades(count, rng), 0.6, rng)
+    cards = leaf_cards.cards_about(at, outward, size, _shades(count, rng), 0.6, rng)
     flat = replace(cards, along=_towards_wall(cards.along), across=_towards_wall(cards.across))
     codes = rng.choose((("#3f5a30", "#4c693a", "#5d7a46"), ("#7a3a30", "#92473a", "#a55a44")))
-    mesh = drop_unused_slots(card_mesh(flat, _leaves("ivy", codes, rng), 0.5, rng))
+    mesh = leaf_cards.drop_unused_slots(
+        leaf_cards.card_mesh(flat, _leaves("ivy", codes, rng), 0.5, rng)
+    )
     x = np.clip(mesh.vertices_m[:, 0], -0.02, 0.4).astype(np.float32)
     mesh = replace(mesh, vertices_m=np.column_stack([x, mesh.vertices_m[:, 1:]]))
     return _boxed(mesh)
@@ -213,16 +206,16 @@ def _lobed(
     parts = []
     for x, y, z, r in lobes:
         count = min(150, round(2.2 * 4.0 * math.pi * r * r / (0.5 * size * size)))
-        outward = directions(count, rng)
+        outward = foliage.directions(count, rng)
         at = np.array([x, y, z]) + r * (0.72 + 0.28 * uniform((count, 1), rng)) * outward
         at[:, 2] = np.maximum(at[:, 2], 0.25 * size)
         sizes = size * (0.75 + 0.5 * uniform(count, rng))
         slots = _shades(count, rng)
         if flowers:
             slots = np.where(uniform(count, rng) < 0.3, 3, slots)
-        parts.append(cards_about(at, outward, sizes, slots, 0.35, rng))
+        parts.append(leaf_cards.cards_about(at, outward, sizes, slots, 0.35, rng))
     low = [replace(core, corners_m=np.maximum(core.corners_m, [-9.0, -9.0, 0.0])) for core in cores]
-    return _planted(low, join_cards(parts), _GREENS[green], rng, flowers)
+    return _planted(low, leaf_cards.join_cards(parts), _GREENS[green], rng, flowers)
 
 
 def _inner(lobes: Sequence[_Ball]) -> list[_Ball]:
@@ -231,7 +224,11 @@ def _inner(lobes: Sequence[_Ball]) -> list[_Ball]:
 
 
 def _planted(
-    cores: Sequence[Patch], cards: Cards, green: Sequence[str], rng: VariantRng, flowers: str = ""
+    cores: Sequence[Patch],
+    cards: leaf_cards.Cards,
+    green: Sequence[str],
+    rng: VariantRng,
+    flowers: str = "",
 ) -> Solid:
     """Leaves over opaque cores of the same green; flowers take slot 3."""
     kind, *codes = green
@@ -239,13 +236,13 @@ def _planted(
     core = finish_mesh(join_patches(cores), (replace(dark, specular=0.2, role="leaf"),), 60.0)
     shades = _leaves(kind, codes, rng)
     if flowers:
-        shades = (*shades, leaf_material("blossom", flowers, 1.0))
-    return _boxed(merge_meshes(core, card_mesh(cards, shades, _SOFTNESS, rng)))
+        shades = (*shades, leaf_cards.leaf_material("blossom", flowers, 1.0))
+    return _boxed(foliage.merge_meshes(core, leaf_cards.card_mesh(cards, shades, _SOFTNESS, rng)))
 
 
 def _leaves(kind: str, codes: Sequence[str], rng: VariantRng) -> tuple[Material, ...]:
     level, warm = rng.between(0.95, 1.3), rng.between(0.9, 1.12)
-    return crown_shades(kind, codes, level, warm)
+    return leaf_cards.crown_shades(kind, codes, level, warm)
 
 
 def _shades(count: int, rng: VariantRng) -> Indices:
@@ -256,7 +253,7 @@ def _boxed(mesh: MeshData) -> Solid:
     """The mesh without unused slots, and a box around its lower nine tenths."""
     (x0, y0, z0), (x1, y1, z1) = mesh.bounds_m()
     hull = hulls.box((0.85 * x0, y0, z0), (0.85 * x1, y1, 0.9 * z1))
-    return Solid(drop_unused_slots(mesh), ConvexParts((np.round(hull, 6),)))
+    return Solid(leaf_cards.drop_unused_slots(mesh), ConvexParts((np.round(hull, 6),)))
 
 
 def _box_skin(size: tuple[float, float, float], count: int, rng: VariantRng) -> tuple[Array, Array]:

@@ -6,8 +6,7 @@ Frame: along X, origin on the ground below its middle.
 import numpy as np
 
 from gen_data.assets.family import Solid
-from gen_data.content.procedural.patches import Patch
-from gen_data.content.procedural.surface_shapes import block, grid
+from gen_data.content.procedural import patches, surface_shapes
 from gen_data.content.scenery.basic_shapes import make_solid
 from gen_data.core.asset_types import Material
 from gen_data.core.variant_rng import variant_rng
@@ -35,13 +34,13 @@ def railway_track(seed: int, length_m: float) -> Solid:
     y = np.array([-_FOOT_M, -_BED_M, _BED_M, _FOOT_M])
     z = np.array([0.0, _BED_TOP_M, _BED_TOP_M, 0.0])
     points = np.stack([np.column_stack([np.full(4, x), y, z]) for x in (-half, half)], axis=1)
-    parts = [grid(points, np.array([0.0, length_m / 3.0]), y / 3.0)]
+    parts = [surface_shapes.grid(points, np.array([0.0, length_m / 3.0]), y / 3.0)]
     for at in np.arange(-half + 0.3, half, _PITCH_M):
         parts.append(_sleeper(float(at)))
     for way in (-1.0, 1.0):
         near = way * 0.5 * GAUGE_M
         a, b = sorted((near, near + way * HEAD_M))
-        parts.append(block((-half, a, TOP_M - 0.17), (half, b, TOP_M), 0.0, 2))
+        parts.append(surface_shapes.block((-half, a, TOP_M - 0.17), (half, b, TOP_M), 0.0, 2))
     rng = variant_rng("railway_track", seed)
     tone, rust = rng.between(0.5, 0.75), rng.between(0.8, 1.2, "rust")
     materials = (
@@ -54,10 +53,10 @@ def railway_track(seed: int, length_m: float) -> Solid:
     return make_solid(parts, materials, [slab])
 
 
-def _sleeper(at_m: float) -> Patch:
+def _sleeper(at_m: float) -> patches.Patch:
     """The visible part of a sleeper: its top and its long sides."""
     a, b = at_m - 0.5 * _SLEEPER_M[0], at_m + 0.5 * _SLEEPER_M[0]
     half, low, top = 0.5 * _SLEEPER_M[1], _BED_TOP_M - 0.02, _BED_TOP_M + 0.04
     x, z = np.array([a, a, b, b]), np.array([low, top, top, low])
     rows = [np.column_stack([x, np.full(4, y), z]) for y in (-half, half)]
-    return grid(np.stack(rows), slot=1)
+    return surface_shapes.grid(np.stack(rows), slot=1)

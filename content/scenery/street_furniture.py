@@ -20,8 +20,7 @@ from gen_data.content.procedural.material_presets import (
 from gen_data.content.procedural.patches import Patch, join_patches
 from gen_data.content.procedural.surface_shapes import block, cone, lathe, rounded_box
 from gen_data.content.scenery.basic_shapes import facing_rectangle, make_solid, post, tube
-from gen_data.core.asset_types import Keypoint, Material, Symmetry
-from gen_data.core.se3 import Vec3
+from gen_data.core import asset_types, se3
 from gen_data.core.variant_rng import variant_rng
 
 GALVANISED = metal_material((0.42, 0.43, 0.44), 0.55)
@@ -38,9 +37,9 @@ def street_light(seed: int) -> Solid:
     rise = rng.choose((0.12, 0.12, 0.5, None))
     head, lens, at = _arm_head(height, reach, rise) if rise else _post_top(height)
     finish = GALVANISED if rng.chance(0.5) else painted_material(rng.choose(_IRON_PAINTS), 0.5)
-    glass = Material((0.75, 0.76, 0.74), roughness=0.2, role="lamp")
+    glass = asset_types.Material((0.75, 0.76, 0.74), roughness=0.2, role="lamp")
     hull = hulls.frustum((0.085, 0.0), (0.04, height), 12)
-    keypoints = (Keypoint("lamp", at, 0.1),)
+    keypoints = (asset_types.Keypoint("lamp", at, 0.1),)
     return make_solid([mast, head, lens.painted(1)], (finish, glass), [hull], keypoints)
 
 
@@ -141,7 +140,7 @@ def bollard_facts(seed: int) -> Facts:
     return Facts(_bollard_kind(seed))
 
 
-def bollard_symmetries(seed: int) -> tuple[Symmetry, ...]:
+def bollard_symmetries(seed: int) -> tuple[asset_types.Symmetry, ...]:
     """Any turn about its axis; none for patterned stone."""
     return () if _bollard_kind(seed) == "stone" else axis_symmetries(z=0)
 
@@ -215,7 +214,7 @@ def bus_stop(seed: int) -> Solid:
         facing_rectangle(0.0, (-0.5, 0.5), (0.4, 2.0)).rotated("z", turn).moved(-0.15, -half + side)
         for turn, side in ((0.5 * math.pi, 0.055), (-0.5 * math.pi, -0.055))
     ]
-    glass = Material((0.9, 0.95, 0.93), roughness=0.05, transmission=1.0, role="glass")
+    glass = asset_types.Material((0.9, 0.95, 0.93), roughness=0.05, transmission=1.0, role="glass")
     parts = [*posts, *(p.painted(1) for p in panes), roof.painted(2), seat.painted(3), *legs, panel]
     parts += [p.painted(4) for p in poster]
     wood = patterned_material("texture/wood_grain?seed=2", 1.2, 0.7, (0.8, 0.75, 0.7))
@@ -268,7 +267,7 @@ def _bollard_kind(seed: int) -> str:
     return ("steel", "iron", "stone", "steel")[seed % 4]
 
 
-def _arm_head(height: float, reach: float, rise: float) -> tuple[Patch, Patch, Vec3]:
+def _arm_head(height: float, reach: float, rise: float) -> tuple[Patch, Patch, se3.Vec3]:
     """An arm towards +X with a flat luminaire; its lens looks down."""
     top = height + rise
     path = [(0.0, 0.0, height - 0.3), (0.05 * reach, 0.0, height),
@@ -279,7 +278,7 @@ def _arm_head(height: float, reach: float, rise: float) -> tuple[Patch, Patch, V
     return join_patches([arm, body]), lens, (reach + 0.26, 0.0, top - 0.06)
 
 
-def _post_top(height: float) -> tuple[Patch, Patch, Vec3]:
+def _post_top(height: float) -> tuple[Patch, Patch, se3.Vec3]:
     """A lantern on the mast's top."""
     eaves, foot = height + 0.42, height + 0.06
     roof = lathe([(0.0, eaves), (0.28, eaves), (0.26, height + 0.46), (0.0, height + 0.56)], 16)

@@ -13,8 +13,7 @@ from gen_data.content.procedural import collision_hulls as hulls
 from gen_data.content.procedural.material_presets import patterned_material
 from gen_data.content.procedural.patches import finish_mesh, join_patches
 from gen_data.content.procedural.surface_shapes import block
-from gen_data.content.scenery.cafe import cafe_set
-from gen_data.content.scenery.foliage import merge_meshes
+from gen_data.content.scenery import cafe, foliage
 from gen_data.core.asset_types import ConvexParts, Material
 from gen_data.core.variant_rng import VariantRng, variant_rng
 
@@ -49,9 +48,9 @@ def terrace(seed: int) -> Solid:
     ]
     mesh = finish_mesh(join_patches(slabs), (_pavement(kind, rng),), 40.0)
     if kind != "path":
-        chairs = cafe_set(int(rng.random() * 18)).mesh
+        chairs = cafe.cafe_set(int(rng.random() * 18)).mesh
         raised = chairs.vertices_m + np.array([0.0, 0.0, high], chairs.vertices_m.dtype)
-        mesh = merge_meshes(mesh, replace(chairs, vertices_m=raised))
+        mesh = foliage.merge_meshes(mesh, replace(chairs, vertices_m=raised))
     hull = hulls.box((-x, -0.5 * long, 0.0), (x, 0.5 * long, high))
     return Solid(mesh, ConvexParts((np.round(hull, 6),)))
 

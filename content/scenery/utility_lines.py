@@ -18,12 +18,10 @@ from gen_data.content.procedural.surface_shapes import (
     rounded_box,
     sweep,
 )
+from gen_data.content.scenery import clutter_shapes, street_furniture
 from gen_data.content.scenery.basic_shapes import facing_rectangle, make_solid, post
-from gen_data.content.scenery.clutter_shapes import bar, rod
-from gen_data.content.scenery.street_furniture import GALVANISED
-from gen_data.core.asset_types import Material
+from gen_data.core import asset_types, se3
 from gen_data.core.errors import AssetError
-from gen_data.core.se3 import Vec3
 from gen_data.core.variant_rng import VariantRng, variant_rng
 
 POLES = ("wood", "concrete", "wood_transformer", "wood_lamp", "concrete_double", "wood_double")
@@ -76,9 +74,9 @@ def utility_pole(seed: int, span_m: float) -> Solid:
     materials = (
         stone if kind.startswith("concrete") else wood,
         painted_material(rng.choose(("#8b8f90", "#5a3d30", "#d8d8d2")), 0.3),
-        GALVANISED,
+        street_furniture.GALVANISED,
         painted_material("#202122", 0.6),
-        Material((0.75, 0.76, 0.74), roughness=0.2, role="lamp"),
+        asset_types.Material((0.75, 0.76, 0.74), roughness=0.2, role="lamp"),
     )
     hull = hulls.frustum((radii[0], 0.0), (radii[1], high), 12)
     return make_solid([*body, *cables], materials, [hull], body=body)
@@ -97,7 +95,7 @@ def _cross_arms(double: bool, radius: float) -> list[Patch]:
         parts.append(block((-0.95, radius, z - 0.05), (0.95, radius + 0.09, z + 0.05), 0.0, 2))
         for side in (-1.0, 1.0):
             brace = ((0.0, radius + 0.02, z - 0.5), (0.5 * side, radius + 0.02, z - 0.05))
-            parts.append(bar(*brace, 0.014, 4, 2))
+            parts.append(clutter_shapes.bar(*brace, 0.014, 4, 2))
         parts += [_insulator().moved(x, radius + 0.045, z + 0.05) for x in _CONDUCTORS]
     return parts
 
@@ -120,14 +118,14 @@ def _fittings(kind: str, radius: float, rng: VariantRng) -> list[Patch]:
     if kind.endswith("lamp"):
         # No further out than the cross-arm: the middle of every variant is the same.
         arm = [(0.0, 0.0, 6.7), (0.2, 0.0, 7.0), (0.5, 0.0, 7.05)]
-        parts.append(rod(arm, 0.025, 6, 2))
+        parts.append(clutter_shapes.rod(arm, 0.025, 6, 2))
         parts.append(rounded_box((0.5, 0.24, 0.1), 0.03, 1).moved(0.69, 0.0, 7.05).painted(2))
         parts.append(block((0.48, -0.09, 6.985), (0.9, 0.09, 7.0), 0.0, 4))
     if rng.chance(0.6):
         z = rng.between(2.2, 3.2)
         parts.append(block((radius, -0.14, z), (radius + 0.16, 0.14, z + 0.4), 0.01, 2))
         duct = ((0.13, 0.05, 0.0), (0.13, 0.05, z))
-        parts.append(bar(*duct, 0.02, 5, 2))
+        parts.append(clutter_shapes.bar(*duct, 0.02, 5, 2))
     parts.append(block((0.02, -0.1, 1.7), (0.155, 0.1, 1.85), 0.0, 1))
     # The clamp of the telephone cable.
     parts.append(post(0.03, (_BUNDLE_M - 0.08, _BUNDLE_M + 0.05), (radius + 0.04, 0.0, 0.0), 6))
@@ -136,7 +134,7 @@ def _fittings(kind: str, radius: float, rng: VariantRng) -> list[Patch]:
 
 def _half_spans(span_m: float, radius: float) -> list[Patch]:
     """Cables along Y from the pole to the middle of the span on both sides, as parabolas."""
-    grips: list[tuple[Vec3, float, float]] = [
+    grips: list[tuple[se3.Vec3, float, float]] = [
         ((x, radius + 0.045, _ARM_M), _CONDUCTOR_RADIUS_M, x) for x in _CONDUCTORS
     ]
     grips.append(((radius + 0.04, 0.0, _BUNDLE_M), _BUNDLE_RADIUS_M, 0.12))

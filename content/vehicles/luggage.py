@@ -5,8 +5,7 @@ from gen_data.content.procedural.surface_shapes import block
 from gen_data.content.vehicles.rider import Seat
 from gen_data.content.vehicles.vehicle_materials import COLORS
 from gen_data.content.vehicles.vehicle_materials import VehicleSlot as Slot
-from gen_data.core.se3 import Vec3
-from gen_data.core.variant_rng import VariantRng
+from gen_data.core import se3, variant_rng
 
 BACKPACK, PANNIERS, BOTH_SIDES = 0.4, 0.45, 0.6
 """Shares of riders with a backpack, of carriers with panniers, and of these with two; assumed."""
@@ -14,12 +13,12 @@ _SLOT = Slot.SOFT_TOP
 """Slot of canvas, which two-wheelers have no other use for."""
 
 
-def draw_color(rng: VariantRng) -> Vec3:
+def draw_color(rng: variant_rng.VariantRng) -> se3.Vec3:
     """Colour of the luggage, linear RGB."""
     return material_presets.hex_to_linear(rng.choose(COLORS["luggage"]))
 
 
-def backpack(seat: Seat, rng: VariantRng) -> patches.Patch:
+def backpack(seat: Seat, rng: variant_rng.VariantRng) -> patches.Patch:
     """A bag on the rider's back."""
     depth, width, height = (
         rng.between(0.12, 0.2),
@@ -31,7 +30,7 @@ def backpack(seat: Seat, rng: VariantRng) -> patches.Patch:
     return bag.rotated("y", seat.lean_rad).moved(*seat.hips)
 
 
-def panniers(carrier: Vec3, rng: VariantRng) -> list[patches.Patch]:
+def panniers(carrier: se3.Vec3, rng: variant_rng.VariantRng) -> list[patches.Patch]:
     """Bags that hang from a carrier whose middle is given, on one side or both."""
     x, _, z = carrier
     length, width, height = (
@@ -49,6 +48,6 @@ def panniers(carrier: Vec3, rng: VariantRng) -> list[patches.Patch]:
     return bags
 
 
-def rear_carrier(axle_m: float, wheel_m: float) -> Vec3:
+def rear_carrier(axle_m: float, wheel_m: float) -> se3.Vec3:
     """Middle of the carrier over the rear wheel, in the bicycle's frame."""
     return (-axle_m, 0.0, 2.0 * wheel_m + 0.07)

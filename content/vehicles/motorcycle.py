@@ -8,18 +8,15 @@ import numpy as np
 from gen_data.assets.family import Facts, Solid
 from gen_data.config.data_files import load_table
 from gen_data.content.procedural import collision_hulls as hulls
-from gen_data.content.procedural.material_presets import hex_to_linear
-from gen_data.content.procedural.patches import Patch
+from gen_data.content.procedural import material_presets, patches
 from gen_data.content.procedural.surface_shapes import block, circle, sweep
 from gen_data.content.scenery.basic_shapes import make_solid
+from gen_data.content.vehicles import body_shell, wheels
 from gen_data.content.vehicles import rider as people
-from gen_data.content.vehicles.body_shell import drop_uvs
 from gen_data.content.vehicles.rider import Seat, blob, limb
 from gen_data.content.vehicles.vehicle_materials import COLORS, Print, materials
 from gen_data.content.vehicles.vehicle_materials import VehicleSlot as Slot
-from gen_data.content.vehicles.wheels import wheel
-from gen_data.core.asset_types import Keypoint
-from gen_data.core.se3 import Vec3
+from gen_data.core import asset_types, se3
 from gen_data.core.variant_rng import in_turn, variant_rng
 
 STYLES = ("naked", "sport", "scooter")
@@ -33,8 +30,8 @@ class _Build:
     wheel_m: float
     tyre_m: float
     seat: tuple[float, float]
-    grip: Vec3
-    foot: Vec3
+    grip: se3.Vec3
+    foot: se3.Vec3
     head: tuple[float, float]
     fork: tuple[float, float]
     lean_rad: float
@@ -53,10 +50,10 @@ def motorcycle(seed: int) -> Solid:
     if ridden:
         above += people.rider(_seat(build), people.draw_nod(rng))
     parts, body = (
-        [drop_uvs(part) for part in (*_running_gear(build, mirrors=mirrors), *above)]
+        [body_shell.drop_uvs(part) for part in (*_running_gear(build, mirrors=mirrors), *above)]
         for mirrors in (True, False)
     )
-    paint = hex_to_linear(rng.choose(COLORS["motorcycles"]))
+    paint = material_presets.hex_to_linear(rng.choose(COLORS["motorcycles"]))
     finish = materials(rng, paint, clothes=people.draw_clothes(rng), printed=Print(plate_rows=2))
     reach = build.axle + build.wheel_m
     hull = [
@@ -66,10 +63,10 @@ def motorcycle(seed: int) -> Solid:
     z = build.wheel_m
     head, tail = _lamp_places(style, build)
     points = (
-        Keypoint("wheel_front", (build.axle, 0.0, z), 0.12),
-        Keypoint("wheel_rear", (-build.axle, 0.0, z), 0.12),
-        Keypoint("headlight", head, 0.12),
-        Keypoint("taillight", tail, 0.1),
+        asset_types.Keypoint("wheel_front", (build.axle, 0.0, z), 0.12),
+        asset_types.Keypoint("wheel_rear", (-build.axle, 0.0, z), 0.12),
+        asset_types.Keypoint("headlight", head, 0.12),
+        asset_types.Keypoint("taillight", tail, 0.1),
     )
     return make_solid(parts, finish, hull, points, body)
 
@@ -83,8 +80,8 @@ def _is_ridden(seed: int) -> bool:
     return variant_rng("motorcycle rider", seed).chance(2.0 / 3.0)
 
 
-def _running_gear(build: _Build, *, mirrors: bool) -> list[Patch]:
-    made = wheel(build.wheel_m, build.tyre_m, "six")
+def _running_gear(build: _Build, *, mirrors: bool) -> list[patches.Patch]:
+    made = wheels.wheel(build.wheel_m, build.tyre_m, "six")
     both = [made, made.rotated("z", math.pi)]
     parts = [w.moved(sign * build.axle, 0.0, build.wheel_m) for sign in (1.0, -1.0) for w in both]
     head_x, head_z = build.head
@@ -108,7 +105,7 @@ def _running_gear(build: _Build, *, mirrors: bool) -> list[Patch]:
     return [*parts, _guard(build, 1.0, (0.7, 2.3)), _guard(build, -1.0, (0.7, 2.2))]
 
 
-def _guard(build: _Build, sign: float, arc_rad: tuple[float, float]) -> Patch:
+def _guard(build: _Build, sign: float, arc_rad: tuple[float, float]) -> patches.Patch:
     turn = np.linspace(*arc_rad, 8)
     radius = build.wheel_m + 0.03
     x, z = sign * build.axle + radius * np.cos(turn), build.wheel_m + radius * np.sin(turn)
@@ -117,14 +114,14 @@ def _guard(build: _Build, sign: float, arc_rad: tuple[float, float]) -> Patch:
     return sweep(path, section, up=(0.0, 0.0, 1.0), slot=Slot.PAINT)
 
 
-def _lamp_places(style: str, build: _Build) -> tuple[Vec3, Vec3]:
+def _lamp_places(style: str, build: _Build) -> tuple[se3.Vec3, se3.Vec3]:
     x, z = build.head
     if style == "scooter":
         return (x + 0.14, 0.0, z + 0.0), (-build.axle - 0.12, 0.0, 0.68)
     return (x + 0.17, 0.0, z - 0.1), (-build.axle - 0.06, 0.0, 0.87)
 
 
-def _lamps(style: str, build: _Build) -> list[Patch]:
+def _lamps(style: str, build: _Build) -> list[patches.Patch]:
     (hx, _, hz), (tx, _, tz) = _lamp_places(style, build)
     parts = [
         blob((hx - 0.03, 0.0, hz), (0.09, 0.1, 0.095), Slot.TRIM),
@@ -140,7 +137,7 @@ def _lamps(style: str, build: _Build) -> list[Patch]:
     return parts
 
 
-def _bodies(style: str, build: _Build) -> list[Patch]:
+def _bodies(style: str, build: _Build) -> list[patches.Patch]:
     if style == "scooter":
         return _scooter(build)
     x, z = build.seat
@@ -165,7 +162,7 @@ def _bodies(style: str, build: _Build) -> list[Patch]:
     return parts
 
 
-def _fairing() -> list[Patch]:
+def _fairing() -> list[patches.Patch]:
     parts = [
         blob((0.42, 0.0, 0.86), (0.26, 0.19, 0.17), Slot.PAINT, 0.35),
         blob((0.36, 0.0, 1.0), (0.17, 0.14, 0.13), Slot.GLASS, 0.5),
@@ -176,7 +173,7 @@ def _fairing() -> list[Patch]:
     return parts
 
 
-def _scooter(build: _Build) -> list[Patch]:
+def _scooter(build: _Build) -> list[patches.Patch]:
     x, z = build.seat
     shield = np.array([(0.36, 0.0, 0.98), (0.4, 0.0, 0.7), (0.33, 0.0, 0.34), (0.1, 0.0, 0.24)])
     sizes = np.array([(0.12, 0.07), (0.22, 0.07), (0.2, 0.06), (0.17, 0.05)])

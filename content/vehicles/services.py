@@ -7,10 +7,8 @@ from gen_data.content.procedural.material_presets import hex_to_linear
 from gen_data.content.procedural.patches import Patch
 from gen_data.content.procedural.surface_shapes import Point2, block
 from gen_data.content.scenery.basic_shapes import tube
-from gen_data.content.vehicles.bodywork import Additions, make_vehicle
+from gen_data.content.vehicles import bodywork, cars, liveries
 from gen_data.content.vehicles.car_design import Design, read_models
-from gen_data.content.vehicles.cars import draw_car, draw_van, van_image_m
-from gen_data.content.vehicles.liveries import livery_ground, livery_id
 from gen_data.content.vehicles.vehicle_materials import COLORS, Print, materials
 from gen_data.content.vehicles.vehicle_materials import VehicleSlot as Slot
 from gen_data.core.asset_types import Material
@@ -32,7 +30,7 @@ _FOODS = ("snacks", "coffee", "ices")
 def taxi(seed: int, steer_deg: float) -> Solid:
     """A taxi with its sign on the roof, in colours of one of several countries."""
     rng = variant_rng("taxi", seed)
-    design = _without_roof_load(draw_car(*in_turn(_TAXIS, seed), rng))
+    design = _without_roof_load(cars.draw_car(*in_turn(_TAXIS, seed), rng))
     paint, sign = (hex_to_linear(code) for code in in_turn(COLORS["taxis"], seed).split())
     finish = materials(rng, paint, printed=Print(fixed=True, sign=sign))
     middle, top = _roof_m(design, 0.35), design.height_m
@@ -41,21 +39,21 @@ def taxi(seed: int, steer_deg: float) -> Solid:
         block((middle - 0.05, -0.18, top + 0.015), (middle + 0.05, 0.18, top + 0.14), 0.02,
               Slot.ROOF_SIGN),
     )  # fmt: skip
-    return make_vehicle(design, steer_deg, finish, Additions(parts=parts))
+    return bodywork.make_vehicle(design, steer_deg, finish, bodywork.Additions(parts=parts))
 
 
 def police_car(seed: int, steer_deg: float) -> Solid:
     """A police car with a light bar."""
     rng = variant_rng("police_car", seed)
-    design = _without_roof_load(draw_car(*in_turn(_POLICE, seed), rng))
+    design = _without_roof_load(cars.draw_car(*in_turn(_POLICE, seed), rng))
     kind = in_turn(_PATROLS, seed)
     finish = _printed(kind, seed, rng)
     image = (
         (design.seams[0] - 0.1, design.seams[-1] + 0.1),
         (design.clearance_m + 0.2, design.belt_m - 0.1),
     )
-    additions = Additions(image, tuple(_light_bar(design, _roof_m(design, 0.3))))
-    return make_vehicle(replace(design, strip=False), steer_deg, finish, additions)
+    additions = bodywork.Additions(image, tuple(_light_bar(design, _roof_m(design, 0.3))))
+    return bodywork.make_vehicle(replace(design, strip=False), steer_deg, finish, additions)
 
 
 def ambulance(seed: int, steer_deg: float) -> Solid:
@@ -110,18 +108,18 @@ def _service_van(
     steer_deg: float,
     parts: tuple[Patch, ...],
 ) -> Solid:
-    additions = Additions(van_image_m(design), parts)
-    return make_vehicle(design, steer_deg, _printed(kind, seed, rng), additions)
+    additions = bodywork.Additions(cars.van_image_m(design), parts)
+    return bodywork.make_vehicle(design, steer_deg, _printed(kind, seed, rng), additions)
 
 
 def _printed(kind: str, seed: int, rng: VariantRng) -> tuple[Material, ...]:
     second = hex_to_linear(rng.choose(COLORS["awnings"]))
-    printed = Print(livery_id(kind, seed), fixed=True)
-    return materials(rng, livery_ground(kind, seed), second, printed=printed)
+    printed = Print(liveries.livery_id(kind, seed), fixed=True)
+    return materials(rng, liveries.livery_ground(kind, seed), second, printed=printed)
 
 
 def _closed_van(body: str, rng: VariantRng) -> Design:
-    design = draw_van(body, rng.choose(("2010s", "2020s", "2000s")), rng)
+    design = cars.draw_van(body, rng.choose(("2010s", "2020s", "2000s")), rng)
     return replace(design, strip=False, extras=())
 
 

@@ -19,8 +19,7 @@ from gen_data.content.scenery.clutter_shapes import (
     worn_paint,
 )
 from gen_data.content.scenery.street_furniture import GALVANISED
-from gen_data.content.vehicles.bicycle import bicycle_parts
-from gen_data.content.vehicles.wheels import wheel
+from gen_data.content.vehicles import bicycle, wheels
 from gen_data.core.asset_types import Material
 from gen_data.core.variant_rng import in_turn, variant_rng
 
@@ -41,7 +40,7 @@ def parked_bicycle(seed: int) -> Solid:
     count = {"rack": 3, "hoop_pair": 2}.get(kind, 1)
     pieces: list[tuple[list[Patch], tuple[Material, ...]]] = []
     for k in range(count):
-        machine, finish = bicycle_parts((seed * 5 + 7 * k) % 36)
+        machine, finish = bicycle.bicycle_parts((seed * 5 + 7 * k) % 36)
         lean = _LEAN_RAD.get(kind, rng.between(-0.05, 0.05))
         along = math.pi if kind == "hoop_pair" and k else 0.0
         away = (k - 0.5 * (count - 1)) * (0.55 if kind == "rack" else 0.6)
@@ -184,7 +183,7 @@ def trailer(seed: int) -> Solid:
                 6,
             )
         )
-        made = _paint_wheel(wheel(0.29, 0.16, "steel"))
+        made = _paint_wheel(wheels.wheel(0.29, 0.16, "steel"))
         placed = made if side > 0 else made.rotated("z", math.pi)
         parts.append(placed.moved(-0.1, side * (wide + 0.12), 0.29))
         turn = np.linspace(0.15 * math.pi, 0.85 * math.pi, 6)

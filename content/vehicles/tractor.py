@@ -15,10 +15,9 @@ from gen_data.content.procedural.material_presets import hex_to_linear
 from gen_data.content.procedural.patches import Patch
 from gen_data.content.procedural.surface_shapes import block, cone, lathe, sweep
 from gen_data.content.scenery.basic_shapes import make_solid
-from gen_data.content.vehicles.body_shell import drop_uvs
+from gen_data.content.vehicles import body_shell, wheels
 from gen_data.content.vehicles.vehicle_materials import VehicleSlot as Slot
 from gen_data.content.vehicles.vehicle_materials import materials
-from gen_data.content.vehicles.wheels import wheel
 from gen_data.core.asset_types import Keypoint
 from gen_data.core.variant_rng import VariantRng, variant_rng
 
@@ -46,8 +45,8 @@ def tractor(seed: int) -> Solid:
         hulls.box((rear_x - 0.6, -0.85, 0.9), (rear_x + 1.0, 0.85, top)),
         hulls.box((rear_x, -0.95, 0.0), (x, 0.95, 1.75)),
     ]
-    body = [drop_uvs(p) for p in parts]
-    whole = [*body, *(drop_uvs(p) for p in _mirrors(rear_x + 0.95))]
+    body = [body_shell.drop_uvs(p) for p in parts]
+    whole = [*body, *(body_shell.drop_uvs(p) for p in _mirrors(rear_x + 0.95))]
     points = _keypoints(x, (rear_x, rear), (front_x, front))
     return make_solid(whole, finish, hull, points, body)
 
@@ -66,7 +65,7 @@ def _wheels(rear_x: float, rear: float, front_x: float, front: float) -> list[Pa
     """Wide tyres; the rear wheels are about half as large again as the front ones."""
     made = []
     for at, radius, width in ((rear_x, rear, 0.55), (front_x, front, 0.42)):
-        one = wheel(radius, width, "steel")
+        one = wheels.wheel(radius, width, "steel")
         for sign in (1.0, -1.0):
             side = one if sign > 0.0 else one.rotated("z", math.pi)
             made.append(side.moved(at, sign * (_HALF_M - 0.5 * width), radius))

@@ -18,10 +18,9 @@ from gen_data.annotations.bev_raster import (
     strips,
 )
 from gen_data.config.base_model import Strict
-from gen_data.core import capture, errors, interfaces, sample
+from gen_data.core import capture, errors, interfaces, sample, se3
 from gen_data.core.lane_geometry import lane_borders, left_normals
 from gen_data.core.scene import Body, Instance, Scene
-from gen_data.core.se3 import SE3, Array
 
 LINE_PX = 1.5
 """Width of borders: wide enough that rasterised lines have no gaps."""
@@ -147,7 +146,7 @@ def _height_m(body: Body, assets: interfaces.AssetLibrary, corner: int) -> float
     return body.T_world_body.translation_m[2] + body.scale * assets.bounds_m(body.asset)[corner][2]
 
 
-def level_pose(pose: SE3) -> SE3:
+def level_pose(pose: se3.SE3) -> se3.SE3:
     """The pose with roll and pitch removed: the X axis keeps its heading.
 
     Only square roots are used, so that it has the same bits on every processor.
@@ -155,17 +154,17 @@ def level_pose(pose: SE3) -> SE3:
     ahead = pose.rotate(np.array([1.0, 0.0, 0.0]))
     length = math.sqrt(float(ahead[0]) ** 2 + float(ahead[1]) ** 2)
     if length < 1e-6:
-        return SE3(pose.translation_m)
+        return se3.SE3(pose.translation_m)
     c, s = float(ahead[0]) / length, float(ahead[1]) / length
     turn = (math.sqrt(0.5 * max(1.0 + c, 0.0)), math.sqrt(0.5 * max(1.0 - c, 0.0)))
-    return SE3(pose.translation_m, (turn[0], 0.0, 0.0, math.copysign(turn[1], s))).rounded()
+    return se3.SE3(pose.translation_m, (turn[0], 0.0, 0.0, math.copysign(turn[1], s))).rounded()
 
 
-def _lanes(scene: Scene, kind: str) -> Array:
+def _lanes(scene: Scene, kind: str) -> se3.Array:
     return strips(lane for lane in scene.lanes if lane.kind == kind)
 
 
-def _borders(scene: Scene, kind: str, width_m: float) -> Array:
+def _borders(scene: Scene, kind: str, width_m: float) -> se3.Array:
     """Triangles [n, 3, 3] of ribbons along borders of lanes."""
     parts = [np.zeros((0, 3, 3))]
     for border in lane_borders(scene.lanes):
@@ -176,7 +175,7 @@ def _borders(scene: Scene, kind: str, width_m: float) -> Array:
     return np.concatenate(parts)
 
 
-def _floors(instances: list[Instance]) -> Array:
+def _floors(instances: list[Instance]) -> se3.Array:
     """Bottom faces of boxes, as triangles [n, 3, 3]."""
     parts = [np.zeros((0, 3, 3))]
     for instance in instances:

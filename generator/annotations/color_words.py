@@ -15,8 +15,7 @@ from functools import cache, lru_cache
 
 import numpy as np
 
-from gen_data.core import colorimetry, interfaces, se3
-from gen_data.core.scene import Body
+from gen_data.core import colorimetry, interfaces, scene, se3
 
 CENTROIDS = {
     "white": ("F2F3F4",),
@@ -68,7 +67,7 @@ def cielab(rgb: se3.Array) -> se3.Array:
     return np.stack([116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)], axis=-1)
 
 
-def color_of(bodies: Sequence[Body], assets: interfaces.AssetLibrary) -> str:
+def color_of(bodies: Sequence[scene.Body], assets: interfaces.AssetLibrary) -> str:
     """Word of nearly all of the surface of some bodies; empty if there is none."""
     areas: dict[str, float] = {}
     for body in bodies:

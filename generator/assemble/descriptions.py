@@ -8,8 +8,7 @@ from pydantic import BaseModel
 
 from gen_data.assemble.config import GeneralSettings
 from gen_data.assemble.plugin_tables import TABLES, find_plugin
-from gen_data.assets.asset_ids import format_parameter
-from gen_data.assets.families import KIND, family_summary, known_families
+from gen_data.assets import asset_ids, families
 from gen_data.config.describe import TEXT_WIDTH, describe
 from gen_data.core.errors import ConfigError, did_you_mean
 from gen_data.packs.provision import open_assets
@@ -49,14 +48,14 @@ def describe_name(name: str) -> str:
         found = _selected_by(first)
     if found:
         return "\n".join(f"{_title(at, model)}\n{describe(model)}" for at, model in found)
-    family = name.removeprefix(f"{KIND}/")
-    if family in known_families() and (name != family or not _is_plugin(name)):
-        return f"{KIND} {family}\n{_describe_family(family)}"
+    family = name.removeprefix(f"{families.KIND}/")
+    if family in families.known_families() and (name != family or not _is_plugin(name)):
+        return f"{families.KIND} {family}\n{_describe_family(family)}"
     try:
         kind, plugin = find_plugin(first)
     except ConfigError as error:
         known = {*_sections(), *_words(), *(n for t in TABLES.values() for n in t)}
-        known |= known_families().keys()
+        known |= families.known_families().keys()
         short = first.rpartition("/")[2]
         if "several" in str(error):
             raise
@@ -73,8 +72,8 @@ def _is_plugin(name: str) -> bool:
 
 def _describe_family(name: str) -> str:
     """Summary of a family of assets, its parameters with their values, and an example."""
-    family = known_families()[name]
-    lines = [_fill(family_summary(family)), ""]
+    family = families.known_families()[name]
+    lines = [_fill(families.family_summary(family)), ""]
     lines += [f"{key}: default {_in_id(value)}" for key, value in family.parameters.items()]
     if not family.variants:
         return "\n".join(lines) + "\n"
@@ -89,7 +88,7 @@ def _describe_family(name: str) -> str:
 
 
 def _in_id(value: Any) -> str:
-    return format_parameter(round(value, 3) if isinstance(value, float) else value)
+    return asset_ids.format_parameter(round(value, 3) if isinstance(value, float) else value)
 
 
 def _fill(text: str, others: str = "") -> str:

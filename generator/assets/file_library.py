@@ -38,10 +38,9 @@ from gen_data.assets.robot_tools import VERSION as TOOLS_VERSION
 from gen_data.assets.sandbox import run_sandboxed
 from gen_data.assets.texture_maps import compose_texture, find_maps
 from gen_data.assets.usd_stages import is_stage
+from gen_data.core import plates, scene
 from gen_data.core.asset_types import Asset, Float32, RobotModel, Symmetry, TextureData, UInt8
 from gen_data.core.errors import AssetError
-from gen_data.core.plates import Plate
-from gen_data.core.scene import Lane, StageModel
 
 PYBULLET = "pybullet"
 """Name of the pack with those files of pybullet that its index describes."""
@@ -73,7 +72,7 @@ class FileLibrary:
         self._digests = content_hashes.ContentHashes(disk)
         self._listed: dict[str, IndexedAsset] | None = None
         self._robots: dict[str, RobotDescription] = {}
-        self._stages: dict[str, StageModel] = {}
+        self._stages: dict[str, scene.StageModel] = {}
         self._hashed: dict[str, dict[str, str]] = {}
         self._keys: dict[str, str] = {}
 
@@ -188,7 +187,7 @@ class FileLibrary:
         one = part[0] if part else self._entries().get(asset_id)
         return one is not None and one.root in self._user_roots
 
-    def lanes(self, asset_id: str) -> tuple[Lane, ...]:
+    def lanes(self, asset_id: str) -> tuple[scene.Lane, ...]:
         """Lanes of a road network; empty for anything else."""
         content = self._road_network(asset_id)
         return content.lanes if content else ()
@@ -222,7 +221,7 @@ class FileLibrary:
             raise AssetError(f"asset '{asset_id}': is of kind {one.kind}, not a robot")
         return robot_model(asset_id, self._robot(one), one.entry, str(one.root / one.entry.file))
 
-    def stage(self, asset_id: str) -> StageModel:
+    def stage(self, asset_id: str) -> scene.StageModel:
         """Pieces, lights and cameras of a stage."""
         one = self._entries()[asset_id]
         entry = one.entry
@@ -232,20 +231,20 @@ class FileLibrary:
             self._stages[asset_id] = self._store.get(
                 content_key({"asset": self._key(one), "part": "stage"}),
                 lambda: self._parse(one, parsing.parse_stage, entry, asset_id),
-                lambda arrays: parsing.unpack_value(StageModel, arrays),
+                lambda arrays: parsing.unpack_value(scene.StageModel, arrays),
             )
         return self._stages[asset_id]
 
-    def plate(self, asset_id: str) -> Plate:
+    def plate(self, asset_id: str) -> plates.Plate:
         """Camera, ground and light of a photograph. Raises AssetError if it is none."""
         one = self._entries()[asset_id]
         entry = one.entry
         if not isinstance(entry, PlateEntry):
             raise AssetError(f"asset '{asset_id}': is of kind {one.kind}, not a plate")
-        plate: Plate = self._store.get(
+        plate: plates.Plate = self._store.get(
             content_key({"asset": self._key(one), "part": "plate", "version": PLATES_VERSION}),
             lambda: self._parse(one, parsing.parse_plate, entry),
-            lambda arrays: parsing.unpack_value(Plate, arrays),
+            lambda arrays: parsing.unpack_value(plates.Plate, arrays),
         )
         return plate
 

@@ -10,10 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.core.asset_types import Float32, UInt8
-from gen_data.core.colorimetry import luminance
+from gen_data.core import asset_types, colorimetry, optional_packages
 from gen_data.core.errors import AssetError
-from gen_data.core.optional_packages import missing_packages
 
 DECODER_VERSION = 2
 """Increased whenever the same file is decoded to other pixels."""
@@ -26,7 +24,7 @@ _FORMATS = ("PNG", "JPEG", "BMP", "TIFF", "WEBP", "TGA")
 _WITH_ALPHA = ("RGBA", "LA", "PA")
 
 
-def decode_image(data: bytes, place: str, *, alpha: bool = False) -> UInt8:
+def decode_image(data: bytes, place: str, *, alpha: bool = False) -> asset_types.UInt8:
     """Decode an image to sRGB, uint8 [height, width, 3], upright as its EXIF orientation says.
 
     Sixteen bits per channel become eight; floating-point values count to 1.
@@ -75,7 +73,7 @@ _DEEP = ("I;16", "I;16L", "I;16B", "I;16N", "I", "F")
 """Modes of single channels with more than eight bits, which a conversion to RGB would clip."""
 
 
-def _to_eight_bits(values: NDArray[Any], mode: str = "") -> UInt8:
+def _to_eight_bits(values: NDArray[Any], mode: str = "") -> asset_types.UInt8:
     """Eight bits of single-channel or colour images with more, as three channels."""
     if values.dtype.kind == "f":
         scaled = np.where(np.isfinite(values), values, 0.0) * 255.0
@@ -88,7 +86,7 @@ def _to_eight_bits(values: NDArray[Any], mode: str = "") -> UInt8:
     return np.repeat(level[..., None], 3, axis=2) if level.ndim == 2 else level
 
 
-def _decode_deep(data: bytes) -> UInt8 | None:
+def _decode_deep(data: bytes) -> asset_types.UInt8 | None:
     """Decode a TIFF of colours with 16 bits or floating point, which Pillow cannot; else None."""
     import cv2
 
@@ -107,7 +105,7 @@ def _decode_deep(data: bytes) -> UInt8 | None:
     return np.ascontiguousarray(_to_eight_bits(image[..., 2::-1]))
 
 
-def decode_radiance(data: bytes, place: str) -> Float32:
+def decode_radiance(data: bytes, place: str) -> asset_types.Float32:
     """Decode an equirectangular panorama, float32 [height, width, 3], to mean luminance 1.
 
     Args:
@@ -125,19 +123,19 @@ def decode_radiance(data: bytes, place: str) -> Float32:
     _check_texels(rgb, place)
     # Resampling filters ring slightly below zero; _check_texels refuses larger negative values.
     rgb = np.maximum(rgb, 0.0)
-    radiance: Float32 = (rgb / _mean_luminance(rgb)).astype(np.float32)
+    radiance: asset_types.Float32 = (rgb / _mean_luminance(rgb)).astype(np.float32)
     if not np.isfinite(radiance).all():
         raise AssetError(f"{place}: a single texel dominates; export it again")
     return radiance
 
 
-def read_exr(data: bytes, place: str) -> Float32:
+def read_exr(data: bytes, place: str) -> asset_types.Float32:
     """Decode an OpenEXR image to RGB, float32 [height, width, 3].
 
     Raises:
         AssetError: if it is unreadable, too large, or lacks a colour, or the library is missing.
     """
-    missing = missing_packages("OpenEXR")
+    missing = optional_packages.missing_packages("OpenEXR")
     if missing:
         raise AssetError(f"{place}: {missing}")
     import OpenEXR
@@ -184,7 +182,7 @@ def _color_channels(names: tuple[str, ...]) -> tuple[str, ...]:
     return ()
 
 
-def _read_radiance(data: bytes, place: str) -> Float32:
+def _read_radiance(data: bytes, place: str) -> asset_types.Float32:
     """Decode a Radiance image to RGB, float32 [height, width, 3]."""
     import cv2
 
@@ -251,7 +249,7 @@ def _mean_luminance(rgb: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> f
     """Mean luminance (Rec. 709) of an equirectangular image over the sphere."""
     height = rgb.shape[0]
     edges = np.array([math.cos(math.pi * k / height) for k in range(height + 1)])
-    rows = luminance(rgb).mean(axis=1)
+    rows = colorimetry.luminance(rgb).mean(axis=1)
     # By Archimedes, a band of the sphere has an area in proportion to its height, cos - cos.
     return float((rows * 0.5 * (edges[:-1] - edges[1:])).sum())
 

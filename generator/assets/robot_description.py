@@ -8,8 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from gen_data.core.asset_types import Joint
-from gen_data.core.kinematics import joint_transform
+from gen_data.core import asset_types, kinematics
 from gen_data.core.se3 import SE3, Vec3
 
 MAX_LINKS = 500
@@ -77,7 +76,7 @@ class DescriptionParts:
     """A ``RobotDescription`` without mappings, whose order JSON would lose."""
 
     links: tuple[Link, ...]
-    joints: tuple[Joint, ...]
+    joints: tuple[asset_types.Joint, ...]
     home: tuple[tuple[str, float], ...]
     included: tuple[str, ...]
     remarks: tuple[str, ...]
@@ -101,7 +100,7 @@ class RobotDescription:
     """
 
     links: dict[str, Link]
-    joints: tuple[Joint, ...]
+    joints: tuple[asset_types.Joint, ...]
     home: dict[str, float] = field(default_factory=dict)
     included: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()
@@ -129,19 +128,19 @@ class RobotDescription:
 class MisplacedJoint(ValueError):
     """A joint that keeps links from forming a tree."""
 
-    def __init__(self, joint: Joint, reason: str) -> None:
+    def __init__(self, joint: asset_types.Joint, reason: str) -> None:
         super().__init__(f"joint '{joint.name[:40]}' {reason}")
         self.joint = joint
 
 
-def sort_links(links: Mapping[str, Link], joints: Sequence[Joint]) -> RobotDescription:
+def sort_links(links: Mapping[str, Link], joints: Sequence[asset_types.Joint]) -> RobotDescription:
     """Sort links depth first from the root.
 
     Raises:
         MisplacedJoint: a joint closes a loop, or refers to a missing link.
         ValueError: not exactly one link has no parent.
     """
-    by_parent: dict[str, list[Joint]] = {}
+    by_parent: dict[str, list[asset_types.Joint]] = {}
     for joint in joints:
         if joint.parent not in links or joint.child not in links:
             raise MisplacedJoint(joint, "refers to a missing link")
@@ -177,7 +176,7 @@ class PlacedJoint:
         position: Its position [rad or m] in the poses of the links.
     """
 
-    joint: Joint
+    joint: asset_types.Joint
     anchor_m: Vec3
     axis: Vec3
     position: float = 0.0
@@ -207,7 +206,7 @@ def jointed(
         joint = replace(placed.joint, axis=axis)
         T_parent_child = frames[parent].inverse() @ frames[child]
         if placed.position:
-            T_parent_child = T_parent_child @ joint_transform(joint, -placed.position)
+            T_parent_child = T_parent_child @ kinematics.joint_transform(joint, -placed.position)
         finished.append(replace(joint, T_parent_joint=T_parent_child.rounded(_DECIMALS)))
     moved = {
         name: _moved(link, frames[name].inverse() @ poses[name]) for name, link in links.items()

@@ -16,8 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from gen_data.assets.asset_cache import Arrays, encode_arrays
-from gen_data.assets.sandbox import LENGTH
+from gen_data.assets import asset_cache, sandbox
 from gen_data.core import errors, processes, system_calls
 
 try:
@@ -42,11 +41,11 @@ def main(parent_pid: int, temporary_folder: str) -> None:
     _give_up_rights()
     system_calls.read_binary(0, replies)
     while _is_request_due():
-        head = _read(LENGTH.size)
+        head = _read(sandbox.LENGTH.size)
         if not head:
             break
-        reply = _serve(_read(LENGTH.unpack(head)[0]))
-        _write(replies, LENGTH.pack(len(reply)) + reply)
+        reply = _serve(_read(sandbox.LENGTH.unpack(head)[0]))
+        _write(replies, sandbox.LENGTH.pack(len(reply)) + reply)
 
 
 def _is_request_due() -> bool:
@@ -79,7 +78,7 @@ def _serve(request: bytes) -> bytes:
             # The parent may have changed it since this process started, as notebooks do.
             os.chdir(working_folder)
         _limit(cpu_s, memory_bytes)
-        return encode_arrays("", function(*arguments))
+        return asset_cache.encode_arrays("", function(*arguments))
     except errors.AssetError as error:
         return _encode_error(str(error), expected=True)
     except MemoryError:
@@ -112,8 +111,8 @@ def _limit(cpu_s: float, memory_bytes: int) -> None:
 
 def _encode_error(message: str, *, expected: bool) -> bytes:
     text = json.dumps({"message": message, "expected": expected})
-    arrays: Arrays = {"error": np.frombuffer(text.encode(), np.uint8)}
-    return encode_arrays("", arrays)
+    arrays: asset_cache.Arrays = {"error": np.frombuffer(text.encode(), np.uint8)}
+    return asset_cache.encode_arrays("", arrays)
 
 
 def _read(size: int) -> bytes:

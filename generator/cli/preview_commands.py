@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from gen_data.cli.options import ConfigurationOptions, configuration_options
-from gen_data.core import optional_packages, sample
-from gen_data.core.capture import Channel
+from gen_data.core import capture, optional_packages, sample
 from gen_data.core.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -156,11 +155,11 @@ def _samples(
         yield sample_at(index)
 
 
-def _channel(name: str) -> Channel:
-    shown = [c.value for c in Channel if c is not Channel.AMODAL]
+def _channel(name: str) -> capture.Channel:
+    shown = [c.value for c in capture.Channel if c is not capture.Channel.AMODAL]
     if name not in shown:
         raise ConfigError(
             f"--channels: unknown channel '{name}'; expected {WRITTEN}, or some of"
             f" {', '.join(shown)}"
         )
-    return Channel(name)
+    return capture.Channel(name)

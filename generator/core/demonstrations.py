@@ -4,8 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
-from gen_data.core import asset_types, scene, se3
-from gen_data.core.kinematics import gripper_opening, link_poses
+from gen_data.core import asset_types, kinematics, scene, se3
 
 AnySpan = TypeVar("AnySpan", bound=scene.Span)
 
@@ -58,10 +57,10 @@ def demonstration_step(
     at_s, next_s = min(time_s, end_s), min(time_s + step_s, end_s)
     contacts = _spans_at(episode.contacts, at_s)
     touching = [contact.at(at_s) for contact in contacts]
-    openings = [round(gripper_opening(robot, q), 6) for q in (positions, action)]
+    openings = [round(kinematics.gripper_opening(robot, q), 6) for q in (positions, action)]
     if hand is not None and hand.cup is not None:
         openings = [0.0 if _spans_at(episode.held, t) else 1.0 for t in (at_s, next_s)]
-    poses = link_poses(robot, se3.SE3(), positions)
+    poses = kinematics.link_poses(robot, se3.SE3(), positions)
     T_base_grasp = poses[hand.link] @ hand.T_link_grasp if hand else poses[robot.links[0]]
     return DemonstrationStep(
         positions,

@@ -6,9 +6,8 @@ Uses only ``+ - * / sqrt`` and the C library's sine and cosine, on plain floats.
 import math
 from collections.abc import Mapping, Sequence
 
+from gen_data.core import errors, scene
 from gen_data.core.asset_types import Gripper, Joint, RobotModel
-from gen_data.core.errors import did_you_mean
-from gen_data.core.scene import Articulation, Body
 from gen_data.core.se3 import SE3
 
 POSITION_DECIMALS = 6
@@ -39,8 +38,8 @@ def joint_transform(joint: Joint, position: float) -> SE3:
 
 
 def make_link_bodies(
-    articulation: Articulation, robot: RobotModel, parts: tuple[str, ...]
-) -> tuple[Body, ...]:
+    articulation: scene.Articulation, robot: RobotModel, parts: tuple[str, ...]
+) -> tuple[scene.Body, ...]:
     """The bodies of a robot's visible links at ``articulation.joint_positions``.
 
     ``parts`` are ``Instance.parts`` of the robot; a link that is not listed has part id 0.
@@ -48,7 +47,7 @@ def make_link_bodies(
     poses = link_poses(robot, articulation.T_world_base, articulation.joint_positions)
     part_ids = {link: k for k, link in enumerate(parts, 1)}
     return tuple(
-        Body(
+        scene.Body(
             name=f"{articulation.name}/{link}",
             asset=robot.visuals[link],
             T_world_body=poses[link].rounded(),
@@ -95,7 +94,7 @@ def leader_of(joint: Joint, joints: Sequence[Joint]) -> tuple[Joint, float, floa
             return leader, multiplier, offset
         followed = named.get(leader.mimic)
         if followed is None:
-            near = did_you_mean(leader.mimic, named)
+            near = errors.did_you_mean(leader.mimic, named)
             raise ValueError(
                 f"joint '{leader.name}' mimics '{leader.mimic}', which does not exist{near}"
             )

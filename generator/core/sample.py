@@ -8,12 +8,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.core.boxes import BoxPx, OrientedBox
+from gen_data.core import boxes, lane_geometry, se3
 from gen_data.core.capture import Capture
-from gen_data.core.lane_geometry import LaneBorder
 from gen_data.core.motion import STILL, Twist
 from gen_data.core.scene import Camera, Instance, Scene
-from gen_data.core.se3 import IDENTITY, SE3, Vec3
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -41,7 +39,7 @@ class KeypointTruth:
     """
 
     name: str
-    position_m: Vec3
+    position_m: se3.Vec3
     image_px: tuple[float, float] = (0.0, 0.0)
     visibility: Literal[0, 1, 2] = 0
 
@@ -105,12 +103,12 @@ class ObjectTruth:
 
     instance: Instance
     visible_px: int
-    box: BoxPx | None
-    amodal_box: BoxPx | None = None
+    box: boxes.BoxPx | None
+    amodal_box: boxes.BoxPx | None = None
     oriented_box: tuple[PointPx, PointPx, PointPx, PointPx] | None = None
-    box3d_world: OrientedBox | None = None
-    box3d_camera: OrientedBox | None = None
-    T_camera_object: SE3 | None = None
+    box3d_world: boxes.OrientedBox | None = None
+    box3d_camera: boxes.OrientedBox | None = None
+    T_camera_object: se3.SE3 | None = None
     mask: MaskPx | None = None
     amodal_mask: MaskPx | None = None
     visible_fraction: float | None = None
@@ -239,7 +237,7 @@ class BirdseyeMap:
             centre of pixel (r, c) is at x = (n / 2 - r - 0.5) px_m, y = (n / 2 - c - 0.5) px_m.
     """
 
-    T_world_map: SE3
+    T_world_map: se3.SE3
     px_m: float
     layers: Mapping[str, NDArray[np.bool_]]
 
@@ -256,7 +254,7 @@ class Grasp:
     """
 
     instance_id: int
-    T_world_grasp: SE3
+    T_world_grasp: se3.SE3
     width_m: float
     score: float
 
@@ -272,8 +270,8 @@ class Suction:
     """
 
     instance_id: int
-    point_m: Vec3
-    normal: Vec3
+    point_m: se3.Vec3
+    normal: se3.Vec3
     score: float
 
 
@@ -298,10 +296,10 @@ class EgoTruth:
     """
 
     rig: str = ""
-    T_world_ego: SE3 = IDENTITY
+    T_world_ego: se3.SE3 = se3.IDENTITY
     twist: Twist = STILL
-    boxes3d: Mapping[str, Mapping[int, OrientedBox]] | None = None
-    borders: tuple[LaneBorder, ...] | None = None
+    boxes3d: Mapping[str, Mapping[int, boxes.OrientedBox]] | None = None
+    borders: tuple[lane_geometry.LaneBorder, ...] | None = None
     birdseye: BirdseyeMap | None = None
     relations: tuple[Relation, ...] | None = None
     grasps: tuple[Grasp, ...] | None = None

@@ -7,8 +7,7 @@ are rectified. What the left one shows in column ``x`` the right one shows in ``
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.core.asset_types import Float32
-from gen_data.core.scene import Camera
+from gen_data.core import asset_types, scene
 
 ALIGNED = 1e-6
 """Largest deviation, in metres and as a sine, of cameras that look the same way."""
@@ -17,7 +16,7 @@ NEARER_PX = 0.5
 changes by no more than that between a point and the centre of its column."""
 
 
-def baseline_m(left: Camera, right: Camera) -> float:
+def baseline_m(left: scene.Camera, right: scene.Camera) -> float:
     """How far the right camera is to the right of the left one.
 
     Raises:
@@ -41,7 +40,7 @@ def baseline_m(left: Camera, right: Camera) -> float:
     return float(x)
 
 
-def disparity_px(z_depth_m: Float32, focal_baseline: float) -> Float32:
+def disparity_px(z_depth_m: asset_types.Float32, focal_baseline: float) -> asset_types.Float32:
     """``focal * baseline / z`` [px]; 0 where the depth is inf.
 
     ``focal_baseline`` is the focal length [px] times the baseline [m]; negative = the other camera
@@ -51,7 +50,7 @@ def disparity_px(z_depth_m: Float32, focal_baseline: float) -> Float32:
 
 
 def is_seen_by_both(
-    here_px: Float32, there_px: Float32, *, beyond: bool = False
+    here_px: asset_types.Float32, there_px: asset_types.Float32, *, beyond: bool = False
 ) -> NDArray[np.bool_]:
     """Whether the other camera sees what this one does, bool [h, w].
 

@@ -10,11 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from gen_data.core import interfaces, serialization
 from gen_data.core.capture import Channel, LidarHits, LidarRays, SensorReading
 from gen_data.core.errors import SampleError
-from gen_data.core.interfaces import FindTones, Renderer
 from gen_data.core.scene import Camera, Lidar, Scene
-from gen_data.core.serialization import find_not_finite, to_plain
 
 DISTANCES = frozenset({Channel.Z_DEPTH, Channel.RANGE})
 """Channels with infinity for nothing."""
@@ -24,14 +23,14 @@ DISTANCES = frozenset({Channel.Z_DEPTH, Channel.RANGE})
 class CheckedRenderer:
     """A renderer whose radiance is finite, and whose distances are not NaN."""
 
-    renderer: Renderer
+    renderer: interfaces.Renderer
 
     def render(
         self,
         scene: Scene,
         camera: Camera,
         channels: frozenset[Channel],
-        find_tones: FindTones | None = None,
+        find_tones: interfaces.FindTones | None = None,
     ) -> SensorReading:
         """See ``Renderer.render``.
 
@@ -67,5 +66,5 @@ def _refuse(scene: Scene, quantity: str, wrong: NDArray[np.bool_]) -> None:
         return
     place = np.argwhere(wrong)[0].tolist()
     fact = f"{quantity}: {int(wrong.sum())} values are NaN or infinite, the first at {place}"
-    field = find_not_finite(to_plain(scene))
+    field = serialization.find_not_finite(serialization.to_plain(scene))
     raise SampleError(f"scene.{field}: is NaN or infinite; {fact}" if field else fact)

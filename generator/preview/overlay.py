@@ -8,11 +8,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.core.boxes import BoxPx, OrientedBox
+from gen_data.core import boxes, sample, skeletons
 from gen_data.core.capture import Channel, SensorReading
 from gen_data.core.intrinsics import Intrinsics
-from gen_data.core.sample import ImageTruth, KeypointTruth, ObjectTruth
-from gen_data.core.skeletons import find_skeleton
 from gen_data.preview.palette import (
     Rgb,
     color_depth,
@@ -41,7 +39,7 @@ NEAR_M = 0.01
 """Edges are clipped at this distance from the camera plane."""
 
 
-def draw_labels(reading: SensorReading, truth: ImageTruth, unit: float = 1.0) -> Image:
+def draw_labels(reading: SensorReading, truth: sample.ImageTruth, unit: float = 1.0) -> Image:
     """Draw every label on the RGB image, uint8 [h, w, 3].
 
     What surrounds the scene, walls and floors, is outlined and named only.
@@ -68,7 +66,7 @@ def draw_labels(reading: SensorReading, truth: ImageTruth, unit: float = 1.0) ->
             b = item.box
             cv2.rectangle(image, (b.x_min, b.y_min), (b.x_max - 1, b.y_max - 1), color, width)
         draw_keypoints(image, item.keypoints or (), _lighter(color))
-    places: list[BoxPx] = []
+    places: list[boxes.BoxPx] = []
     # Names of things first: those of their surroundings make room.
     for item in (*things, *around):
         if item.box is not None:
@@ -120,7 +118,7 @@ _SHOWN: Mapping[Channel, Callable[[NDArray[Any]], Image]] = {
 
 
 def draw_box3d(
-    image: Image, box: OrientedBox, intrinsics: Intrinsics, color: Rgb, width: int = 1
+    image: Image, box: boxes.OrientedBox, intrinsics: Intrinsics, color: Rgb, width: int = 1
 ) -> None:
     """Draw the edges of a box given in the camera frame into ``image``, in place."""
     corners = box.corners()
@@ -151,10 +149,10 @@ def _draw_line(image: Image, ends_px: NDArray[Any], color: Rgb, width: int) -> N
     cv2.line(image, (round(ua), round(va)), (round(ub), round(vb)), color, width, cv2.LINE_AA)
 
 
-def draw_keypoints(image: Image, points: Sequence[KeypointTruth], color: Rgb) -> None:
+def draw_keypoints(image: Image, points: Sequence[sample.KeypointTruth], color: Rgb) -> None:
     """Draw bones and points inside the image, in place; hidden points are rings."""
     shown = {p.name: p for p in points if p.visibility}
-    skeleton = find_skeleton(p.name for p in points)
+    skeleton = skeletons.find_skeleton(p.name for p in points)
     for a, b in skeleton.bones:
         ends = [shown.get(skeleton.names[k]) for k in (a, b)]
         if ends[0] is not None and ends[1] is not None:
@@ -174,7 +172,7 @@ _SHIFT = 4
 """Fractional bits of OpenCV's drawing coordinates; its pixel centres are integers."""
 
 
-def _at(point: KeypointTruth) -> tuple[int, int]:
+def _at(point: sample.KeypointTruth) -> tuple[int, int]:
     u, v = point.image_px
     return (round((u - 0.5) * (1 << _SHIFT)), round((v - 0.5) * (1 << _SHIFT)))
 
@@ -190,13 +188,13 @@ def _in_front(a: NDArray[Any], b: NDArray[Any]) -> NDArray[Any] | None:
     return np.stack([a, b])
 
 
-def _surrounds(image: Image, item: ObjectTruth) -> bool:
+def _surrounds(image: Image, item: sample.ObjectTruth) -> bool:
     """Whether a tint would colour the scene rather than a thing in it."""
     fills = item.visible_px > SURROUNDING_SHARE * image.shape[0] * image.shape[1]
     return fills or item.instance.category in SURROUNDINGS
 
 
-def _tint(image: Image, item: ObjectTruth) -> None:
+def _tint(image: Image, item: sample.ObjectTruth) -> None:
     if item.mask is None:
         return
     height, width = item.mask.pixels.shape
@@ -206,7 +204,7 @@ def _tint(image: Image, item: ObjectTruth) -> None:
     window[item.mask.pixels] = tinted.astype(np.uint8)
 
 
-def _outline(image: Image, item: ObjectTruth, width: int) -> None:
+def _outline(image: Image, item: sample.ObjectTruth, width: int) -> None:
     if item.mask is None:
         return
     # Zeros around it: what is outside the mask's box is outside the mask.
@@ -217,7 +215,7 @@ def _outline(image: Image, item: ObjectTruth, width: int) -> None:
     window[edge] = id_color(item.instance.instance_id)
 
 
-def _write(image: Image, item: ObjectTruth, unit: float, places: list[BoxPx]) -> None:
+def _write(image: Image, item: sample.ObjectTruth, unit: float, places: list[boxes.BoxPx]) -> None:
     """Write the category of an object above its box, below the names at the same place."""
     assert item.box is not None
     text, size, pen = item.instance.category, FONT_SIZE * unit, max(1, round(unit))
@@ -226,9 +224,9 @@ def _write(image: Image, item: ObjectTruth, unit: float, places: list[BoxPx]) ->
     width, height = width + 2 * pad, height + base // 2 + 2 * pad
     x = min(max(item.box.x_min, 0), max(image.shape[1] - width, 0))
     y = max(item.box.y_min - height, 0)
-    place = BoxPx(x, y, x + width, y + height)
+    place = boxes.BoxPx(x, y, x + width, y + height)
     while (hidden := _overlapping(place, places)) and hidden.y_max + height <= image.shape[0]:
-        place = BoxPx(x, hidden.y_max, x + width, hidden.y_max + height)
+        place = boxes.BoxPx(x, hidden.y_max, x + width, hidden.y_max + height)
     places.append(place)
     plate = image[place.window()]
     plate[:] = plate // 4
@@ -237,5 +235,5 @@ def _write(image: Image, item: ObjectTruth, unit: float, places: list[BoxPx]) ->
     cv2.putText(image, text, at, cv2.FONT_HERSHEY_SIMPLEX, size, color, pen, cv2.LINE_AA)
 
 
-def _overlapping(place: BoxPx, places: Sequence[BoxPx]) -> BoxPx | None:
+def _overlapping(place: boxes.BoxPx, places: Sequence[boxes.BoxPx]) -> boxes.BoxPx | None:
     return next((other for other in places if not place.intersection(other).is_empty), None)

@@ -9,8 +9,7 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from gen_data.core import asset_types, boxes, se3
-from gen_data.core.capture import Measurements, PointCloud
+from gen_data.core import asset_types, boxes, capture, se3
 from gen_data.core.scene import Scene
 from gen_data.preview.overlay import BOX_EDGES, Image
 from gen_data.preview.palette import color_shares, id_color
@@ -39,7 +38,7 @@ COLORS: Mapping[str, Sequence[int]] = yaml.safe_load(
 """Colours of points without a category, by surface."""
 
 
-def point_colors(cloud: PointCloud, by: PointColors = "class") -> NDArray[np.uint8]:
+def point_colors(cloud: capture.PointCloud, by: PointColors = "class") -> NDArray[np.uint8]:
     """SRGB colour of each point, uint8 [n, 3].
 
     Args:
@@ -59,7 +58,7 @@ def point_colors(cloud: PointCloud, by: PointColors = "class") -> NDArray[np.uin
     return colors
 
 
-def top_view(cloud: PointCloud, scene: Scene, aspect: float) -> Image:
+def top_view(cloud: capture.PointCloud, scene: Scene, aspect: float) -> Image:
     """Draw a scan from above, its X axis to the right, uint8 [h, w, 3], with outlined boxes.
 
     Args:
@@ -94,7 +93,7 @@ def outline_things(image: Image, scene: Scene, T_world_sensor: se3.SE3) -> None:
             _outline(image, thing.box3d.seen_from(T_sensor_world), id_color(thing.category_id))
 
 
-def range_view(cloud: PointCloud) -> Image:
+def range_view(cloud: capture.PointCloud) -> Image:
     """Draw panoramas of range, intensity and class, one above the other.
 
     A row is a ring, the highest first; the middle column is straight ahead, left is left. The
@@ -143,7 +142,7 @@ def _outline(image: Image, box: boxes.OrientedBox, color: tuple[int, int, int]) 
         cv2.line(image, start, end, color, 1, cv2.LINE_AA)
 
 
-def radar_view(table: Measurements, scene: Scene, aspect: float) -> Image:
+def radar_view(table: capture.Measurements, scene: Scene, aspect: float) -> Image:
     """Draw detections from above, the radar's X axis to the right, uint8 [h, w, 3], with boxes.
 
     Green is static, blue approaches, red recedes. The size of a dot shows its signal strength.
@@ -168,7 +167,7 @@ def radar_view(table: Measurements, scene: Scene, aspect: float) -> Image:
     return image
 
 
-def event_view(table: Measurements, scene: Scene, aspect: float) -> Image:
+def event_view(table: capture.Measurements, scene: Scene, aspect: float) -> Image:
     """Draw all events of a reading, uint8 [h, w, 3], cropped to their extent.
 
     Blue is brighter, red is darker; the last event of a pixel counts.

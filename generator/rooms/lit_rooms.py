@@ -7,9 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from gen_data.assets.asset_ids import parse_asset_id
-from gen_data.core.interfaces import AssetIndex
+from gen_data.core import interfaces, se3
 from gen_data.core.scene import Body, Scene
-from gen_data.core.se3 import Vec3
 from gen_data.rooms.floor_plan import WALL_M
 from gen_data.rooms.interreflection import Hole, LitRoom
 
@@ -20,7 +19,7 @@ _HIDES = 0.55
 count (assumed)."""
 
 
-def find_lit_rooms(scene: Scene, name: str, assets: AssetIndex) -> tuple[LitRoom, ...]:
+def find_lit_rooms(scene: Scene, name: str, assets: interfaces.AssetIndex) -> tuple[LitRoom, ...]:
     """The rooms of a ``room_layout`` element, with reflectances of the surfaces drawn for them."""
     own = [b for b in scene.bodies if b.name.partition("/")[0] == name]
     boxes: dict[str, list[Body]] = {}
@@ -36,7 +35,7 @@ def find_lit_rooms(scene: Scene, name: str, assets: AssetIndex) -> tuple[LitRoom
     return tuple(rooms)
 
 
-def _lit_room(bodies: Sequence[Body], floor: Body, assets: AssetIndex) -> LitRoom:
+def _lit_room(bodies: Sequence[Body], floor: Body, assets: interfaces.AssetIndex) -> LitRoom:
     (x0, y0, _), (x1, y1, _) = assets.bounds_m(floor.asset)
     x, y, _ = floor.T_world_body.translation_m
     prefix = floor.name.rpartition("/")[0]
@@ -52,12 +51,12 @@ def _lit_room(bodies: Sequence[Body], floor: Body, assets: AssetIndex) -> LitRoo
     return LitRoom(low, high, tuple(colors[k] for k in range(6)), furniture=furniture)
 
 
-def _box_surface_m2(low: Vec3, high: Vec3) -> float:
+def _box_surface_m2(low: se3.Vec3, high: se3.Vec3) -> float:
     a, b, c = (h - w for w, h in zip(low, high, strict=True))
     return 2.0 * (a * b + b * c + c * a)
 
 
-def _mean_color(body: Body, assets: AssetIndex) -> Vec3:
+def _mean_color(body: Body, assets: interfaces.AssetIndex) -> se3.Vec3:
     material = (body.materials or assets.materials(body.asset))[0]
     if not material.texture:
         return material.base_color
@@ -97,7 +96,7 @@ def _add_hole(rooms: list[LitRoom], body: Body, word: str, openness: float) -> N
         rooms[k] = replace(rooms[k], holes=(*rooms[k].holes, hole))
 
 
-def _size_m(asset: str) -> Vec3:
+def _size_m(asset: str) -> se3.Vec3:
     size = parse_asset_id(asset).parameters["size_m"]
     assert isinstance(size, tuple)
     width, height, depth = (float(v) for v in size)

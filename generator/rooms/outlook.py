@@ -5,8 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from gen_data.assets.families import declared
-from gen_data.core.se3 import SE3
-from gen_data.core.streams import Rng
+from gen_data.core import se3, streams
 from gen_data.rooms.floor_plan import Room, between, draw_count, outer_radius_m
 
 _STOREY_M = 3.0
@@ -44,7 +43,7 @@ class Outlook:
 
     ground: str
     ground_m: float
-    things: tuple[tuple[str, SE3], ...] = ()
+    things: tuple[tuple[str, se3.SE3], ...] = ()
 
 
 def outlook_assets() -> tuple[str, ...]:
@@ -58,7 +57,7 @@ def outlook_assets() -> tuple[str, ...]:
     return (*things, *sorted({f"{ground}?seed={k}" for ground in _GROUNDS for k in range(4)}))
 
 
-def draw_outlook(rooms: Sequence[Room], rng: Rng) -> Outlook:
+def draw_outlook(rooms: Sequence[Room], rng: streams.Rng) -> Outlook:
     """Draw houses around the rooms and greenery before them, each in a sector of its own."""
     radius_m = outer_radius_m(tuple(rooms))
     storey = draw_count(rng, (0, 3)) if rooms[0].kind != "warehouse" else 0
@@ -77,13 +76,13 @@ def draw_outlook(rooms: Sequence[Room], rng: Rng) -> Outlook:
             at = (away * math.cos(turn), away * math.sin(turn), -ground_m)
             # Fronts face the building, roughly, as along streets.
             yaw = turn + math.pi + between(rng, (-0.3, 0.3))
-            things.append((f"{family}?seed={seed}", SE3.about_z(yaw, at).rounded()))
+            things.append((f"{family}?seed={seed}", se3.SE3.about_z(yaw, at).rounded()))
     things += _end_of_view(ground_m, rng)
     ground = f"{_GROUNDS[draw_count(rng, (0, len(_GROUNDS) - 1))]}?seed={draw_count(rng, (0, 3))}"
     return Outlook(ground, ground_m, tuple(things))
 
 
-def _end_of_view(ground_m: float, rng: Rng) -> list[tuple[str, SE3]]:
+def _end_of_view(ground_m: float, rng: streams.Rng) -> list[tuple[str, se3.SE3]]:
     """Pieces of a wood all around, which hide where the ground ends."""
     family, variants, far_m = _FAR[draw_count(rng, (0, len(_FAR) - 1))]
     length_m: float = declared(family, "length_m")
@@ -93,5 +92,5 @@ def _end_of_view(ground_m: float, rng: Rng) -> list[tuple[str, SE3]]:
         turn = first + 2.0 * math.pi * k / count
         at = (far_m * math.cos(turn), far_m * math.sin(turn), -ground_m)
         seed = draw_count(rng, (0, variants - 1))
-        pieces.append((f"{family}?seed={seed}", SE3.about_z(turn + math.pi, at).rounded()))
+        pieces.append((f"{family}?seed={seed}", se3.SE3.about_z(turn + math.pi, at).rounded()))
     return pieces

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from gen_data.core.errors import SampleError, StorageError
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.serialization import canonical_json
+from gen_data.runner import error_context, layout, shard_record
 from gen_data.runner.data_card import (
     CARD_NAME,
     CROISSANT_NAME,
@@ -25,12 +26,9 @@ from gen_data.runner.durable_files import (
     sync_tree,
     tree_sizes,
 )
-from gen_data.runner.error_context import explain_errors
-from gen_data.runner.layout import LICENCES_NAME, MANIFEST_NAME, PLAN_NAME, SHARDS_NAME, SUMS_NAME
 from gen_data.runner.plan import Plan, plan_bytes
 from gen_data.runner.seal import Entry, SealedBefore, dataset_id, sums_text
 from gen_data.runner.shard import PipelineLike
-from gen_data.runner.shard_record import ShardRecord, sum_counts
 from gen_data.runner.store import LocalStore
 
 LicencesOf = Callable[[Sequence[str]], str]
@@ -74,7 +72,7 @@ def finalize(
         # Only exporters link files of shards; without any, the files may be elsewhere.
         known = _inodes(store, records) if names else {}
         for name in names:
-            with explain_errors(f"exporter {name}, merging"), store.errors():
+            with error_context.explain_errors(f"exporter {name}, merging"), store.errors():
                 _merge(records, store, pipeline, name, known)
         scratch = store.scratch_dir()
         documents = _documents(plan, store, pipeline, records, licences)
@@ -88,14 +86,14 @@ def finalize(
         sealed_before.expect(entries)
         folders = [f"{n}/{inner}" for n in names for inner in empty_folders(store.root / n)]
         manifest = _manifest(plan, pipeline.info, records, record_bytes, entries, folders)
-        sealed = [*entries, _entry_of_bytes(MANIFEST_NAME, manifest)]
+        sealed = [*entries, _entry_of_bytes(layout.MANIFEST_NAME, manifest)]
         lines = sums_text(sorted(sealed, key=_by_path))
-        store.replace_file(SUMS_NAME, lines.encode(), scratch)
-        store.replace_file(MANIFEST_NAME, manifest, scratch)
+        store.replace_file(layout.SUMS_NAME, lines.encode(), scratch)
+        store.replace_file(layout.MANIFEST_NAME, manifest, scratch)
     return dataset_id(sums)
 
 
-def _all_records(plan: Plan, store: LocalStore) -> list[ShardRecord]:
+def _all_records(plan: Plan, store: LocalStore) -> list[shard_record.ShardRecord]:
     records = []
     for shard in range(plan.shard_count):
         record = store.record(shard)
@@ -105,7 +103,7 @@ def _all_records(plan: Plan, store: LocalStore) -> list[ShardRecord]:
     return records
 
 
-def _inodes(store: LocalStore, records: list[ShardRecord]) -> dict[Inode, str]:
+def _inodes(store: LocalStore, records: list[shard_record.ShardRecord]) -> dict[Inode, str]:
     """Digests by inode: files that exporters hard-link are not hashed again."""
     folders = [(store.shard_dir(record.shard), record) for record in records]
     return {
@@ -116,7 +114,7 @@ def _inodes(store: LocalStore, records: list[ShardRecord]) -> dict[Inode, str]:
 
 
 def _merge(
-    records: Sequence[ShardRecord],
+    records: Sequence[shard_record.ShardRecord],
     store: LocalStore,
     pipeline: PipelineLike,
     name: str,
@@ -139,7 +137,7 @@ def _documents(
     plan: Plan,
     store: LocalStore,
     pipeline: PipelineLike,
-    records: list[ShardRecord],
+    records: list[shard_record.ShardRecord],
     licences: LicencesOf | None,
 ) -> dict[str, bytes]:
     """Files for readers at the root of the data set: licences, card and metadata."""
@@ -148,29 +146,29 @@ def _documents(
     facts = DatasetFacts(
         plan,
         pipeline.info,
-        sum_counts(count for record in records for count in record.splits),
+        shard_record.sum_counts(count for record in records for count in record.splits),
         sum(record.scenes for record in records),
         [name for name in pipeline.exporters if (store.root / name).is_dir()],
         table,
     )
     texts = {CARD_NAME: data_card(facts), CROISSANT_NAME: croissant_json(facts)}
     if table is not None:
-        texts[LICENCES_NAME] = table
+        texts[layout.LICENCES_NAME] = table
     return {name: text.encode() for name, text in texts.items()}
 
 
 def _entries(
     plan: Plan,
     store: LocalStore,
-    records: list[ShardRecord],
+    records: list[shard_record.ShardRecord],
     record_bytes: list[bytes],
     exporters: list[str],
     known: Mapping[Inode, str],
 ) -> Iterator[Entry]:
     """Plan, records, files of shards and of exporters, in no particular order."""
-    yield _entry_of_bytes(PLAN_NAME, plan_bytes(plan))
+    yield _entry_of_bytes(layout.PLAN_NAME, plan_bytes(plan))
     for record, data in zip(records, record_bytes, strict=True):
-        folder = f"{SHARDS_NAME}/{store.shard_dir(record.shard).name}"
+        folder = f"{layout.SHARDS_NAME}/{store.shard_dir(record.shard).name}"
         yield _entry_of_bytes(f"{folder}.json", data)
         for file in record.files:
             yield Entry(f"{folder}/{file.path}", file.bytes, file.sha256)
@@ -184,7 +182,7 @@ def _entries(
 def _manifest(
     plan: Plan,
     info: DatasetInfo,
-    records: list[ShardRecord],
+    records: list[shard_record.ShardRecord],
     record_bytes: list[bytes],
     entries: list[Entry],
     folders: list[str],
@@ -202,7 +200,7 @@ def _manifest(
         "n": plan.n,
         "shard_size": plan.shard_size,
         "info": info,
-        "splits": sum_counts(count for record in records for count in record.splits),
+        "splits": shard_record.sum_counts(count for record in records for count in record.splits),
         "scenes": sum(record.scenes for record in records),
         "rejections": sum(record.rejections for record in records),
         "bytes": sum(record.size_bytes for record in records),

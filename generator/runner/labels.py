@@ -11,9 +11,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any
 
-from gen_data.core.path_names import check_name
+from gen_data.core import path_names, scene
 from gen_data.core.sample import EgoTruth, ImageTruth, ObjectTruth, Sample
-from gen_data.core.scene import Device, Instance, Lidar
 from gen_data.core.serialization import canonical_json, from_plain, to_plain
 
 LABELS_NAME = "labels.jsonl"
@@ -31,7 +30,7 @@ class ImageInfo:
 class ScanInfo:
     """Instant and pose of a laser scan; see ``PointCloud``."""
 
-    lidar: Lidar
+    lidar: scene.Lidar
     time_s: float
 
 
@@ -39,7 +38,7 @@ class ScanInfo:
 class TableInfo:
     """Instant and pose of a device's measurements; see ``Measurements``."""
 
-    device: Device
+    device: scene.Device
     time_s: float
 
 
@@ -94,7 +93,7 @@ def parse_labels(line: bytes | str) -> Labels:
         ValueError, KeyError, TypeError: the line is damaged.
     """
     plain = json.loads(line)
-    instances = {i["instance_id"]: from_plain(Instance, i) for i in plain.pop("instances")}
+    instances = {i["instance_id"]: from_plain(scene.Instance, i) for i in plain.pop("instances")}
     for image in plain["truth"].values():
         for item in image["objects"]:
             if isinstance(item["instance"], int):
@@ -102,16 +101,16 @@ def parse_labels(line: bytes | str) -> Labels:
     labels = from_plain(Labels, plain)
     # They become parts of paths.
     for name in (labels.split, *labels.images, *labels.scans, *labels.tables):
-        check_name(name)
+        path_names.check_name(name)
     return labels
 
 
-def _plain_image(truth: ImageTruth, instances: Mapping[int, Instance]) -> dict[str, Any]:
+def _plain_image(truth: ImageTruth, instances: Mapping[int, scene.Instance]) -> dict[str, Any]:
     objects = [_plain_object(item, instances) for item in truth.objects]
     return {**{name: to_plain(getattr(truth, name)) for name in _IMAGE_FIELDS}, "objects": objects}
 
 
-def _plain_object(truth: ObjectTruth, instances: Mapping[int, Instance]) -> dict[str, Any]:
+def _plain_object(truth: ObjectTruth, instances: Mapping[int, scene.Instance]) -> dict[str, Any]:
     """Fields that are not None, which stands for annotations that were not requested."""
     values = ((name, getattr(truth, name)) for name in _OBJECT_FIELDS)
     plain = {name: to_plain(value) for name, value in values if value is not None or name == "box"}

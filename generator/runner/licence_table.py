@@ -4,14 +4,13 @@ import html
 import re
 from collections.abc import Iterable
 
-from gen_data.core.asset_types import Asset
-from gen_data.core.markdown import plain
+from gen_data.core import asset_types, markdown
 
 _BAR = re.compile(r"(?<!\\)\|")
 _HEADER = ("source", "licence", "author", "assets")
 
 
-def licence_table(assets: Iterable[Asset]) -> str:
+def licence_table(assets: Iterable[asset_types.Asset]) -> str:
     """Format the table; assets of one family are one entry."""
     groups: dict[tuple[str, str, str], list[str]] = {}
     for asset in assets:
@@ -32,4 +31,4 @@ def licences_in(table: str) -> list[str]:
 
 
 def _row(*cells: str) -> str:
-    return f"| {' | '.join(map(plain, cells))} |"
+    return f"| {' | '.join(map(markdown.plain, cells))} |"

@@ -7,12 +7,10 @@ import hashlib
 import os
 
 from gen_data.core.errors import StorageError
+from gen_data.runner import layout, seal, verify
 from gen_data.runner.durable_files import make_folder, write_durably
-from gen_data.runner.layout import PLAN_NAME
 from gen_data.runner.plan import Plan, plan_bytes
-from gen_data.runner.seal import read_or_empty, read_sums
 from gen_data.runner.store import LocalStore
-from gen_data.runner.verify import find_deviations
 
 
 def read_declared_plan(store: LocalStore) -> bytes | None:
@@ -23,9 +21,9 @@ def read_declared_plan(store: LocalStore) -> bytes | None:
     Returns:
         None if it is not known.
     """
-    own = read_or_empty(store.root / PLAN_NAME)
-    copy = read_or_empty(store.run_dir / PLAN_NAME)
-    declared = read_sums(store.root).digests.get(PLAN_NAME)
+    own = seal.read_or_empty(store.root / layout.PLAN_NAME)
+    copy = seal.read_or_empty(store.run_dir / layout.PLAN_NAME)
+    declared = seal.read_sums(store.root).digests.get(layout.PLAN_NAME)
     for data in (own, copy):
         if data and declared == hashlib.sha256(data).hexdigest():
             return data
@@ -40,12 +38,12 @@ def restore_plan(store: LocalStore, plan: Plan) -> None:
     Raises:
         StorageError: the file is damaged, and ``plan`` is not what it was.
     """
-    path, data = store.root / PLAN_NAME, plan_bytes(plan)
-    current = read_or_empty(path)
-    sums = read_sums(store.root)
-    declared = {sums.digests.get(PLAN_NAME)} - {None}
+    path, data = store.root / layout.PLAN_NAME, plan_bytes(plan)
+    current = seal.read_or_empty(path)
+    sums = seal.read_sums(store.root)
+    declared = {sums.digests.get(layout.PLAN_NAME)} - {None}
     if not declared:
-        copy = read_or_empty(store.run_dir / PLAN_NAME)
+        copy = seal.read_or_empty(store.run_dir / layout.PLAN_NAME)
         declared = {hashlib.sha256(copy).hexdigest()} if copy else set()
     started = os.path.lexists(path) or store.has_shards()
     if not started or not declared or hashlib.sha256(current).hexdigest() in declared:
@@ -66,6 +64,6 @@ def quarantine_extra(store: LocalStore) -> None:
     """Move files and empty folders that do not belong to a finished data set to quarantine."""
     with store.errors():
         # More than once: a folder that held nothing else becomes empty.
-        while extra := [f for f in find_deviations(store.root) if f.kind == "extra"]:
+        while extra := [f for f in verify.find_deviations(store.root) if f.kind == "extra"]:
             for finding in extra:
                 store.set_aside(store.root / finding.path)

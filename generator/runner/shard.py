@@ -7,11 +7,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol
 
+from gen_data.core import interfaces, serialization
 from gen_data.core.capture import Capture, SensorReading
 from gen_data.core.errors import GenDataError, SampleError, in_stage
-from gen_data.core.interfaces import DatasetInfo, Exporter
 from gen_data.core.sample import Sample
-from gen_data.core.serialization import find_not_finite, to_plain
 from gen_data.runner import durable_files, resident_memory
 from gen_data.runner.error_context import explain_errors
 from gen_data.runner.failed_sample import FailedSample, describe_failure, may_be_skipped
@@ -21,7 +20,7 @@ from gen_data.runner.provenance import SCENES_NAME, scene_line
 from gen_data.runner.shard_record import ShardRecord, describe_shard
 from gen_data.runner.store import LocalStore
 
-MediaWriter = Callable[[DatasetInfo, Sample, Path], object]
+MediaWriter = Callable[[interfaces.DatasetInfo, Sample, Path], object]
 """Writes the images of a sample to their places in a shard folder."""
 
 RecordWriter = Callable[[Sample, Sample | None, Path], object]
@@ -39,12 +38,12 @@ class PipelineLike(Protocol):
     """
 
     @property
-    def info(self) -> DatasetInfo:
+    def info(self) -> interfaces.DatasetInfo:
         """Facts about the data set, for exporters."""
         ...
 
     @property
-    def exporters(self) -> Mapping[str, Exporter]:
+    def exporters(self) -> Mapping[str, interfaces.Exporter]:
         """Exporters by name, which is also that of the folder of their results."""
         ...
 
@@ -71,7 +70,7 @@ def no_digests(shard: int) -> Mapping[durable_files.Inode, str]:
     return {}
 
 
-def write_images(info: DatasetInfo, sample: Sample, shard_dir: Path) -> None:
+def write_images(info: interfaces.DatasetInfo, sample: Sample, shard_dir: Path) -> None:
     """Check a sample, then write its images to their places in a shard.
 
     Imports OpenCV when first used.
@@ -96,7 +95,7 @@ def write_records(sample: Sample, base: Sample | None, shard_dir: Path) -> None:
         lines = {SCENES_NAME: scene_line(sample, base), LABELS_NAME: labels_line(sample)}
     except ValueError as error:
         parts = {"scene": sample.scene, "truth": sample.truth, "frame": sample.frame}
-        field = find_not_finite(to_plain(parts))
+        field = serialization.find_not_finite(serialization.to_plain(parts))
         if not field:
             raise
         raise SampleError(f"{field}: is NaN or infinite; expected a finite number") from error

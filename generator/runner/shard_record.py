@@ -12,11 +12,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
 
+from gen_data.core import path_names, scene_assets, serialization
 from gen_data.core.errors import StorageError
-from gen_data.core.path_names import check_inner_path
 from gen_data.core.sample import Sample
-from gen_data.core.scene_assets import assets_in
-from gen_data.core.serialization import SPARSE, canonical_json, from_plain, to_plain
 from gen_data.runner.durable_files import (
     IRREGULAR,
     Inode,
@@ -38,7 +36,7 @@ class FileRecord:
 
     def __post_init__(self) -> None:
         """Refuse a path that leaves the shard's folder: records may come from elsewhere."""
-        check_inner_path(self.path)
+        path_names.check_inner_path(self.path)
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,12 +72,12 @@ class ShardRecord:
     assets: tuple[str, ...]
     files: tuple[FileRecord, ...]
     empty_folders: tuple[str, ...] = ()
-    failed: tuple[FailedSample, ...] = field(default=(), metadata={SPARSE: True})
+    failed: tuple[FailedSample, ...] = field(default=(), metadata={serialization.SPARSE: True})
 
     def __post_init__(self) -> None:
         """Refuse folders outside the shard's folder."""
         for folder in self.empty_folders:
-            check_inner_path(folder)
+            path_names.check_inner_path(folder)
 
     @property
     def samples(self) -> int:
@@ -96,9 +94,9 @@ class ShardRecord:
 
         Its ``sha256`` is that of the same line without it.
         """
-        plain = to_plain(self)
-        checksum = hashlib.sha256(canonical_json(plain).encode()).hexdigest()
-        return (canonical_json({**plain, "sha256": checksum}) + "\n").encode()
+        plain = serialization.to_plain(self)
+        checksum = hashlib.sha256(serialization.canonical_json(plain).encode()).hexdigest()
+        return (serialization.canonical_json({**plain, "sha256": checksum}) + "\n").encode()
 
 
 def parse_record(data: bytes) -> ShardRecord | None:
@@ -118,7 +116,7 @@ def parse_unchecked_record(data: bytes) -> ShardRecord | None:
     try:
         plain = json.loads(data)
         plain.pop("sha256", None)
-        return from_plain(ShardRecord, plain)
+        return serialization.from_plain(ShardRecord, plain)
     except (ValueError, TypeError, KeyError, AttributeError):
         return None
 
@@ -143,7 +141,7 @@ def describe_shard(
     counts = []
     assets: set[str] = set()
     for sample in samples:
-        assets |= assets_in(sample.scene)
+        assets |= scene_assets.assets_in(sample.scene)
         if sample.view_index == 0 and sample.step_index == 0:
             scenes += 1
             rejections += sample.attempts - 1

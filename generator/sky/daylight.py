@@ -15,8 +15,7 @@ import math
 
 import numpy as np
 
-from gen_data.core.colorimetry import luminance
-from gen_data.core.se3 import Vec3
+from gen_data.core import colorimetry, se3
 
 SOLAR_ILLUMINANCE_LUX = 127_500.0
 """Outside the atmosphere, on a surface that faces the sun (IES RP-21)."""
@@ -60,7 +59,7 @@ def sun_illuminance_lux(
     return SOLAR_ILLUMINANCE_LUX * reach * rim * (1.0 - _step(0.5, 0.85, cloudiness))
 
 
-def sun_color(altitude_rad: float, turbidity: float = CLEAR_TURBIDITY) -> Vec3:
+def sun_color(altitude_rad: float, turbidity: float = CLEAR_TURBIDITY) -> se3.Vec3:
     """Linear RGB of the sun's light at the ground, luminance 1."""
     mass = air_mass(max(altitude_rad, 0.0))
     aerosol = _aerosol(turbidity)
@@ -68,7 +67,7 @@ def sun_color(altitude_rad: float, turbidity: float = CLEAR_TURBIDITY) -> Vec3:
     for wavelength_um, outside in zip(_WAVELENGTHS_UM, _SOLAR_COLOR, strict=True):
         rayleigh = math.exp(-0.008735 * wavelength_um**-4.08 * mass)
         rgb.append(outside * rayleigh * math.exp(-aerosol * wavelength_um**-1.3 * mass))
-    relative = float(luminance(np.array(rgb)))
+    relative = float(colorimetry.luminance(np.array(rgb)))
     red, green, blue = (round(part / relative, 6) for part in rgb)
     return (red, green, blue)
 

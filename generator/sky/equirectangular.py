@@ -5,8 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.core.asset_types import Float32
-from gen_data.core.colorimetry import luminance
+from gen_data.core import asset_types, colorimetry
 
 Array = NDArray[np.float64]
 
@@ -23,13 +22,13 @@ def pixel_directions(height_px: int, rows: int | None = None) -> Array:
     return directions
 
 
-def normalize_luminance(image: Array | Float32) -> Float32:
+def normalize_luminance(image: Array | asset_types.Float32) -> asset_types.Float32:
     """The image scaled to mean luminance 1 by solid angle."""
     image = np.maximum(image, 0.0)
     rows = image.shape[0]
     edges = np.cos(math.pi * np.arange(rows + 1) / rows)
     weight = (edges[:-1] - edges[1:]) / 2.0
-    per_row = luminance(image).mean(axis=1, dtype=np.float64)
+    per_row = colorimetry.luminance(image).mean(axis=1, dtype=np.float64)
     image /= float((per_row * weight).sum())
-    scaled: Float32 = image.astype(np.float32, copy=False)
+    scaled: asset_types.Float32 = image.astype(np.float32, copy=False)
     return scaled

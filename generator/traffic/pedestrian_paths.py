@@ -6,9 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gen_data.core.lane_geometry import LaneLine
+from gen_data.core import lane_geometry, streams
 from gen_data.core.se3 import Array, Vec3
-from gen_data.core.streams import Rng
 from gen_data.traffic.lane_routes import LaneGraph, project_on_lane
 
 GRID_M = 0.25
@@ -121,7 +120,7 @@ def _find_join(
     return Join(place.lane, place.at_m, crosswalk, begins)
 
 
-def _lateral_bounds(line: LaneLine, boxes: Array) -> tuple[Array, Array, Array]:
+def _lateral_bounds(line: lane_geometry.LaneLine, boxes: Array) -> tuple[Array, Array, Array]:
     """Lateral bounds on a lane: people pass obstacles on the wider side."""
     count = max(2, math.ceil(line.length_m / GRID_M) + 1)
     at = np.linspace(0.0, line.length_m, count)
@@ -174,7 +173,7 @@ def draw_path(
     forward: bool,
     length_m: float,
     crossing: float,
-    rng: Rng,
+    rng: streams.Rng,
 ) -> Path:
     """Draw a path from a position on a sidewalk or crosswalk.
 
@@ -210,7 +209,7 @@ def _append_next(
     left_m: float,
     crossing: float,
     passages: list[Passage],
-    rng: Rng,
+    rng: streams.Rng,
 ) -> tuple[str, float, bool] | None:
     """Append a section of sidewalk, and a crosswalk if taken; return the next position."""
     name, at_m, forward = place
@@ -236,7 +235,7 @@ def _append_next(
 
 
 def _cross_road(
-    line: _Line, walks: WalkNetwork, join: Join, passages: list[Passage], rng: Rng
+    line: _Line, walks: WalkNetwork, join: Join, passages: list[Passage], rng: streams.Rng
 ) -> tuple[str, float, bool] | None:
     whole = walks.crosswalks.lines[join.crosswalk]
     start = 0.0 if join.begins else whole.length_m
@@ -249,7 +248,7 @@ def _cross_road(
 
 
 def _leave_crosswalk(
-    line: _Line, walks: WalkNetwork, crosswalk: str, forward: bool, rng: Rng
+    line: _Line, walks: WalkNetwork, crosswalk: str, forward: bool, rng: streams.Rng
 ) -> tuple[str, float, bool] | None:
     """Append the path from a crosswalk's end to the sidewalk; draw one of its directions."""
     for joins in walks.joins.values():
@@ -262,7 +261,7 @@ def _leave_crosswalk(
 
 
 def _append_lane(
-    line: _Line, walks: WalkNetwork, lane: LaneLine, start_m: float, end_m: float
+    line: _Line, walks: WalkNetwork, lane: lane_geometry.LaneLine, start_m: float, end_m: float
 ) -> None:
     """Append a section of a lane, backwards if it ends before it starts."""
     way = 1.0 if end_m >= start_m else -1.0

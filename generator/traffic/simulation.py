@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from gen_data.core import boxes, motion
 from gen_data.core.se3 import SE3, Array, Vec3
-from gen_data.traffic import lane_routes, signal_cycles, vehicle_model, vehicles
-from gen_data.traffic.pedestrians import Pedestrian, Pedestrians
+from gen_data.traffic import lane_routes, pedestrians, signal_cycles, vehicle_model, vehicles
 
 STEP_S = 0.05
 KNOT_S = 0.1
@@ -50,7 +49,7 @@ class SimulatedMotion:
 
 def simulate(
     fleet: vehicles.Vehicles | None,
-    walkers: Sequence[Pedestrian],
+    walkers: Sequence[pedestrians.Pedestrian],
     obstacles: Array,
     approaches: Mapping[str, signal_cycles.Approach],
     duration_s: float,
@@ -66,7 +65,7 @@ def simulate(
     """
     steps = _PER_KNOT * math.ceil(duration_s / KNOT_S - 1e-9)
     driving = vehicle_model.VehicleModel(fleet, approaches) if fleet is not None else None
-    walking = Pedestrians(walkers, approaches, obstacles)
+    walking = pedestrians.Pedestrians(walkers, approaches, obstacles)
     if driving is not None:
         driving.settle(walking.crossers())
     cars: list[tuple[Array, Array, Array]] = []

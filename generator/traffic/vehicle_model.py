@@ -6,10 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gen_data.core.se3 import Array
-from gen_data.traffic.conflict_zones import Zone
-from gen_data.traffic.idm import HARDEST_M_S2, equilibrium_speed, free_acceleration, interaction
-from gen_data.traffic.lane_routes import STATION_M
-from gen_data.traffic.signal_cycles import Approach
+from gen_data.traffic import conflict_zones, idm, lane_routes, signal_cycles
 from gen_data.traffic.vehicles import EASY_M_S2, Entry, Vehicles
 
 SEEN_M = 12.0
@@ -66,7 +63,7 @@ class VehicleModel:
         waited_s: Time since each vehicle stopped [n].
     """
 
-    def __init__(self, fleet: Vehicles, approaches: Mapping[str, Approach]) -> None:
+    def __init__(self, fleet: Vehicles, approaches: Mapping[str, signal_cycles.Approach]) -> None:
         self.fleet = fleet
         self.approaches = approaches
         n = len(fleet.vehicles)
@@ -89,7 +86,7 @@ class VehicleModel:
         speed = np.minimum(self.speed_m_s, np.sqrt(2.0 * EASY_M_S2 * np.minimum(room, 1e4)))
         for _ in range(len(speed)):
             gap, leader = self._find_leaders(speed)
-            behind = equilibrium_speed(fleet.drivers, gap, speed)
+            behind = idm.equilibrium_speed(fleet.drivers, gap, speed)
             free = np.maximum(np.minimum(gap, 1e4) - fleet.drivers.standstill_m, 0.0)
             lower = np.minimum(behind, np.sqrt(leader * leader + 2.0 * EASY_M_S2 * free))
             if (lower >= speed - 1e-9).all():
@@ -104,11 +101,11 @@ class VehicleModel:
         stops = self._find_stops(time_s, crossers, gap, leader)
         to_stop = stops - self.station_m - fleet.front_m + drivers.standstill_m - BEFORE_LINE_M
         taken = np.maximum(
-            interaction(drivers, v, gap, leader),
-            interaction(self._at_lines, v, to_stop, np.zeros_like(v)),
+            idm.interaction(drivers, v, gap, leader),
+            idm.interaction(self._at_lines, v, to_stop, np.zeros_like(v)),
         )
-        a = free_acceleration(drivers, v, self._speed_limits(v)) - taken
-        a = np.maximum(np.minimum(a, drivers.acceleration_m_s2), -HARDEST_M_S2)
+        a = idm.free_acceleration(drivers, v, self._speed_limits(v)) - taken
+        a = np.maximum(np.minimum(a, drivers.acceleration_m_s2), -idm.HARDEST_M_S2)
         after = np.maximum(v + a * step_s, 0.0)
         # Stop vehicles that would creep on by millimetres.
         after[(after < 0.05) & (a < 0.1)] = 0.0
@@ -135,7 +132,7 @@ class VehicleModel:
         """Speed limits half a second ahead [n]."""
         ahead = self.station_m - self.fleet.first_m + 0.5 * speed_m_s
         last = self.fleet.allowed_m_s.shape[1] - 1
-        k = np.minimum((ahead / STATION_M).astype(np.int64), last)
+        k = np.minimum((ahead / lane_routes.STATION_M).astype(np.int64), last)
         allowed: Array = self.fleet.allowed_m_s[np.arange(len(k)), k]
         return allowed
 
@@ -293,7 +290,9 @@ class VehicleModel:
                     break
 
 
-def _is_in_the_way(crosser: CrossingPedestrian, zone: Zone, needed_m_s2: float) -> bool:
+def _is_in_the_way(
+    crosser: CrossingPedestrian, zone: conflict_zones.Zone, needed_m_s2: float
+) -> bool:
     """Whether to stop before a zone for a pedestrian who has not yet left the lane.
 
     Args:

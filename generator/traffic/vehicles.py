@@ -9,10 +9,9 @@ import numpy as np
 
 from gen_data.core.boxes import rectangles_overlap
 from gen_data.core.se3 import Array
+from gen_data.traffic import idm, steering
 from gen_data.traffic.conflict_zones import Overlap, Zone, crosswalk_zones, find_overlaps, heading
-from gen_data.traffic.idm import Drivers
 from gen_data.traffic.lane_routes import STATION_M, LaneGraph, Route, points_at
-from gen_data.traffic.steering import Courses, follow_lines, normalize
 
 LOOKAHEAD_S, LOOKAHEAD_M = 0.6, (3.0, 10.0)
 """Lookahead of the steering: a time at the vehicle's speed, within bounds."""
@@ -98,11 +97,11 @@ class Vehicles:
     """
 
     vehicles: tuple[Vehicle, ...]
-    drivers: Drivers
+    drivers: idm.Drivers
     front_m: Array
     rear_m: Array
     first_m: Array
-    courses: Courses
+    courses: steering.Courses
     allowed_m_s: Array
     height_m: Array
     offset_m: Array
@@ -139,7 +138,7 @@ def make_vehicles(
     limits = np.stack([_speed_limits(graph, v, grid[:m]) for v in vehicles])
     limit_braking(limits)
     lookahead = np.clip(LOOKAHEAD_S * limits, *LOOKAHEAD_M) / STATION_M
-    courses = follow_lines(
+    courses = steering.follow_lines(
         lines[..., :2],
         np.array([v.xy_m for v in vehicles]),
         np.array([v.ahead for v in vehicles]),
@@ -186,7 +185,7 @@ def _followed_line(graph: LaneGraph, vehicle: Vehicle, grid: Array) -> Array:
     """Points [m, 3] that a vehicle follows: beside the middle of its lanes by ``left_m``."""
     points = points_at(graph, vehicle.route, vehicle.station_m + grid)
     if vehicle.left_m:
-        way = normalize(np.gradient(points[:, :2], axis=0))
+        way = steering.normalize(np.gradient(points[:, :2], axis=0))
         points[:, :2] += vehicle.left_m * np.column_stack([-way[:, 1], way[:, 0]])
     return points
 
@@ -199,13 +198,13 @@ def limit_braking(limits: Array) -> None:
         limits[:, k] = np.minimum(limits[:, k], reachable)
 
 
-def _end_m(vehicle: Vehicle, courses: Courses, k: int, obstacles: Array) -> float:
+def _end_m(vehicle: Vehicle, courses: steering.Courses, k: int, obstacles: Array) -> float:
     """Station at which a vehicle's front has to stop; ``inf`` = nowhere."""
     route_m = vehicle.route.end_m if vehicle.route.dead_end else math.inf
     return min(route_m, _free_station_m(vehicle, courses, k, obstacles))
 
 
-def _free_station_m(vehicle: Vehicle, courses: Courses, k: int, obstacles: Array) -> float:
+def _free_station_m(vehicle: Vehicle, courses: steering.Courses, k: int, obstacles: Array) -> float:
     """Station at which a vehicle's front has to stop for obstacles; ``inf`` = none."""
     xy, ahead = courses.xy_m[k], courses.ahead[k]
     half = np.array([0.5 * (vehicle.front_m + vehicle.rear_m), 0.5 * vehicle.width_m])
@@ -235,9 +234,9 @@ def _speed_limits(graph: LaneGraph, vehicle: Vehicle, grid: Array) -> Array:
     return np.minimum(speeds[np.maximum(at, 0)] * vehicle.speed_factor, vehicle.speed_max_m_s)
 
 
-def _drivers(vehicles: Sequence[Vehicle]) -> Drivers:
+def _drivers(vehicles: Sequence[Vehicle]) -> idm.Drivers:
     n = len(vehicles)
-    return Drivers(
+    return idm.Drivers(
         headway_s=np.array([v.headway_s for v in vehicles]),
         standstill_m=np.full(n, 2.0),
         acceleration_m_s2=np.array([v.acceleration_m_s2 for v in vehicles]),

@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from gen_data.core.colorimetry import luminance
+from gen_data.core import colorimetry, photometry
 from gen_data.core.errors import AssetError
-from gen_data.core.photometry import luminance_cd_m2
 from gen_data.core.scene import Environment, Light
 from gen_data.core.se3 import SE3, Array, Vec3
 from gen_data.usd.prims import along_minus_z, rotation_from_axes, set_transforms
@@ -42,11 +41,11 @@ def define_light(
         prim = UsdLux.RectLight.Define(stage, path)
         prim.CreateWidthAttr(light.size_m[0])
         prim.CreateHeightAttr(light.size_m[1])
-        prim.CreateIntensityAttr(luminance_cd_m2(light))
+        prim.CreateIntensityAttr(photometry.luminance_cd_m2(light))
     elif light.kind == "disk":
         prim = UsdLux.DiskLight.Define(stage, path)
         prim.CreateRadiusAttr(light.radius_m)
-        prim.CreateIntensityAttr(luminance_cd_m2(light))
+        prim.CreateIntensityAttr(photometry.luminance_cd_m2(light))
     else:
         radius_m = max(light.radius_m, RADIUS_M_MIN)
         prim = UsdLux.SphereLight.Define(stage, path)
@@ -221,7 +220,7 @@ def _light_pose(light: Light) -> SE3:
 def _read_color(lux: Any) -> tuple[Vec3, float]:
     """Read a colour, normalised to luminance 1 (Rec. 709), and the corresponding intensity."""
     red, green, blue = (float(c) for c in lux.GetColorAttr().Get())
-    relative = float(luminance(np.array([red, green, blue])))
+    relative = float(colorimetry.luminance(np.array([red, green, blue])))
     strength = float(lux.GetIntensityAttr().Get()) * 2.0 ** float(lux.GetExposureAttr().Get())
     if relative == 0.0:
         return (1.0, 1.0, 1.0), 0.0

@@ -6,9 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from gen_data.core.asset_types import Material
+from gen_data.core import asset_types, se3
 from gen_data.core.errors import AssetError
-from gen_data.core.se3 import Array, Vec3
 
 _IDENTITY = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 
@@ -34,7 +33,7 @@ class BoundMaterial:
     """
 
     name: str = ""
-    material: Material = field(default_factory=Material)
+    material: asset_types.Material = field(default_factory=asset_types.Material)
     texture: str = ""
     roughness_image: tuple[str, int] = ("", 0)
     metallic_image: tuple[str, int] = ("", 0)
@@ -45,7 +44,7 @@ class BoundMaterial:
     emission_image: str = ""
     cutoff: float = 0.5
     uv_name: str = "st"
-    uv_matrix: Array = field(default_factory=lambda: _IDENTITY)
+    uv_matrix: se3.Array = field(default_factory=lambda: _IDENTITY)
     color_name: str = ""
     unused: tuple[str, ...] = ()
 
@@ -108,7 +107,7 @@ def _read_preview_surface(name: str, surface: Any, where: str) -> BoundMaterial:
     # Glass states its refractive index; without one, opacity 0 hides a helper.
     hidden = opacity == 0.0 and _find_source(surface, "ior") == (None, None)
     present = hidden or _find_source(surface, "opacityMode")[0] == "presence"
-    material = Material(
+    material = asset_types.Material(
         base_color=_clamp_color(color),
         roughness=round(numbers["roughness"], 4),
         metallic=round(numbers["metallic"], 4),
@@ -186,7 +185,7 @@ def _read_number(
     return _read_scale(node)[channel], (_image_path(node, where), channel)
 
 
-def _read_color(surface: Any, name: str, default: Vec3, where: str) -> tuple[Vec3, Any]:
+def _read_color(surface: Any, name: str, default: se3.Vec3, where: str) -> tuple[se3.Vec3, Any]:
     """Read a colour input and the node of the image that it multiplies; None = no image."""
     value, node = _find_source(surface, name)
     if _is_image(node):
@@ -228,7 +227,7 @@ def _image_path(node: Any, where: str) -> str:
     return str(asset.resolvedPath)
 
 
-def _read_coordinates(image: Any) -> tuple[str, Array]:
+def _read_coordinates(image: Any) -> tuple[str, se3.Array]:
     """Primvar of an image's texture coordinates, and the affine map of its values."""
     matrix = _IDENTITY
     node = _find_source(image, "st")[1]
@@ -245,7 +244,7 @@ def _read_coordinates(image: Any) -> tuple[str, Array]:
     return str(_find_source(node, "varname")[0] or "st"), matrix
 
 
-def _clamp_color(color: Any) -> Vec3:
+def _clamp_color(color: Any) -> se3.Vec3:
     return (_clamp_unit(color[0]), _clamp_unit(color[1]), _clamp_unit(color[2]))
 
 

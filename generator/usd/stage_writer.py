@@ -20,15 +20,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from gen_data.core.asset_types import Material
+from gen_data.core import asset_types, se3
 from gen_data.core.scene import Body, Instance, Scene
-from gen_data.core.se3 import IDENTITY, SE3
 from gen_data.usd import cameras, prims
 from gen_data.usd.asset_layer import MESH, TextureFinder, bind_materials
 from gen_data.usd.lights import define_light, define_sky
 
 WORLD = "/World"
-Look = tuple[str, tuple[Material, ...]]
+Look = tuple[str, tuple[asset_types.Material, ...]]
 """Mesh asset, and materials; empty = the asset's own."""
 
 
@@ -46,7 +45,7 @@ class StageFiles:
     layer: Callable[[str], str]
     textures: TextureFinder
     panorama: Callable[[str], str]
-    materials: Callable[[str], tuple[Material, ...]]
+    materials: Callable[[str], tuple[asset_types.Material, ...]]
 
 
 def write_stage(
@@ -101,14 +100,14 @@ class _Writer:
         return f"{parent}/{prims.unique_name(name, self._taken.setdefault(parent, set()))}"
 
     def bodies(self, steps: Sequence[Scene]) -> None:
-        frames: dict[int, tuple[str, Sequence[SE3]]] = {}
+        frames: dict[int, tuple[str, Sequence[se3.SE3]]] = {}
         annotated = set()
         for k, instance in enumerate(steps[0].instances):
             poses = [step.instances[k].T_world_instance for step in steps]
             frames[instance.instance_id] = (self._instance(instance, poses), poses)
             if instance.annotated:
                 annotated.add(instance.instance_id)
-        still = (f"{WORLD}/Background", [IDENTITY] * len(steps))
+        still = (f"{WORLD}/Background", [se3.IDENTITY] * len(steps))
         for k, body in enumerate(steps[0].bodies):
             parent, parents = frames.get(body.instance_id, still)
             # Labelling tools do not enter shared instances.
@@ -116,7 +115,7 @@ class _Writer:
             at = [step.bodies[k] for step in steps]
             self._body(parent, parents, at, shared=shared)
 
-    def _instance(self, instance: Instance, poses: Sequence[SE3]) -> str:
+    def _instance(self, instance: Instance, poses: Sequence[se3.SE3]) -> str:
         from pxr import UsdSemantics
 
         path = self.path(WORLD, instance.name)
@@ -132,7 +131,7 @@ class _Writer:
         return path
 
     def _body(
-        self, parent: str, parents: Sequence[SE3], steps: Sequence[Body], *, shared: bool
+        self, parent: str, parents: Sequence[se3.SE3], steps: Sequence[Body], *, shared: bool
     ) -> None:
         from pxr import UsdGeom
 
@@ -175,7 +174,7 @@ class _Writer:
         else:
             prim.GetReferences().AddReference(self._files.layer(asset))
 
-    def _prototype(self, asset: str, materials: tuple[Material, ...]) -> str:
+    def _prototype(self, asset: str, materials: tuple[asset_types.Material, ...]) -> str:
         path = self.path(f"{WORLD}/Prototypes", asset.rpartition("/")[2])
         prim = self._stage.CreateClassPrim(path)
         prim.SetTypeName("Xform")

@@ -10,11 +10,10 @@ from pathlib import Path
 
 from gen_data.core import errors, interfaces
 from gen_data.exporters.sensor_selection import rgb_cameras
+from gen_data.lab.certificate import labelled_images, scoring
 from gen_data.lab.certificate.examined import Examined
 from gen_data.lab.certificate.finding import Contradictions, Figure, Finding, not_checked
-from gen_data.lab.certificate.labelled_images import LabelledImage, compare_images, image_of
 from gen_data.lab.certificate.readers import READERS, Reader
-from gen_data.lab.certificate.scoring import average_precision
 
 PERFECT = 1.0 - 1e-9
 """Average precision that rounding of sums leaves of 1."""
@@ -22,7 +21,7 @@ PERFECT = 1.0 - 1e-9
 
 def check_exports(examined: Examined) -> Iterator[Finding]:
     """Read every export of the data set."""
-    stated: list[LabelledImage] | None = None
+    stated: list[labelled_images.LabelledImage] | None = None
     for exporter in sorted(examined.config.exporters, key=lambda e: e.type):
         root = examined.stored.folder / exporter.type
         reader = READERS.get(exporter.type)
@@ -33,7 +32,7 @@ def check_exports(examined: Examined) -> Iterator[Finding]:
         if stated is None:
             cameras = rgb_cameras(examined.stored.info)
             stated = [
-                image_of(image, examined.photograph(image.index, image.camera))
+                labelled_images.image_of(image, examined.photograph(image.index, image.camera))
                 for image in examined.images()
                 if image.camera in cameras
             ]
@@ -56,7 +55,7 @@ def _unable(examined: Examined, exporter: interfaces.Exporter, reader: Reader | 
 
 
 def _check_export(
-    examined: Examined, root: Path, reader: Reader, stated: Sequence[LabelledImage]
+    examined: Examined, root: Path, reader: Reader, stated: Sequence[labelled_images.LabelledImage]
 ) -> Finding:
     contradictions = Contradictions()
     figures: dict[str, Figure] = {"reader": " ".join(f"{k} {v}" for k, v in _releases(reader))}
@@ -82,13 +81,13 @@ def _check_export(
 
 
 def _compare(
-    stated: Sequence[LabelledImage],
-    found: Sequence[LabelledImage],
+    stated: Sequence[labelled_images.LabelledImage],
+    found: Sequence[labelled_images.LabelledImage],
     reader: Reader,
     contradictions: Contradictions,
 ) -> dict[str, Figure]:
     """Compare images with the labels, and score them; adds contradictions, returns figures."""
-    for fact in compare_images(stated, found, reader.tolerance_px):
+    for fact in labelled_images.compare_images(stated, found, reader.tolerance_px):
         contradictions.add(fact)
     figures: dict[str, Figure] = {
         "images": len(found),
@@ -99,7 +98,7 @@ def _compare(
     for kind, noun in (("bbox", "boxes"), ("segm", "masks")):
         if kind == "segm" and not masked:
             continue
-        score = average_precision(found, stated, kind)  # type: ignore[arg-type]
+        score = scoring.average_precision(found, stated, kind)  # type: ignore[arg-type]
         figures[f"AP of {noun}"] = round(score, 6)
         if score < PERFECT:
             contradictions.add(f"labels as predictions: AP of {noun} {score:.4f}, expected 1")

@@ -20,10 +20,7 @@ from gen_data.core.se3 import Array
 from gen_data.lab.certificate.examined import Examined
 from gen_data.lab.certificate.finding import Finding, not_checked
 from gen_data.lab.certificate.ray_casting import Agreement, RayCaster, Seen, lets_light_through
-from gen_data.sensors.lidar.lidar_atmosphere import rain_noise_m
-from gen_data.sensors.lidar.lidar_sensor import LidarSensor
-from gen_data.sensors.lidar.pseudo_lidar import PseudoLidar
-from gen_data.sensors.lidar.scan_pattern import LidarModel
+from gen_data.sensors.lidar import lidar_atmosphere, lidar_sensor, pseudo_lidar, scan_pattern
 
 ELSEWHERE = tuple(SURFACES.index(name) for name in ("air", "mirrored"))
 """Surfaces of points at whose place there is nothing."""
@@ -64,9 +61,9 @@ def check_points(examined: Examined) -> Iterator[Finding]:
 
 def _unable(sensor: Sensor | None) -> str:
     """Why the points of a sensor cannot be compared; empty if they can."""
-    if isinstance(sensor, LidarSensor):
+    if isinstance(sensor, lidar_sensor.LidarSensor):
         return "its beams diverge: a point may be of any ray of its beam" * sensor.divergence
-    if isinstance(sensor, PseudoLidar):
+    if isinstance(sensor, pseudo_lidar.PseudoLidar):
         return ""
     return "a sensor of another package"
 
@@ -100,7 +97,9 @@ def _compare(
         caster = RayCaster(pulses.scene, examined.library, origin_m, passes)
         away = pulses.points_m - pulses.origins_m
         range_m = np.linalg.norm(away, axis=1)
-        rain_m = rain_noise_m(pulses.scene.weather.rain_mm_h, range_m.astype(np.float32))
+        rain_m = lidar_atmosphere.rain_noise_m(
+            pulses.scene.weather.rain_mm_h, range_m.astype(np.float32)
+        )
         noisy_m = NOISE_MAX * (noise_m + rain_m) if noise_m else np.zeros(1)
         tolerance_m = noisy_m + 0.5 * step_m + TOLERANCE_M + RELATIVE_TOLERANCE * range_m
         ids = points["instance_id"][pulses.which].astype(np.int64)
@@ -116,7 +115,7 @@ def _compare(
 
 def _spread_m(sensor: Sensor) -> tuple[float, float]:
     """Standard deviation and quantisation of a sensor's ranges [m]; 0 = none."""
-    if not isinstance(sensor, LidarSensor) or sensor.ideal:
+    if not isinstance(sensor, lidar_sensor.LidarSensor) or sensor.ideal:
         return 0.0, 0.0
     return sensor.device.range_noise_m, sensor.device.range_step_m
 
@@ -133,14 +132,14 @@ def _choose_pulses(
     timeline, points, count = examined.timeline(sample), cloud.points, examined.scope.rays
     middle = timeline.at(cloud.time_s)
     T_world_middle = middle.lidar(cloud.sensor).T_world_lidar
-    if isinstance(sensor, PseudoLidar):
+    if isinstance(sensor, pseudo_lidar.PseudoLidar):
         which = np.sort(rng.permutation(there)[:count])
         eye_m = middle.camera(sensor.camera).T_world_camera.translation_m
         at_m = T_world_middle.apply(points["position_m"][which].astype(np.float64))
         if len(which):
             yield Pulses(middle, which, np.broadcast_to(eye_m, at_m.shape), at_m)
         return
-    assert isinstance(sensor, LidarSensor)
+    assert isinstance(sensor, lidar_sensor.LidarSensor)
     moves = bool(sample.scene.tracks) and sensor.motion_distortion != "none"
     times_s = points["time_s"][there]
     chosen_s = rng.permutation(np.unique(times_s))[:INSTANTS] if moves else [None]
@@ -158,7 +157,7 @@ def _choose_pulses(
         yield Pulses(scene, which, T_world_lidar.apply(lasers_m), at_m)
 
 
-def laser_places_m(model: LidarModel, points: NDArray[np.void]) -> Array:
+def laser_places_m(model: scan_pattern.LidarModel, points: NDArray[np.void]) -> Array:
     """Where the beams of points leave the scanner, lidar frame of their instant [m], [n, 3].
 
     Lasers of a rotating scanner are at heights of their own, and beside its axis; its azimuth

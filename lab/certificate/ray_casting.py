@@ -15,10 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.core.asset_types import Material
-from gen_data.core.interfaces import AssetLibrary
+from gen_data.core import asset_types, interfaces, se3
 from gen_data.core.scene import Scene
-from gen_data.core.se3 import Array
 from gen_data.lab.certificate.finding import Contradictions, Finding, not_checked
 
 DISAGREEING_SHARE = 0.001
@@ -30,7 +28,7 @@ FALSE_ALARM = 1e-6
 CONFIDENCE = 0.99
 """Of the stated limit to the share of rays of the whole data set that disagree."""
 
-Passes = Callable[[Material], bool]
+Passes = Callable[[asset_types.Material], bool]
 """Whether rays may go through surfaces of a material."""
 
 
@@ -45,10 +43,10 @@ class Seen:
         reach: Farthest distance that would have been stated.
     """
 
-    distance: Array
-    tolerance: Array
+    distance: se3.Array
+    tolerance: se3.Array
     instance_id: NDArray[np.int64]
-    reach: Array
+    reach: se3.Array
 
 
 @dataclass
@@ -111,7 +109,7 @@ class RayCaster:
     """
 
     def __init__(
-        self, scene: Scene, library: AssetLibrary, origin_m: Array, passes: Passes
+        self, scene: Scene, library: interfaces.AssetLibrary, origin_m: se3.Array, passes: Passes
     ) -> None:
         try:
             open3d: Any = import_module("open3d")
@@ -135,7 +133,7 @@ class RayCaster:
         self._first_face = np.cumsum([0, *map(len, passable)])[:-1]
         self._passable = np.concatenate(passable) if passable else np.zeros(0, bool)
 
-    def agrees(self, origins_m: Array, directions: Array, seen: Seen) -> NDArray[np.bool_]:
+    def agrees(self, origins_m: se3.Array, directions: se3.Array, seen: Seen) -> NDArray[np.bool_]:
         """Whether surfaces that rays cross are what a data set says, bool [n].
 
         A ray agrees if one of the surfaces that it can reach is at the stated distance and belongs
@@ -160,8 +158,8 @@ class RayCaster:
         return np.asarray(met | (vacant & ~stopped), np.bool_)
 
     def _crossings(
-        self, origins_m: Array, directions: Array
-    ) -> tuple[NDArray[np.intp], Array, NDArray[np.int64], NDArray[np.bool_]]:
+        self, origins_m: se3.Array, directions: se3.Array
+    ) -> tuple[NDArray[np.intp], se3.Array, NDArray[np.int64], NDArray[np.bool_]]:
         """All crossings, ordered by ray and distance.
 
         Number of the ray, distance, instance id, and whether nothing passes, [crossings] each.
@@ -185,10 +183,10 @@ def _solids_before(ray: NDArray[np.intp], solid: NDArray[np.bool_]) -> NDArray[n
     return np.asarray(total - total[first], np.intp)
 
 
-def has_holes(library: AssetLibrary) -> Passes:
+def has_holes(library: interfaces.AssetLibrary) -> Passes:
     """Whether the texture of a material has holes, which labels of cameras go through."""
 
-    def passes(material: Material) -> bool:
+    def passes(material: asset_types.Material) -> bool:
         return bool(material.texture) and library.texture(material.texture).alpha is not None
 
     return passes
@@ -198,11 +196,11 @@ GLASS = "glass"
 """Role of panes that stop what is seen and let laser light through; house windows do not."""
 
 
-def lets_light_through(library: AssetLibrary) -> Passes:
+def lets_light_through(library: interfaces.AssetLibrary) -> Passes:
     """Whether a laser may go through a material: panes, other clear ones, textures with holes."""
     holes = has_holes(library)
 
-    def passes(material: Material) -> bool:
+    def passes(material: asset_types.Material) -> bool:
         clear = material.transmission > 0.0 or material.opacity < 1.0
         return clear or material.role == GLASS or holes(material)
 

@@ -11,8 +11,7 @@ from gen_data.core.se3 import Array
 from gen_data.lab.matching import indirect_inference, recordings, results
 from gen_data.lab.matching.descriptions import PICTURES
 from gen_data.lab.matching.picture import Picture
-from gen_data.lab.matching.quantities import CAMERA, CameraQuantity, jpeg_quality
-from gen_data.lab.matching.quantities.base import FieldChange, round_digits, typical
+from gen_data.lab.matching.quantities import CAMERA, CameraQuantity, base, jpeg_quality
 from gen_data.lab.matching.quantities.noise import NOISE
 from gen_data.lab.matching.quantities.read_noise import READ_NOISE
 from gen_data.lab.matching.simulation import Exposure, map_in_threads, measure_exposures, photograph
@@ -99,7 +98,7 @@ def fit_camera(
 
 def _field(sensor: int, key: str, value: Any, row: results.FittedQuantity) -> results.FittedField:
     return results.FittedField(
-        FieldChange("sensors", sensor, f"image_pipeline.{key}", value), (row,)
+        base.FieldChange("sensors", sensor, f"image_pipeline.{key}", value), (row,)
     )
 
 
@@ -108,7 +107,7 @@ def _fit_jpeg(pipeline: ImagePipeline, qualities: Array) -> results.FittedQuanti
     known = qualities[np.isfinite(qualities)]
     named = (jpeg_quality.NAME, jpeg_quality.UNIT, jpeg_quality.PATH, jpeg_quality.STATISTIC)
     own = pipeline.jpeg_quality
-    before = None if own is None else typical(own)
+    before = None if own is None else base.typical(own)
     missing = len(qualities) - len(known)
     note = f"no compression found in {missing} of {len(qualities)}" if missing else ""
     if 2 * len(known) <= len(qualities):
@@ -167,13 +166,13 @@ def _unmeasurable(
 def _distribution(quantity: CameraQuantity, found: indirect_inference.Estimate) -> Any:
     """YAML of a fitted parameter: a number, or a clipped normal distribution."""
     mean = quantity.to_value(found.mean)
-    stddev = round_digits(results.spread_of(found, quantity.to_value))
+    stddev = base.round_digits(results.spread_of(found, quantity.to_value))
     if not quantity.axis.varies or stddev <= 0.0:
-        return round_digits(mean)
+        return base.round_digits(mean)
     lowest, highest = (quantity.to_value(v) for v in (quantity.axis.low, quantity.axis.high))
     clip = max(mean - CLIP * stddev, lowest), min(mean + CLIP * stddev, highest)
-    bounds = [round_digits(v) for v in clip]
-    return {"normal": {"mean": round_digits(mean), "stddev": stddev, "clip": bounds}}
+    bounds = [base.round_digits(v) for v in clip]
+    return {"normal": {"mean": base.round_digits(mean), "stddev": stddev, "clip": bounds}}
 
 
 def _compare(

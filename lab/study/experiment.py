@@ -20,12 +20,9 @@ from typing import Any
 from gen_data.api.config import load_config
 from gen_data.api.dataset import Dataset
 from gen_data.api.generate import generate
-from gen_data.core.distribution import install_command
+from gen_data.core import distribution, serialization, streams, system_calls
 from gen_data.core.errors import ConfigError, SampleError, StorageError, list_names
 from gen_data.core.processes import SINGLE_THREADED, interrupts_blocked, tie
-from gen_data.core.serialization import canonical_json
-from gen_data.core.streams import Streams
-from gen_data.core.system_calls import usable_cores
 from gen_data.lab.study.real_pictures import RealPicture, RealSet, check_judges, read_real
 from gen_data.runner.durable_files import write_durably
 
@@ -98,7 +95,7 @@ class Prepared:
     def training_pictures(self, count: int, seed: int) -> tuple[RealPicture, ...]:
         """The first of the pictures that are kept for training, in an order drawn by the seed."""
         kept, _ = self._divide()
-        order = Streams(seed, 0).rng("study/training").permutation(len(kept))
+        order = streams.Streams(seed, 0).rng("study/training").permutation(len(kept))
         return tuple(kept[number] for number in order[:count])
 
     def judged_pictures(self) -> tuple[RealPicture, ...]:
@@ -107,7 +104,7 @@ class Prepared:
 
     def _divide(self) -> tuple[tuple[RealPicture, ...], tuple[RealPicture, ...]]:
         pictures, count = self.real.pictures, self.experiment.real_count()
-        order = Streams(0, 0).rng("study/kept").permutation(len(pictures))
+        order = streams.Streams(0, 0).rng("study/kept").permutation(len(pictures))
         chosen = set(order[:count].tolist())
         numbered = list(enumerate(pictures))
         return (
@@ -147,7 +144,9 @@ def require_torch(command: str) -> None:
     The extra ``all`` leaves it out: it is larger than everything else together.
     """
     if find_spec("torch") is None:
-        raise ConfigError(f"{command} needs the package torch: {install_command('study')}")
+        raise ConfigError(
+            f"{command} needs the package torch: {distribution.install_command('study')}"
+        )
 
 
 def prepare(experiment: Experiment) -> Prepared:
@@ -216,7 +215,7 @@ def perform(
     missing = [run for run in runs if not run.is_done]
     if len(missing) < len(runs):
         report(f"{len(runs) - len(missing)} of {len(runs)} runs were done before")
-    count = usable_cores() if workers is None else max(workers, 1)
+    count = system_calls.usable_cores() if workers is None else max(workers, 1)
     for first in range(0, len(missing), count):
         together = missing[first : first + count]
         for run in together:
@@ -244,7 +243,7 @@ def _claim(prepared: Prepared, out: Path) -> None:
         ],
         "classes": list(prepared.classes),
         "pictures": hashlib.sha256(
-            canonical_json([
+            serialization.canonical_json([
                 [p.image_id, p.path.name, p.size_px, [asdict(thing) for thing in p.objects]]
                 for p in prepared.real.pictures
             ]).encode()
@@ -268,7 +267,7 @@ def _claim(prepared: Prepared, out: Path) -> None:
 
 def _digest(variant: Variant) -> str:
     loaded = load_config(variant.config, overrides=variant.overrides, without=variant.without)
-    return hashlib.sha256(canonical_json(loaded.resolved).encode()).hexdigest()
+    return hashlib.sha256(serialization.canonical_json(loaded.resolved).encode()).hexdigest()
 
 
 def _generate(

@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gen_data.lab.matching.label_files import Box, RealObject
-from gen_data.lab.study.evaluation import Evaluation, Match
-from gen_data.lab.study.real_pictures import RealPicture, read_image
+from gen_data.lab.study import evaluation, real_pictures
 
 SMALL_PX2, LARGE_PX2 = 32**2, 96**2
 """Bounds of COCO's areas."""
@@ -36,7 +35,7 @@ Groups = Mapping[tuple[str, str], Share]
 """Shares by kind of group and group: ``("size", "small")``."""
 
 
-def count_groups(runs: Sequence[Evaluation]) -> Groups:
+def count_groups(runs: Sequence[evaluation.Evaluation]) -> Groups:
     """Found and all objects of every group, summed over runs on the same pictures."""
     counts: dict[tuple[str, str], list[int]] = defaultdict(lambda: [0, 0])
     for run in runs:
@@ -49,7 +48,7 @@ def count_groups(runs: Sequence[Evaluation]) -> Groups:
     return {group: Share(*pair) for group, pair in sorted(counts.items())}
 
 
-def worst_pictures(runs: Sequence[Evaluation], most: int) -> list[tuple[int, int]]:
+def worst_pictures(runs: Sequence[evaluation.Evaluation], most: int) -> list[tuple[int, int]]:
     """Numbers of the pictures with most misses and false alarms per run, and their sums."""
     faults: dict[int, int] = defaultdict(int)
     for run in runs:
@@ -59,9 +58,9 @@ def worst_pictures(runs: Sequence[Evaluation], most: int) -> list[tuple[int, int
     return [(number, count) for number, count in ranked[:most] if count]
 
 
-def draw_faults(run: Evaluation, number: int) -> NDArray[np.uint8]:
+def draw_faults(run: evaluation.Evaluation, number: int) -> NDArray[np.uint8]:
     """A picture with the objects that were found and missed, and the false alarms; RGB."""
-    image = read_image(run.pictures[number].path)
+    image = real_pictures.read_image(run.pictures[number].path)
     # Small pictures are enlarged: lines must not hide what they mark.
     scale = SHOWN_PX / max(image.shape[:2])
     filter_ = cv2.INTER_AREA if scale < 1.0 else cv2.INTER_LINEAR
@@ -74,14 +73,14 @@ def draw_faults(run: Evaluation, number: int) -> NDArray[np.uint8]:
     return np.asarray(shown, np.uint8)
 
 
-def _look(match: Match) -> tuple[Box, tuple[int, int, int]]:
+def _look(match: evaluation.Match) -> tuple[Box, tuple[int, int, int]]:
     if match.thing is not None:
         return match.thing.box, FOUND if match.box is not None else MISSED
     assert match.box is not None, "a false alarm has a box"
     return match.box, ALARM
 
 
-def _groups(picture: RealPicture, thing: RealObject) -> Iterator[tuple[str, str]]:
+def _groups(picture: real_pictures.RealPicture, thing: RealObject) -> Iterator[tuple[str, str]]:
     x0, y0, x1, y1 = thing.box
     area_px2 = (x1 - x0) * (y1 - y0)
     yield "class", thing.name
@@ -103,4 +102,4 @@ def _mean_luma(path: Path, box: Box) -> float:
 
 @lru_cache(256)
 def _luma(path: Path) -> NDArray[np.uint8]:
-    return np.asarray(cv2.cvtColor(read_image(path), cv2.COLOR_RGB2GRAY), np.uint8)
+    return np.asarray(cv2.cvtColor(real_pictures.read_image(path), cv2.COLOR_RGB2GRAY), np.uint8)

@@ -12,13 +12,8 @@ from numpy.typing import NDArray
 from gen_data.assets.asset_folder import Folder
 from gen_data.assets.folder_index import LevelHorizon, PlateEntry, PlateLane
 from gen_data.assets.image_decoding import decode_image
+from gen_data.assets.plates import vanishing_points
 from gen_data.assets.plates.surroundings import surroundings
-from gen_data.assets.plates.vanishing_points import (
-    CameraEstimate,
-    NoHorizonError,
-    estimate_camera,
-    find_edges,
-)
 from gen_data.core import asset_types, colorimetry, errors, intrinsics, plates, scene, se3
 
 _EXIF_IFD, _FOCAL_35MM = 0x8769, 0xA405
@@ -79,7 +74,7 @@ def _focal_px(entry: PlateEntry, data: bytes, width_px: int, height_px: int) -> 
 
 def _find_zenith(
     entry: PlateEntry, rgb: asset_types.UInt8, focal_px: float | None
-) -> tuple[NDArray[np.float64], float, CameraEstimate | None]:
+) -> tuple[NDArray[np.float64], float, vanishing_points.CameraEstimate | None]:
     """Zenith in the camera frame, focal length, and the estimate if the horizon is one.
 
     Raises:
@@ -89,8 +84,8 @@ def _find_zenith(
     horizon = entry.horizon
     if horizon is None:
         try:
-            found = estimate_camera(find_edges(rgb), focal_px)
-        except NoHorizonError as error:
+            found = vanishing_points.estimate_camera(vanishing_points.find_edges(rgb), focal_px)
+        except vanishing_points.NoHorizonError as error:
             given = "" if focal_px is not None else " and hfov_deg"
             raise ValueError(
                 f"no horizon was found: {error}; give horizon, two of its points or its "

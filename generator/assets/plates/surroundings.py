@@ -13,8 +13,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 
-from gen_data.core.asset_types import Float32, UInt8
-from gen_data.core.colorimetry import luminance, srgb_decode
+from gen_data.core import asset_types, colorimetry
 from gen_data.core.plates import Plate, ground_illuminance
 from gen_data.core.se3 import Array
 
@@ -26,24 +25,24 @@ _FADE = 0.5
 photograph's height."""
 
 
-def surroundings(plate: Plate, rgb: UInt8) -> tuple[Plate, Float32]:
+def surroundings(plate: Plate, rgb: asset_types.UInt8) -> tuple[Plate, asset_types.Float32]:
     """The plate with the luminance of its surroundings, and these, [64, 128, 3], of mean 1."""
     polar = math.pi * (np.arange(_ROWS) + 0.5) / _ROWS
     azimuth = math.pi - math.pi * (np.arange(2 * _ROWS) + 0.5) / _ROWS
     image = _continue(plate, rgb, polar, azimuth)
     image = _match_ground(image, polar, plate)
     weights = np.sin(polar)[:, None]
-    level = luminance(image)
+    level = colorimetry.luminance(image)
     mean = float((level * weights).sum() / (weights.sum() * level.shape[1]))
     return replace(plate, sky_mean=round(mean, 9)), (image / mean).astype(np.float32)
 
 
-def _continue(plate: Plate, rgb: UInt8, polar: Array, azimuth: Array) -> Array:
+def _continue(plate: Plate, rgb: asset_types.UInt8, polar: Array, azimuth: Array) -> Array:
     """Linear colours in all directions, [rows, columns, 3]."""
     width_px, height_px = plate.size_px
     scale = min(_SMALL_PX / max(plate.size_px), 1.0)
     size = (max(round(width_px * scale), 1), max(round(height_px * scale), 1))
-    small = srgb_decode(cv2.resize(rgb, size, interpolation=cv2.INTER_AREA) / 255.0)
+    small = colorimetry.srgb_decode(cv2.resize(rgb, size, interpolation=cv2.INTER_AREA) / 255.0)
     half = math.atan(0.5 * width_px / plate.focal_px)
     # A triangle wave: azimuths beyond the borders are mirrored back into the photograph.
     folded = np.abs((azimuth + half) % (4.0 * half) - 2.0 * half) - half
@@ -79,6 +78,6 @@ def _match_ground(image: Array, polar: Array, plate: Plate) -> Array:
     share = 1.0 - (plate.sun.share if plate.sun else 0.0)
     cosines = np.maximum(np.cos(polar), 0.0)[:, None]
     texel = np.sin(polar)[:, None] * (math.pi / len(polar)) ** 2
-    raw = float((luminance(image) * cosines * texel).sum())
+    raw = float((colorimetry.luminance(image) * cosines * texel).sum())
     factor = max(share, 1e-3) * ground_illuminance(plate) / raw
     return np.where(np.cos(polar)[:, None, None] > 0.0, image * factor, image)

@@ -10,15 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gen_data.core.kinematics import (
-    all_positions,
-    arm_joints,
-    finger_links,
-    gripper_opening,
-    link_poses,
-    position_limits,
-)
-from gen_data.core.scene import BodyJoint
+from gen_data.core import kinematics, scene
 from gen_data.core.se3 import SE3, Array
 from gen_data.physics.manipulation import demonstration, measures
 from gen_data.physics.manipulation.arm_goals import Arm
@@ -65,7 +57,7 @@ class SimulatedBodies:
     """
 
     loose: tuple[str, ...]
-    joints: Mapping[str, BodyJoint]
+    joints: Mapping[str, scene.BodyJoint]
     obstacles: tuple[str, ...]
     held: str = ""
 
@@ -93,16 +85,16 @@ class ArmSimulation:
         self, arm: Arm, world: World, bodies: SimulatedBodies, servo: Servo, time_step_s: float
     ) -> None:
         robot, start = arm.robot, arm.articulation.joint_positions
-        joints = arm_joints(robot)
+        joints = kinematics.arm_joints(robot)
         at = dict(zip((j.name for j in robot.movable), start, strict=True))
         self._arm, self._world, self._bodies = arm, world, bodies
         self._servo, self._step_s = servo, time_step_s
-        self._fingers = [arm.body(k) for k in finger_links(robot) if k in arm.links]
-        self.limits = np.array([position_limits(joint, robot) for joint in joints]).T
+        self._fingers = [arm.body(k) for k in kinematics.finger_links(robot) if k in arm.links]
+        self.limits = np.array([kinematics.position_limits(joint, robot) for joint in joints]).T
         self.speeds_max = np.array([speed_max(joint) for joint in joints])
         self.positions = np.array([at[joint.name] for joint in joints])
         self.speeds = np.zeros(len(joints))
-        self.opening = gripper_opening(robot, start)
+        self.opening = kinematics.gripper_opening(robot, start)
         self._finger_speed = _opening_speed(arm)
         self.held, self.is_blocked = bodies.held, False
         self._T_grasp_held = SE3()
@@ -114,7 +106,7 @@ class ArmSimulation:
     @property
     def joint_positions(self) -> tuple[float, ...]:
         """Positions of all movable joints of the robot [rad or m]."""
-        return all_positions(self._arm.robot, self.positions.tolist(), self.opening)
+        return kinematics.all_positions(self._arm.robot, self.positions.tolist(), self.opening)
 
     @property
     def T_world_grasp(self) -> SE3:  # noqa: N802
@@ -152,7 +144,9 @@ class ArmSimulation:
             if name == self.held or demonstration.has_moved(before, now):
                 self._poses = {**self._poses, name: now}
         arm = self._arm
-        links = link_poses(arm.robot, arm.articulation.T_world_base, self.joint_positions)
+        links = kinematics.link_poses(
+            arm.robot, arm.articulation.T_world_base, self.joint_positions
+        )
         return {**self._poses, **{arm.body(k): pose.rounded() for k, pose in links.items()}}
 
     def proximity_m(self, limit_m: float) -> float:

@@ -14,10 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gen_data.core.errors import Rejection
-from gen_data.core.kinematics import finger_links
-from gen_data.core.scene import BodyJoint, Condition, ContactSpan, Episode, Span
-from gen_data.core.se3 import SE3, Vec3
+from gen_data.core import errors, kinematics, scene, se3
 from gen_data.physics.manipulation import arm_goals, manipulation_planner, measures, suction
 from gen_data.physics.manipulation.joint_trajectories import STEP_S, Held, Leg, smooth_step
 from gen_data.physics.world import Contact, World
@@ -38,7 +35,7 @@ _SETTLE_S = 0.6
 
 def demonstrate(
     planner: manipulation_planner.TaskPlanner, arm: arm_goals.Arm, world: World, time_step_s: float
-) -> Demonstration | Rejection:
+) -> Demonstration | errors.Rejection:
     """Plan and carry out the task of an arm goal by goal; each plan starts from what physics left.
 
     A failure that was asked for befalls the first grasp. It is no reason to stop: the arm goes on
@@ -57,11 +54,11 @@ def demonstrate(
         fails = goal is first_grasp
         if assignment.failure == "collision" and fails:
             blow = planner.plan_blow(goal, number)
-            if isinstance(blow, Rejection):
+            if isinstance(blow, errors.Rejection):
                 return blow
             shown.run(blow, "approach")
         legs = planner.plan_goal(goal, number)
-        if isinstance(legs, Rejection):
+        if isinstance(legs, errors.Rejection):
             return legs
         if assignment.failure == "miss" and fails:
             legs = _without_approach(legs)
@@ -71,14 +68,14 @@ def demonstrate(
     shown.settle()
     failed = shown.failed_conditions()
     if assignment.failure and not failed:
-        return Rejection(
+        return errors.Rejection(
             f"task '{assignment.name}': it succeeds in spite of a {assignment.failure}",
             "fewer failures, or another task",
         )
     if failed and not assignment.failure:
         first = failed[0]
         between = f" to '{first.other}'" if first.other else ""
-        return Rejection(
+        return errors.Rejection(
             f"task '{assignment.name}': after the demonstration, {first.measure} of "
             f"'{first.body}'{between} is {shown.value_at_end(first):.3f}",
             f"other places of the things of task '{assignment.name}', or another task",
@@ -107,7 +104,7 @@ class Demonstration:
     """
 
     def __init__(
-        self, arm: arm_goals.Arm, world: World, loose: Mapping[str, SE3], time_step_s: float
+        self, arm: arm_goals.Arm, world: World, loose: Mapping[str, se3.SE3], time_step_s: float
     ) -> None:
         assignment = arm.articulation.assignment
         assert assignment is not None
@@ -119,12 +116,12 @@ class Demonstration:
         self._values: list[tuple[float, ...]] = []
         self._phases: list[str] = []
         self._held: list[str] = []
-        self._contacts: list[dict[str, tuple[float, Vec3]]] = []
+        self._contacts: list[dict[str, tuple[float, se3.Vec3]]] = []
         self._torn = ""
-        self._fingers = [arm.body(k) for k in finger_links(arm.robot) if k in arm.links]
+        self._fingers = [arm.body(k) for k in kinematics.finger_links(arm.robot) if k in arm.links]
         self._first_held = ""
         self.legs: list[Leg] = []
-        self.poses: list[dict[str, SE3]] = []
+        self.poses: list[dict[str, se3.SE3]] = []
 
     def run(self, legs: Sequence[Leg], phase: str) -> None:
         """Carry out timed legs from where the latest ones ended."""
@@ -166,10 +163,10 @@ class Demonstration:
         last = self.legs[-1]
         self.run([Leg(last.end, last.end, _SETTLE_S, last.held)], "settle")
 
-    def episode(self, start_s: float) -> Episode:
+    def episode(self, start_s: float) -> scene.Episode:
         """What happened, and whether it is a success, at times from ``start_s`` on."""
         succeeded = not self.failed_conditions()
-        return Episode(
+        return scene.Episode(
             succeeded,
             "" if succeeded else self._assignment.failure,
             tuple(_spans(self._phases, start_s)),
@@ -177,7 +174,7 @@ class Demonstration:
             tuple(self._contact_spans(start_s)),
         )
 
-    def failed_conditions(self) -> list[Condition]:
+    def failed_conditions(self) -> list[scene.Condition]:
         """The conditions of success that do not hold."""
         return [
             condition
@@ -188,7 +185,7 @@ class Demonstration:
             )
         ]
 
-    def value_at_end(self, condition: Condition) -> float:
+    def value_at_end(self, condition: scene.Condition) -> float:
         """Value of a condition of success at the latest knot."""
         return self._values[-1][self._assignment.success.index(condition)]
 
@@ -235,7 +232,7 @@ class Demonstration:
         hand = np.array(self._arm.grasp_pose(positions).translation_m)
         self._values.append(tuple(self._measures.value(c, hand) for c in self._assignment.success))
 
-    def _touching(self, held: str, before: Mapping[str, SE3]) -> Iterator[Contact]:
+    def _touching(self, held: str, before: Mapping[str, se3.SE3]) -> Iterator[Contact]:
         """Contacts of two bodies, one of which moves or is of the arm."""
         moving = {n for n, pose in self.poses[-1].items() if pose != before[n]} | {held}
         moving |= {self._arm.body(link) for link in self._arm.moving}
@@ -251,32 +248,32 @@ class Demonstration:
             if contact.gap_m < _TOUCH_M and not own and (one in moving or other in moving):
                 yield contact
 
-    def _contact_spans(self, start_s: float) -> Iterator[ContactSpan]:
+    def _contact_spans(self, start_s: float) -> Iterator[scene.ContactSpan]:
         for pair in sorted({pair for contacts in self._contacts for pair in contacts}):
             seen = [pair if pair in contacts else "" for contacts in self._contacts]
             for span in (span for span in _spans(seen, start_s) if span.label):
                 first, end = (round((t - start_s) / STEP_S) for t in (span.start_s, span.end_s))
                 values = [c[pair] for c in self._contacts[first:end] if pair in c]
                 forces, points = zip(*values, strict=True)
-                yield ContactSpan(pair, span.start_s, span.end_s, STEP_S, forces, points)
+                yield scene.ContactSpan(pair, span.start_s, span.end_s, STEP_S, forces, points)
 
-    def _middle_m(self, link: str) -> Vec3:
+    def _middle_m(self, link: str) -> se3.Vec3:
         low, high = self._world.bounds_m(link)
         x, y, z = (0.5 * (low + high)).tolist()
         return (x, y, z)
 
 
-def _finger_joint(held: Held) -> BodyJoint:
+def _finger_joint(held: Held) -> scene.BodyJoint:
     """The joint that a held body turns about: the line between the fingers."""
     T_held_grasp = held.T_grasp_held.inverse()
     x, y, z = T_held_grasp.rotate(np.array([0.0, 1.0, 0.0])).tolist()
     anchor_m = T_held_grasp.translation_m
-    return BodyJoint(
+    return scene.BodyJoint(
         held.body, "revolute", (x, y, z), anchor_m, -math.pi, math.pi, _PAD_FRICTION_N_M
     )
 
 
-def _sum_contacts(contacts: Iterable[Contact]) -> dict[str, tuple[float, Vec3]]:
+def _sum_contacts(contacts: Iterable[Contact]) -> dict[str, tuple[float, se3.Vec3]]:
     """Sum of forces [N] and middle of the points [m] of every pair of bodies."""
     points: dict[str, list[Contact]] = {}
     for contact in contacts:
@@ -288,18 +285,18 @@ def _sum_contacts(contacts: Iterable[Contact]) -> dict[str, tuple[float, Vec3]]:
     return summed
 
 
-def has_moved(one: SE3, other: SE3) -> bool:
+def has_moved(one: se3.SE3, other: se3.SE3) -> bool:
     """Whether two poses of a body differ by more than the simulator's noise."""
     cosine = sum(a * b for a, b in zip(one.quaternion_wxyz, other.quaternion_wxyz, strict=True))
     turned = 2.0 * math.sqrt(max(0.0, 2.0 * (1.0 - abs(cosine)))) > _STILL_RAD
     return turned or math.dist(one.translation_m, other.translation_m) > _STILL_M
 
 
-def _spans(labels: Sequence[str], start_s: float) -> Iterator[Span]:
+def _spans(labels: Sequence[str], start_s: float) -> Iterator[scene.Span]:
     """Runs of equal labels; label k holds during the step up to knot k."""
     first = 0
     for k in range(1, len(labels) + 1):
         if k == len(labels) or labels[k] != labels[first]:
             low_s, high_s = start_s + first * STEP_S, start_s + k * STEP_S
-            yield Span(labels[first], round(low_s, 6), round(high_s, 6))
+            yield scene.Span(labels[first], round(low_s, 6), round(high_s, 6))
             first = k

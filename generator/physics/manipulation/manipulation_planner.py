@@ -6,18 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from gen_data.core.errors import Rejection
-from gen_data.core.kinematics import (
-    all_positions,
-    gripper_opening,
-    is_within_limits,
-    round_positions,
-)
-from gen_data.core.scene import ArmGoal, SupportSurface
+from gen_data.core import errors, kinematics, scene
 from gen_data.core.se3 import SE3, Vec3
-from gen_data.physics.manipulation.arm_goals import Arm, ArmState
+from gen_data.physics.manipulation import arm_goals, grasping
 from gen_data.physics.manipulation.continuous_collision import ITSELF, Obstacles
-from gen_data.physics.manipulation.grasping import Grasp, Hand
 from gen_data.physics.manipulation.joint_trajectories import Held, Leg, limit_speed, time_leg
 from gen_data.physics.manipulation.motion_planner import MotionPlanner, Positions
 from gen_data.physics.settling import home_surface, is_within
@@ -77,12 +69,12 @@ class TaskPlanner:
 
     def __init__(
         self,
-        arm: Arm,
-        state: ArmState,
+        arm: arm_goals.Arm,
+        state: arm_goals.ArmState,
         world: World,
         fixed: Sequence[str],
         resting: Mapping[str, SE3],
-        surfaces: Sequence[SupportSurface],
+        surfaces: Sequence[scene.SupportSurface],
     ) -> None:
         self._arm = arm
         self._world = world
@@ -90,7 +82,7 @@ class TaskPlanner:
         self._surfaces = surfaces
         self._motion = MotionPlanner(arm, world)
         gripper = arm.robot.gripper
-        self._hand = Hand(arm.robot, gripper, world, arm.body) if gripper else None
+        self._hand = grasping.Hand(arm.robot, gripper, world, arm.body) if gripper else None
         self.positions = state.positions
         self.resting = dict(resting)
         goal = arm.articulation.goal
@@ -98,18 +90,18 @@ class TaskPlanner:
         self._held = self._initial_held(held, state) if held else None
         self.resting.pop(held, None)
 
-    def plan(self) -> list[Leg] | Rejection:
+    def plan(self) -> list[Leg] | errors.Rejection:
         """Timed legs to all goals, in order, or the reason why one cannot be accomplished."""
         legs: list[Leg] = []
         for number, goal in enumerate(self._arm.articulation.task, 1):
             planned = self.plan_goal(goal, number)
-            if isinstance(planned, Rejection):
+            if isinstance(planned, errors.Rejection):
                 return planned
             legs += planned
         self._restore_world()
         return legs
 
-    def plan_goal(self, goal: ArmGoal, number: int) -> list[Leg] | Rejection:
+    def plan_goal(self, goal: scene.ArmGoal, number: int) -> list[Leg] | errors.Rejection:
         """Timed legs to the next goal, or the reason why it cannot be accomplished.
 
         Args:
@@ -118,7 +110,7 @@ class TaskPlanner:
         """
         self._restore_world()
         planned = self._plan_untimed(goal, number)
-        if isinstance(planned, Rejection):
+        if isinstance(planned, errors.Rejection):
             return planned
         legs = [time_leg(leg, self._arm.robot, goal.speed) for leg in planned]
         if goal.touches and self._held is None and not _only_rises(goal):
@@ -137,7 +129,7 @@ class TaskPlanner:
             moved = T_grasp_world @ poses[self._held.body]
             self._held = replace(self._held, T_grasp_held=moved)
 
-    def plan_blow(self, goal: ArmGoal, number: int) -> list[Leg] | Rejection:
+    def plan_blow(self, goal: scene.ArmGoal, number: int) -> list[Leg] | errors.Rejection:
         """Timed legs of a closed hand that knock away the first object of a grasp.
 
         They come down beside it, pass through its place and rise; of several directions the first
@@ -149,7 +141,7 @@ class TaskPlanner:
             legs: list[Leg] = []
             for blow in self._blow_goals(goal, 2.0 * math.pi * k / _BLOWS_MAX):
                 planned = self.plan_goal(blow, number)
-                if isinstance(planned, Rejection):
+                if isinstance(planned, errors.Rejection):
                     refused = planned
                     break
                 legs += planned
@@ -158,7 +150,7 @@ class TaskPlanner:
         self.positions = start
         return refused
 
-    def _blow_goals(self, goal: ArmGoal, yaw_rad: float) -> list[ArmGoal]:
+    def _blow_goals(self, goal: scene.ArmGoal, yaw_rad: float) -> list[scene.ArmGoal]:
         body = goal.objects[0]
         self._restore_world()
         low, high = self._world.bounds_m(body)
@@ -171,10 +163,10 @@ class TaskPlanner:
         rise = SE3((0.0, 0.0, 1.5 * _APPROACH_M))
         ahead = (turn @ SE3((way_m + 0.5 * _BLOW_M, 0.0, 0.0))).translation_m
         return [
-            ArmGoal("reach", pose_candidates=(place,), gripper_opening=0.0, speed=goal.speed),
-            ArmGoal("move", waypoints=(SE3((0.0, 0.0, -_APPROACH_M)),), speed=goal.speed),
-            ArmGoal("move", waypoints=(SE3(ahead),), touches=(body,), speed=goal.speed),
-            ArmGoal("move", waypoints=(rise,), touches=(body,), speed=goal.speed),
+            scene.ArmGoal("reach", pose_candidates=(place,), gripper_opening=0.0, speed=goal.speed),
+            scene.ArmGoal("move", waypoints=(SE3((0.0, 0.0, -_APPROACH_M)),), speed=goal.speed),
+            scene.ArmGoal("move", waypoints=(SE3(ahead),), touches=(body,), speed=goal.speed),
+            scene.ArmGoal("move", waypoints=(rise,), touches=(body,), speed=goal.speed),
         ]
 
     def all_poses(self) -> dict[str, SE3]:
@@ -184,7 +176,7 @@ class TaskPlanner:
         pose = self._arm.grasp_pose(self.positions) @ self._held.T_grasp_held
         return {**self.resting, self._held.body: pose.rounded()}
 
-    def _plan_untimed(self, goal: ArmGoal, number: int) -> list[Leg] | Rejection:
+    def _plan_untimed(self, goal: scene.ArmGoal, number: int) -> list[Leg] | errors.Rejection:
         if goal.kind == "grasp":
             return self._plan_grasp(goal, number)
         if goal.kind == "place":
@@ -203,12 +195,12 @@ class TaskPlanner:
             collisions.append(path)
         return self._reject(collisions, CANNOT_REACH, number)
 
-    def _goal_configurations(self, goal: ArmGoal) -> Iterator[Positions]:
+    def _goal_configurations(self, goal: scene.ArmGoal) -> Iterator[Positions]:
         """Configurations at a goal, in the order of its candidates."""
         opening = self._held.opening if self._held else goal.gripper_opening
         for candidate in goal.joint_candidates:
-            positions = all_positions(self._arm.robot, candidate, opening)
-            if is_within_limits(self._arm.robot, positions):
+            positions = kinematics.all_positions(self._arm.robot, candidate, opening)
+            if kinematics.is_within_limits(self._arm.robot, positions):
                 yield positions
         for pose in goal.pose_candidates:
             found = self._motion.configurations(
@@ -216,13 +208,13 @@ class TaskPlanner:
             )
             yield from found[:_CONFIGURATIONS_MAX]
 
-    def _hand_pose(self, goal: ArmGoal, pose: SE3) -> SE3:
+    def _hand_pose(self, goal: scene.ArmGoal, pose: SE3) -> SE3:
         """``T_world_grasp`` for a pose of a goal, which may be that of the held object."""
         if not goal.carries or self._held is None:
             return pose
         return pose @ self._held.T_surface_rest @ self._held.T_grasp_held.inverse()
 
-    def _plan_move(self, goal: ArmGoal, number: int) -> list[Leg] | Rejection:
+    def _plan_move(self, goal: scene.ArmGoal, number: int) -> list[Leg] | errors.Rejection:
         """One leg along straight lines of the hand, which may touch some bodies."""
         hand = self._arm.grasp_pose(self.positions)
         poses = [motion @ hand for motion in goal.waypoints]
@@ -249,7 +241,7 @@ class TaskPlanner:
                 return self._reject([collision], CANNOT_REACH, number)
         return [leg]
 
-    def _plan_grip(self, goal: ArmGoal) -> list[Leg]:
+    def _plan_grip(self, goal: scene.ArmGoal) -> list[Leg]:
         """One leg of the fingers; what they hold rests from then on where it is."""
         opening = goal.gripper_opening
         if goal.objects and self._hand is not None:
@@ -260,7 +252,7 @@ class TaskPlanner:
             self.resting[self._held.body] = pose.rounded()
             self._held = None
         end = self._motion.with_opening(self.positions, opening)
-        return [Leg(self.positions, round_positions(end))]
+        return [Leg(self.positions, kinematics.round_positions(end))]
 
     def _plan_path(self, end: Positions) -> list[Leg] | str:
         """Legs from the current configuration to another, clear of all resting bodies."""
@@ -270,7 +262,7 @@ class TaskPlanner:
 
     # Grasping.
 
-    def _plan_grasp(self, goal: ArmGoal, number: int) -> list[Leg] | Rejection:
+    def _plan_grasp(self, goal: scene.ArmGoal, number: int) -> list[Leg] | errors.Rejection:
         if self._hand is None or self._held is not None:
             return self._reject([], NOTHING_TO_GRASP, number)
         otherwise = NOTHING_TO_SUCK
@@ -294,7 +286,7 @@ class TaskPlanner:
         return self._reject(collisions, otherwise, number)
 
     def _grasp_candidates(
-        self, grasps: list[Grasp], body: str, rest: SE3
+        self, grasps: list[grasping.Grasp], body: str, rest: SE3
     ) -> list[tuple[Held, Positions, Positions]]:
         """The narrowest grasps with configurations at and above them, least effort first."""
         candidates = []
@@ -308,7 +300,7 @@ class TaskPlanner:
         candidates.sort(key=lambda candidate: self._effort_s(*candidate[1:]))
         return candidates[:_GRASPS_MAX]
 
-    def _find_grasps(self, hand: Hand, body: str) -> list[Grasp]:
+    def _find_grasps(self, hand: grasping.Hand, body: str) -> list[grasping.Grasp]:
         """Grasps of a resting body from above, the narrowest first.
 
         Some close along its own axes, flush with the faces of a box.
@@ -356,7 +348,7 @@ class TaskPlanner:
 
     # Placing.
 
-    def _plan_place(self, goal: ArmGoal, number: int) -> list[Leg] | Rejection:
+    def _plan_place(self, goal: scene.ArmGoal, number: int) -> list[Leg] | errors.Rejection:
         """Legs that place the held object and leave the open hand above it."""
         held = self._held
         if held is None:
@@ -451,13 +443,13 @@ class TaskPlanner:
             self._world.gap_m(body, name, _SUPPORT_GAP_M) < _SUPPORT_GAP_M for name in self._fixed
         )
 
-    def _initial_held(self, body: str, state: ArmState) -> Held:
+    def _initial_held(self, body: str, state: arm_goals.ArmState) -> Held:
         """The body that the arm holds from the beginning; it will be placed upright."""
         assert state.T_world_held is not None
         self._world.place(body, SE3())
         bottom = float(self._world.bounds_m(body)[0][2])
         T_grasp_held = self._arm.grasp_pose(state.positions).inverse() @ state.T_world_held
-        opening = gripper_opening(self._arm.robot, state.positions)
+        opening = kinematics.gripper_opening(self._arm.robot, state.positions)
         return Held(body, T_grasp_held, SE3((0.0, 0.0, -bottom)), opening)
 
     def _restore_world(self) -> None:
@@ -469,19 +461,19 @@ class TaskPlanner:
             pose = self._arm.grasp_pose(self.positions) @ self._held.T_grasp_held
             self._world.place(self._held.body, pose)
 
-    def _reject(self, collisions: Sequence[str], otherwise: str, number: int) -> Rejection:
+    def _reject(self, collisions: Sequence[str], otherwise: str, number: int) -> errors.Rejection:
         """The first collision as the reason; ``otherwise`` if there was none."""
         reason = otherwise
         if collisions:
             reason = "it hits " + (ITSELF if collisions[0] == ITSELF else f"'{collisions[0]}'")
         name = self._arm.articulation.name
-        return Rejection(
+        return errors.Rejection(
             f"arm '{name}', goal {number} of its task: {reason}",
             f"other goals or more candidates for arm '{name}', or fewer objects around it (count)",
         )
 
 
-def _only_rises(goal: ArmGoal) -> bool:
+def _only_rises(goal: scene.ArmGoal) -> bool:
     return all(w == SE3((0.0, 0.0, max(0.0, w.translation_m[2]))) for w in goal.waypoints)
 
 

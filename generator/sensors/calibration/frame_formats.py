@@ -22,17 +22,7 @@ from gen_data.config.problems import Position, refuse
 from gen_data.config.yaml_tree import Node
 from gen_data.core.errors import ConfigError
 from gen_data.core.se3 import SE3, turned
-from gen_data.sensors.calibration.calibration import (
-    CalibratedCamera,
-    Calibration,
-    Frame,
-    camera_matrix,
-    check_rotation,
-    fail,
-    numbers,
-    rigid,
-)
-from gen_data.sensors.calibration.camera_formats import lens_of, shifted
+from gen_data.sensors.calibration import calibration, camera_formats
 
 _NAMES = {
     "R_rect": "R0_rect",
@@ -49,47 +39,49 @@ def is_optical(name: str) -> bool:
     return name.endswith(_OPTICAL)
 
 
-def tf_frames(root: Node) -> Calibration:
+def tf_frames(root: Node) -> calibration.Calibration:
     """Frames of ROS transforms: ``transforms:`` with a list, or one of them.
 
     Raises:
         ConfigError: a transform is malformed, or two have the same child.
     """
     listed = root.get("transforms")
-    frames: dict[str, Frame] = {}
+    frames: dict[str, calibration.Frame] = {}
     for one in listed.items if listed else (root,):
         child, parent = one.get("child_frame_id"), one.get("header", "frame_id")
         shift, turn = one.get("transform", "translation"), one.get("transform", "rotation")
         if child is None or parent is None or shift is None or turn is None:
-            fail(one, "", "expected header.frame_id, child_frame_id and transform")
+            calibration.fail(one, "", "expected header.frame_id, child_frame_id and transform")
         values = {}
         for part, keys in ((shift, "xyz"), (turn, "xyzw")):
             for key in keys:
                 number = part.get(key)
                 if number is None:
-                    fail(part, key, "is missing")
-                (values[f"{key}{len(keys)}"],) = numbers(number, [1], key)
+                    calibration.fail(part, key, "is missing")
+                (values[f"{key}{len(keys)}"],) = calibration.numbers(number, [1], key)
         q = np.array([values[f"{key}4"] for key in "wxyz"])
         if abs(float(np.linalg.norm(q)) - 1.0) > 1e-3:
-            fail(turn, "rotation", f"is no unit quaternion, its length is {np.linalg.norm(q):g}")
+            calibration.fail(
+                turn, "rotation", f"is no unit quaternion, its length is {np.linalg.norm(q):g}"
+            )
         w, x, y, z = (float(v) for v in q / np.linalg.norm(q))
         name, above = child.text.strip("/"), parent.text.strip("/")
-        if frames.get(name, Frame()).parent:
-            fail(child, "child_frame_id", f"'{name}' has two parents")
+        if frames.get(name, calibration.Frame()).parent:
+            calibration.fail(child, "child_frame_id", f"'{name}' has two parents")
         place = SE3((values["x3"], values["y3"], values["z3"]), (w, x, y, z))
-        frames[name] = Frame(above, place, is_optical(name))
-        frames.setdefault(above, Frame(optical=is_optical(above)))
-    return Calibration(root.position.file, "transforms of ROS", {}, frames)
+        frames[name] = calibration.Frame(above, place, is_optical(name))
+        frames.setdefault(above, calibration.Frame(optical=is_optical(above)))
+    return calibration.Calibration(root.position.file, "transforms of ROS", {}, frames)
 
 
-def urdf_frames(robot: Element, file: str) -> Calibration:
+def urdf_frames(robot: Element, file: str) -> calibration.Calibration:
     """Links of a URDF at the zero of its joints.
 
     Raises:
         ConfigError: a joint is malformed.
     """
-    frames: dict[str, Frame] = {
-        link.get("name", ""): Frame(optical=is_optical(link.get("name", "")))
+    frames: dict[str, calibration.Frame] = {
+        link.get("name", ""): calibration.Frame(optical=is_optical(link.get("name", "")))
         for link in robot.iter("link")
     }
     moving = []
@@ -109,12 +101,12 @@ def urdf_frames(robot: Element, file: str) -> Calibration:
         link = child.get("link", "")
         # A pitch of URDF turns X downwards.
         pose = turned((x, y, z), yaw, -pitch, roll)
-        frames[link] = Frame(parent.get("link", ""), pose, is_optical(link))
+        frames[link] = calibration.Frame(parent.get("link", ""), pose, is_optical(link))
     unused = [f"joint {name} (at 0)" for name in moving]
-    return Calibration(file, "a URDF", {}, frames, unused)
+    return calibration.Calibration(file, "a URDF", {}, frames, unused)
 
 
-def nuscenes_frames(records: Any, path: Path) -> Calibration:
+def nuscenes_frames(records: Any, path: Path) -> calibration.Calibration:
     """Channels of nuScenes' ``calibrated_sensor.json``; records that differ go by their token.
 
     Raises:
@@ -127,8 +119,8 @@ def nuscenes_frames(records: Any, path: Path) -> Calibration:
         for record in records:
             channel = sensors[record["sensor_token"]]["channel"]
             by_channel.setdefault(channel, []).append(record)
-        cameras: dict[str, CalibratedCamera] = {}
-        frames = {"ego": Frame()}
+        cameras: dict[str, calibration.CalibratedCamera] = {}
+        frames = {"ego": calibration.Frame()}
         for channel, listed in by_channel.items():
             distinct = {json.dumps({**r, "token": ""}, sort_keys=True): r for r in listed}
             for record in distinct.values():
@@ -142,10 +134,10 @@ def nuscenes_frames(records: Any, path: Path) -> Calibration:
         raise ConfigError(f"{path}: {fact}") from None
     except (KeyError, TypeError, ValueError) as error:
         raise ConfigError(f"{path}: is no calibrated_sensor.json of nuScenes ({error})") from None
-    return Calibration(str(path), "calibrated sensors of nuScenes", cameras, frames)
+    return calibration.Calibration(str(path), "calibrated sensors of nuScenes", cameras, frames)
 
 
-def _nuscenes_frame(record: Mapping[str, Any], modality: str, path: Path) -> Frame:
+def _nuscenes_frame(record: Mapping[str, Any], modality: str, path: Path) -> calibration.Frame:
     w, x, y, z = (float(v) for v in record["rotation"])
     tx, ty, tz = (float(v) for v in record["translation"])
     norm = math.sqrt(w * w + x * x + y * y + z * z)
@@ -154,16 +146,16 @@ def _nuscenes_frame(record: Mapping[str, Any], modality: str, path: Path) -> Fra
     pose = SE3((tx, ty, tz), (w / norm, x / norm, y / norm, z / norm))
     # The scanner's frame is X right, Y forward; a sensor here has X forward.
     ahead = SE3.about_z(0.5 * math.pi) if modality == "lidar" else SE3()
-    return Frame("ego", pose @ ahead, optical=modality == "camera")
+    return calibration.Frame("ego", pose @ ahead, optical=modality == "camera")
 
 
-def _nuscenes_camera(record: Mapping[str, Any], path: Path) -> CalibratedCamera:
+def _nuscenes_camera(record: Mapping[str, Any], path: Path) -> calibration.CalibratedCamera:
     (fx, _, cx), (_, fy, cy), _ = record["camera_intrinsic"]
     place = Position(str(path), 1, 1)
-    return CalibratedCamera(place, (float(fx), float(fy)), (float(cx), float(cy)))
+    return calibration.CalibratedCamera(place, (float(fx), float(fy)), (float(cx), float(cy)))
 
 
-def kitti_calibration(text: str, file: str, *, rectified: bool = False) -> Calibration:
+def kitti_calibration(text: str, file: str, *, rectified: bool = False) -> calibration.Calibration:
     """One file of KITTI's calibration: cameras, and frames as far as the file has them.
 
     The benchmarks' files have rectified cameras. Of raw data, ``calib_cam_to_cam.txt`` has both:
@@ -180,7 +172,7 @@ def kitti_calibration(text: str, file: str, *, rectified: bool = False) -> Calib
         key = _NAMES.get(key.rstrip(":"), key.rstrip(":"))
         if key:
             lines[key] = Node(place, cells, text=rest.strip())
-    frames, cameras = {"camera_0": Frame(optical=True)}, {}
+    frames, cameras = {"camera_0": calibration.Frame(optical=True)}, {}
     used = {"calib_time", "corner_dist"}
     for number in "0123":
         name = f"camera_{number}"
@@ -192,7 +184,7 @@ def kitti_calibration(text: str, file: str, *, rectified: bool = False) -> Calib
     if not cameras and len(frames) < 2:
         refuse(Position(file, 1, 1), "", "no calibration of KITTI found")
     unused = [key for key in lines if key not in used]
-    return Calibration(file, "a calibration of KITTI", cameras, frames, unused)
+    return calibration.Calibration(file, "a calibration of KITTI", cameras, frames, unused)
 
 
 def _number(word: str) -> float | str:
@@ -206,29 +198,29 @@ def _kitti_camera(lines: Mapping[str, Node], number: str, *, rectified: bool) ->
     """The camera of a number, its frame and the lines used; nothing if there is none."""
     P = lines.get(f"P{number}") or (lines.get(f"P_rect_0{number}") if rectified else None)
     S = lines.get(f"S_rect_0{number}" if rectified else f"S_0{number}")
-    size = tuple(int(v) for v in numbers(S, [2], "S")) if S else None
+    size = tuple(int(v) for v in calibration.numbers(S, [2], "S")) if S else None
     if P is not None:
-        fx, fy, cx, cy = camera_matrix(P, "P", 4)
+        fx, fy, cx, cy = calibration.camera_matrix(P, "P", 4)
         keys = {f"P{number}", f"P_rect_0{number}", f"S_rect_0{number}"}
-        camera = CalibratedCamera(P.position, (fx, fy), (cx, cy), size_px=size)  # type: ignore[arg-type]
-        yield camera, shifted(P, "camera_0"), keys
+        camera = calibration.CalibratedCamera(P.position, (fx, fy), (cx, cy), size_px=size)  # type: ignore[arg-type]
+        yield camera, camera_formats.shifted(P, "camera_0"), keys
         return
     K, D = lines.get(f"K_0{number}"), lines.get(f"D_0{number}")
     R, T = lines.get(f"R_0{number}"), lines.get(f"T_0{number}")
     if K is None or D is None or R is None or T is None:
         return
-    fx, fy, cx, cy = camera_matrix(K, "K")
-    lens = lens_of("brown_conrady", numbers(D, [5], "D"), D, "D")
-    rows = np.array(numbers(R, [9], "R")).reshape(3, 3)
-    check_rotation(rows, R, "R")
+    fx, fy, cx, cy = calibration.camera_matrix(K, "K")
+    lens = camera_formats.lens_of("brown_conrady", calibration.numbers(D, [5], "D"), D, "D")
+    rows = np.array(calibration.numbers(R, [9], "R")).reshape(3, 3)
+    calibration.check_rotation(rows, R, "R")
     # Points of camera 0 are mapped to those of the camera.
-    pose = SE3.from_matrix(np.column_stack([rows, numbers(T, [3], "T")])).inverse()
+    pose = SE3.from_matrix(np.column_stack([rows, calibration.numbers(T, [3], "T")])).inverse()
     keys = {f"{name}_0{number}" for name in "SKDRT"}
-    camera = CalibratedCamera(K.position, (fx, fy), (cx, cy), *lens, size_px=size)  # type: ignore[arg-type]
-    yield camera, Frame("camera_0", pose, optical=True), keys
+    camera = calibration.CalibratedCamera(K.position, (fx, fy), (cx, cy), *lens, size_px=size)  # type: ignore[arg-type]
+    yield camera, calibration.Frame("camera_0", pose, optical=True), keys
 
 
-def _kitti_devices(lines: Mapping[str, Node], frames: dict[str, Frame]) -> set[str]:
+def _kitti_devices(lines: Mapping[str, Node], frames: dict[str, calibration.Frame]) -> set[str]:
     """Add the scanner and the navigation unit to the frames; names of the lines used."""
     used = set()
     for key, inner, outer in (
@@ -237,22 +229,22 @@ def _kitti_devices(lines: Mapping[str, Node], frames: dict[str, Frame]) -> set[s
     ):
         if key in lines:
             # Benchmarks: to camera 0 before its rectification R0_rect, which is the frame of P.
-            pose = rigid(numbers(lines[key], [12], key), lines[key], key)
+            pose = calibration.rigid(calibration.numbers(lines[key], [12], key), lines[key], key)
             if outer == "camera_0" and "R0_rect" in lines:
-                rect = np.array(numbers(lines["R0_rect"], [9], "R0_rect")).reshape(3, 3)
+                rect = np.array(calibration.numbers(lines["R0_rect"], [9], "R0_rect")).reshape(3, 3)
                 pose = SE3.from_matrix(np.column_stack([rect, np.zeros(3)])) @ pose
                 used.add("R0_rect")
-            frames[inner] = Frame(outer, pose)
-            frames.setdefault(outer, Frame())
+            frames[inner] = calibration.Frame(outer, pose)
+            frames.setdefault(outer, calibration.Frame())
             used.add(key)
     if "R" in lines and "T" in lines:
         # Raw data: one pose per file, named by the file.
         file = Path(lines["R"].position.file).name
         inner, outer = ("imu", "velodyne") if "imu_to_velo" in file else ("velodyne", "camera_0")
-        rows = np.array(numbers(lines["R"], [9], "R")).reshape(3, 3)
-        check_rotation(rows, lines["R"], "R")
-        shift = numbers(lines["T"], [3], "T")
-        frames[inner] = Frame(outer, SE3.from_matrix(np.column_stack([rows, shift])))
-        frames.setdefault(outer, Frame(optical=outer == "camera_0"))
+        rows = np.array(calibration.numbers(lines["R"], [9], "R")).reshape(3, 3)
+        calibration.check_rotation(rows, lines["R"], "R")
+        shift = calibration.numbers(lines["T"], [3], "T")
+        frames[inner] = calibration.Frame(outer, SE3.from_matrix(np.column_stack([rows, shift])))
+        frames.setdefault(outer, calibration.Frame(optical=outer == "camera_0"))
         used |= {"R", "T"}
     return used

@@ -21,11 +21,9 @@ from gen_data.config.distributions import (
     Scalar,
     UnitInterval,
 )
-from gen_data.core import errors, interfaces, se3
+from gen_data.core import capture, errors, interfaces, se3, streams
 from gen_data.core.asset_types import Float32
-from gen_data.core.capture import Channel, SensorReading
 from gen_data.core.scene import Camera, Scene, Weather
-from gen_data.core.streams import Rng
 from gen_data.sensors.camera import isp, local_tone, optics
 from gen_data.sensors.camera.denoising import denoise, is_noisy
 from gen_data.sensors.camera.exposure import (
@@ -208,8 +206,8 @@ class Shot:
     weather: Weather
     depth_m: NDArray[np.floating] | None
     exposure: ExposureSettings
-    rng: Rng
-    noise_rng: Rng
+    rng: streams.Rng
+    noise_rng: streams.Rng
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -242,29 +240,29 @@ def capture_photograph(
     scene: Scene,
     renderer: interfaces.Renderer,
     camera: Camera,
-    channels: frozenset[Channel],
+    channels: frozenset[capture.Channel],
     pipeline: ImagePipeline,
-    rng: Rng,
-    settings_rng: Rng | None = None,
-) -> SensorReading:
+    rng: streams.Rng,
+    settings_rng: streams.Rng | None = None,
+) -> capture.SensorReading:
     """Render the channels of a camera and, if RGB is among them, develop its photograph.
 
     ``rng`` and ``settings_rng`` are those of ``develop``.
     """
-    if Channel.RGB not in channels:
+    if capture.Channel.RGB not in channels:
         return renderer.render(scene, camera, channels)
-    needed = (channels - {Channel.RGB}) | {Channel.RADIANCE}
+    needed = (channels - {capture.Channel.RGB}) | {capture.Channel.RADIANCE}
     # Points beside a wide lens have no depth along its axis: it is focused by range.
-    depth = Channel.Z_DEPTH if camera.intrinsics.straight else Channel.RANGE
+    depth = capture.Channel.Z_DEPTH if camera.intrinsics.straight else capture.Channel.RANGE
     if pipeline.focus is not None:
         needed = needed | {depth}
     tones = (_tones_of(camera, pipeline),) if pipeline.reduction > 1.0 else ()
     reading = renderer.render(scene, camera, needed, *tones)
-    radiance = reading.channels[Channel.RADIANCE]
+    radiance = reading.channels[capture.Channel.RADIANCE]
     depth_m = reading.channels.get(depth)
     photo = develop(radiance, depth_m, camera, scene.weather, pipeline, rng, settings_rng)
     images = {k: image for k, image in reading.channels.items() if k in channels}
-    return replace(reading, channels={**images, Channel.RGB: photo.rgb}, ev100=photo.ev100)
+    return replace(reading, channels={**images, capture.Channel.RGB: photo.rgb}, ev100=photo.ev100)
 
 
 def _tones_of(camera: Camera, pipeline: ImagePipeline) -> interfaces.FindTones:
@@ -283,8 +281,8 @@ def develop(
     camera: Camera,
     weather: Weather,
     pipeline: ImagePipeline,
-    rng: Rng,
-    settings_rng: Rng | None = None,
+    rng: streams.Rng,
+    settings_rng: streams.Rng | None = None,
 ) -> Photograph:
     """Develop a photograph: meter the exposure, then apply all of ``STAGES`` in order.
 
@@ -336,7 +334,7 @@ def _meter(radiance: Float32, pipeline: ImagePipeline, limits_ev100: tuple[float
     return meter_mean_ev100(radiance, pipeline.metered_mean, pipeline.metered_clip, limits_ev100)
 
 
-def _draw(pipeline: ImagePipeline, field: str, rng: Rng) -> float:
+def _draw(pipeline: ImagePipeline, field: str, rng: streams.Rng) -> float:
     """Draw a setting. Raises SampleError if it is no finite number, as of a faulty plug-in."""
     drawn: float = getattr(pipeline, field).draw(rng)
     if not math.isfinite(drawn):

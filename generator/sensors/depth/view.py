@@ -6,8 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.core import asset_types, capture, interfaces, se3, streams
-from gen_data.core.colorimetry import luminance
+from gen_data.core import asset_types, capture, colorimetry, interfaces, se3, streams
 from gen_data.core.scene import Camera, Lidar, Scene
 
 
@@ -81,7 +80,7 @@ class View:
 
     def luminance_cd_m2(self, right_m: float) -> asset_types.Float32:
         """Luminance of the scene in ambient light, float32 [h, w]."""
-        return luminance(self._render(right_m, capture.Channel.RADIANCE))
+        return colorimetry.luminance(self._render(right_m, capture.Channel.RADIANCE))
 
     def _render(self, right_m: float, channel: capture.Channel) -> asset_types.Float32:
         seen = self.renderer.render(self.scene, self.beside(right_m), frozenset({channel}))

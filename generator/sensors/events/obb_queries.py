@@ -4,9 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gen_data.core import lane_geometry, motion
 from gen_data.core.boxes import boxes_touch
-from gen_data.core.lane_geometry import LaneLine
-from gen_data.core.motion import STILL, Trajectory, Twist
 from gen_data.core.scene import Instance, Lane, Scene
 from gen_data.core.se3 import SE3, Array
 
@@ -28,7 +27,7 @@ class OrientedObstacle:
     """
 
     instance: Instance
-    track: Trajectory | None
+    track: motion.Trajectory | None
     T_world_instance: SE3
     T_instance_box: SE3
     half_m: tuple[float, float, float]
@@ -38,9 +37,9 @@ class OrientedObstacle:
         place = self.T_world_instance if self.track is None else self.track.pose(time_s)
         return place @ self.T_instance_box
 
-    def twist(self, time_s: float) -> Twist:
+    def twist(self, time_s: float) -> motion.Twist:
         """Twist of the instance's frame at an instant."""
-        return STILL if self.track is None else self.track.twist(time_s)
+        return motion.STILL if self.track is None else self.track.twist(time_s)
 
     @property
     def radius_m(self) -> float:
@@ -52,7 +51,7 @@ def find_obstacles(scene: Scene) -> tuple[OrientedObstacle, ...]:
     """Boxes of all instances that have one, in order of id."""
     tracks = {track.body: track for track in scene.tracks}
     rooted = {a.instance_id for a in scene.articulations}
-    carriers: dict[int, Trajectory] = {}
+    carriers: dict[int, motion.Trajectory] = {}
     for body in scene.bodies:
         if body.name in tracks and body.instance_id not in rooted:
             carriers.setdefault(body.instance_id, tracks[body.name])
@@ -100,7 +99,7 @@ def is_below(
     return top_m < bottom_m + clearance_m
 
 
-def _make_obstacle(instance: Instance, track: Trajectory | None) -> OrientedObstacle:
+def _make_obstacle(instance: Instance, track: motion.Trajectory | None) -> OrientedObstacle:
     low, high = np.asarray(instance.box_min_m), np.asarray(instance.box_max_m)
     half, middle = 0.5 * (high - low), 0.5 * (low + high)
     if instance.category in STEMS:
@@ -229,7 +228,7 @@ def _side_segments(lane: Lane) -> tuple[Array, Array]:
     return one, other
 
 
-def _find_lane(scene: Scene, T_world_box: SE3) -> tuple[LaneLine, float] | None:
+def _find_lane(scene: Scene, T_world_box: SE3) -> tuple[lane_geometry.LaneLine, float] | None:
     """The nearest driving lane below a box with its heading, and the arc length [m] on it."""
     position = np.array(T_world_box.translation_m[:2])
     heading = T_world_box.rotation()[:2, 0]
@@ -247,7 +246,7 @@ def _find_lane(scene: Scene, T_world_box: SE3) -> tuple[LaneLine, float] | None:
         if beyond or distances[k] > 0.5 * lane.width_m or span[k] @ heading <= 0.0:
             continue
         if best is None or distances[k] < best[0]:
-            at_m = LaneLine(lane).at_m
+            at_m = lane_geometry.LaneLine(lane).at_m
             along_m = at_m[k] + float(np.clip(share[k], 0.0, 1.0)) * (at_m[k + 1] - at_m[k])
             best = (float(distances[k]), lane, along_m)
-    return None if best is None else (LaneLine(best[1]), best[2])
+    return None if best is None else (lane_geometry.LaneLine(best[1]), best[2])

@@ -16,32 +16,7 @@ from gen_data.core.capture import POINT, Channel, LidarHits, LidarRays, PointClo
 from gen_data.core.scene import Lidar, Scene, Weather
 from gen_data.core.streams import Rng
 from gen_data.sensors import device_presets, mounting
-from gen_data.sensors.lidar import lidar_atmosphere
-from gen_data.sensors.lidar.lidar_detection import (
-    FIELDS,
-    LABELS,
-    Float32,
-    Kept,
-    Pulses,
-    UInt8,
-    UInt16,
-    clip_range,
-    is_detected,
-    make_pulses,
-    measure_intensity,
-    report_intensity,
-    select_returns,
-)
-from gen_data.sensors.lidar.scan_pattern import (
-    PRESETS,
-    Elevation,
-    LidarModel,
-    Sweep,
-    SweepPulses,
-    fire_pulses,
-    lidar_model,
-    make_sweep,
-)
+from gen_data.sensors.lidar import lidar_atmosphere, lidar_detection, scan_pattern
 
 SUBRAYS = 7
 """Rays that sample a beam with divergence."""
@@ -50,7 +25,7 @@ CLEAR = Weather()
 
 
 Angle = Annotated[float, Field(ge=-180, le=180)]
-Beam = tuple[Elevation, Angle]
+Beam = tuple[scan_pattern.Elevation, Angle]
 
 BEAMS_SCHEMA = {
     "anyOf": [
@@ -90,11 +65,11 @@ class LidarSensor(mounting.Mounted):
 
     type: Literal["lidar"] = "lidar"
     name: str = Field("lidar", pattern=NAME_PATTERN)
-    model: str | LidarModel = "HDL-64E"
+    model: str | scan_pattern.LidarModel = "HDL-64E"
     beams: Annotated[tuple[Beam, ...], WithJsonSchema(BEAMS_SCHEMA)] = Field((), max_length=4096)
     rotation_hz: float | None = Field(None, gt=0, le=100)
     camera: str = "color"
-    returns: Kept = "strongest"
+    returns: lidar_detection.Kept = "strongest"
     divergence: bool = False
     window: float = Field(1.0, gt=0, le=1)
     ideal: bool = False
@@ -102,8 +77,8 @@ class LidarSensor(mounting.Mounted):
 
     @field_validator("model")
     @classmethod
-    def _is_known(cls, model: str | LidarModel) -> str | LidarModel:
-        known = device_presets.preset_names(PRESETS)
+    def _is_known(cls, model: str | scan_pattern.LidarModel) -> str | scan_pattern.LidarModel:
+        known = device_presets.preset_names(scan_pattern.PRESETS)
         if isinstance(model, str) and model not in known:
             raise ValueError(
                 f"expected one of {', '.join(known)}, or the name of a .yaml file"
@@ -112,9 +87,9 @@ class LidarSensor(mounting.Mounted):
         return model
 
     @property
-    def device(self) -> LidarModel:
+    def device(self) -> scan_pattern.LidarModel:
         """The data sheet, with the settings of this sensor."""
-        model = lidar_model(self.model) if isinstance(self.model, str) else self.model
+        model = scan_pattern.lidar_model(self.model) if isinstance(self.model, str) else self.model
         if self.rotation_hz is not None:
             model = model.model_copy(update={"rotation_hz": self.rotation_hz})
         return model.with_beams(self.beams) if self.beams else model
@@ -122,7 +97,7 @@ class LidarSensor(mounting.Mounted):
     def count_rays(self, size_px: tuple[int, int]) -> int:
         """Number of pulses of a sweep, whatever the size of its camera's image."""
         del size_px
-        return len(make_sweep(self.device, 0.0).ring)
+        return len(scan_pattern.make_sweep(self.device, 0.0).ring)
 
     def describe(self) -> interfaces.SensorInfo:
         """Describe a laser scanner."""
@@ -146,10 +121,10 @@ class LidarSensor(mounting.Mounted):
         del channels
         model = self.device
         lidar = scene.lidar(self.name)
-        sweep = make_sweep(model, float(rng.uniform(0.0, 3600.0)))
-        shots = still = SweepPulses(sweep.directions, sweep.origins_m)
+        sweep = scan_pattern.make_sweep(model, float(rng.uniform(0.0, 3600.0)))
+        shots = still = scan_pattern.SweepPulses(sweep.directions, sweep.origins_m)
         if self.motion_distortion != "none":
-            shots = fire_pulses(scene, lidar, sweep)
+            shots = scan_pattern.fire_pulses(scene, lidar, sweep)
         beams = LidarRays(
             shots.directions,
             1e-3 * model.divergence_mrad,
@@ -161,21 +136,23 @@ class LidarSensor(mounting.Mounted):
         )
         hits = renderer.scan(scene, lidar, beams)
         hits = _without_mirrored(hits) if self.ideal else hits
-        pulses = make_pulses(hits, model, self.returns)
+        pulses = lidar_detection.make_pulses(hits, model, self.returns)
         weather = CLEAR if self.ideal else scene.weather
         if weather != CLEAR:
             pulses = _apply_weather(pulses, weather, model, lidar, shots, rng)
         if self.window < 1.0 and not self.ideal:
             pulses = lidar_atmosphere.attenuate(pulses, np.float32(-math.log(self.window)))
-        pulses = clip_range(pulses, model)
-        detected = pulses.light > 0.0 if self.ideal else is_detected(pulses, rng)
-        returns = Returns.select(pulses, *select_returns(pulses, detected, self.returns))
+        pulses = lidar_detection.clip_range(pulses, model)
+        detected = pulses.light > 0.0 if self.ideal else lidar_detection.is_detected(pulses, rng)
+        returns = Returns.select(
+            pulses, *lidar_detection.select_returns(pulses, detected, self.returns)
+        )
         if self.ideal:
-            intensity = report_intensity(returns.reflectance, model)
+            intensity = lidar_detection.report_intensity(returns.reflectance, model)
         else:
             ring = sweep.ring.take(returns.row)
             light = returns.reflectance
-            intensity = measure_intensity(light, returns.range_m, ring, model, rng)
+            intensity = lidar_detection.measure_intensity(light, returns.range_m, ring, model, rng)
             returns = _add_range_noise(returns, model, weather, rng)
         frames = still if self.motion_distortion == "raw" else shots
         points = _make_points(returns, intensity, frames, sweep)
@@ -187,17 +164,21 @@ class Returns:
     """Reported returns, arrays [n]; ``row`` is the number of their pulse."""
 
     row: NDArray[np.intp]
-    range_m: Float32
-    reflectance: Float32
-    instance_id: UInt16
-    category_id: UInt16
-    surface: UInt8
+    range_m: lidar_detection.Float32
+    reflectance: lidar_detection.Float32
+    instance_id: lidar_detection.UInt16
+    category_id: lidar_detection.UInt16
+    surface: lidar_detection.UInt8
 
     @classmethod
-    def select(cls, pulses: Pulses, rows: NDArray[np.intp], picks: NDArray[np.intp]) -> Returns:
+    def select(
+        cls, pulses: lidar_detection.Pulses, rows: NDArray[np.intp], picks: NDArray[np.intp]
+    ) -> Returns:
         """Select candidate ``picks[k]`` of pulse ``rows[k]``."""
         which = rows * pulses.light.shape[1] + picks
-        return cls(rows, *(getattr(pulses, name).ravel().take(which) for name in FIELDS))
+        return cls(
+            rows, *(getattr(pulses, name).ravel().take(which) for name in lidar_detection.FIELDS)
+        )
 
 
 def _without_mirrored(hits: LidarHits) -> LidarHits:
@@ -210,8 +191,13 @@ def _without_mirrored(hits: LidarHits) -> LidarHits:
 
 
 def _apply_weather(
-    pulses: Pulses, weather: Weather, model: LidarModel, lidar: Lidar, shots: SweepPulses, rng: Rng
-) -> Pulses:
+    pulses: lidar_detection.Pulses,
+    weather: Weather,
+    model: scan_pattern.LidarModel,
+    lidar: Lidar,
+    shots: scan_pattern.SweepPulses,
+    rng: Rng,
+) -> lidar_detection.Pulses:
     height_m = lidar.T_world_lidar.translation_m[2]
     up = shots.directions @ lidar.T_world_lidar.rotation()[2].astype(np.float32)
     finite = np.where(np.isfinite(pulses.range_m), pulses.range_m, np.float32(model.range_m[1]))
@@ -221,7 +207,9 @@ def _apply_weather(
     )
 
 
-def _add_range_noise(returns: Returns, model: LidarModel, weather: Weather, rng: Rng) -> Returns:
+def _add_range_noise(
+    returns: Returns, model: scan_pattern.LidarModel, weather: Weather, rng: Rng
+) -> Returns:
     spread_m = np.float32(model.range_noise_m) + lidar_atmosphere.rain_noise_m(
         weather.rain_mm_h, returns.range_m
     )
@@ -233,7 +221,10 @@ def _add_range_noise(returns: Returns, model: LidarModel, weather: Weather, rng:
 
 
 def _make_points(
-    returns: Returns, intensity: Float32, shots: SweepPulses, sweep: Sweep
+    returns: Returns,
+    intensity: lidar_detection.Float32,
+    shots: scan_pattern.SweepPulses,
+    sweep: scan_pattern.Sweep,
 ) -> NDArray[np.void]:
     """Records of ``POINT`` [n]; returns of one pulse are adjacent, nearest first."""
     rows = returns.row
@@ -243,7 +234,7 @@ def _make_points(
     points["time_s"] = sweep.time_s.take(rows)
     points["ring"] = sweep.ring.take(rows)
     points["return_number"] = points["return_count"] = 1
-    for name in LABELS:
+    for name in lidar_detection.LABELS:
         points[name] = getattr(returns, name)
     if (np.diff(rows) > 0).all():
         return points

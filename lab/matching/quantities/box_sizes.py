@@ -11,12 +11,7 @@ import numpy as np
 from gen_data.assemble.config import Config
 from gen_data.config.distributions import Distribution
 from gen_data.lab.matching import indirect_inference, recordings
-from gen_data.lab.matching.quantities.base import (
-    FieldChange,
-    LabelQuantity,
-    NoParameter,
-    map_numbers,
-)
+from gen_data.lab.matching.quantities import base
 from gen_data.randomizers.camera_pose import CameraPose
 
 
@@ -27,22 +22,22 @@ def measure(labels: recordings.ImageLabels) -> float:
     return float(0.5 * np.log2(areas / pixels).mean()) if len(areas) else float("nan")
 
 
-def _change(config: Config, camera: str, coordinate: float) -> FieldChange:
+def _change(config: Config, camera: str, coordinate: float) -> base.FieldChange:
     for number, pose in enumerate(config.probes[0].randomizers):
         if isinstance(pose, CameraPose) and pose.camera in ("", camera):
             if pose.fills is None:
                 value = _scaled(pose.distance_m, 2.0**-coordinate)
-                return FieldChange("randomizers", number, "distance_m", value)
+                return base.FieldChange("randomizers", number, "distance_m", value)
             value = _scaled(pose.fills, 2.0**coordinate)
-            return FieldChange("randomizers", number, "fills", value)
-    raise NoParameter("no camera_pose sets a distance")
+            return base.FieldChange("randomizers", number, "fills", value)
+    raise base.NoParameter("no camera_pose sets a distance")
 
 
 def _scaled(distribution: Distribution[float], factor: float) -> Any:
     def scale(value: float) -> float:
         return factor * value
 
-    return map_numbers(distribution.to_yaml(), scale, scale)
+    return base.map_numbers(distribution.to_yaml(), scale, scale)
 
 
 def _slope(focal_heights: float) -> float:
@@ -55,7 +50,7 @@ def to_factor(coordinate: float) -> float:
     return float(2.0**coordinate)
 
 
-BOX_SIZES = LabelQuantity(
+BOX_SIZES = base.LabelQuantity(
     "box sizes", "factor", "mean log2 of the size of boxes over that of the image",
     measure, _slope, _change,
     indirect_inference.Axis(-3.0, 3.0, step=0.25, plausible=1.0, enough=0.15, varies=False),

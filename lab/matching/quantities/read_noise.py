@@ -13,8 +13,7 @@ from typing import Any
 
 from gen_data.config.distributions import Constant
 from gen_data.lab.matching.indirect_inference import Axis
-from gen_data.lab.matching.quantities.base import CameraQuantity, typical
-from gen_data.lab.matching.quantities.noise import noise_between
+from gen_data.lab.matching.quantities import base, noise
 from gen_data.sensors.camera.image_pipeline import ImagePipeline
 from gen_data.sensors.camera.image_sensor import ImageSensor
 
@@ -24,11 +23,11 @@ as most pictures have only few darker blocks."""
 LEAST_E = 0.25
 """Smallest read noise to be fitted [electrons]: that of the best sensors there are."""
 
-measure = noise_between(DARKEST, BRIGHTEST)
+measure = noise.noise_between(DARKEST, BRIGHTEST)
 
 
 def _start(pipeline: ImagePipeline) -> float:
-    own_e = typical((pipeline.image_sensor or ImageSensor()).read_noise_e)
+    own_e = base.typical((pipeline.image_sensor or ImageSensor()).read_noise_e)
     return math.log2(max(own_e, LEAST_E))
 
 
@@ -48,7 +47,7 @@ def _fields(value: Any) -> Mapping[str, Any]:
 
 
 # Pictures tell the ratio to the full-well capacity: as logarithms, the two have a linear relation.
-READ_NOISE = CameraQuantity(
+READ_NOISE = base.CameraQuantity(
     "read noise", "electrons", "log2 of linear variance in flat dark blocks",
     "image_pipeline.image_sensor.read_noise_e",
     measure, _start, _apply, _fields,

@@ -16,10 +16,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from gen_data.core import intrinsics, streams
-from gen_data.core.colorimetry import MIDDLE_GREY, luminance
-from gen_data.core.scene import Camera, Weather
-from gen_data.core.se3 import SE3, Array
+from gen_data.core import colorimetry, intrinsics, scene, se3, streams
 from gen_data.renderers.warp.atmosphere.kernels import precipitation
 from gen_data.renderers.warp.visibility.frame_context import CameraView
 
@@ -77,13 +74,13 @@ def light_level_ev100(radiance: wp.array, fixed_ev100: float | None) -> float:
     """
     if fixed_ev100 is not None:
         return fixed_ev100
-    levels = luminance(radiance.numpy()[::_METERED_EVERY])
+    levels = colorimetry.luminance(radiance.numpy()[::_METERED_EVERY])
     # Black pixels, outside a lens's field or without a background, are ignored.
     lit = levels[levels > 0.0]
     median_cd_m2 = float(np.median(lit)) if len(lit) else 0.0
     # Rounded, so that the last bit of a logarithm has no effect.
     # White is 1.2 * 2^EV100 cd/m^2 (ISO 12232); metering places the mean at middle grey.
-    return round(math.log2(max(median_cd_m2, 1e-6) / (1.2 * MIDDLE_GREY)) * 16.0) / 16.0
+    return round(math.log2(max(median_cd_m2, 1e-6) / (1.2 * colorimetry.MIDDLE_GREY)) * 16.0) / 16.0
 
 
 def usual_exposure_s(ev100: float) -> float:
@@ -126,7 +123,7 @@ def draw_precipitation(frame: CameraView, z_m: wp.array, radiance: wp.array) -> 
 
 
 def make_streaks(
-    kind: Kind, camera: Camera, weather: Weather, exposure_s: float, name: str
+    kind: Kind, camera: scene.Camera, weather: scene.Weather, exposure_s: float, name: str
 ) -> NDArray[np.void]:
     """Streak records of all visible particles of a kind."""
     k = camera.intrinsics
@@ -152,13 +149,13 @@ def make_streaks(
 
 def _draw_particles(
     kind: Kind,
-    camera: Camera,
-    weather: Weather,
+    camera: scene.Camera,
+    weather: scene.Weather,
     exposure_s: float,
     name: str,
     expected: float,
     count_max: int,
-) -> tuple[Array, Array, Array, Array]:
+) -> tuple[se3.Array, se3.Array, se3.Array, se3.Array]:
     """Uniform numbers [5, n], distances, diameters and motion in the camera frame [n, 3]."""
     T = camera.T_world_camera
     rng = streams.Streams(seed=weather.seed, scene=0).rng(
@@ -174,12 +171,12 @@ def _draw_particles(
 
 
 def _streak_records(
-    T_world_camera: SE3,
-    ends_px: Array,
-    p_camera: Array,
-    depth_m: Array,
-    diameter_m: Array,
-    px_per_rad: Array | float,
+    T_world_camera: se3.SE3,
+    ends_px: se3.Array,
+    p_camera: se3.Array,
+    depth_m: se3.Array,
+    diameter_m: se3.Array,
+    px_per_rad: se3.Array | float,
 ) -> NDArray[np.void]:
     """Streak records of particles with the given ends [n, 2, 2], places [n, 3] and depths [n]."""
     values = np.zeros(len(depth_m), dtype=precipitation.Streak.numpy_dtype())
@@ -198,7 +195,7 @@ def _streak_records(
 
 
 def trace_through_lens(
-    kind: Kind, camera: Camera, weather: Weather, exposure_s: float, name: str
+    kind: Kind, camera: scene.Camera, weather: scene.Weather, exposure_s: float, name: str
 ) -> NDArray[np.void]:
     """As ``make_streaks``, for lenses with distortion: depths are ranges.
 
@@ -234,7 +231,7 @@ def _rim_cosine(k: intrinsics.Intrinsics) -> float:
     return -1.0 if np.isnan(cosines).any() else float(max(cosines.min() - 1e-3, -1.0))
 
 
-def _px_per_rad(k: intrinsics.Intrinsics, places_px: Array) -> Array:
+def _px_per_rad(k: intrinsics.Intrinsics, places_px: se3.Array) -> se3.Array:
     """Side in pixels of the image of a small square angle, per radian, [n]."""
     right, below = np.array([0.5, 0.0]), np.array([0.0, 0.5])
     across = k.rays(places_px + right) - k.rays(places_px - right)
@@ -258,7 +255,7 @@ def poisson(expected: float, rng: streams.Rng) -> int:
     return count
 
 
-def _velocity(name: str, diameter_m: Array, u: Array, seed: int) -> Array:
+def _velocity(name: str, diameter_m: se3.Array, u: se3.Array, seed: int) -> se3.Array:
     """World velocities [m/s], [n, 3]: fall, and drift with the wind."""
     wind = streams.Streams(seed=seed, scene=0).rng("wind").random(2)
     angle, gust = 2.0 * math.pi * wind[0], 3.0 * wind[1]

@@ -10,9 +10,8 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from gen_data.core import bounded_cache, distribution, errors, se3, streams
+from gen_data.core import bounded_cache, colorimetry, distribution, errors, se3, streams
 from gen_data.core.asset_types import Float32
-from gen_data.core.colorimetry import luminance
 from gen_data.core.scene import Camera, Scene
 from gen_data.renderers.warp.atmosphere.weather import fill_fog, ground_record
 from gen_data.renderers.warp.device import launch
@@ -210,7 +209,7 @@ def sky_shares(image: Float32, *, whole: bool) -> tuple[float, Float32, Float32]
         over the columns of each row, [rows, columns + 1]. Images of more than 512 rows are reduced
         to that. If ``whole``, the density is positive wherever there is light.
     """
-    light = _mean_of_texels(np.maximum(luminance(image.astype(np.float64)), 0.0))
+    light = _mean_of_texels(np.maximum(colorimetry.luminance(image.astype(np.float64)), 0.0))
     if len(light) > _HEIGHT_MAX:
         size = (2 * _HEIGHT_MAX, _HEIGHT_MAX)
         light = np.asarray(cv2.resize(light, size, interpolation=cv2.INTER_AREA), np.float64)

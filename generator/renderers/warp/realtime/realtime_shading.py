@@ -34,13 +34,8 @@ from gen_data.renderers.warp.visibility.frame_context import (
     RenderContext,
     render_view,
 )
-from gen_data.renderers.warp.visibility.kernels import edge_antialiasing, rasterizer
+from gen_data.renderers.warp.visibility.kernels import edge_antialiasing, edge_detection, rasterizer
 from gen_data.renderers.warp.visibility.kernels import msaa as mixing
-from gen_data.renderers.warp.visibility.kernels.edge_detection import (
-    GROUP_PX,
-    find_edges,
-    write_mixed,
-)
 from gen_data.renderers.warp.visibility.multisampling import draw_samples
 
 _PARTS = 2
@@ -161,7 +156,7 @@ def _average_samples(frame: CameraView, radiance: wp.array, samples: int) -> Non
     else:
         inputs += [cache.constant(wp.vec2, pixel_samples, samples), rasterizer.Z_NEAR_M]
         frame.launch(edge_antialiasing.antialias, len(edges), inputs, [mixed])
-    frame.launch(write_mixed, len(edges), [edges, mixed], [radiance])
+    frame.launch(edge_detection.write_mixed, len(edges), [edges, mixed], [radiance])
 
 
 def _average_tones(shading: Shading, samples: int, tones: Tones) -> None:
@@ -184,7 +179,7 @@ def _average_tones(shading: Shading, samples: int, tones: Tones) -> None:
     inputs = [*frame.inputs, radiance, edges, hits, thin, thin_radiance]
     limits = [tones.white_cd_m2, tones.brightest_cd_m2]
     frame.launch(mixing.mix_samples, len(edges), [*inputs, *limits], [mixed])
-    frame.launch(write_mixed, len(edges), [edges, mixed], [radiance])
+    frame.launch(edge_detection.write_mixed, len(edges), [edges, mixed], [radiance])
 
 
 def _find_edges(frame: CameraView) -> wp.array:
@@ -193,9 +188,11 @@ def _find_edges(frame: CameraView) -> wp.array:
     count = wp.zeros(1, dtype=wp.int32, device=cache.device)
     pixels = cache.scratch("listed pixels", frame.pixels, wp.int32)
     view = frame.view
-    run = view.width if cache.device.is_cpu else int(GROUP_PX)
+    run = view.width if cache.device.is_cpu else int(edge_detection.GROUP_PX)
     shape = (view.height, -(-view.width // run))
-    frame.launch(find_edges, shape, [view, frame.gbuffer.record, run], [count, pixels])
+    frame.launch(
+        edge_detection.find_edges, shape, [view, frame.gbuffer.record, run], [count, pixels]
+    )
     return pixels[: int(count.numpy()[0])]
 
 
@@ -363,7 +360,7 @@ def _refine_layers(
     limits = [tones.white_cd_m2, tones.brightest_cd_m2]
     inputs = [*frame.inputs, places, listed, probe, offsets, *limits, radiance]
     frame.launch(clearcoat_glass.shade_contrasts, found, inputs, [pixels, mixed])
-    frame.launch(write_mixed, found, [pixels, mixed], [radiance])
+    frame.launch(edge_detection.write_mixed, found, [pixels, mixed], [radiance])
 
 
 _STRIDE_PX = 3

@@ -5,9 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 import warp as wp
 
-from gen_data.core.asset_types import Float32
+from gen_data.core import asset_types, se3
 from gen_data.core.intrinsics import Intrinsics
-from gen_data.core.se3 import Array
 
 NODE_STRIDE_PX = 8
 """Spacing of the nodes between which directions outside the image are interpolated."""
@@ -25,7 +24,7 @@ class DeviceOptics:
     """
 
     directions: wp.array
-    nodes: Float32
+    nodes: asset_types.Float32
     nodes_on_device: wp.array
     nbytes: int
 
@@ -44,7 +43,7 @@ def upload_optics(intrinsics: Intrinsics, device: wp.Device) -> DeviceOptics:
     )
 
 
-def pixel_table(intrinsics: Intrinsics) -> Float32:
+def pixel_table(intrinsics: Intrinsics) -> asset_types.Float32:
     """Unit directions and the angle of each pixel [rad], shape [h, w, 4].
 
     The optical axis and 0 where the lens shows nothing.
@@ -57,7 +56,7 @@ def pixel_table(intrinsics: Intrinsics) -> Float32:
     return table
 
 
-def canvas_nodes(intrinsics: Intrinsics) -> Float32:
+def canvas_nodes(intrinsics: Intrinsics) -> asset_types.Float32:
     """Directions at the nodes of the canvas; see DeviceOptics."""
     width, height = intrinsics.width_px, intrinsics.height_px
     u, v = (
@@ -67,7 +66,7 @@ def canvas_nodes(intrinsics: Intrinsics) -> Float32:
     return np.asarray(intrinsics.rays(np.stack(np.meshgrid(u, v), axis=-1)).astype(np.float32))
 
 
-def _pixel_angles(rays: Array, intrinsics: Intrinsics) -> Array:
+def _pixel_angles(rays: se3.Array, intrinsics: Intrinsics) -> se3.Array:
     """Side of the square with each pixel's solid angle [rad]."""
     across, down = (_slopes(rays, axis) for axis in (1, 0))
     area = np.cross(across, down)
@@ -77,7 +76,7 @@ def _pixel_angles(rays: Array, intrinsics: Intrinsics) -> Array:
     return np.asarray(np.maximum(np.nan_to_num(angles, nan=usual), 0.05 * usual))
 
 
-def _slopes(rays: Array, axis: int) -> Array:
+def _slopes(rays: se3.Array, axis: int) -> se3.Array:
     """Change per pixel along an axis; NaN beside pixels that are not shown."""
     if rays.shape[axis] == 1:
         return np.full_like(rays, np.nan)
