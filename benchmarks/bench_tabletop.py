@@ -17,10 +17,7 @@ from benchmarks.runs import format_summary, machine, measure_run
 from gen_data.assemble.config import Config, load_config
 from gen_data.assemble.pipeline_factory import open_pipeline
 
-OVERRIDES = (
-    "randomizers.clutter.count=10",
-    "randomizers.lamps.count=2",
-)
+OVERRIDES = ("randomizers.clutter.count=10", "randomizers.lamps.count=2")
 
 
 # All features of lights and materials: balls, spots, rectangles, disks and visible panels; coats,

@@ -46,11 +46,7 @@ _MARGIN = 2
 
 
 def read_surfaces(
-    info: DatasetInfo,
-    sample: Sample,
-    camera: str,
-    shard_dir: Path,
-    assets: AssetLibrary,
+    info: DatasetInfo, sample: Sample, camera: str, shard_dir: Path, assets: AssetLibrary
 ) -> tuple[UInt16, UInt8]:
     """Read the instance image of a camera, and find the surfaces behind it.
 

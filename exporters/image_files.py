@@ -108,10 +108,7 @@ def write_media(info: DatasetInfo, sample: Sample, shard_dir: Path) -> None:
 
 
 def encode_channel(
-    channel: Channel,
-    image: NDArray[Any],
-    depth_scale_m: float,
-    encoding: ImageEncoding = PNG,
+    channel: Channel, image: NDArray[Any], depth_scale_m: float, encoding: ImageEncoding = PNG
 ) -> bytes:
     """Encode one channel; see the table at the top of this module.
 

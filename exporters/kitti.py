@@ -279,10 +279,7 @@ def _is_dont_care(row: LabelRow) -> bool:
 
 
 def point_members(
-    points: NDArray[np.void],
-    truth: ImageTruth,
-    rows: Sequence[LabelRow],
-    T_camera_velo: se3.Array,
+    points: NDArray[np.void], truth: ImageTruth, rows: Sequence[LabelRow], T_camera_velo: se3.Array
 ) -> tuple[NDArray[np.int64], frozenset[int]]:
     """Assign points to instances; also return the labelled instances without a point.
 

@@ -68,11 +68,7 @@ def upright_box(box: OrientedBox) -> UprightBox:
     middle_along = 0.5 * float(along.min() + along.max())
     middle_across = 0.5 * float(across.min() + across.max())
     return UprightBox(
-        size_hwl_m=(
-            float(np.ptp(corners[:, 1])),
-            float(np.ptp(across)),
-            float(np.ptp(along)),
-        ),
+        size_hwl_m=(float(np.ptp(corners[:, 1])), float(np.ptp(across)), float(np.ptp(along))),
         bottom_m=(
             middle_along * x - middle_across * z,
             float(corners[:, 1].max()),

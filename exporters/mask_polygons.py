@@ -196,9 +196,7 @@ def _trace_borders(corners: _Corners) -> list[list[int]]:
 
 
 def _follow(
-    border: Sequence[int],
-    corners: _Corners,
-    bridges: Mapping[int, Sequence[tuple[int, Polygon]]],
+    border: Sequence[int], corners: _Corners, bridges: Mapping[int, Sequence[tuple[int, Polygon]]]
 ) -> Polygon:
     """Points of a border and of the holes that are attached to its edges by ``bridges``."""
     starts = np.array(border)

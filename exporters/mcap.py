@@ -439,11 +439,7 @@ def _objects_message(objects: Iterable[Mapping[str, Any]], time_ns: int) -> Mess
             id=str(thing["id"]),
             metadata=[{"key": key, "value": value} for key, value in facts.items()],
             cubes=[
-                {
-                    "pose": pose,
-                    "size": {"x": length, "y": width, "z": height},
-                    "color": BOX_COLOR,
-                }
+                {"pose": pose, "size": {"x": length, "y": width, "z": height}, "color": BOX_COLOR}
             ],
         )
     return message

@@ -118,10 +118,7 @@ def constant_rows(token: Tokens, channels: Mapping[str, str]) -> Iterator[tuple[
         text = f"between {low} % and {high} % of the object are visible in all images together"
         yield "visibility", {"token": key, "level": level, "description": text}
     for name, modality in channels.items():
-        yield (
-            "sensor",
-            {"token": token("sensor", name), "channel": name, "modality": modality},
-        )
+        yield ("sensor", {"token": token("sensor", name), "channel": name, "modality": modality})
 
 
 def world_rows(token: Tokens, frame: Frame, map_file: str) -> Iterator[tuple[str, Row]]:

@@ -63,9 +63,7 @@ class PointClouds(base.ExporterBase):
 
     type: Literal["pointclouds"] = "pointclouds"
     conventions: ClassVar[Conventions] = Conventions(
-        time=f"{READING}; {POINT_TIME}",
-        ring="highest laser",
-        intensity="0 to 1",
+        time=f"{READING}; {POINT_TIME}", ring="highest laser", intensity="0 to 1"
     )
     own_classes: ClassVar[bool] = True
 

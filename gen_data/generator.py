@@ -16,10 +16,7 @@ _MOVED = (
     (r"^assets\.procedural\.family$", "assets.family"),
     (r"^assets\.procedural\.variant_rng$", "core.variant_rng"),
     (r"^assets\.skies\.(clouds|daylight|equirectangular|sky)$", r"sky.\1"),
-    (
-        r"^assets\.(interiors|people|procedural|roads|scenery|skies|vehicles)\b",
-        r"content.\1",
-    ),
+    (r"^assets\.(interiors|people|procedural|roads|scenery|skies|vehicles)\b", r"content.\1"),
     (
         r"^packs\.(example_robot_data|mjcf|panoramas|pybullet_files|robosuite|sweethome3d)$",
         r"content.packs.\1",

@@ -165,8 +165,7 @@ class ArmTask(RandomizerBase):
         )
         changed = replace(arm, task=goals, assignment=assignment)
         return replace(
-            scene,
-            articulations=tuple(changed if a is arm else a for a in scene.articulations),
+            scene, articulations=tuple(changed if a is arm else a for a in scene.articulations)
         )
 
     def _possible_tasks(self) -> tuple[str, ...]:
@@ -320,11 +319,7 @@ def _goals(
         if step.verb == "move":
             waypoints = tuple(_motions(step, frame, latest_m))
             yield ArmGoal(
-                "move",
-                waypoints=waypoints,
-                touches=touches,
-                pivots=step.pivots,
-                phase=step.phase,
+                "move", waypoints=waypoints, touches=touches, pivots=step.pivots, phase=step.phase
             )
             continue
         latest_m = (frame @ SE3(step.offset_m)).translation_m

@@ -82,11 +82,7 @@ def tape_carton(
 
 
 def _sticker(
-    axis: int,
-    face: float,
-    across: tuple[float, float],
-    up: tuple[float, float],
-    slot: int,
+    axis: int, face: float, across: tuple[float, float], up: tuple[float, float], slot: int
 ) -> Patch:
     """A thin rectangle on a side of a box."""
     t = 0.0005

@@ -615,9 +615,7 @@ def _standing_book(
             if rng.chance(0.7):
                 side, wide = thick * (0.42 + 0.16 * line), 0.09 * thick
                 print_ = rectangle(
-                    (x1 + 0.0003, y + side, low * h),
-                    (0.0, wide, 0.0),
-                    (0.0, 0.0, (high - low) * h),
+                    (x1 + 0.0003, y + side, low * h), (0.0, wide, 0.0), (0.0, 0.0, (high - low) * h)
                 )
                 made.append(print_.painted(10))
     return made

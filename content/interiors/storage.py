@@ -139,9 +139,7 @@ def _looks(family: str, rng: VariantRng, seed: int) -> list[Material]:
         shared = variant_rng("kitchen", seed // VARIANTS_PER_LOOK)
         facing = front(shared)
         worktop = patterned_material(
-            f"texture/{shared.choose(_WORKTOPS)}?seed={int(shared.between(0, 16))}",
-            0.5,
-            0.3,
+            f"texture/{shared.choose(_WORKTOPS)}?seed={int(shared.between(0, 16))}", 0.5, 0.3
         )
         return [painted_material("#eeede9", 0.5), facing, steel, worktop]
     body = front(rng)

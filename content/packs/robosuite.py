@@ -78,10 +78,7 @@ def _index_entry(arm: Arm) -> folder_index.RobotEntry:
         author=arm.author,
         home={**arm.home, **fingers},
         gripper=folder_index.GripperEntry(
-            link=_HAND,
-            grasp_offset_m=_GRASP_M,
-            finger_joints=_FINGERS,
-            stroke_m=_STROKE_M,
+            link=_HAND, grasp_offset_m=_GRASP_M, finger_joints=_FINGERS, stroke_m=_STROKE_M
         ),
         touching=arm.touching,
         max_faces=1500,

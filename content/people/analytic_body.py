@@ -246,11 +246,7 @@ def _hand(bones: Bones, side: str) -> tuple[Array, Indices]:
 
 
 def _along_arm(
-    bones: Bones,
-    start: Array,
-    along_m: Array,
-    halves_m: Array,
-    chain: Sequence[str],
+    bones: Bones, start: Array, along_m: Array, halves_m: Array, chain: Sequence[str]
 ) -> tuple[Array, Indices]:
     across = np.cross(_DOWN_OUT, [1.0, 0.0, 0.0])
     middles = start + along_m[:, None] * _DOWN_OUT

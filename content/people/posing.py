@@ -143,10 +143,7 @@ def shorten_stride(stance: Stance, share: float) -> Stance:
     """Shorten the steps of a stride, for narrow clothes."""
     left, right = (
         replace(
-            leg,
-            hip=share * leg.hip,
-            knee=leg.knee * (0.5 + 0.5 * share),
-            ankle=leg.ankle * share,
+            leg, hip=share * leg.hip, knee=leg.knee * (0.5 + 0.5 * share), ankle=leg.ankle * share
         )
         for leg in (stance.left_leg, stance.right_leg)
     )

@@ -146,11 +146,7 @@ def _sheet(stations: Sequence[Station], count: int, across: int = 6) -> Patch:
 
 
 def _cutlery(
-    sheets: list[Patch],
-    size: float,
-    cut_mm: float,
-    rng: VariantRng,
-    grip: Material | None = None,
+    sheets: list[Patch], size: float, cut_mm: float, rng: VariantRng, grip: Material | None = None
 ) -> Solid:
     """The finished piece: scaled to metres, slot 1 behind the cut, collision in slices."""
     scale = 0.001 * size

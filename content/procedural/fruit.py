@@ -230,10 +230,7 @@ def _half(shape: Callable[[Array], Array]) -> list[Patch]:
     middle = np.array([0.0, 0.0, float(rim[:, 2].mean())])
     cut = middle + share * (rim - middle)[None]
     v = 1.0 - share[:, 0, 0]
-    return [
-        shapes.grid(skin, v=np.linspace(0.0, 0.5, rings + 1)),
-        shapes.grid(cut, v=v, slot=1),
-    ]
+    return [shapes.grid(skin, v=np.linspace(0.0, 0.5, rings + 1)), shapes.grid(cut, v=v, slot=1)]
 
 
 Stalk = tuple[Patch, Material]

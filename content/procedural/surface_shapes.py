@@ -154,11 +154,7 @@ def ball(shape: Callable[[Array], Array], rings: int = 16, segments: int = 24) -
 
 
 def rounded_box(
-    size_m: Vec3,
-    radius_m: float,
-    steps: int = 2,
-    *,
-    uv: Mapping[str, UvRect] | None = None,
+    size_m: Vec3, radius_m: float, steps: int = 2, *, uv: Mapping[str, UvRect] | None = None
 ) -> Patch:
     """A box about the origin with rounded edges.
 

@@ -212,9 +212,7 @@ def _strew(piece: Patch, places: Array, lying: bool, rng: VariantRng) -> Patch:
                         optimize=False)  # fmt: skip
     corners = corners + places[:, None, None, :]
     return Patch(
-        corners.reshape(-1, 3, 3),
-        np.tile(piece.uvs, (count, 1, 1)),
-        np.tile(piece.slots, count),
+        corners.reshape(-1, 3, 3), np.tile(piece.uvs, (count, 1, 1)), np.tile(piece.slots, count)
     )
 
 

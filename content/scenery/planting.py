@@ -194,11 +194,7 @@ def _wild_hedge(long: float, rng: VariantRng) -> Solid:
 
 
 def _lobed(
-    lobes: Sequence[_Ball],
-    height: float,
-    green: int,
-    flowers: str,
-    rng: VariantRng,
+    lobes: Sequence[_Ball], height: float, green: int, flowers: str, rng: VariantRng
 ) -> Solid:
     """A plant that fills balls (x, y, z, radius), with opaque cores inside them."""
     cores = [ball(lambda d: d, 5, 7).scaled(k, k, k).moved(x, y, z) for x, y, z, k in _inner(lobes)]

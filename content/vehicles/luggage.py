@@ -20,11 +20,7 @@ def draw_color(rng: variant_rng.VariantRng) -> se3.Vec3:
 
 def backpack(seat: Seat, rng: variant_rng.VariantRng) -> patches.Patch:
     """A bag on the rider's back."""
-    depth, width, height = (
-        rng.between(0.12, 0.2),
-        rng.between(0.28, 0.34),
-        rng.between(0.4, 0.5),
-    )
+    depth, width, height = (rng.between(0.12, 0.2), rng.between(0.28, 0.34), rng.between(0.4, 0.5))
     back = -0.1
     bag = block((back - depth, -0.5 * width, 0.08), (back, 0.5 * width, 0.08 + height), 0.05, _SLOT)
     return bag.rotated("y", seat.lean_rad).moved(*seat.hips)

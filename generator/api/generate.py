@@ -195,11 +195,7 @@ def _opened(
 
 
 def _check_arguments(
-    config: ConfigLike,
-    n: int,
-    out: str | PathLike[str] | None,
-    workers: int | None,
-    repair: bool,
+    config: ConfigLike, n: int, out: str | PathLike[str] | None, workers: int | None, repair: bool
 ) -> None:
     """Refuse wrong numbers, repair at a URL, and a folder in which another run writes."""
     from gen_data.runner.object_store import open_store

@@ -145,10 +145,7 @@ VARYING: Mapping[str, PluginTable[Any]] = {
 }
 """Lists that may depend on shared values, with their plug-in tables."""
 
-PLUGIN_LISTS: Mapping[str, PluginTable[Any]] = {
-    **VARYING,
-    "exporters": EXPORTERS,
-}
+PLUGIN_LISTS: Mapping[str, PluginTable[Any]] = {**VARYING, "exporters": EXPORTERS}
 """Lists of plug-ins with a ``type``, with their tables."""
 
 CONSTANT = {
@@ -332,16 +329,7 @@ def _make_config(document: Node, name: str, changes: Changes) -> Config:
     problems.raise_if_any()
     assert head is not None
     assert render is not None
-    config = Config(
-        name,
-        document.plain(),
-        head,
-        render,
-        annotations,
-        exporters,
-        probes,
-        document,
-    )
+    config = Config(name, document.plain(), head, render, annotations, exporters, probes, document)
     _ = config.asset_folders  # Missing folders are refused before a run.
     return config
 

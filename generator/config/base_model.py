@@ -14,9 +14,5 @@ class Strict(BaseModel):
     """
 
     model_config = ConfigDict(
-        extra="forbid",
-        frozen=True,
-        strict=True,
-        validate_default=True,
-        allow_inf_nan=False,
+        extra="forbid", frozen=True, strict=True, validate_default=True, allow_inf_nan=False
     )

@@ -105,11 +105,7 @@ def _entries(rows: Sequence[FieldRow]) -> Iterator[str]:
 
 def _wrapped(text: str, first: str = "", others: str = "") -> str:
     return textwrap.fill(
-        text,
-        TEXT_WIDTH,
-        initial_indent=first,
-        subsequent_indent=others,
-        break_on_hyphens=False,
+        text, TEXT_WIDTH, initial_indent=first, subsequent_indent=others, break_on_hyphens=False
     )
 
 

@@ -41,10 +41,7 @@ class Timeline:
 
 
 def finalize_scene(
-    scene: Scene,
-    assets: AssetLibrary,
-    category_ids: Mapping[str, int],
-    before: Scene | None = None,
+    scene: Scene, assets: AssetLibrary, category_ids: Mapping[str, int], before: Scene | None = None
 ) -> Scene:
     """Fill in category id, attributes, frame, keypoints and tight box of every instance.
 
@@ -101,9 +98,7 @@ def _measure(
             "body_bounds_m": _body_bounds(body, assets) if box3d == "body" else None,
             "keypoints": tuple(
                 asset_types.Keypoint(
-                    point.name,
-                    _scale(point.position_m, body.scale),
-                    point.radius_m * body.scale,
+                    point.name, _scale(point.position_m, body.scale), point.radius_m * body.scale
                 )
                 for point in assets.keypoints(body.asset)
             ),

@@ -109,10 +109,7 @@ def range_view(cloud: capture.PointCloud) -> Image:
     row = cloud.points["ring"].astype(np.intp)
     order = np.argsort(-range_m, kind="stable")
     share = np.log(np.maximum(range_m, 1e-6) / NEAR_M) / np.log(FAR_M / NEAR_M)
-    looks = (
-        color_shares(share),
-        *(point_colors(cloud, by) for by in get_args(PointColors)[::-1]),
-    )
+    looks = (color_shares(share), *(point_colors(cloud, by) for by in get_args(PointColors)[::-1]))
     panels = []
     for colors in looks:
         panel: Image = np.zeros((1 + int(row.max(initial=0)), PANEL_PX, 3), np.uint8)

@@ -257,10 +257,7 @@ def _viewpoints(objects: ObjectStatistics, columns: Mapping[str, Column]) -> Jso
     """Directions of the camera seen from objects, counted in cells of equal area, by category."""
     azimuth = columns["azimuth_rad"]
     height = np.sin(columns["elevation_rad"])
-    edges = (
-        np.linspace(-math.pi, math.pi, AZIMUTHS + 1),
-        np.linspace(-1.0, 1.0, ELEVATIONS + 1),
-    )
+    edges = (np.linspace(-math.pi, math.pi, AZIMUTHS + 1), np.linspace(-1.0, 1.0, ELEVATIONS + 1))
     counts = {}
     for number, name in enumerate(objects.categories):
         own = (columns["category"] == number) & np.isfinite(azimuth)
@@ -382,10 +379,7 @@ def _compare_numbers(parameter: Parameter, name: str, drawn: Column, expected: C
     # Fewer draws have wider bins, of about ten draws each.
     bins = int(np.clip(len(drawn) // 10, BINS_MIN, BINS_MAX))
     edges = np.linspace(low, high if high > low else low + 1.0, bins + 1)
-    rows = {
-        "drawn": np.histogram(drawn, edges)[0],
-        "expected": np.histogram(expected, edges)[0],
-    }
+    rows = {"drawn": np.histogram(drawn, edges)[0], "expected": np.histogram(expected, edges)[0]}
     ends = np.sort(np.concatenate([drawn, expected]))
     steps = [np.searchsorted(np.sort(c), ends, "right") / len(c) for c in (drawn, expected)]
     deviation = float(np.abs(steps[0] - steps[1]).max())

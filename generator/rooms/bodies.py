@@ -246,11 +246,7 @@ class Builder:
         base = room.name
         floor_at, top_at = SE3((*at, 0.0)), SE3((*at, z))
         self.add(
-            f"{base}/floor",
-            _id("floor", size_m=(x, y)),
-            floor_at,
-            kind,
-            materials=(looks.floor,),
+            f"{base}/floor", _id("floor", size_m=(x, y)), floor_at, kind, materials=(looks.floor,)
         )
         self.add(
             f"{base}/ceiling",

@@ -20,11 +20,7 @@ _HOUSES = (
     ("building/house", 96),
     ("building/old_town", 96),
 )
-_FAR = (
-    ("horizon/trees", 8, 75.0),
-    ("horizon/town", 8, 105.0),
-    ("horizon/forest", 6, 110.0),
-)
+_FAR = (("horizon/trees", 8, 75.0), ("horizon/town", 8, 105.0), ("horizon/forest", 6, 110.0))
 """Families that close the view, numbers of their variants, distances of pieces [m]."""
 _GROUNDS = ("texture/grass", "texture/grass", "texture/paving", "texture/asphalt")
 _VARIANTS = 24

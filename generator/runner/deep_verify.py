@@ -82,10 +82,7 @@ def choose_samples(folder: Path, count: int) -> list[int]:
 
 
 def find_irreproducible_samples(
-    folder: Path,
-    indices: Sequence[int],
-    semantic: bool = False,
-    source: Path | None = None,
+    folder: Path, indices: Sequence[int], semantic: bool = False, source: Path | None = None
 ) -> Iterator[verify.Finding]:
     """Generate samples again, and compare them with the stored ones.
 

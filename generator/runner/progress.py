@@ -83,10 +83,7 @@ class Summary:
         """Names and values, for a table."""
         if self.already_complete:
             return [
-                (
-                    "samples",
-                    f"{self.samples} (all there, every sha256 equal; nothing to do)",
-                ),
+                ("samples", f"{self.samples} (all there, every sha256 equal; nothing to do)"),
                 *self._skipped_row(),
                 ("id", self.dataset_id[:16]),
             ]

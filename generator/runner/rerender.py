@@ -95,10 +95,7 @@ class RerenderedScenes:
         step_index = index % self.info.steps_per_scene
         first = self.plan.stored.sample(index - step_index)
         streams = Streams(
-            self.info.seed,
-            first.scene_index,
-            attempt=first.attempts - 1,
-            index=first.scene_index,
+            self.info.seed, first.scene_index, attempt=first.attempts - 1, index=first.scene_index
         )
         nominal, randomizers, sensors = self.pipeline.config.open_scene(streams)
         scene = self._with_sensors(first.scene, nominal, sensors)
@@ -273,16 +270,7 @@ def rerender_plan(
 
 
 CHANGEABLE = frozenset(
-    {
-        "annotations",
-        "dataset",
-        "exporters",
-        "labels",
-        "randomizers",
-        "render",
-        "sensors",
-        "shared",
-    }
+    {"annotations", "dataset", "exporters", "labels", "randomizers", "render", "sensors", "shared"}
 )
 """Sections in which a configuration may differ from that of the data set."""
 

@@ -191,11 +191,7 @@ class _Check:
     """Comparison of the declared with the existing files of a data set."""
 
     def __init__(
-        self,
-        folder: Path,
-        plan: Plan,
-        contents: Contents | None,
-        digests: Mapping[str, str] | None,
+        self, folder: Path, plan: Plan, contents: Contents | None, digests: Mapping[str, str] | None
     ) -> None:
         self._contents = contents
         self._digests = digests

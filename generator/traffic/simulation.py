@@ -173,11 +173,7 @@ def _near_pairs(moving: Array, every: Array, reach_m: Array) -> list[tuple[int, 
 
 
 def make_upright_trajectories(
-    names: Sequence[str],
-    ground_m: Array,
-    ahead: Array,
-    climb: Array,
-    offsets_m: Sequence[Vec3],
+    names: Sequence[str], ground_m: Array, ahead: Array, climb: Array, offsets_m: Sequence[Vec3]
 ) -> list[motion.Trajectory | None]:
     """Make trajectories of bodies on the ground; None for bodies that never move.
 

@@ -50,11 +50,7 @@ class Courses:
 
 
 def follow_lines(
-    lines_m: Array,
-    xy_m: Array,
-    ahead: Array,
-    lookahead: NDArray[np.int64],
-    sharpest_per_m: Array,
+    lines_m: Array, xy_m: Array, ahead: Array, lookahead: NDArray[np.int64], sharpest_per_m: Array
 ) -> Courses:
     """Compute the paths of n vehicles along their lines.
 

@@ -276,9 +276,7 @@ def _zones(route: Route, walked: Mapping[str, tuple[Zone, ...]]) -> tuple[RouteZ
 
 
 def _shared_lanes(
-    routes: Sequence[Route],
-    first_m: Array,
-    crossed: Mapping[tuple[str, str], Overlap],
+    routes: Sequence[Route], first_m: Array, crossed: Mapping[tuple[str, str], Overlap]
 ) -> tuple[Array, Array, Array]:
     """First shared lanes of each pair: offset, start and end, [n, n] each."""
     n = len(routes)

@@ -137,10 +137,7 @@ def _paint(prim: Any, mesh: MeshPrim, topology: _Topology) -> MeshPrim:
         if np.ptp(opacity) > 1e-3:
             remarks.append("only the mean of displayOpacity is used")
     return replace(
-        mesh,
-        materials=tuple(materials),
-        colors=colors if found else None,
-        remarks=tuple(remarks),
+        mesh, materials=tuple(materials), colors=colors if found else None, remarks=tuple(remarks)
     )
 
 

@@ -121,11 +121,7 @@ def _spread_m(sensor: Sensor) -> tuple[float, float]:
 
 
 def _choose_pulses(
-    examined: Examined,
-    sample: Sample,
-    cloud: PointCloud,
-    sensor: Sensor,
-    there: NDArray[np.intp],
+    examined: Examined, sample: Sample, cloud: PointCloud, sensor: Sensor, there: NDArray[np.intp]
 ) -> Iterator[Pulses]:
     """Random points of a scan, instant by instant; none if there are no points."""
     rng = examined.rng(f"points/{sample.index}/{cloud.sensor}")

@@ -38,12 +38,7 @@ gen-data --config out/next/round_1.yaml --n 4000
     show_default=True,
 )
 def adapt(
-    config: str,
-    data: Path,
-    results: Path | None,
-    detector: Path | None,
-    strength: float,
-    out: Path,
+    config: str, data: Path, results: Path | None, detector: Path | None, strength: float, out: Path
 ) -> None:
     """Write the next round of a curriculum."""
     from rich.console import Console

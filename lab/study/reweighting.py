@@ -173,10 +173,7 @@ def _divide_integers(declared: UniformInteger) -> tuple[tuple[Distribution[Any],
         declared.low + round(k * count / min(BINS, count)) for k in range(min(BINS, count) + 1)
     ]
     return tuple(
-        (
-            Constant(low) if high == low + 1 else UniformInteger(low, high - 1),
-            (high - low) / count,
-        )
+        (Constant(low) if high == low + 1 else UniformInteger(low, high - 1), (high - low) / count)
         for low, high in pairwise(bounds)
     )
 

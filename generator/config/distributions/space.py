@@ -73,8 +73,7 @@ class EulerDeg(Distribution[Quaternion], key="euler_deg", kinds=("rotation",)):
     """
 
     roll_pitch_yaw_deg: Annotated[
-        tuple[float, float, float],
-        sized(3, "expected three angles [roll, pitch, yaw] in degrees"),
+        tuple[float, float, float], sized(3, "expected three angles [roll, pitch, yaw] in degrees")
     ] = Field(description="[roll, pitch, yaw] in degrees, fixed axes")
 
     def draw(self, rng: Rng) -> Quaternion:  # noqa: ARG002

@@ -101,11 +101,7 @@ class WarpRenderer:
         return replace(self._context, backdrop=backdrop)
 
     def _render_instant(
-        self,
-        scene: Scene,
-        camera: Camera,
-        channels: frozenset[Channel],
-        context: RenderContext,
+        self, scene: Scene, camera: Camera, channels: frozenset[Channel], context: RenderContext
     ) -> SensorReading:
         world = scene_packing.pack_world(scene, camera, self._cache)
         view = scene_packing.pack_view(camera, self._cache)

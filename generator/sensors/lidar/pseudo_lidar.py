@@ -55,10 +55,7 @@ class PseudoLidar(Mounted):
     def describe(self) -> SensorInfo:
         """Describe a laser scanner, as which exporters treat it."""
         return SensorInfo(
-            self.name,
-            Modality.LIDAR,
-            rate_hz=self.rate_hz,
-            time_offset_s=self.time_offset_s,
+            self.name, Modality.LIDAR, rate_hz=self.rate_hz, time_offset_s=self.time_offset_s
         )
 
     def mount(self, scene: Scene) -> Scene:
