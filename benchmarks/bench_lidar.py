@@ -12,8 +12,7 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 
-from benchmarks.bench_render import timed_launches
-from benchmarks.runs import machine
+from benchmarks import bench_render, runs
 from gen_data.assemble.config import load_config
 from gen_data.assemble.pipeline_factory import open_pipeline
 from gen_data.core import motion, se3, streams
@@ -66,7 +65,7 @@ def main() -> None:
     sweep = scan_pattern.make_sweep(model, 0.0)
     beams = LidarRays(sweep.directions, 0.0, 1, model.range_m[1], order=sweep.order)
     config = load_config("kitti_rig.yaml", overrides=["sensors[0].size_px=[64, 32]"])
-    print(f"{machine()}; {arguments.model}, {len(sweep.ring)} pulses")
+    print(f"{runs.machine()}; {arguments.model}, {len(sweep.ring)} pulses")
     with open_pipeline(config) as pipeline:
         for index in range(0, 5 * arguments.samples, 5):
             scene = pipeline.sample(index).scene
@@ -95,7 +94,7 @@ def main() -> None:
                 return sensor.capture(replace(moving), renderer, frozenset(), rng)  # noqa: B023
 
             spent = best_s(capture_moving, arguments.repeats)
-            with timed_launches() as by_kernel:
+            with bench_render.timed_launches() as by_kernel:
                 capture_moving()
             print(f"sample {index}, 1 ray, moving: {1e3 * spent:.0f} ms, of which " + ", ".join(
                   f"{name} {ms:.0f} ms = {len(sweep.ring) / ms / 1e3:.2f} million rays/s"
@@ -104,7 +103,7 @@ def main() -> None:
                 lambda: renderer.scan(replace(scene), lidar, beams),  # noqa: B023
                 arguments.repeats,
             )
-            with timed_launches() as by_kernel:
+            with bench_render.timed_launches() as by_kernel:
                 renderer.scan(scene, lidar, beams)
             for kernel, ms in by_kernel.items():
                 rate = len(sweep.ring) / ms / 1e3

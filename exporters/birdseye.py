@@ -38,9 +38,8 @@ from gen_data.core import capture, lane_geometry, motion
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.sample import BirdseyeMap, BorderTruth, EgoTruth, Sample
 from gen_data.core.serialization import canonical_json
-from gen_data.exporters import base, image_files, png
+from gen_data.exporters import base, image_files, png, sequences
 from gen_data.exporters.conventions import ANY_LENS, SAMPLE, Conventions
-from gen_data.exporters.sequences import write_text
 
 FRAMES, LANES = "frames.jsonl", "lanes"
 ROWS_PX = 10
@@ -81,9 +80,9 @@ class Birdseye(base.ExporterBase):
             frames.append(canonical_json(_frame(sample, truth, truth.birdseye)) + "\n")
             for sensor in (s for s in info.cameras if s in sample.truth):
                 images[sensor].append(canonical_json(_image(info, sample, sensor)) + "\n")
-        write_text(folder / FRAMES, "".join(frames))
+        sequences.write_text(folder / FRAMES, "".join(frames))
         for sensor, lines in images.items():
-            write_text(folder / LANES / f"{sensor}.jsonl", "".join(lines))
+            sequences.write_text(folder / LANES / f"{sensor}.jsonl", "".join(lines))
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Link the layers of all shards, given in index order, and join their lines."""
@@ -94,7 +93,7 @@ class Birdseye(base.ExporterBase):
                     image_files.link_or_copy(path, dataset_dir / layer.name / path.name)
         for name in (FRAMES, *(f"{LANES}/{sensor}.jsonl" for sensor in info.cameras)):
             lines = "".join((folder / name).read_text("utf-8") for folder in folders)
-            write_text(dataset_dir / name, lines)
+            sequences.write_text(dataset_dir / name, lines)
 
 
 def _frame(sample: Sample, truth: EgoTruth, birdseye: BirdseyeMap) -> dict[str, Any]:

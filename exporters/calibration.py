@@ -29,7 +29,7 @@ from gen_data.core import capture, errors, serialization
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.sample import Sample
 from gen_data.core.scene import Scene
-from gen_data.exporters import base, image_files, sensor_selection
+from gen_data.exporters import base, image_files, sensor_selection, sequences
 from gen_data.exporters.calibration_texts import (
     camera_info_text,
     colmap_camera,
@@ -37,15 +37,6 @@ from gen_data.exporters.calibration_texts import (
     opencv_text,
 )
 from gen_data.exporters.conventions import Conventions
-from gen_data.exporters.sequences import (
-    camera_mount,
-    device_mount,
-    frame_facts,
-    read_sequences,
-    relative_pose,
-    write_frames,
-    write_text,
-)
 
 PANORAMA = "equirectangular"
 
@@ -74,21 +65,21 @@ class CalibrationFiles(base.ExporterBase):
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
         """Write a line with the calibration and the poses of every sample."""
         self.check(info)
-        write_frames(shard_dir / self.type, [_row(info, sample) for sample in samples])
+        sequences.write_frames(shard_dir / self.type, [_row(info, sample) for sample in samples])
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Write every distinct calibration, the number of each sample's, and COLMAP's models."""
         numbers: dict[str, int] = {}
         table = ["index,split,calibration\n"]
         models: dict[int, _Model] = {}
-        for frames in read_sequences(shard_dirs, self.type).values():
+        for frames in sequences.read_sequences(shard_dirs, self.type).values():
             for frame in frames:
                 row = frame.row
                 key = serialization.canonical_json(row["texts"])
                 if key not in numbers:
                     numbers[key] = len(numbers)
                     for name, text in row["texts"].items():
-                        write_text(dataset_dir / f"{numbers[key]:04d}/{name}", text)
+                        sequences.write_text(dataset_dir / f"{numbers[key]:04d}/{name}", text)
                 table.append(f"{row['index']},{row['split']},{numbers[key]}\n")
                 models.setdefault(row["scene"], _Model()).add(row["images"])
                 for image in row["images"]:
@@ -97,7 +88,7 @@ class CalibrationFiles(base.ExporterBase):
                     )
                     folder = dataset_dir / f"colmap/{row['scene']:06d}/images"
                     image_files.link_or_copy(source, folder / image["name"])
-        write_text(dataset_dir / "samples.csv", "".join(table))
+        sequences.write_text(dataset_dir / "samples.csv", "".join(table))
         for scene, model in models.items():
             model.write(dataset_dir / f"colmap/{scene:06d}")
 
@@ -118,10 +109,12 @@ class _Model:
 
     def write(self, folder: Path) -> None:
         cameras = "".join(f"{k} {text}\n" for text, k in self.cameras.items())
-        write_text(folder / "cameras.txt", f"# CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]\n{cameras}")
+        sequences.write_text(
+            folder / "cameras.txt", f"# CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]\n{cameras}"
+        )
         head = "# IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME, then POINTS2D[] on a line\n"
-        write_text(folder / "images.txt", head + "".join(self.images))
-        write_text(folder / "points3D.txt", "")
+        sequences.write_text(folder / "images.txt", head + "".join(self.images))
+        sequences.write_text(folder / "points3D.txt", "")
 
 
 def _cameras(info: DatasetInfo) -> tuple[str, ...]:
@@ -142,7 +135,7 @@ def _row(info: DatasetInfo, sample: Sample) -> dict[str, Any]:
             text = colmap_camera(camera.intrinsics)
             images.append({"eye": name, "camera": text, "pose": pose, "name": file})
     texts = calibration_texts(sample.scene, _cameras(info))
-    return {**frame_facts(info, sample), "scene": sample.scene_index, "texts": texts,
+    return {**sequences.frame_facts(info, sample), "scene": sample.scene_index, "texts": texts,
             "images": images}  # fmt: skip
 
 
@@ -162,9 +155,9 @@ def calibration_texts(scene: Scene, cameras: Sequence[str]) -> dict[str, str]:
 
 
 def _chain_text(scene: Scene, chain: Sequence[str], imu: str) -> str:
-    mounts = [camera_mount(scene, name) for name in chain]
-    steps = [None, *(relative_pose(scene, b, a) for a, b in pairwise(mounts))]
-    unit = device_mount(scene, imu) if imu else None
-    poses = [relative_pose(scene, mount, unit) if unit else None for mount in mounts]
+    mounts = [sequences.camera_mount(scene, name) for name in chain]
+    steps = [None, *(sequences.relative_pose(scene, b, a) for a, b in pairwise(mounts))]
+    unit = sequences.device_mount(scene, imu) if imu else None
+    poses = [sequences.relative_pose(scene, mount, unit) if unit else None for mount in mounts]
     lenses = [scene.camera(name).intrinsics for name in chain]
     return kalibr_text(list(zip(chain, lenses, steps, poses, strict=True)))

@@ -44,21 +44,10 @@ from gen_data.core.errors import ConfigError, StorageError
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.sample import Sample
 from gen_data.core.serialization import canonical_json
-from gen_data.exporters import base, captions, image_files, label_png
+from gen_data.exporters import base, captions, image_files, label_png, sensor_selection, sequences
 from gen_data.exporters.conventions import ANY_LENS, Conventions
 from gen_data.exporters.id_colors import id_colors
 from gen_data.exporters.png import RowFilter, encode_png
-from gen_data.exporters.sensor_selection import rgb_camera
-from gen_data.exporters.sequences import (
-    Frame,
-    check_frame_names,
-    even_sequences,
-    frame_facts,
-    frame_rate_hz,
-    write_bytes,
-    write_frames,
-    write_text,
-)
 
 CONTROLS = ("depth", "segmentation", "edges")
 IMAGES = ("rgb", *CONTROLS)
@@ -110,7 +99,7 @@ class ControlClips(base.ExporterBase):
             ConfigError: no such camera, it lacks a channel, the range of depth is missing or
                 empty, or there are too many samples for six digits.
         """
-        camera = rgb_camera(info, self.camera, self.type)
+        camera = sensor_selection.rgb_camera(info, self.camera, self.type)
         for channel in (Channel.Z_DEPTH, self._ids):
             if channel not in info.media[camera]:
                 raise ConfigError(
@@ -128,7 +117,7 @@ class ControlClips(base.ExporterBase):
                 "set the nearest and farthest depth of your scenes, such as near_m: 0.5, far_m: 3 "
                 "(table), near_m: 0.6, far_m: 10 (room) or near_m: 3, far_m: 100 (street)"
             )
-        check_frame_names(info, self.type)
+        sequences.check_frame_names(info, self.type)
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
         """Write the controls of each image, and a JSON line with its caption.
@@ -138,7 +127,7 @@ class ControlClips(base.ExporterBase):
             StorageError: an image of the shard is missing.
         """
         self.check(info)
-        camera = rgb_camera(info, self.camera, self.type)
+        camera = sensor_selection.rgb_camera(info, self.camera, self.type)
         folder = shard_dir / self.type
         rows = []
         for sample in samples:
@@ -159,22 +148,22 @@ class ControlClips(base.ExporterBase):
                 "edges": encode_png(edges, RowFilter.UP, 1),
             }
             for kind, png in files.items():
-                write_bytes(folder / kind / f"{sample.index:09d}.png", png)
+                sequences.write_bytes(folder / kind / f"{sample.index:09d}.png", png)
             row = {
-                **frame_facts(info, sample),
+                **sequences.frame_facts(info, sample),
                 "text": captions.caption(sample, camera),
                 "near_m": near_m,
                 "far_m": far_m,
                 "size": [depth.shape[1], depth.shape[0]],
             }
             rows.append(row)
-        write_frames(folder, rows)
+        sequences.write_frames(folder, rows)
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Link the images of every clip, describe it, and list all frames."""
-        camera = rgb_camera(info, self.camera, self.type)
+        camera = sensor_selection.rgb_camera(info, self.camera, self.type)
         dataset_dir.mkdir(parents=True, exist_ok=True)
-        for number, frames in even_sequences(info, shard_dirs, self.type).items():
+        for number, frames in sequences.even_sequences(info, shard_dirs, self.type).items():
             split = dataset_dir / frames[0].row["split"]
             folder = split / f"{number:06d}"
             for k, frame in enumerate(frames):
@@ -206,17 +195,17 @@ class ControlClips(base.ExporterBase):
         grey = cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY)
         return np.asarray(cv2.Canny(grey, self.canny_low, self.canny_high), np.uint8)
 
-    def _source(self, info: DatasetInfo, frame: Frame, kind: str, camera: str) -> Path:
+    def _source(self, info: DatasetInfo, frame: sequences.Frame, kind: str, camera: str) -> Path:
         if kind == "rgb":
             return info.media_path(frame.shard_dir, camera, Channel.RGB, frame.index)
         return frame.shard_dir / self.type / kind / f"{frame.index:09d}.png"
 
     def _describe(
-        self, info: DatasetInfo, camera: str, folder: Path, frames: Sequence[Frame]
+        self, info: DatasetInfo, camera: str, folder: Path, frames: Sequence[sequences.Frame]
     ) -> None:
         text = frames[0].row["text"]
-        rate_hz = frame_rate_hz(info, frames)
-        write_text(folder / "caption.txt", f"{text}\n")
+        rate_hz = sequences.frame_rate_hz(info, frames)
+        sequences.write_text(folder / "caption.txt", f"{text}\n")
         facts = {
             "caption": text,
             "camera": camera,
@@ -231,7 +220,7 @@ class ControlClips(base.ExporterBase):
             "segmentation": self.segmentation,
             "edges": {"canny_low": self.canny_low, "canny_high": self.canny_high},
         }
-        write_text(folder / "clip.json", canonical_json(facts) + "\n")
+        sequences.write_text(folder / "clip.json", canonical_json(facts) + "\n")
         if self.video:
             for kind in IMAGES:
                 suffix = info.encoding(camera, Channel.RGB).suffix if kind == "rgb" else ".png"
@@ -239,7 +228,7 @@ class ControlClips(base.ExporterBase):
                 write_video(folder / f"{kind}.mp4", images, rate_hz)
             parameters = self._cosmos_parameters(f"{info.name}_{folder.name}", text)
             text = json.dumps(parameters, indent=2, ensure_ascii=False)
-            write_text(folder / "cosmos_transfer.json", text + "\n")
+            sequences.write_text(folder / "cosmos_transfer.json", text + "\n")
 
     def _cosmos_parameters(self, name: str, prompt: str) -> dict[str, Any]:
         """Parameters of Cosmos-Transfer 2.5; paths are relative to the clip."""
@@ -302,7 +291,7 @@ def write_video(path: Path, images: Sequence[Path], rate_hz: float) -> None:
         writer.release()
 
 
-def _metadata_lines(clip: str, frames: Sequence[Frame], suffix: str) -> Iterator[str]:
+def _metadata_lines(clip: str, frames: Sequence[sequences.Frame], suffix: str) -> Iterator[str]:
     """Lines of ``metadata.jsonl``: names of images relative to it, and the caption."""
     for k, frame in enumerate(frames):
         files = {f"{kind}_file_name": f"{clip}/{kind}/{k:06d}.png" for kind in CONTROLS}

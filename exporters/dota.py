@@ -24,9 +24,8 @@ from pydantic import Field
 from gen_data.core.capture import Channel
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.sample import ObjectTruth, Sample
-from gen_data.exporters import coco, fragments, image_files, image_rows
+from gen_data.exporters import coco, fragments, image_files, image_rows, sequences
 from gen_data.exporters.conventions import ANY_LENS, Conventions
-from gen_data.exporters.sequences import write_text
 
 HEADER = ("imagesource:gen-data", "gsd:null")
 
@@ -69,7 +68,7 @@ class Dota(image_rows.ImageRowsExporter):
             for shard_dir, row in fragments.fragment_rows(shard_dirs, self.type, f"{split}.images"):
                 name = Path(row["file_name"])
                 text = "".join(f"{line}\n" for line in (*HEADER, *row["lines"]))
-                write_text(folder / f"labelTxt/{name.stem}.txt", text)
+                sequences.write_text(folder / f"labelTxt/{name.stem}.txt", text)
                 image_files.link_photograph(info, shard_dir, row, folder / "images" / name)
 
     def _line(self, thing: ObjectTruth) -> str:

@@ -45,7 +45,7 @@ from gen_data.core import boxes, capture
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.lens import Lens
 from gen_data.core.sample import ObjectTruth, Sample
-from gen_data.exporters import base, fragments, ignored_regions, rle
+from gen_data.exporters import base, fragments, ignored_regions, rle, sequences
 from gen_data.exporters.conventions import EDGES, READING, Conventions
 from gen_data.exporters.lens_fields import has_bent_camera, lens_fields
 from gen_data.exporters.parquet_tables import (
@@ -57,7 +57,6 @@ from gen_data.exporters.parquet_tables import (
     value_feature,
 )
 from gen_data.exporters.sensor_selection import instant_s, photographs, rgb_camera, rgb_cameras
-from gen_data.exporters.sequences import write_text
 
 if TYPE_CHECKING:
     import pyarrow
@@ -128,7 +127,7 @@ class HuggingFace(base.ExporterBase):
             splits[line["split"]].add(row)
         for files in splits.values():
             files.close()
-        write_text(dataset_dir / "README.md", self._card(info, splits))
+        sequences.write_text(dataset_dir / "README.md", self._card(info, splits))
 
     def _card(self, info: DatasetInfo, splits: Mapping[str, _SplitFiles]) -> str:
         """Dataset card; ``datasets`` ignores splits without ``num_bytes``."""

@@ -7,8 +7,7 @@ from typing import Any, ClassVar
 
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.sample import Sample
-from gen_data.exporters import base, fragments
-from gen_data.exporters.sensor_selection import check_channels, photographs
+from gen_data.exporters import base, fragments, sensor_selection
 
 
 class ImageRowsExporter(base.ExporterBase):
@@ -23,7 +22,7 @@ class ImageRowsExporter(base.ExporterBase):
         Raises:
             ConfigError: no sensor writes the rgb channel.
         """
-        check_channels(info, (), self.type)
+        sensor_selection.check_channels(info, (), self.type)
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
         """Write a JSON line per photograph to ``<split>.images.jsonl``.
@@ -33,7 +32,7 @@ class ImageRowsExporter(base.ExporterBase):
         """
         self.check(info)
         rows: dict[str, list[Mapping[str, Any]]] = {}
-        for sample, sensor in photographs(info, samples):
+        for sample, sensor in sensor_selection.photographs(info, samples):
             facts = self.image_row(info, sample, sensor)
             row = {**facts, "sensor": sensor, "sample": sample.index}
             rows.setdefault(f"{sample.split}.images", []).append(row)

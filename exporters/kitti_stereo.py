@@ -33,18 +33,8 @@ from gen_data.core import errors, stereo
 from gen_data.core.capture import Channel
 from gen_data.core.interfaces import DatasetInfo, media_path
 from gen_data.core.sample import Sample
-from gen_data.exporters import base, image_files, kitti_raw, png, sensor_selection
+from gen_data.exporters import base, image_files, kitti_raw, png, sensor_selection, sequences
 from gen_data.exporters.conventions import PINHOLE, Conventions
-from gen_data.exporters.sequences import (
-    Frame,
-    camera_mount,
-    check_frame_names,
-    frame_facts,
-    read_sequences,
-    write_bytes,
-    write_frames,
-    write_text,
-)
 
 SPLITS = ("train", "val", "test")
 LABELS = {Channel.DISPARITY: "disp_occ_0", Channel.DISPARITY_VISIBLE: "disp_noc_0"}
@@ -70,7 +60,7 @@ class KittiStereo(base.ExporterBase):
                 samples.
         """
         self._pair(info)
-        check_frame_names(info, self.type)
+        sequences.check_frame_names(info, self.type)
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
         """Write the calibration of each pair, and a line for it.
@@ -85,12 +75,12 @@ class KittiStereo(base.ExporterBase):
             if all(name in sample.truth for name in pair.values()):
                 text = self._calibration(sample, pair)
                 path = shard_dir / self.type / f"calib_cam_to_cam/{sample.index:06d}.txt"
-                write_text(path, text)
+                sequences.write_text(path, text)
                 if set(FLOWS) <= set(info.media[pair["02"]]):
                     data = visible_flow(shard_dir, pair["02"], sample.index)
-                    write_bytes(self._flow_noc(shard_dir, sample.index), data)
-                rows.append(frame_facts(info, sample))
-        write_frames(shard_dir / self.type, rows)
+                    sequences.write_bytes(self._flow_noc(shard_dir, sample.index), data)
+                rows.append(sequences.frame_facts(info, sample))
+        sequences.write_frames(shard_dir / self.type, rows)
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Link all files of the shards into one tree and list the frames of each split."""
@@ -98,7 +88,7 @@ class KittiStereo(base.ExporterBase):
         frames_of: dict[str, list[str]] = {split: [] for split in SPLITS}
         # Without sequences no frame has a next one.
         is_paired = Channel.FLOW_FORWARD in info.media[pair["02"]] and info.steps_per_scene > 1
-        for frames in read_sequences(shard_dirs, self.type).values():
+        for frames in sequences.read_sequences(shard_dirs, self.type).values():
             followers = {frame.index - 1: frame for frame in frames}
             for frame in frames:
                 if is_paired and frame.index not in followers:
@@ -108,9 +98,9 @@ class KittiStereo(base.ExporterBase):
                 for source, target in links:
                     image_files.link_or_copy(source, dataset_dir / "training" / target)
         for split, names in frames_of.items():
-            write_text(dataset_dir / f"ImageSets/{split}.txt", "".join(names))
+            sequences.write_text(dataset_dir / f"ImageSets/{split}.txt", "".join(names))
         readme = _README.format(name=info.name, left=pair["02"], right=pair["03"])
-        write_text(dataset_dir / "README.txt", readme)
+        sequences.write_text(dataset_dir / "README.txt", readme)
 
     def _pair(self, info: DatasetInfo) -> dict[str, str]:
         known = sensor_selection.rgb_cameras(info)
@@ -143,11 +133,15 @@ class KittiStereo(base.ExporterBase):
                 f"exporter '{self.type}': cameras '{left.name}' and '{right.name}' are not a "
                 f"rectified pair: {error}"
             ) from error
-        reference = camera_mount(sample.scene, left.name)
+        reference = sequences.camera_mount(sample.scene, left.name)
         return kitti_raw.cameras_text(sample.scene, pair, reference, self.type)
 
     def _links(
-        self, info: DatasetInfo, pair: Mapping[str, str], frame: Frame, follower: Frame | None
+        self,
+        info: DatasetInfo,
+        pair: Mapping[str, str],
+        frame: sequences.Frame,
+        follower: sequences.Frame | None,
     ) -> Iterator[tuple[Path, str]]:
         """Yield the files of one frame, each with its path below ``training``."""
         name = f"{frame.index:06d}"

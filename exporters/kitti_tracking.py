@@ -30,26 +30,12 @@ from gen_data.core.capture import Channel
 from gen_data.core.interfaces import DatasetInfo, media_path
 from gen_data.core.sample import ObjectTruth, Sample
 from gen_data.core.scene import Scene
-from gen_data.exporters import base, image_files, kitti
+from gen_data.exporters import base, image_files, kitti, sequences
 from gen_data.exporters.conventions import PINHOLE, Conventions
 from gen_data.exporters.kitti_raw import Latitude, Longitude, projection
 from gen_data.exporters.oxts import navigation_mount, oxts_row, rig_motion
 from gen_data.exporters.point_cloud_io import read_points, xyzi_bytes
 from gen_data.exporters.sensor_selection import has_scans, laser_scanner, pinhole_camera
-from gen_data.exporters.sequences import (
-    Frame,
-    Mount,
-    camera_mount,
-    check_sequence_count,
-    even_sequences,
-    frame_facts,
-    lidar_mount,
-    matrix_numbers,
-    relative_pose,
-    write_bytes,
-    write_frames,
-    write_text,
-)
 
 SEQUENCES_MAX = 10_000
 """Names of sequences have four digits."""
@@ -102,7 +88,7 @@ class KittiTracking(base.ExporterBase):
         """
         self._cameras(info)
         laser_scanner(info, self.lidar, self.type)
-        check_sequence_count(info, SEQUENCES_MAX, self.type)
+        sequences.check_sequence_count(info, SEQUENCES_MAX, self.type)
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
         """Write the points of each frame, and a line with its labels."""
@@ -115,21 +101,21 @@ class KittiTracking(base.ExporterBase):
             rows.append(self._row(info, sample))
             if has_scans(shard_dir, lidar, sample.index):
                 path = shard_dir / self.type / f"velodyne/{sample.index:09d}.bin"
-                write_bytes(path, xyzi_bytes(read_points(shard_dir, lidar, sample.index)))
-        write_frames(shard_dir / self.type, rows)
+                sequences.write_bytes(path, xyzi_bytes(read_points(shard_dir, lidar, sample.index)))
+        sequences.write_frames(shard_dir / self.type, rows)
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Link images and scans, join labels, and list the sequences."""
         folder = dataset_dir / "training"
         seqmaps: dict[str, list[str]] = {"training": [], "train": [], "val": [], "test": []}
-        for number, frames in even_sequences(info, shard_dirs, self.type).items():
+        for number, frames in sequences.even_sequences(info, shard_dirs, self.type).items():
             name = f"{number:04d}"
             self._write_sequence(info, frames, folder, name)
             for split in ("training", frames[0].row["split"]):
                 line = f"{name} empty 000000 {len(frames):06d}\n"
                 seqmaps.setdefault(split, []).append(line)
         for split, lines in seqmaps.items():
-            write_text(folder / f"evaluate_tracking.seqmap.{split}", "".join(lines))
+            sequences.write_text(folder / f"evaluate_tracking.seqmap.{split}", "".join(lines))
 
     def _cameras(self, info: DatasetInfo) -> dict[str, str]:
         cameras = {"02": pinhole_camera(info, self.camera, self.type)}
@@ -139,11 +125,11 @@ class KittiTracking(base.ExporterBase):
 
     def _row(self, info: DatasetInfo, sample: Sample) -> dict[str, Any]:
         cameras, scene = self._cameras(info), sample.scene
-        carrier = camera_mount(scene, cameras["02"]).rig
+        carrier = sequences.camera_mount(scene, cameras["02"]).rig
         unit = navigation_mount(scene, self.oxts, carrier, self.type)
         truth = sample.truth[cameras["02"]]
         things = {thing.instance.instance_id: thing for thing in truth.objects}
-        return frame_facts(info, sample) | {
+        return sequences.frame_facts(info, sample) | {
             "cameras": [number for number, name in cameras.items() if name in sample.truth],
             "oxts": oxts_row(rig_motion(scene, unit), self.origin_deg),
             "calib": calib_text(scene, cameras, laser_scanner(info, self.lidar, self.type), unit),
@@ -154,12 +140,14 @@ class KittiTracking(base.ExporterBase):
         }
 
     def _write_sequence(
-        self, info: DatasetInfo, frames: Sequence[Frame], folder: Path, name: str
+        self, info: DatasetInfo, frames: Sequence[sequences.Frame], folder: Path, name: str
     ) -> None:
         labels = [f"{k} {row}\n" for k, frame in enumerate(frames) for row in frame.row["labels"]]
-        write_text(folder / f"label_02/{name}.txt", "".join(labels))
-        write_text(folder / f"oxts/{name}.txt", "".join(f.row["oxts"] + "\n" for f in frames))
-        write_text(folder / f"calib/{name}.txt", frames[0].row["calib"])
+        sequences.write_text(folder / f"label_02/{name}.txt", "".join(labels))
+        sequences.write_text(
+            folder / f"oxts/{name}.txt", "".join(f.row["oxts"] + "\n" for f in frames)
+        )
+        sequences.write_text(folder / f"calib/{name}.txt", frames[0].row["calib"])
         for k, frame in enumerate(frames):
             for number, camera in self._cameras(info).items():
                 if number in frame.row["cameras"]:
@@ -186,22 +174,24 @@ def truncation_level(truncation: float) -> int:
     return int(truncation > SLIGHTLY_TRUNCATED) + int(truncation > LARGELY_TRUNCATED)
 
 
-def calib_text(scene: Scene, cameras: Mapping[str, str], lidar: str, unit: Mount) -> str:
+def calib_text(scene: Scene, cameras: Mapping[str, str], lidar: str, unit: sequences.Mount) -> str:
     """Format the seven lines of a sequence's calibration; camera 02 is the reference.
 
     Without a laser scanner, the camera's frame takes the place of the scanner's.
     """
-    reference = camera_mount(scene, cameras["02"])
-    scanner = lidar_mount(scene, lidar) if lidar else reference
-    T_camera_velo = relative_pose(scene, reference, scanner).matrix()[:3]
-    T_velo_imu = relative_pose(scene, scanner, unit).matrix()[:3]
+    reference = sequences.camera_mount(scene, cameras["02"])
+    scanner = sequences.lidar_mount(scene, lidar) if lidar else reference
+    T_camera_velo = sequences.relative_pose(scene, reference, scanner).matrix()[:3]
+    T_velo_imu = sequences.relative_pose(scene, scanner, unit).matrix()[:3]
     lines = []
     for k in range(4):
         name = cameras.get(f"{k:02d}", cameras["02"])
-        shift_m = relative_pose(scene, camera_mount(scene, name), reference).translation_m
+        shift_m = sequences.relative_pose(
+            scene, sequences.camera_mount(scene, name), reference
+        ).translation_m
         P = projection(scene.camera(name).intrinsics, shift_m)
-        lines.append(f"P{k}: {matrix_numbers(P)}\n")
-    lines.append(f"R_rect {matrix_numbers(np.eye(3))}\n")
-    lines.append(f"Tr_velo_cam {matrix_numbers(T_camera_velo)}\n")
-    lines.append(f"Tr_imu_velo {matrix_numbers(T_velo_imu)}\n")
+        lines.append(f"P{k}: {sequences.matrix_numbers(P)}\n")
+    lines.append(f"R_rect {sequences.matrix_numbers(np.eye(3))}\n")
+    lines.append(f"Tr_velo_cam {sequences.matrix_numbers(T_camera_velo)}\n")
+    lines.append(f"Tr_imu_velo {sequences.matrix_numbers(T_velo_imu)}\n")
     return "".join(lines)

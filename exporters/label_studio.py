@@ -34,11 +34,10 @@ from gen_data.core.capture import Channel
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.sample import MaskPx, ObjectTruth, Sample
-from gen_data.exporters import coco, image_files, image_rows, label_colors
+from gen_data.exporters import coco, image_files, image_rows, label_colors, sequences
 from gen_data.exporters.conventions import ANY_LENS, Conventions
 from gen_data.exporters.fragments import fragment_rows, image_splits
 from gen_data.exporters.mask_polygons import drawable_polygons, join_polygons
-from gen_data.exporters.sequences import write_text
 
 LOCAL_FILES = "/data/local-files/?d="
 """Label Studio's address of a file in its folder of local files."""
@@ -94,7 +93,7 @@ class LabelStudio(image_rows.ImageRowsExporter):
                     image_files.link_photograph(info, shard_dir, row, target)
                 file.write("\n]\n")
         config = label_config(info.categories, self.shapes, sorted(keypoints))
-        write_text(dataset_dir / "label_config.xml", config)
+        sequences.write_text(dataset_dir / "label_config.xml", config)
 
     def image_row(self, info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
         """Its regions, as a task."""

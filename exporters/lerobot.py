@@ -34,9 +34,7 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
-from gen_data.core.capture import Channel
-from gen_data.core.demonstrations import DemonstrationStep, demonstration_step, joint_positions
-from gen_data.core.errors import ConfigError
+from gen_data.core import capture, demonstrations, errors
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.sample import Sample
 from gen_data.core.scene import Articulation, Scene
@@ -80,14 +78,14 @@ class LeRobot(base.AssetExporter):
         """
         base.check_installed(self.type, "pyarrow")
         if info.steps_per_scene < 2:
-            raise ConfigError(
+            raise errors.ConfigError(
                 f"exporter '{self.type}': episodes are sequences, but steps_per_scene is 1; "
                 "set steps_per_scene, and an arm that moves"
             )
         for name in self._cameras(info):
             rate_hz = info.sensor(name).rate_hz
             if rate_hz is not None and rate_hz * info.step_s < 1.0 - 1e-9:
-                raise ConfigError(
+                raise errors.ConfigError(
                     f"exporter '{self.type}': camera '{name}' reads {rate_hz:g} times per second, "
                     f"but frames are {info.step_s:g} s apart; omit its rate_hz, or list the other "
                     "cameras in the exporter's cameras"
@@ -137,18 +135,18 @@ class LeRobot(base.AssetExporter):
         time_s = sample.scene.time_s
         images = {
             camera: lerobot_statistics.image_sums(
-                info.media_path(shard_dir, camera, Channel.RGB, sample.index)
+                info.media_path(shard_dir, camera, capture.Channel.RGB, sample.index)
             )
             for camera in self._cameras(info)
         }
         robot = self.library.robot(arm.asset)
-        step = demonstration_step(arm, robot, time_s, info.step_s)
+        step = demonstrations.demonstration_step(arm, robot, time_s, info.step_s)
         return sequences.frame_facts(info, sample) | {
             "labels": {} if step is None else _labels(step),
             "robot": arm.asset,
             "joints": [joint.name for joint in robot.movable],
-            "state": joint_positions(arm, time_s),
-            "action": joint_positions(arm, time_s + info.step_s),
+            "state": demonstrations.joint_positions(arm, time_s),
+            "action": demonstrations.joint_positions(arm, time_s + info.step_s),
             "task": task_sentence(sample.scene, arm),
             "images": images,
         }
@@ -158,7 +156,7 @@ class LeRobot(base.AssetExporter):
             if self.arm in ("", arm.name):
                 return arm
         known = ", ".join(arm.name for arm in scene.articulations) or "none"
-        raise ConfigError(
+        raise errors.ConfigError(
             f"exporter '{self.type}': the scene has no arm '{self.arm}'; expected one of: {known}"
             if self.arm
             else f"exporter '{self.type}': the scene has no arm; add an element of type robot and "
@@ -166,7 +164,7 @@ class LeRobot(base.AssetExporter):
         )
 
 
-def _labels(step: DemonstrationStep) -> dict[str, Any]:
+def _labels(step: demonstrations.DemonstrationStep) -> dict[str, Any]:
     """Features of a demonstration at one instant."""
     pose = (*step.T_base_grasp.translation_m, *step.T_base_grasp.quaternion_wxyz)
     contacts = ", ".join(step.contacts)

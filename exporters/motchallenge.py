@@ -24,18 +24,8 @@ from typing import Any, ClassVar, Literal
 from gen_data.core import capture, errors, scene
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.sample import ImageTruth, ObjectTruth, Sample
-from gen_data.exporters import base, image_files
+from gen_data.exporters import base, image_files, sensor_selection, sequences
 from gen_data.exporters.conventions import ANY_LENS, Conventions
-from gen_data.exporters.sensor_selection import rgb_camera
-from gen_data.exporters.sequences import (
-    Frame,
-    check_sequence_count,
-    even_sequences,
-    frame_facts,
-    frame_rate_hz,
-    write_frames,
-    write_text,
-)
 
 PEDESTRIAN, PERSON_ON_VEHICLE, BICYCLE, MOTORBIKE, STATIC_PERSON = 1, 2, 4, 5, 7
 CLASSES = {
@@ -83,56 +73,58 @@ class MotChallenge(base.ExporterBase):
             ConfigError: the camera is missing, there are too many sequences, or no category has a
                 class in this format.
         """
-        rgb_camera(info, self.camera, self.type)
+        sensor_selection.rgb_camera(info, self.camera, self.type)
         if not any(_class_of(category) for category in info.categories):
             raise errors.ConfigError(
                 f"exporter '{self.type}': no category of the data set has a class in this format; "
                 f"expected at least one of: {', '.join(CLASSES)}. Use coco for other categories"
             )
-        check_sequence_count(info, SEQUENCES_MAX, self.type)
+        sequences.check_sequence_count(info, SEQUENCES_MAX, self.type)
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
         """Write a line per frame with the rows of its objects."""
         self.check(info)
-        camera = rgb_camera(info, self.camera, self.type)
+        camera = sensor_selection.rgb_camera(info, self.camera, self.type)
         rows = [
             self._row(info, sample, sample.truth[camera])
             for sample in samples
             if camera in sample.truth
         ]
-        write_frames(shard_dir / self.type, rows)
+        sequences.write_frames(shard_dir / self.type, rows)
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Link images, join rows, and list the sequences of each split."""
         benchmark = "_".join(info.name.split())
         names: dict[str, list[str]] = {}
-        for number, frames in even_sequences(info, shard_dirs, self.type).items():
+        for number, frames in sequences.even_sequences(info, shard_dirs, self.type).items():
             name = f"{benchmark}-{number:04d}"
             split = frames[0].row["split"]
             names.setdefault(split, []).append(name)
             self._write_sequence(info, frames, dataset_dir / f"{benchmark}-{split}" / name)
         for split, listed in names.items():
             lines = "".join(f"{name}\n" for name in ("name", *listed))
-            write_text(dataset_dir / f"seqmaps/{benchmark}-{split}.txt", lines)
+            sequences.write_text(dataset_dir / f"seqmaps/{benchmark}-{split}.txt", lines)
 
     def _row(self, info: DatasetInfo, sample: Sample, truth: ImageTruth) -> dict[str, Any]:
         rows = (gt_columns(thing, self.boxes) for thing in truth.objects)
         camera = truth.camera.intrinsics
-        return frame_facts(info, sample) | {
+        return sequences.frame_facts(info, sample) | {
             "size_px": [camera.width_px, camera.height_px],
             "gt": [row for row in rows if row],
         }
 
-    def _write_sequence(self, info: DatasetInfo, frames: Sequence[Frame], folder: Path) -> None:
-        camera = rgb_camera(info, self.camera, self.type)
+    def _write_sequence(
+        self, info: DatasetInfo, frames: Sequence[sequences.Frame], folder: Path
+    ) -> None:
+        camera = sensor_selection.rgb_camera(info, self.camera, self.type)
         width_px, height_px = frames[0].row["size_px"]
         lines = [f"{k},{row}\n" for k, frame in enumerate(frames, 1) for row in frame.row["gt"]]
-        write_text(folder / "gt/gt.txt", "".join(lines))
+        sequences.write_text(folder / "gt/gt.txt", "".join(lines))
         suffix = info.encoding(camera, capture.Channel.RGB).suffix
-        write_text(
+        sequences.write_text(
             folder / "seqinfo.ini",
             f"[Sequence]\nname={folder.name}\nimDir=img1\n"
-            f"frameRate={frame_rate_hz(info, frames):g}\nseqLength={len(frames)}\n"
+            f"frameRate={sequences.frame_rate_hz(info, frames):g}\nseqLength={len(frames)}\n"
             f"imWidth={width_px}\nimHeight={height_px}\nimExt={suffix}\n",
         )
         for k, frame in enumerate(frames, 1):

@@ -16,8 +16,7 @@ from typing import Any, TextIO
 
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.serialization import canonical_json
-from gen_data.exporters.nuscenes_classes import classes
-from gen_data.exporters.sequences import Frame, write_text
+from gen_data.exporters import nuscenes_classes, sequences
 
 TABLES = (
     "attribute",
@@ -104,11 +103,11 @@ def constant_rows(token: Tokens, channels: Mapping[str, str]) -> Iterator[tuple[
         token: Tokens of the data set.
         channels: Modality by channel.
     """
-    for index, (name, description) in enumerate(classes().categories):
+    for index, (name, description) in enumerate(nuscenes_classes.classes().categories):
         key = token("category", name)
         row = {"token": key, "name": name, "description": description, "index": index}
         yield "category", row
-    for name, description in classes().attributes.items():
+    for name, description in nuscenes_classes.classes().attributes.items():
         yield (
             "attribute",
             {"token": token("attribute", name), "name": name, "description": description},
@@ -121,7 +120,7 @@ def constant_rows(token: Tokens, channels: Mapping[str, str]) -> Iterator[tuple[
         yield ("sensor", {"token": token("sensor", name), "channel": name, "modality": modality})
 
 
-def world_rows(token: Tokens, frame: Frame, map_file: str) -> Iterator[tuple[str, Row]]:
+def world_rows(token: Tokens, frame: sequences.Frame, map_file: str) -> Iterator[tuple[str, Row]]:
     """Rows of the log and of the map of a world."""
     world = frame.row["scene"]
     log = {
@@ -146,4 +145,4 @@ def world_rows(token: Tokens, frame: Frame, map_file: str) -> Iterator[tuple[str
 
 def write_splits(folder: Path, names: Mapping[str, Sequence[str]]) -> None:
     """Write the scenes of each split, and of ``all``, as the devkit reads custom splits."""
-    write_text(folder / "splits.json", canonical_json(names) + "\n")
+    sequences.write_text(folder / "splits.json", canonical_json(names) + "\n")

@@ -16,10 +16,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gen_data.core.errors import ConfigError, did_you_mean
+from gen_data.core import errors, se3
 from gen_data.core.motion import STILL, Twist
 from gen_data.core.scene import Scene
-from gen_data.core.se3 import SE3, Array
 from gen_data.exporters.sequences import Mount, mounted_pose
 
 COLUMNS = """\
@@ -47,7 +46,7 @@ EXACT = "0 0 4 12 6 6 6"
 class RigMotion:
     """Pose and motion of a frame (X forward, Y left, Z up), along world axes."""
 
-    T_world_frame: SE3
+    T_world_frame: se3.SE3
     twist: Twist
 
 
@@ -64,12 +63,12 @@ def navigation_mount(scene: Scene, name: str, carrier: str, exporter: str) -> Mo
         ConfigError: there is no such device.
     """
     if not name:
-        return Mount(carrier, SE3())
+        return Mount(carrier, se3.SE3())
     known = [device.name for device in scene.devices]
     if name not in known:
-        raise ConfigError(
+        raise errors.ConfigError(
             f"exporter '{exporter}': there is no device '{name}' for oxts; expected one of: "
-            f"{', '.join(known) or 'none'}{did_you_mean(name, known)}"
+            f"{', '.join(known) or 'none'}{errors.did_you_mean(name, known)}"
         )
     device = scene.device(name)
     return Mount(device.rig, device.T_rig_device)
@@ -102,7 +101,7 @@ def oxts_row(motion: RigMotion, origin_deg: tuple[float, float]) -> str:
         origin_deg: Latitude and longitude of the world's origin.
     """
     roll_rad, pitch_rad, yaw_rad = roll_pitch_yaw(motion.T_world_frame.rotation())
-    T_level_world = SE3.about_z(yaw_rad).inverse()
+    T_level_world = se3.SE3.about_z(yaw_rad).inverse()
     T_unit_world = motion.T_world_frame.inverse()
     velocity = np.array(motion.twist.velocity_m_s)
     force = np.add(motion.twist.acceleration_m_s2, (0.0, 0.0, GRAVITY_M_S2))
@@ -120,7 +119,7 @@ def oxts_row(motion: RigMotion, origin_deg: tuple[float, float]) -> str:
     return " ".join(f"{round(float(v), 12) + 0.0:.12f}" for v in values) + " " + EXACT
 
 
-def roll_pitch_yaw(rotation: Array) -> tuple[float, float, float]:
+def roll_pitch_yaw(rotation: se3.Array) -> tuple[float, float, float]:
     """Angles [rad] with ``rotation = Rz(yaw) Ry(pitch) Rx(roll)``."""
     pitch_rad = math.atan2(-rotation[2, 0], math.hypot(rotation[2, 1], rotation[2, 2]))
     roll_rad = math.atan2(rotation[2, 1], rotation[2, 2])

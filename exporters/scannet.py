@@ -34,15 +34,9 @@ from gen_data.core.capture import Channel, ImageEncoding
 from gen_data.core.interfaces import DatasetInfo, media_path
 from gen_data.core.sample import Sample
 from gen_data.core.se3 import Array
-from gen_data.exporters import base, label_map, label_png, rgbd_sequences
+from gen_data.exporters import base, label_map, label_png, rgbd_sequences, sequences
 from gen_data.exporters.conventions import PINHOLE, Conventions
 from gen_data.exporters.image_files import encode_channel, link_or_copy, read_image, read_pixels
-from gen_data.exporters.sequences import (
-    check_sequence_count,
-    read_sequences,
-    write_bytes,
-    write_text,
-)
 
 UNITS_PER_M = 1000
 SPACES_MAX = 10_000
@@ -75,7 +69,7 @@ class ScanNet(rgbd_sequences.RgbdExporter):
             ConfigError: see ``RgbdExporter.check``, or there are too many sequences.
         """
         super().check(info)
-        check_sequence_count(info, SPACES_MAX * info.views_per_scene, self.type)
+        sequences.check_sequence_count(info, SPACES_MAX * info.views_per_scene, self.type)
 
     def write_frame(
         self, info: DatasetInfo, sample: Sample, camera: str, shard_dir: Path
@@ -83,7 +77,7 @@ class ScanNet(rgbd_sequences.RgbdExporter):
         """Write the images in the format's units; return pose, size and calibration."""
         for kind, data in self._images(info, sample, camera, shard_dir).items():
             name = f"{kind}/{sample.index:09d}{IMAGES[kind]}"
-            write_bytes(shard_dir / self.type / name, data)
+            sequences.write_bytes(shard_dir / self.type / name, data)
         view = sample.truth[camera].camera
         k = view.intrinsics
         return {
@@ -96,7 +90,7 @@ class ScanNet(rgbd_sequences.RgbdExporter):
         """Link the frames of all shards into scans and list them by split."""
         camera = self._camera(info)
         scans: dict[str, list[str]] = {split: [] for split in SPLITS}
-        for number, frames in read_sequences(shard_dirs, self.type).items():
+        for number, frames in sequences.read_sequences(shard_dirs, self.type).items():
             space, scan = divmod(number, info.views_per_scene)
             name = f"scene{space:04d}_{scan:02d}"
             folder = dataset_dir / "scans" / name
@@ -107,12 +101,16 @@ class ScanNet(rgbd_sequences.RgbdExporter):
                     if kind == "color" and _has_jpeg(info, camera):
                         source = info.media_path(frame.shard_dir, camera, Channel.RGB, frame.index)
                     link_or_copy(source, folder / kind / f"{k}{suffix}")
-                write_text(folder / f"pose/{k}.txt", matrix_text(np.array(frame.row["pose"])))
+                sequences.write_text(
+                    folder / f"pose/{k}.txt", matrix_text(np.array(frame.row["pose"]))
+                )
             for path, text in camera_texts(frames[0].row, len(frames)).items():
-                write_text(folder / path.format(name=name), text)
+                sequences.write_text(folder / path.format(name=name), text)
         for split, names in scans.items():
-            write_text(dataset_dir / f"scannetv2_{split}.txt", "".join(names))
-        write_text(dataset_dir / "scannetv2-labels.combined.tsv", label_table(self.classes))
+            sequences.write_text(dataset_dir / f"scannetv2_{split}.txt", "".join(names))
+        sequences.write_text(
+            dataset_dir / "scannetv2-labels.combined.tsv", label_table(self.classes)
+        )
 
     def _images(
         self, info: DatasetInfo, sample: Sample, camera: str, shard_dir: Path

@@ -45,12 +45,10 @@ from gen_data.core import capture, serialization
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.lens import Lens
 from gen_data.core.sample import ImageTruth, ObjectTruth, Sample
-from gen_data.exporters import base, ignored_regions, png
+from gen_data.exporters import base, ignored_regions, png, sensor_selection, sequences
 from gen_data.exporters.conventions import Conventions
 from gen_data.exporters.fragments import fragment_rows, numbered_stem, write_fragment
 from gen_data.exporters.lens_fields import lens_fields
-from gen_data.exporters.sensor_selection import photographs, rgb_camera
-from gen_data.exporters.sequences import write_bytes, write_text
 
 IMAGES = "images"
 DIFFICULT = 0.25
@@ -114,7 +112,7 @@ class TfRecord(base.ExporterBase):
             ConfigError: no sensor writes the rgb channel, or the CRC library is missing.
         """
         base.check_installed(self.type, "google_crc32c")
-        rgb_camera(info, "", self.type)
+        sensor_selection.rgb_camera(info, "", self.type)
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
         """Write the encoded labels of all images to one file, and a JSON line per image."""
@@ -122,14 +120,14 @@ class TfRecord(base.ExporterBase):
         rows: list[dict[str, Any]] = []
         parts: list[bytes] = []
         offset = 0
-        for sample, sensor in photographs(info, samples):
+        for sample, sensor in sensor_selection.photographs(info, samples):
             labels = encode_features(self._labels(info, sample, sensor))
             where = {"split": sample.split, "sample": sample.index, "sensor": sensor}
             rows.append(where | {"offset": offset, "size": len(labels)})
             parts.append(labels)
             offset += len(labels)
         write_fragment(shard_dir / self.type, IMAGES, rows)
-        write_bytes(shard_dir / self.type / LABELS, b"".join(parts))
+        sequences.write_bytes(shard_dir / self.type / LABELS, b"".join(parts))
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Join labels and images to records, and write the label map."""
@@ -147,7 +145,7 @@ class TfRecord(base.ExporterBase):
             with (dataset_dir / f"{stem}.tfrecord").open("ab") as file:
                 file.write(frame_record(example))
             written[split] += 1
-        write_text(dataset_dir / "label_map.pbtxt", label_map(info.categories))
+        sequences.write_text(dataset_dir / "label_map.pbtxt", label_map(info.categories))
 
     def _labels(self, info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Feature]:
         truth = sample.truth[sensor]

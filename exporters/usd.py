@@ -32,9 +32,8 @@ from gen_data.core import asset_types, scene_time
 from gen_data.core.interfaces import AssetLibrary, DatasetInfo
 from gen_data.core.sample import Sample
 from gen_data.core.serialization import canonical_json
-from gen_data.exporters import base, image_files, png
+from gen_data.exporters import base, image_files, png, sequences
 from gen_data.exporters.conventions import Conventions
-from gen_data.exporters.sequences import write_bytes, write_text
 from gen_data.usd.asset_layer import TextureFiles, write_asset_layer
 from gen_data.usd.stage_writer import StageFiles, write_stage
 
@@ -86,7 +85,7 @@ class Usd(base.AssetExporter):
             path = folder / f"{sample.index:09d}.{self.format}"
             write_stage(path, instants, info.step_s, shared.files(), offsets_s)
             rows.append(_row(sample, path.name, count))
-        write_text(folder / STAGES, "".join(canonical_json(row) + "\n" for row in rows))
+        sequences.write_text(folder / STAGES, "".join(canonical_json(row) + "\n" for row in rows))
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Link stages and shared files, and join the lines."""
@@ -99,7 +98,7 @@ class Usd(base.AssetExporter):
                 if not target.exists():
                     image_files.link_or_copy(path, target)
         lines = "".join((folder / STAGES).read_text("utf-8") for folder in folders)
-        write_text(dataset_dir / STAGES, lines)
+        sequences.write_text(dataset_dir / STAGES, lines)
 
 
 def _row(sample: Sample, name: str, steps: int) -> dict[str, Any]:
@@ -164,7 +163,7 @@ class _SharedFiles:
         """Write an image and return its name; empty if there is none."""
         if pixels is None:
             return ""
-        write_bytes(self._folder / name, png.encode_png(pixels, png.RowFilter.SUB, 2))
+        sequences.write_bytes(self._folder / name, png.encode_png(pixels, png.RowFilter.SUB, 2))
         return name
 
     def _panorama(self, sky: str) -> str:
@@ -172,7 +171,7 @@ class _SharedFiles:
         if not (self._folder / name).exists():
             bgr = np.ascontiguousarray(self.library.environment(sky)[..., ::-1])
             _, data = cv2.imencode(".hdr", bgr)
-            write_bytes(self._folder / name, data.tobytes())
+            sequences.write_bytes(self._folder / name, data.tobytes())
         return name
 
 

@@ -10,11 +10,10 @@ import numpy as np
 from pydantic import Field
 
 from gen_data.config import distributions as dist
-from gen_data.core.errors import ConfigError, LayoutRejected, Rejection, did_you_mean
+from gen_data.core import errors, se3
 from gen_data.core.interfaces import AssetIndex
 from gen_data.core.motion import StateChange, Trajectory
 from gen_data.core.scene import Body, Scene
-from gen_data.core.se3 import Array
 from gen_data.core.streams import Rng
 from gen_data.randomizers import base, traffic_actors, traffic_lights, traffic_states
 from gen_data.randomizers.ego_on_lane import Stop
@@ -155,15 +154,15 @@ class TrafficFlow(base.RandomizerBase):
             where = f"randomizers.{self.name}.routes.{name}"
             if name not in places:
                 known = sorted(places)
-                raise ConfigError(
+                raise errors.ConfigError(
                     f"{where}: there is no vehicle '{name}' on a driving lane; expected one of "
-                    f"{', '.join(known) or 'none'}{did_you_mean(name, known)}"
+                    f"{', '.join(known) or 'none'}{errors.did_you_mean(name, known)}"
                 )
             _check_points(standing, stops, where)
             lanes = lanes_through_point(streets.driving, stops, where)
             start = places[name].lane
             if start not in lanes:
-                raise ConfigError(
+                raise errors.ConfigError(
                     f"{where}: '{name}' starts on '{start}', which the route does not pass: "
                     f"{', '.join(lanes)}; give ego_on_lane the same route"
                 )
@@ -175,7 +174,7 @@ class TrafficFlow(base.RandomizerBase):
         drivers: Sequence[traffic_actors.OnRoad],
         streets: Streets,
         planned: dict[str, tuple[str, ...]],
-        obstacles: Array,
+        obstacles: se3.Array,
         rng: Rng,
     ) -> Vehicles | None:
         """Draw a driver and a route for each vehicle; None if there is none."""
@@ -284,7 +283,7 @@ def _check_points(standing: traffic_actors.Standing, stops: Sequence[Stop], wher
     for k, stop in enumerate(stops):
         wall = "" if isinstance(stop, str) else standing.at(*stop)
         if wall and not isinstance(stop, str):
-            raise ConfigError(
+            raise errors.ConfigError(
                 f"{where}[{k}]: ({stop[0]:g}, {stop[1]:g}) is inside '{wall}': a vehicle cannot "
                 "drive through it; expected a point on a driving lane"
             )
@@ -354,7 +353,7 @@ def _reject_collisions(
     kinds = [m.category for m in drivers] + ["person"] * len(people) + list(standing.categories)
     one, other = sorted((kinds[found[1]], kinds[found[2]]))
     remedy = f"fewer vehicles or people, or a shorter duration_s (randomizers.{name})"
-    raise LayoutRejected(Rejection(f"{one} and {other} collide in traffic", remedy))
+    raise errors.LayoutRejected(errors.Rejection(f"{one} and {other} collide in traffic", remedy))
 
 
 def _set_in_motion(

@@ -14,15 +14,7 @@ from typing import TypeVar
 
 import pytest
 
-from benchmarks.faults.children import (
-    UNEXPECTED,
-    Call,
-    Ended,
-    fork_run,
-    spread,
-    trace,
-    writing_calls,
-)
+from benchmarks.faults import children
 from benchmarks.faults.recorded_run import RESUME, record, reference_digest, resumes_to, tree_digest
 from benchmarks.faults.results import Result, Scale
 from gen_data.core.errors import GenDataError, StorageError
@@ -55,7 +47,7 @@ def kills_at_calls(scale: Scale, folder: Path) -> Result:
         result.skip("all", "strace is not installed")
         return result
     digest = reference_digest(folder)
-    calls = writing_calls(folder)
+    calls = children.writing_calls(folder)
     chosen = calls if scale.is_full else calls[:: max(1, len(calls) // 12)]
     result.notes.append(f"{len(calls)} writing system calls in a run of 3 shards")
     _judge_all(result, scale, partial(_kill_at, folder, digest), chosen)
@@ -64,16 +56,16 @@ def kills_at_calls(scale: Scale, folder: Path) -> Result:
 
 def _judge_all(result: Result, scale: Scale, judge: Callable[[T], str], tasks: Sequence[T]) -> None:
     """Count tasks, judged in forked processes: an empty text is a promise that held."""
-    problems = spread(judge, tasks)
+    problems = children.spread(judge, tasks)
     for task in result.until_end(scale, tasks):
         problem = next(problems)
         result.add(not problem, f"{task}: {problem}")
 
 
-def _kill_at(folder: Path, digest: str, call: Call) -> str:
+def _kill_at(folder: Path, digest: str, call: children.Call) -> str:
     out = folder / f"killed-{call.name}-{call.number}"
     inject = f"inject={call.name}:signal=SIGKILL:when={call.number}"
-    ended = trace(out, "-o", "/dev/null", "-e", f"trace={call.name}", "-e", inject)
+    ended = children.trace(out, "-o", "/dev/null", "-e", f"trace={call.name}", "-e", inject)
     problem = resumes_to(out, digest) if ended.code == -signal.SIGKILL else "it was not killed"
     shutil.rmtree(out, ignore_errors=True)
     return problem
@@ -86,24 +78,24 @@ def errnos_at_calls(scale: Scale, folder: Path) -> Result:
         result.skip("all", "strace is not installed")
         return result
     digest = reference_digest(folder)
-    calls = [call for call in writing_calls(folder) if call.name != "close"]
+    calls = [call for call in children.writing_calls(folder) if call.name != "close"]
     tasks = [(call, ERRNOS[k % len(ERRNOS)]) for k, call in enumerate(calls)]
     chosen = tasks if scale.is_full else tasks[:: max(1, len(tasks) // 12)]
     _judge_all(result, scale, partial(_fail_at, folder, digest), chosen)
     return result
 
 
-def _fail_at(folder: Path, digest: str, task: tuple[Call, str]) -> str:
+def _fail_at(folder: Path, digest: str, task: tuple[children.Call, str]) -> str:
     call, name = task
     out = folder / f"failed-{call.name}-{call.number}"
     inject = f"inject={call.name}:error={name}:when={call.number}"
-    ended = trace(out, "-o", "/dev/null", "-e", f"trace={call.name}", "-e", inject)
+    ended = children.trace(out, "-o", "/dev/null", "-e", f"trace={call.name}", "-e", inject)
     problem = _judge_error(ended, out, name) or resumes_to(out, digest)
     shutil.rmtree(out, ignore_errors=True)
     return problem
 
 
-def _judge_error(ended: Ended, out: Path, name: str) -> str:
+def _judge_error(ended: children.Ended, out: Path, name: str) -> str:
     """Whether an error ended in success, or in one message with path, error and command."""
     if ended.code == 0:
         return ""
@@ -147,8 +139,8 @@ def _break_at(folder: Path, digest: str, task: tuple[int, str]) -> str:
         except GenDataError as error:
             code, message = error.exit_code, str(error)
         except OSError as error:
-            code, message = UNEXPECTED, repr(error)
-    problem = _judge_error(Ended(code, message), out, name) or resumes_to(out, digest)
+            code, message = children.UNEXPECTED, repr(error)
+    problem = _judge_error(children.Ended(code, message), out, name) or resumes_to(out, digest)
     shutil.rmtree(out, ignore_errors=True)
     return problem
 
@@ -161,7 +153,7 @@ def crash_states(scale: Scale, folder: Path) -> Result:
     tasks = [(k % (count + 1), scale.seed + k) for k in range(states)]
     result = Result()
     kinds = set()
-    problems = spread(partial(_cut_power_at, folder, digest), tasks)
+    problems = children.spread(partial(_cut_power_at, folder, digest), tasks)
     for task in result.until_end(scale, tasks):
         state, problem = next(problems)
         kinds.add(state)
@@ -237,7 +229,7 @@ HANG_S = 120.0
 def _kill_after(out: Path, instant_s: float, target: str, digest: str) -> tuple[bool, str]:
     """Whether something was killed, and what is wrong afterwards."""
     message = out.with_name(f"{out.name}.message")
-    pid = fork_run(out, message, workers=2, delay_s=0.2)
+    pid = children.fork_run(out, message, workers=2, delay_s=0.2)
     time.sleep(instant_s)
     if os.waitpid(pid, os.WNOHANG)[0]:
         return False, ""

@@ -10,38 +10,36 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.readers.detection import import_torchvision, matrix_lens
-from benchmarks.readers.records import examples, load_dataset
-from benchmarks.readers.truth import image_name
+from benchmarks.readers import detection, records, truth
 from benchmarks.readers.views import Thing, View, cube, of_pixels, thing
 from gen_data.core.se3 import SE3
 
 
 def by_lerobot(root: Path) -> Iterator[View]:
     """Rows of LeRobot's data set: joints, and images as fractions of 255."""
-    import_torchvision()
+    detection.import_torchvision()
     from lerobot.datasets.lerobot_dataset import LeRobotDataset
 
     (folder,) = root.glob("train/*")
     data = LeRobotDataset("local/arm", root=folder)
     for k in range(len(data)):
         row = data[k]
-        yield View(image_name(k, "arm"), (thing("state", row["observation.state"].numpy()),))
+        yield View(truth.image_name(k, "arm"), (thing("state", row["observation.state"].numpy()),))
         for key in data.meta.camera_keys:
             pixels = 255.0 * row[key].permute(1, 2, 0).numpy()
-            yield View(image_name(k, key.rpartition(".")[2]), (thing("rgb", pixels),))
+            yield View(truth.image_name(k, key.rpartition(".")[2]), (thing("rgb", pixels),))
 
 
 def by_tfrecord_episodes(root: Path) -> Iterator[View]:
     """The steps of an episode: lists, one after the other."""
-    for row in examples(root, "train/*/*.tfrecord"):
+    for row in records.examples(root, "train/*/*.tfrecord"):
         steps = len(row["steps/is_first"])
         for k, state in enumerate(np.reshape(row["steps/observation/state"], (steps, -1))):
-            yield View(image_name(k, "arm"), (thing("state", state),))
+            yield View(truth.image_name(k, "arm"), (thing("state", state),))
         for key in (key for key in row if "/image/" in key):
             for k, file in enumerate(row[key]):
                 pixels = decoded(np.frombuffer(file, np.uint8))
-                yield View(image_name(k, key.rpartition("/")[2]), (thing("rgb", pixels),))
+                yield View(truth.image_name(k, key.rpartition("/")[2]), (thing("rgb", pixels),))
 
 
 def decoded(file: Any) -> Any:
@@ -61,12 +59,12 @@ def segments(ids: Any, names: Any) -> tuple[Thing, ...]:
 
 def by_datasets_clips(root: Path) -> Iterator[View]:
     """Hugging Face's folder of images; a colour per instance."""
-    for k, row in enumerate(r for split in load_dataset(str(root)).values() for r in split):
+    for k, row in enumerate(r for split in records.load_dataset(str(root)).values() for r in split):
         pixels = {key: np.array(row[key]) for key in ("image", "depth", "segmentation")}
         colors = pixels["segmentation"].astype(int) @ (65536, 256, 1)
         things = segments(colors, np.full(colors.shape, "instance"))
         yield View(
-            image_name(k, "color"),
+            truth.image_name(k, "color"),
             (*things, thing("rgb", pixels["image"]), thing("depth", pixels["depth"])),
         )
 
@@ -82,7 +80,7 @@ def by_opencv_scannet(root: Path) -> Iterator[View]:
         pose = np.loadtxt(folder / "pose/0.txt")[:3]
         K = np.loadtxt(folder / "intrinsic/intrinsic_depth.txt")[:3, :3]
         things = (*segments(ids, names[classes]), thing("depth", depth), thing("pose", pose))
-        yield View(image_name(k, "color"), things, matrix_lens(K, shift=0.5))
+        yield View(truth.image_name(k, "color"), things, detection.matrix_lens(K, shift=0.5))
 
 
 def by_graspnet(root: Path) -> Iterator[View]:
@@ -114,7 +112,7 @@ def by_torchvision_stereo(root: Path) -> Iterator[View]:
     The reader of disparities takes images of the next step for further pairs, of the original
     data too: it gets those of the first step only.
     """
-    import_torchvision()
+    detection.import_torchvision()
     import torch
     from torchvision.datasets import Kitti2015Stereo, KittiFlow, _optical_flow
 
@@ -134,7 +132,7 @@ def by_torchvision_stereo(root: Path) -> Iterator[View]:
     flows = [(flow * valid).transpose(1, 2, 0) for *_, flow, valid in KittiFlow(str(scratch))]
     for k, (_, _, disparity, _) in enumerate(Kitti2015Stereo(str(scratch))):
         things = [thing("disparity", disparity), *(thing("flow", f) for f in flows[k : k + 1])]
-        yield View(image_name(k, "image_02"), tuple(things))
+        yield View(truth.image_name(k, "image_02"), tuple(things))
 
 
 def by_trackeval(root: Path) -> Iterator[View]:
@@ -150,7 +148,7 @@ def by_trackeval(root: Path) -> Iterator[View]:
         columns = zip(rows["gt_classes"], rows["gt_ids"], rows["gt_dets"], strict=True)
         for k, found in enumerate(columns):
             things = (thing(f"{names[c]} {n}", box) for c, n, box in zip(*found, strict=True))
-            yield View(image_name(k, "image_02"), tuple(things))
+            yield View(truth.image_name(k, "image_02"), tuple(things))
 
 
 def by_open3d_ml(root: Path) -> Iterator[View]:
@@ -172,7 +170,7 @@ def by_open3d_ml(root: Path) -> Iterator[View]:
             for n in np.unique(ids)
             if n
         )
-        yield View(image_name(k, "velodyne"), tuple(things))
+        yield View(truth.image_name(k, "velodyne"), tuple(things))
 
 
 def by_pandas_tables(root: Path) -> Iterator[View]:
@@ -183,7 +181,7 @@ def by_pandas_tables(root: Path) -> Iterator[View]:
         for index, rows in pandas.read_csv(path).groupby("sample"):
             columns = rows.drop(columns="sample").items()
             things = (thing(name, np.nan_to_num(column.to_numpy())) for name, column in columns)
-            yield View(image_name(int(index), path.parent.name), tuple(things))
+            yield View(truth.image_name(int(index), path.parent.name), tuple(things))
 
 
 def by_pandas_birdseye(root: Path) -> Iterator[View]:
@@ -204,4 +202,4 @@ def by_pandas_birdseye(root: Path) -> Iterator[View]:
         ]
         for path in sorted(root.glob(f"*/{row.index:09d}.png")):
             things.append(thing(path.parent.name, (), decoded(path) > 0))
-        yield View(image_name(row.index, "world"), tuple(things))
+        yield View(truth.image_name(row.index, "world"), tuple(things))

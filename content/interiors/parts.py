@@ -7,13 +7,8 @@ import numpy as np
 
 from gen_data.assets.family import Solid
 from gen_data.content.procedural import collision_hulls as hulls
+from gen_data.content.procedural import material_presets as presets
 from gen_data.content.procedural import surface_shapes as shapes
-from gen_data.content.procedural.material_presets import (
-    PALETTES,
-    draw_linear,
-    painted_material,
-    patterned_material,
-)
 from gen_data.content.procedural.patches import Patch, make_solid_in_place
 from gen_data.core.asset_types import Material
 from gen_data.core.se3 import Vec3
@@ -129,14 +124,14 @@ def solid(patches: Sequence[Patch], materials: Sequence[Material], boxes: Sequen
 
 def wood(rng: VariantRng, roughness: float = 0.45) -> Material:
     """Oiled or varnished wood."""
-    return patterned_material(
+    return presets.patterned_material(
         f"texture/wood_grain?seed={int(rng.between(0, _WOODS))}", 0.0, roughness
     )
 
 
 def lacquer(rng: VariantRng, roughness: float = 0.35) -> Material:
     """A lacquered front."""
-    return painted_material(rng.choose(LACQUERS), roughness)
+    return presets.painted_material(rng.choose(LACQUERS), roughness)
 
 
 def front(rng: VariantRng) -> Material:
@@ -147,21 +142,25 @@ def front(rng: VariantRng) -> Material:
 def upholstery(rng: VariantRng) -> Material:
     """Fabric or leather."""
     if rng.chance(0.25):
-        return patterned_material(f"texture/leather?seed={int(rng.between(0, 16))}", 0.2, 0.55)
-    return patterned_material(f"texture/fabric?seed={int(rng.between(0, _FABRICS))}", 0.15, 0.95)
+        return presets.patterned_material(
+            f"texture/leather?seed={int(rng.between(0, 16))}", 0.2, 0.55
+        )
+    return presets.patterned_material(
+        f"texture/fabric?seed={int(rng.between(0, _FABRICS))}", 0.15, 0.95
+    )
 
 
 def cloth(rng: VariantRng) -> Material:
     """Plain cloth."""
-    return Material(draw_linear(PALETTES["cloth"], 0.08, rng), 0.95)
+    return Material(presets.draw_linear(presets.PALETTES["cloth"], 0.08, rng), 0.95)
 
 
 def brushed_steel(seed: int) -> Material:
     """Sheet of stainless steel as on kitchen appliances, brushed along Y."""
     texture = f"texture/brushed_metal?seed={in_turn(_STEEL_SHEETS, seed)}"
-    return replace(patterned_material(texture, 0.15, 0.42), metallic=1.0)
+    return replace(presets.patterned_material(texture, 0.15, 0.42), metallic=1.0)
 
 
 def ceramic(roughness: float = 0.12) -> Material:
     """White sanitary ware."""
-    return painted_material("#f1f0ec", roughness)
+    return presets.painted_material("#f1f0ec", roughness)

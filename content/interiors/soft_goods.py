@@ -7,16 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from gen_data.assets.family import Solid
-from gen_data.content.interiors.parts import (
-    Box,
-    board,
-    cloth,
-    cushion,
-    four_legs,
-    front,
-    rod,
-    solid,
-)
+from gen_data.content.interiors import parts
 from gen_data.content.procedural import surface_shapes as shapes
 from gen_data.content.procedural.material_presets import (
     PALETTES,
@@ -37,7 +28,7 @@ _LINEN = ("#f3f1ec", "#f1f1ef", "#e8e9ea", "#e6e0d6", "#cfd3d5", "#dfe3e3", "#b9
 def fabric(rng: VariantRng, repeat_m: float = 0.15) -> Material:
     """Plain or patterned cloth."""
     if rng.chance(0.45):
-        return cloth(rng)
+        return parts.cloth(rng)
     return patterned_material(f"texture/fabric?seed={int(rng.between(0, 16))}", repeat_m, 0.95)
 
 
@@ -216,18 +207,20 @@ def bed(seed: int = 0) -> Solid:
     length, top = 2.0, rng.between(0.42, 0.52, "top_m")
     x0, x1, y0, y1 = -0.5 * length - 0.06, 0.5 * length + 0.04, -0.5 * w - 0.04, 0.5 * w + 0.04
     rail = rng.between(0.24, 0.32, "rail_m")
-    head: Box = ((x0, y0, 0.0), (x0 + 0.05, y1, rng.between(0.8, 1.15)))
-    sides: list[Box] = [
+    head: parts.Box = ((x0, y0, 0.0), (x0 + 0.05, y1, rng.between(0.8, 1.15)))
+    sides: list[parts.Box] = [
         ((x0 + 0.05, y0, 0.12), (x1, y0 + 0.03, rail)),
         ((x0 + 0.05, y1 - 0.03, 0.12), (x1, y1, rail)),
         ((x1 - 0.03, y0 + 0.03, 0.12), (x1, y1 - 0.03, rail)),
     ]
     soft_head = rng.chance(0.4, "soft_head")
-    patches: list[Patch] = [cushion(*head, 4, 0.03) if soft_head else board(*head, 0, 0.006)]
-    patches += [board(*b) for b in sides]
-    patches += four_legs(x1 - x0, y1 - y0, 0.2, 0.06, 0)
-    mattress: Box = ((-0.5 * length, -0.5 * w, 0.14), (0.5 * length, 0.5 * w, top))
-    patches.append(cushion(*mattress, 1, 0.05))
+    patches: list[Patch] = [
+        parts.cushion(*head, 4, 0.03) if soft_head else parts.board(*head, 0, 0.006)
+    ]
+    patches += [parts.board(*b) for b in sides]
+    patches += parts.four_legs(x1 - x0, y1 - y0, 0.2, 0.06, 0)
+    mattress: parts.Box = ((-0.5 * length, -0.5 * w, 0.14), (0.5 * length, 0.5 * w, top))
+    patches.append(parts.cushion(*mattress, 1, 0.05))
     fold, hang = rng.between(0.5, 0.75, "fold_m"), rng.between(0.16, 0.26, "hang_m")
     start = -0.5 * length + fold
     patches.append(drape((start, 0.5 * length), 0.5 * w, top + 0.02, hang, rng, 2))
@@ -247,16 +240,16 @@ def bed(seed: int = 0) -> Solid:
         throw = drape((throw_at, throw_at + 0.55), 0.5 * w + 0.035, top + 0.11, hang, rng, 5, 0.007)
         patches.append(throw)
     linen = painted_material(rng.choose(_LINEN), 0.95)
-    looks = [front(rng), linen, fabric(rng), linen, fabric(rng), fabric(rng)]
-    return solid(patches, looks, [head, mattress])
+    looks = [parts.front(rng), linen, fabric(rng), linen, fabric(rng), fabric(rng)]
+    return parts.solid(patches, looks, [head, mattress])
 
 
 def cushion_pillow(seed: int = 0) -> Solid:
     """A cushion that lies flat. Slot: cloth."""
     rng = variant_rng("cushion_pillow", seed)
     s, h = rng.between(0.19, 0.25), rng.between(0.12, 0.16, "height_m")
-    body: Box = ((-0.8 * s, -0.8 * s, 0.0), (0.8 * s, 0.8 * s, h))
-    return solid([pillow(s, s, h, rng)], [fabric(rng)], [body])
+    body: parts.Box = ((-0.8 * s, -0.8 * s, 0.0), (0.8 * s, 0.8 * s, h))
+    return parts.solid([pillow(s, s, h, rng)], [fabric(rng)], [body])
 
 
 def blanket(seed: int = 0) -> Solid:
@@ -279,7 +272,7 @@ def towel_stack(seed: int = 0) -> Solid:
         rng.whole(2, 7, "count"),
     )
     sizes = [(x * rng.between(0.93, 1.0), y * rng.between(0.93, 1.0), 0.045)] * count
-    return _folded(rng, sizes, [cloth(rng), cloth(rng)])
+    return _folded(rng, sizes, [parts.cloth(rng), parts.cloth(rng)])
 
 
 def folded_clothes(seed: int = 0) -> Solid:
@@ -300,11 +293,11 @@ def _folded(
     z = 0.0
     for k, (x, y, t) in enumerate(sizes_m):
         dx, dy = (rng.between(-0.008, 0.008) if k else 0.0 for _ in range(2))
-        layer = cushion((-x, -y, 0.0), (x, y, t), k % len(looks), 0.45 * t)
+        layer = parts.cushion((-x, -y, 0.0), (x, y, t), k % len(looks), 0.45 * t)
         patches.append(layer.rotated("z", rng.between(-0.05, 0.05)).moved(dx, dy, z))
         z += 0.97 * t
     x, y = max(s[0] for s in sizes_m), max(s[1] for s in sizes_m)
-    return solid(patches, looks, [((-x, -y, 0.0), (x, y, z))])
+    return parts.solid(patches, looks, [((-x, -y, 0.0), (x, y, z))])
 
 
 def clothes_pile(seed: int = 0) -> Solid:
@@ -328,7 +321,7 @@ def clothes_pile(seed: int = 0) -> Solid:
         patches.append(shapes.grid(points, slot=k).flipped().moved(dx, dy, 0.012 * k))
         reach, top = max(reach, 1.3 * r), max(top, float(z.max()) + 0.012 * k)
     looks = [fabric(rng) for _ in range(3)]
-    return solid(
+    return parts.solid(
         patches, looks, [((-0.5 * reach, -0.5 * reach, 0.0), (0.5 * reach, 0.5 * reach, top))]
     )
 
@@ -353,7 +346,7 @@ def laundry_basket(seed: int = 0) -> Solid:
     look = patterned_material(f"texture/fabric?seed={int(rng.between(0, 16))}", 0.12, 0.9)
     shell = look if rng.chance(0.5) else painted_material(rng.choose(("#f0efeb", "#8a8d90")), 0.5)
     looks = [shell, painted_material(rng.choose(_LINEN), 0.95), fabric(rng, 0.3), fabric(rng, 0.3)]
-    return solid([wall, heap], looks, [((-0.8 * r, -0.8 * r, 0.0), (0.8 * r, 0.8 * r, h))])
+    return parts.solid([wall, heap], looks, [((-0.8 * r, -0.8 * r, 0.0), (0.8 * r, 0.8 * r, h))])
 
 
 def coat_hooks(seed: int = 0) -> Solid:
@@ -364,20 +357,20 @@ def coat_hooks(seed: int = 0) -> Solid:
     rng = variant_rng("coat_hooks", seed)
     count = rng.turn((3, 4, 5), "hooks")
     w, drop = 0.17 * count, 1.05
-    patches: list[Patch] = [board((0.0, -0.5 * w, drop), (0.02, 0.5 * w, drop + 0.09))]
+    patches: list[Patch] = [parts.board((0.0, -0.5 * w, drop), (0.02, 0.5 * w, drop + 0.09))]
     lowest = drop
     for k in range(count):
         y = (k + 0.5) * 0.17 - 0.5 * w
-        patches.append(rod((0.02, y, drop + 0.05), (0.075, y, drop + 0.065), 0.007, 1))
+        patches.append(parts.rod((0.02, y, drop + 0.05), (0.075, y, drop + 0.065), 0.007, 1))
         if rng.chance(0.72):
             length = rng.between(0.6, 1.0)
             lowest = min(lowest, drop - length + 0.05)
             coat = hang_garment(rng, length, 2 + k % 3).rotated("z", rng.between(-0.15, 0.15))
             patches.append(coat.moved(0.06, y, drop + 0.05))
-    looks = [front(rng), metal_material(STAINLESS, 0.3), *(wool(rng) for _ in range(3))]
+    looks = [parts.front(rng), metal_material(STAINLESS, 0.3), *(wool(rng) for _ in range(3))]
     moved = [patch.moved(0.0, 0.0, -lowest) for patch in patches]
     top = drop + 0.09 - lowest
-    return solid(moved, looks, [((0.0, -0.5 * w, 0.0), (0.16, 0.5 * w, top))])
+    return parts.solid(moved, looks, [((0.0, -0.5 * w, 0.0), (0.16, 0.5 * w, top))])
 
 
 def wool(rng: VariantRng) -> Material:
@@ -478,8 +471,8 @@ def draped_clothes(seed: int = 0) -> Solid:
     low = np.min([p.bounds_m()[0] for p in leaned], axis=0).tolist()
     high = np.max([p.bounds_m()[1] for p in leaned], axis=0).tolist()
     look = fabric(rng, 0.3) if rng.chance(0.5) else wool(rng)
-    box: Box = ((low[0], low[1], -0.02), (high[0], high[1], high[2]))
-    return solid(leaned, [look], [box])
+    box: parts.Box = ((low[0], low[1], -0.02), (high[0], high[1], high[2]))
+    return parts.solid(leaned, [look], [box])
 
 
 LEAN_RAD = 0.14
@@ -547,12 +540,12 @@ def towel(seed: int = 0) -> Solid:
         _over_rail(rng, w, rail_z, rail_z * rng.between(0.55, 0.95)).moved(rail_x, 0, rail_z)
     ]
     half = 0.5 * w + 0.06
-    patches.append(rod((rail_x, -half, rail_z), (rail_x, half, rail_z), radius, 1))
+    patches.append(parts.rod((rail_x, -half, rail_z), (rail_x, half, rail_z), radius, 1))
     for sy in (-1, 1):
         y = sy * (half - 0.01)
-        patches.append(rod((0.0, y, rail_z), (rail_x + 0.004, y, rail_z), radius, 1))
-    boxes: list[Box] = [((0.0, -half, 0.0), (0.1, half, h))]
-    return solid(patches, [fabric(rng), metal_material(STAINLESS, 0.2)], boxes)
+        patches.append(parts.rod((0.0, y, rail_z), (rail_x + 0.004, y, rail_z), radius, 1))
+    boxes: list[parts.Box] = [((0.0, -half, 0.0), (0.1, half, h))]
+    return parts.solid(patches, [fabric(rng), metal_material(STAINLESS, 0.2)], boxes)
 
 
 def _over_rail(
@@ -598,8 +591,10 @@ def bath_mat(seed: int = 0) -> Solid:
     )
     pile = Material(draw_linear(PALETTES["cloth"], 0.1, rng), 1.0)
     look = patterned_material(f"texture/carpet?seed={int(rng.between(0, 16))}", 0.5, 1.0)
-    body: Box = ((-x, -y, 0.0), (x, y, t))
-    return solid([cushion(*body, 0, 0.007)], [look if rng.chance(0.4) else pile], [body])
+    body: parts.Box = ((-x, -y, 0.0), (x, y, t))
+    return parts.solid(
+        [parts.cushion(*body, 0, 0.007)], [look if rng.chance(0.4) else pile], [body]
+    )
 
 
 def drying_rack(seed: int = 0) -> Solid:
@@ -610,17 +605,17 @@ def drying_rack(seed: int = 0) -> Solid:
     for sy in (-1, 1):
         y = sy * 0.5 * w
         patches += [
-            rod((-0.5 * d, y, 0.0), (0.38 * d, y, h), 0.009),
-            rod((0.5 * d, y, 0.0), (-0.38 * d, y, h), 0.009),
-            rod((-0.55 * d, y, h), (0.55 * d, y, h), 0.008),
+            parts.rod((-0.5 * d, y, 0.0), (0.38 * d, y, h), 0.009),
+            parts.rod((0.5 * d, y, 0.0), (-0.38 * d, y, h), 0.009),
+            parts.rod((-0.55 * d, y, h), (0.55 * d, y, h), 0.008),
         ]
     for k in range(7):
         x = (k / 6 - 0.5) * 1.1 * d
-        patches.append(rod((x, -0.5 * w, h), (x, 0.5 * w, h), 0.004, 0, 6))
+        patches.append(parts.rod((x, -0.5 * w, h), (x, 0.5 * w, h), 0.004, 0, 6))
         if k % 2 == 0 and rng.chance(0.85):
             patches.append(_hung(rng, x, w, h, 1 + k // 2 % 3))
     looks = [painted_material("#e6e6e3", 0.4), *(fabric(rng) for _ in range(3))]
-    return solid(patches, looks, [((-0.5 * d, -0.5 * w, 0.0), (0.5 * d, 0.5 * w, h))])
+    return parts.solid(patches, looks, [((-0.5 * d, -0.5 * w, 0.0), (0.5 * d, 0.5 * w, h))])
 
 
 def _hung(rng: VariantRng, x: float, w: float, h: float, slot: int) -> Patch:

@@ -17,24 +17,18 @@ from gen_data.content.interiors.parts import (
     solid,
     wood,
 )
+from gen_data.content.procedural import material_presets as presets
 from gen_data.content.procedural import surface_shapes as shapes
-from gen_data.content.procedural.material_presets import (
-    STAINLESS,
-    STEEL,
-    draw_linear,
-    metal_material,
-    painted_material,
-)
 from gen_data.content.procedural.patches import Patch
 from gen_data.core.asset_types import Material
 from gen_data.core.variant_rng import VariantRng, variant_rng
 
-_DARK = painted_material("#1d1e20", 0.5)
-_STEEL = metal_material(STEEL, 0.35)
+_DARK = presets.painted_material("#1d1e20", 0.5)
+_STEEL = presets.metal_material(presets.STEEL, 0.35)
 
 
 def _plastic(rng: VariantRng) -> Material:
-    return Material(draw_linear(TOOLS, 0.1, rng), 0.4)
+    return Material(presets.draw_linear(TOOLS, 0.1, rng), 0.4)
 
 
 def toolbox(seed: int = 0) -> Solid:
@@ -78,7 +72,7 @@ def paint_can(seed: int = 0) -> Solid:
     inner = h - 0.02 if rng.chance(0.4) else h - 0.004
     wall = [(0.0, 0.0), (r, 0.0), (r, h), (r - 0.008, h), (r - 0.008, inner), (0.0, inner)]
     label = shapes.lathe([(r + 0.0005, 0.2 * h), (r + 0.0005, 0.8 * h)], 40, 1)
-    looks = [metal_material(STAINLESS, 0.35), _plastic(rng)]
+    looks = [presets.metal_material(presets.STAINLESS, 0.35), _plastic(rng)]
     return solid([shapes.lathe(wall, 40), label], looks, [((-r, -r, 0.0), (r, r, h))])
 
 
@@ -114,7 +108,7 @@ def barrel(seed: int = 0) -> Solid:
     profile += [(r, h), (r - 0.012, h), (r - 0.012, h - 0.015), (0.0, h - 0.015)]
     patches = [shapes.lathe(profile, 44), disc(0.6 * r, 0.0, h - 0.016, h + 0.002, 0.03)]
     paint = rng.choose(("#1f4e8c", "#2c6e49", "#8a2f26", "#d9b23c", "#3b4046"))
-    return solid(patches, [painted_material(paint, 0.4)], [((-r, -r, 0.0), (r, r, h))])
+    return solid(patches, [presets.painted_material(paint, 0.4)], [((-r, -r, 0.0), (r, r, h))])
 
 
 def vacuum_cleaner(seed: int = 0) -> Solid:
@@ -148,7 +142,7 @@ def iron(seed: int = 0) -> Solid:
         rod((0.04, 0.0, 0.05), (0.02, 0.0, 0.125), 0.016),
         rod((-0.1, 0.0, 0.125), (0.03, 0.0, 0.125), 0.018),
     ]
-    looks = [_plastic(rng), metal_material(STAINLESS, 0.2)]
+    looks = [_plastic(rng), presets.metal_material(presets.STAINLESS, 0.2)]
     return solid(patches, looks, [((-0.11, -0.058, 0.0), (0.14, 0.058, 0.14))])
 
 
@@ -168,7 +162,7 @@ def globe(seed: int = 0) -> Solid:
         start = (0.0, 1.06 * r * math.cos(a), z + 1.06 * r * math.sin(a))
         end = (0.0, 1.06 * r * math.cos(b), z + 1.06 * r * math.sin(b))
         patches.append(rod(start, end, 0.004, 1, 8))
-    sea = Material(draw_linear(("#3f6f9f", "#c9b487", "#7aa0b8"), 0.1, rng), 0.3)
+    sea = Material(presets.draw_linear(("#3f6f9f", "#c9b487", "#7aa0b8"), 0.1, rng), 0.3)
     return solid(patches, [sea, wood(rng)], [((-r, -r, 0.0), (r, r, z + r))])
 
 
@@ -198,7 +192,7 @@ def hand_truck(seed: int = 0) -> Solid:
         z = 0.15 + 0.2 * k
         patches.append(rod((-0.03, -w, z), (-0.03, w, z), 0.011))
     patches.append(rod((-0.04, -w - 0.02, h), (-0.04, w + 0.02, h), 0.02, 1))
-    paint = painted_material(rng.choose(("#a3261d", "#1f4e8c", "#2c2f33")), 0.35)
+    paint = presets.painted_material(rng.choose(("#a3261d", "#1f4e8c", "#2c2f33")), 0.35)
     return solid(patches, [paint, _DARK], [((-0.2, -w - 0.06, 0.0), (0.26, w + 0.06, h))])
 
 
@@ -215,7 +209,7 @@ def vise(seed: int = 0) -> Solid:
     patches.append(rod((0.19, -0.09, 0.07), (0.19, 0.09, 0.07), 0.006, 1))
     for x in (0.0, 0.034):
         patches.append(shapes.block((x, -0.05, 0.12), (x + 0.006, 0.05, 0.15), 0.0, 1))
-    paint = painted_material(rng.choose(("#2f5d7c", "#3d7a4c", "#3b4046")), 0.4)
+    paint = presets.painted_material(rng.choose(("#2f5d7c", "#3d7a4c", "#3b4046")), 0.4)
     return solid(patches, [paint, _STEEL], boxes)
 
 
@@ -232,5 +226,5 @@ def first_aid_box(seed: int = 0) -> Solid:
     ]
     green = rng.chance(0.5)
     paints = ("#1f7a4d", "#f3f3f0") if green else ("#f3f3f0", "#b01218")
-    looks = [painted_material(paints[0], 0.4), painted_material(paints[1], 0.4)]
+    looks = [presets.painted_material(paints[0], 0.4), presets.painted_material(paints[1], 0.4)]
     return solid(patches, looks, [((-x, -y, 0.0), (x, y, h))])

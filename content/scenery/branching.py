@@ -19,8 +19,7 @@ from gen_data.content.procedural.patches import (
     unit,
 )
 from gen_data.content.procedural.surface_shapes import circle, sweep
-from gen_data.core import se3, streams
-from gen_data.core.noise import uniform
+from gen_data.core import noise, se3, streams
 
 _PIPE_EXPONENT = 2.3
 _ROUNDS_MAX = 70
@@ -62,7 +61,7 @@ def points_in(lobes: Sequence[Lobe], count: int, rng: streams.Rng) -> Array:
     found = []
     for lobe, share in zip(lobes, volume / volume.sum(), strict=True):
         wanted = max(4, round(count * float(share)))
-        cube = 2.0 * uniform((6 * wanted, 3), rng) - 1.0
+        cube = 2.0 * noise.uniform((6 * wanted, 3), rng) - 1.0
         r2 = (cube**2).sum(axis=1)
         kept = cube[(r2 < 1.0) & (r2 > 0.12)][:wanted]
         found.append(np.array(lobe.centre_m) + kept * np.array(lobe.axes_m))

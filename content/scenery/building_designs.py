@@ -10,12 +10,7 @@ from typing import Any, Literal
 
 from gen_data.assets.family import check_option
 from gen_data.config.data_files import load_table
-from gen_data.content.procedural.material_presets import (
-    draw_linear,
-    hex_to_linear,
-    patterned_material,
-    printed_material,
-)
+from gen_data.content.procedural import material_presets as presets
 from gen_data.core.asset_types import Material
 from gen_data.core.se3 import Vec3
 from gen_data.core.variant_rng import VariantRng, variant_rng
@@ -188,18 +183,18 @@ def building_materials(plan: Design, seed: int, region: str = "any") -> tuple[Ma
         _glass_material(f"texture/window_view?seed={views[1]}&kind={other}"),
         _glass_material(f"texture/window_view?seed={display}&kind=shop"),
         _plain_material(rng.choose(_COLORS["doors"]), 0.5, "trim"),
-        Material(hex_to_linear(seam), roughness=0.5, metallic=0.6, role="chrome"),
+        Material(presets.hex_to_linear(seam), roughness=0.5, metallic=0.6, role="chrome"),
         _roof(place, plan, rng),
-        replace(printed_material(prints[0], 0.5), role="trim"),
+        replace(presets.printed_material(prints[0], 0.5), role="trim"),
         _plain_material(rng.choose(cloth), 0.7, "trim"),
         _textured_material("brick", 4, (0.8, 0.78, 0.76), 1.1, "trim"),
         _plain_material(rng.choose(_COLORS["accents"]), 0.55, "trim"),
-        patterned_material(
-            "texture/foliage?seed=0", 0.8, 0.8, hex_to_linear(rng.choose(_COLORS["plants"]))
+        presets.patterned_material(
+            "texture/foliage?seed=0", 0.8, 0.8, presets.hex_to_linear(rng.choose(_COLORS["plants"]))
         ),
         _plain_material(rng.choose(_COLORS["flowers"]), 0.8, "trim"),
-        replace(printed_material(prints[1], 0.6), role="trim"),
-        replace(printed_material(prints[2], 0.7), role="trim"),
+        replace(presets.printed_material(prints[1], 0.6), role="trim"),
+        replace(presets.printed_material(prints[2], 0.7), role="trim"),
         _plain_material(rng.choose(("#1d1f22", "#2a2826", "#22303c")), 0.4, "trim"),
         _textured_material("concrete", 3, (0.8, 0.79, 0.77), 2.2, "trim"),
         _plain_material(rng.choose(("#e6e5e0", "#d8d6ce", "#cfd0cf")), 0.5, "trim"),
@@ -259,7 +254,7 @@ def _wall(plan: Design, tints: Sequence[str], rng: VariantRng) -> Material:
 def _tint(texture: str, codes: Sequence[str], amount: float, rng: VariantRng) -> Vec3:
     """Tint of a texture with which its mean is one of several sRGB colours, jittered."""
     mean = TEXTURE_ALBEDOS[texture]
-    red, green, blue = (min(1.0, part / mean) for part in draw_linear(codes, amount, rng))
+    red, green, blue = (min(1.0, part / mean) for part in presets.draw_linear(codes, amount, rng))
     return (red, green, blue)
 
 
@@ -287,7 +282,7 @@ def _roof(place: str, plan: Design, rng: VariantRng) -> Material:
 
 
 def _plain_material(code: str, roughness: float, role: str) -> Material:
-    return Material(hex_to_linear(code), roughness=roughness, role=role)
+    return Material(presets.hex_to_linear(code), roughness=roughness, role=role)
 
 
 def _glass_material(texture: str) -> Material:

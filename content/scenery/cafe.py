@@ -9,26 +9,12 @@ import numpy as np
 
 from gen_data.assets.family import Facts, Solid
 from gen_data.content.procedural import collision_hulls as hulls
-from gen_data.content.procedural.material_presets import (
-    GLAZES,
-    ceramic_material,
-    draw_linear,
-    painted_material,
-    patterned_material,
-)
+from gen_data.content.procedural import material_presets as presets
 from gen_data.content.procedural.patches import Patch, join_patches
 from gen_data.content.procedural.surface_shapes import block, cone, grid, lathe
+from gen_data.content.scenery import clutter_shapes as clutter
 from gen_data.content.scenery.awnings import awning_cloth, hanging_cloth
 from gen_data.content.scenery.basic_shapes import make_solid, post
-from gen_data.content.scenery.clutter_shapes import (
-    Rectangle,
-    bar,
-    chair,
-    hopper,
-    on_ground,
-    worn_paint,
-    worn_steel,
-)
 from gen_data.core.asset_types import Material
 from gen_data.core.variant_rng import VariantRng, variant_rng
 
@@ -57,7 +43,7 @@ def cafe_set(seed: int) -> Solid:
     for k in range(count):
         turn = first + 2.0 * math.pi * k / count + rng.between(-0.35, 0.35)
         away = half + rng.between(0.12, 0.36)
-        one = join_patches(chair(kind, rng.between(0.43, 0.46), 0, 1))
+        one = join_patches(clutter.chair(kind, rng.between(0.43, 0.46), 0, 1))
         # It faces the table, from behind +X before the turn.
         placed = one.rotated("z", math.pi + rng.between(-0.3, 0.3)).moved(away + 0.2)
         parts.append(placed.rotated("z", turn))
@@ -72,16 +58,18 @@ def cafe_set(seed: int) -> Solid:
     low, top = join_patches(parts).bounds_m()
     # The middle of the group, not the table, is the origin.
     x, y = -0.5 * float(low[0] + top[0]), -0.5 * float(low[1] + top[1])
-    parts = on_ground([part.moved(x, y) for part in parts])
-    grain = patterned_material("texture/wood_grain?seed=5", 1.2, 0.7, (0.75, 0.66, 0.58))
-    plain = worn_paint(("#e4e2da", "#3b3d3f", "#8d9091", "#5a3a2a"), 0.4, rng)
-    woven = patterned_material("texture/fabric?seed=3", 0.12, 0.85, draw_linear(_SEATS, 0.1, rng))
-    seats = {"slats": grain, "woven": woven}.get(kind, worn_paint(_SEATS, 0.45, rng))
+    parts = clutter.on_ground([part.moved(x, y) for part in parts])
+    grain = presets.patterned_material("texture/wood_grain?seed=5", 1.2, 0.7, (0.75, 0.66, 0.58))
+    plain = clutter.worn_paint(("#e4e2da", "#3b3d3f", "#8d9091", "#5a3a2a"), 0.4, rng)
+    woven = presets.patterned_material(
+        "texture/fabric?seed=3", 0.12, 0.85, presets.draw_linear(_SEATS, 0.1, rng)
+    )
+    seats = {"slats": grain, "woven": woven}.get(kind, clutter.worn_paint(_SEATS, 0.45, rng))
     materials = (
-        worn_paint(_FRAMES, 0.4, rng),
+        clutter.worn_paint(_FRAMES, 0.4, rng),
         seats,
         rng.choose((grain, plain, plain)),
-        ceramic_material(rng, GLAZES[:3]),
+        presets.ceramic_material(rng, presets.GLAZES[:3]),
         *_canvas(rng),
     )
     disc = hulls.frustum((half, 0.0), (half, high), 12) + np.array([x, y, 0.0])
@@ -149,11 +137,11 @@ def parasol(seed: int) -> Solid:
         parts.append(grid(np.stack(rows), slot=_SLOT_CANVAS))
     else:
         parts += _canopy(half, 4 if seed % 2 else 8, rng.chance(0.4, "striped"))
-    wood = patterned_material("texture/wood_grain?seed=2", 1.0, 0.6, (0.6, 0.45, 0.32))
+    wood = presets.patterned_material("texture/wood_grain?seed=2", 1.0, 0.6, (0.6, 0.45, 0.32))
     materials = (
-        worn_steel(rng),
-        rng.choose((wood, worn_steel(rng), painted_material("#e4e2da", 0.4))),
-        patterned_material("texture/concrete?seed=3", 1.0, 0.9, (0.6, 0.6, 0.58)),
+        clutter.worn_steel(rng),
+        rng.choose((wood, clutter.worn_steel(rng), presets.painted_material("#e4e2da", 0.4))),
+        presets.patterned_material("texture/concrete?seed=3", 1.0, 0.9, (0.6, 0.6, 0.58)),
         wood,
         *_canvas(rng),
     )
@@ -186,7 +174,7 @@ def _canopy(half: float, sides: int, striped: bool) -> list[Patch]:
         for sheet in (grid(panel, slot=slot), grid(hem, slot=slot)):
             # Cloth is seen from both sides.
             parts += [sheet, _underside(sheet)]
-        parts.append(bar((x1, y1, eaves - 0.01), (0.0, 0.0, top - 0.03), 0.009, 3))
+        parts.append(clutter.bar((x1, y1, eaves - 0.01), (0.0, 0.0, top - 0.03), 0.009, 3))
     parts.append(cone((0.04, top), (0.01, top + 0.08), 8))
     return parts
 
@@ -201,8 +189,8 @@ def _canvas(rng: VariantRng) -> tuple[Material, Material]:
     """Cloth of canopies, and of their stripes."""
     color, other = rng.choose(_CLOTHS), rng.choose(("#f2f0ea", "#e9e2d0", "#d9a520"))
     return (
-        Material(draw_linear((color,), 0.1, rng), roughness=0.9, specular=0.3),
-        Material(draw_linear((other,), 0.06, rng), roughness=0.9, specular=0.3),
+        Material(presets.draw_linear((color,), 0.1, rng), roughness=0.9, specular=0.3),
+        Material(presets.draw_linear((other,), 0.06, rng), roughness=0.9, specular=0.3),
     )
 
 
@@ -217,8 +205,8 @@ def market_stall(seed: int) -> Solid:
     for x in (-deep, deep - 0.1):
         high = 2.5 if x < 0 else 2.15
         for y in (-half + 0.05, half - 0.05):
-            parts.append(bar((x, y, 0.0), (x, y, high), 0.02, 5))
-        parts.append(bar((x, -half, high), (x, half, high), 0.02, 5))
+            parts.append(clutter.bar((x, y, 0.0), (x, y, high), 0.02, 5))
+        parts.append(clutter.bar((x, -half, high), (x, half, high), 0.02, 5))
     parts += _awning(half, deep, rng.chance(0.7, "striped"))
     front = deep - 0.35
     parts.append(block((-0.35, -half + 0.1, table - 0.04), (front, half - 0.1, table), 0.0, 1))
@@ -238,12 +226,12 @@ def market_stall(seed: int) -> Solid:
         parts.append(box.rotated("z", rng.between(-0.4, 0.4)).moved(-0.7, y))
     fruits = rng.shuffled(("#b8261e", "#d9821e", "#5f8a2a", "#d9c43a", "#6a3a2a", "#7a2a4a",
                            "#e4dcc4", "#3f6a2f"))  # fmt: skip
-    grain = patterned_material("texture/wood_grain?seed=5", 1.2, 0.8, (0.7, 0.6, 0.5))
-    crate = rng.choose((grain, worn_paint(("#2f6f4a", "#22406f", "#3b3d3f"), 0.55, rng)))
+    grain = presets.patterned_material("texture/wood_grain?seed=5", 1.2, 0.8, (0.7, 0.6, 0.5))
+    crate = rng.choose((grain, clutter.worn_paint(("#2f6f4a", "#22406f", "#3b3d3f"), 0.55, rng)))
     materials = (
-        worn_steel(rng),
+        clutter.worn_steel(rng),
         grain,
-        Material(draw_linear(("#2f6f4a", "#22406f", "#5a5d60", "#7a2a24"), 0.1, rng), 0.85),
+        Material(presets.draw_linear(("#2f6f4a", "#22406f", "#5a5d60", "#7a2a24"), 0.1, rng), 0.85),
         crate,
         *_canvas(rng),
         *(_produce(color, rng) for color in fruits[:3]),
@@ -254,7 +242,9 @@ def market_stall(seed: int) -> Solid:
 
 def _produce(color: str, rng: VariantRng) -> Material:
     texture_id = f"texture/produce?seed={rng.choose((0, 1, 2, 3))}"
-    return patterned_material(texture_id, 0.56, 0.45, draw_linear((color,), 0.1, rng))
+    return presets.patterned_material(
+        texture_id, 0.56, 0.45, presets.draw_linear((color,), 0.1, rng)
+    )
 
 
 def _awning(half: float, deep: float, striped: bool) -> list[Patch]:
@@ -267,7 +257,9 @@ def _awning(half: float, deep: float, striped: bool) -> list[Patch]:
 def _crate(slot: int, rng: VariantRng) -> list[Patch]:
     """A crate of 0.4 x 0.5 m, heaped with produce: its shape is a texture's."""
     x, y, high = 0.2, 0.25, 0.13
-    walls = hopper(Rectangle(-x, x, -y, y), Rectangle(-x, x, -y, y), (0.0, high), 3, True)
+    walls = clutter.hopper(
+        clutter.Rectangle(-x, x, -y, y), clutter.Rectangle(-x, x, -y, y), (0.0, high), 3, True
+    )
     v, u = np.meshgrid(np.linspace(0, 1, 5), np.linspace(0, 1, 6), indexing="ij")
     heap = rng.between(0.08, 0.13) * (1 - (2 * u - 1) ** 4) * (1 - (2 * v - 1) ** 4)
     points = np.stack([(2 * u - 1) * x * 0.97, (2 * v - 1) * y * 0.97, high + heap - 0.01], axis=2)

@@ -13,9 +13,8 @@ from gen_data.content.procedural.material_presets import hex_to_linear
 from gen_data.content.procedural.patches import GRID_M, Array, Indices, round_values, unit
 from gen_data.content.scenery.foliage import Sprays, directions
 from gen_data.content.scenery.textures.leaves import TILES
+from gen_data.core import colorimetry, noise
 from gen_data.core.asset_types import Material, MeshData
-from gen_data.core.colorimetry import luminance
-from gen_data.core.noise import uniform
 from gen_data.core.se3 import Vec3
 from gen_data.core.streams import Rng
 
@@ -59,7 +58,7 @@ def card_mesh(cards: Cards, materials: Sequence[Material], softness: float, rng:
     corners = np.stack(rim, axis=1)
     own = np.cross(cards.across, cards.along)
     inward = (own * cards.outward).sum(axis=1) < 0.0
-    tile = np.floor(uniform((n, 2), rng) * TILES) / TILES
+    tile = np.floor(noise.uniform((n, 2), rng) * TILES) / TILES
     local = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]) / TILES
     uvs = tile[:, None, :] + local[None]
     # The front faces outward: two corners change places, and their texture coordinates with them.
@@ -93,8 +92,8 @@ def cards_about(
         rng: Draws directions.
     """
     n = len(at_m)
-    wild = 2.0 * uniform((n, 3), rng) - 1.0
-    facing = unit(outward + 0.75 * (2.0 * uniform((n, 3), rng) - 1.0))
+    wild = 2.0 * noise.uniform((n, 3), rng) - 1.0
+    facing = unit(outward + 0.75 * (2.0 * noise.uniform((n, 3), rng) - 1.0))
     along = upright * np.array([0.0, 0.0, 1.0]) + (1.0 - upright) * wild
     along = unit(along - (along * facing).sum(axis=1, keepdims=True) * facing + 1e-6)
     across = unit(np.cross(along, facing))
@@ -189,7 +188,7 @@ def depth_levels(codes: Sequence[str]) -> list[float]:
     Leaves in a crown's depth are dark for want of light, which renderers find; that they reflect
     as much as others is assumed.
     """
-    levels = luminance(np.array([hex_to_linear(code) for code in codes]))
+    levels = colorimetry.luminance(np.array([hex_to_linear(code) for code in codes]))
     return [float(k) for k in np.round(levels[-1] / levels, 6)]
 
 

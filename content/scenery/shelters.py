@@ -10,11 +10,7 @@ import numpy as np
 
 from gen_data.assets.family import Facts, Solid
 from gen_data.content.procedural import collision_hulls as hulls
-from gen_data.content.procedural.material_presets import (
-    painted_material,
-    patterned_material,
-    printed_material,
-)
+from gen_data.content.procedural import material_presets as presets
 from gen_data.content.procedural.patches import Array, Patch
 from gen_data.content.procedural.surface_shapes import block, cone, grid, rounded_box, sweep
 from gen_data.content.scenery.basic_shapes import facing_rectangle, make_solid, post
@@ -64,12 +60,13 @@ def bus_shelter(seed: int) -> Solid:
     parts.append(facing_rectangle(-x + 0.012, (0.1, 0.7), (1.0, 1.75), 5))
     parts += _stop_sign(x + 0.1, half - 0.3)
     color = worn_paint(("#2f3234", "#3b3d3f", "#6b7073", "#2f4236", "#8d9091"), 0.45, rng)
-    wood = patterned_material("texture/wood_grain?seed=2", 1.2, 0.7, (0.8, 0.75, 0.7))
+    wood = presets.patterned_material("texture/wood_grain?seed=2", 1.2, 0.7, (0.8, 0.75, 0.7))
     prints = [
-        printed_material(f"texture/poster?seed={(5 * seed + k) % 12}", 0.35) for k in range(2)
+        presets.printed_material(f"texture/poster?seed={(5 * seed + k) % 12}", 0.35)
+        for k in range(2)
     ]
     roof = worn_paint(("#5f6365", "#3b3d3f", "#c9cccb", "#7a2a24"), 0.5, rng)
-    sign = painted_material(rng.choose(("#2f7a3a", "#d9a520", "#1f5fa8", "#b3261e")), 0.4)
+    sign = presets.painted_material(rng.choose(("#2f7a3a", "#d9a520", "#1f5fa8", "#b3261e")), 0.4)
     materials = (color, _GLASS, roof, rng.choose((wood, color)), *prints, sign)
     walls = [
         hulls.box((-x - 0.03, -half, 0.0), (-x + 0.03, half, high)),
@@ -164,9 +161,9 @@ def phone_box(seed: int) -> Solid:
     materials = (
         frame,
         _GLASS,
-        rng.choose((frame, painted_material("#55585a", 0.5))),
-        painted_material("#26282a", 0.4),
-        printed_material(f"texture/poster?seed={seed % 12}", 0.4),
+        rng.choose((frame, presets.painted_material("#55585a", 0.5))),
+        presets.painted_material("#26282a", 0.4),
+        presets.printed_material(f"texture/poster?seed={seed % 12}", 0.4),
     )
     return make_solid(parts, materials, [hulls.box((-half, -half, 0.0), (half, half, 2.0))])
 
@@ -237,7 +234,7 @@ def level_crossing_barrier(seed: int) -> Solid:
         worn_paint(("#e8e7e2",), 0.4, rng),
         worn_steel(rng),
         Material((0.4, 0.02, 0.02), roughness=0.15, role="lamp"),
-        painted_material("#161718", 0.6),
+        presets.painted_material("#161718", 0.6),
     )
     hull = hulls.box((-0.22, -0.25, 0.0), (0.22, 0.25, 1.05))
     return make_solid(parts, materials, [hull])
@@ -278,12 +275,12 @@ def petrol_canopy(seed: int) -> Solid:
     first, second = brand.split()
     materials = (
         worn_paint((first,), 0.4, rng),
-        painted_material("#d8d8d4", 0.5),
+        presets.painted_material("#d8d8d4", 0.5),
         worn_paint(("#c9cccb", "#8d9091"), 0.4, rng),
         worn_paint((first, "#e4e4e0"), 0.4, rng),
-        painted_material("#232527", 0.35),
-        painted_material("#121213", 0.6),
-        patterned_material("texture/concrete?seed=3", 1.8, 0.9),
+        presets.painted_material("#232527", 0.35),
+        presets.painted_material("#121213", 0.6),
+        presets.patterned_material("texture/concrete?seed=3", 1.8, 0.9),
         Material((0.85, 0.86, 0.84), roughness=0.3, role="lamp"),
         worn_paint((second,), 0.4, rng),
     )

@@ -12,11 +12,7 @@ import numpy as np
 from gen_data.assets.family import Facts, Solid, check_option
 from gen_data.config.data_files import load_table
 from gen_data.content.procedural import collision_hulls as hulls
-from gen_data.content.procedural.material_presets import (
-    hex_to_linear,
-    jitter_color,
-    patterned_material,
-)
+from gen_data.content.procedural import material_presets as presets
 from gen_data.content.procedural.patches import Array, Patch, finish_mesh, unit
 from gen_data.content.procedural.surface_shapes import circle, sweep
 from gen_data.content.scenery import leaf_cards
@@ -29,8 +25,7 @@ from gen_data.content.scenery.foliage import (
     merge_meshes,
     sprays_about,
 )
-from gen_data.core.asset_types import ConvexParts, Material, MeshData
-from gen_data.core.errors import AssetError
+from gen_data.core import asset_types, errors
 from gen_data.core.noise import uniform
 from gen_data.core.variant_rng import VariantRng, in_turn, variant_rng
 
@@ -129,7 +124,7 @@ def tree(seed: int, species: str, leaves: float, season: str = "summer") -> Soli
     check_option("tree", "species", species, SPECIES)
     check_option("tree", "season", season, SEASONS)
     if not 0.0 <= leaves <= 1.0:
-        raise AssetError(f"tree: leaves={leaves} is not a share between 0 and 1")
+        raise errors.AssetError(f"tree: leaves={leaves} is not a share between 0 and 1")
     rng = variant_rng(f"tree/{species}", seed)
     if species == "conifer":
         return _conifer(rng)
@@ -192,12 +187,12 @@ def _broadleaf(kind: Species, shape: Shape, leaves: float, season: str, rng: Var
         mesh = merge_meshes(mesh, crown)
     else:
         mesh = merge_meshes(mesh, _bare_twigs(shape, skeleton, rng))
-    return Solid(leaf_cards.drop_unused_slots(mesh), ConvexParts((np.round(hull, 6),)))
+    return Solid(leaf_cards.drop_unused_slots(mesh), asset_types.ConvexParts((np.round(hull, 6),)))
 
 
 def _season_leaves(
     kind: Species, shape: Shape, season: str, rng: VariantRng
-) -> tuple[Material, ...]:
+) -> tuple[asset_types.Material, ...]:
     """Shades of leaf from the crown's depth to its surface, then blossom where there is any."""
     warm, level = rng.between(0.88, 1.14), rng.between(0.88, 1.14) * _LEAF_LEVEL
     codes = kind.autumn if season == "autumn" and kind.autumn else shape.green
@@ -237,7 +232,7 @@ def _crown(
     return leaf_cards.spray_cards(sprays_about(skeleton.twigs(), middle, habit, rng), rng)
 
 
-def _bare_twigs(shape: Shape, skeleton: Skeleton, rng: VariantRng) -> MeshData:
+def _bare_twigs(shape: Shape, skeleton: Skeleton, rng: VariantRng) -> asset_types.MeshData:
     """The finest twigs of a winter crown."""
     middle = np.array([0.0, 0.0, shape.clear_m])
     length = min(0.11 * (shape.height_m - shape.clear_m), 1.1)
@@ -298,7 +293,7 @@ def _conifer(rng: VariantRng) -> Solid:
         wooden, leaf_cards.card_mesh(leaf_cards.spray_cards(sprays, rng), greens, OUTWARD, rng)
     )
     hull = hulls.frustum((base_m, 0.0), (0.6 * base_m, 0.5 * height), 10)
-    return Solid(mesh, ConvexParts((np.round(hull, 6),)))
+    return Solid(mesh, asset_types.ConvexParts((np.round(hull, 6),)))
 
 
 def _tip(height: float, rng: VariantRng) -> tuple[Array, Array, Array]:
@@ -327,20 +322,22 @@ def _fan(
     return at, growth, (0.34 + 0.26 * reach) * (0.7 + 0.5 * uniform(count, rng))
 
 
-def _bark(code: str) -> Material:
-    bark = patterned_material("texture/bark?seed=0", 0.8, 0.95, hex_to_linear(code))
+def _bark(code: str) -> asset_types.Material:
+    bark = presets.patterned_material("texture/bark?seed=0", 0.8, 0.95, presets.hex_to_linear(code))
     return replace(bark, role="bark")
 
 
-def leaf_greens(codes: tuple[str, ...], rng: VariantRng) -> tuple[Material, ...]:
+def leaf_greens(codes: tuple[str, ...], rng: VariantRng) -> tuple[asset_types.Material, ...]:
     """Shades of leaf that vary together from tree to tree."""
-    r, g, b = jitter_color((1.0, 1.0, 1.0), 0.0, rng)
+    r, g, b = presets.jitter_color((1.0, 1.0, 1.0), 0.0, rng)
     warm, level = rng.between(0.85, 1.18), rng.between(0.85, 1.15)
     colors = (
         (k * level * warm * c[0] * r, k * level * c[1] * g, k * level * c[2] * b)
-        for c, k in zip(map(hex_to_linear, codes), leaf_cards.depth_levels(codes), strict=True)
+        for c, k in zip(
+            map(presets.hex_to_linear, codes), leaf_cards.depth_levels(codes), strict=True
+        )
     )
-    plain = (Material(c, roughness=0.75, specular=0.35, role="leaf") for c in colors)
+    plain = (asset_types.Material(c, roughness=0.75, specular=0.35, role="leaf") for c in colors)
     return tuple(leaf_cards.transmitting(leaf, leaf_cards.BROAD) for leaf in plain)
 
 

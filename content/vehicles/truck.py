@@ -15,16 +15,7 @@ from gen_data.content.procedural.material_presets import hex_to_linear
 from gen_data.content.procedural.patches import Patch, join_patches
 from gen_data.content.procedural.surface_shapes import block, lathe
 from gen_data.content.scenery.basic_shapes import make_solid
-from gen_data.content.vehicles.body_shell import (
-    body_rows,
-    drop_uvs,
-    gap,
-    level_height,
-    mirror_half,
-    paint,
-    plan,
-    stack,
-)
+from gen_data.content.vehicles import body_shell
 from gen_data.content.vehicles.vehicle_materials import COLORS, SIDES, Print, materials
 from gen_data.content.vehicles.vehicle_materials import VehicleSlot as Slot
 from gen_data.content.vehicles.wheels import Axles
@@ -101,8 +92,8 @@ def assemble_truck(
     x, cab, roof, top = sizes_m
     axles = Axles(x - 1.22, -x + 1.8, 1.0, radius_m, 0.27, radius_m + 0.08, "truck", twin=True)
     fitted = [*axles.wheels(0.0), *load, *_chassis(x, cab, axles)]
-    before = [_cab(x, cab, roof, axles), *(drop_uvs(p) for p in fitted)]
-    after = [drop_uvs(_spoiler(x, cab, roof, top))] if spoiler else []
+    before = [_cab(x, cab, roof, axles), *(body_shell.drop_uvs(p) for p in fitted)]
+    after = [body_shell.drop_uvs(_spoiler(x, cab, roof, top))] if spoiler else []
     body = [*before, *_lamps(x, mirrors=False), *after]
     parts = [*before, *_lamps(x, mirrors=True), *after]
     hull = [
@@ -115,27 +106,31 @@ def assemble_truck(
 
 
 def _cab(x: float, length: float, roof: float, axles: Axles) -> Patch:
-    ring = plan((14.0, 3.0), (40.0, 9.0), sides=9)
-    rows = body_rows("truck", x, x - length, _HALF_M)
-    low, high = level_height(_FLOOR_M), level_height(roof - 0.05)
-    half = stack(ring, rows, low, high, crown_m=0.05, lid_rows=2)
-    half = paint(half, Slot.UNDERBODY, row=(-2.0, 0.0))
+    ring = body_shell.plan((14.0, 3.0), (40.0, 9.0), sides=9)
+    rows = body_shell.body_rows("truck", x, x - length, _HALF_M)
+    low, high = body_shell.level_height(_FLOOR_M), body_shell.level_height(roof - 0.05)
+    half = body_shell.stack(ring, rows, low, high, crown_m=0.05, lid_rows=2)
+    half = body_shell.paint(half, Slot.UNDERBODY, row=(-2.0, 0.0))
     belt, door = _FLOOR_M + 0.5 * (roof - _FLOOR_M), x - length + 0.42
-    half = paint(half, Slot.TRIM, row=(0.0, 1.0), z=(None, 0.6))
-    half = paint(half, Slot.GLASS, ring=(-1.0, ring.front(0.9)), z=(belt - 0.05, roof - 0.3))
+    half = body_shell.paint(half, Slot.TRIM, row=(0.0, 1.0), z=(None, 0.6))
+    half = body_shell.paint(
+        half, Slot.GLASS, ring=(-1.0, ring.front(0.9)), z=(belt - 0.05, roof - 0.3)
+    )
     side = (ring.front(0.92) + 0.04, 1.0)
-    half = paint(half, Slot.GLASS, ring=side, x=(door, None), z=(belt, roof - 0.33))
-    half = paint(half, Slot.TRIM, x=(x - 0.4, None), y=(None, 0.78), z=(0.92, belt - 0.24))
+    half = body_shell.paint(half, Slot.GLASS, ring=side, x=(door, None), z=(belt, roof - 0.33))
+    half = body_shell.paint(
+        half, Slot.TRIM, x=(x - 0.4, None), y=(None, 0.78), z=(0.92, belt - 0.24)
+    )
     lamp = (ring.front(0.66), ring.front(0.92))
-    half = paint(half, Slot.HEADLIGHT, ring=lamp, z=(0.63, 0.82), x=(x - 0.6, None))
+    half = body_shell.paint(half, Slot.HEADLIGHT, ring=lamp, z=(0.63, 0.82), x=(x - 0.6, None))
     wink = (ring.front(0.83), ring.front(0.92) + 0.03)
-    half = paint(half, Slot.INDICATOR_LEFT, ring=wink, x=(x - 0.7, None), z=(0.82, 0.9))
+    half = body_shell.paint(half, Slot.INDICATOR_LEFT, ring=wink, x=(x - 0.7, None), z=(0.82, 0.9))
     panels, wells = axles.wells(half, _HALF_M)
     gaps = [
-        gap(panels, at, 0.012, Slot.TRIM, y=(0.7, None), row=(0.1, 0.93))
+        body_shell.gap(panels, at, 0.012, Slot.TRIM, y=(0.7, None), row=(0.1, 0.93))
         for at in (door - 0.08, x - 0.42)
     ]
-    return mirror_half(join_patches([panels, *wells, *gaps]), SIDES)
+    return body_shell.mirror_half(join_patches([panels, *wells, *gaps]), SIDES)
 
 
 def _load(x: float, cab: float, top: float) -> list[Patch]:
@@ -314,7 +309,7 @@ def _lamps(x: float, *, mirrors: bool) -> list[Patch]:
         parts.append(block((x - 0.42, y[0], 1.65), (x - 0.3, y[1], 2.1), 0.03, Slot.TRIM))
         y = sorted((sign * 1.0, sign * 1.25))
         parts.append(block((x - 0.45, y[0], 2.1), (x - 0.4, y[1], 2.14), 0.0, Slot.TRIM))
-    return [drop_uvs(part) for part in parts]
+    return [body_shell.drop_uvs(part) for part in parts]
 
 
 def _spoiler(x: float, cab: float, roof: float, top: float) -> Patch:

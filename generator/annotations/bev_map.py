@@ -18,8 +18,7 @@ from gen_data.annotations.bev_raster import (
     strips,
 )
 from gen_data.config.base_model import Strict
-from gen_data.core import capture, errors, interfaces, sample, se3
-from gen_data.core.lane_geometry import lane_borders, left_normals
+from gen_data.core import capture, errors, interfaces, lane_geometry, sample, se3
 from gen_data.core.scene import Body, Instance, Scene
 
 LINE_PX = 1.5
@@ -167,10 +166,10 @@ def _lanes(scene: Scene, kind: str) -> se3.Array:
 def _borders(scene: Scene, kind: str, width_m: float) -> se3.Array:
     """Triangles [n, 3, 3] of ribbons along borders of lanes."""
     parts = [np.zeros((0, 3, 3))]
-    for border in lane_borders(scene.lanes):
+    for border in lane_geometry.lane_borders(scene.lanes):
         if border.kind == kind:
             line = np.asarray(border.points_m)
-            aside = 0.5 * width_m * left_normals(line)
+            aside = 0.5 * width_m * lane_geometry.left_normals(line)
             parts.append(ribbon(line + aside, line - aside))
     return np.concatenate(parts)
 

@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING
 
 from gen_data.api.config import ConfigLike, check_whole, count_workers, load_config
 from gen_data.api.label_gaps import check_label_gaps
-from gen_data.core.errors import ConfigError
-from gen_data.core.urls import is_url
+from gen_data.core import errors, urls
 
 if TYPE_CHECKING:
     from gen_data.assemble.config import Config
@@ -170,7 +169,7 @@ def _folder(loaded: Config, out: str | PathLike[str] | None) -> Iterator[Path | 
 
     folder = fspath(out) if out is not None else Path("out") / loaded.name
     yield folder
-    if not is_url(folder):
+    if not urls.is_url(folder):
         store = LocalStore(Path(folder))
         with store.errors():
             write_locations(store.run_dir, loaded.asset_locations)
@@ -185,7 +184,7 @@ def _opened(
     from gen_data.runner.processes import open_worker_pool
 
     if cluster is not None and workers == 0:
-        raise ConfigError("workers: 0 on a cluster; expected at least 1, or no number")
+        raise errors.ConfigError("workers: 0 on a cluster; expected at least 1, or no number")
     with threadpool_limits(limits=1):
         if cluster is None:
             yield partial(open_worker_pool, standby=standby), count_workers(workers)
@@ -202,10 +201,10 @@ def _check_arguments(
 
     check_whole("n", n)
     if n < 1:
-        raise ConfigError(f"n: {n} samples cannot be made; expected at least 1")
+        raise errors.ConfigError(f"n: {n} samples cannot be made; expected at least 1")
     count_workers(workers)
-    if repair and out is not None and is_url(out):
-        raise ConfigError(
+    if repair and out is not None and urls.is_url(out):
+        raise errors.ConfigError(
             f"out: {fspath(out)} cannot be repaired in place; expected a folder: run the command "
             "without repair, which replaces damaged shards, or repair a copy"
         )
@@ -214,7 +213,7 @@ def _check_arguments(
 
 def _check_time_limit(limit_s: float | None) -> None:
     if limit_s is not None and not 0.0 < limit_s < math.inf:
-        raise ConfigError(
+        raise errors.ConfigError(
             f"sample_timeout_s: {limit_s:g} is not a time limit; expected seconds above 0"
         )
 
@@ -244,7 +243,7 @@ def check_shards(shards: tuple[int, int], count: int) -> range:
     """The range of shards that exist. Raises ConfigError if there are none."""
     first, end = shards
     if not 0 <= first < min(end, count):
-        raise ConfigError(
+        raise errors.ConfigError(
             f"shards: {first}:{end} are none of the {count} shards; expected FIRST:END with "
             f"0 <= FIRST < {count} and END above FIRST"
         )

@@ -16,11 +16,8 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.api.config import check_whole
-from gen_data.api.dataset import SampleSequence
-from gen_data.api.sample import Sample
-from gen_data.core.errors import ConfigError, SampleError
-from gen_data.core.streams import Streams
+from gen_data.api import config, dataset, sample
+from gen_data.core import errors, streams
 
 T = TypeVar("T")
 Indices = NDArray[np.int64]
@@ -59,8 +56,8 @@ class Loader(Generic[T]):
 
     def __init__(  # noqa: PLR0913
         self,
-        samples: SampleSequence,
-        target: Callable[[Sample], T],
+        samples: dataset.SampleSequence,
+        target: Callable[[sample.Sample], T],
         *,
         batch_size: int = 1,
         shuffle: bool = False,
@@ -79,18 +76,18 @@ class Loader(Generic[T]):
             ("mixed_scenes", mixed_scenes, 1),
             ("world_size", world_size, 1),
         ):
-            check_whole(name, value, least)
-        check_whole("rank", rank)
-        check_whole("seed", seed)
+            config.check_whole(name, value, least)
+        config.check_whole("rank", rank)
+        config.check_whole("seed", seed)
         if not 0 <= rank < world_size:
-            raise ConfigError(f"rank: {rank}; expected 0 to {world_size - 1}")
+            raise errors.ConfigError(f"rank: {rank}; expected 0 to {world_size - 1}")
         if samples.is_bounded == (epoch_size is not None):
-            raise ConfigError(
+            raise errors.ConfigError(
                 "epoch_size: expected for a data set without a size, and for no other"
             )
         if samples.is_bounded and not len(samples):
-            raise ConfigError("samples: there are none; expected at least one")
-        if isinstance(samples, SampleSequence):
+            raise errors.ConfigError("samples: there are none; expected at least one")
+        if isinstance(samples, dataset.SampleSequence):
             samples.warn_of_mixed_splits()
         self._samples, self._target = samples, target
         self._batch_size, self._shuffle, self._seed = batch_size, shuffle, seed
@@ -134,14 +131,14 @@ class Loader(Generic[T]):
             ConfigError: the other loader had another seed, or this is not a state of a loader.
         """
         if set(state) != set(self.state_dict()):
-            raise ConfigError(
+            raise errors.ConfigError(
                 f"state: has the keys {', '.join(map(str, state)) or 'none'}; expected the keys of "
                 f"state_dict: {', '.join(self.state_dict())}"
             )
         for name in ("epoch", "position"):
-            check_whole(name, state[name], 0)
+            config.check_whole(name, state[name], 0)
         if state["seed"] != self._seed:
-            raise ConfigError(
+            raise errors.ConfigError(
                 f"seed: the state is of a loader with the seed {state['seed']}, this one has "
                 f"{self._seed}; expected the same"
             )
@@ -156,7 +153,7 @@ class Loader(Generic[T]):
         starts = np.flatnonzero(np.diff(scenes, prepend=-1))
         groups = np.split(positions, starts[1:])
         order = np.arange(len(groups))
-        rng = Streams(self._seed, scene=epoch).rng("loader")
+        rng = streams.Streams(self._seed, scene=epoch).rng("loader")
         if self._shuffle:
             order = rng.permutation(order)
         own = [groups[k] for k in order[self._rank :: self._world_size]]
@@ -207,11 +204,11 @@ class Loader(Generic[T]):
                 yield _result(waiting.popleft())
 
 
-_worker: tuple[SampleSequence, Callable[[Sample], Any]] | None = None
+_worker: tuple[dataset.SampleSequence, Callable[[sample.Sample], Any]] | None = None
 """Samples and target of this worker process."""
 
 
-def _start_worker(samples: SampleSequence, target: Callable[[Sample], Any]) -> None:
+def _start_worker(samples: dataset.SampleSequence, target: Callable[[sample.Sample], Any]) -> None:
     global _worker  # noqa: PLW0603  (set once per process)
     _worker = samples, target
 
@@ -226,7 +223,7 @@ def _result(future: Future[list[Any]]) -> list[Any]:
     try:
         return future.result()
     except BrokenProcessPool as error:
-        raise SampleError(
+        raise errors.SampleError(
             "a worker process of the loader ended, perhaps for lack of memory; use fewer workers, "
             "or workers=0 to see its error"
         ) from error

@@ -5,19 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from gen_data.assets import asset_folder, texture_maps
+from gen_data.assets import asset_folder, texture_maps, triangle_soup
 from gen_data.assets.readers import mesh_source, read_mesh
 from gen_data.assets.robot_description import Look, Shape
-from gen_data.assets.triangle_soup import (
-    Float64,
-    MaterialSlot,
-    TriangleSoup,
-    box,
-    capsule,
-    cylinder,
-    face_crosses,
-    sphere,
-)
 from gen_data.core.errors import AssetError, did_you_mean
 from gen_data.core.se3 import SE3
 
@@ -44,7 +34,7 @@ def read_shape(
             # Y points up in glTF: RViz (ros2/rviz pull request 1482) and Drake turn it, too.
             matrix = matrix[:, [0, 2, 1, 3]] * (1.0, 1.0, -1.0, 1.0)
     else:
-        source = mesh_source.MeshSource(TriangleSoup.of(_primitive(shape)))
+        source = mesh_source.MeshSource(triangle_soup.TriangleSoup.of(_primitive(shape)))
         if shape.look.texture and materials:
             uvs = _wrapped(shape.kind, source.soup.corners)
             source = replace(source, soup=replace(source.soup, uvs=uvs))
@@ -54,7 +44,9 @@ def read_shape(
     return replace(source, soup=replace(soup, slots=slots).transformed(matrix))
 
 
-def _part_of(soup: TriangleSoup, shape: Shape, folder: asset_folder.Folder) -> TriangleSoup:
+def _part_of(
+    soup: triangle_soup.TriangleSoup, shape: Shape, folder: asset_folder.Folder
+) -> triangle_soup.TriangleSoup:
     """The triangles of the named object of a mesh file.
 
     Raises:
@@ -92,20 +84,22 @@ def _with_named_images(source: mesh_source.MeshSource, file: str) -> mesh_source
     return replace(source, soup=replace(source.soup, slots=slots), images=images)
 
 
-def _primitive(shape: Shape) -> Float64:
+def _primitive(shape: Shape) -> triangle_soup.Float64:
     if shape.kind == "box":
-        return box(shape.size)
+        return triangle_soup.box(shape.size)
     if shape.kind == "cylinder":
-        return cylinder(shape.size[0], shape.size[1])
+        return triangle_soup.cylinder(shape.size[0], shape.size[1])
     if shape.kind == "capsule":
-        return capsule(shape.size[0], shape.size[1])
+        return triangle_soup.capsule(shape.size[0], shape.size[1])
     if shape.kind == "ellipsoid":
-        stretched: Float64 = sphere(1.0) * np.array(shape.size)
+        stretched: triangle_soup.Float64 = triangle_soup.sphere(1.0) * np.array(shape.size)
         return stretched
-    return sphere(shape.size[0])
+    return triangle_soup.sphere(shape.size[0])
 
 
-def _apply_look(slot: MaterialSlot, look: Look, extent_m: float) -> MaterialSlot:
+def _apply_look(
+    slot: triangle_soup.MaterialSlot, look: Look, extent_m: float
+) -> triangle_soup.MaterialSlot:
     """Apply the material of a description to a slot without texture.
 
     White is the usual placeholder in descriptions; it does not replace the mesh's own colours.
@@ -129,10 +123,10 @@ def _apply_look(slot: MaterialSlot, look: Look, extent_m: float) -> MaterialSlot
         return slot
     material = replace(slot.material, **changes)  # type: ignore[arg-type]
     named = look.name if (look.color is not None and replaced) or look.texture else ""
-    return MaterialSlot(named or slot.name, material, True)
+    return triangle_soup.MaterialSlot(named or slot.name, material, True)
 
 
-def _wrapped(kind: str, corners: Float64) -> Float64:
+def _wrapped(kind: str, corners: triangle_soup.Float64) -> triangle_soup.Float64:
     """Texture coordinates [m, 3, 2] of a primitive.
 
     The whole image is upright on each face of a box, and goes once around anything else.
@@ -145,7 +139,7 @@ def _wrapped(kind: str, corners: Float64) -> Float64:
         first = around[:, :1]
         around = around + np.rint(first - around)
         return np.round(np.stack([around, shares[..., 2]], axis=-1), 6)
-    normals = face_crosses(corners)
+    normals = triangle_soup.face_crosses(corners)
     axis = np.abs(normals).argmax(axis=1)
     sign = np.sign(np.take_along_axis(normals, axis[:, None], axis=1))
     x, y, z = (shares[..., k] - 0.5 for k in range(3))

@@ -24,9 +24,8 @@ from gen_data.assets.robot_description import (
     jointed,
 )
 from gen_data.assets.robot_files import resolve_uri
+from gen_data.core import errors, safe_xml
 from gen_data.core.asset_types import Joint
-from gen_data.core.errors import AssetError
-from gen_data.core.safe_xml import format_position, parse_xml
 from gen_data.core.se3 import SE3, Vec3
 
 _MAX_ELEMENTS = 100_000
@@ -135,11 +134,11 @@ class _Reader:
     ) -> None:
         place = str(self.folder.root / file)
         data = self.folder.read(file)
-        root = parse_xml(data, place, "sdf", "an SDF file", _MAX_ELEMENTS)
+        root = safe_xml.parse_xml(data, place, "sdf", "an SDF file", _MAX_ELEMENTS)
         models = root.findall("model") or root.findall("world/model")
         included = [] if models else root.findall("include") or root.findall("world/include")
         if len(models) + len(included) != 1:
-            raise AssetError(f"{place}: holds {len(models)} models; give a file with one")
+            raise errors.AssetError(f"{place}: holds {len(models)} models; give a file with one")
         version = [int(n) for n in re.findall(r"\d+", root.get("version", ""))]
         scope = _Scope(file, prefix, placement.model, (*depth, file), version < [1, 7])
         try:
@@ -151,8 +150,8 @@ class _Reader:
         except (ValueError, KeyError) as error:
             at = error.element if isinstance(error, _Fault) else (models + included)[0]
             reason = f"missing {error}" if isinstance(error, KeyError) else error
-            raise AssetError(
-                f"{place}{format_position(at)}: malformed SDF ({reason}); correct it"
+            raise errors.AssetError(
+                f"{place}{safe_xml.format_position(at)}: malformed SDF ({reason}); correct it"
             ) from None
 
     def _add_model(self, model: Element, scope: _Scope, placement: _Placement) -> None:
@@ -245,7 +244,7 @@ class _Reader:
             return str(base / "model.sdf")
         place = str(self.folder.root / config)
         data = self.folder.read(config)
-        root = parse_xml(data, place, "model", "a model.config", _MAX_ELEMENTS)
+        root = safe_xml.parse_xml(data, place, "model", "a model.config", _MAX_ELEMENTS)
         self.included.append(config)
         names = [(k.text or "").strip() for k in root.findall("sdf")]
         return self.folder.refer(config, names[-1] if names else "model.sdf")
@@ -405,7 +404,7 @@ class _Reader:
             links = {_MODEL: Link(_MODEL, (), ()), **self.links}
             described = jointed(links, poses, placed)
         except ValueError as error:
-            raise AssetError(f"{place}: malformed SDF ({error}); correct it") from None
+            raise errors.AssetError(f"{place}: malformed SDF ({error}); correct it") from None
         remarks = tuple(
             f"not used: {n} {what}{'' if n == 1 or what.endswith(')') else 's'}"
             for what, n in sorted(self.remarks.items())

@@ -12,8 +12,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from gen_data.assets.installed_packs import RECORD_NAME, Record, StoredFile, read_record
-from gen_data.core import serialization, system_calls
-from gen_data.core.errors import AssetError, GenDataError, StorageError, VerificationError
+from gen_data.core import errors, serialization, system_calls
 from gen_data.packs import archives, pack_table
 from gen_data.packs.fetch import check_archive, fetch, file_digest
 
@@ -115,7 +114,7 @@ def verify(name: str, folder: Path) -> Record:
         expected, actual = should.get(path), found.get(path)
         if expected != actual:
             what = "was not installed" if expected is None else "missing"
-            raise VerificationError(
+            raise errors.VerificationError(
                 f"{pack / path}: {'changed' if expected and actual else what}; install the pack "
                 f"again: gen-data assets install {name}"
             )
@@ -124,7 +123,7 @@ def verify(name: str, folder: Path) -> Record:
 
 def _require_installed(name: str, folder: Path) -> None:
     if not (folder / name / RECORD_NAME).is_file():
-        raise AssetError(
+        raise errors.AssetError(
             f"pack '{name}': not installed in {folder}; gen-data assets install {name}"
         )
 
@@ -156,7 +155,7 @@ def _scratch(folder: Path, wait: bool = False) -> Iterator[Path]:
         if wait:
             system_calls.wait_for_lock(lock.fileno())
         elif not system_calls.try_lock(lock.fileno()):
-            raise StorageError(
+            raise errors.StorageError(
                 f"{folder}: another process is installing or removing packs; wait for it"
             )
         for left_behind in sorted(folder.glob(f"{_SCRATCH}*")):
@@ -172,11 +171,11 @@ def _scratch(folder: Path, wait: bool = False) -> Iterator[Path]:
 def _storage(folder: Path) -> Iterator[None]:
     try:
         yield
-    except GenDataError:
+    except errors.GenDataError:
         raise
     except OSError as error:
         place = error.filename or folder
-        raise StorageError(
+        raise errors.StorageError(
             f"{place}: {error.strerror}; make room or set GEN_DATA_ASSETS to another folder"
         ) from None
 

@@ -12,21 +12,10 @@ from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
+from gen_data.core import errors, interfaces, scene_time
 from gen_data.core.capture import Capture, Channel, Measurements, PointCloud, SensorReading
-from gen_data.core.errors import ConfigError, LayoutRejected, Rejection, SceneRejected, in_stage
-from gen_data.core.interfaces import (
-    AssetLibrary,
-    DatasetInfo,
-    Exporter,
-    PhysicsEngine,
-    Randomizer,
-    Renderer,
-    Sensor,
-    Stage,
-)
 from gen_data.core.sample import EgoTruth, ImageTruth, Sample
 from gen_data.core.scene import LABEL_IDS_MAX, Scene
-from gen_data.core.scene_time import place_sensors
 from gen_data.core.streams import Streams
 from gen_data.pipeline import checked_renderer, splits
 from gen_data.pipeline.finalize_scene import Timeline, finalize_scene
@@ -37,7 +26,9 @@ if TYPE_CHECKING:
 
 
 T = TypeVar("T")
-SceneSource = Callable[[Streams], tuple[Scene, Sequence[Randomizer], Sequence[Sensor]]]
+SceneSource = Callable[
+    [Streams], tuple[Scene, Sequence[interfaces.Randomizer], Sequence[interfaces.Sensor]]
+]
 """Pure function from streams to nominal scene (sensors mounted), randomizers and sensors."""
 
 
@@ -59,13 +50,13 @@ class PipelineConfig:
         located_errors: Opens a block that adds places in the configuration to errors of plug-ins.
     """
 
-    info: DatasetInfo
+    info: interfaces.DatasetInfo
     open_scene: SceneSource
     channels: frozenset[Channel]
     image_truth: Callable[[Scene, SensorReading], ImageTruth]
     split_shares: Mapping[str, float]
     layout_attempts_max: int
-    exporters: Mapping[str, Exporter]
+    exporters: Mapping[str, interfaces.Exporter]
     strides: Mapping[str, int] = field(default_factory=dict)
     frame_truth: Callable[[Mapping[str, Scene]], EgoTruth | None] | None = None
     split_assignment: splits.Assignment = "random"
@@ -85,8 +76,8 @@ class AcceptedScene:
 
     index: int
     scene: Scene
-    randomizers: Sequence[Randomizer]
-    sensors: Sequence[Sensor]
+    randomizers: Sequence[interfaces.Randomizer]
+    sensors: Sequence[interfaces.Sensor]
     attempt: int
     timings_s: Mapping[str, float]
 
@@ -114,15 +105,15 @@ class Pipeline:
     def __init__(
         self,
         config: PipelineConfig,
-        assets: AssetLibrary,
-        open_physics: Callable[[], PhysicsEngine],
-        open_renderer: Callable[[], Renderer],
+        assets: interfaces.AssetLibrary,
+        open_physics: Callable[[], interfaces.PhysicsEngine],
+        open_renderer: Callable[[], interfaces.Renderer],
     ) -> None:
         self.config, self.info, self.exporters = config, config.info, config.exporters
         self.assets = assets
         self._open_physics = open_physics
         self._open_renderer = open_renderer
-        self._physics: PhysicsEngine | None = None
+        self._physics: interfaces.PhysicsEngine | None = None
         self._resources = ExitStack()
         self._latest: AcceptedScene | None = None
         self._view: DrawnView | None = None
@@ -130,7 +121,7 @@ class Pipeline:
         self._category_ids = {name: i for i, name in enumerate(config.info.categories, 1)}
 
     @cached_property
-    def renderer(self) -> Renderer:
+    def renderer(self) -> interfaces.Renderer:
         """The renderer, opened by the context or on first use; merging shards needs none."""
         return checked_renderer.CheckedRenderer(self._open_renderer())
 
@@ -178,7 +169,7 @@ class Pipeline:
     def read_sensors(
         self,
         view: DrawnView,
-        sensors: Sequence[Sensor],
+        sensors: Sequence[interfaces.Sensor],
         step_index: int,
         timings_s: Mapping[str, float] | None = None,
     ) -> Sample:
@@ -225,7 +216,7 @@ class Pipeline:
         self,
         timeline: Timeline,
         time_s: float,
-        sensors: Sequence[Sensor],
+        sensors: Sequence[interfaces.Sensor],
         streams: Streams,
         timings_s: dict[str, float],
     ) -> tuple[Capture, dict[str, ImageTruth]]:
@@ -271,11 +262,11 @@ class Pipeline:
             streams = Streams(self.info.seed, scene_index, attempt=attempt, index=scene_index)
             with _timed(timings, "randomize"):
                 nominal, randomizers, sensors = self.config.open_scene(streams)
-                scene = self._randomize(nominal, randomizers, Stage.BUILD, streams)
+                scene = self._randomize(nominal, randomizers, interfaces.Stage.BUILD, streams)
             with _timed(timings, "physics"):
                 settled = physics.settle(scene)
             if settled.rejection is not None:
-                raise LayoutRejected(settled.rejection)
+                raise errors.LayoutRejected(settled.rejection)
             scene = finalize_scene(settled.scene, self.assets, self._category_ids)
             return AcceptedScene(scene_index, scene, randomizers, sensors, attempt, timings)
 
@@ -283,13 +274,13 @@ class Pipeline:
 
     def _first_accepted(self, scene_index: int, draw: Callable[[int], T]) -> T:
         """Result of the first attempt that is not rejected; SceneRejected if all are."""
-        rejections: list[Rejection] = []
+        rejections: list[errors.Rejection] = []
         for attempt in range(self.config.layout_attempts_max):
             try:
                 return draw(attempt)
-            except LayoutRejected as refused:
+            except errors.LayoutRejected as refused:
                 rejections.append(refused.rejection)
-        raise SceneRejected(scene_index, tuple(rejections))
+        raise errors.SceneRejected(scene_index, tuple(rejections))
 
     def drawn_view(self, accepted: AcceptedScene, view_index: int) -> DrawnView:
         """A view of a scene at time 0."""
@@ -301,14 +292,20 @@ class Pipeline:
             streams = Streams(
                 self.info.seed, accepted.index, view=view_index, attempt=attempt, index=number
             )
-            scene = self._randomize(accepted.scene, accepted.randomizers, Stage.VIEW, streams)
-            return DrawnView(number, place_sensors(scene), streams)
+            scene = self._randomize(
+                accepted.scene, accepted.randomizers, interfaces.Stage.VIEW, streams
+            )
+            return DrawnView(number, scene_time.place_sensors(scene), streams)
 
         self._view = self._first_accepted(accepted.index, draw)
         return self._view
 
     def _randomize(
-        self, scene: Scene, randomizers: Sequence[Randomizer], stage: Stage, streams: Streams
+        self,
+        scene: Scene,
+        randomizers: Sequence[interfaces.Randomizer],
+        stage: interfaces.Stage,
+        streams: Streams,
     ) -> Scene:
         """Apply the randomizers of a stage; ConfigError if there are too many instances."""
         for randomizer in randomizers:
@@ -316,7 +313,7 @@ class Pipeline:
                 rng = streams.rng(f"randomizer/{randomizer.name}")
                 scene = randomizer(scene, self.assets, rng)
         if len(scene.instances) > LABEL_IDS_MAX:
-            raise ConfigError(
+            raise errors.ConfigError(
                 f"scene {streams.scene}: {len(scene.instances)} instances, but label images have "
                 f"room for {LABEL_IDS_MAX}; place fewer objects"
             )
@@ -349,7 +346,7 @@ def _timed(timings_s: dict[str, float], stage: str) -> Iterator[None]:
     """
     started_s = time.process_time()
     try:
-        with in_stage(stage):
+        with errors.in_stage(stage):
             yield
     finally:
         timings_s[stage] = timings_s.get(stage, 0.0) + time.process_time() - started_s

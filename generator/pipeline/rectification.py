@@ -18,9 +18,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.annotations import amodal_masks, boxes2d, instance_extents, instance_masks
+from gen_data.annotations import amodal_masks, boxes2d, instance_extents, instance_masks, lanes
 from gen_data.annotations.annotate import Thresholds, is_listed
-from gen_data.annotations.lanes import runs
 from gen_data.annotations.oriented_boxes2d import OrientedBoxes2d
 from gen_data.annotations.part_masks import PartMasks
 from gen_data.annotations.visibility import Visibility
@@ -417,7 +416,7 @@ def _borders(borders: Sequence[BorderTruth], bent: Rectification) -> tuple[Borde
     cut = []
     for border in borders:
         places = bent.points(np.array(border.points_px))
-        for start, end in runs(bent.shows(places)):
+        for start, end in lanes.runs(bent.shows(places)):
             if end - start >= 2:
                 points = tuple(
                     (round(float(u), 2), round(float(v), 2)) for u, v in places[start:end]

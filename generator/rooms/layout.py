@@ -17,8 +17,7 @@ from gen_data.assets.families import declared
 from gen_data.core import bounded_cache, interfaces, streams
 from gen_data.core.boxes import Rectangle, overlap_of
 from gen_data.core.se3 import SE3, Array, Quaternion, Vec3
-from gen_data.rooms import resting, rules
-from gen_data.rooms.floor_plan import Opening, Room, direction
+from gen_data.rooms import floor_plan, resting, rules
 
 Options = Mapping[str, Sequence[str]]
 """Ids of assets by family."""
@@ -158,7 +157,7 @@ class Layout:
         zones: Floor to keep free, with the index of the piece that needs it; -1 = a door.
     """
 
-    room: Room
+    room: floor_plan.Room
     assets: interfaces.AssetIndex
     rng: streams.Rng
     look: float = 0.0
@@ -334,11 +333,11 @@ class Layout:
         )
 
     def before_opening(
-        self, opening: Opening, reach_m: float = _CROWDED, beside_m: float = 0.0
+        self, opening: floor_plan.Opening, reach_m: float = _CROWDED, beside_m: float = 0.0
     ) -> Rectangle:
         """The floor just before an opening, and beside that."""
         x, y = self.room.at_wall(opening.wall, opening.along_m, 0.5 * reach_m)
-        c, s = direction(opening.wall)
+        c, s = floor_plan.direction(opening.wall)
         return (x, y, c, s, 0.5 * reach_m, 0.5 * opening.width_m + beside_m)
 
 
@@ -346,7 +345,7 @@ def cos_sin(yaw_rad: float) -> tuple[float, float]:
     """Cosine and sine, exact for multiples of a quarter turn."""
     quarter = yaw_rad / (0.5 * math.pi)
     if abs(quarter - round(quarter)) < 1e-9:
-        return direction(round(quarter))
+        return floor_plan.direction(round(quarter))
     return math.cos(yaw_rad), math.sin(yaw_rad)
 
 

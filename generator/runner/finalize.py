@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from gen_data.core.errors import SampleError, StorageError
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.serialization import canonical_json
-from gen_data.runner import error_context, layout, shard_record
+from gen_data.runner import durable_files, error_context, layout, seal, shard_record
 from gen_data.runner.data_card import (
     CARD_NAME,
     CROISSANT_NAME,
@@ -17,17 +17,7 @@ from gen_data.runner.data_card import (
     croissant_json,
     data_card,
 )
-from gen_data.runner.durable_files import (
-    Inode,
-    empty_folders,
-    get_inode,
-    hash_file,
-    move_durably,
-    sync_tree,
-    tree_sizes,
-)
 from gen_data.runner.plan import Plan, plan_bytes
-from gen_data.runner.seal import Entry, SealedBefore, dataset_id, sums_text
 from gen_data.runner.shard import PipelineLike
 from gen_data.runner.store import LocalStore
 
@@ -40,7 +30,7 @@ def finalize(
     store: LocalStore,
     pipeline: PipelineLike,
     licences: LicencesOf | None,
-    sealed_before: SealedBefore,
+    sealed_before: seal.SealedBefore,
 ) -> str:
     """Merge, summarise and seal a data set whose shards are all committed.
 
@@ -82,15 +72,17 @@ def finalize(
         record_bytes = [record.to_bytes() for record in records]
         entries += _entries(plan, store, records, record_bytes, names, known)
         entries.sort(key=_by_path)
-        sums = sums_text(entries)
+        sums = seal.sums_text(entries)
         sealed_before.expect(entries)
-        folders = [f"{n}/{inner}" for n in names for inner in empty_folders(store.root / n)]
+        folders = [
+            f"{n}/{inner}" for n in names for inner in durable_files.empty_folders(store.root / n)
+        ]
         manifest = _manifest(plan, pipeline.info, records, record_bytes, entries, folders)
         sealed = [*entries, _entry_of_bytes(layout.MANIFEST_NAME, manifest)]
-        lines = sums_text(sorted(sealed, key=_by_path))
+        lines = seal.sums_text(sorted(sealed, key=_by_path))
         store.replace_file(layout.SUMS_NAME, lines.encode(), scratch)
         store.replace_file(layout.MANIFEST_NAME, manifest, scratch)
-    return dataset_id(sums)
+    return seal.dataset_id(sums)
 
 
 def _all_records(plan: Plan, store: LocalStore) -> list[shard_record.ShardRecord]:
@@ -103,11 +95,13 @@ def _all_records(plan: Plan, store: LocalStore) -> list[shard_record.ShardRecord
     return records
 
 
-def _inodes(store: LocalStore, records: list[shard_record.ShardRecord]) -> dict[Inode, str]:
+def _inodes(
+    store: LocalStore, records: list[shard_record.ShardRecord]
+) -> dict[durable_files.Inode, str]:
     """Digests by inode: files that exporters hard-link are not hashed again."""
     folders = [(store.shard_dir(record.shard), record) for record in records]
     return {
-        get_inode(f"{folder}/{file.path}"): file.sha256
+        durable_files.get_inode(f"{folder}/{file.path}"): file.sha256
         for folder, record in folders
         for file in record.files
     }
@@ -118,19 +112,19 @@ def _merge(
     store: LocalStore,
     pipeline: PipelineLike,
     name: str,
-    known: Mapping[Inode, str],
+    known: Mapping[durable_files.Inode, str],
 ) -> None:
     """Let one exporter merge into a temporary folder, which then replaces the older one."""
     staging = store.scratch_dir()
     shard_dirs = [store.shard_dir(record.shard) for record in records if record.samples]
     pipeline.exporters[name].finalize(pipeline.info, shard_dirs, staging)
-    sync_tree(staging, synced=known)
+    durable_files.sync_tree(staging, synced=known)
     target = store.root / name
     if not any(staging.iterdir()):
         return
     if target.exists():
-        move_durably(target, store.scratch_dir() / name)
-    move_durably(staging, target)
+        durable_files.move_durably(target, store.scratch_dir() / name)
+    durable_files.move_durably(staging, target)
 
 
 def _documents(
@@ -163,20 +157,20 @@ def _entries(
     records: list[shard_record.ShardRecord],
     record_bytes: list[bytes],
     exporters: list[str],
-    known: Mapping[Inode, str],
-) -> Iterator[Entry]:
+    known: Mapping[durable_files.Inode, str],
+) -> Iterator[seal.Entry]:
     """Plan, records, files of shards and of exporters, in no particular order."""
     yield _entry_of_bytes(layout.PLAN_NAME, plan_bytes(plan))
     for record, data in zip(records, record_bytes, strict=True):
         folder = f"{layout.SHARDS_NAME}/{store.shard_dir(record.shard).name}"
         yield _entry_of_bytes(f"{folder}.json", data)
         for file in record.files:
-            yield Entry(f"{folder}/{file.path}", file.bytes, file.sha256)
+            yield seal.Entry(f"{folder}/{file.path}", file.bytes, file.sha256)
     for name in exporters:
-        for inner, size in tree_sizes(store.root / name).items():
+        for inner, size in durable_files.tree_sizes(store.root / name).items():
             path = f"{store.root}/{name}/{inner}"
-            digest = known.get(get_inode(path)) or hash_file(path)
-            yield Entry(f"{name}/{inner}", size, digest)
+            digest = known.get(durable_files.get_inode(path)) or durable_files.hash_file(path)
+            yield seal.Entry(f"{name}/{inner}", size, digest)
 
 
 def _manifest(
@@ -184,7 +178,7 @@ def _manifest(
     info: DatasetInfo,
     records: list[shard_record.ShardRecord],
     record_bytes: list[bytes],
-    entries: list[Entry],
+    entries: list[seal.Entry],
     folders: list[str],
 ) -> bytes:
     """Contents of the manifest, without time, host, path or number of workers.
@@ -194,7 +188,7 @@ def _manifest(
     sized_by_records = {file.sha256 for record in records for file in record.files}
     manifest = {
         "format_version": plan.format_version,
-        "dataset_id": dataset_id(sums_text(entries)),
+        "dataset_id": seal.dataset_id(seal.sums_text(entries)),
         "name": plan.name,
         "seed": plan.seed,
         "n": plan.n,
@@ -215,9 +209,9 @@ def _manifest(
     return (canonical_json(manifest | ({"failed": failed} if failed else {})) + "\n").encode()
 
 
-def _by_path(entry: Entry) -> str:
+def _by_path(entry: seal.Entry) -> str:
     return entry.path
 
 
-def _entry_of_bytes(path: str, data: bytes) -> Entry:
-    return Entry(path, len(data), hashlib.sha256(data).hexdigest())
+def _entry_of_bytes(path: str, data: bytes) -> seal.Entry:
+    return seal.Entry(path, len(data), hashlib.sha256(data).hexdigest())

@@ -7,8 +7,7 @@ import hashlib
 import os
 
 from gen_data.core.errors import StorageError
-from gen_data.runner import layout, seal, verify
-from gen_data.runner.durable_files import make_folder, write_durably
+from gen_data.runner import durable_files, layout, seal, verify
 from gen_data.runner.plan import Plan, plan_bytes
 from gen_data.runner.store import LocalStore
 
@@ -56,8 +55,8 @@ def restore_plan(store: LocalStore, plan: Plan) -> None:
     with store.locked(), store.errors():
         if os.path.lexists(path):
             store.set_aside(path)
-        make_folder(store.scratch_root)
-        write_durably(path, data, store.scratch_root)
+        durable_files.make_folder(store.scratch_root)
+        durable_files.write_durably(path, data, store.scratch_root)
 
 
 def quarantine_extra(store: LocalStore) -> None:

@@ -9,16 +9,8 @@ from typing import TypeVar
 
 from gen_data.assemble.config import Config, load_config
 from gen_data.core import capture, errors, interfaces, system_calls
-from gen_data.lab.matching import label_fit, lidar_fit, recordings, results, simulation
+from gen_data.lab.matching import label_fit, lidar_fit, real_files, recordings, results, simulation
 from gen_data.lab.matching.camera_fit import MeasuredPhoto, fit_camera, measure_photo
-from gen_data.lab.matching.real_files import (
-    Inventory,
-    RealFiles,
-    find_files,
-    read_labels,
-    read_photos,
-    read_scans,
-)
 from gen_data.sensors.camera.rgb_camera import RgbCamera
 from gen_data.sensors.lidar.lidar_sensor import LidarSensor
 
@@ -62,15 +54,17 @@ def match_recordings(  # noqa: PLR0913  (keywords of one front door)
     config = load_config(source)
     eye = _find_sensor(config, RgbCamera, camera, "camera")
     scanner = _find_sensor(config, LidarSensor, lidar, "lidar")
-    files, inventory = find_files(folder), Inventory()
+    files, inventory = real_files.find_files(folder), real_files.Inventory()
     progress("reading photographs")
     photos = _measure_photos(files, images, inventory)
     progress("reading scans")
-    swept = list(read_scans(files, scans, inventory))
+    swept = list(real_files.read_scans(files, scans, inventory))
     if not photos and not swept:
         reasons = "; ".join(f"{n} {kind}: {why}" for (kind, why), n in inventory.skipped.items())
         raise errors.StorageError(f"{folder}: nothing in it can be read: {reasons}")
-    labels = read_labels(files, {photo.name: photo.size_px for photo in photos}, inventory)
+    labels = real_files.read_labels(
+        files, {photo.name: photo.size_px for photo in photos}, inventory
+    )
     eye = eye if photos else None
     scanner = scanner if swept else None
     placed = label_fit.fit_labels(source, eye, labels, scenes, progress)
@@ -117,10 +111,14 @@ def _position(config: Config, sensor: interfaces.Sensor | None) -> int:
     return -1 if sensor is None else names.index(sensor.name)
 
 
-def _measure_photos(files: RealFiles, limit: int, inventory: Inventory) -> list[MeasuredPhoto]:
+def _measure_photos(
+    files: real_files.RealFiles, limit: int, inventory: real_files.Inventory
+) -> list[MeasuredPhoto]:
     """Measure photographs, of which a few are in memory at a time."""
     measured: list[MeasuredPhoto] = []
-    for batch in _batches(read_photos(files, limit, inventory), 4 * system_calls.usable_cores()):
+    for batch in _batches(
+        real_files.read_photos(files, limit, inventory), 4 * system_calls.usable_cores()
+    ):
         measured += simulation.map_in_threads(measure_photo, batch)
     return measured
 

@@ -11,15 +11,7 @@ import torch
 from numpy.typing import NDArray
 
 from gen_data.core.streams import Streams
-from gen_data.lab.study.detector import (
-    STRIDE,
-    Detector,
-    Truth,
-    augment,
-    compute_loss,
-    detect,
-    encode,
-)
+from gen_data.lab.study import detector
 from gen_data.lab.study.real_pictures import RealPicture, RealSet, read_image
 
 PEAK_RATE = 2e-3
@@ -31,13 +23,13 @@ Target = tuple[NDArray[np.uint8], Arrays]
 
 
 def fit(
-    model: Detector,
+    model: detector.Detector,
     batches: Iterable[Sequence[Target]],
     used: Callable[[int], float],
     *,
     seed: int = 0,
     report: Callable[[int, float], None] | None = None,
-) -> Detector:
+) -> detector.Detector:
     """Train a detector with AdamW, and make it ready to detect.
 
     Args:
@@ -59,7 +51,7 @@ def fit(
         optimizer.param_groups[0]["lr"] = PEAK_RATE * rate
         images, truths = zip(*(prepare(model, *pair, rng) for pair in batch), strict=True)
         logits, boxes = model(torch.stack(images))
-        loss = compute_loss(logits, boxes, truths)
+        loss = detector.compute_loss(logits, boxes, truths)
         optimizer.zero_grad()
         loss.backward()
         torch.nn.utils.clip_grad_norm_(model.parameters(), 10.0)
@@ -71,12 +63,12 @@ def fit(
 
 
 def prepare(
-    model: Detector, image: NDArray[np.uint8], target: Arrays, rng: np.random.Generator
-) -> tuple[torch.Tensor, Truth]:
+    model: detector.Detector, image: NDArray[np.uint8], target: Arrays, rng: np.random.Generator
+) -> tuple[torch.Tensor, detector.Truth]:
     """An augmented image [3, h, w] in [0, 1] and its truth."""
-    moved, boxes = augment(image.transpose(1, 2, 0), target["boxes"], model.size_px, rng)
-    shape = len(model.classes), moved.shape[0] // STRIDE, moved.shape[1] // STRIDE
-    truth = encode(boxes, target["labels"], target["iscrowd"] == 1, shape)
+    moved, boxes = detector.augment(image.transpose(1, 2, 0), target["boxes"], model.size_px, rng)
+    shape = len(model.classes), moved.shape[0] // detector.STRIDE, moved.shape[1] // detector.STRIDE
+    truth = detector.encode(boxes, target["labels"], target["iscrowd"] == 1, shape)
     return torch.from_numpy(moved).permute(2, 0, 1).float() / 255.0, truth
 
 
@@ -123,7 +115,7 @@ def real_target(picture: RealPicture, classes: Sequence[str]) -> Target:
 
 
 def detect_all(
-    model: Detector, real: RealSet, pictures: Sequence[RealPicture]
+    model: detector.Detector, real: RealSet, pictures: Sequence[RealPicture]
 ) -> list[dict[str, Any]]:
     """Detections in pictures, in COCO's format of results, of the classes of a real set."""
     images = ((picture.image_id, read_image(picture.path)) for picture in pictures)
@@ -131,14 +123,14 @@ def detect_all(
 
 
 def detect_in_images(
-    model: Detector,
+    model: detector.Detector,
     images: Iterable[tuple[int, NDArray[np.uint8]]],
     category_ids: Mapping[str, int],
 ) -> list[dict[str, Any]]:
     """Detections in RGB images [h, w, 3] with their ids, in COCO's format of results."""
     results = []
     for image_id, image in images:
-        found = detect(model, image)
+        found = detector.detect(model, image)
         for (x0, y0, x1, y1), confidence, label in zip(*found, strict=True):
             category_id = category_ids.get(model.classes[label - 1])
             if category_id is not None:

@@ -4,8 +4,7 @@ import math
 
 import numpy as np
 
-from gen_data.content.procedural import toys
-from gen_data.content.procedural.patches import unit
+from gen_data.content.procedural import patches, toys
 from gen_data.content.procedural.textures.texture_images import (
     color,
     draw_color,
@@ -77,7 +76,7 @@ def _foot(d: Float32, rng: VariantRng) -> Float32:
     near = np.einsum("ik,jk->ij", corners, corners, optimize=False) > 0.4
     triples = [(i, j, k) for i in range(12) for j in range(i) for k in range(j)]
     close = [(i, j, k) for i, j, k in triples if near[i, j] and near[j, k] and near[i, k]]
-    faces = unit(np.array([corners[list(t)].sum(axis=0) for t in close]))
+    faces = patches.unit(np.array([corners[list(t)].sum(axis=0) for t in close]))
     heights = np.concatenate([corners / _PENTAGON, faces / _HEXAGON])
     reach = np.einsum("hwk,fk->hwf", d, heights.astype(np.float32), optimize=False)
     two = np.sort(reach, axis=2)[..., -2:]

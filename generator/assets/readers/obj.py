@@ -19,17 +19,7 @@ from typing import Any
 import numpy as np
 
 from gen_data.assets.asset_folder import Folder
-from gen_data.assets.readers.mesh_source import (
-    MAX_FACES,
-    WHITE,
-    MeshSource,
-    clamp_min,
-    fraction,
-    locate_file,
-    shininess_to_roughness,
-    split_fans,
-    srgb_to_linear,
-)
+from gen_data.assets.readers import mesh_source
 from gen_data.assets.texture_maps import TextureMaps
 from gen_data.assets.triangle_soup import Float64, Int64, MaterialSlot, TriangleSoup
 from gen_data.core import asset_types, colorimetry, errors
@@ -52,7 +42,7 @@ class _Statements:
     group_names: list[str] = field(default_factory=lambda: [""])
 
 
-def read_obj(folder: Folder, relative: str, materials: bool) -> MeshSource:
+def read_obj(folder: Folder, relative: str, materials: bool) -> mesh_source.MeshSource:
     """Read an OBJ file with the materials of its MTL files.
 
     Polygons become triangle fans. Each ``o`` (or, where there is none, each ``g``) is a group.
@@ -72,9 +62,9 @@ def read_obj(folder: Folder, relative: str, materials: bool) -> MeshSource:
             f"{folder.root / relative}: malformed OBJ ({error}); export it again"
         ) from None
     if not materials:
-        return MeshSource(replace(soup, colors=None))
+        return mesh_source.MeshSource(replace(soup, colors=None))
     soup, more = _color_untextured(_transform_uvs(soup, transforms))
-    return MeshSource(soup, {}, (*remarks, *more, *_unread(statements)))
+    return mesh_source.MeshSource(soup, {}, (*remarks, *more, *_unread(statements)))
 
 
 def decode_text(data: bytes) -> str:
@@ -168,9 +158,9 @@ def _build_soup(s: _Statements, slots: tuple[MaterialSlot, ...]) -> TriangleSoup
     sizes = np.array(s.polygon_sizes, dtype=np.int64)
     if (sizes < 3).any():
         raise ValueError("a face with fewer than three corners")
-    if (sizes - 2).sum() > MAX_FACES:
-        raise ValueError(f"more than {MAX_FACES} triangles")
-    fans = split_fans(sizes)
+    if (sizes - 2).sum() > mesh_source.MAX_FACES:
+        raise ValueError(f"more than {mesh_source.MAX_FACES} triangles")
+    fans = mesh_source.split_fans(sizes)
     polygon = np.repeat(np.arange(len(sizes)), sizes - 2)
     indices = _parse_indices(s.corners)[fans]
     positions, colors = _parse_positions(s.positions)
@@ -221,7 +211,8 @@ def _color_untextured(soup: TriangleSoup) -> tuple[TriangleSoup, tuple[str, ...]
         return soup, ()
     textured = np.array([bool(slot.material.texture) for slot in soup.slots])[soup.face_slots]
     slots = tuple(
-        slot if slot.from_file else replace(slot, material=WHITE, missing="") for slot in soup.slots
+        slot if slot.from_file else replace(slot, material=mesh_source.WHITE, missing="")
+        for slot in soup.slots
     )
     colors = np.where(textured[:, None, None], 1.0, soup.colors)
     remarks = ("vertex colours are not used where an image is",) if textured.any() else ()
@@ -330,11 +321,11 @@ def _compose(name: str) -> str:
 
 def _library_files(folder: Folder, relative: str, names: str) -> tuple[str, ...]:
     """Paths of an ``mtllib`` statement: one name, which may hold spaces, or several."""
-    whole = locate_file(folder, relative, names)
+    whole = mesh_source.locate_file(folder, relative, names)
     parts = names.split()
     if folder.exists(whole) or len(parts) < 2:
         return (whole,)
-    paths = tuple(locate_file(folder, relative, part) for part in parts)
+    paths = tuple(mesh_source.locate_file(folder, relative, part) for part in parts)
     return paths if any(folder.exists(path) for path in paths) else (whole,)
 
 
@@ -433,7 +424,7 @@ def _apply_statement(
     key = word.lower()
     if key in _IMAGES:
         name, placement = _image_name(rest)
-        path = locate_file(folder, relative, name, remarks)
+        path = mesh_source.locate_file(folder, relative, name, remarks)
         image: dict[str, Any] = {_IMAGES[key]: path}
         known.maps = replace(known.maps, **image)
         if key == "map_kd":
@@ -444,14 +435,14 @@ def _apply_statement(
     numbers = [float(x) for x in rest.partition("#")[0].split()]
     if key == "kd":
         red, green, blue = (numbers * 3)[:3]
-        color = srgb_to_linear((red, green, blue))
+        color = mesh_source.srgb_to_linear((red, green, blue))
         known.material = replace(known.material, base_color=color)
     elif key == "ke":
-        red, green, blue = (clamp_min(0.0, c, word) for c in (numbers * 3)[:3])
+        red, green, blue = (mesh_source.clamp_min(0.0, c, word) for c in (numbers * 3)[:3])
         known.material = replace(known.material, emission_cd_m2=(red, green, blue))
     elif key == "ns":
         if numbers[0] > 0.0:
-            roughness = shininess_to_roughness(numbers[0])
+            roughness = mesh_source.shininess_to_roughness(numbers[0])
             known.material = replace(known.material, roughness=roughness)
     elif key == "ni":
         # Exporters write values below 1 for an unknown index.
@@ -460,7 +451,7 @@ def _apply_statement(
         _set_opacity(known, word, numbers[-1])
     else:
         names = {"pr": "roughness", "pm": "metallic", "pc": "coat", "pcr": "coat_roughness"}
-        share: dict[str, Any] = {names[key]: fraction(numbers[0], word)}
+        share: dict[str, Any] = {names[key]: mesh_source.fraction(numbers[0], word)}
         known.material = replace(known.material, **share)
 
 
@@ -470,7 +461,11 @@ def _set_opacity(known: _Definition, word: str, number: float) -> None:
     ``Tr 1`` is read as opaque, because some exporters swap the two (MeshLab).
     """
     key = word.lower()
-    opacity = fraction(number, word) if key == "d" else 1.0 - fraction(number, word)
+    opacity = (
+        mesh_source.fraction(number, word)
+        if key == "d"
+        else 1.0 - mesh_source.fraction(number, word)
+    )
     if key == "d" or not known.dissolved:
         opacity = 1.0 if key == "tr" and opacity == 0.0 else opacity
         known.material = replace(known.material, opacity=opacity)

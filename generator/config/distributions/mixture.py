@@ -8,15 +8,7 @@ from dataclasses import dataclass, field
 from itertools import accumulate
 from typing import TYPE_CHECKING, Any
 
-from gen_data.config.distributions.base import (
-    Kind,
-    Malformed,
-    Numeric,
-    T_co,
-    inside,
-    read_distribution,
-    read_number,
-)
+from gen_data.config.distributions import base
 from gen_data.config.yaml_scalars import format_number, quote_value
 
 if TYPE_CHECKING:
@@ -24,7 +16,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Mixture(Numeric[T_co], key="mixture", kinds=("number", "whole number")):
+class Mixture(base.Numeric[base.T_co], key="mixture", kinds=("number", "whole number")):
     """One of several distributions over numbers, in proportion to weights.
 
     Attributes:
@@ -32,23 +24,25 @@ class Mixture(Numeric[T_co], key="mixture", kinds=("number", "whole number")):
         weights: Relative frequency of each, >= 0; they need not add up to 1.
     """
 
-    parts: tuple[Numeric[T_co], ...]
+    parts: tuple[base.Numeric[base.T_co], ...]
     weights: tuple[float, ...]
     _cumulative: tuple[float, ...] = field(init=False, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         """Refuse negative weights, and a mixture of nothing."""
         if len(self.parts) != len(self.weights):
-            raise Malformed(f"mixture has {len(self.parts)} parts, but {len(self.weights)} weights")
+            raise base.Malformed(
+                f"mixture has {len(self.parts)} parts, but {len(self.weights)} weights"
+            )
         for number, weight in enumerate(self.weights):
             if not weight >= 0:
                 fact = f"mixture needs weights >= 0, got {format_number(weight)}"
-                raise Malformed(fact, (number, 0))
+                raise base.Malformed(fact, (number, 0))
         object.__setattr__(self, "_cumulative", tuple(accumulate(self.weights)))
         if not self.parts or not self._cumulative[-1] > 0:
-            raise Malformed("mixture needs at least one weight > 0")
+            raise base.Malformed("mixture needs at least one weight > 0")
 
-    def draw(self, rng: Rng) -> T_co:
+    def draw(self, rng: Rng) -> base.T_co:
         """A value of a part that is drawn first."""
         total = self._cumulative[-1]
         index = bisect_right(self._cumulative, rng.random() * total)
@@ -56,7 +50,7 @@ class Mixture(Numeric[T_co], key="mixture", kinds=("number", "whole number")):
         last = bisect_right(self._cumulative, total * (1 - 2.0**-53))
         return self.parts[min(index, last)].draw(rng)
 
-    def outcomes(self) -> tuple[T_co, ...]:
+    def outcomes(self) -> tuple[base.T_co, ...]:
         """Every value that can be drawn, where all parts have few; empty = a continuum."""
         values = [part.outcomes() for part in self._drawn()]
         if not all(values):
@@ -68,25 +62,25 @@ class Mixture(Numeric[T_co], key="mixture", kinds=("number", "whole number")):
         limits = [part.support() for part in self._drawn()]
         return min(low for low, _ in limits), max(high for _, high in limits)
 
-    def _drawn(self) -> list[Numeric[T_co]]:
+    def _drawn(self) -> list[base.Numeric[base.T_co]]:
         return [p for p, weight in zip(self.parts, self.weights, strict=True) if weight > 0]
 
     @classmethod
-    def from_yaml(cls, argument: Any, kind: Kind[Any]) -> Mixture[Any]:
+    def from_yaml(cls, argument: Any, kind: base.Kind[Any]) -> Mixture[Any]:
         """Read a list of pairs: weight and distribution."""
         wanted = "mixture needs a list of pairs [weight, distribution]"
         if not isinstance(argument, (list, tuple)):
-            raise Malformed(f"{wanted}, got {quote_value(argument)}")
+            raise base.Malformed(f"{wanted}, got {quote_value(argument)}")
         parts, weights = [], []
         for number, pair in enumerate(argument):
             if not isinstance(pair, (list, tuple)) or len(pair) != 2:
-                raise Malformed(f"{wanted}, got {quote_value(pair)}", (number,))
-            with inside(number, 0):
-                weights.append(read_number(pair[0]))
-            with inside(number, 1):
-                part = read_distribution(pair[1], kind)
-                if not isinstance(part, Numeric):
-                    raise Malformed(f"expected {kind.expected} or a distribution over numbers")
+                raise base.Malformed(f"{wanted}, got {quote_value(pair)}", (number,))
+            with base.inside(number, 0):
+                weights.append(base.read_number(pair[0]))
+            with base.inside(number, 1):
+                part = base.read_distribution(pair[1], kind)
+                if not isinstance(part, base.Numeric):
+                    raise base.Malformed(f"expected {kind.expected} or a distribution over numbers")
                 parts.append(part)
         return cls(tuple(parts), tuple(weights))
 

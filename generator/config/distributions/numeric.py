@@ -8,15 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from pydantic import Field, WithJsonSchema
 
-from gen_data.config.distributions.base import (
-    Malformed,
-    Numeric,
-    T_co,
-    parameters,
-    require_order,
-    round_significant,
-    sized,
-)
+from gen_data.config.distributions import base
 from gen_data.config.yaml_scalars import format_number
 
 if TYPE_CHECKING:
@@ -29,7 +21,7 @@ _PAIR = {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems"
 _Above0 = Annotated[float, WithJsonSchema({"type": "number", "exclusiveMinimum": 0})]
 
 
-class Interval(Numeric[T_co], needs="two numbers [low, high]"):
+class Interval(base.Numeric[base.T_co], needs="two numbers [low, high]"):
     """A distribution between two numbers."""
 
     low: float
@@ -37,14 +29,14 @@ class Interval(Numeric[T_co], needs="two numbers [low, high]"):
 
     def __post_init__(self) -> None:
         """Refuse a reversed range."""
-        require_order(self.name, self.low, self.high)
+        base.require_order(self.name, self.low, self.high)
 
     def support(self) -> tuple[float, float]:
         """Smallest and largest value."""
         return self.low, self.high
 
 
-@parameters
+@base.parameters
 class Uniform(Interval[float], key="uniform", kinds=("number",)):
     """Every number between low and high is equally likely."""
 
@@ -55,14 +47,14 @@ class Uniform(Interval[float], key="uniform", kinds=("number",)):
         """Refuse a reversed range, and one whose width overflows."""
         super().__post_init__()
         if math.isinf(self.high - self.low):
-            raise Malformed(f"uniform needs a finite range, got {self.argument()}")
+            raise base.Malformed(f"uniform needs a finite range, got {self.argument()}")
 
     def draw(self, rng: Rng) -> float:
         """One value."""
         return min(self.low + (self.high - self.low) * rng.random(), self.high)
 
 
-@parameters
+@base.parameters
 class LogUniform(
     Interval[float],
     key="log_uniform",
@@ -77,7 +69,7 @@ class LogUniform(
     def __post_init__(self) -> None:
         """Refuse a reversed range and one that touches zero."""
         if not self.low > 0 or not self.high > 0:
-            raise Malformed(
+            raise base.Malformed(
                 f"log_uniform needs low > 0 and high > 0, "
                 f"got [{format_number(self.low)}, {format_number(self.high)}]"
             )
@@ -89,12 +81,12 @@ class LogUniform(
         if self.low == self.high:
             return self.low
         log_low = math.log(self.low)
-        value = round_significant(math.exp(log_low + (math.log(self.high) - log_low) * u))
+        value = base.round_significant(math.exp(log_low + (math.log(self.high) - log_low) * u))
         return min(max(value, self.low), self.high)
 
 
-@parameters
-class Normal(Numeric[float], key="normal", kinds=("number",)):
+@base.parameters
+class Normal(base.Numeric[float], key="normal", kinds=("number",)):
     """Gaussian; with ``clip`` it is truncated: values outside are not drawn, none pile up.
 
     Drawn by inverting the cumulative distribution: each value costs exactly one random
@@ -109,26 +101,26 @@ class Normal(Numeric[float], key="normal", kinds=("number",)):
     stddev: float = Field(json_schema_extra={"minimum": 0})
     clip: Annotated[
         tuple[float, float] | None,
-        sized(2, "clip needs two numbers [low, high]"),
+        base.sized(2, "clip needs two numbers [low, high]"),
         WithJsonSchema({**_PAIR, "description": "[low, high]: truncated to it"}),
     ] = None
 
     def __post_init__(self) -> None:
         """Refuse a negative deviation, and a clip range that holds no probability."""
         if self.stddev < 0:
-            raise Malformed(f"normal needs stddev >= 0, got {format_number(self.stddev)}")
+            raise base.Malformed(f"normal needs stddev >= 0, got {format_number(self.stddev)}")
         if self.clip is not None:
             self._refuse_empty(*self.clip)
 
     def _refuse_empty(self, low: float, high: float) -> None:
-        require_order("normal clip", low, high)
+        base.require_order("normal clip", low, high)
         if low < high and self.stddev > 0:
             below, above, _ = self._tail()
             empty = not above - below > _LEAST_PROBABILITY
         else:
             empty = self.stddev == 0 and not low <= self.center <= high
         if empty:
-            raise Malformed(
+            raise base.Malformed(
                 f"normal with mean {format_number(self.center)} and stddev "
                 f"{format_number(self.stddev)} never "
                 f"falls into clip [{format_number(low)}, {format_number(high)}]"
@@ -143,7 +135,7 @@ class Normal(Numeric[float], key="normal", kinds=("number",)):
             return min(max(self.center, low), high)
         below, above, sign = self._tail()
         z = sign * _STANDARD.inv_cdf(min(below + (above - below) * u, 1 - 2.0**-53))
-        return min(max(round_significant(self.center + self.stddev * z), low), high)
+        return min(max(base.round_significant(self.center + self.stddev * z), low), high)
 
     def support(self) -> tuple[float, float]:
         """The clip range; without one, all numbers."""
@@ -164,7 +156,7 @@ class Normal(Numeric[float], key="normal", kinds=("number",)):
         return _cumulative(a), _cumulative(b), 1
 
 
-@parameters
+@base.parameters
 class UniformInteger(
     Interval[int],
     key="uniform_integer",

@@ -7,15 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from pydantic import AfterValidator, Field
 
-from gen_data.config.distributions.base import (
-    Distribution,
-    Malformed,
-    Vector,
-    parameters,
-    require_order,
-    round_significant,
-    sized,
-)
+from gen_data.config.distributions import base
 from gen_data.config.yaml_scalars import format_number
 from gen_data.core.se3 import Quaternion, Vec3, multiply_quaternions, rotate_by_quaternion
 
@@ -26,7 +18,7 @@ if TYPE_CHECKING:
 def _unit(parts: tuple[float, ...], noun: str) -> tuple[float, ...]:
     largest = max(abs(v) for v in parts)
     if largest == 0:
-        raise Malformed(f"{noun} must not be zero")
+        raise base.Malformed(f"{noun} must not be zero")
     scaled = [v / largest for v in parts]
     square = sum(v * v for v in scaled)
     # One that is unit already to the last digits stays as it is: reading it back changes nothing.
@@ -38,20 +30,20 @@ def _unit(parts: tuple[float, ...], noun: str) -> tuple[float, ...]:
 
 UnitQuaternion = Annotated[
     tuple[float, float, float, float],
-    sized(4, "expected a quaternion [w, x, y, z]"),
+    base.sized(4, "expected a quaternion [w, x, y, z]"),
     AfterValidator(lambda parts: _unit(parts, "a quaternion")),
 ]
 """A rotation, scalar first; normalised."""
 UnitVector = Annotated[
     tuple[float, float, float],
-    sized(3, "expected a direction [x, y, z]"),
+    base.sized(3, "expected a direction [x, y, z]"),
     AfterValidator(lambda parts: _unit(parts, "a direction")),
 ]
 """A direction; normalised."""
 
 
-@parameters
-class QuaternionWxyz(Distribution[Quaternion], key="quaternion_wxyz", kinds=("rotation",)):
+@base.parameters
+class QuaternionWxyz(base.Distribution[Quaternion], key="quaternion_wxyz", kinds=("rotation",)):
     """A fixed rotation as a quaternion, scalar first; it is normalised."""
 
     quaternion_wxyz: UnitQuaternion
@@ -65,15 +57,16 @@ class QuaternionWxyz(Distribution[Quaternion], key="quaternion_wxyz", kinds=("ro
         return (self.quaternion_wxyz,)
 
 
-@parameters
-class EulerDeg(Distribution[Quaternion], key="euler_deg", kinds=("rotation",)):
+@base.parameters
+class EulerDeg(base.Distribution[Quaternion], key="euler_deg", kinds=("rotation",)):
     """A fixed rotation: roll about X, then pitch about Y, then yaw about Z, all fixed axes [deg].
 
     The convention of URDF: R = Rz(yaw) Ry(pitch) Rx(roll).
     """
 
     roll_pitch_yaw_deg: Annotated[
-        tuple[float, float, float], sized(3, "expected three angles [roll, pitch, yaw] in degrees")
+        tuple[float, float, float],
+        base.sized(3, "expected three angles [roll, pitch, yaw] in degrees"),
     ] = Field(description="[roll, pitch, yaw] in degrees, fixed axes")
 
     def draw(self, rng: Rng) -> Quaternion:  # noqa: ARG002
@@ -85,8 +78,8 @@ class EulerDeg(Distribution[Quaternion], key="euler_deg", kinds=("rotation",)):
         return multiply_quaternions(about_z, multiply_quaternions(about_y, about_x))
 
 
-@parameters
-class So3(Distribution[Quaternion], key="so3", kinds=("rotation",), bare=True):
+@base.parameters
+class So3(base.Distribution[Quaternion], key="so3", kinds=("rotation",), bare=True):
     """Every rotation is equally likely.
 
     Source: Shoemake, "Uniform random rotations", Graphics Gems III, 1992.
@@ -97,28 +90,28 @@ class So3(Distribution[Quaternion], key="so3", kinds=("rotation",), bare=True):
         u1, u2, u3 = rng.random(), 2 * math.pi * rng.random(), 2 * math.pi * rng.random()
         a, b = math.sqrt(1 - u1), math.sqrt(u1)
         return (
-            round_significant(b * math.cos(u3)),
-            round_significant(a * math.sin(u2)),
-            round_significant(a * math.cos(u2)),
-            round_significant(b * math.sin(u3)),
+            base.round_significant(b * math.cos(u3)),
+            base.round_significant(a * math.sin(u2)),
+            base.round_significant(a * math.cos(u2)),
+            base.round_significant(b * math.sin(u3)),
         )
 
 
-@parameters
-class AboutZ(Distribution[Quaternion], key="about_z", kinds=("rotation",), bare=True):
+@base.parameters
+class AboutZ(base.Distribution[Quaternion], key="about_z", kinds=("rotation",), bare=True):
     """A turn about the vertical; every angle of the range is equally likely.
 
     Attributes:
         yaw_deg: Range of the angle [deg].
     """
 
-    yaw_deg: Annotated[tuple[float, float], sized(2, "about_z needs two numbers [low, high]")] = (
-        Field((0.0, 360.0), description="[low, high] in degrees")
-    )
+    yaw_deg: Annotated[
+        tuple[float, float], base.sized(2, "about_z needs two numbers [low, high]")
+    ] = Field((0.0, 360.0), description="[low, high] in degrees")
 
     def __post_init__(self) -> None:
         """Refuse a reversed range."""
-        require_order(self.name, *self.yaw_deg)
+        base.require_order(self.name, *self.yaw_deg)
 
     def draw(self, rng: Rng) -> Quaternion:
         """One unit quaternion, scalar first."""
@@ -127,8 +120,8 @@ class AboutZ(Distribution[Quaternion], key="about_z", kinds=("rotation",), bare=
         return cosine, 0.0, 0.0, sine
 
 
-@parameters
-class Sphere(Distribution[Vec3], key="sphere", kinds=("direction",), bare=True):
+@base.parameters
+class Sphere(base.Distribution[Vec3], key="sphere", kinds=("direction",), bare=True):
     """Every direction is equally likely.
 
     By Archimedes' hat-box theorem the height on the unit sphere is uniform.
@@ -139,8 +132,8 @@ class Sphere(Distribution[Vec3], key="sphere", kinds=("direction",), bare=True):
         return _on_sphere(-1.0, 1.0, rng)
 
 
-@parameters
-class Cap(Distribution[Vec3], key="cap", kinds=("direction",)):
+@base.parameters
+class Cap(base.Distribution[Vec3], key="cap", kinds=("direction",)):
     """Directions within a cone about an axis, uniform by area on the unit sphere.
 
     Attributes:
@@ -154,32 +147,32 @@ class Cap(Distribution[Vec3], key="cap", kinds=("direction",)):
     def __post_init__(self) -> None:
         """Refuse an impossible angle."""
         if not 0 <= self.half_angle_deg <= 180:
-            raise Malformed(
+            raise base.Malformed(
                 f"cap needs half_angle_deg in [0, 180], got {format_number(self.half_angle_deg)}",
                 ("half_angle_deg",),
             )
 
     def draw(self, rng: Rng) -> Vec3:
         """One unit vector."""
-        rim = round_significant(math.cos(math.radians(self.half_angle_deg)))
+        rim = base.round_significant(math.cos(math.radians(self.half_angle_deg)))
         return rotate_by_quaternion(_from_z(self.axis), _on_sphere(rim, 1.0, rng))
 
 
-@parameters
-class Box(Distribution[Vec3], key="box", kinds=("position",), needs="two corners [low, high]"):
+@base.parameters
+class Box(base.Distribution[Vec3], key="box", kinds=("position",), needs="two corners [low, high]"):
     """Positions in an axis-aligned box, uniform by volume.
 
     Attributes:
         low_m, high_m: Opposite corners [m].
     """
 
-    low_m: Vector
-    high_m: Vector
+    low_m: base.Vector
+    high_m: base.Vector
 
     def __post_init__(self) -> None:
         """Refuse reversed corners."""
         for axis, low, high in zip("xyz", self.low_m, self.high_m, strict=True):
-            require_order(f"box along {axis}", low, high)
+            base.require_order(f"box along {axis}", low, high)
 
     def draw(self, rng: Rng) -> Vec3:
         """One position [m]."""
@@ -191,8 +184,8 @@ class Box(Distribution[Vec3], key="box", kinds=("position",), needs="two corners
         )
 
 
-@parameters
-class Shell(Distribution[Vec3], key="shell", kinds=("position",)):
+@base.parameters
+class Shell(base.Distribution[Vec3], key="shell", kinds=("position",)):
     """Positions between two spheres, uniform by volume.
 
     The cube of the radius and the sine of the elevation are uniform.
@@ -203,33 +196,33 @@ class Shell(Distribution[Vec3], key="shell", kinds=("position",)):
         elevation_deg: Range of the angle above the horizontal [deg], -90 to 90.
     """
 
-    center_m: Vector
-    radius_m: Annotated[tuple[float, float], sized(2, "radius_m needs two numbers [low, high]")] = (
-        Field(description="[inner, outer]")
-    )
+    center_m: base.Vector
+    radius_m: Annotated[
+        tuple[float, float], base.sized(2, "radius_m needs two numbers [low, high]")
+    ] = Field(description="[inner, outer]")
     elevation_deg: Annotated[
-        tuple[float, float], sized(2, "elevation_deg needs two numbers [low, high]")
+        tuple[float, float], base.sized(2, "elevation_deg needs two numbers [low, high]")
     ] = Field((-90.0, 90.0), description="[low, high], -90 to 90")
 
     def __post_init__(self) -> None:
         """Refuse reversed or impossible ranges."""
-        require_order("shell radius_m", *self.radius_m, "radius_m")
+        base.require_order("shell radius_m", *self.radius_m, "radius_m")
         if self.radius_m[0] < 0:
             fact = f"shell needs radius_m >= 0, got {format_number(self.radius_m[0])}"
-            raise Malformed(fact, ("radius_m",))
+            raise base.Malformed(fact, ("radius_m",))
         low, high = self.elevation_deg
-        require_order("shell elevation_deg", low, high, "elevation_deg")
+        base.require_order("shell elevation_deg", low, high, "elevation_deg")
         if low < -90 or high > 90:
             given = f"[{format_number(low)}, {format_number(high)}]"
             fact = f"shell needs elevation_deg within [-90, 90], got {given}"
-            raise Malformed(fact, ("elevation_deg",))
+            raise base.Malformed(fact, ("elevation_deg",))
 
     def draw(self, rng: Rng) -> Vec3:
         """One position [m]."""
         inner, outer = self.radius_m
         cubed = inner**3 + (outer**3 - inner**3) * rng.random()
-        radius_m = min(max(round_significant(cubed ** (1 / 3)), inner), outer)
-        low, high = (round_significant(math.sin(math.radians(v))) for v in self.elevation_deg)
+        radius_m = min(max(base.round_significant(cubed ** (1 / 3)), inner), outer)
+        low, high = (base.round_significant(math.sin(math.radians(v))) for v in self.elevation_deg)
         x, y, z = _on_sphere(low, high, rng)
         cx, cy, cz = self.center_m
         return cx + radius_m * x, cy + radius_m * y, cz + radius_m * z
@@ -241,8 +234,8 @@ def _on_sphere(sine_low: float, sine_high: float, rng: Rng) -> Vec3:
     azimuth_rad = 2 * math.pi * rng.random()
     ring = math.sqrt(max(0.0, 1 - z * z))
     return (
-        round_significant(ring * math.cos(azimuth_rad)),
-        round_significant(ring * math.sin(azimuth_rad)),
+        base.round_significant(ring * math.cos(azimuth_rad)),
+        base.round_significant(ring * math.sin(azimuth_rad)),
         z,
     )
 
@@ -258,4 +251,4 @@ def _from_z(axis: Vec3) -> Quaternion:
 
 def _half_turn_deg(angle_deg: float) -> tuple[float, float]:
     half_rad = math.radians(0.5 * angle_deg)
-    return round_significant(math.cos(half_rad)), round_significant(math.sin(half_rad))
+    return base.round_significant(math.cos(half_rad)), base.round_significant(math.sin(half_rad))

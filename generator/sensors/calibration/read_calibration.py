@@ -7,8 +7,7 @@ from xml.etree.ElementTree import Element
 
 from gen_data.config import problems, yaml_scalars
 from gen_data.config.yaml_tree import Node, parse_yaml
-from gen_data.core.errors import AssetError, ConfigError
-from gen_data.core.safe_xml import PlacedElement, parse_xml
+from gen_data.core import errors, safe_xml
 from gen_data.sensors.calibration import frame_formats
 from gen_data.sensors.calibration.calibration import Calibration
 from gen_data.sensors.calibration.camera_formats import camera_file, colmap_cameras, kalibr_chain
@@ -38,7 +37,7 @@ def read_calibration(path: Path, *, fisheye: bool = False, rectified: bool = Fal
         try:
             return frame_formats.nuscenes_frames(json.loads(text), path)
         except ValueError as error:
-            raise ConfigError(f"{path}: is no valid JSON ({error})") from None
+            raise errors.ConfigError(f"{path}: is no valid JSON ({error})") from None
     if path.suffix.lower() == ".txt":
         if _KITTI.search(text):
             return frame_formats.kitti_calibration(text, file, rectified=rectified)
@@ -56,13 +55,13 @@ def _text(path: Path) -> str:
         with path.open("rb") as file:
             data = file.read(MAX_BYTES + 1)
     except OSError as error:
-        raise ConfigError(f"{path}: cannot be read: {error.strerror or error}") from None
+        raise errors.ConfigError(f"{path}: cannot be read: {error.strerror or error}") from None
     if len(data) > MAX_BYTES:
-        raise ConfigError(f"{path}: is larger than {MAX_BYTES >> 20} MiB")
+        raise errors.ConfigError(f"{path}: is larger than {MAX_BYTES >> 20} MiB")
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError:
-        raise ConfigError(f"{path}: is not UTF-8 text") from None
+        raise errors.ConfigError(f"{path}: is not UTF-8 text") from None
 
 
 def _plain_yaml(text: str) -> str:
@@ -79,9 +78,9 @@ def _read_xml(text: str, path: Path, *, fisheye: bool, rectified: bool) -> Calib
     is_urdf = re.search(r"<robot[\s>]", text) is not None
     tag, kind = ("robot", "a URDF") if is_urdf else ("opencv_storage", "a file of OpenCV")
     try:
-        root = parse_xml(text.encode(), str(path), tag, kind, _MAX_ELEMENTS)
-    except AssetError as error:
-        raise ConfigError(str(error)) from None
+        root = safe_xml.parse_xml(text.encode(), str(path), tag, kind, _MAX_ELEMENTS)
+    except errors.AssetError as error:
+        raise errors.ConfigError(str(error)) from None
     if is_urdf:
         return frame_formats.urdf_frames(root, str(path))
     return camera_file(_storage(root, str(path)), fisheye=fisheye, rectified=rectified)
@@ -89,7 +88,7 @@ def _read_xml(text: str, path: Path, *, fisheye: bool, rectified: bool) -> Calib
 
 def _storage(element: Element, file: str) -> Node:
     """The tree of an element of OpenCV's XML: its children by name, or its numbers."""
-    assert isinstance(element, PlacedElement)
+    assert isinstance(element, safe_xml.PlacedElement)
     place = problems.Position(file, element.line, element.column)
     if len(element):
         return Node(place, {child.tag: _storage(child, file) for child in element})

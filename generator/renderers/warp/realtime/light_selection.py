@@ -14,9 +14,8 @@ from gen_data.core.colorimetry import luminance
 from gen_data.core.scene import LIGHT_KINDS, PANEL_KINDS, Environment, Light, Scene
 from gen_data.core.se3 import Array
 from gen_data.renderers.warp.realtime.kernels.soft_shadows import count_free_paths
-from gen_data.renderers.warp.scene import environment_maps, scene_packing
+from gen_data.renderers.warp.scene import environment_maps, scene_packing, struct_dtypes
 from gen_data.renderers.warp.scene.kernels import analytic_lights, records
-from gen_data.renderers.warp.scene.struct_dtypes import take_rows, to_device
 from gen_data.renderers.warp.visibility.frame_context import CameraView
 from gen_data.renderers.warp.visibility.gbuffer import GBuffer
 
@@ -31,7 +30,7 @@ def keep_main_lamps(frame: CameraView) -> None:
     """Restrict the world to the lamps that contribute most to the visible surfaces, in place."""
     chosen = main_lamp_numbers(frame)
     if chosen is not None:
-        frame.world.record.lamps = take_rows(frame.world.record.lamps, chosen)
+        frame.world.record.lamps = struct_dtypes.take_rows(frame.world.record.lamps, chosen)
 
 
 def main_lamp_numbers(frame: CameraView) -> NDArray[np.int64] | None:
@@ -160,7 +159,7 @@ def extract_sky_lights(frame: CameraView) -> scene_packing.PackedWorld:
     # Reflected rays hit them in the panorama itself.
     added["shown"] = 1
     lamps = np.concatenate([scene_packing.lamp_records(scene.lights), added])
-    lit.record.lamps = to_device(lamps, records.LightRecord, cache.device)
+    lit.record.lamps = struct_dtypes.to_device(lamps, records.LightRecord, cache.device)
     return lit
 
 
