@@ -3,8 +3,7 @@
 import warp as wp
 
 from gen_data.renderers.warp.atmosphere.kernels.fog import phase_function
-from gen_data.renderers.warp.scene.kernels.analytic_lights import beam_from
-from gen_data.renderers.warp.scene.kernels.environment_lighting import sky_irradiance
+from gen_data.renderers.warp.scene.kernels import analytic_lights, environment_lighting
 from gen_data.renderers.warp.scene.kernels.records import View, World, fast_normalize, floor_int
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
@@ -41,9 +40,9 @@ def light_streaks(view: View, world: World, streaks: wp.array[Streak]):
     # The mean of the sphere and of the upper hemisphere: drops refract light from all around, most
     # of it from above.
     mean = world.sky.irradiance[0] * world.sky.luminance
-    c = (mean + sky_irradiance(world.sky, wp.vec3(0.0, 0.0, 1.0))) * 0.5
+    c = (mean + environment_lighting.sky_irradiance(world.sky, wp.vec3(0.0, 0.0, 1.0))) * 0.5
     for j in range(world.lamps.shape[0]):
-        beam = beam_from(world.lamps[j], p)
+        beam = analytic_lights.beam_from(world.lamps[j], p)
         c += beam.normal_lux * phase_function(wp.dot(d, beam.direction))
     streaks[k].radiance = c
 

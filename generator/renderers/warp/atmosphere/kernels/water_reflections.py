@@ -6,16 +6,8 @@ around each. Puddles are traced pixel by pixel.
 
 import warp as wp
 
-from gen_data.renderers.warp.atmosphere.kernels.ground_weathering import (
-    estimate_porosity,
-    footprint,
-    fractal_noise,
-    puddle_at,
-    snow_at,
-)
-from gen_data.renderers.warp.scene.kernels.analytic_lights import SUN, beam_from
-from gen_data.renderers.warp.scene.kernels.brdf import WATER_F0, fresnel_schlick
-from gen_data.renderers.warp.scene.kernels.distortion import project_to_pixel
+from gen_data.renderers.warp.atmosphere.kernels import ground_weathering
+from gen_data.renderers.warp.scene.kernels import analytic_lights, brdf, distortion
 from gen_data.renderers.warp.scene.kernels.environment_lighting import sky_irradiance, sky_rest
 from gen_data.renderers.warp.scene.kernels.lattice import (
     Lattice,
@@ -90,11 +82,13 @@ def water_at(
     # Water runs off slopes above 60 degrees.
     if n[2] < 0.5:
         return wp.vec2(0.0)
-    porous = estimate_porosity(world, surface)
-    puddle = puddle_at(world, surface, p, n, exposed, footprint_m) * porous
+    porous = ground_weathering.estimate_porosity(world, surface)
+    puddle = ground_weathering.puddle_at(world, surface, p, n, exposed, footprint_m) * porous
     film = world.ground.wetness * wp.clamp(n[2], 0.0, 1.0) * exposed * porous
     # A film follows the grain of the ground: half of it reflects, and not sharply.
-    share = wp.max(puddle, 0.5 * film) * (1.0 - snow_at(world, p, n, exposed, footprint_m))
+    share = wp.max(puddle, 0.5 * film) * (
+        1.0 - ground_weathering.snow_at(world, p, n, exposed, footprint_m)
+    )
     return wp.vec2(share, FILM_SLOPE * (1.0 - puddle) * (1.0 - puddle))
 
 
@@ -115,7 +109,7 @@ def reflected_sky(world: World, d: wp.vec3, width: float):
     """Radiance of the sky in one direction, with suns blurred by an angle."""
     c = sky_rest(world.sky, d)
     for j in range(world.lamps.shape[0]):
-        if world.lamps[j].kind == SUN:
+        if world.lamps[j].kind == analytic_lights.SUN:
             # Gaussian in the angle: 1 - cos is half its square; blur and sun add in quadrature.
             away = wp.max(1.0 - wp.dot(d, -world.lamps[j].direction), 0.0)
             spread = 0.5 * (width * width + world.lamps[j].radius * world.lamps[j].radius)
@@ -139,7 +133,7 @@ def reflected_surface(
     p = origin + d * t
     q = wp.transpose(view.R_world_camera) @ (p - view.eye_m)
     c = wp.vec3(-1.0)
-    j, depth_m = project_to_pixel(view, q)
+    j, depth_m = distortion.project_to_pixel(view, q)
     if j >= 0:
         # The image shows that very point: same body, same depth.
         if images.hits[j][0] == hit[0] and wp.abs(images.z_m[j] - depth_m) < 0.05 + 0.02 * depth_m:
@@ -152,7 +146,7 @@ def reflected_surface(
         # Outside the image or hidden in it: 0.7 stands for average ambient occlusion.
         light = sky_irradiance(world.sky, n) * 0.7
         for j in range(world.lamps.shape[0]):
-            beam = beam_from(world.lamps[j], p)
+            beam = analytic_lights.beam_from(world.lamps[j], p)
             light += beam.normal_lux * (wp.max(wp.dot(n, beam.direction), 0.0) / wp.pi)
         c = wp.cw_mul(light, mean_color(world, surface)) + world.surfaces[surface].emission_cd_m2
     return c
@@ -194,7 +188,7 @@ def facet_reflection(
     r = d + m * (2.0 * c)
     # A tilted facet would reflect the ground on which it lies.
     r = fast_normalize(wp.vec3(r[0], r[1], wp.max(r[2], 0.02)))
-    fresnel = fresnel_schlick(WATER_F0, c)
+    fresnel = brdf.fresnel_schlick(brdf.WATER_F0, c)
     seen = reflected_radiance(view, world, images, radiance, origin, r, 0.02 + width) * fresnel
     return wp.vec4(seen[0], seen[1], seen[2], fresnel)
 
@@ -221,7 +215,7 @@ def mirror_in_films(
         return
     p = lattice.p_m[k]
     n = lattice.normal[k]
-    size_m = footprint(view, p, n, float(lattice.stride))
+    size_m = ground_weathering.footprint(view, p, n, float(lattice.stride))
     wet = water_at(world, lattice.surface[k], p, n, world.ground.exposed[k], size_m)
     # Less than one percent of water is not worth a ray.
     if wet[0] < 0.01:
@@ -360,7 +354,7 @@ def mirror_in_puddles(
     if around.found > 0.0:
         wet = wet * (1.0 / around.found)
     elif around.films > 0.0:
-        size_m = footprint(view, p, n, 1.0)
+        size_m = ground_weathering.footprint(view, p, n, 1.0)
         wet = water_at(world, surface_index(world, hit), p, n, wp.min(around.exposed, 1.0), size_m)
     if wet[0] < 0.01:
         return
@@ -370,8 +364,8 @@ def mirror_in_puddles(
     origin = ray_origin(world, hit, images.weights[i], p, way)
     # Waves smaller than a pixel would flicker between pixels.
     slope = ripples * wp.min(5.0 / images.z_m[i], 1.0)
-    tilt_x = fractal_noise(p[0], p[1], 0.09, world.ground.seed + 48) * slope
-    tilt_y = fractal_noise(p[0], p[1], 0.09, world.ground.seed + 52) * slope
+    tilt_x = ground_weathering.fractal_noise(p[0], p[1], 0.09, world.ground.seed + 48) * slope
+    tilt_y = ground_weathering.fractal_noise(p[0], p[1], 0.09, world.ground.seed + 52) * slope
     m = fast_normalize(n + wp.vec3(tilt_x, tilt_y, 0.0))
     laid[i] = facet_reflection(view, world, images, radiance, p, origin, m, wet[1]) * wet[0]
 

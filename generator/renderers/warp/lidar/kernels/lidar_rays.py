@@ -7,32 +7,9 @@ from gen_data.renderers.warp.atmosphere.kernels.ground_weathering import (
     coat_at,
     estimate_porosity,
 )
-from gen_data.renderers.warp.lidar.kernels.ray_packets import (
-    FAR_M,
-    Boxes,
-    Bundle,
-    ListedBodies,
-    empty_bundle,
-    extend_bundle,
-    is_box_entered,
-    list_bodies,
-)
-from gen_data.renderers.warp.scene.kernels.alpha_test import closest_solid_hit
+from gen_data.renderers.warp.lidar.kernels import ray_packets
+from gen_data.renderers.warp.scene.kernels import alpha_test, ray_queries, records
 from gen_data.renderers.warp.scene.kernels.brdf import WATER_F0, fresnel_schlick
-from gen_data.renderers.warp.scene.kernels.ray_queries import (
-    LASER_OFFSET_M,
-    SHELTER_OFFSET_M,
-    precipitation_exposure,
-)
-from gen_data.renderers.warp.scene.kernels.records import (
-    HOLES,
-    World,
-    face_vertices,
-    fast_normalize,
-    normal_at,
-    reciprocals,
-    surface_index,
-)
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 
@@ -148,11 +125,11 @@ def beam_direction(axis: wp.vec3, k: int, spread: float):
         return axis
     # Any axis far from parallel keeps the digits of the cross product.
     helper = wp.where(wp.abs(axis[2]) < 0.9, wp.vec3(0.0, 0.0, 1.0), wp.vec3(1.0, 0.0, 0.0))
-    across = fast_normalize(wp.cross(helper, axis))
+    across = records.fast_normalize(wp.cross(helper, axis))
     up = wp.cross(axis, across)
     # Six around one: the densest regular pattern in a round beam.
     turn = float(k - 1) * (PI / 3.0)
-    return fast_normalize(axis + (across * wp.cos(turn) + up * wp.sin(turn)) * spread)
+    return records.fast_normalize(axis + (across * wp.cos(turn) + up * wp.sin(turn)) * spread)
 
 
 @wp.func
@@ -218,7 +195,9 @@ def mover_frame(motion: BodyMotion, m: int, ray: Ray):
 
 
 @wp.func
-def intersect_body(world: World, motion: BodyMotion, b: int, ray: Ray, hit: Nearest, offset: bool):
+def intersect_body(
+    world: records.World, motion: BodyMotion, b: int, ray: Ray, hit: Nearest, offset: bool
+):
     """The nearer of a hit and the first point of a body.
 
     Computed in the scanner's own frame: positions far from the world's origin lose no precision.
@@ -236,7 +215,7 @@ def intersect_body(world: World, motion: BodyMotion, b: int, ray: Ray, hit: Near
         d = B @ ray.direction
     elif offset:
         o += world.bodies[b].B_mesh_camera @ ray.origin_m
-    answer = closest_solid_hit(world, b, o, d, hit.range_m, HOLES)
+    answer = alpha_test.closest_solid_hit(world, b, o, d, hit.range_m, records.HOLES)
     if answer.face >= 0:
         hit.range_m = answer.t
         hit.body = b
@@ -247,20 +226,20 @@ def intersect_body(world: World, motion: BodyMotion, b: int, ray: Ray, hit: Near
 
 
 @wp.func
-def hit_normal(scan: Scan, world: World, motion: BodyMotion, ray: Ray, hit: Nearest):
+def hit_normal(scan: Scan, world: records.World, motion: BodyMotion, ray: Ray, hit: Nearest):
     """Interpolated unit normal of a hit, lidar frame."""
     g = world.bodies[hit.body].geometry
-    corner = face_vertices(world, g, hit.face)
-    n = normal_at(world, g, corner[0]) * hit.u
-    n += normal_at(world, g, corner[1]) * hit.v
-    n += normal_at(world, g, corner[2]) * (1.0 - hit.u - hit.v)
+    corner = records.face_vertices(world, g, hit.face)
+    n = records.normal_at(world, g, corner[0]) * hit.u
+    n += records.normal_at(world, g, corner[1]) * hit.v
+    n += records.normal_at(world, g, corner[2]) * (1.0 - hit.u - hit.v)
     if motion.keys > 0:
         m = motion.rows[hit.body]
         if m >= 0:
             # The transpose of mesh-from-lidar; its scale cancels in the normalisation.
-            return fast_normalize(wp.transpose(mover_frame(motion, m, ray)) @ n)
+            return records.fast_normalize(wp.transpose(mover_frame(motion, m, ray)) @ n)
     return wp.transpose(scan.R_world_lidar) @ (
-        world.bodies[hit.body].R_world_mesh @ fast_normalize(n)
+        world.bodies[hit.body].R_world_mesh @ records.fast_normalize(n)
     )
 
 
@@ -295,10 +274,10 @@ def world_origin(scan: Scan, ray: Ray, offset: bool):
 @wp.func
 def first_hit(
     scan: Scan,
-    world: World,
+    world: records.World,
     motion: BodyMotion,
-    boxes: Boxes,
-    listed: ListedBodies,
+    boxes: ray_packets.Boxes,
+    listed: ray_packets.ListedBodies,
     ray: Ray,
     likely: int,
     gone_m: float,
@@ -318,7 +297,7 @@ def first_hit(
         # Neighbouring rays mostly hit the same body: its range rejects most other boxes.
         hit = intersect_body(world, motion, likely, ray, hit, offset)
     eye_m = world_origin(scan, ray, offset)
-    inverse = reciprocals(scan.R_world_lidar @ ray.direction)
+    inverse = records.reciprocals(scan.R_world_lidar @ ray.direction)
     # An overflowing list: test every body's box.
     count = wp.where(listed.count < 0, boxes.lows_m.shape[0], listed.count)
     for k in range(count):
@@ -329,14 +308,14 @@ def first_hit(
                 break
             b = boxes.listed[listed.row, k]
         if b != likely:
-            if is_box_entered(boxes, b, eye_m, inverse, hit.range_m):
+            if ray_packets.is_box_entered(boxes, b, eye_m, inverse, hit.range_m):
                 hit = intersect_body(world, motion, b, ray, hit, offset)
     return hit
 
 
 @wp.func
 def coat_at_hit(
-    scan: Scan, world: World, ray: Ray, range_m: float, hit: wp.vec2i, n_lidar: wp.vec3
+    scan: Scan, world: records.World, ray: Ray, range_m: float, hit: wp.vec2i, n_lidar: wp.vec3
 ):
     """Water and snow at the end of a ray, at a (body, material)."""
     n = scan.R_world_lidar @ n_lidar
@@ -345,14 +324,16 @@ def coat_at_hit(
     p = scan.eye_m + scan.R_world_lidar @ (ray.origin_m + ray.direction * range_m)
     exposed = float(1.0)
     if n[2] > 0.1:
-        exposed = precipitation_exposure(world, hit[0], p + n * SHELTER_OFFSET_M)
+        exposed = ray_queries.precipitation_exposure(
+            world, hit[0], p + n * ray_queries.SHELTER_OFFSET_M
+        )
     # A footprint grows by 1 / cosine; beyond fifty beam widths its length no longer matters.
     slant = wp.max(wp.abs(wp.dot(n_lidar, ray.direction)), 0.02)
     return coat_at(world, hit[1], p, n, exposed, scan.divergence_rad * range_m / slant)
 
 
 @wp.func
-def apply_weather(world: World, light: Infrared, coat: Coat, surface: int, cosine: float):
+def apply_weather(world: records.World, light: Infrared, coat: Coat, surface: int, cosine: float):
     """A surface under water and snow.
 
     Water darkens rough ground also at wavelengths that it does not absorb (Lekner and Dorf, "Why
@@ -389,18 +370,22 @@ def ray_index(scan: Scan, order: wp.array[int], j: int):
 
 
 @wp.func
-def add_ray(bundle: Bundle, scan: Scan, motion: BodyMotion, axes: wp.array[wp.vec3], i: int):
+def add_ray(
+    bundle: ray_packets.Bundle, scan: Scan, motion: BodyMotion, axes: wp.array[wp.vec3], i: int
+):
     """The bundle extended by ray i of all."""
     ray = make_ray(scan, motion, axes, i)
-    return extend_bundle(bundle, world_origin(scan, ray, True), scan.R_world_lidar @ ray.direction)
+    return ray_packets.extend_bundle(
+        bundle, world_origin(scan, ray, True), scan.R_world_lidar @ ray.direction
+    )
 
 
 @wp.kernel
 def scan_beams(
     scan: Scan,
-    world: World,
+    world: records.World,
     motion: BodyMotion,
-    boxes: Boxes,
+    boxes: ray_packets.Boxes,
     lights: wp.array[Infrared],
     axes: wp.array[wp.vec3],
     order: wp.array[int],
@@ -424,10 +409,10 @@ def scan_beams(
     t = wp.tid()
     for begin in range(t * scan.run, ranges_m.shape[0], scan.threads * scan.run):
         end = wp.min(begin + scan.run, ranges_m.shape[0])
-        bundle = empty_bundle()
+        bundle = ray_packets.empty_bundle()
         for j in range(begin, end):
             bundle = add_ray(bundle, scan, motion, axes, ray_index(scan, order, j))
-        listed = list_bodies(boxes, t, bundle, scan.reach_m)
+        listed = ray_packets.list_bodies(boxes, t, bundle, scan.reach_m)
         last = int(-1)
         for j in range(begin, end):
             i = ray_index(scan, order, j)
@@ -444,7 +429,7 @@ def scan_beams(
             else:
                 n_lidar = hit_normal(scan, world, motion, ray, hit)
                 cosine = wp.min(wp.abs(wp.dot(n_lidar, ray.direction)), 1.0)
-                material = surface_index(world, wp.vec2i(hit.body, hit.face))
+                material = records.surface_index(world, wp.vec2i(hit.body, hit.face))
                 hits[i] = wp.vec2i(hit.body, material)
                 ranges_m[i] = hit.range_m
                 cosines[i] = cosine
@@ -463,9 +448,9 @@ def scan_beams(
 @wp.kernel
 def trace_behind_panes(
     scan: Scan,
-    world: World,
+    world: records.World,
     motion: BodyMotion,
-    boxes: Boxes,
+    boxes: ray_packets.Boxes,
     lights: wp.array[Infrared],
     axes: wp.array[wp.vec3],
     selected: wp.array[int],
@@ -478,16 +463,16 @@ def trace_behind_panes(
     t = wp.tid()
     for begin in range(t * scan.run, selected.shape[0], scan.threads * scan.run):
         end = wp.min(begin + scan.run, selected.shape[0])
-        bundle = empty_bundle()
+        bundle = ray_packets.empty_bundle()
         for j in range(begin, end):
             bundle = add_ray(bundle, scan, motion, axes, selected[j])
-        listed = list_bodies(boxes, t, bundle, FAR_M)
+        listed = ray_packets.list_bodies(boxes, t, bundle, ray_packets.FAR_M)
         for j in range(begin, end):
             hits[j] = wp.vec2i(-1, -1)
             ray = make_ray(scan, motion, axes, selected[j])
             begin_m = ray.origin_m
             # Start just before the pane, so that its own face is found first.
-            way_m = wp.max(first_m[selected[j]] - LASER_OFFSET_M, 0.0)
+            way_m = wp.max(first_m[selected[j]] - ray_queries.LASER_OFFSET_M, 0.0)
             passed = float(1.0)
             for face in range(FACES_MAX):
                 if passed > 0.0:
@@ -496,15 +481,15 @@ def trace_behind_panes(
                     if hit.body < 0:
                         passed = 0.0
                     else:
-                        way_m += hit.range_m + LASER_OFFSET_M
+                        way_m += hit.range_m + ray_queries.LASER_OFFSET_M
                         n = hit_normal(scan, world, motion, ray, hit)
                         cosine = wp.min(wp.abs(wp.dot(n, ray.direction)), 1.0)
-                        material = surface_index(world, wp.vec2i(hit.body, hit.face))
+                        material = records.surface_index(world, wp.vec2i(hit.body, hit.face))
                         clear = lights[material].clear
                         if face > 0:
                             # A pane's echo is overwritten by that of the surface behind it, if any.
                             hits[j] = wp.vec2i(hit.body, material)
-                            ranges_m[j] = way_m - LASER_OFFSET_M
+                            ranges_m[j] = way_m - ray_queries.LASER_OFFSET_M
                             reflected = backscatter(lights[material], cosine)
                             share = echo_share(scan, lights[material], way_m)
                             reflectances[j] = passed * share * reflected
@@ -521,18 +506,20 @@ def reflect_ray(ray: Ray, n: wp.vec3, range_m: float):
     """A ray after reflection at the given range, at a surface with normal n."""
     facing = wp.dot(n, ray.direction)
     ray.origin_m = ray.origin_m + ray.direction * range_m
-    ray.direction = fast_normalize(ray.direction - n * (2.0 * facing))
+    ray.direction = records.fast_normalize(ray.direction - n * (2.0 * facing))
     # Off the mirror along both directions: it must not be hit again.
-    ray.origin_m += ray.direction * LASER_OFFSET_M - n * (wp.sign(facing) * LASER_OFFSET_M)
+    ray.origin_m += ray.direction * ray_queries.LASER_OFFSET_M - n * (
+        wp.sign(facing) * ray_queries.LASER_OFFSET_M
+    )
     return ray
 
 
 @wp.kernel
 def trace_mirrors(
     scan: Scan,
-    world: World,
+    world: records.World,
     motion: BodyMotion,
-    boxes: Boxes,
+    boxes: ray_packets.Boxes,
     lights: wp.array[Infrared],
     axes: wp.array[wp.vec3],
     selected: wp.array[int],
@@ -555,14 +542,14 @@ def trace_mirrors(
     t = wp.tid()
     for begin in range(t * scan.run, selected.shape[0], scan.threads * scan.run):
         end = wp.min(begin + scan.run, selected.shape[0])
-        bundle = empty_bundle()
+        bundle = ray_packets.empty_bundle()
         for j in range(begin, end):
             i = selected[j]
             ray = reflect_ray(make_ray(scan, motion, axes, i), normals[i], first_m[i])
-            bundle = extend_bundle(
+            bundle = ray_packets.extend_bundle(
                 bundle, world_origin(scan, ray, True), scan.R_world_lidar @ ray.direction
             )
-        listed = list_bodies(boxes, t, bundle, scan.reach_m)
+        listed = ray_packets.list_bodies(boxes, t, bundle, scan.reach_m)
         last = int(-1)
         for j in range(begin, end):
             i = selected[j]
@@ -577,9 +564,9 @@ def trace_mirrors(
             hits[j] = wp.vec2i(-1, -1)
             if hit.body >= 0:
                 n = hit_normal(scan, world, motion, ray, hit)
-                material = surface_index(world, wp.vec2i(hit.body, hit.face))
+                material = records.surface_index(world, wp.vec2i(hit.body, hit.face))
                 hits[j] = wp.vec2i(hit.body, material)
-                ranges_m[j] = first_m[i] + LASER_OFFSET_M + hit.range_m
+                ranges_m[j] = first_m[i] + ray_queries.LASER_OFFSET_M + hit.range_m
                 cosine = wp.min(wp.abs(wp.dot(n, ray.direction)), 1.0)
                 kept *= kept * echo_share(scan, lights[material], ranges_m[j])
                 reflectances[j] = kept * backscatter(lights[material], cosine)

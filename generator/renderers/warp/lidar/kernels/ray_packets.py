@@ -8,13 +8,7 @@ arithmetic culling methods for entire ray packets", 2006).
 import warp as wp
 
 from gen_data.renderers.warp.native_code import native
-from gen_data.renderers.warp.scene.kernels.records import (
-    componentwise_max,
-    componentwise_min,
-    max_of_two,
-    min_of_two,
-    slab_interval,
-)
+from gen_data.renderers.warp.scene.kernels import records
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 
@@ -76,10 +70,10 @@ def empty_bundle():
 @wp.func
 def extend_bundle(bundle: Bundle, origin_m: wp.vec3, way: wp.vec3):
     """The bundle extended by a ray."""
-    bundle.origin_low_m = componentwise_min(bundle.origin_low_m, origin_m)
-    bundle.origin_high_m = componentwise_max(bundle.origin_high_m, origin_m)
-    bundle.way_low = componentwise_min(bundle.way_low, way)
-    bundle.way_high = componentwise_max(bundle.way_high, way)
+    bundle.origin_low_m = records.componentwise_min(bundle.origin_low_m, origin_m)
+    bundle.origin_high_m = records.componentwise_max(bundle.origin_high_m, origin_m)
+    bundle.way_low = records.componentwise_min(bundle.way_low, way)
+    bundle.way_high = records.componentwise_max(bundle.way_high, way)
     return bundle
 
 
@@ -119,11 +113,11 @@ def entry_distance(bundle: Bundle, low_m: wp.vec3, high_m: wp.vec3):
     c = high_m + slack - bundle.origin_low_m
     low, high = bundle.way_low, bundle.way_high
     enter = slab_entry(a[0], c[0], low[0], high[0])
-    enter = max_of_two(enter, slab_entry(a[1], c[1], low[1], high[1]))
-    enter = max_of_two(enter, slab_entry(a[2], c[2], low[2], high[2]))
+    enter = records.max_of_two(enter, slab_entry(a[1], c[1], low[1], high[1]))
+    enter = records.max_of_two(enter, slab_entry(a[2], c[2], low[2], high[2]))
     leave = slab_exit(a[0], c[0], low[0], high[0])
-    leave = min_of_two(leave, slab_exit(a[1], c[1], low[1], high[1]))
-    leave = min_of_two(leave, slab_exit(a[2], c[2], low[2], high[2]))
+    leave = records.min_of_two(leave, slab_exit(a[1], c[1], low[1], high[1]))
+    leave = records.min_of_two(leave, slab_exit(a[2], c[2], low[2], high[2]))
     enter = enter * (1.0 - SLACK)
     return wp.where(enter > leave * (1.0 + SLACK), FAR_M, enter)
 
@@ -182,5 +176,5 @@ def list_bodies(boxes: Boxes, row: int, bundle: Bundle, reach_m: float):
 def is_box_entered(boxes: Boxes, b: int, origin_m: wp.vec3, inverse: wp.vec3, reach_m: float):
     """Whether a ray may enter a body's box within its reach."""
     low_m = boxes.lows_m[b] - origin_m
-    enter, leave = slab_interval(low_m, boxes.highs_m[b] - origin_m, inverse)
+    enter, leave = records.slab_interval(low_m, boxes.highs_m[b] - origin_m, inverse)
     return leave >= 0.0 and leave >= enter and enter < reach_m

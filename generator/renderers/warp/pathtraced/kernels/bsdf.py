@@ -15,13 +15,7 @@ microfacet-based BRDFs", JCGT 3(2), 2014; Walter et al. 2007 (refraction).
 
 import warp as wp
 
-from gen_data.renderers.warp.scene.kernels.brdf import (
-    directional_albedo,
-    fresnel_dielectric,
-    luminance,
-    refract,
-)
-from gen_data.renderers.warp.scene.kernels.records import fast_normalize
+from gen_data.renderers.warp.scene.kernels import brdf, records
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 
@@ -136,17 +130,17 @@ def make_bsdf(
     s.f0 = one * dielectric + albedo * metallic
     # Nothing real reflects less than 2 %: below that even the grazing reflection fades.
     s.f90 = wp.min(50.0 * wp.max(s.f0), 1.0)
-    part = directional_albedo(table, wp.sqrt(s.alpha), n_v)
+    part = brdf.directional_albedo(table, wp.sqrt(s.alpha), n_v)
     # Turquin 2019; the floor guards against entries of the table near 0.
     s.scale = one + s.f0 * (1.0 / wp.max(part[0] + part[1], 0.05) - 1.0)
     gloss = wp.cw_mul(s.f0 * part[0] + one * (s.f90 * part[1]), s.scale)
     s.diffuse = wp.cw_mul(one - gloss, albedo) * (1.0 - metallic)
     # Layers are sampled in proportion to the luminance of their albedo.
-    shine = luminance(gloss)
+    shine = brdf.luminance(gloss)
     if coat > 0.0:
         s.coat_f0 = coat_f0
         s.coat_alpha = roughness_to_alpha(coat_roughness)
-        above = directional_albedo(table, wp.sqrt(s.coat_alpha), n_v)
+        above = brdf.directional_albedo(table, wp.sqrt(s.coat_alpha), n_v)
         s.coat = coat * (1.0 + coat_f0 * (1.0 / (above[0] + above[1]) - 1.0))
         coated = s.coat * (coat_f0 * above[0] + above[1])
         # What the coat reflects is missing below it.
@@ -154,11 +148,11 @@ def make_bsdf(
         s.diffuse = s.diffuse * (1.0 - coated)
         shine = shine * (1.0 - coated)
         s.p_coat = coated
-    total = s.p_coat + shine + luminance(s.diffuse)
+    total = s.p_coat + shine + brdf.luminance(s.diffuse)
     if wp.max(translucency) > 0.0:
         s.passed = wp.cw_mul(s.diffuse, translucency)
         s.flat = flat
-        s.p_passed = luminance(s.passed)
+        s.p_passed = brdf.luminance(s.passed)
         total += s.p_passed
     if total > 0.0:
         s.p_coat = s.p_coat / total
@@ -184,7 +178,7 @@ def reflectance(s: Bsdf, v_h: float):
     """Reflectance of the specular layer's facets at the cosine ``v_h``."""
     f = s.f0
     if s.ior > 0.0:
-        r = fresnel_dielectric(v_h, s.ior)
+        r = brdf.fresnel_dielectric(v_h, s.ior)
         f = wp.vec3(r, r, r)
     else:
         k = schlick_weight(wp.min(v_h, 1.0))
@@ -224,7 +218,7 @@ def evaluate(s: Bsdf, l: wp.vec3):  # noqa: E741
     # Purely diffuse surfaces are the most common: they skip the half vector.
     if s.p_shine == 0.0 and s.coat == 0.0:
         return f, density
-    h = fast_normalize(s.v + l)
+    h = records.fast_normalize(s.v + l)
     v_h = wp.max(wp.dot(s.v, h), 0.0)
     if s.p_shine > 0.0:
         lobe = 0.5 * ggx_density(s.alpha, h)
@@ -253,7 +247,7 @@ def evaluate(s: Bsdf, l: wp.vec3):  # noqa: E741
 def sample_visible_normal(v: wp.vec3, alpha: float, u: wp.vec2):
     """Sample the GGX distribution of normals visible from ``v``."""
     # Heitz 2018: scaled by alpha, a GGX surface becomes a hemisphere.
-    w = fast_normalize(wp.vec3(v[0] * alpha, v[1] * alpha, v[2]))
+    w = records.fast_normalize(wp.vec3(v[0] * alpha, v[1] * alpha, v[2]))
     # Dupuy and Benyoub 2023: a uniform spherical cap of directions gives the visible normals.
     z = (1.0 - u[1]) * (1.0 + w[2]) - w[2]
     r = wp.sqrt(wp.max(1.0 - z * z, 0.0))
@@ -261,7 +255,7 @@ def sample_visible_normal(v: wp.vec3, alpha: float, u: wp.vec2):
     x = r * wp.cos(angle) + w[0]
     y = r * wp.sin(angle) + w[1]
     # Scale back. Rounding may leave Z slightly below 0, where no facet faces outwards.
-    return fast_normalize(wp.vec3(x * alpha, y * alpha, wp.max(z + w[2], 0.0)))
+    return records.fast_normalize(wp.vec3(x * alpha, y * alpha, wp.max(z + w[2], 0.0)))
 
 
 @wp.func
@@ -321,14 +315,14 @@ def scatter_glass(s: Bsdf, xi: float, u: wp.vec2):
     out = Scattering()
     h = sample_visible_normal(s.v, s.alpha, u)
     v_h = wp.min(wp.dot(s.v, h), 1.0)
-    if xi < fresnel_dielectric(v_h, s.ior):
+    if xi < brdf.fresnel_dielectric(v_h, s.ior):
         out.l = h * (2.0 * v_h) - s.v
         if out.l[2] > 0.0:
             f, density = evaluate(s, out.l)
             out.density = density
             out.weight = f * (1.0 / wp.max(density, 1.0e-20))
     else:
-        out.l = refract(-s.v, h, s.ior)
+        out.l = brdf.refract(-s.v, h, s.ior)
         out.density = -1.0
         n_l = -out.l[2]
         if n_l > 0.0:

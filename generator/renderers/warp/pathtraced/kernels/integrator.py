@@ -11,8 +11,8 @@ refract nothing: paths and shadow rays pass straight through them.
 
 import warp as wp
 
-from gen_data.renderers.warp.atmosphere.kernels.ground_weathering import apply_coat, coat_at
-from gen_data.renderers.warp.atmosphere.kernels.water_reflections import water_at
+from gen_data.renderers.warp.atmosphere.kernels import ground_weathering, water_reflections
+from gen_data.renderers.warp.pathtraced.kernels import emitters, sampler
 from gen_data.renderers.warp.pathtraced.kernels.bsdf import (
     COAT_F0,
     Bsdf,
@@ -24,51 +24,10 @@ from gen_data.renderers.warp.pathtraced.kernels.bsdf import (
     scatter,
     scatter_glass,
 )
-from gen_data.renderers.warp.pathtraced.kernels.emitters import (
-    AT_INFINITY,
-    SKY,
-    LightSample,
-    SkyTable,
-    SourceChoice,
-    choose_source,
-    draw_ball,
-    draw_panel,
-    draw_sky,
-    intersect_lamp,
-    lamp_weight_at,
-    power_heuristic,
-    sky_density,
-    sky_light,
-    sky_place,
-    sky_weight_at,
-)
-from gen_data.renderers.warp.pathtraced.kernels.sampler import (
-    hash_bits,
-    morton_index,
-    random_number,
-    random_pair,
-)
-from gen_data.renderers.warp.realtime.kernels.clearcoat_glass import maps_at
-from gen_data.renderers.warp.realtime.kernels.soft_shadows import make_frame
+from gen_data.renderers.warp.realtime.kernels import clearcoat_glass, soft_shadows
+from gen_data.renderers.warp.scene.kernels import analytic_lights, brdf, ray_queries
 from gen_data.renderers.warp.scene.kernels.alpha_test import OUT_OF_LINE
-from gen_data.renderers.warp.scene.kernels.analytic_lights import is_panel
-from gen_data.renderers.warp.scene.kernels.brdf import (
-    WATER_F0,
-    directional_albedo,
-    fresnel_dielectric,
-    luminance,
-    pane_reflectance,
-    pane_transmittance,
-)
 from gen_data.renderers.warp.scene.kernels.material_eval import SurfaceMaterial, evaluate_material
-from gen_data.renderers.warp.scene.kernels.ray_queries import (
-    RayHit,
-    closest_hit,
-    is_intersected,
-    offset_origin,
-    path_along,
-    precipitation_exposure,
-)
 from gen_data.renderers.warp.scene.kernels.records import (
     HOLES,
     View,
@@ -82,8 +41,7 @@ from gen_data.renderers.warp.scene.kernels.records import (
     surface_index,
     vertex_at,
 )
-from gen_data.renderers.warp.visibility.kernels.label_resolve import face_viewer
-from gen_data.renderers.warp.visibility.kernels.rasterizer import Z_NEAR_M
+from gen_data.renderers.warp.visibility.kernels import label_resolve, rasterizer
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 
@@ -179,7 +137,7 @@ class Anchor:
 
 
 @wp.func
-def make_vertex(world: World, hit: RayHit, d: wp.vec3, width_m: float):
+def make_vertex(world: World, hit: ray_queries.RayHit, d: wp.vec3, width_m: float):
     """The vertex at a hit, with its layers and weather."""
     b = hit.at[0]
     g = world.bodies[b].geometry
@@ -200,7 +158,7 @@ def make_vertex(world: World, hit: RayHit, d: wp.vec3, width_m: float):
     n += normal_at(world, g, corner[1]) * hit.weight[0]
     n += normal_at(world, g, corner[2]) * hit.weight[1]
     # Interpolated normals may face away from the ray; the BSDF needs a positive cosine.
-    smooth = face_viewer((R @ n) * side, d)
+    smooth = label_resolve.face_viewer((R @ n) * side, d)
     v.surface = surface_index(world, hit.at)
     weight = wp.vec2(hit.weight[0] + 1.0 - side, hit.weight[1])
     v.material = evaluate_material(world, v.surface, hit.at, weight, smooth, width_m, -d)
@@ -210,14 +168,14 @@ def make_vertex(world: World, hit: RayHit, d: wp.vec3, width_m: float):
         v = add_layers(world, v, hit.at, weight, width_m)
     if world.ground.covered != 0:
         v = add_weather(world, v, b, smooth, width_m)
-    v.material.normal = face_viewer(v.material.normal, d)
+    v.material.normal = label_resolve.face_viewer(v.material.normal, d)
     return v
 
 
 @wp.func(**OUT_OF_LINE)
 def add_layers(world: World, v: Vertex, at: wp.vec2i, weight: wp.vec2, width_m: float):
     """Add further maps, transmission, opacity and coat to a vertex."""
-    maps = maps_at(world, v.surface, at, weight, width_m)
+    maps = clearcoat_glass.maps_at(world, v.surface, at, weight, width_m)
     v.material.metallic *= maps.metallic
     v.glow = wp.cw_mul(v.glow, maps.glow)
     v.clear = world.surfaces[v.surface].transmission * (1.0 - v.material.metallic)
@@ -238,18 +196,20 @@ def add_weather(world: World, v: Vertex, b: int, n: wp.vec3, width_m: float):
     """Add water and snow to a vertex on body b; ``n`` is its normal without bumps."""
     exposed = float(1.0)
     if n[2] > 0.1:
-        exposed = precipitation_exposure(world, b, offset_origin(v.p, v.flat))
-    coat = coat_at(world, v.surface, v.p, n, exposed, width_m)
-    v.material = apply_coat(world, v.surface, v.material, coat, n)
+        exposed = ray_queries.precipitation_exposure(
+            world, b, ray_queries.offset_origin(v.p, v.flat)
+        )
+    coat = ground_weathering.coat_at(world, v.surface, v.p, n, exposed, width_m)
+    v.material = ground_weathering.apply_coat(world, v.surface, v.material, coat, n)
     bare = 1.0 - wp.min(coat.snow, 1.0)
     v.clear *= bare
     v.film *= bare
     v.opacity = 1.0 - (1.0 - v.opacity) * bare
-    wet = water_at(world, v.surface, v.p, n, exposed, width_m)
+    wet = water_reflections.water_at(world, v.surface, v.p, n, exposed, width_m)
     # A vertex has one film: the stronger of coat and water.
     if wet[0] > v.film:
         v.film = wet[0]
-        v.film_f0 = WATER_F0
+        v.film_f0 = brdf.WATER_F0
         v.film_roughness = wp.sqrt(wet[1])
     return v
 
@@ -260,8 +220,8 @@ def straight_transmittance(world: World, v: Vertex, d: wp.vec3):
     through = wp.vec3(1.0, 1.0, 1.0) * (1.0 - v.opacity)
     if v.clear > 0.0 and is_clear_pane(world, v.surface):
         cosine = wp.min(wp.abs(wp.dot(v.material.normal, d)), 1.0)
-        f = fresnel_dielectric(cosine, world.surfaces[v.surface].ior)
-        through += pane_transmittance(f, v.material.albedo) * (v.opacity * v.clear)
+        f = brdf.fresnel_dielectric(cosine, world.surfaces[v.surface].ior)
+        through += brdf.pane_transmittance(f, v.material.albedo) * (v.opacity * v.clear)
     return through
 
 
@@ -285,7 +245,7 @@ def transmittance(world: World, o: wp.vec3, d: wp.vec3, distance_m: float, clear
     through = wp.vec3(1.0, 1.0, 1.0)
     if clear != 0:
         through = pane_chain_transmittance(world, o, d, distance_m)
-    elif is_intersected(world, path_along(o, d * distance_m), HOLES):
+    elif ray_queries.is_intersected(world, ray_queries.path_along(o, d * distance_m), HOLES):
         through = wp.vec3(0.0)
     return through
 
@@ -300,14 +260,14 @@ def pane_chain_transmittance(world: World, o: wp.vec3, d: wp.vec3, distance_m: f
     going = bool(True)
     while going:
         # March from surface to surface until the light or an opaque surface is reached.
-        hit = closest_hit(world, origin, d, rest_m, HOLES)
+        hit = ray_queries.closest_hit(world, origin, d, rest_m, HOLES)
         going = False
         if hit.at[0] >= 0:
             leaves = wp.vec3(0.0)
             if may_pass_straight(world, surface_index(world, hit.at)):
                 v = make_vertex(world, hit, d, 0.0)
                 leaves = straight_transmittance(world, v, d)
-                origin = offset_origin(v.p, -v.flat)
+                origin = ray_queries.offset_origin(v.p, -v.flat)
             through = wp.cw_mul(through, leaves)
             passages += 1
             rest_m -= hit.t
@@ -327,34 +287,36 @@ def hit_lamp_light(world: World, budget: Budget, a: Anchor, d: wp.vec3, end_m: f
     light = wp.vec3(0.0)
     shown = int(0)
     for j in range(world.lamps.shape[0]):
-        g = intersect_lamp(world.lamps[j], a.p, d)
+        g = emitters.intersect_lamp(world.lamps[j], a.p, d)
         # Straight passages split the ray: each lamp counts in one segment only.
         if g.distance_m > a.way_m and g.distance_m < end_m:
             part = float(1.0)
             if a.density >= 0.0 and budget.lights != 2:
                 # Density of the other technique: the source's share of all weights, times its
                 # density.
-                weight = lamp_weight_at(world.lamps[j], a.p, a.n, a.sheet)
+                weight = emitters.lamp_weight_at(world.lamps[j], a.p, a.n, a.sheet)
                 asked = g.density * weight / wp.max(a.total, 1.0e-20)
                 # If only source sampling is under test (1), hits count for nothing.
-                part = power_heuristic(a.density, asked) * float(budget.lights >> 1)
+                part = emitters.power_heuristic(a.density, asked) * float(budget.lights >> 1)
             light += g.radiance * part
             shown = wp.max(shown, world.lamps[j].shown)
     return light, shown
 
 
 @wp.func
-def hit_sky_light(world: World, table: SkyTable, budget: Budget, a: Anchor, d: wp.vec3):
+def hit_sky_light(world: World, table: emitters.SkyTable, budget: Budget, a: Anchor, d: wp.vec3):
     """MIS-weighted light of the environment that a ray hits."""
     light = wp.vec3(0.0)
     if world.sky.luminance > 0.0:
-        place = sky_place(world.sky, d)
+        place = emitters.sky_place(world.sky, d)
         part = float(1.0)
         if a.density >= 0.0 and budget.lights != 2 and table.part > 0.0:
-            asked = sky_density(table, place) * sky_weight_at(world.sky, table, a.n, a.sheet)
+            asked = emitters.sky_density(table, place) * emitters.sky_weight_at(
+                world.sky, table, a.n, a.sheet
+            )
             asked = asked / wp.max(a.total, 1.0e-20)
-            part = power_heuristic(a.density, asked) * float(budget.lights >> 1)
-        light = sky_light(world.sky, place) * part
+            part = emitters.power_heuristic(a.density, asked) * float(budget.lights >> 1)
+        light = emitters.sky_light(world.sky, place) * part
     return light
 
 
@@ -367,25 +329,25 @@ def to_shading_frame(v: wp.vec3, x: wp.vec3, y: wp.vec3, n: wp.vec3):
 @wp.func
 def sample_source(
     world: World,
-    table: SkyTable,
+    table: emitters.SkyTable,
     budget: Budget,
     s: Bsdf,
     v: Vertex,
     o: wp.vec3,
     x: wp.vec3,
     y: wp.vec3,
-    choice: SourceChoice,
+    choice: emitters.SourceChoice,
     u: wp.vec2,
 ):
     """Reflected light of one sampled source; x, y complete the vertex's shading frame."""
     light = wp.vec3(0.0)
-    g = LightSample()
-    if choice.source == SKY:
-        g = draw_sky(world.sky, table, u)
-    elif is_panel(world.lamps[choice.source]):
-        g = draw_panel(world.lamps[choice.source], o, u)
+    g = emitters.LightSample()
+    if choice.source == emitters.SKY:
+        g = emitters.draw_sky(world.sky, table, u)
+    elif analytic_lights.is_panel(world.lamps[choice.source]):
+        g = emitters.draw_panel(world.lamps[choice.source], o, u)
     else:
-        g = draw_ball(world.lamps[choice.source], o, u)
+        g = emitters.draw_ball(world.lamps[choice.source], o, u)
     l = to_shading_frame(g.direction, x, y, v.material.normal)  # noqa: E741
     # Above both horizons: light must not leak through a face because of its shading normal. Sheets
     # are lit from either side.
@@ -398,11 +360,11 @@ def sample_source(
             part = float(1.0)
             # As the only technique it carries all light and needs no weight.
             if budget.lights == 3:
-                part = power_heuristic(asked, density)
+                part = emitters.power_heuristic(asked, density)
             # The shadow ray comes last: it is the most expensive part.
             start = o
             if not before:
-                start = offset_origin(v.p, -v.flat)
+                start = ray_queries.offset_origin(v.p, -v.flat)
             through = transmittance(world, start, g.direction, g.distance_m, budget.clear)
             light = wp.cw_mul(f, through) * (part / asked)
     return light
@@ -449,17 +411,17 @@ def choose_glass_lobe(world: World, v: Vertex, w: wp.vec3, xi: float):
     alpha = roughness_to_alpha(v.material.roughness)
     ior = world.surfaces[v.surface].ior
     if world.surfaces[v.surface].thin != 0:
-        f = fresnel_dielectric(w[2], ior)
-        back = pane_reflectance(f, tint)
-        on = pane_transmittance(f, tint)
-        p = reflection_probability(luminance(back), luminance(on))
+        f = brdf.fresnel_dielectric(w[2], ior)
+        back = brdf.pane_reflectance(f, tint)
+        on = brdf.pane_transmittance(f, tint)
+        p = reflection_probability(brdf.luminance(back), brdf.luminance(on))
         out.bsdf = make_interface(w, alpha, 0.0)
         out.bsdf.f0 = wp.vec3(1.0, 1.0, 1.0)
         out.bsdf.f90 = 1.0
         # Divided by the probability of the choice: the estimate stays unbiased.
         out.weight = on * (1.0 / (1.0 - p))
         # Multiple scattering returns what rough facets mask.
-        part = directional_albedo(world.lobes, wp.sqrt(alpha), w[2])
+        part = brdf.directional_albedo(world.lobes, wp.sqrt(alpha), w[2])
         # At F0 1 single scattering would lose energy: it is restored.
         boost = 1.0 / (part[0] + part[1])
         out.bsdf.scale = back * (boost / p)
@@ -495,7 +457,7 @@ def choose_lobe(
     out = ChosenLobe()
     xi = float(0.0)
     if v.opacity < 1.0 or v.clear > 0.0:
-        xi = random_pair(key, pair, sample)[0]
+        xi = sampler.random_pair(key, pair, sample)[0]
     if v.opacity < 1.0:
         if xi >= v.opacity:
             out.kind = STRAIGHT
@@ -547,7 +509,7 @@ class Step:
 @wp.func
 def scatter_path(
     world: World,
-    table: SkyTable,
+    table: emitters.SkyTable,
     budget: Budget,
     v: Vertex,
     d: wp.vec3,
@@ -562,7 +524,7 @@ def scatter_path(
         key, pair, sample: Identify the first of its PAIRS pairs of random numbers.
     """
     n = v.material.normal
-    x, y = make_frame(n)
+    x, y = soft_shadows.make_frame(n)
     w = to_shading_frame(-d, x, y, n)
     # Bumps may turn the normal away from the path; the BSDF needs Z > 0.
     w = wp.vec3(w[0], w[1], wp.max(w[2], 1.0e-3))
@@ -571,13 +533,13 @@ def scatter_path(
     step = Step()
     step.density = -1.0
     step.straight = dealt.kind == STRAIGHT
-    step.o = offset_origin(v.p, -v.flat)
+    step.o = ray_queries.offset_origin(v.p, -v.flat)
     step.d = d
     step.weight = dealt.weight
     if step.straight:
         return step
-    u = random_pair(key, pair + 1, sample)
-    choices = random_pair(key, pair + 2, sample)
+    u = sampler.random_pair(key, pair + 1, sample)
+    choices = sampler.random_pair(key, pair + 2, sample)
     sent = Scattering()
     if dealt.kind == SOLID:
         sent = scatter_glass(dealt.bsdf, choices[0], u)
@@ -595,17 +557,17 @@ def scatter_path(
     elif sent.l[2] <= 0.0:
         side = -v.flat
         step.weight = wp.cw_mul(sent.weight, dealt.weight)
-    o = offset_origin(v.p, v.flat)
+    o = ray_queries.offset_origin(v.p, v.flat)
     # No source is sampled inside glass: refracted paths have to find the outside themselves.
     if dealt.kind == OPAQUE or (dealt.kind == SOLID and v.outside):
-        choice = choose_source(world, table, o, n, sheet, choices[1])
+        choice = emitters.choose_source(world, table, o, n, sheet, choices[1])
         step.density = sent.density
         step.sheet = sheet
         step.total = choice.total
         if choice.part > 0.0 and budget.lights != 2:
-            u = random_pair(key, pair + 3, sample)
+            u = sampler.random_pair(key, pair + 3, sample)
             step.light = sample_source(world, table, budget, dealt.bsdf, v, o, x, y, choice, u)
-    step.o = offset_origin(v.p, side)
+    step.o = ray_queries.offset_origin(v.p, side)
     step.d = x * sent.l[0] + y * sent.l[1] + n * sent.l[2]
     # The shading normal has sent it into the face: that light is lost, as in a groove.
     if wp.dot(step.d, side) <= 0.0:
@@ -629,14 +591,14 @@ def make_anchor(step: Step, n: wp.vec3):
 def trace_path(
     view: View,
     world: World,
-    table: SkyTable,
+    table: emitters.SkyTable,
     budget: Budget,
     i: int,
     key: wp.uint32,
     sample: wp.uint32,
 ):
     """Light that one path brings to pixel i [cd/m^2]."""
-    place = random_pair(key, 0, sample)
+    place = sampler.random_pair(key, 0, sample)
     way = pixel_direction(view, float(i % view.width) + place[0], float(i / view.width) + place[1])
     length = wp.length(way)
     d = fast_normalize(view.R_world_camera @ way)
@@ -644,7 +606,7 @@ def trace_path(
     a.p = view.eye_m
     a.density = -1.0
     # Same near plane as the rasteriser: both tiers show the same surfaces.
-    a.way_m = Z_NEAR_M * length
+    a.way_m = rasterizer.Z_NEAR_M * length
     o = view.eye_m + d * a.way_m
     # Texture footprints: each sample covers its share of the pixel.
     cone = pixel_width(view, i, 1.0) / (length * wp.sqrt(float(budget.whole)))
@@ -657,9 +619,9 @@ def trace_path(
     going = bool(True)
     while going:
         going = False
-        hit = closest_hit(world, o, d, AT_INFINITY, HOLES)
+        hit = ray_queries.closest_hit(world, o, d, emitters.AT_INFINITY, HOLES)
         # Beyond suns, which are at AT_INFINITY and would otherwise lie behind the segment's end.
-        end_m = a.way_m + wp.where(hit.at[0] < 0, 2.0 * AT_INFINITY, hit.t)
+        end_m = a.way_m + wp.where(hit.at[0] < 0, 2.0 * emitters.AT_INFINITY, hit.t)
         shown = int(0)
         # Cameras do not show lamps without a body, as in the realtime tier.
         if bounces > 0:
@@ -697,7 +659,7 @@ def trace_path(
                     survival = wp.where(bounces == 1, SURVIVAL_SHARE * wp.max(through), survival)
                     keep = wp.max(through) / wp.max(survival, 1.0e-20)
                     if going and keep < 1.0:
-                        going = random_number(key, pair, sample) < keep
+                        going = sampler.random_number(key, pair, sample) < keep
                         # Russian roulette: survivors carry the weight of terminated paths, which
                         # keeps the mean.
                         through = through * (1.0 / keep)
@@ -706,18 +668,18 @@ def trace_path(
 
 @wp.kernel
 def trace_paths(
-    view: View, world: World, table: SkyTable, budget: Budget, light: wp.array[wp.vec3]
+    view: View, world: World, table: emitters.SkyTable, budget: Budget, light: wp.array[wp.vec3]
 ):
     """Add the light of some samples to every pixel."""
     i = wp.tid()
     if not is_in_view(view, i):
         return
     # Morton numbers that exceed the sequence's 32 bits start another sequence.
-    place = morton_index(i % view.width, i / view.width)
+    place = sampler.morton_index(i % view.width, i / view.width)
     bits = wp.uint32(budget.sample_bits)
     key = budget.key
     if budget.sample_bits > 0:
-        key = hash_bits(key ^ (place >> (wp.uint32(32) - bits)))
+        key = sampler.hash_bits(key ^ (place >> (wp.uint32(32) - bits)))
     first = (place << bits) + wp.uint32(budget.first)
     total = wp.vec3(0.0)
     for k in range(budget.samples):

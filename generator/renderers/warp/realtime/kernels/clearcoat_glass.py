@@ -18,29 +18,18 @@ reflections and what lies behind.
 
 import warp as wp
 
-from gen_data.renderers.warp.atmosphere.kernels.ground_weathering import (
-    apply_coat,
-    coat_at,
-    footprint,
-)
-from gen_data.renderers.warp.realtime.kernels.lattice_lighting import (
-    ListedPixels,
-    Probe,
-    light_at,
-    sky_exposure_at,
-    specular_occlusion,
-    sum_lamp_light,
-    visible_lamp_fraction,
-    visible_sky_fraction,
+from gen_data.renderers.warp.atmosphere.kernels import ground_weathering
+from gen_data.renderers.warp.realtime.kernels import lattice_lighting
+from gen_data.renderers.warp.scene.kernels import (
+    ambient_light,
+    analytic_lights,
+    environment_lighting,
+    lattice,
+    material_eval,
+    records,
+    texture_sampling,
 )
 from gen_data.renderers.warp.scene.kernels.alpha_test import OUT_OF_LINE, uv_at
-from gen_data.renderers.warp.scene.kernels.ambient_light import (
-    ambient_irradiance,
-    ambient_reflection,
-    is_indoors,
-    received_ambience,
-)
-from gen_data.renderers.warp.scene.kernels.analytic_lights import SUN, beam_from
 from gen_data.renderers.warp.scene.kernels.brdf import (
     fresnel_dielectric,
     make_brdf,
@@ -48,42 +37,8 @@ from gen_data.renderers.warp.scene.kernels.brdf import (
     pane_transmittance,
     refract,
 )
-from gen_data.renderers.warp.scene.kernels.environment_lighting import (
-    sky_image,
-    sky_reflection,
-    sky_rest,
-)
-from gen_data.renderers.warp.scene.kernels.lattice import ray_origin
-from gen_data.renderers.warp.scene.kernels.material_eval import (
-    SurfaceMaterial,
-    evaluate_material,
-    sheet_normal,
-)
 from gen_data.renderers.warp.scene.kernels.ray_queries import FARTHEST, closest_hit, passed_origin
-from gen_data.renderers.warp.scene.kernels.records import (
-    HOLES,
-    MIRROR_ROUGHNESS,
-    GBufferRecord,
-    View,
-    World,
-    face_vertices,
-    fast_normalize,
-    first_weight,
-    flat_normal,
-    is_back_face,
-    normal_at,
-    pixel_width,
-    surface_index,
-    vertex_at,
-)
-from gen_data.renderers.warp.scene.kernels.texture_sampling import (
-    FULL,
-    make_sampler,
-    mix_texels,
-    taps_at,
-)
-from gen_data.renderers.warp.visibility.kernels.edge_detection import from_tone, to_tone
-from gen_data.renderers.warp.visibility.kernels.label_resolve import face_viewer, point_at
+from gen_data.renderers.warp.visibility.kernels import edge_detection, label_resolve
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 1})
 
@@ -120,7 +75,7 @@ class Maps:
 
 
 @wp.func
-def texels_per_m2(world: World, surface: int, hit: wp.vec2i):
+def texels_per_m2(world: records.World, surface: int, hit: wp.vec2i):
     """Texels of the finest level per area of a face [1/m^2]."""
     texture = world.surfaces[surface].texture
     size = float(world.textures[texture].width * world.textures[texture].height)
@@ -130,13 +85,13 @@ def texels_per_m2(world: World, surface: int, hit: wp.vec2i):
         return wide * wide
     b = hit[0]
     g = world.bodies[b].geometry
-    corner = face_vertices(world, g, hit[1])
+    corner = records.face_vertices(world, g, hit[1])
     uv = world.geometries[g].uvs[corner[0]]
     d1 = world.geometries[g].uvs[corner[1]] - uv
     d2 = world.geometries[g].uvs[corner[2]] - uv
-    p = vertex_at(world, g, corner[0])
-    e1 = (vertex_at(world, g, corner[1]) - p) * world.bodies[b].scale
-    e2 = (vertex_at(world, g, corner[2]) - p) * world.bodies[b].scale
+    p = records.vertex_at(world, g, corner[0])
+    e1 = (records.vertex_at(world, g, corner[1]) - p) * world.bodies[b].scale
+    e2 = (records.vertex_at(world, g, corner[2]) - p) * world.bodies[b].scale
     # Twice the face's area, as the UV determinant below is twice its area: the factors cancel.
     area_m2 = wp.max(wp.length(wp.cross(e1, e2)), 1.0e-12)
     return wp.abs(d1[0] * d2[1] - d1[1] * d2[0]) * size / area_m2
@@ -145,11 +100,13 @@ def texels_per_m2(world: World, surface: int, hit: wp.vec2i):
 @wp.func
 def texture_mix(texels: wp.array[wp.uint32], first: int, width: int, height: int, uv: wp.vec2):
     """Four channels of one mip level at a point, [0, 1]."""
-    return mix_texels(texels, taps_at(first, width, height, uv[0], uv[1])) * (1.0 / FULL)
+    return texture_sampling.mix_texels(
+        texels, texture_sampling.taps_at(first, width, height, uv[0], uv[1])
+    ) * (1.0 / texture_sampling.FULL)
 
 
 @wp.func
-def maps_at(world: World, surface: int, hit: wp.vec2i, weight: wp.vec2, footprint_m: float):
+def maps_at(world: records.World, surface: int, hit: wp.vec2i, weight: wp.vec2, footprint_m: float):
     """The further maps of a surface at a point, averaged over a footprint."""
     maps = Maps()
     maps.metallic = 1.0
@@ -158,11 +115,11 @@ def maps_at(world: World, surface: int, hit: wp.vec2i, weight: wp.vec2, footprin
     t = world.surfaces[surface].texture
     if t >= 0:
         if world.textures[t].has_shares + world.textures[t].has_glow > 0:
-            u = first_weight(weight)
+            u = records.first_weight(weight)
             weights = wp.vec3(1.0 - u - weight[1], u, weight[1])
             uv = uv_at(world, surface, hit[0], hit[1], weights)
             texels = texels_per_m2(world, surface, hit) * footprint_m * footprint_m
-            s = make_sampler(world, t, 0.5 * wp.log2(wp.max(texels, 1.0e-6)))
+            s = texture_sampling.make_sampler(world, t, 0.5 * wp.log2(wp.max(texels, 1.0e-6)))
             # One level without blending: these maps are smooth.
             if world.textures[t].has_shares != 0:
                 c = texture_mix(world.textures[t].shares, s.first, s.width, s.height, uv)
@@ -193,42 +150,45 @@ class SurfaceHit:
 
 
 @wp.func(**OUT_OF_LINE)
-def trace_surface(world: World, origin: wp.vec3, d: wp.vec3):
+def trace_surface(world: records.World, origin: wp.vec3, d: wp.vec3):
     """The first surface along a ray."""
-    first = closest_hit(world, origin, d, FARTHEST, HOLES)
+    first = closest_hit(world, origin, d, FARTHEST, records.HOLES)
     m = SurfaceHit()
     m.hit = first.at
     m.t = first.t
     if m.hit[0] >= 0:
         g = world.bodies[m.hit[0]].geometry
-        corner = face_vertices(world, g, m.hit[1])
+        corner = records.face_vertices(world, g, m.hit[1])
         v = first.weight[0]
         w = first.weight[1]
-        m.entering = wp.where(wp.dot(flat_normal(world, m.hit), d) < 0.0, 1, 0)
-        n = normal_at(world, g, corner[0]) * (1.0 - v - w) + normal_at(world, g, corner[1]) * v
-        n += normal_at(world, g, corner[2]) * w
+        m.entering = wp.where(wp.dot(records.flat_normal(world, m.hit), d) < 0.0, 1, 0)
+        n = (
+            records.normal_at(world, g, corner[0]) * (1.0 - v - w)
+            + records.normal_at(world, g, corner[1]) * v
+        )
+        n += records.normal_at(world, g, corner[2]) * w
         side = wp.where(m.entering != 0, 1.0, -1.0)
-        m.normal = face_viewer(world.bodies[m.hit[0]].R_world_mesh @ n * side, d)
+        m.normal = label_resolve.face_viewer(world.bodies[m.hit[0]].R_world_mesh @ n * side, d)
         # Adds 2 to the weight where the back of the face is hit, as records.is_back_face expects.
         m.weight = wp.vec2(v + 1.0 - side, w)
     return m
 
 
 @wp.func
-def curvature(world: World, hit: wp.vec2i):
+def curvature(world: records.World, hit: wp.vec2i):
     """Mean curvature of a face from its vertex normals [1/m]; positive where convex.
 
     Source: Akenine-Moeller et al., "Improved shader and texture level of detail using ray cones",
     JCGT 2021, equation 9.
     """
     g = world.bodies[hit[0]].geometry
-    corner = face_vertices(world, g, hit[1])
+    corner = records.face_vertices(world, g, hit[1])
     total = float(0.0)
     for k in range(3):
         i = corner[k]
         j = corner[(k + 1) % 3]
-        way = vertex_at(world, g, j) - vertex_at(world, g, i)
-        turn = normal_at(world, g, j) - normal_at(world, g, i)
+        way = records.vertex_at(world, g, j) - records.vertex_at(world, g, i)
+        turn = records.normal_at(world, g, j) - records.normal_at(world, g, i)
         total += wp.dot(turn, way) / wp.max(wp.dot(way, way), 1.0e-12)
     return total / (3.0 * world.bodies[hit[0]].scale)
 
@@ -237,12 +197,12 @@ def curvature(world: World, hit: wp.vec2i):
 def lift_over_horizon(r: wp.vec3, n: wp.vec3):
     """Lift a reflected direction that bumps have turned below the surface."""
     # At least about one degree above the horizon, so that the ray leaves the surface.
-    return fast_normalize(r + n * wp.max(0.02 - wp.dot(r, n), 0.0))
+    return records.fast_normalize(r + n * wp.max(0.02 - wp.dot(r, n), 0.0))
 
 
 @wp.func(**OUT_OF_LINE)
 def evaluate_with_maps(
-    world: World,
+    world: records.World,
     surface: int,
     hit: wp.vec2i,
     weight: wp.vec2,
@@ -251,7 +211,7 @@ def evaluate_with_maps(
     v: wp.vec3,
 ):
     """Material of a surface with all its maps, and the further maps themselves."""
-    material = evaluate_material(world, surface, hit, weight, n, width_m, v)
+    material = material_eval.evaluate_material(world, surface, hit, weight, n, width_m, v)
     slant = wp.sqrt(wp.max(wp.dot(n, v), 0.05))
     maps = maps_at(world, surface, hit, weight, width_m / slant)
     material.metallic *= maps.metallic
@@ -260,10 +220,10 @@ def evaluate_with_maps(
 
 @wp.func(**OUT_OF_LINE)
 def light_at_hit(
-    world: World,
-    probe: Probe,
+    world: records.World,
+    probe: lattice_lighting.Probe,
     m: SurfaceHit,
-    material: SurfaceMaterial,
+    material: material_eval.SurfaceMaterial,
     occlusion: float,
     p: wp.vec3,
     d: wp.vec3,
@@ -279,35 +239,35 @@ def light_at_hit(
         clear: Share of clear glass, whose highlights need no shadows.
         sample: Number of the pixel's sample.
     """
-    origin = ray_origin(world, m.hit, m.weight, p, d)
+    origin = lattice.ray_origin(world, m.hit, m.weight, p, d)
     parts = probe.parts
     disc = probe.disc
     if share < SAMPLED_SHARE * float(probe.few.shape[0]):
         parts = probe.centre
         disc = probe.few[sample]
-    surface = surface_index(world, m.hit)
-    side = sheet_normal(world, surface, m.hit, m.weight)
-    faint_lux = FAINT_SHARE * wp.pi * wp.max(ambient_irradiance(world, p, m.normal))
-    indoors = is_indoors(world, p)
+    surface = records.surface_index(world, m.hit)
+    side = material_eval.sheet_normal(world, surface, m.hit, m.weight)
+    faint_lux = FAINT_SHARE * wp.pi * wp.max(ambient_light.ambient_irradiance(world, p, m.normal))
+    indoors = ambient_light.is_indoors(world, p)
     for j in range(world.lamps.shape[0]):
         # As in soft_shadows.weigh_lamps.
-        if indoors and world.lamps[j].kind == SUN:
+        if indoors and world.lamps[j].kind == analytic_lights.SUN:
             continue
-        faint_lux += FAINT_SHARE * wp.max(beam_from(world.lamps[j], p).normal_lux)
+        faint_lux += FAINT_SHARE * wp.max(analytic_lights.beam_from(world.lamps[j], p).normal_lux)
     for j in range(world.lamps.shape[0]):
         # Scratch memory holds values of earlier rays: set every lamp.
         probe.lit[j, k] = 1.0
-        bright = wp.max(beam_from(world.lamps[j], p).normal_lux) > faint_lux
+        bright = wp.max(analytic_lights.beam_from(world.lamps[j], p).normal_lux) > faint_lux
         if clear < MOSTLY_CLEAR and bright:
-            probe.lit[j, k] = visible_lamp_fraction(
+            probe.lit[j, k] = lattice_lighting.visible_lamp_fraction(
                 world, world.lamps[j], p, origin, m.normal, side, parts
             )
     open_sky = occlusion
     if share > AMBIENT_SHARE and clear < MOSTLY_CLEAR:
-        open_sky *= visible_sky_fraction(
+        open_sky *= lattice_lighting.visible_sky_fraction(
             world, m.hit[0], p, origin, m.normal, side, disc, probe.radius_m
         )
-    return light_at(world, surface, material, side, p, -d, probe.lit, open_sky, k)
+    return lattice_lighting.light_at(world, surface, material, side, p, -d, probe.lit, open_sky, k)
 
 
 @wp.struct
@@ -331,16 +291,18 @@ class Ray:
 
 
 @wp.func
-def sky_along(world: World, ray: Ray):
+def sky_along(world: records.World, ray: Ray):
     """Radiance of the sky along a ray that hits nothing."""
     c = wp.vec3(0.0)
     if ray.mirrored != 0:
         # Prefiltered maps lack the parts that lamps represent; the difference adds them in their
         # own shape.
-        c = sky_reflection(world.sky, ray.d, ray.roughness)
-        c += sky_image(world.sky, ray.d) - sky_rest(world.sky, ray.d)
+        c = environment_lighting.sky_reflection(world.sky, ray.d, ray.roughness)
+        c += environment_lighting.sky_image(world.sky, ray.d) - environment_lighting.sky_rest(
+            world.sky, ray.d
+        )
     elif world.sky.visible != 0:
-        c = sky_image(world.sky, ray.d)
+        c = environment_lighting.sky_image(world.sky, ray.d)
     return c
 
 
@@ -352,14 +314,19 @@ def sqrt_color(color: wp.vec3):
 
 @wp.func
 def continue_ray(
-    world: World, ray: Ray, m: SurfaceHit, material: SurfaceMaterial, clear: float, opacity: float
+    world: records.World,
+    ray: Ray,
+    m: SurfaceHit,
+    material: material_eval.SurfaceMaterial,
+    clear: float,
+    opacity: float,
 ):
     """The ray behind a surface, with its direction and weight.
 
     Args:
         clear: Share of the light below the specular layer that is transmitted.
     """
-    surface = surface_index(world, m.hit)
+    surface = records.surface_index(world, m.hit)
     c = wp.min(-wp.dot(ray.d, m.normal), 1.0)
     ior = world.surfaces[surface].ior
     onward = ray.share * (1.0 - opacity)
@@ -390,7 +357,14 @@ def continue_ray(
 
 
 @wp.func
-def radiance_along(view: View, world: World, probe: Probe, ray: Ray, sample: int, k: int):
+def radiance_along(
+    view: records.View,
+    world: records.World,
+    probe: lattice_lighting.Probe,
+    ray: Ray,
+    sample: int,
+    k: int,
+):
     """Weighted radiance along a ray, including what lies behind clear surfaces."""
     total = wp.vec3(0.0)
     surfaces = int(0)
@@ -404,15 +378,15 @@ def radiance_along(view: View, world: World, probe: Probe, ray: Ray, sample: int
             p = ray.origin + ray.d * m.t
             # A cone that converges has a focus; behind it the width grows again.
             ray.width_m = wp.abs(ray.width_m + ray.spread * m.t)
-            surface = surface_index(world, m.hit)
+            surface = records.surface_index(world, m.hit)
             v = -ray.d
             n = m.normal
             material, maps = evaluate_with_maps(world, surface, m.hit, m.weight, n, ray.width_m, v)
             if world.ground.covered != 0:
-                lifted = ray_origin(world, m.hit, m.weight, p, ray.d)
-                exposed = sky_exposure_at(world, m.hit[0], lifted, n)
-                coat = coat_at(world, surface, p, n, exposed, ray.width_m)
-                material = apply_coat(world, surface, material, coat, n)
+                lifted = lattice.ray_origin(world, m.hit, m.weight, p, ray.d)
+                exposed = lattice_lighting.sky_exposure_at(world, m.hit[0], lifted, n)
+                coat = ground_weathering.coat_at(world, surface, p, n, exposed, ray.width_m)
+                material = ground_weathering.apply_coat(world, surface, material, coat, n)
             clear = world.surfaces[surface].transmission * (1.0 - material.metallic)
             opacity = world.surfaces[surface].opacity
             # Inside a solid only the transmitted ray counts: the back of its surface has no light
@@ -458,7 +432,7 @@ class Layers:
 
 
 @wp.func
-def glass_shares(world: World, surface: int, albedo: wp.vec3, c: float):
+def glass_shares(world: records.World, surface: int, albedo: wp.vec3, c: float):
     """Reflectance and transmittance of glass from outside, at the cosine ``c`` of incidence."""
     f = fresnel_dielectric(c, world.surfaces[surface].ior)
     mirrored = wp.vec3(f)
@@ -471,7 +445,7 @@ def glass_shares(world: World, surface: int, albedo: wp.vec3, c: float):
 
 @wp.func
 def add_clearcoat(
-    world: World,
+    world: records.World,
     surface: int,
     layers: Layers,
     coat: float,
@@ -487,25 +461,25 @@ def add_clearcoat(
     rough = world.surfaces[surface].coat_roughness
     lacquer = make_brdf(world.lobes, wp.vec3(0.0), rough, 0.0, 0.5, c)
     share = coat * lacquer.gloss[0]
-    lamps = sum_lamp_light(world, lacquer, n, wp.vec3(0.0), p, v, lit, k)
+    lamps = lattice_lighting.sum_lamp_light(world, lacquer, n, wp.vec3(0.0), p, v, lit, k)
     layers.own = layers.own * (1.0 - share) + lamps.shine * coat
     layers.mirror = layers.mirror * (1.0 - share)
     layers.behind = layers.behind * (1.0 - share)
-    if lacquer.roughness < MIRROR_ROUGHNESS:
+    if lacquer.roughness < records.MIRROR_ROUGHNESS:
         layers.coat = share
         # The reflected ray will find these lamps itself: do not count them twice.
         layers.own -= lamps.shown * coat
     else:
-        sky = ambient_reflection(world, p, n * (2.0 * c) - v, lacquer.roughness)
-        layers.own += sky * (share * specular_occlusion(lacquer, open_sky))
+        sky = ambient_light.ambient_reflection(world, p, n * (2.0 * c) - v, lacquer.roughness)
+        layers.own += sky * (share * lattice_lighting.specular_occlusion(lacquer, open_sky))
     return layers
 
 
 @wp.func(**OUT_OF_LINE)
 def layers_at(
-    world: World,
+    world: records.World,
     surface: int,
-    material: SurfaceMaterial,
+    material: material_eval.SurfaceMaterial,
     maps: Maps,
     bare: float,
     n: wp.vec3,
@@ -542,24 +516,26 @@ def layers_at(
         mirrored, passed = glass_shares(world, surface, material.albedo, c)
         gloss = gloss * (1.0 - clear) + mirrored * clear
         layers.behind = passed * clear
-    lamps = sum_lamp_light(world, brdf, material.normal, side, p, v, lit, k)
-    ambient = received_ambience(world, p, material.normal, open_sky)
+    lamps = lattice_lighting.sum_lamp_light(world, brdf, material.normal, side, p, v, lit, k)
+    ambient = ambient_light.received_ambience(world, p, material.normal, open_sky)
     diffuse = wp.cw_mul(brdf.matte, material.albedo) * (1.0 - clear)
     received = lamps.lux * (1.0 / wp.pi) + ambient
     if wp.dot(side, side) > 0.0:
-        behind = received_ambience(world, p, -material.normal, open_sky)
+        behind = ambient_light.received_ambience(world, p, -material.normal, open_sky)
         behind += lamps.behind * (1.0 / wp.pi)
         received += wp.cw_mul(material.translucency, behind)
     layers.own = wp.cw_mul(diffuse, received) + lamps.shine
     layers.own += wp.cw_mul(world.surfaces[surface].emission_cd_m2, maps.glow)
-    if brdf.roughness < MIRROR_ROUGHNESS and (material.metallic >= 0.5 or clear > 0.0):
+    if brdf.roughness < records.MIRROR_ROUGHNESS and (material.metallic >= 0.5 or clear > 0.0):
         layers.mirror = gloss
         # The reflected ray will find these lamps itself: do not count them twice.
         layers.own -= lamps.shown
     else:
         # Rough layers reflect the prefiltered environment, dimmed by specular occlusion.
-        sky = ambient_reflection(world, p, material.normal * (2.0 * n_v) - v, brdf.roughness)
-        layers.own += wp.cw_mul(gloss, sky) * specular_occlusion(brdf, open_sky)
+        sky = ambient_light.ambient_reflection(
+            world, p, material.normal * (2.0 * n_v) - v, brdf.roughness
+        )
+        layers.own += wp.cw_mul(gloss, sky) * lattice_lighting.specular_occlusion(brdf, open_sky)
     coat = world.surfaces[surface].coat * bare
     if coat > 0.0:
         layers = add_clearcoat(world, surface, layers, coat, n, p, v, lit, open_sky, k)
@@ -574,8 +550,8 @@ def layers_at(
 
 @wp.func
 def make_layer_ray(
-    view: View,
-    world: World,
+    view: records.View,
+    world: records.World,
     layers: Layers,
     part: int,
     hit: wp.vec2i,
@@ -590,8 +566,8 @@ def make_layer_ray(
     Its weight is 0 where there is none.
     """
     ray = Ray()
-    surface = surface_index(world, hit)
-    d = fast_normalize(way)
+    surface = records.surface_index(world, hit)
+    d = records.fast_normalize(way)
     ray.d = d
     ray.width_m = width_m
     ray.spread = width_m / wp.max(wp.length(way), 1.0e-6)
@@ -604,9 +580,9 @@ def make_layer_ray(
             ray.share = layers.mirror
             ray.roughness = world.surfaces[surface].roughness
         ray.d = lift_over_horizon(d - m * (2.0 * wp.dot(m, d)), n)
-        ray.origin = ray_origin(world, hit, weight, p, way)
+        ray.origin = lattice.ray_origin(world, hit, weight, p, way)
         ray.mirrored = 1
-        side = wp.where(is_back_face(weight), -1.0, 1.0)
+        side = wp.where(records.is_back_face(weight), -1.0, 1.0)
         # A convex mirror widens the ray's cone by twice the turn of its normal (Akenine-Moeller et
         # al. 2021).
         ray.spread += 2.0 * side * curvature(world, hit) * width_m
@@ -618,9 +594,9 @@ def make_layer_ray(
                 ray.share += wp.vec3(layers.straight)
             else:
                 ior = world.surfaces[surface].ior
-                eta = wp.where(is_back_face(weight), 1.0 / ior, ior)
+                eta = wp.where(records.is_back_face(weight), 1.0 / ior, ior)
                 bent = refract(d, layers.n, eta)
-                side = wp.where(is_back_face(weight), -1.0, 1.0)
+                side = wp.where(records.is_back_face(weight), -1.0, 1.0)
                 ray.spread -= (1.0 - 1.0 / eta) * side * curvature(world, hit) * width_m
                 if wp.dot(bent, bent) > 0.0:
                     ray.d = bent
@@ -634,13 +610,13 @@ def make_layer_ray(
 # Two kernels call this function: compiled out of line, it exists once.
 @wp.func(**OUT_OF_LINE)
 def layered_radiance(
-    view: View,
-    world: World,
-    images: GBufferRecord,
+    view: records.View,
+    world: records.World,
+    images: records.GBufferRecord,
     x_px: float,
     y_px: float,
-    listed: ListedPixels,
-    probe: Probe,
+    listed: lattice_lighting.ListedPixels,
+    probe: lattice_lighting.Probe,
     sample: int,
     k: int,
 ):
@@ -651,20 +627,22 @@ def layered_radiance(
     """
     i = listed.pixels[k]
     hit = images.hits[i]
-    surface = surface_index(world, hit)
-    point = point_at(view, world, hit, x_px, y_px)
+    surface = records.surface_index(world, hit)
+    point = label_resolve.point_at(view, world, hit, x_px, y_px)
     n = point.normal
-    v = fast_normalize(-point.way)
+    v = records.fast_normalize(-point.way)
     p = view.eye_m + point.way
-    width_m = pixel_width(view, i, images.z_m[i])
+    width_m = records.pixel_width(view, i, images.z_m[i])
     material, maps = evaluate_with_maps(world, surface, hit, point.weight, n, width_m, v)
     bare = float(1.0)
     if world.ground.covered != 0:
-        coat = coat_at(world, surface, p, n, listed.exposed[k], footprint(view, p, n, 1.0))
-        material = apply_coat(world, surface, material, coat, n)
+        coat = ground_weathering.coat_at(
+            world, surface, p, n, listed.exposed[k], ground_weathering.footprint(view, p, n, 1.0)
+        )
+        material = ground_weathering.apply_coat(world, surface, material, coat, n)
         bare = 1.0 - wp.min(coat.snow, 1.0)
     sky = listed.open_sky[0, k] * maps.occlusion
-    side = sheet_normal(world, surface, hit, point.weight)
+    side = material_eval.sheet_normal(world, surface, hit, point.weight)
     layers = layers_at(world, surface, material, maps, bare, n, side, p, v, listed.lit, sky, k)
     c = layers.own
     for part in range(4):
@@ -676,18 +654,18 @@ def layered_radiance(
 
 @wp.kernel
 def shade_layers(
-    view: View,
-    world: World,
-    images: GBufferRecord,
-    listed: ListedPixels,
-    probe: Probe,
+    view: records.View,
+    world: records.World,
+    images: records.GBufferRecord,
+    listed: lattice_lighting.ListedPixels,
+    probe: lattice_lighting.Probe,
     radiance: wp.array[wp.vec3],
 ):
     """Shade the listed pixels that show layered surfaces, each by itself."""
     k = wp.tid()
     i = listed.pixels[k]
     # lattice_lighting.shade_points has shaded all others.
-    if world.surfaces[surface_index(world, images.hits[i])].layered != 0:
+    if world.surfaces[records.surface_index(world, images.hits[i])].layered != 0:
         x = float(i % view.width) + 0.5
         y = float(i / view.width) + 0.5
         radiance[i] = layered_radiance(view, world, images, x, y, listed, probe, 0, k)
@@ -702,7 +680,9 @@ def contrast(a: wp.vec3, b: wp.vec3):
 
 
 @wp.func
-def contrast_around(view: View, images: GBufferRecord, radiance: wp.array[wp.vec3], i: int):
+def contrast_around(
+    view: records.View, images: records.GBufferRecord, radiance: wp.array[wp.vec3], i: int
+):
     """Largest contrast between a pixel and the four beside it that show the same body."""
     x = i % view.width
     y = i / view.width
@@ -719,10 +699,10 @@ def contrast_around(view: View, images: GBufferRecord, radiance: wp.array[wp.vec
 
 @wp.kernel
 def find_contrasts(
-    view: View,
-    world: World,
-    images: GBufferRecord,
-    listed: ListedPixels,
+    view: records.View,
+    world: records.World,
+    images: records.GBufferRecord,
+    listed: lattice_lighting.ListedPixels,
     radiance: wp.array[wp.vec3],
     count: wp.array[int],
     places: wp.array[int],
@@ -735,7 +715,7 @@ def find_contrasts(
     """
     k = wp.tid()
     i = listed.pixels[k]
-    if world.surfaces[surface_index(world, images.hits[i])].layered == 0:
+    if world.surfaces[records.surface_index(world, images.hits[i])].layered == 0:
         return
     if contrast_around(view, images, radiance, i) > CONTRAST:
         places[wp.atomic_add(count, 0, 1)] = k
@@ -743,12 +723,12 @@ def find_contrasts(
 
 @wp.kernel
 def shade_contrasts(
-    view: View,
-    world: World,
-    images: GBufferRecord,
+    view: records.View,
+    world: records.World,
+    images: records.GBufferRecord,
     places: wp.array[int],
-    listed: ListedPixels,
-    probe: Probe,
+    listed: lattice_lighting.ListedPixels,
+    probe: lattice_lighting.Probe,
     offsets: wp.array[wp.vec2],
     white: float,
     brightest: float,
@@ -771,7 +751,7 @@ def shade_contrasts(
     i = listed.pixels[k]
     x = i % view.width
     y = i / view.width
-    total = to_tone(radiance[i], white, brightest)
+    total = edge_detection.to_tone(radiance[i], white, brightest)
     count = float(1.0)
     both = white > 0.0 or contrast_around(view, images, radiance, i) > STARK_CONTRAST
     for s in range(2):
@@ -779,7 +759,7 @@ def shade_contrasts(
             x_px = float(x) + offsets[s][0]
             y_px = float(y) + offsets[s][1]
             sample = layered_radiance(view, world, images, x_px, y_px, listed, probe, s, k)
-            total += to_tone(sample, white, brightest)
+            total += edge_detection.to_tone(sample, white, brightest)
             count += 1.0
     pixels[place] = i
-    mixed[place] = from_tone(total / count, white)
+    mixed[place] = edge_detection.from_tone(total / count, white)

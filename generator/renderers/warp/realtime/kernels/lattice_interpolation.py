@@ -13,27 +13,14 @@ from gen_data.renderers.warp.atmosphere.kernels.ground_weathering import (
     SNOW_RED,
 )
 from gen_data.renderers.warp.native_code import native
-from gen_data.renderers.warp.realtime.kernels.lattice_lighting import LatticeLight, is_gatherable
-from gen_data.renderers.warp.realtime.kernels.soft_shadows import surface_tolerance
-from gen_data.renderers.warp.scene.kernels.environment_lighting import sky_image
+from gen_data.renderers.warp.realtime.kernels import lattice_lighting, soft_shadows
+from gen_data.renderers.warp.scene.kernels import (
+    environment_lighting,
+    material_eval,
+    records,
+    texture_sampling,
+)
 from gen_data.renderers.warp.scene.kernels.lattice import Lattice, points_agree, step_at
-from gen_data.renderers.warp.scene.kernels.material_eval import print_footprint
-from gen_data.renderers.warp.scene.kernels.records import (
-    GBufferRecord,
-    TextureRecord,
-    View,
-    World,
-    fast_normalize,
-    pixel_direction,
-    pixel_width,
-    surface_index,
-)
-from gen_data.renderers.warp.scene.kernels.texture_sampling import (
-    Patch,
-    Sampler,
-    make_sampler,
-    patch_at,
-)
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 
@@ -46,7 +33,7 @@ CONTINUED_MIN = wp.constant(0.4)
 
 @wp.func
 def agreement(
-    images: GBufferRecord,
+    images: records.GBufferRecord,
     lattice: Lattice,
     surface: int,
     i: int,
@@ -129,11 +116,11 @@ def point_beyond(lattice: Lattice, stretch: Stretch, first: int, k: int):
 
 @wp.func
 def stretch_at(
-    view: View,
-    world: World,
-    images: GBufferRecord,
+    view: records.View,
+    world: records.World,
+    images: records.GBufferRecord,
     lattice: Lattice,
-    lights: wp.array[LatticeLight],
+    lights: wp.array[lattice_lighting.LatticeLight],
     surface: int,
     first: int,
     x: int,
@@ -145,14 +132,14 @@ def stretch_at(
     """
     i = y * view.width + x
     stretch = Stretch()
-    patch = Patch()
-    sampler = Sampler()
+    patch = texture_sampling.Patch()
+    sampler = texture_sampling.Sampler()
     stretch.face = images.hits[i]
     stretch.first = first
     stretch.columns = lattice.width
-    d = pixel_direction(view, float(x) + 0.5, float(y) + 0.5)
+    d = records.pixel_direction(view, float(x) + 0.5, float(y) + 0.5)
     p = view.eye_m + view.R_world_camera @ (d * images.z_m[i])
-    tolerance_m = surface_tolerance(view, p)
+    tolerance_m = soft_shadows.surface_tolerance(view, p)
     towards = wp.vec3(0.0)
     lamps = float(0.0)
     shine = float(0.0)
@@ -178,19 +165,19 @@ def stretch_at(
     stretch.roughness = world.surfaces[surface].roughness
     stretch.texture = world.surfaces[surface].texture
     if stretch.texture >= 0 and found > 0.0:
-        patch = patch_at(world, surface, stretch.face)
+        patch = texture_sampling.patch_at(world, surface, stretch.face)
         n = images.normals[i]
-        v = fast_normalize(view.eye_m - p)
+        v = records.fast_normalize(view.eye_m - p)
         # Footprints are ellipses: use the level of the geometric mean of both axes.
         slant = wp.max(wp.dot(n, v), 0.05)
-        width_m = pixel_width(view, i, images.z_m[i])
-        width_m = print_footprint(world, surface, images.weights[i], width_m)
+        width_m = records.pixel_width(view, i, images.z_m[i])
+        width_m = material_eval.print_footprint(world, surface, images.weights[i], width_m)
         texels = width_m * patch.texels_per_m / wp.sqrt(slant)
-        sampler = make_sampler(world, stretch.texture, wp.log2(texels))
+        sampler = texture_sampling.make_sampler(world, stretch.texture, wp.log2(texels))
         if world.textures[stretch.texture].has_bumps != 0 and wp.dot(towards, towards) > 0.0:
             stretch.bumpy = 1
-            stretch.towards = fast_normalize(towards)
-            stretch.half = fast_normalize(stretch.towards + v)
+            stretch.towards = records.fast_normalize(towards)
+            stretch.half = records.fast_normalize(stretch.towards + v)
             stretch.lamps = lamps / found
             stretch.shine = shine / found
     return stretch, patch, sampler
@@ -203,16 +190,16 @@ CELL_ROW = wp.constant(4)
 
 @wp.func_native(native("realtime/kernels/shade_stretch.h", CONTINUED_MIN=CONTINUED_MIN))
 def shade_stretch(
-    view: View,
-    images: GBufferRecord,
-    textures: wp.array[TextureRecord],
-    lights: wp.array[LatticeLight],
+    view: records.View,
+    images: records.GBufferRecord,
+    textures: wp.array[records.TextureRecord],
+    lights: wp.array[lattice_lighting.LatticeLight],
     coats: wp.array[wp.vec4],
     covered: bool,
     white: wp.vec3,
     stretch: Stretch,
-    patch: Patch,
-    sampler: Sampler,
+    patch: texture_sampling.Patch,
+    sampler: texture_sampling.Sampler,
     stride: int,
     x0: int,
     y0: int,
@@ -235,22 +222,22 @@ def shade_stretch(
 
 
 @wp.func
-def background(view: View, world: World, x: int, y: int):
+def background(view: records.View, world: records.World, x: int, y: int):
     """Radiance of a pixel without a surface."""
     c = wp.vec3(0.0)
     if world.sky.visible != 0:
-        d = pixel_direction(view, float(x) + 0.5, float(y) + 0.5)
-        c = sky_image(world.sky, view.R_world_camera @ d)
+        d = records.pixel_direction(view, float(x) + 0.5, float(y) + 0.5)
+        c = environment_lighting.sky_image(world.sky, view.R_world_camera @ d)
     return c
 
 
 @wp.kernel
 def gather_light(
-    view: View,
-    world: World,
-    images: GBufferRecord,
+    view: records.View,
+    world: records.World,
+    images: records.GBufferRecord,
     lattice: Lattice,
-    lights: wp.array[LatticeLight],
+    lights: wp.array[lattice_lighting.LatticeLight],
     coats: wp.array[wp.vec4],
     run: int,
     count: wp.array[int],
@@ -285,9 +272,9 @@ def gather_light(
                 if (done & bit) == 0:
                     hit = images.hits[i]
                     if hit[0] >= 0:
-                        surface = surface_index(world, hit)
+                        surface = records.surface_index(world, hit)
                         missed |= bit
-                        if is_gatherable(world, surface):
+                        if lattice_lighting.is_gatherable(world, surface):
                             stretch, patch, sampler = stretch_at(
                                 view, world, images, lattice, lights, surface, first, x, y
                             )

@@ -8,29 +8,13 @@ from gen_data.renderers.warp.atmosphere.kernels.ground_weathering import (
     footprint,
 )
 from gen_data.renderers.warp.native_code import native
-from gen_data.renderers.warp.realtime.kernels.shadow_culling import FAINT_SHARE
-from gen_data.renderers.warp.realtime.kernels.soft_shadows import (
-    CROWN_GLOW,
-    CROWN_M,
-    SMOOTHED_SHARE,
-    lamp_weight,
-    make_frame,
-    path_to_lamp,
-    surface_tolerance,
-)
-from gen_data.renderers.warp.scene.kernels.ambient_light import (
-    ambient_irradiance,
-    ambient_reflection,
-    is_indoors,
-    received_ambience,
-)
-from gen_data.renderers.warp.scene.kernels.analytic_lights import (
-    SUN,
-    above_horizon_fraction,
-    beam_from,
-    lobe_widening,
-    relative_illuminance,
-    representative_direction,
+from gen_data.renderers.warp.realtime.kernels import shadow_culling, soft_shadows
+from gen_data.renderers.warp.scene.kernels import (
+    ambient_light,
+    analytic_lights,
+    material_eval,
+    ray_queries,
+    records,
 )
 from gen_data.renderers.warp.scene.kernels.brdf import Brdf, make_brdf, specular_lobe
 from gen_data.renderers.warp.scene.kernels.lattice import (
@@ -38,29 +22,6 @@ from gen_data.renderers.warp.scene.kernels.lattice import (
     cell_at,
     ray_origin,
     sheet_side,
-)
-from gen_data.renderers.warp.scene.kernels.material_eval import (
-    SurfaceMaterial,
-    evaluate_material,
-    plain_material,
-    sheet_normal,
-)
-from gen_data.renderers.warp.scene.kernels.ray_queries import (
-    free_path,
-    free_path_before,
-    is_occluded,
-    path_along,
-    precipitation_exposure,
-)
-from gen_data.renderers.warp.scene.kernels.records import (
-    GBufferRecord,
-    LightRecord,
-    View,
-    World,
-    fast_normalize,
-    pixel_ray,
-    pixel_width,
-    surface_index,
 )
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
@@ -157,7 +118,7 @@ class LampLight:
 
 @wp.func
 def sum_lamp_light(
-    world: World,
+    world: records.World,
     brdf: Brdf,
     n: wp.vec3,
     side: wp.vec3,
@@ -173,22 +134,24 @@ def sum_lamp_light(
     for j in range(world.lamps.shape[0]):
         visible = lit[j, k]
         if visible > 0.0:
-            beam = beam_from(world.lamps[j], p_world)
+            beam = analytic_lights.beam_from(world.lamps[j], p_world)
             facing = lit_normal(n, side, beam.direction)
-            n_l = relative_illuminance(world.lamps[j], beam, p_world, facing)
+            n_l = analytic_lights.relative_illuminance(world.lamps[j], beam, p_world, facing)
             arriving = beam.normal_lux * (n_l * visible)
             if wp.dot(side, beam.direction) < 0.0:
                 light.behind += arriving
             elif n_l > 0.0:
-                l = representative_direction(world.lamps[j], beam, p_world, mirrored, alpha)  # noqa: E741
+                l = analytic_lights.representative_direction(  # noqa: E741
+                    world.lamps[j], beam, p_world, mirrored, alpha
+                )
                 # The representative point of a wide lamp may be below the horizon while the lamp
                 # still contributes: see ``above_horizon_fraction``.
                 n_s = wp.max(wp.dot(n, l), 1.0e-3)
-                wider = lobe_widening(world.lamps[j], beam, alpha)
+                wider = analytic_lights.lobe_widening(world.lamps[j], beam, alpha)
                 lobe = specular_lobe(brdf, n, v, l, n_s, wider)
                 light.lux += arriving
                 shine = wp.cw_mul(lobe, beam.normal_lux) * (n_s * visible)
-                shine *= above_horizon_fraction(world.lamps[j], beam, n)
+                shine *= analytic_lights.above_horizon_fraction(world.lamps[j], beam, n)
                 light.shine += shine
                 if world.lamps[j].shown != 0:
                     light.shown += shine
@@ -222,9 +185,9 @@ def specular_occlusion(brdf: Brdf, open_sky: float):
 
 @wp.func
 def light_at(
-    world: World,
+    world: records.World,
     surface: int,
-    material: SurfaceMaterial,
+    material: material_eval.SurfaceMaterial,
     side: wp.vec3,
     p_world: wp.vec3,
     v: wp.vec3,
@@ -249,8 +212,8 @@ def light_at(
     lamps = sum_lamp_light(world, brdf, n, side, p_world, v, lit, k)
     light = LatticeLight()
     light.towards = lamps.towards
-    ambient = received_ambience(world, p_world, n, open_sky)
-    mirror = ambient_reflection(world, p_world, n * (2.0 * n_v) - v, brdf.roughness)
+    ambient = ambient_light.received_ambience(world, p_world, n, open_sky)
+    mirror = ambient_light.ambient_reflection(world, p_world, n * (2.0 * n_v) - v, brdf.roughness)
     # Lambert: illuminance over pi is luminance per albedo.
     lux = lamps.lux * (1.0 / wp.pi)
     received = lux + ambient
@@ -258,7 +221,9 @@ def light_at(
     if wp.dot(side, side) > 0.0:
         # What hides the sky from a leaf hides it from its reflections, at any angle.
         mirrored = wp.min(mirrored, open_sky)
-        behind = lamps.behind * (1.0 / wp.pi) + received_ambience(world, p_world, -n, open_sky)
+        behind = lamps.behind * (1.0 / wp.pi) + ambient_light.received_ambience(
+            world, p_world, -n, open_sky
+        )
         received += wp.cw_mul(material.translucency, behind)
     light.diffuse = wp.cw_mul(brdf.matte, received)
     light.rest = wp.cw_mul(brdf.gloss, mirror) * mirrored + lamps.shine
@@ -270,9 +235,9 @@ def light_at(
 
 @wp.kernel
 def light_lattice(
-    view: View,
-    world: World,
-    images: GBufferRecord,
+    view: records.View,
+    world: records.World,
+    images: records.GBufferRecord,
     lattice: Lattice,
     lit: wp.array2d[float],
     open_sky: wp.array2d[float],
@@ -293,14 +258,14 @@ def light_lattice(
         return
     i = lattice.pixel[k]
     p = lattice.p_m[k]
-    v = fast_normalize(view.eye_m - p)
-    material = plain_material(world, surface, lattice.normal[k])
+    v = records.fast_normalize(view.eye_m - p)
+    material = material_eval.plain_material(world, surface, lattice.normal[k])
     if world.surfaces[surface].texture >= 0:
         z = images.z_m[i]
         weight = images.weights[i]
-        width_m = pixel_width(view, i, z)
+        width_m = records.pixel_width(view, i, z)
         # The texture sets roughness here; pixels apply their own albedo.
-        material = evaluate_material(
+        material = material_eval.evaluate_material(
             world, surface, images.hits[i], weight, lattice.normal[k], width_m, v
         )
     if world.ground.covered != 0:
@@ -316,9 +281,9 @@ def light_lattice(
 
 @wp.kernel
 def shade_points(
-    view: View,
-    world: World,
-    images: GBufferRecord,
+    view: records.View,
+    world: records.World,
+    images: records.GBufferRecord,
     listed: ListedPixels,
     radiance: wp.array[wp.vec3],
 ):
@@ -326,14 +291,14 @@ def shade_points(
     k = wp.tid()
     i = listed.pixels[k]
     hit = images.hits[i]
-    surface = surface_index(world, hit)
+    surface = records.surface_index(world, hit)
     if world.surfaces[surface].layered != 0:
         return
-    d = pixel_ray(view, i)
-    v = fast_normalize(-d)
+    d = records.pixel_ray(view, i)
+    v = records.fast_normalize(-d)
     z = images.z_m[i]
-    width_m = pixel_width(view, i, z)
-    material = evaluate_material(
+    width_m = records.pixel_width(view, i, z)
+    material = material_eval.evaluate_material(
         world, surface, hit, images.weights[i], images.normals[i], width_m, v
     )
     p = view.eye_m + d * z
@@ -341,13 +306,13 @@ def shade_points(
         n = images.normals[i]
         coat = coat_at(world, surface, p, n, listed.exposed[k], footprint(view, p, n, 1.0))
         material = apply_coat(world, surface, material, coat, n)
-    side = sheet_normal(world, surface, hit, images.weights[i])
+    side = material_eval.sheet_normal(world, surface, hit, images.weights[i])
     light = light_at(world, surface, material, side, p, v, listed.lit, listed.open_sky[0, k], k)
     radiance[i] = wp.cw_mul(light.diffuse, material.albedo) + light.rest
 
 
 @wp.func
-def is_gatherable(world: World, surface: int):
+def is_gatherable(world: records.World, surface: int):
     """Whether a material's light varies slowly enough to be interpolated from the lattice."""
     smooth = world.surfaces[surface].roughness >= GATHERED_ROUGHNESS
     smooth = smooth and world.surfaces[surface].layered == 0
@@ -390,9 +355,9 @@ def interpolate_visibility(
 
 @wp.kernel
 def find_pixel_visibility(
-    view: View,
-    world: World,
-    images: GBufferRecord,
+    view: records.View,
+    world: records.World,
+    images: records.GBufferRecord,
     lattice: Lattice,
     lattice_lit: wp.array2d[float],
     lattice_sky: wp.array2d[float],
@@ -404,7 +369,7 @@ def find_pixel_visibility(
     i = listed.pixels[k]
     x = i % view.width
     y = i / view.width
-    d = pixel_ray(view, i)
+    d = records.pixel_ray(view, i)
     p = view.eye_m + d * images.z_m[i]
     n = images.normals[i]
     body = images.hits[i][0]
@@ -419,7 +384,7 @@ def find_pixel_visibility(
         body,
         p,
         n,
-        2.0 * surface_tolerance(view, p),
+        2.0 * soft_shadows.surface_tolerance(view, p),
         x / lattice.stride,
         y / lattice.stride,
         cell.right,
@@ -429,24 +394,24 @@ def find_pixel_visibility(
     )
     if not found:
         origin = ray_origin(world, images.hits[i], images.weights[i], p, d * images.z_m[i])
-        side = sheet_normal(
-            world, surface_index(world, images.hits[i]), images.hits[i], images.weights[i]
+        side = material_eval.sheet_normal(
+            world, records.surface_index(world, images.hits[i]), images.hits[i], images.weights[i]
         )
         # As by weigh_lamps: of faint lamps the lattice has no light either.
-        total = wp.max(wp.max(ambient_irradiance(world, p, n)) * wp.pi, 1.0e-9)
-        indoors = is_indoors(world, p)
+        total = wp.max(wp.max(ambient_light.ambient_irradiance(world, p, n)) * wp.pi, 1.0e-9)
+        indoors = ambient_light.is_indoors(world, p)
         for j in range(world.lamps.shape[0]):
-            listed.lit[j, k] = lamp_weight(world.lamps[j], origin, n, side)
-            if not indoors or world.lamps[j].kind != SUN:
+            listed.lit[j, k] = soft_shadows.lamp_weight(world.lamps[j], origin, n, side)
+            if not indoors or world.lamps[j].kind != analytic_lights.SUN:
                 total += wp.max(listed.lit[j, k], 0.0)
         for j in range(world.lamps.shape[0]):
             weight = listed.lit[j, k] / total
             listed.lit[j, k] = 0.0
-            if weight > SMOOTHED_SHARE:
+            if weight > soft_shadows.SMOOTHED_SHARE:
                 listed.lit[j, k] = visible_lamp_fraction(
                     world, world.lamps[j], p, origin, n, side, probe.parts
                 )
-            elif weight > FAINT_SHARE:
+            elif weight > shadow_culling.FAINT_SHARE:
                 listed.lit[j, k] = visible_lamp_fraction(
                     world, world.lamps[j], p, origin, n, side, probe.centre
                 )
@@ -459,12 +424,12 @@ def find_pixel_visibility(
 
 
 @wp.func
-def sky_exposure_at(world: World, body: int, origin: wp.vec3, n: wp.vec3):
+def sky_exposure_at(world: records.World, body: int, origin: wp.vec3, n: wp.vec3):
     """Exposure of a point on a body to precipitation, by a ray."""
     exposed = float(1.0)
     # Steep surfaces hold no water or snow: their exposure is never used.
     if world.ground.covered != 0 and n[2] > 0.1:
-        exposed = precipitation_exposure(world, body, origin)
+        exposed = ray_queries.precipitation_exposure(world, body, origin)
     return exposed
 
 
@@ -487,8 +452,8 @@ def body_sky_visibility(lattice: Lattice, lattice_sky: wp.array2d[float], q: int
 
 @wp.func
 def visible_lamp_fraction(
-    world: World,
-    lamp: LightRecord,
+    world: records.World,
+    lamp: records.LightRecord,
     p: wp.vec3,
     origin: wp.vec3,
     n: wp.vec3,
@@ -504,7 +469,7 @@ def visible_lamp_fraction(
         n: Normal of the horizon of opaque surfaces.
         side: As for light_at.
     """
-    beam = beam_from(lamp, origin)
+    beam = analytic_lights.beam_from(lamp, origin)
     seen = float(0.0)
     cast = int(0)
     start = origin
@@ -519,8 +484,11 @@ def visible_lamp_fraction(
             # Penumbrae are rare: where the first two rays agree, the rest is taken to agree.
             if k < 2 or (seen > 0.0 and seen < float(cast)):
                 cast += 1
-                if not is_occluded(
-                    world, path_along(start, path_to_lamp(lamp, start, horizon, parts[k]))
+                if not ray_queries.is_occluded(
+                    world,
+                    ray_queries.path_along(
+                        start, soft_shadows.path_to_lamp(lamp, start, horizon, parts[k])
+                    ),
                 ):
                     seen += 1.0
     return seen / wp.max(float(cast), 1.0)
@@ -528,7 +496,7 @@ def visible_lamp_fraction(
 
 @wp.func
 def visible_sky_fraction(
-    world: World,
+    world: records.World,
     body: int,
     p: wp.vec3,
     origin: wp.vec3,
@@ -545,7 +513,7 @@ def visible_sky_fraction(
     """
     if radius_m == 0.0:
         return 1.0
-    x, y = make_frame(n)
+    x, y = soft_shadows.make_frame(n)
     total = float(0.0)
     for k in range(disc.shape[0]):
         c = disc[k]
@@ -558,8 +526,10 @@ def visible_sky_fraction(
             way = way * wp.where((k & 1) == 0, 1.0, -1.0)
             if wp.dot(side, way) < 0.0:
                 start = p * 2.0 - origin
-            within = free_path_before(world, body, path_along(start, way * CROWN_M), 1.0)
-        t = free_path(world, path_along(start, way * radius_m))
+            within = ray_queries.free_path_before(
+                world, body, ray_queries.path_along(start, way * soft_shadows.CROWN_M), 1.0
+            )
+        t = ray_queries.free_path(world, ray_queries.path_along(start, way * radius_m))
         # Full occlusion on contact, fading with zero slope at the radius.
-        total += wp.min(t * (2.0 - t), wp.max(within, CROWN_GLOW))
+        total += wp.min(t * (2.0 - t), wp.max(within, soft_shadows.CROWN_GLOW))
     return total / float(disc.shape[0])

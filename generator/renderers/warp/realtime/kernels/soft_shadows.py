@@ -15,14 +15,7 @@ import warp as wp
 
 from gen_data.renderers.warp.native_code import LANES, native
 from gen_data.renderers.warp.realtime.kernels.shadow_culling import FAINT_SHARE, TILE
-from gen_data.renderers.warp.scene.kernels.ambient_light import ambient_irradiance, is_indoors
-from gen_data.renderers.warp.scene.kernels.analytic_lights import (
-    DISK,
-    RECTANGLE,
-    SUN,
-    SUN_DISTANCE_M,
-    beam_from,
-)
+from gen_data.renderers.warp.scene.kernels import ambient_light, analytic_lights, ray_queries
 from gen_data.renderers.warp.scene.kernels.lattice import (
     Departure,
     Lattice,
@@ -30,14 +23,6 @@ from gen_data.renderers.warp.scene.kernels.lattice import (
     sheet_side,
 )
 from gen_data.renderers.warp.scene.kernels.material_eval import is_translucent
-from gen_data.renderers.warp.scene.kernels.ray_queries import (
-    NOBODY,
-    free_path_before,
-    free_path_of_listed,
-    is_occluded,
-    listed_blocker,
-    path_along,
-)
 from gen_data.renderers.warp.scene.kernels.records import LightRecord, View, World, fast_normalize
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
@@ -89,8 +74,8 @@ def make_frame(z: wp.vec3):
 def lamp_vector(lamp: LightRecord, p_world: wp.vec3):
     """Displacement from a point to the centre of a lamp."""
     way = lamp.position_m - p_world
-    if lamp.kind == SUN:
-        way = lamp.direction * -SUN_DISTANCE_M
+    if lamp.kind == analytic_lights.SUN:
+        way = lamp.direction * -analytic_lights.SUN_DISTANCE_M
     return way
 
 
@@ -104,15 +89,15 @@ def path_to_lamp(lamp: LightRecord, origin: wp.vec3, n: wp.vec3, part: wp.vec2):
     """
     to_lamp = lamp_vector(lamp, origin)
     off = wp.vec3(0.0)
-    if lamp.kind == RECTANGLE:
+    if lamp.kind == analytic_lights.RECTANGLE:
         q = square_of_disc(part)
         off = lamp.along * q[0] + lamp.across * q[1]
-    elif lamp.kind == DISK:
+    elif lamp.kind == analytic_lights.DISK:
         off = lamp.along * part[0] + lamp.across * part[1]
     else:
         radius = lamp.radius
-        if lamp.kind == SUN:
-            radius = lamp.radius * SUN_DISTANCE_M
+        if lamp.kind == analytic_lights.SUN:
+            radius = lamp.radius * analytic_lights.SUN_DISTANCE_M
         x, y = make_frame(fast_normalize(to_lamp))
         off = (x * part[0] + y * part[1]) * radius
     # Parts below the horizon contribute nothing: the ray samples the opposite part instead.
@@ -177,7 +162,7 @@ def lamp_weight(lamp: LightRecord, origin: wp.vec3, n: wp.vec3, side: wp.vec3):
         side: Direction away from a translucent surface, lamps behind which count like those before
             it; 0 for opaque surfaces.
     """
-    beam = beam_from(lamp, origin)
+    beam = analytic_lights.beam_from(lamp, origin)
     cosine = wp.dot(beam.direction, n)
     if wp.dot(side, side) > 0.0:
         cosine = wp.abs(cosine)
@@ -204,12 +189,12 @@ def weigh_lamps(world: World, lattice: Lattice, shares: wp.array2d[float], matte
     n = lattice.normal[i]
     side = sheet_side(world, lattice, i)
     p = lattice.p_m[i]
-    total = wp.max(wp.max(ambient_irradiance(world, p, n)) * wp.pi, 1.0e-9)
-    indoors = is_indoors(world, p)
+    total = wp.max(wp.max(ambient_light.ambient_irradiance(world, p, n)) * wp.pi, 1.0e-9)
+    indoors = ambient_light.is_indoors(world, p)
     for j in range(world.lamps.shape[0]):
         shares[j, i] = lamp_weight(world.lamps[j], lattice.origin_m[i], n, side)
         # A sun that is nearly always behind walls hides no lamp.
-        if not indoors or world.lamps[j].kind != SUN:
+        if not indoors or world.lamps[j].kind != analytic_lights.SUN:
             total += wp.max(shares[j, i], 0.0)
     for j in range(world.lamps.shape[0]):
         if shares[j, i] > 0.0:
@@ -260,7 +245,7 @@ def probe_lamps(
     # Where nothing can shade, the first pass writes both colours.
     if not shaded and parity == 1:
         return
-    likely = int(NOBODY)
+    likely = int(ray_queries.NOBODY)
     k = int(part * run)
     while k < (part + 1) * run:
         i = block_point(lattice, row, column, k)
@@ -283,11 +268,13 @@ def probe_lamps(
                         )
                         at = disc[3 * bayer(k % BLOCK, k / BLOCK) + 1]
                         way = path_to_lamp(world.lamps[j], start.origin_m, start.normal, at)
-                        path = path_along(start.origin_m, way)
-                        blocker = listed_blocker(world, lists, tile, j, start.skip, likely, path)
-                        value = wp.where(blocker == NOBODY, 1.0, 0.0)
+                        path = ray_queries.path_along(start.origin_m, way)
+                        blocker = ray_queries.listed_blocker(
+                            world, lists, tile, j, start.skip, likely, path
+                        )
+                        value = wp.where(blocker == ray_queries.NOBODY, 1.0, 0.0)
                         # The next path is close by.
-                        likely = wp.where(blocker == NOBODY, likely, blocker)
+                        likely = wp.where(blocker == ray_queries.NOBODY, likely, blocker)
             lit[j, i] = value
         k += 1
 
@@ -377,7 +364,7 @@ def refine_lamps(
     tile = block_tile(row, column, tile_columns)
     x = BLOCK * column
     mixed = (classes_near(classes, x, x, BLOCK * row, j) & 3) == 3
-    likely = int(NOBODY)
+    likely = int(ray_queries.NOBODY)
     k = int(part * run)
     while k < (part + 1) * run:
         i = block_point(lattice, row, column, k)
@@ -394,9 +381,11 @@ def refine_lamps(
                         # The two points of the triple that probe_lamps has left out.
                         at = disc[3 * rank + 2 * more]
                         way = path_to_lamp(world.lamps[j], start.origin_m, start.normal, at)
-                        path = path_along(start.origin_m, way)
-                        blocker = listed_blocker(world, lists, tile, j, start.skip, likely, path)
-                        if blocker == NOBODY:
+                        path = ray_queries.path_along(start.origin_m, way)
+                        blocker = ray_queries.listed_blocker(
+                            world, lists, tile, j, start.skip, likely, path
+                        )
+                        if blocker == ray_queries.NOBODY:
                             seen += 1.0
                         else:
                             likely = blocker
@@ -564,11 +553,11 @@ def open_path(
         way = way * wp.where(other_side, -1.0, 1.0)
         start = departure_to(world, lattice, i, way)
         start.skip = lattice.body[i]
-        within = free_path_before(
-            world, lattice.body[i], path_along(start.origin_m, way * CROWN_M), 1.0
+        within = ray_queries.free_path_before(
+            world, lattice.body[i], ray_queries.path_along(start.origin_m, way * CROWN_M), 1.0
         )
-    path = path_along(start.origin_m, way * radius_m)
-    t = free_path_of_listed(world, lists, tile, start.skip, path)
+    path = ray_queries.path_along(start.origin_m, way * radius_m)
+    t = ray_queries.free_path_of_listed(world, lists, tile, start.skip, path)
     # Full occlusion on contact, fading with zero slope at the radius: no visible boundary.
     return wp.min(t * (2.0 - t), wp.max(within, CROWN_GLOW))
 
@@ -670,5 +659,5 @@ def count_free_paths(
     """Count the unobstructed paths over all points and directions."""
     i = wp.tid()
     for k in range(ways.shape[0]):
-        if not is_occluded(world, path_along(points[i], ways[k])):
+        if not ray_queries.is_occluded(world, ray_queries.path_along(points[i], ways[k])):
             wp.atomic_add(free, 0, 1)

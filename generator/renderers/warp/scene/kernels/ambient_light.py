@@ -6,11 +6,7 @@ Source: McTaggart, "Half-Life 2 / Valve Source shading", GDC 2004 (ambient cubes
 import warp as wp
 
 from gen_data.core.scene import VOLUME_REACH_M
-from gen_data.renderers.warp.scene.kernels.environment_lighting import (
-    sky_irradiance,
-    sky_reflection,
-)
-from gen_data.renderers.warp.scene.kernels.records import World, floor_int
+from gen_data.renderers.warp.scene.kernels import environment_lighting, records
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 
@@ -18,7 +14,7 @@ MARGIN_M = wp.constant(VOLUME_REACH_M)
 
 
 @wp.func
-def depth_in_volume(world: World, v: int, p: wp.vec3):
+def depth_in_volume(world: records.World, v: int, p: wp.vec3):
     """How deep a point is in a volume: 1 in its middle, 0 or less where it does not reach."""
     low = p - world.volumes[v].low_m
     high = world.volumes[v].high_m - p
@@ -30,7 +26,7 @@ def depth_in_volume(world: World, v: int, p: wp.vec3):
 
 
 @wp.func
-def is_indoors(world: World, p: wp.vec3):
+def is_indoors(world: records.World, p: wp.vec3):
     """Whether any volume reaches a point."""
     found = bool(False)
     for v in range(world.volumes.shape[0]):
@@ -39,7 +35,7 @@ def is_indoors(world: World, p: wp.vec3):
 
 
 @wp.func
-def probe_light(world: World, row: int, n: wp.vec3):
+def probe_light(world: records.World, row: int, n: wp.vec3):
     """Irradiance over pi around a direction, by one ambient cube."""
     x = world.probes[row, wp.where(n[0] >= 0.0, 0, 1)] * (n[0] * n[0])
     y = world.probes[row, wp.where(n[1] >= 0.0, 2, 3)] * (n[1] * n[1])
@@ -48,7 +44,7 @@ def probe_light(world: World, row: int, n: wp.vec3):
 
 
 @wp.func
-def volume_light(world: World, v: int, p: wp.vec3, n: wp.vec3):
+def volume_light(world: records.World, v: int, p: wp.vec3, n: wp.vec3):
     """Irradiance over pi in a volume, trilinear between its probes [cd/m^2]."""
     low = world.volumes[v].low_m
     size = world.volumes[v].high_m - low
@@ -59,7 +55,7 @@ def volume_light(world: World, v: int, p: wp.vec3, n: wp.vec3):
     for k in range(3):
         last = float(counts[k] - 1)
         place = wp.clamp((p[k] - low[k]) / size[k] * float(counts[k]) - 0.5, 0.0, last)
-        base[k] = wp.min(floor_int(place), wp.max(counts[k] - 2, 0))
+        base[k] = wp.min(records.floor_int(place), wp.max(counts[k] - 2, 0))
         at[k] = place - float(base[k])
     for corner in range(8):
         dx = corner & 1
@@ -75,7 +71,7 @@ def volume_light(world: World, v: int, p: wp.vec3, n: wp.vec3):
 
 
 @wp.func
-def light_of_volumes(world: World, p: wp.vec3, n: wp.vec3):
+def light_of_volumes(world: records.World, p: wp.vec3, n: wp.vec3):
     """Irradiance over pi by the volumes that reach a point, and the sum of their weights.
 
     Weights are squares of depths: light passes evenly from one room to the other within a wall, and
@@ -94,11 +90,11 @@ def light_of_volumes(world: World, p: wp.vec3, n: wp.vec3):
 
 
 @wp.func
-def ambient_irradiance(world: World, p: wp.vec3, n: wp.vec3):
+def ambient_irradiance(world: records.World, p: wp.vec3, n: wp.vec3):
     """Irradiance over pi from the hemisphere around a normal [cd/m^2]."""
     light, weight = light_of_volumes(world, p, n)
     if weight == 0.0:
-        light = sky_irradiance(world.sky, n)
+        light = environment_lighting.sky_irradiance(world.sky, n)
     return light
 
 
@@ -116,19 +112,19 @@ def interreflected_share(open_share: float):
 
 
 @wp.func
-def received_ambience(world: World, p: wp.vec3, n: wp.vec3, open_share: float):
+def received_ambience(world: records.World, p: wp.vec3, n: wp.vec3, open_share: float):
     """As ``ambient_irradiance``, where surfaces nearby leave a share of the hemisphere open."""
     light, weight = light_of_volumes(world, p, n)
     if weight > 0.0:
         return light * interreflected_share(open_share)
-    return sky_irradiance(world.sky, n) * open_share
+    return environment_lighting.sky_irradiance(world.sky, n) * open_share
 
 
 @wp.func
-def ambient_reflection(world: World, p: wp.vec3, d: wp.vec3, roughness: float):
+def ambient_reflection(world: records.World, p: wp.vec3, d: wp.vec3, roughness: float):
     """Radiance averaged over the lobe of a roughness around a mirrored direction."""
     # Walls are near and even: what a hemisphere of them sends stands for any lobe.
     light, weight = light_of_volumes(world, p, d)
     if weight == 0.0:
-        light = sky_reflection(world.sky, d, roughness)
+        light = environment_lighting.sky_reflection(world.sky, d, roughness)
     return light

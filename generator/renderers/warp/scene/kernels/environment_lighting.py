@@ -8,17 +8,13 @@ al., "A survey of efficient representations for independent unit vectors", JCGT 
 import warp as wp
 
 from gen_data.renderers.warp.native_code import native
-from gen_data.renderers.warp.scene.kernels.records import (
-    EnvironmentRecord,
-    fast_normalize,
-    floor_int,
-)
+from gen_data.renderers.warp.scene.kernels import records
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 
 
 @wp.func
-def to_sky(sky: EnvironmentRecord, d: wp.vec3):
+def to_sky(sky: records.EnvironmentRecord, d: wp.vec3):
     """Rotate a world direction into the frame of the image."""
     return wp.vec3(
         sky.cos_yaw * d[0] + sky.sin_yaw * d[1], sky.cos_yaw * d[1] - sky.sin_yaw * d[0], d[2]
@@ -26,7 +22,7 @@ def to_sky(sky: EnvironmentRecord, d: wp.vec3):
 
 
 @wp.func
-def sky_irradiance(sky: EnvironmentRecord, n_world: wp.vec3):
+def sky_irradiance(sky: records.EnvironmentRecord, n_world: wp.vec3):
     """Irradiance over pi from the hemisphere around a normal [cd/m^2]."""
     n = to_sky(sky, n_world)
     c = sky.irradiance
@@ -38,13 +34,13 @@ def sky_irradiance(sky: EnvironmentRecord, n_world: wp.vec3):
 
 
 @wp.func
-def sky_image(sky: EnvironmentRecord, d_world: wp.vec3):
+def sky_image(sky: records.EnvironmentRecord, d_world: wp.vec3):
     """Luminance of the image in one direction of any length [cd/m^2]."""
     return sample_panorama(sky.image, to_sky(sky, d_world)) * sky.luminance
 
 
 @wp.func
-def sky_rest(sky: EnvironmentRecord, d_world: wp.vec3):
+def sky_rest(sky: records.EnvironmentRecord, d_world: wp.vec3):
     """As sky_image, without the parts that lamps represent."""
     return sample_panorama(sky.rest, to_sky(sky, d_world)) * sky.luminance
 
@@ -52,7 +48,7 @@ def sky_rest(sky: EnvironmentRecord, d_world: wp.vec3):
 @wp.func
 def sample_panorama(image: wp.array2d[wp.vec3], direction: wp.vec3):
     """An equirectangular image in one direction of its own frame, bilinear; any length."""
-    d = fast_normalize(direction)
+    d = records.fast_normalize(direction)
     height = image.shape[0]
     width = image.shape[1]
     # Row 0 is the zenith and columns run clockwise from -X; texel centres are at halves.
@@ -67,8 +63,8 @@ def blend_texels(image: wp.array2d[wp.vec3], x: float, y: float):
     """An equirectangular image at a position in texels from the centre of the first, bilinear."""
     height = image.shape[0]
     width = image.shape[1]
-    x0 = floor_int(x)
-    y0 = floor_int(y)
+    x0 = records.floor_int(x)
+    y0 = records.floor_int(y)
     fx = x - float(x0)
     fy = y - float(y0)
     # Around the horizon columns wrap; rows end at the poles.
@@ -98,7 +94,7 @@ def octahedral(d: wp.vec3):
 
 
 @wp.func
-def glossy_level(sky: EnvironmentRecord, level: int, p: wp.vec2):
+def glossy_level(sky: records.EnvironmentRecord, level: int, p: wp.vec2):
     """One prefiltered map at a point of the square; maps have a border of one texel."""
     # The border repeats texels across the fold: bilinear taps need no special cases.
     inner = float(sky.glossy.shape[1] - 2)
@@ -114,12 +110,12 @@ def glossy_level(sky: EnvironmentRecord, level: int, p: wp.vec2):
 
 
 @wp.func
-def sky_reflection(sky: EnvironmentRecord, d_world: wp.vec3, roughness: float):
+def sky_reflection(sky: records.EnvironmentRecord, d_world: wp.vec3, roughness: float):
     """Radiance averaged over the lobe of a roughness around a mirrored direction."""
     levels = sky.glossy.shape[0]
     level = roughness * float(levels) - 1.0
     p = octahedral(to_sky(sky, d_world))
-    lower = wp.clamp(floor_int(level), 0, levels - 1)
+    lower = wp.clamp(records.floor_int(level), 0, levels - 1)
     upper = wp.min(lower + 1, levels - 1)
     part = wp.clamp(level - float(lower), 0.0, 1.0)
     rough = glossy_level(sky, lower, p)
@@ -141,7 +137,7 @@ def octahedral_direction(x: float, y: float):
         fold_x = (1.0 - wp.abs(y)) * wp.where(x >= 0.0, 1.0, -1.0)
         y = (1.0 - wp.abs(x)) * wp.where(y >= 0.0, 1.0, -1.0)
         x = fold_x
-    return fast_normalize(wp.vec3(x, y, z))
+    return records.fast_normalize(wp.vec3(x, y, z))
 
 
 @wp.kernel

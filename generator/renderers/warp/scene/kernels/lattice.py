@@ -6,21 +6,7 @@ lattice, and all other pixels interpolate between lattice points on the same str
 
 import warp as wp
 
-from gen_data.renderers.warp.scene.kernels.material_eval import is_translucent
-from gen_data.renderers.warp.scene.kernels.ray_queries import OFFSET_M, OFFSET_PER_DISTANCE
-from gen_data.renderers.warp.scene.kernels.records import (
-    GBufferRecord,
-    View,
-    World,
-    face_vertices,
-    fast_normalize,
-    first_weight,
-    is_back_face,
-    normal_at,
-    pixel_ray,
-    surface_index,
-    vertex_at,
-)
+from gen_data.renderers.warp.scene.kernels import material_eval, ray_queries, records
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 
@@ -52,43 +38,45 @@ class Lattice:
 
 
 @wp.func
-def ray_origin(world: World, hit: wp.vec2i, weight: wp.vec2, p_world: wp.vec3, d_world: wp.vec3):
+def ray_origin(
+    world: records.World, hit: wp.vec2i, weight: wp.vec2, p_world: wp.vec3, d_world: wp.vec3
+):
     """Origin of rays just off the smooth surface that the vertex normals describe.
 
     Source: Hanika, "Hacking the shadow terminator", Ray Tracing Gems II, 2021.
     """
     b = hit[0]
     g = world.bodies[b].geometry
-    corner = face_vertices(world, g, hit[1])
-    p0 = vertex_at(world, g, corner[0])
-    p1 = vertex_at(world, g, corner[1])
-    p2 = vertex_at(world, g, corner[2])
-    side = wp.where(is_back_face(weight), -1.0, 1.0)
-    u = first_weight(weight)
+    corner = records.face_vertices(world, g, hit[1])
+    p0 = records.vertex_at(world, g, corner[0])
+    p1 = records.vertex_at(world, g, corner[1])
+    p2 = records.vertex_at(world, g, corner[2])
+    side = wp.where(records.is_back_face(weight), -1.0, 1.0)
+    u = records.first_weight(weight)
     v = weight[1]
     w = 1.0 - u - v
     p = p0 * w + p1 * u + p2 * v
-    n0 = normal_at(world, g, corner[0]) * side
-    n1 = normal_at(world, g, corner[1]) * side
-    n2 = normal_at(world, g, corner[2]) * side
+    n0 = records.normal_at(world, g, corner[0]) * side
+    n1 = records.normal_at(world, g, corner[1]) * side
+    n2 = records.normal_at(world, g, corner[2]) * side
     # Project the point onto each vertex's tangent plane, and interpolate: coarse meshes then do not
     # shade themselves where the smooth normal still faces the light.
     shift = n0 * (w * wp.min(0.0, wp.dot(p - p0, n0)))
     shift += n1 * (u * wp.min(0.0, wp.dot(p - p1, n1)))
     shift += n2 * (v * wp.min(0.0, wp.dot(p - p2, n2)))
-    if is_translucent(world, surface_index(world, hit)):
+    if material_eval.is_translucent(world, records.surface_index(world, hit)):
         # Light of either side counts: the point must lie on the side of the sheet that it is for.
         shift = wp.vec3(0.0)
-    flat = fast_normalize(wp.cross(p1 - p0, p2 - p0)) * side
-    lift_m = OFFSET_M + OFFSET_PER_DISTANCE * wp.length(d_world)
+    flat = records.fast_normalize(wp.cross(p1 - p0, p2 - p0)) * side
+    lift_m = ray_queries.OFFSET_M + ray_queries.OFFSET_PER_DISTANCE * wp.length(d_world)
     return p_world + world.bodies[b].R_world_mesh @ (flat * lift_m - shift * world.bodies[b].scale)
 
 
 @wp.kernel
 def sample_lattice(
-    view: View,
-    world: World,
-    images: GBufferRecord,
+    view: records.View,
+    world: records.World,
+    images: records.GBufferRecord,
     lattice: Lattice,
 ):
     """Compute the lattice's points from the G-buffer."""
@@ -102,8 +90,8 @@ def sample_lattice(
     lattice.surface[i] = -1
     if hit[0] < 0:
         return
-    lattice.surface[i] = surface_index(world, hit)
-    offset = pixel_ray(view, pixel) * images.z_m[pixel]
+    lattice.surface[i] = records.surface_index(world, hit)
+    offset = records.pixel_ray(view, pixel) * images.z_m[pixel]
     p = view.eye_m + offset
     lattice.p_m[i] = p
     lattice.normal[i] = images.normals[pixel]
@@ -115,10 +103,10 @@ def sample_lattice(
 
 
 @wp.func
-def sheet_side(world: World, lattice: Lattice, i: int):
+def sheet_side(world: records.World, lattice: Lattice, i: int):
     """Direction away from a translucent surface on its visible side, any length; 0 for others."""
     side = wp.vec3(0.0)
-    if is_translucent(world, lattice.surface[i]):
+    if material_eval.is_translucent(world, lattice.surface[i]):
         side = lattice.origin_m[i] - lattice.p_m[i]
     return side
 
@@ -139,7 +127,7 @@ class Departure:
 
 
 @wp.func
-def departure_to(world: World, lattice: Lattice, i: int, to_lamp: wp.vec3):
+def departure_to(world: records.World, lattice: Lattice, i: int, to_lamp: wp.vec3):
     """Start of the rays from lattice point i towards a lamp in the given direction."""
     start = Departure()
     start.origin_m = lattice.origin_m[i]
@@ -180,7 +168,7 @@ class Cell:
 
 
 @wp.func
-def cell_at(view: View, lattice: Lattice, x: int, y: int):
+def cell_at(view: records.View, lattice: Lattice, x: int, y: int):
     """The cell of a pixel."""
     column = x / lattice.stride
     row = y / lattice.stride

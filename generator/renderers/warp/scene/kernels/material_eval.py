@@ -2,17 +2,7 @@
 
 import warp as wp
 
-from gen_data.renderers.warp.scene.kernels.alpha_test import project_uv
-from gen_data.renderers.warp.scene.kernels.records import (
-    World,
-    face_vertices,
-    fast_normalize,
-    first_weight,
-    flat_normal,
-    is_back_face,
-    mesh_point,
-    vertex_at,
-)
+from gen_data.renderers.warp.scene.kernels import alpha_test, records
 from gen_data.renderers.warp.scene.kernels.texture_sampling import make_sampler, texel_at
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
@@ -37,13 +27,13 @@ class SurfaceMaterial:
 
 
 @wp.func
-def is_translucent(world: World, surface: int):
+def is_translucent(world: records.World, surface: int):
     """Whether a surface scatters light to its other side."""
     return wp.max(world.surfaces[surface].translucency) > 0.0
 
 
 @wp.func
-def sheet_normal(world: World, surface: int, hit: wp.vec2i, weight: wp.vec2):
+def sheet_normal(world: records.World, surface: int, hit: wp.vec2i, weight: wp.vec2):
     """Geometric normal of a translucent surface on its visible side; 0 for opaque surfaces.
 
     Smooth normals of foliage lean out of the crown, so that they do not tell the sides of a leaf
@@ -51,17 +41,17 @@ def sheet_normal(world: World, surface: int, hit: wp.vec2i, weight: wp.vec2):
     """
     n = wp.vec3(0.0)
     if is_translucent(world, surface):
-        n = flat_normal(world, hit)
-        if is_back_face(weight):
+        n = records.flat_normal(world, hit)
+        if records.is_back_face(weight):
             n = -n
     return n
 
 
 @wp.func
-def print_footprint(world: World, surface: int, weight: wp.vec2, width_m: float):
+def print_footprint(world: records.World, surface: int, weight: wp.vec2, width_m: float):
     """Width over which a texture is averaged: the back of a print shows its mean."""
     prints = world.surfaces[surface].one_sided != 0
-    if prints and is_back_face(weight) and world.surfaces[surface].texture_scale_m == 0.0:
+    if prints and records.is_back_face(weight) and world.surfaces[surface].texture_scale_m == 0.0:
         return EVERYTHING_M
     return width_m
 
@@ -69,7 +59,7 @@ def print_footprint(world: World, surface: int, weight: wp.vec2, width_m: float)
 @wp.func
 def apply_uv_texture(
     material: SurfaceMaterial,
-    world: World,
+    world: records.World,
     texture: int,
     hit: wp.vec2i,
     weight: wp.vec2,
@@ -78,16 +68,16 @@ def apply_uv_texture(
     """Apply a texture by the mesh's own UVs."""
     b = hit[0]
     g = world.bodies[b].geometry
-    corner = face_vertices(world, g, hit[1])
+    corner = records.face_vertices(world, g, hit[1])
     uv0 = world.geometries[g].uvs[corner[0]]
     d1 = world.geometries[g].uvs[corner[1]] - uv0
     d2 = world.geometries[g].uvs[corner[2]] - uv0
-    u = first_weight(weight)
+    u = records.first_weight(weight)
     uv = uv0 + d1 * u + d2 * weight[1]
-    p = vertex_at(world, g, corner[0])
+    p = records.vertex_at(world, g, corner[0])
     scale = world.bodies[b].scale
-    e1 = (vertex_at(world, g, corner[1]) - p) * scale
-    e2 = (vertex_at(world, g, corner[2]) - p) * scale
+    e1 = (records.vertex_at(world, g, corner[1]) - p) * scale
+    e2 = (records.vertex_at(world, g, corner[2]) - p) * scale
     area_uv = d1[0] * d2[1] - d1[1] * d2[0]
     area_m2 = wp.length(wp.cross(e1, e2))
     size = float(world.textures[texture].width * world.textures[texture].height)
@@ -105,9 +95,11 @@ def apply_uv_texture(
         bitangent = world.bodies[b].R_world_mesh @ ((e2 * d1[0] - e1 * d2[0]) / area_uv)
         n = material.normal
         # Gram-Schmidt: interpolated normals are not perpendicular to the face's tangents.
-        tangent = fast_normalize(tangent - n * wp.dot(n, tangent))
-        bitangent = fast_normalize(bitangent - n * wp.dot(n, bitangent))
-        material.normal = fast_normalize(tangent * bump[0] + bitangent * bump[1] + n * bump[2])
+        tangent = records.fast_normalize(tangent - n * wp.dot(n, tangent))
+        bitangent = records.fast_normalize(bitangent - n * wp.dot(n, bitangent))
+        material.normal = records.fast_normalize(
+            tangent * bump[0] + bitangent * bump[1] + n * bump[2]
+        )
     return material
 
 
@@ -129,7 +121,7 @@ def tilt_normal(bump: wp.vec3, axis: int, n: wp.vec3):
 @wp.func
 def apply_triplanar_texture(
     material: SurfaceMaterial,
-    world: World,
+    world: records.World,
     texture: int,
     b: int,
     p_mesh: wp.vec3,
@@ -153,7 +145,7 @@ def apply_triplanar_texture(
     for axis in range(3):
         # A weight below one step of 8 bits is not worth a texture lookup.
         if w[axis] > 0.004:
-            uv = project_uv(p, axis)
+            uv = alpha_test.project_uv(p, axis)
             texel = texel_at(world, texture, sampler, uv[0], uv[1], bumpy)
             albedo += texel.albedo * w[axis]
             roughness += texel.roughness * w[axis]
@@ -161,12 +153,12 @@ def apply_triplanar_texture(
     material.albedo = wp.cw_mul(material.albedo, albedo)
     material.roughness *= roughness
     if bumpy:
-        material.normal = fast_normalize(world.bodies[b].R_world_mesh @ m)
+        material.normal = records.fast_normalize(world.bodies[b].R_world_mesh @ m)
     return material
 
 
 @wp.func
-def plain_material(world: World, surface: int, normal: wp.vec3):
+def plain_material(world: records.World, surface: int, normal: wp.vec3):
     """Material of a surface without its textures."""
     material = SurfaceMaterial()
     material.albedo = world.surfaces[surface].base_color
@@ -180,7 +172,7 @@ def plain_material(world: World, surface: int, normal: wp.vec3):
 
 @wp.func
 def evaluate_material(
-    world: World,
+    world: records.World,
     surface: int,
     hit: wp.vec2i,
     weight: wp.vec2,
@@ -197,7 +189,7 @@ def evaluate_material(
         footprint_m = width_m / slant
         scale_m = world.surfaces[surface].texture_scale_m
         if scale_m > 0.0:
-            p_mesh = mesh_point(world, hit, weight)
+            p_mesh = records.mesh_point(world, hit, weight)
             material = apply_triplanar_texture(
                 material, world, texture, hit[0], p_mesh, scale_m, footprint_m
             )

@@ -10,29 +10,7 @@ Ray Tracing Gems, 2019, here in its plain form.
 
 import warp as wp
 
-from gen_data.renderers.warp.scene.kernels.alpha_test import (
-    OUT_OF_LINE,
-    closest_solid_hit,
-    first_opaque_hit,
-    is_mesh_intersected,
-)
-from gen_data.renderers.warp.scene.kernels.bvh_traverse import any_in_scene, first_in_scene
-from gen_data.renderers.warp.scene.kernels.records import (
-    CLEAR,
-    HOLES,
-    MOVES,
-    View,
-    World,
-    is_in_view,
-    max_of_two,
-    min_of_two,
-    pixel_direction,
-    pixel_ray,
-    reciprocals,
-    slab_interval,
-    to_mesh_point,
-    to_mesh_vector,
-)
+from gen_data.renderers.warp.scene.kernels import alpha_test, bvh_traverse, records
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 
@@ -72,7 +50,7 @@ SHELTER_M = wp.constant(2.5)
 # No body.
 NOBODY = wp.constant(-1)
 # Shadow rays pass both holes and clear faces.
-LIGHT = wp.constant(HOLES | CLEAR)
+LIGHT = wp.constant(records.HOLES | records.CLEAR)
 
 
 @wp.struct
@@ -91,14 +69,16 @@ class RayHit:
 
 
 @wp.func
-def closest_hit(world: World, o: wp.vec3, d: wp.vec3, reach: float, through: int):
+def closest_hit(world: records.World, o: wp.vec3, d: wp.vec3, reach: float, through: int):
     """The first surface that a ray does not pass.
 
     Args:
         reach: Largest parameter along the ray.
         through: What the ray may pass: HOLES, CLEAR or both.
     """
-    found = first_in_scene(world.tree, world.bodies, world.geometries, o, d, reach, through)
+    found = bvh_traverse.first_in_scene(
+        world.tree, world.bodies, world.geometries, o, d, reach, through
+    )
     met = RayHit()
     met.at = wp.vec2i(int(found[4]), int(found[3]))
     met.t = float(found[0])
@@ -110,8 +90,8 @@ def closest_hit(world: World, o: wp.vec3, d: wp.vec3, reach: float, through: int
     return met
 
 
-@wp.func(**OUT_OF_LINE)
-def closest_cutout_hit(world: World, o: wp.vec3, d: wp.vec3, through: int, before: RayHit):
+@wp.func(**alpha_test.OUT_OF_LINE)
+def closest_cutout_hit(world: records.World, o: wp.vec3, d: wp.vec3, through: int, before: RayHit):
     """The nearer of a hit and the first opaque point of bodies with cut-outs."""
     met = before
     candidates = wp.bvh_query_ray(world.cutout_hierarchy, o, d)
@@ -119,9 +99,9 @@ def closest_cutout_hit(world: World, o: wp.vec3, d: wp.vec3, through: int, befor
     while wp.bvh_query_next(candidates, k, met.t):
         b = world.cutouts[k]
         if (world.bodies[b].cutouts & through) != 0:
-            origin = to_mesh_point(world, b, o)
-            direction = to_mesh_vector(world, b, d)
-            strike = first_opaque_hit(world, b, origin, direction, met.t, through)
+            origin = records.to_mesh_point(world, b, o)
+            direction = records.to_mesh_vector(world, b, d)
+            strike = alpha_test.first_opaque_hit(world, b, origin, direction, met.t, through)
             if strike.face >= 0:
                 met.t = strike.t
                 met.at = wp.vec2i(b, strike.face)
@@ -130,20 +110,20 @@ def closest_cutout_hit(world: World, o: wp.vec3, d: wp.vec3, through: int, befor
 
 
 @wp.kernel
-def trace_pixels(view: View, world: World, t_min: float, hits: wp.array[wp.vec2i]):
+def trace_pixels(view: records.View, world: records.World, t_min: float, hits: wp.array[wp.vec2i]):
     """Nearest (body, face) through every pixel centre."""
     i = wp.tid()
-    d = pixel_ray(view, i)
+    d = records.pixel_ray(view, i)
     hit = wp.vec2i(-1, -1)
-    if is_in_view(view, i):
-        hit = closest_hit(world, view.eye_m + d * t_min, d, FARTHEST, HOLES).at
+    if records.is_in_view(view, i):
+        hit = closest_hit(world, view.eye_m + d * t_min, d, FARTHEST, records.HOLES).at
     hits[i] = hit
 
 
 @wp.kernel
 def trace_samples(
-    view: View,
-    world: World,
+    view: records.View,
+    world: records.World,
     pixels: wp.array[int],
     offsets: wp.array[wp.vec2],
     t_min: float,
@@ -153,11 +133,11 @@ def trace_samples(
     row, s = wp.tid()
     i = pixels[row]
     hit = wp.vec2i(-1, -1)
-    if is_in_view(view, i):
+    if records.is_in_view(view, i):
         x_px = float(i % view.width) + offsets[s][0]
         y_px = float(i / view.width) + offsets[s][1]
-        d = view.R_world_camera @ pixel_direction(view, x_px, y_px)
-        hit = closest_hit(world, view.eye_m + d * t_min, d, FARTHEST, HOLES).at
+        d = view.R_world_camera @ records.pixel_direction(view, x_px, y_px)
+        hit = closest_hit(world, view.eye_m + d * t_min, d, FARTHEST, records.HOLES).at
     hits[row, s] = hit
 
 
@@ -176,52 +156,52 @@ def path_along(origin: wp.vec3, way: wp.vec3):
     path = Path()
     path.origin = origin
     path.way = way
-    path.inverse = reciprocals(way)
+    path.inverse = records.reciprocals(way)
     return path
 
 
 @wp.func
-def enters_box(world: World, b: int, path: Path):
+def enters_box(world: records.World, b: int, path: Path):
     """Whether a path may enter a body's box; a cheap test before any query of its mesh."""
     low = world.bodies[b].low_m - path.origin
-    enters, leaves = slab_interval(low, world.bodies[b].high_m - path.origin, path.inverse)
+    enters, leaves = records.slab_interval(low, world.bodies[b].high_m - path.origin, path.inverse)
     # The slab test: the path is inside all three pairs of planes at once.
-    return max_of_two(enters, 0.0) <= min_of_two(leaves, 1.0)
+    return records.max_of_two(enters, 0.0) <= records.min_of_two(leaves, 1.0)
 
 
 @wp.func
-def is_cut_by(world: World, b: int, path: Path, through: int):
+def is_cut_by(world: records.World, b: int, path: Path, through: int):
     """Whether a body intersects a path that passes ``through``: HOLES, CLEAR or both."""
     hit = enters_box(world, b, path)
     if hit:
-        o = to_mesh_point(world, b, path.origin)
-        d = to_mesh_vector(world, b, path.way)
-        hit = is_mesh_intersected(world, b, o, d, 1.0, through)
+        o = records.to_mesh_point(world, b, path.origin)
+        d = records.to_mesh_vector(world, b, path.way)
+        hit = alpha_test.is_mesh_intersected(world, b, o, d, 1.0, through)
     return hit
 
 
 @wp.func
-def is_blocked_by(world: World, b: int, path: Path):
+def is_blocked_by(world: records.World, b: int, path: Path):
     """Whether a body blocks light along a path."""
     return is_cut_by(world, b, path, LIGHT)
 
 
 @wp.func
-def is_occluded(world: World, path: Path):
+def is_occluded(world: records.World, path: Path):
     """Whether anything blocks light along a path."""
     return is_intersected(world, path, LIGHT)
 
 
 @wp.func
-def is_intersected(world: World, path: Path, through: int):
+def is_intersected(world: records.World, path: Path, through: int):
     """Whether anything intersects a path that passes ``through``."""
     return blocker_of(world, path, through) != NOBODY
 
 
 @wp.func
-def blocker_of(world: World, path: Path, through: int):
+def blocker_of(world: records.World, path: Path, through: int):
     """A body that intersects a path that passes ``through``; NOBODY if there is none."""
-    b = any_in_scene(
+    b = bvh_traverse.any_in_scene(
         world.tree,
         world.bodies,
         world.geometries,
@@ -235,11 +215,11 @@ def blocker_of(world: World, path: Path, through: int):
     return b
 
 
-@wp.func(**OUT_OF_LINE)
-def blocker_with_cutouts(world: World, path: Path, through: int):
+@wp.func(**alpha_test.OUT_OF_LINE)
+def blocker_with_cutouts(world: records.World, path: Path, through: int):
     """As ``blocker_of``, among bodies with cut-outs."""
     blocker = int(NOBODY)
-    passed = through & MOVES
+    passed = through & records.MOVES
     candidates = wp.bvh_query_ray(world.cutout_hierarchy, path.origin, path.way)
     k = int(0)
     while wp.bvh_query_next(candidates, k, 1.0):
@@ -254,7 +234,13 @@ def blocker_with_cutouts(world: World, path: Path, through: int):
 
 @wp.func
 def listed_blocker(
-    world: World, lists: wp.array3d[int], tile: int, j: int, skip: int, likely: int, path: Path
+    world: records.World,
+    lists: wp.array3d[int],
+    tile: int,
+    j: int,
+    skip: int,
+    likely: int,
+    path: Path,
 ):
     """A body but ``skip`` that blocks the path from a point of a tile to lamp j, or NOBODY.
 
@@ -280,13 +266,15 @@ def listed_blocker(
 
 
 @wp.func
-def free_path(world: World, path: Path):
+def free_path(world: records.World, path: Path):
     """Length of the unobstructed part of a path, from 0 to 1."""
     return closest_hit(world, path.origin, path.way, 1.0, LIGHT).t
 
 
 @wp.func
-def free_path_of_listed(world: World, lists: wp.array3d[int], tile: int, skip: int, path: Path):
+def free_path_of_listed(
+    world: records.World, lists: wp.array3d[int], tile: int, skip: int, path: Path
+):
     """Unobstructed part of a path from a point of a tile, ignoring the body ``skip``."""
     # The last list is that of ambient occlusion.
     j = world.lamps.shape[0]
@@ -302,19 +290,19 @@ def free_path_of_listed(world: World, lists: wp.array3d[int], tile: int, skip: i
 
 
 @wp.func
-def free_path_before(world: World, b: int, path: Path, free: float):
+def free_path_before(world: records.World, b: int, path: Path, free: float):
     """Unobstructed part of a path in front of one body, at most ``free``."""
     if enters_box(world, b, path):
-        o = to_mesh_point(world, b, path.origin)
-        d = to_mesh_vector(world, b, path.way)
-        strike = closest_solid_hit(world, b, o, d, free, LIGHT)
+        o = records.to_mesh_point(world, b, path.origin)
+        d = records.to_mesh_vector(world, b, path.way)
+        strike = alpha_test.closest_solid_hit(world, b, o, d, free, LIGHT)
         if strike.face >= 0:
             free = strike.t
     return free
 
 
 @wp.func
-def precipitation_exposure(world: World, body: int, origin: wp.vec3):
+def precipitation_exposure(world: records.World, body: int, origin: wp.vec3):
     """Exposure of a point on a body to precipitation: 1 or 0, by one upward ray.
 
     Bodies that move shelter what moves, such as seats below a roof, but never the ground: it was
@@ -326,9 +314,9 @@ def precipitation_exposure(world: World, body: int, origin: wp.vec3):
     y = origin[1] * 5.0
     east = 0.15 * wp.sin(1.7 * x + 2.3 * wp.sin(1.3 * y))
     north = 0.15 * wp.sin(1.9 * y + 2.1 * wp.sin(1.1 * x))
-    through = HOLES
-    if (world.bodies[body].cutouts & MOVES) == 0:
-        through = HOLES | MOVES
+    through = records.HOLES
+    if (world.bodies[body].cutouts & records.MOVES) == 0:
+        through = records.HOLES | records.MOVES
     free = float(1.0)
     if is_intersected(world, path_along(origin, wp.vec3(east, north, 1.0) * SHELTER_M), through):
         free = 0.0

@@ -5,13 +5,7 @@ Patches are flat faces whose texture coordinates are linear in space, for fast l
 
 import warp as wp
 
-from gen_data.renderers.warp.scene.kernels.records import (
-    World,
-    face_vertices,
-    fast_normalize,
-    floor_int,
-    vertex_at,
-)
+from gen_data.renderers.warp.scene.kernels import records
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 
@@ -62,7 +56,7 @@ class Sampler:
 
 
 @wp.func
-def make_sampler(world: World, texture: int, level: float):
+def make_sampler(world: records.World, texture: int, level: float):
     """The sampler of a fractional mip level."""
     bounded = wp.clamp(level, 0.0, float(world.textures[texture].levels - 1))
     lower = int(bounded)
@@ -87,10 +81,10 @@ def taps_at(first: int, width: int, height: int, u: float, v: float):
     # Beyond this, single precision holds no position within a texel.
     u = wp.clamp(u, -1.0e6, 1.0e6)
     v = wp.clamp(v, -1.0e6, 1.0e6)
-    x = (u - float(floor_int(u))) * float(width) - 0.5
-    y = (1.0 - (v - float(floor_int(v)))) * float(height) - 0.5
-    x0 = floor_int(x)
-    y0 = floor_int(y)
+    x = (u - float(records.floor_int(u))) * float(width) - 0.5
+    y = (1.0 - (v - float(records.floor_int(v)))) * float(height) - 0.5
+    x0 = records.floor_int(x)
+    y0 = records.floor_int(y)
     right = wp.uint32(int((x - float(x0)) * 256.0))
     down = wp.uint32(int((y - float(y0)) * 256.0))
     # After rounding, x may be a hair outside [-0.5, width - 0.5].
@@ -134,7 +128,7 @@ def mix_texels(texels: wp.array[wp.uint32], t: Taps):
 
 
 @wp.func
-def texel_at(world: World, texture: int, s: Sampler, u: float, v: float, bumpy: bool):
+def texel_at(world: records.World, texture: int, s: Sampler, u: float, v: float, bumpy: bool):
     """The texture at a point; normals only on request."""
     taps = taps_at(s.first, s.width, s.height, u, v)
     c = mix_texels(world.textures[texture].texels, taps)
@@ -177,7 +171,7 @@ class Patch:
 
 
 @wp.func
-def triplanar_patch(world: World, surface: int, b: int):
+def triplanar_patch(world: records.World, surface: int, b: int):
     """Patch of a texture projected along the body's axes, as apply_triplanar_texture."""
     scale_m = world.surfaces[surface].texture_scale_m
     texture = world.surfaces[surface].texture
@@ -192,14 +186,14 @@ def triplanar_patch(world: World, surface: int, b: int):
 
 
 @wp.func
-def uv_patch(world: World, texture: int, hit: wp.vec2i):
+def uv_patch(world: records.World, texture: int, hit: wp.vec2i):
     """Patch of a texture mapped by the mesh's own UVs, as material_eval.apply_uv_texture."""
     b = hit[0]
     g = world.bodies[b].geometry
-    corner = face_vertices(world, g, hit[1])
-    p = vertex_at(world, g, corner[0])
-    e1 = vertex_at(world, g, corner[1]) - p
-    e2 = vertex_at(world, g, corner[2]) - p
+    corner = records.face_vertices(world, g, hit[1])
+    p = records.vertex_at(world, g, corner[0])
+    e1 = records.vertex_at(world, g, corner[1]) - p
+    e2 = records.vertex_at(world, g, corner[2]) - p
     uv0 = world.geometries[g].uvs[corner[0]]
     d1 = world.geometries[g].uvs[corner[1]] - uv0
     d2 = world.geometries[g].uvs[corner[2]] - uv0
@@ -226,8 +220,8 @@ def uv_patch(world: World, texture: int, hit: wp.vec2i):
     # Without an area in UV space there are no tangents: the normal stays.
     if world.textures[texture].has_bumps != 0 and area_uv != 0.0:
         sign = wp.where(area_uv < 0.0, -1.0, 1.0)
-        tangent = fast_normalize(e1 * d2[1] - e2 * d1[1]) * sign
-        bitangent = fast_normalize(e2 * d1[0] - e1 * d2[0]) * sign
+        tangent = records.fast_normalize(e1 * d2[1] - e2 * d1[1]) * sign
+        bitangent = records.fast_normalize(e2 * d1[0] - e1 * d2[0]) * sign
         patch.axes = world.bodies[b].R_world_mesh @ wp.matrix_from_cols(
             tangent, bitangent, wp.vec3(0.0)
         )
@@ -235,7 +229,7 @@ def uv_patch(world: World, texture: int, hit: wp.vec2i):
 
 
 @wp.func
-def patch_at(world: World, surface: int, hit: wp.vec2i):
+def patch_at(world: records.World, surface: int, hit: wp.vec2i):
     """The patch of a textured (body, face)."""
     patch = Patch()
     if world.surfaces[surface].texture_scale_m > 0.0:

@@ -6,14 +6,7 @@ Source: Heckbert and Moreton, "Interpolation for polygon texture mapping and sha
 
 import warp as wp
 
-from gen_data.renderers.warp.scene.kernels.alpha_test import dominant_axis, project_uv
-from gen_data.renderers.warp.scene.kernels.records import (
-    HOLES,
-    View,
-    World,
-    face_vertices,
-    vertex_at,
-)
+from gen_data.renderers.warp.scene.kernels import alpha_test, records
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 
@@ -41,11 +34,11 @@ class Cutout:
 
 
 @wp.func
-def make_cutout(view: View, world: World, b: int, face: int):
+def make_cutout(view: records.View, world: records.World, b: int, face: int):
     """Where a face of a body has holes, before a pinhole."""
     cutout = Cutout()
     cutout.texture = -1
-    if (world.bodies[b].cutouts & HOLES) == 0:
+    if (world.bodies[b].cutouts & records.HOLES) == 0:
         return cutout
     g = world.bodies[b].geometry
     surface = world.bodies[b].first_material + world.geometries[g].face_slots[face]
@@ -54,10 +47,10 @@ def make_cutout(view: View, world: World, b: int, face: int):
         return cutout
     if world.textures[texture].has_cover == 0:
         return cutout
-    corner = face_vertices(world, g, face)
-    p = vertex_at(world, g, corner[0])
-    e1 = vertex_at(world, g, corner[1]) - p
-    e2 = vertex_at(world, g, corner[2]) - p
+    corner = records.face_vertices(world, g, face)
+    p = records.vertex_at(world, g, corner[0])
+    e1 = records.vertex_at(world, g, corner[1]) - p
+    e2 = records.vertex_at(world, g, corner[2]) - p
     n = wp.cross(e1, e2)
     squared = wp.dot(n, n)
     if squared == 0.0:
@@ -70,11 +63,11 @@ def make_cutout(view: View, world: World, b: int, face: int):
     d2 = world.geometries[g].uvs[corner[2]] - uv
     scale_m = world.surfaces[surface].texture_scale_m
     if scale_m > 0.0:
-        axis = dominant_axis(n)
+        axis = alpha_test.dominant_axis(n)
         scale = world.bodies[b].scale / scale_m
-        uv = project_uv(p * scale, axis)
-        d1 = project_uv(e1 * scale, axis)
-        d2 = project_uv(e2 * scale, axis)
+        uv = alpha_test.project_uv(p * scale, axis)
+        d1 = alpha_test.project_uv(e1 * scale, axis)
+        d2 = alpha_test.project_uv(e2 * scale, axis)
     cutout.texture = texture
     eye = world.bodies[b].eye_mesh - p
     cutout.u = uv[0] + wp.dot(along_1 * d1[0] + along_2 * d2[0], eye)

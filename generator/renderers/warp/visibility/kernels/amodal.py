@@ -3,23 +3,7 @@
 import warp as wp
 
 from gen_data.renderers.warp.scene.kernels.records import View, World
-from gen_data.renderers.warp.visibility.kernels.alpha_cutouts import make_cutout
-from gen_data.renderers.warp.visibility.kernels.rasterizer import (
-    UNSNAPPED,
-    Z_NEAR_M,
-    DepthPlane,
-    Outline,
-    clip,
-    depth_plane,
-    draw_coverage,
-    fan_edges_in,
-    in_rows,
-    is_beyond_guard,
-    is_empty,
-    is_filled,
-    make_edges,
-    pixel_box,
-)
+from gen_data.renderers.warp.visibility.kernels import alpha_cutouts, rasterizer
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 
@@ -30,7 +14,7 @@ def draw_silhouettes(
     world: World,
     p_camera: wp.array[wp.vec3],
     xy: wp.array[wp.vec2i],
-    outlines: wp.array[Outline],
+    outlines: wp.array[rasterizer.Outline],
     parts: int,
     mask: wp.array[wp.uint8],
 ):
@@ -50,30 +34,38 @@ def draw_silhouettes(
         i = first + geometry.faces[3 * f]
         j = first + geometry.faces[3 * f + 1]
         k = first + geometry.faces[3 * f + 2]
-        if xy[i][0] != UNSNAPPED and xy[j][0] != UNSNAPPED and xy[k][0] != UNSNAPPED:
-            box = pixel_box(xy[i], xy[j], xy[k], outline.window, 0)
-            box = in_rows(box, outline.first_row, outline.last_row)
-            if is_empty(box) or is_filled(box, outline, mask):
+        if (
+            xy[i][0] != rasterizer.UNSNAPPED
+            and xy[j][0] != rasterizer.UNSNAPPED
+            and xy[k][0] != rasterizer.UNSNAPPED
+        ):
+            box = rasterizer.pixel_box(xy[i], xy[j], xy[k], outline.window, 0)
+            box = rasterizer.in_rows(box, outline.first_row, outline.last_row)
+            if rasterizer.is_empty(box) or rasterizer.is_filled(box, outline, mask):
                 continue
-            e = make_edges(xy[i], xy[j], xy[k], outline.window, box)
+            e = rasterizer.make_edges(xy[i], xy[j], xy[k], outline.window, box)
             if e.covers != 0:
-                cutout = make_cutout(view, world, outline.body, f)
-                plane = DepthPlane()
+                cutout = alpha_cutouts.make_cutout(view, world, outline.body, f)
+                plane = rasterizer.DepthPlane()
                 if cutout.texture >= 0:
-                    plane = depth_plane(view, p_camera[i], p_camera[j], p_camera[k], outline.window)
-                draw_coverage(world, e, plane, cutout, outline, mask)
-        elif not is_beyond_guard(view, p_camera[i], p_camera[j], p_camera[k]):
+                    plane = rasterizer.depth_plane(
+                        view, p_camera[i], p_camera[j], p_camera[k], outline.window
+                    )
+                rasterizer.draw_coverage(world, e, plane, cutout, outline, mask)
+        elif not rasterizer.is_beyond_guard(view, p_camera[i], p_camera[j], p_camera[k]):
             # A vertex lies outside the snapping range: clip first, then draw the polygon as a fan.
-            polygon, corners = clip(view, p_camera[i], p_camera[j], p_camera[k])
-            cutout = make_cutout(view, world, outline.body, f)
-            plane = depth_plane(view, p_camera[i], p_camera[j], p_camera[k], outline.window)
-            plane.high = 1.0 / Z_NEAR_M
+            polygon, corners = rasterizer.clip(view, p_camera[i], p_camera[j], p_camera[k])
+            cutout = alpha_cutouts.make_cutout(view, world, outline.body, f)
+            plane = rasterizer.depth_plane(
+                view, p_camera[i], p_camera[j], p_camera[k], outline.window
+            )
+            plane.high = 1.0 / rasterizer.Z_NEAR_M
             for t in range(1, corners - 1):
-                e = fan_edges_in(
+                e = rasterizer.fan_edges_in(
                     view, polygon, t, outline.window, 0, outline.first_row, outline.last_row
                 )
                 if e.covers != 0:
-                    draw_coverage(world, e, plane, cutout, outline, mask)
+                    rasterizer.draw_coverage(world, e, plane, cutout, outline, mask)
 
 
 @wp.kernel

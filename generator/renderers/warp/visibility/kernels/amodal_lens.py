@@ -2,23 +2,15 @@
 
 import warp as wp
 
-from gen_data.renderers.warp.scene.kernels.alpha_test import is_mesh_intersected
+from gen_data.renderers.warp.scene.kernels import alpha_test, records
 from gen_data.renderers.warp.scene.kernels.ray_queries import FARTHEST
-from gen_data.renderers.warp.scene.kernels.records import (
-    HOLES,
-    View,
-    World,
-    fast_normalize,
-    to_mesh_point,
-    to_mesh_vector,
-)
 from gen_data.renderers.warp.visibility.kernels.rasterizer import Outline
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 
 
 @wp.func
-def canvas_direction(view: View, nodes: wp.array2d[wp.vec4], stride: int, x: int, y: int):
+def canvas_direction(view: records.View, nodes: wp.array2d[wp.vec4], stride: int, x: int, y: int):
     """Unit direction through a pixel's centre inside or outside the image; 0 if not shown.
 
     Args:
@@ -43,13 +35,13 @@ def canvas_direction(view: View, nodes: wp.array2d[wp.vec4], stride: int, x: int
             d = (a * (1.0 - right) + b * right) * (1.0 - down) + (
                 c * (1.0 - right) + e * right
             ) * down
-    return fast_normalize(wp.vec3(d[0], d[1], d[2]))
+    return records.fast_normalize(wp.vec3(d[0], d[1], d[2]))
 
 
 @wp.kernel
 def trace_silhouettes(
-    view: View,
-    world: World,
+    view: records.View,
+    world: records.World,
     nodes: wp.array2d[wp.vec4],
     stride: int,
     t_min: float,
@@ -69,7 +61,7 @@ def trace_silhouettes(
             y = silhouette.window.y0 + row
             d = view.R_world_camera @ canvas_direction(view, nodes, stride, x, y)
             if wp.dot(d, d) > 0.5:
-                o = to_mesh_point(world, b, view.eye_m + d * t_min)
-                way = to_mesh_vector(world, b, d)
-                if is_mesh_intersected(world, b, o, way, FARTHEST, HOLES):
+                o = records.to_mesh_point(world, b, view.eye_m + d * t_min)
+                way = records.to_mesh_vector(world, b, d)
+                if alpha_test.is_mesh_intersected(world, b, o, way, FARTHEST, records.HOLES):
                     mask[i] = wp.uint8(1)

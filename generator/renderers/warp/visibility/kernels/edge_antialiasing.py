@@ -8,24 +8,8 @@ Source: Chajdas, McGuire and Luebke, "Subpixel reconstruction antialiasing", I3D
 
 import warp as wp
 
-from gen_data.renderers.warp.scene.kernels.alpha_test import closest_solid_hit, is_hole
-from gen_data.renderers.warp.scene.kernels.ray_queries import FARTHEST
-from gen_data.renderers.warp.scene.kernels.records import (
-    HOLES,
-    GBufferRecord,
-    View,
-    World,
-    flat_normal,
-    is_in_view,
-    pixel_direction,
-    to_mesh_point,
-    to_mesh_vector,
-)
-from gen_data.renderers.warp.visibility.kernels.edge_detection import (
-    most_similar_normal,
-    neighbour_pixel,
-)
-from gen_data.renderers.warp.visibility.kernels.label_resolve import make_facet
+from gen_data.renderers.warp.scene.kernels import alpha_test, ray_queries, records
+from gen_data.renderers.warp.visibility.kernels import edge_detection, label_resolve
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 
@@ -47,12 +31,12 @@ class Parts:
 
 
 @wp.func
-def is_face_repeated(view: View, images: GBufferRecord, x: int, y: int, k: int):
+def is_face_repeated(view: records.View, images: records.GBufferRecord, x: int, y: int, k: int):
     """Whether an earlier of the nine pixels shows the same face as the k-th."""
-    hit = images.hits[neighbour_pixel(view, x, y, k)]
+    hit = images.hits[edge_detection.neighbour_pixel(view, x, y, k)]
     before = bool(False)
     for m in range(k):
-        other = images.hits[neighbour_pixel(view, x, y, m)]
+        other = images.hits[edge_detection.neighbour_pixel(view, x, y, m)]
         if other[0] == hit[0] and other[1] == hit[1]:
             before = True
     return before
@@ -60,9 +44,9 @@ def is_face_repeated(view: View, images: GBufferRecord, x: int, y: int, k: int):
 
 @wp.func
 def cover(
-    view: View,
-    world: World,
-    images: GBufferRecord,
+    view: records.View,
+    world: records.World,
+    images: records.GBufferRecord,
     offsets: wp.array[wp.vec2],
     x: int,
     y: int,
@@ -71,12 +55,12 @@ def cover(
 ):
     """Assign the samples of pixel (x, y) to the face of pixel ``source`` where it is nearest."""
     hit = images.hits[source]
-    facet = make_facet(world, hit)
-    cutouts = (world.bodies[hit[0]].cutouts & HOLES) != 0
+    facet = label_resolve.make_facet(world, hit)
+    cutouts = (world.bodies[hit[0]].cutouts & records.HOLES) != 0
     for s in range(offsets.shape[0]):
         x_px = float(x) + offsets[s][0]
         y_px = float(y) + offsets[s][1]
-        d = pixel_direction(view, x_px, y_px)
+        d = records.pixel_direction(view, x_px, y_px)
         det = wp.dot(d, facet.across)
         # Barycentric weights and depth without a division: all are scaled by det.
         side = wp.where(det < 0.0, -1.0, 1.0)
@@ -88,7 +72,7 @@ def cover(
             seen = nearness > parts.nearness[s]
             if seen and cutouts:
                 weights = wp.vec3(w - u - v, u, v) * (1.0 / w)
-                seen = not is_hole(world, hit[0], hit[1], weights)
+                seen = not alpha_test.is_hole(world, hit[0], hit[1], weights)
             if seen:
                 parts.nearness[s] = nearness
                 parts.source[s] = source
@@ -97,9 +81,9 @@ def cover(
 
 @wp.func
 def trace_source(
-    view: View,
-    world: World,
-    images: GBufferRecord,
+    view: records.View,
+    world: records.World,
+    images: records.GBufferRecord,
     x: int,
     y: int,
     x_px: float,
@@ -110,36 +94,38 @@ def trace_source(
 
     Only bodies of the nine pixels are traced: no other has a colour to provide.
     """
-    d = view.R_world_camera @ pixel_direction(view, x_px, y_px)
+    d = view.R_world_camera @ records.pixel_direction(view, x_px, y_px)
     origin = view.eye_m + d * t_min
-    nearest = float(FARTHEST)
+    nearest = float(ray_queries.FARTHEST)
     source = int(-1)
     normal = wp.vec3(0.0)
     last = int(-1)
     for k in range(9):
-        j = neighbour_pixel(view, x, y, k)
+        j = edge_detection.neighbour_pixel(view, x, y, k)
         b = images.hits[j][0]
         if b < 0:
             if source < 0:
                 source = j
         elif b != last:
             last = b
-            o = to_mesh_point(world, b, origin)
-            answer = closest_solid_hit(world, b, o, to_mesh_vector(world, b, d), nearest, HOLES)
+            o = records.to_mesh_point(world, b, origin)
+            answer = alpha_test.closest_solid_hit(
+                world, b, o, records.to_mesh_vector(world, b, d), nearest, records.HOLES
+            )
             if answer.face >= 0:
                 nearest = answer.t
                 source = j
-                normal = flat_normal(world, wp.vec2i(b, answer.face))
-    if nearest < FARTHEST:
-        source = most_similar_normal(view, images, x, y, source, normal)
+                normal = records.flat_normal(world, wp.vec2i(b, answer.face))
+    if nearest < ray_queries.FARTHEST:
+        source = edge_detection.most_similar_normal(view, images, x, y, source, normal)
     return source
 
 
 @wp.kernel
 def antialias(
-    view: View,
-    world: World,
-    images: GBufferRecord,
+    view: records.View,
+    world: records.World,
+    images: records.GBufferRecord,
     radiance: wp.array[wp.vec3],
     pixels: wp.array[int],
     offsets: wp.array[wp.vec2],
@@ -155,7 +141,7 @@ def antialias(
     row = wp.tid()
     i = pixels[row]
     mixed[row] = radiance[i]
-    if not is_in_view(view, i):
+    if not records.is_in_view(view, i):
         return
     x = i % view.width
     y = i / view.width
@@ -163,7 +149,7 @@ def antialias(
     for s in range(offsets.shape[0]):
         parts.source[s] = -1
     for k in range(9):
-        j = neighbour_pixel(view, x, y, k)
+        j = edge_detection.neighbour_pixel(view, x, y, k)
         if images.hits[j][0] >= 0 and not is_face_repeated(view, images, x, y, k):
             parts = cover(view, world, images, offsets, x, y, j, parts)
     total = wp.vec3(0.0)

@@ -2,18 +2,7 @@
 
 import warp as wp
 
-from gen_data.renderers.warp.scene.kernels.records import (
-    PINHOLE,
-    GBufferRecord,
-    View,
-    World,
-    face_vertices,
-    fast_normalize,
-    mesh_point,
-    normal_at,
-    pixel_direction,
-    vertex_at,
-)
+from gen_data.renderers.warp.scene.kernels import records
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 
@@ -44,14 +33,14 @@ class Facet:
 
 
 @wp.func
-def make_facet(world: World, hit: wp.vec2i):
+def make_facet(world: records.World, hit: wp.vec2i):
     """The facet of a (body, face)."""
     b = hit[0]
     g = world.bodies[b].geometry
-    corner = face_vertices(world, g, hit[1])
-    p = vertex_at(world, g, corner[0])
-    e1 = vertex_at(world, g, corner[1]) - p
-    e2 = vertex_at(world, g, corner[2]) - p
+    corner = records.face_vertices(world, g, hit[1])
+    p = records.vertex_at(world, g, corner[0])
+    e1 = records.vertex_at(world, g, corner[1]) - p
+    e2 = records.vertex_at(world, g, corner[2]) - p
     # In the mesh frame: only the results are rotated.
     to_eye = world.bodies[b].eye_mesh - p
     camera = wp.transpose(world.bodies[b].B_mesh_camera)
@@ -66,9 +55,9 @@ def make_facet(world: World, hit: wp.vec2i):
     z = wp.dot(row, p) + world.bodies[b].t_camera_mesh[2]
     f.z_m = wp.vec3(z, z + wp.dot(row, e1), z + wp.dot(row, e2))
     R = world.bodies[b].R_world_mesh
-    f.n = R @ normal_at(world, g, corner[0])
-    f.n_u = R @ normal_at(world, g, corner[1]) - f.n
-    f.n_v = R @ normal_at(world, g, corner[2]) - f.n
+    f.n = R @ records.normal_at(world, g, corner[0])
+    f.n_u = R @ records.normal_at(world, g, corner[1]) - f.n
+    f.n_v = R @ records.normal_at(world, g, corner[2]) - f.n
     return f
 
 
@@ -78,11 +67,11 @@ def face_viewer(n: wp.vec3, d_world: wp.vec3):
 
     Interpolation may tip a normal over the horizon: it is brought back to grazing view.
     """
-    m = fast_normalize(n)
+    m = records.fast_normalize(n)
     over = wp.dot(m, d_world)
     if over > 0.0:
         # A thousandth beyond grazing: exactly there, rounding would decide.
-        m = fast_normalize(m - d_world * (over * 1.001 / wp.dot(d_world, d_world)))
+        m = records.fast_normalize(m - d_world * (over * 1.001 / wp.dot(d_world, d_world)))
     return m
 
 
@@ -96,10 +85,10 @@ class Point:
 
 
 @wp.func
-def point_at(view: View, world: World, hit: wp.vec2i, x_px: float, y_px: float):
+def point_at(view: records.View, world: records.World, hit: wp.vec2i, x_px: float, y_px: float):
     """Intersection of a pixel's ray with the plane of a face."""
     facet = make_facet(world, hit)
-    d = pixel_direction(view, x_px, y_px)
+    d = records.pixel_direction(view, x_px, y_px)
     det = wp.dot(d, facet.across)
     inverse = 1.0 / wp.where(wp.abs(det) < 1.0e-30, 1.0e-30, det)
     # Subpixel rays may miss the face: clamped to its edge, whose attributes are defined.
@@ -116,10 +105,10 @@ def point_at(view: View, world: World, hit: wp.vec2i, x_px: float, y_px: float):
 
 @wp.kernel
 def resolve(
-    view: View,
-    world: World,
+    view: records.View,
+    world: records.World,
     run: int,
-    images: GBufferRecord,
+    images: records.GBufferRecord,
 ):
     """Depth (inf for nothing), barycentric weights and smooth world normal of every pixel.
 
@@ -144,7 +133,7 @@ def resolve(
             facet = make_facet(world, hit)
             same = bool(True)
             while same:
-                d = pixel_direction(view, float(x) + 0.5, float(y) + 0.5)
+                d = records.pixel_direction(view, float(x) + 0.5, float(y) + 0.5)
                 det = wp.dot(d, facet.across)
                 # Seen edge-on after snapping; the branch below repairs depth and weights.
                 inverse = 1.0 / wp.where(wp.abs(det) < 1.0e-30, 1.0e-30, det)
@@ -156,7 +145,7 @@ def resolve(
                     u = wp.clamp(u, 0.0, 1.0)
                     v = wp.clamp(v, 0.0, 1.0 - u)
                     z = facet.z_m[0] * (1.0 - u - v) + facet.z_m[1] * u + facet.z_m[2] * v
-                    if view.lens != PINHOLE:
+                    if view.lens != records.PINHOLE:
                         z = distance_to(world, hit, wp.vec2(u, v))
                 n = facet.n + facet.n_u * u + facet.n_v * v
                 side = wp.where(det < 0.0, -1.0, 1.0)
@@ -177,16 +166,16 @@ def label_ids(hits: wp.array[wp.vec2i], ids: wp.array[wp.uint16], labels: wp.arr
 
 
 @wp.kernel
-def label_ranges(view: View, z_m: wp.array[float], ranges_m: wp.array[float]):
+def label_ranges(view: records.View, z_m: wp.array[float], ranges_m: wp.array[float]):
     """Distance along the ray [m]."""
     i = wp.tid()
     x = float(i % view.width) + 0.5
     y = float(i / view.width) + 0.5
-    ranges_m[i] = z_m[i] * wp.length(pixel_direction(view, x, y))
+    ranges_m[i] = z_m[i] * wp.length(records.pixel_direction(view, x, y))
 
 
 @wp.kernel
-def label_z_depths(view: View, ranges_m: wp.array[float], z_m: wp.array[float]):
+def label_z_depths(view: records.View, ranges_m: wp.array[float], z_m: wp.array[float]):
     """Distance along the optical axis [m]; inf behind the camera's plane."""
     i = wp.tid()
     z = ranges_m[i] * view.directions[i][2]
@@ -197,7 +186,9 @@ def label_z_depths(view: View, ranges_m: wp.array[float], z_m: wp.array[float]):
 
 
 @wp.kernel
-def label_normals(view: View, normals: wp.array[wp.vec3], normals_camera: wp.array[wp.vec3]):
+def label_normals(
+    view: records.View, normals: wp.array[wp.vec3], normals_camera: wp.array[wp.vec3]
+):
     """Normals in the camera frame."""
     i = wp.tid()
     normals_camera[i] = wp.transpose(view.R_world_camera) @ normals[i]
@@ -214,7 +205,7 @@ class BoxFrame:
 
 @wp.kernel
 def label_object_coordinates(
-    world: World,
+    world: records.World,
     hits: wp.array[wp.vec2i],
     weights: wp.array[wp.vec2],
     frames: wp.array[BoxFrame],
@@ -227,7 +218,7 @@ def label_object_coordinates(
     p = wp.vec3(0.0)
     if b >= 0:
         if frames[b].labelled != 0:
-            m = mesh_point(world, hits[i], weights[i])
+            m = records.mesh_point(world, hits[i], weights[i])
             q = frames[b].A_box_mesh @ m + frames[b].t_box_mesh
             p = wp.vec3(
                 wp.clamp(q[0], 0.0, 1.0), wp.clamp(q[1], 0.0, 1.0), wp.clamp(q[2], 0.0, 1.0)
@@ -236,8 +227,8 @@ def label_object_coordinates(
 
 
 @wp.func
-def distance_to(world: World, hit: wp.vec2i, weight: wp.vec2):
+def distance_to(world: records.World, hit: wp.vec2i, weight: wp.vec2):
     """Distance from the camera's centre to a point of a (body, face) [m]."""
     b = hit[0]
-    m = mesh_point(world, hit, weight)
+    m = records.mesh_point(world, hit, weight)
     return wp.length(world.bodies[b].A_camera_mesh @ m + world.bodies[b].t_camera_mesh)

@@ -20,32 +20,8 @@ from gen_data.renderers.warp.scene.kernels.records import (
     surface_index,
     vertex_at,
 )
+from gen_data.renderers.warp.visibility.kernels import edge_detection, label_resolve, rasterizer
 from gen_data.renderers.warp.visibility.kernels.alpha_cutouts import Cutout, make_cutout
-from gen_data.renderers.warp.visibility.kernels.edge_detection import (
-    CREASE_COSINE,
-    from_tone,
-    most_similar_normal,
-    to_tone,
-)
-from gen_data.renderers.warp.visibility.kernels.label_resolve import point_at
-from gen_data.renderers.warp.visibility.kernels.rasterizer import (
-    UNSNAPPED,
-    Z_NEAR_M,
-    DepthPlane,
-    DrawnBody,
-    Edges,
-    Window,
-    clip,
-    depth_plane,
-    fan_edges,
-    is_beyond_guard,
-    is_empty,
-    is_hidden,
-    largest_nearness,
-    make_edges,
-    pixel_box,
-    window_in_image,
-)
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False, "max_unroll": 3})
 
@@ -88,8 +64,8 @@ def number_pixels(
 @wp.func_native(native("visibility/kernels/draw_face_samples.h"))
 def draw_face_samples(
     world: World,
-    edges: Edges,
-    plane: DepthPlane,
+    edges: rasterizer.Edges,
+    plane: rasterizer.DepthPlane,
     cutout: Cutout,
     body: int,
     face: int,
@@ -111,9 +87,9 @@ def draw_face_samples(
 @wp.kernel
 def draw_samples(
     view: View,
-    window: Window,
+    window: rasterizer.Window,
     world: World,
-    bodies: wp.array[DrawnBody],
+    bodies: wp.array[rasterizer.DrawnBody],
     p_camera: wp.array[wp.vec3],
     xy: wp.array[wp.vec2i],
     numbers: wp.array[int],
@@ -135,8 +111,8 @@ def draw_samples(
     """
     drawn = bodies[wp.tid()]
     stride = window.width
-    whole = window_in_image(drawn.window, window)
-    if is_hidden(whole, drawn.nearness_max, stride, floors):
+    whole = rasterizer.window_in_image(drawn.window, window)
+    if rasterizer.is_hidden(whole, drawn.nearness_max, stride, floors):
         return
     b = drawn.body
     geometry = world.geometries[world.bodies[b].geometry]
@@ -145,26 +121,32 @@ def draw_samples(
         i = first + geometry.faces[3 * f]
         j = first + geometry.faces[3 * f + 1]
         k = first + geometry.faces[3 * f + 2]
-        if xy[i][0] != UNSNAPPED and xy[j][0] != UNSNAPPED and xy[k][0] != UNSNAPPED:
-            box = pixel_box(xy[i], xy[j], xy[k], window, HALF)
-            if not is_empty(box):
-                nearest = largest_nearness(p_camera[i], p_camera[j], p_camera[k])
-                if not is_hidden(box, nearest, stride, floors):
-                    e = make_edges(xy[i], xy[j], xy[k], window, box)
+        if (
+            xy[i][0] != rasterizer.UNSNAPPED
+            and xy[j][0] != rasterizer.UNSNAPPED
+            and xy[k][0] != rasterizer.UNSNAPPED
+        ):
+            box = rasterizer.pixel_box(xy[i], xy[j], xy[k], window, HALF)
+            if not rasterizer.is_empty(box):
+                nearest = rasterizer.largest_nearness(p_camera[i], p_camera[j], p_camera[k])
+                if not rasterizer.is_hidden(box, nearest, stride, floors):
+                    e = rasterizer.make_edges(xy[i], xy[j], xy[k], window, box)
                     if e.covers != 0:
-                        plane = depth_plane(view, p_camera[i], p_camera[j], p_camera[k], window)
+                        plane = rasterizer.depth_plane(
+                            view, p_camera[i], p_camera[j], p_camera[k], window
+                        )
                         cutout = make_cutout(view, world, b, f)
                         draw_face_samples(
                             world, e, plane, cutout, b, f, stride, numbers, floors, offsets,
                             nearness, hits,
                         )  # fmt: skip
-        elif not is_beyond_guard(view, p_camera[i], p_camera[j], p_camera[k]):
-            polygon, corners = clip(view, p_camera[i], p_camera[j], p_camera[k])
-            plane = depth_plane(view, p_camera[i], p_camera[j], p_camera[k], window)
-            plane.high = 1.0 / Z_NEAR_M
+        elif not rasterizer.is_beyond_guard(view, p_camera[i], p_camera[j], p_camera[k]):
+            polygon, corners = rasterizer.clip(view, p_camera[i], p_camera[j], p_camera[k])
+            plane = rasterizer.depth_plane(view, p_camera[i], p_camera[j], p_camera[k], window)
+            plane.high = 1.0 / rasterizer.Z_NEAR_M
             cutout = make_cutout(view, world, b, f)
             for t in range(1, corners - 1):
-                e = fan_edges(view, polygon, t, window, HALF)
+                e = rasterizer.fan_edges(view, polygon, t, window, HALF)
                 if e.covers != 0:
                     draw_face_samples(
                         world, e, plane, cutout, b, f, stride, numbers, floors, offsets,
@@ -189,7 +171,9 @@ def color_source(view: View, world: World, images: GBufferRecord, x: int, y: int
     source = found[0]
     if found[1] > 1:
         # Several faces of the body are near, none of them the sample's: choose by orientation.
-        source = most_similar_normal(view, images, x, y, source, flat_normal(world, hit))
+        source = edge_detection.most_similar_normal(
+            view, images, x, y, source, flat_normal(world, hit)
+        )
     return source
 
 
@@ -208,7 +192,7 @@ def shows_like(view: View, world: World, images: GBufferRecord, source: int, hit
             n = flat_normal(world, hit)
             if (
                 surface_index(world, shown) == surface_index(world, hit)
-                and wp.abs(wp.dot(images.normals[source], n)) > CREASE_COSINE
+                and wp.abs(wp.dot(images.normals[source], n)) > edge_detection.CREASE_COSINE
             ):
                 b = hit[0]
                 g = world.bodies[b].geometry
@@ -231,7 +215,7 @@ def thin_layer(world: World, thin: wp.array2d[wp.vec2i], layers: int, i: int, hi
             alike = at[1] == hit[1]
             if not alike:
                 cosine = wp.dot(flat_normal(world, at), flat_normal(world, hit))
-                alike = wp.abs(cosine) > CREASE_COSINE
+                alike = wp.abs(cosine) > edge_detection.CREASE_COSINE
             if alike:
                 found = layer
     return found
@@ -283,7 +267,7 @@ def find_thin(
                     offset = offsets[s % offsets.shape[0]]
                     x_px = float(x) + offset[0]
                     y_px = float(y) + offset[1]
-                    point = point_at(view, world, hit, x_px, y_px)
+                    point = label_resolve.point_at(view, world, hit, x_px, y_px)
                     d = view.R_world_camera @ pixel_direction(view, x_px, y_px)
                     thin.hits[i] = hit
                     thin.z_m[i] = wp.dot(point.way, d) / wp.dot(d, d)
@@ -335,11 +319,11 @@ def mix_samples(
                 if not shows_like(view, world, images, source, hit):
                     layer = thin_layer(world, thin, thin.shape[0], i, hit)
         if layer >= 0:
-            total += to_tone(thin_radiance[layer, i], white, brightest)
+            total += edge_detection.to_tone(thin_radiance[layer, i], white, brightest)
             lit += 1
         elif source >= 0:
-            total += to_tone(radiance[source], white, brightest)
+            total += edge_detection.to_tone(radiance[source], white, brightest)
             lit += 1
     mixed[row] = radiance[i]
     if lit > 0:
-        mixed[row] = from_tone(total * (1.0 / float(lit)), white)
+        mixed[row] = edge_detection.from_tone(total * (1.0 / float(lit)), white)
