@@ -21,8 +21,6 @@ from gen_data.randomizers.free_space import Footprint, Ground, hidden_share
 from gen_data.randomizers.lane_objects import LaneObjects
 from tests.randomizers.doubles import FakeAssets, rng_of
 
-BRICK_M = (0.06, 0.03)
-
 
 def street(**group: Any) -> Scene:
     """Two lanes of 40 m in opposite directions, 3 m apart."""
