@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from pydantic import ValidationError
 
 from gen_data.config.distributions import Choice, Constant, LogUniform, Normal, Uniform
 from gen_data.core.errors import ConfigError, LayoutRejected
@@ -302,22 +301,6 @@ def test_possible_framing_passes_the_check() -> None:
         SCENE, FakeAssets()
     )
     CameraPose(name="b").check(SCENE, FakeAssets())
-
-
-@pytest.mark.parametrize(
-    ("given", "fact"),
-    [
-        ({"fills": 0.2, "distance_m": 1.0}, "distance_m: excludes fills"),
-        ({"fills": 0.2, "jitter_m": 0.1}, "jitter_m: excludes fills; expected off_center"),
-        ({"off_center": 0.2}, "off_center: needs fills"),
-        ({"fills": 0.0}, "0 is not in"),
-        ({"fills": {"normal": {"mean": 0.2, "stddev": 0.1}}}, "add a clip"),
-    ],
-)
-def test_contradictory_fields_are_refused(given: dict[str, object], fact: str) -> None:
-    """One way to give the distance; shares above 0."""
-    with pytest.raises(ValidationError, match=fact):
-        CameraPose.model_validate({"name": "close", **given})
 
 
 def test_infinite_share_stands_for_points_without_an_image() -> None:

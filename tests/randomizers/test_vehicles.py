@@ -120,11 +120,6 @@ def test_a_coat_lies_over_paint_alone_and_dust_dulls_it() -> None:
     assert slots(clean)["paint"].coat_roughness < 0.15 < slots(clean)["paint"].roughness
 
 
-def test_a_colour_that_does_not_exist_is_refused() -> None:
-    with pytest.raises(ValueError, match="unknown colour 'pink'; expected white, black"):
-        VehiclePaint(name="paint", weights={"pink": 1.0})
-
-
 def test_lights_glow_by_role_and_are_labelled() -> None:
     """Braking to the left by day with head lights off."""
     scene = lit(
