@@ -10,7 +10,6 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import ExitStack
 from typing import Any, Generic, TypeVar
 
 import numpy as np
@@ -37,8 +36,8 @@ class Loader(Generic[T]):
         batch_size: Targets per batch; the last batch of an epoch may be smaller.
         shuffle: Whether each epoch has another order.
         seed: Seed of the orders.
-        workers: Processes; 0 = this process. A script with workers needs the guard
-            ``if __name__ == "__main__":``.
+        workers: Processes, which start with the first epoch and end with the loader; 0 = this
+            process. A script with workers needs the guard ``if __name__ == "__main__":``.
         prefetch: Scenes that each worker may be ahead; bounds the memory.
         mixed_scenes: Number of scenes whose samples are shuffled together.
         rank: Rank of this process among ``world_size`` processes that train together; each has
@@ -93,6 +92,7 @@ class Loader(Generic[T]):
         self._batch_size, self._shuffle, self._seed = batch_size, shuffle, seed
         self._workers, self._prefetch, self._mixed_scenes = workers, prefetch, mixed_scenes
         self._rank, self._world_size, self._epoch_size = rank, world_size, epoch_size
+        self._pool: ProcessPoolExecutor | None = None
         self.epoch = 0
         self._position = 0
 
@@ -184,24 +184,31 @@ class Loader(Generic[T]):
             for item in items:
                 yield [self._target(self._samples[k]) for k in item.tolist()]
             return
-        with ExitStack() as stack:
-            pool = stack.enter_context(
-                ProcessPoolExecutor(
-                    self._workers,
-                    mp_context=multiprocessing.get_context("spawn"),
-                    initializer=_start_worker,
-                    initargs=(self._samples, self._target),
-                )
+        if self._pool is None:
+            self._pool = ProcessPoolExecutor(
+                self._workers,
+                mp_context=multiprocessing.get_context("spawn"),
+                initializer=_start_worker,
+                initargs=(self._samples, self._target),
             )
-            # Leaving early, as `break` does, must not wait for scenes that nobody wants.
-            stack.callback(pool.shutdown, wait=True, cancel_futures=True)
-            waiting: deque[Future[list[Any]]] = deque()
+        waiting: deque[Future[list[Any]]] = deque()
+        try:
             for item in items:
-                waiting.append(pool.submit(_work, item.tolist()))
+                waiting.append(self._pool.submit(_work, item.tolist()))
                 if len(waiting) > self._workers * self._prefetch:
-                    yield _result(waiting.popleft())
+                    yield waiting.popleft().result()
             while waiting:
-                yield _result(waiting.popleft())
+                yield waiting.popleft().result()
+        except BrokenProcessPool as error:
+            self._pool = None
+            raise errors.SampleError(
+                "a worker process of the loader ended, perhaps for lack of memory; use fewer "
+                "workers, or workers=0 to see its error"
+            ) from error
+        finally:
+            # Leaving early, as `break` does, must not wait for scenes that nobody wants.
+            for future in waiting:
+                future.cancel()
 
 
 _worker: tuple[dataset.SampleSequence, Callable[[sample.Sample], Any]] | None = None
@@ -217,13 +224,3 @@ def _work(positions: Sequence[int]) -> list[Any]:
     assert _worker is not None
     samples, target = _worker
     return [target(samples[k]) for k in positions]
-
-
-def _result(future: Future[list[Any]]) -> list[Any]:
-    try:
-        return future.result()
-    except BrokenProcessPool as error:
-        raise errors.SampleError(
-            "a worker process of the loader ended, perhaps for lack of memory; use fewer workers, "
-            "or workers=0 to see its error"
-        ) from error

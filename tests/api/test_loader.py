@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -134,6 +135,26 @@ def test_a_data_set_without_a_size_has_new_samples_in_every_epoch() -> None:
     assert [sorted(flat(source)) for _ in range(3)] == [
         list(range(6)), list(range(6, 12)), list(range(12, 18)),
     ]  # fmt: skip
+
+
+def process_of(number: int) -> int:
+    """The process that reads a sample."""
+    return os.getpid()
+
+
+@pytest.mark.slow
+def test_workers_of_an_epoch_work_in_the_next_one_even_after_a_break() -> None:
+    """Starting them takes seconds; none is this process."""
+    numbers: Any = Numbers(12)
+    loader = gen_data.Loader(numbers, process_of, batch_size=6, workers=1)
+
+    first, second = (set(flat(loader)) for _ in range(2))
+    next(iter(loader))
+    third = set(flat(loader))
+
+    assert first == second == third
+    assert len(first) == 1
+    assert os.getpid() not in first
 
 
 def test_shuffled_orders_are_uniform() -> None:
