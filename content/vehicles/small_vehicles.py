@@ -192,14 +192,8 @@ def trailer(seed: int) -> Solid:
             for t in turn.tolist()
         ]
         parts.append(rod(arch, 0.07, 5, 1))
-        parts.append(
-            block(
-                (-half - 0.02, side * (wide - 0.16) - 0.1, 0.42),
-                (-half, side * (wide - 0.16) + 0.1, 0.52),
-                0.0,
-                4,
-            )
-        )
+        y = side * (wide - 0.16)
+        parts.append(block((-half - 0.02, y - 0.1, 0.42), (-half, y + 0.1, 0.52), 0.0, 4))
     parts.append(bar((-0.1, -wide - 0.1, 0.29), (-0.1, wide + 0.1, 0.29), 0.035, 6, 6))
     parts.append(rounded_box((0.2, 0.09, 0.09), 0.03, 1).moved(reach, 0.0, floor - 0.02).painted(6))
     parts.append(post(0.028, (0.06, floor), (reach - 0.35, 0.0, 0.0), 8).painted(6))
