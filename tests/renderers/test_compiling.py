@@ -16,6 +16,7 @@ import warp as wp
 from gen_data.renderers import warp
 from gen_data.renderers.warp.device import EVERY_FRAME, compile_in_parallel, open_device
 from gen_data.renderers.warp.kernel_cache import copy_modules
+from tests.tiers import exhaustive
 
 _REPORT_MODULES = """
 import sys
@@ -149,7 +150,13 @@ def test_modules_are_copied_without_sources_and_never_over_others(tmp_path: Path
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", KERNEL_MODULES)
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=exhaustive if k % 3 else ())
+        for k, name in enumerate(KERNEL_MODULES)
+    ],
+)
 def test_kernels_compile_for_cuda(name: str, tmp_path: Path) -> None:
     """Compilation to PTX, which needs Warp's compiler but no GPU."""
     open_device("cpu")
