@@ -563,7 +563,7 @@ def plain_replace(store: LocalStore, name: str, data: bytes, scratch: Path) -> N
     ("place", "mutant"),
     [
         ("store.sync_tree", lambda folder, synced: None),
-        ("finalize.sync_tree", lambda folder, synced: None),
+        ("durable_files.sync_tree", lambda folder, synced: None),
         ("store.write_durably", plain_write),
         ("store.LocalStore.replace_file", plain_replace),
         ("durable_files.sync_path", lambda path: None),
