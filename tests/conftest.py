@@ -3,8 +3,6 @@
 With ``GEN_DATA_CI`` set, a skipped test is a failed one: what skips everywhere tests nothing.
 """
 
-from __future__ import annotations
-
 import atexit
 import importlib
 import os

@@ -4,8 +4,6 @@ Unlike durations, it does not depend on what else the machine does. It includes 
 count for the test that needs them first, and processes that have ended.
 """
 
-from __future__ import annotations
-
 import os
 from collections import Counter
 from collections.abc import Generator

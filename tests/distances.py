@@ -1,7 +1,5 @@
 """Exact distances from points to triangles, by trimesh's formula (Ericson 2004, 5.1.5)."""
 
-from __future__ import annotations
-
 import numpy as np
 import trimesh
 from numpy.typing import NDArray

@@ -3,8 +3,6 @@
 The package embreex needs no library of the system, and has wheels for x86-64 only.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """One test for many values, where thousands of tests would take longer to start than to run."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from typing import Any
 

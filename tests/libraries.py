@@ -1,7 +1,5 @@
 """What comes with the package, opened once for all tests."""
 
-from __future__ import annotations
-
 from functools import cache
 
 from gen_data.assets.library import Library, open_library

@@ -1,7 +1,5 @@
 """The files of pybullet for interpreters for which it has no wheel: those of its pack."""
 
-from __future__ import annotations
-
 import os
 import sys
 import tempfile

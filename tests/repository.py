@@ -1,7 +1,5 @@
 """Files of the repository, without git: archives of it and bare systems have none."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator
 from fnmatch import fnmatch

@@ -1,7 +1,5 @@
 """Streets of which little but the traffic is left: quick to draw, make and render."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from gen_data.assemble.config import Config, load_config

@@ -1,7 +1,5 @@
 """Which cases of a test the default run has, and which only CI (``pytest -m slow``)."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Packages without a wheel for every interpreter, or that need libraries of the system."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from importlib.util import find_spec
 from typing import Any, get_args

@@ -1,7 +1,5 @@
 """Annotators on images drawn by hand, where every number can be counted on paper."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Triangles seen from above, against points in polygons and planes."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Grasps and suctions of a settled scene, held against rays and sampled surfaces."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 

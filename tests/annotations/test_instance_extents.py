@@ -1,7 +1,5 @@
 """Extents of all ids in one pass, against one id at a time."""
 
-from __future__ import annotations
-
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st

@@ -1,7 +1,5 @@
 """Visibility of keypoints in images drawn by hand: one camera at the origin that looks along +Z."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Language about images, checked by a reader who has only the picture's boxes and the relations."""
 
-from __future__ import annotations
-
 import colorsys
 import re
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Boxes along headings, held against OpenCV's and the projection of 3D boxes."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from typing import Any

@@ -1,7 +1,5 @@
 """Relations between objects, held against distances, rays and hulls of others."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import cache
 from itertools import combinations

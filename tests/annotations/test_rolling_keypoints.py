@@ -1,7 +1,5 @@
 """Keypoints behind a rolling shutter, against a point that moves evenly."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

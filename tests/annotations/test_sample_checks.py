@@ -1,7 +1,5 @@
 """Every contradiction in a sample is found before the sample is written."""
 
-from __future__ import annotations
-
 import math
 import random
 import time

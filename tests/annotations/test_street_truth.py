@@ -1,7 +1,5 @@
 """Truth about streets: motion, borders of lanes, free space, maps from above."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

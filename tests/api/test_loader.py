@@ -1,7 +1,5 @@
 """Loading for training: the order of samples, and what it does not depend on."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator, Sequence
 from typing import Any

@@ -1,7 +1,5 @@
 """``import gen_data``: data sets as lazy sequences, generated or read back from disk."""
 
-from __future__ import annotations
-
 import pickle
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Samples of one split: selected by name, in every kind of data set."""
 
-from __future__ import annotations
-
 import pickle
 import warnings
 from contextlib import suppress

@@ -1,7 +1,5 @@
 """PyTorch: tensors of samples, from a finished data set and while rendering."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 from types import ModuleType

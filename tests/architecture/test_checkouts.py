@@ -1,7 +1,5 @@
 """A checkout works without symbolic links: as it is, and built into a wheel."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

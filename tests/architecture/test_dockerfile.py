@@ -1,7 +1,5 @@
 """The container image: pinned base, no root, no cache of pip. CI builds it where an engine runs."""
 
-from __future__ import annotations
-
 import io
 import re
 

@@ -1,7 +1,5 @@
 """Programs that import modules by their former names still run."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 

@@ -1,7 +1,5 @@
 """No library that can change a byte of a data set is missing from the data set's identity."""
 
-from __future__ import annotations
-
 import ast
 import re
 import sys

@@ -1,7 +1,5 @@
 """One import root: the repository's folders are packages below ``gen_data`` and nothing else."""
 
-from __future__ import annotations
-
 import ast
 import re
 import subprocess

@@ -4,8 +4,6 @@
 are left.
 """
 
-from __future__ import annotations
-
 from graphlib import CycleError, TopologicalSorter
 
 import grimp

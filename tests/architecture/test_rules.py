@@ -1,7 +1,5 @@
 """Rules that no linter knows; ruff, mypy and lint-imports run before the tests in ``.ci/run``."""
 
-from __future__ import annotations
-
 import ast
 import subprocess
 import sys

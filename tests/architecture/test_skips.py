@@ -1,7 +1,5 @@
 """In CI a skipped test is a failed one."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

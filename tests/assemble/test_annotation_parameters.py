@@ -1,7 +1,5 @@
 """Annotations in configurations: names, or mappings with parameters."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

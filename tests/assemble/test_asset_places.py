@@ -1,7 +1,5 @@
 """Assets that a configuration names and the library lacks."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Errors that plug-ins find themselves have the position of their entry."""
 
-from __future__ import annotations
-
 import pytest
 
 from gen_data.assemble.config import load_config

@@ -1,7 +1,5 @@
 """A configuration may extend another: it states only what differs."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

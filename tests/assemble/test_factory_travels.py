@@ -1,7 +1,5 @@
 """A factory on its way to another process."""
 
-from __future__ import annotations
-
 import pickle
 
 from gen_data.assemble.config import load_config

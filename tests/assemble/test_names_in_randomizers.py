@@ -1,7 +1,5 @@
 """Names in randomizers that stand for nothing are refused before a run, with their place."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """Everything that would stop a run is found before it, and all of it at once."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The shipped rigs, and what is refused about them."""
 
-from __future__ import annotations
-
 import math
 from functools import cache
 

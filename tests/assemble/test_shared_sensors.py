@@ -1,7 +1,5 @@
 """Sensors may depend on shared values, except in what all samples of a data set have in common."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

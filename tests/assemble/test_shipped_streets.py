@@ -1,7 +1,5 @@
 """First samples of shipped streets show what the configurations are for."""
 
-from __future__ import annotations
-
 import pytest
 
 import gen_data

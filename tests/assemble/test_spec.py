@@ -1,7 +1,5 @@
 """A configuration and its template become one validated Config; every fault has its place."""
 
-from __future__ import annotations
-
 import json
 import pickle
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Keys that begin with a space, or hold a dot or a line break, are quoted by messages."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Asset ids that ask for sizes and choices: ``desk?width_m=1.6``."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A folder is checked asset by asset."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """COLLADA files: units, up axis, nodes, polygons, colours and images as the file states them."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

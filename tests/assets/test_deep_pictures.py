@@ -1,7 +1,5 @@
 """Pictures of users: turned by EXIF, with more than eight bits, in odd orders and layers."""
 
-from __future__ import annotations
-
 import io
 from pathlib import Path
 

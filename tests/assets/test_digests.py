@@ -1,7 +1,5 @@
 """Cached digests of files are never used when a file may have changed."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import time

@@ -1,7 +1,5 @@
 """What is seen in a file and not used is told: by checks, plans, ``init`` and generation."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -3,8 +3,6 @@
 Files are built here; expected values follow from the specification of glTF 2.0 and its extensions.
 """
 
-from __future__ import annotations
-
 import json
 import struct
 from pathlib import Path

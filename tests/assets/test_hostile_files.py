@@ -1,7 +1,5 @@
 """How many hostile files the tests read; ``tests/conftest.py`` limits time and memory of each."""
 
-from __future__ import annotations
-
 import importlib
 import inspect
 import math

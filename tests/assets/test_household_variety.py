@@ -1,7 +1,5 @@
 """Kinds and contents of household objects."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The cache: same bytes with it, without it, and when it is damaged."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from dataclasses import fields

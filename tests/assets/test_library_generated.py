@@ -1,7 +1,5 @@
 """Procedural assets through the library: ids, parameters, hashes, cache."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

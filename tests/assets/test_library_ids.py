@@ -1,7 +1,5 @@
 """Asset ids: one spelling for one asset."""
 
-from __future__ import annotations
-
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st

@@ -1,7 +1,5 @@
 """What pybullet installs: real sizes, right way up, found by tag."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """What files say of coats, glass, opacity, holes and light: it arrives, or is refused by name."""
 
-from __future__ import annotations
-
 import io
 import json
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Collision parts: inside the hull, around the shape, few and small."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.spatial import ConvexHull

@@ -1,7 +1,5 @@
 """Broken and malicious files: each is refused quickly, by name, and nothing outside is opened."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

@@ -1,7 +1,5 @@
 """The normal form: outward, welded, split along creases, bounded."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

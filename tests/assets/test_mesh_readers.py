@@ -1,7 +1,5 @@
 """File formats: what the files say is what is read."""
 
-from __future__ import annotations
-
 import base64
 import json
 import struct

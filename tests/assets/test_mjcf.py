@@ -1,7 +1,5 @@
 """MJCF files: bodies, joints, geoms, materials and constraints as MuJoCo itself has them."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """An arm of one file with a hand of another."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -3,8 +3,6 @@
 Expected values are those of the files themselves, of the formats' rules, or computed by hand.
 """
 
-from __future__ import annotations
-
 import struct
 import zipfile
 from pathlib import Path

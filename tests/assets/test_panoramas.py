@@ -1,7 +1,5 @@
 """Panoramas of users: Radiance and OpenEXR; what is no light is refused with one clear error."""
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Callable
 from pathlib import Path

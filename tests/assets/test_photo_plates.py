@@ -1,7 +1,5 @@
 """Photographs as plates: their horizon is found, given or refused, and their light fits them."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

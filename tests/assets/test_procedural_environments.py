@@ -1,7 +1,5 @@
 """Environments: mean luminance, orientation, and what must be bright."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Furniture: sizes asked for are sizes got, and things can be put on and in it."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.spatial import ConvexHull

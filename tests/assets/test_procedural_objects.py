@@ -1,7 +1,5 @@
 """Every family of procedural objects, over several seeds."""
 
-from __future__ import annotations
-
 import hashlib
 from functools import cache
 

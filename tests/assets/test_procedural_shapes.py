@@ -1,7 +1,5 @@
 """Shape generators against formulas of solid geometry."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Symmetries of procedural objects, measured on their meshes."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

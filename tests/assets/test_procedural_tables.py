@@ -1,7 +1,5 @@
 """Tables of content beside the modules: typed rows by key, in the file's order."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

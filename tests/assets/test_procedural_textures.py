@@ -1,7 +1,5 @@
 """Every texture family: it tiles, repeats exactly, and its variants differ."""
 
-from __future__ import annotations
-
 import ast
 from functools import cache
 from pathlib import Path

@@ -1,7 +1,5 @@
 """URDF files as others write them: materials, joints, empty shapes, packages, xacro."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

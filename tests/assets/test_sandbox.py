@@ -3,8 +3,6 @@
 The functions called in it are those of Python itself that do what a hostile file makes a parser do.
 """
 
-from __future__ import annotations
-
 import ctypes
 import os
 import signal

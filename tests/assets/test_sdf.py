@@ -1,7 +1,5 @@
 """SDF models: frames, joints, models inside models, materials and files of Gazebo."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Sun and sky, against tables and formulas of photometry and meteorology."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Which links of a robot may touch."""
 
-from __future__ import annotations
-
 from gen_data.assets.folder_index import RobotEntry
 from gen_data.assets.robot_description import Link, RobotDescription
 from gen_data.assets.robot_models import robot_model

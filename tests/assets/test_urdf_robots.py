@@ -1,7 +1,5 @@
 """Robots: kinematics as the URDF says, geometry link by link."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

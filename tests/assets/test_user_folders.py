@@ -1,7 +1,5 @@
 """A user's own folder: with an index, and without."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable
 from pathlib import Path

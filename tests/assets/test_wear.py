@@ -1,7 +1,5 @@
 """Wear of household things: where it lies is measured on meshes, not on the images."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The measurement on a GPU: its comparison with references, its limits, and its path on a CPU."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """The comparison with other renderers: its scenes, its measures, and PyBullet's part of it."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path

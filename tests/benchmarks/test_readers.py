@@ -1,7 +1,5 @@
 """The comparison of exports with readers of other makers finds what is planted in a view."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from dataclasses import replace

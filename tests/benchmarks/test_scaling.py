@@ -1,7 +1,5 @@
 """Laws of ``python -m benchmarks.bench_scaling``: the fit, and the scenes it varies."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A small data set to certify, and what reseals a damaged copy of it."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Callable
 from pathlib import Path

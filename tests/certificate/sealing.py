@@ -1,7 +1,5 @@
 """Seals of damaged data sets: all checksums are those of the files again."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Certificates of a good data set, and of copies with each damage that claims exclude."""
 
-from __future__ import annotations
-
 import errno
 import json
 import os

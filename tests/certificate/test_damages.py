@@ -3,8 +3,6 @@
 The same as the table of ``docs/certificates.md``. All samples are generated again.
 """
 
-from __future__ import annotations
-
 import json
 import shutil
 from collections.abc import Callable

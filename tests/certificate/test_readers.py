@@ -1,7 +1,5 @@
 """Readers of exports find what labels say in good exports, and name what is wrong in others."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 

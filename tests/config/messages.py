@@ -1,7 +1,5 @@
 """Messages about documents as a user reads them: place, fact, source line and caret."""
 
-from __future__ import annotations
-
 
 def told(name: str, text: str, *faults: tuple[int, int, str]) -> str:
     """Messages about a text, by line, column and fact; tabs are shown as blanks."""

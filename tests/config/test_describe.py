@@ -1,7 +1,5 @@
 """What ``gen-data describe`` and ``gen-data schema`` tell about a plug-in."""
 
-from __future__ import annotations
-
 import json
 from enum import Enum
 from typing import Annotated, Any, Literal

@@ -1,7 +1,5 @@
 """Distributions as values: construction, equality, support, YAML form."""
 
-from __future__ import annotations
-
 import json
 import math
 import pickle

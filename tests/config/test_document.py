@@ -1,7 +1,5 @@
 """Reading YAML: places, limits, and everything that is refused."""
 
-from __future__ import annotations
-
 import os
 import time
 from pathlib import Path

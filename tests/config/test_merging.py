@@ -1,7 +1,5 @@
 """Which parts of a document merge with what is laid over them, and which are replaced."""
 
-from __future__ import annotations
-
 import pytest
 
 from gen_data.config.merging import merge_named, merge_nodes

@@ -1,7 +1,5 @@
 """Paths in configurations: relative to the file that names them, then shipped names."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

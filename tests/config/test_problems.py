@@ -1,7 +1,5 @@
 """Telling everything that is wrong in one message."""
 
-from __future__ import annotations
-
 import pytest
 
 from gen_data.config.problems import Position, Problems, format_path

@@ -1,7 +1,5 @@
 """Words of earlier releases are read, and a warning names the new one and its place."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 import warnings

@@ -1,7 +1,5 @@
 """Scalars of the YAML 1.2 core schema."""
 
-from __future__ import annotations
-
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st

@@ -1,7 +1,5 @@
 """Shared values: drawn once per scene, referred to anywhere, selecting what depends on them."""
 
-from __future__ import annotations
-
 import sys
 from collections import Counter
 

@@ -1,7 +1,5 @@
 """The base of all models."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

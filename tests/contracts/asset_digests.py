@@ -6,8 +6,6 @@ Caches and identities of data sets name an asset by its family's version. A fami
 bytes under the same version is read from old caches, and samples differ from machine to machine.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import tempfile

@@ -6,8 +6,6 @@ They name the first stage that an accidental change of bytes altered (see
 ``gen_data.runner.diff``). A deliberate change renews them in its own commit.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

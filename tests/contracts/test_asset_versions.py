@@ -1,7 +1,5 @@
 """Procedural assets keep their bytes as long as they keep their version."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -4,8 +4,6 @@ The truth classes document each field with its annotator's name in brackets at t
 an annotator may fill in, and nothing else.
 """
 
-from __future__ import annotations
-
 import inspect
 import pickle
 import re

@@ -3,8 +3,6 @@
 Images, sweeps and sequences are reduced: the paths through the program stay the same.
 """
 
-from __future__ import annotations
-
 import subprocess
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """What ``gen-data describe`` prints of everything that a configuration can contain."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,7 +1,5 @@
 """Named draws of every family: sizes and choices that asset ids may ask for."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager

@@ -1,7 +1,5 @@
 """Contract of every randomizer in the table, built-in or third-party."""
 
-from __future__ import annotations
-
 import json
 import math
 import pickle

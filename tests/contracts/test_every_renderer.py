@@ -3,8 +3,6 @@
 The world is one of boxes, so that a ray's hit is known in closed form, whatever draws the rest.
 """
 
-from __future__ import annotations
-
 import pickle
 from collections.abc import Mapping
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Contract of every sensor in the table, built-in or third-party."""
 
-from __future__ import annotations
-
 import json
 import pickle
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Contract of every shipped template and configuration."""
 
-from __future__ import annotations
-
 from functools import cache
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Which stage the comparison with stored digests names."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

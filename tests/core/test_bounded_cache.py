@@ -1,7 +1,5 @@
 """Caches never exceed their bounds, and the least recently used values go first."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from gen_data.core.bounded_cache import ByteCache, CountCache

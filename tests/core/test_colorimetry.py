@@ -1,7 +1,5 @@
 """Luminance, sRGB's transfer function and XYZ, against the standards' own numbers."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """One name on package indices, and commands that install from where the code came."""
 
-from __future__ import annotations
-
 import json
 import re
 from importlib.metadata import PathDistribution

@@ -1,7 +1,5 @@
 """Singulars and plurals of every category, against a list by hand and the package inflect."""
 
-from __future__ import annotations
-
 import importlib
 from functools import cache
 from importlib.resources import files

@@ -1,7 +1,5 @@
 """The pinhole camera and its half-pixel convention."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

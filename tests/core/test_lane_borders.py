@@ -1,7 +1,5 @@
 """Lines at the sides of lanes."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Places along lanes, against the circle that a lane follows."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

@@ -1,7 +1,5 @@
 """Lens models against OpenCV, and what OpenCV leaves open: folds, fields, what lies behind."""
 
-from __future__ import annotations
-
 import math
 
 import cv2

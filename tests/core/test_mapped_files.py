@@ -1,7 +1,5 @@
 """Views of files: no descriptor each, read-only, returned to the system."""
 
-from __future__ import annotations
-
 import gc
 import resource
 from collections.abc import Callable, Iterator

@@ -1,7 +1,5 @@
 """Members of object groups: names, instance ids, labels."""
 
-from __future__ import annotations
-
 from gen_data.core.members import Member, add_members, free_instance_ids, remove_members
 from gen_data.core.scene import Instance, ObjectGroup, Scene
 from gen_data.core.se3 import SE3

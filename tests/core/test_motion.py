@@ -1,7 +1,5 @@
 """Tracks pass through their knots, move as calculus says, and carry everything that rides along."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Overlap of oriented boxes, against linear programming and against a grid of points."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

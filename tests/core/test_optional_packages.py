@@ -1,7 +1,5 @@
 """Features without their package say which extra brings it."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Lumens, candelas, lux: against integrals over the sphere and over panels."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Geometry of plates: horizons, ground and images of other sizes, against projections by hand."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Tables of plug-ins."""
 
-from __future__ import annotations
-
 from typing import Literal, Protocol
 
 import pytest

@@ -1,7 +1,5 @@
 """Helper processes and the process that started them."""
 
-from __future__ import annotations
-
 import re
 import signal
 import subprocess

@@ -1,7 +1,5 @@
 """Safe parsing of XML of others."""
 
-from __future__ import annotations
-
 from typing import Any
 from xml.parsers import expat
 

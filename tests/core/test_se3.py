@@ -1,7 +1,5 @@
 """Rigid poses: group laws, agreement with matrices, and cameras that look at things."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Frozen dataclasses to JSON and back."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass, field
 from enum import Enum

@@ -1,7 +1,5 @@
 """Disparities of rectified pairs, and what only one camera of them sees."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

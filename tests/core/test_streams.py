@@ -1,7 +1,5 @@
 """Random streams: keyed by who draws, never by when."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from hashlib import blake2b
 

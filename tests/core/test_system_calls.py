@@ -4,8 +4,6 @@ Neither macOS nor Windows runs here: what is tested is that everything works wit
 they lack. Their own calls are replaced by ones that do the same.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess

@@ -1,7 +1,5 @@
 """Temporary folders and the processes that own them."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

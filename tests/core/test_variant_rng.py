@@ -1,7 +1,5 @@
 """Draws of variants: the same stream, whatever an asset id asks for."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

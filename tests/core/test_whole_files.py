@@ -1,7 +1,5 @@
 """Files are written as a whole, also on a full disk."""
 
-from __future__ import annotations
-
 import errno
 from pathlib import Path
 

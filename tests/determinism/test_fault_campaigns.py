@@ -4,8 +4,6 @@ Campaigns that need a program or a privilege that is not there are not collected
 table of the command say why.
 """
 
-from __future__ import annotations
-
 import os
 import shutil
 from pathlib import Path

@@ -1,7 +1,5 @@
 """One configuration of each kind of world, killed and resumed: the bytes of an unbroken run."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

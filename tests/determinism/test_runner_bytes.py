@@ -1,7 +1,5 @@
 """Equal bytes for any number of workers, any order and any interruptions."""
 
-from __future__ import annotations
-
 import os
 import random
 import signal

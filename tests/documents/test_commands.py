@@ -3,8 +3,6 @@
 ``tests/documents/test_tutorials.py`` runs tutorials, ``.ci/bare_root`` the README on a bare system.
 """
 
-from __future__ import annotations
-
 import shlex
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Decisions by topic: short pages of complete entries, whose names of code exist."""
 
-from __future__ import annotations
-
 import re
 from functools import cache
 from pathlib import Path, PurePosixPath

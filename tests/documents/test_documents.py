@@ -1,7 +1,5 @@
 """Documents: configurations in them are valid, links and names of modules exist."""
 
-from __future__ import annotations
-
 import importlib.util
 import re
 import shlex

@@ -4,8 +4,6 @@
 none. ``python -m tests.documents.test_english`` writes the table again and refuses larger numbers.
 """
 
-from __future__ import annotations
-
 import ast
 import re
 import sys

@@ -1,7 +1,5 @@
 """The scripts of ``examples/`` run, and its plug-in package works."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

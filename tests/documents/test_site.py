@@ -1,7 +1,5 @@
 """The documentation site: the generated reference is complete, and every picture is there."""
 
-from __future__ import annotations
-
 import re
 from functools import cache
 from pathlib import Path

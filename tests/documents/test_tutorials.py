@@ -4,8 +4,6 @@ A block whose first line is a comment with a path is a file; other Python blocks
 their names. Commands run in the order of the page, ``gen-data`` in this process.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import shlex

@@ -6,8 +6,6 @@ folder, environment and streams; only imports and reads of the package's own fil
 command, happen once.
 """
 
-from __future__ import annotations
-
 import atexit
 import gc
 import importlib

@@ -1,7 +1,5 @@
 """A small data set shared by several tests."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """Run ``gen-data`` in its own process, as a user does."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

@@ -1,7 +1,5 @@
 """Bad input: one clear error with its own exit code, and no partial output."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """``gen-data cache``: what is kept between runs, and its removal."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """Hours and money of a run from measured means."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from gen_data.cli.cost_estimate import Prices, Probe, estimate_rows

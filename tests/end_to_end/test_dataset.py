@@ -1,7 +1,5 @@
 """The main use case, from the command line to files that third-party readers accept."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

@@ -1,7 +1,5 @@
 """Export of a finished data set in other formats."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

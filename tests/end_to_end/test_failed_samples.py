@@ -1,7 +1,5 @@
 """A data set without one of its samples, in every command that reads it."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The first five minutes: init, plan, formats, describe, completion."""
 
-from __future__ import annotations
-
 import json
 import re
 import shlex

@@ -1,7 +1,5 @@
 """A result without labels is said, wherever it comes from; nothing is lost."""
 
-from __future__ import annotations
-
 import warnings
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """``gen-data match``: from a folder of recordings to a configuration that generates."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Mistakes of the first day: each message says what to type instead."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -4,8 +4,6 @@ The points come from the label images; they are projected by OpenCV alone, with 
 file of Kalibr, and must be back at the centres of their pixels.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Preview and information commands."""
 
-from __future__ import annotations
-
 import json
 import re
 import shutil

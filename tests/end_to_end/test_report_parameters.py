@@ -1,7 +1,5 @@
 """The report of a generated data set: parameters that are drawn again."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

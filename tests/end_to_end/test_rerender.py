@@ -1,7 +1,5 @@
 """Scenes of a finished data set, rendered again: pairs that differ in one thing only."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Estimated against written bytes: a disk that is too small is refused before the first sample."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

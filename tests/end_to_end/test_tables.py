@@ -1,7 +1,5 @@
 """Tables on terminals: 80 columns, whole words."""
 
-from __future__ import annotations
-
 import io
 import re
 from typing import Any

@@ -1,7 +1,5 @@
 """verify --deep, --regenerate and repro on a rendered data set."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from pathlib import Path

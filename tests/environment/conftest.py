@@ -1,7 +1,5 @@
 """Environments end with their test; those that tests share, with the last test of a file."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import pytest

@@ -1,7 +1,5 @@
 """A small configuration with a task, and environments over it."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Actions move the arm as told, through the drawn dynamics."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -1,7 +1,5 @@
 """The environment keeps Gymnasium's contract over the scenes of a configuration."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys

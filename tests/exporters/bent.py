@@ -1,7 +1,5 @@
 """The street of ``conftest.py`` through bent lenses, whose rays are OpenCV's."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -4,8 +4,6 @@ Independent of every renderer of the project, so that what exporters write can b
 geometry.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace

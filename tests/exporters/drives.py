@@ -1,7 +1,5 @@
 """Paths, readers and the data set of the drives that tests of sequence formats export."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

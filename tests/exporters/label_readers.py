@@ -1,7 +1,5 @@
 """Objects in images as exports state them, read by the libraries of each format or by hand."""
 
-from __future__ import annotations
-
 import contextlib
 import csv
 import gc

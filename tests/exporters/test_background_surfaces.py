@@ -1,7 +1,5 @@
 """Surfaces behind pixels without an instance, held against the geometry of a street."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Maps from above and lanes on disk."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """BOP export: models rendered again by Embree under the written poses, as bop_toolkit does it."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import json

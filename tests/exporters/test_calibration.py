@@ -1,7 +1,5 @@
 """Calibrations of data sets in the files of OpenCV, ROS, Kalibr and COLMAP."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Matrices and lenses that formats state, against geometry and OpenCV."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path

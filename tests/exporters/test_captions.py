@@ -1,7 +1,5 @@
 """Captions of scenes."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Any

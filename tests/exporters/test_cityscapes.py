@@ -1,7 +1,5 @@
 """Cityscapes export, held against the samples; the slow test reads it with cityscapesscripts."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections import Counter

@@ -1,7 +1,5 @@
 """COCO export, judged by pycocotools."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import json

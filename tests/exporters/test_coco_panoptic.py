@@ -1,7 +1,5 @@
 """COCO panoptic export, held against the instances of ``coco`` and the definition of PQ."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Sequences in COCO's files: ids of sequences, frames and tracks."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Control clips: signals against the readings they come from, and the layouts of their readers."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Exporters state their conventions; page and files repeat them, and the numbers follow them."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

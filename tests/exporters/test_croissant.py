@@ -1,7 +1,5 @@
 """Croissant export: tables by themselves, metadata by the package mlcroissant."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from dataclasses import replace

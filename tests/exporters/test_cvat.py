@@ -1,7 +1,5 @@
 """CVAT export: runs and states of shapes; ``test_labels.py`` reads them."""
 
-from __future__ import annotations
-
 import xml.etree.ElementTree as ET
 from pathlib import Path
 from typing import Any

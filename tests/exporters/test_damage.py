@@ -4,8 +4,6 @@ The tests of the format then hold the export against the samples as they were. S
 facts a format carries to its readers; ``tests/usd/test_usd_export.py`` damages stages of USD.
 """
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, is_dataclass, replace

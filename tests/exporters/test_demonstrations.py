@@ -1,7 +1,5 @@
 """Labels of demonstrations in episodes, read by pyarrow and protobuf."""
 
-from __future__ import annotations
-
 import io
 import json
 from dataclasses import replace

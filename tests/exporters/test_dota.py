@@ -1,7 +1,5 @@
 """DOTA's layout as its development kit reads it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """What every exporter promises, whatever it writes; a new one is tested before it has tests."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Exporters that see some sensors of a data set, and bent lenses as pinholes."""
 
-from __future__ import annotations
-
 import json
 import tarfile
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Flow in files, read back as the KITTI development kit reads it: by OpenCV, 16 bits a colour."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Arrays of GraspNet and SuctionNet, read as their APIs index them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Containers with BlenderProc's keys, read by h5py and NumPy and held against the street."""
 
-from __future__ import annotations
-
 import json
 import zipfile
 from collections.abc import Iterator

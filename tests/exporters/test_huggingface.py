@@ -1,7 +1,5 @@
 """Hugging Face export: Parquet files, read by pyarrow and by the package datasets."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from typing import Any

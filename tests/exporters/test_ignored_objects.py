@@ -1,7 +1,5 @@
 """Ignored objects without a class: readers compare them with detections class by class."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any

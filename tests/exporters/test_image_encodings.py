@@ -1,7 +1,5 @@
 """Photographs as JPEG and WebP: files that other decoders read, in every format that takes them."""
 
-from __future__ import annotations
-
 import configparser
 import io
 import json

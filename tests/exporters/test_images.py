@@ -1,7 +1,5 @@
 """PNG files, read back by Pillow or by hand, never by the library that wrote them."""
 
-from __future__ import annotations
-
 import io
 import os
 import struct

@@ -1,7 +1,5 @@
 """KITTI export, judged by the arithmetic of KITTI's own development kit."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """KITTI raw data: drives, times, calibration, tracklets and grey images."""
 
-from __future__ import annotations
-
 import math
 import xml.etree.ElementTree as ET
 from dataclasses import replace

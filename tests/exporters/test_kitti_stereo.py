@@ -1,7 +1,5 @@
 """KITTI's stereo benchmark, read as its devkit reads it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """KITTI tracking: labels, sequences and calibration."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,7 +1,5 @@
 """Label maps: which objects an export has, and under which names."""
 
-from __future__ import annotations
-
 import json
 from collections import Counter
 from importlib.resources import files

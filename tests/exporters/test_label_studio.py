@@ -1,7 +1,5 @@
 """Label Studio export, held against the samples and Label Studio's own SDK."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Readers of labelled images find the objects of the samples in every format."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Vision-language labels as their readers see them."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

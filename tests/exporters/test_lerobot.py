@@ -1,7 +1,5 @@
 """LeRobot export, read by pyarrow as LeRobot 0.4.4 and 0.3.2 read it, and by LeRobot 0.4.4."""
 
-from __future__ import annotations
-
 import io
 import json
 import os

@@ -1,7 +1,5 @@
 """Binary masks as PNG files, read by two independent decoders."""
 
-from __future__ import annotations
-
 import io
 import zlib
 

@@ -1,7 +1,5 @@
 """Polygons of masks, judged by the rasteriser of pycocotools."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import cv2

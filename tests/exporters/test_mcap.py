@@ -1,7 +1,5 @@
 """MCAP export, read by the packages mcap and mcap-protobuf-support."""
 
-from __future__ import annotations
-
 import io
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """MOTChallenge: rows, sequence files and classes."""
 
-from __future__ import annotations
-
 import configparser
 from dataclasses import replace
 from pathlib import Path

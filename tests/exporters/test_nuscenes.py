@@ -1,7 +1,5 @@
 """nuScenes: tables, poses, files and classes, read without the devkit."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """nuScenes by its own devkit: velocities, points, maps, radars and its evaluations."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Iterator
 from dataclasses import replace

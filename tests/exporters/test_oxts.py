@@ -1,7 +1,5 @@
 """KITTI's navigation rows (OXTS)."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from pathlib import Path

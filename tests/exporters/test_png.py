@@ -1,7 +1,5 @@
 """PNG files read back by decoders that are not ours."""
 
-from __future__ import annotations
-
 import io
 import zlib
 from typing import Any

@@ -1,7 +1,5 @@
 """Consumers add the time of a point to the stamp of its sweep, and find the pulse's instant."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

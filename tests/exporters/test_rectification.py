@@ -1,7 +1,5 @@
 """Rectified images and labels, against OpenCV and against a ray cast of the pinhole."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Data sets that a format cannot represent are refused before rendering, with the remedy."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,7 +1,5 @@
 """Rerun export, read back by rerun-sdk."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """TUM's and ScanNet's RGB-D sequences: points from their files alone lie on the scene."""
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Run-length encoding against pycocotools, the format's own implementation."""
 
-from __future__ import annotations
-
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st

@@ -1,7 +1,5 @@
 """Laser scans in files: KITTI, SemanticKITTI, PLY and PCD, read back by other means."""
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import replace

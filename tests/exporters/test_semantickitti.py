@@ -1,7 +1,5 @@
 """SemanticKITTI: sequences, poses and classes."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

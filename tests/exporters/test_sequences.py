@@ -1,7 +1,5 @@
 """Behaviour common to all formats of sequences: missing readings and bad input."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

@@ -1,7 +1,5 @@
 """SOLO export, held against the street; in slow tests as pysolotools reads it."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator, Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Symmetries found on surfaces and colours, judged by BOP's error of symmetric poses."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Rows of devices as files that spreadsheets and NumPy read."""
 
-from __future__ import annotations
-
 import csv
 import json
 from pathlib import Path

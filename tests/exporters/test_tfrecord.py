@@ -1,7 +1,5 @@
 """TFRecord export, read by the package tfrecord; sums by the package crc32c."""
 
-from __future__ import annotations
-
 import struct
 from pathlib import Path
 from typing import Any

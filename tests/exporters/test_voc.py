@@ -1,7 +1,5 @@
 """Pascal VOC export, held against ``coco`` and the images of the shards."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """WebDataset export, judged by the package webdataset."""
 
-from __future__ import annotations
-
 import tarfile
 from pathlib import Path
 from typing import Any

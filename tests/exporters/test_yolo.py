@@ -1,7 +1,5 @@
 """YOLO export, held against the samples; the slow test reads it with Ultralytics."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Iterator
 from pathlib import Path

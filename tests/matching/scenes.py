@@ -4,8 +4,6 @@ Pictures are dead leaves: opaque shapes with a power law of sizes, whose edges a
 of natural images (Lee, Mumford and Huang, "Occlusion models for natural images", 2001).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 from typing import Any

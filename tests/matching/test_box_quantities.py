@@ -1,7 +1,5 @@
 """Sizes and positions of boxes, and the fields of cameras that answer for them."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,7 +1,5 @@
 """Recovery of a camera's parameters from photographs that were made with known ones."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

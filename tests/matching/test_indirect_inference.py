@@ -1,7 +1,5 @@
 """Indirect inference on models whose answer is known."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from zlib import crc32
 

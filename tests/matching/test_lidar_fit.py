@@ -1,7 +1,5 @@
 """Recovery of a scanner's parameters from scans that were made with known ones."""
 
-from __future__ import annotations
-
 import pytest
 
 from gen_data.lab.matching.lidar_fit import fit_lidar

@@ -1,7 +1,5 @@
 """Folders of recordings: what is read, and what is skipped with which reason."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Converters of packs that only tests have."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

@@ -1,7 +1,5 @@
 """Only wanted plain files inside the folder come out of an archive, and never too many bytes."""
 
-from __future__ import annotations
-
 import io
 import tarfile
 import zipfile

@@ -1,7 +1,5 @@
 """The arms pack: COLLADA and URDF of example-robot-data become robots with fingers."""
 
-from __future__ import annotations
-
 import math
 import os
 from pathlib import Path

@@ -1,7 +1,5 @@
 """``gen-data assets``: output and exit codes."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """From packages to assets, tried on packages of one or two members."""
 
-from __future__ import annotations
-
 import base64
 import json
 import math

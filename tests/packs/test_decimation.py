@@ -1,7 +1,5 @@
 """Fewer triangles, the same pictures on them."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from gen_data.assets.mesh_decimation import decimate

@@ -1,7 +1,5 @@
 """A data set records the packs it may draw from, and their attribution."""
 
-from __future__ import annotations
-
 import zipfile
 from hashlib import sha256
 from pathlib import Path

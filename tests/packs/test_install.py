@@ -1,7 +1,5 @@
 """Packs are installed whole or not at all, from exactly the archive that the table means."""
 
-from __future__ import annotations
-
 import multiprocessing
 import os
 import signal

@@ -1,7 +1,5 @@
 """The files of pybullet are fetched where it has no wheel: once, when they are first needed."""
 
-from __future__ import annotations
-
 import multiprocessing
 from collections.abc import Callable
 from dataclasses import replace

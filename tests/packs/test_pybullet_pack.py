@@ -1,7 +1,5 @@
 """The files of pybullet, for systems for which it has no wheel."""
 
-from __future__ import annotations
-
 import importlib.util
 import zipfile
 from collections.abc import Callable

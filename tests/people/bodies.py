@@ -1,7 +1,5 @@
 """Bodies that tests of people are run on."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

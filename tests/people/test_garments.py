@@ -1,7 +1,5 @@
 """Garments and their textures."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Fingers at rest and in grips; shoes and their textures."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Faces, eyes and hair of people, and their umbrellas."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

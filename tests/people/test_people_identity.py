@@ -1,7 +1,5 @@
 """Who people are, before anything is built; and what is offered for selection."""
 
-from __future__ import annotations
-
 import importlib
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Built people: on the ground, of the right size, with keypoints inside them."""
 
-from __future__ import annotations
-
 from collections import Counter
 
 import numpy as np

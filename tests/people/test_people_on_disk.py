@@ -1,7 +1,5 @@
 """Which people the cache folder keeps."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from gen_data.assets.library import open_library

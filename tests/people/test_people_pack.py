@@ -1,7 +1,5 @@
 """Conversion of the pack, on a small body of the same layout."""
 
-from __future__ import annotations
-
 import gzip
 import json
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Bones, angles and skinning."""
 
-from __future__ import annotations
-
 import itertools
 from collections import Counter
 

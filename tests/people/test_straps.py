@@ -1,7 +1,5 @@
 """Straps of bags."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np

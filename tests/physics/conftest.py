@@ -1,7 +1,5 @@
 """Both engines, as far as they are installed: the same tests hold for each."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import pytest

@@ -1,7 +1,5 @@
 """Stand-ins for the asset library: solids of known size, and small scenes made of them."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from functools import cache

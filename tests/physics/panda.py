@@ -1,7 +1,5 @@
 """Franka Panda as a RobotModel, read from the URDF that pybullet installs."""
 
-from __future__ import annotations
-
 import math
 from functools import cache
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Arms reach, hold and avoid."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Scratch files of the physics engine."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Demonstrations: physics carries out an arm's task, tells what became of it, and judges it."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from functools import cache

@@ -1,7 +1,5 @@
 """Fingers of several links close on what is between them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 

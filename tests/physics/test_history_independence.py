@@ -1,7 +1,5 @@
 """settle(scene) is a function of the scene: of nothing before it, and of no process."""
 
-from __future__ import annotations
-
 import hashlib
 import multiprocessing
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Forward kinematics, and what is derived from it."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 

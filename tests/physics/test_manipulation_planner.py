@@ -1,7 +1,5 @@
 """Arms pass goals in turn, within limits, through free space, and put down what they take up."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from functools import cache

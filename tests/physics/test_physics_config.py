@@ -1,7 +1,5 @@
 """What a user may write under ``physics:``."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Scenes that find no layout: the message names the best attempt, and what stood in its way."""
 
-from __future__ import annotations
-
 import pickle
 
 from gen_data.core.errors import Rejection, SceneRejected

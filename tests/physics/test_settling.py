@@ -1,7 +1,5 @@
 """Where things come to rest."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Collision geometry as the engine gets it."""
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

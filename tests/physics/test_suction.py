@@ -1,7 +1,5 @@
 """Suction cups, hinges in the hand and forces of contacts, against formulas."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

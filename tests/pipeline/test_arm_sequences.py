@@ -1,7 +1,5 @@
 """Samples of a sequence in which an arm carries something."""
 
-from __future__ import annotations
-
 import pytest
 
 from gen_data.assemble.config import load_config

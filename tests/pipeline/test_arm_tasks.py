@@ -1,7 +1,5 @@
 """Every task of the table is demonstrated, and physics confirms it."""
 
-from __future__ import annotations
-
 import shutil
 from contextlib import nullcontext
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A whole sample through a fisheye: labels that agree with each other and with OpenCV."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import cv2

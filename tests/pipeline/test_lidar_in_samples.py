@@ -1,7 +1,5 @@
 """Laser scanners in samples of the shipped rig."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 

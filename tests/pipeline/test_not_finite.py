@@ -1,7 +1,5 @@
 """NaN and infinity, planted in every stage: an error that names the place, never an image."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """The shipped dash camera: rolling rows, blur, flow and labels in the samples of a sequence."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 

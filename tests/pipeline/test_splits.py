@@ -1,7 +1,5 @@
 """Scenes are assigned to splits at random, or in turns."""
 
-from __future__ import annotations
-
 import warnings
 from collections import Counter
 from pathlib import Path

@@ -4,8 +4,6 @@ It is written from the Protocols of ``gen_data.core.interfaces`` and inherits no
 ``Strict``; ``mypy`` checks it with the rest of the project (``pyproject.toml``).
 """
 
-from __future__ import annotations
-
 import json
 import os
 import re

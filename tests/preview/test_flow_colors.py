@@ -1,7 +1,5 @@
 """The colour wheel of flow, against the published one's corners."""
 
-from __future__ import annotations
-
 import colorsys
 import math
 

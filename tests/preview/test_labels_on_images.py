@@ -1,7 +1,5 @@
 """Labels drawn on images: legible at the size of a tile, and nothing is painted over."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """What is drawn lies where the labels say."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

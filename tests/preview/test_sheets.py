@@ -1,7 +1,5 @@
 """Sheets of sensors: what is on them, and those of the documentation."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 from pathlib import Path

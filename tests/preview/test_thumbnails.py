@@ -1,7 +1,5 @@
 """Pictures of single assets."""
 
-from __future__ import annotations
-
 from gen_data.assets.library import open_library
 from gen_data.preview.thumbnails import thumbnail
 from gen_data.renderers import TABLE

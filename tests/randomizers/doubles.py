@@ -1,7 +1,5 @@
 """Fake asset library with the sizes, tags and materials that the tests define."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, product

@@ -1,7 +1,5 @@
 """Goals of robot arms."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

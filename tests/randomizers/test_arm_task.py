@@ -1,7 +1,5 @@
 """Tasks of arms: the table, and what is drawn from it."""
 
-from __future__ import annotations
-
 from collections import Counter
 from dataclasses import replace
 

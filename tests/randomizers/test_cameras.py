@@ -1,7 +1,5 @@
 """Where cameras are, what they look at, and through which lens."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

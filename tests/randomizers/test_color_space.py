@@ -1,7 +1,5 @@
 """Colours that people name, against tables."""
 
-from __future__ import annotations
-
 import pytest
 
 from gen_data.core.colorimetry import temperature_to_chromaticity

@@ -1,7 +1,5 @@
 """Company for people along lanes."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Paths from gardens' street edges to doors."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

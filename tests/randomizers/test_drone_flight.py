@@ -1,7 +1,5 @@
 """Flights of drones: mechanics of coordinated turns, the gimbal, and what it looks at."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Any

@@ -3,8 +3,6 @@
 Expected images are projected by OpenCV, and by hand for panoramas.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Things with joints of a user: parts, joint labels, and parts that open as far as they can."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from pathlib import Path

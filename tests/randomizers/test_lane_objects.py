@@ -1,7 +1,5 @@
 """Things along lanes, and cameras that ride there."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Any

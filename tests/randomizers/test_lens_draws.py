@@ -1,7 +1,5 @@
 """Lenses that differ from sample to sample."""
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import replace

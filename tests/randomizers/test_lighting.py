@@ -1,7 +1,5 @@
 """Lamps, the sun, and light from all around."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Colours, finishes, textures and the background; and what objects weigh."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from dataclasses import replace

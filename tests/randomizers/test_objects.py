@@ -1,7 +1,5 @@
 """Which objects a group gets, and where they start."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from dataclasses import replace

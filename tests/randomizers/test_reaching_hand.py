@@ -1,7 +1,5 @@
 """Hands that hold things: contact without penetration, room for others, labels."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Values that no randomizer can have are refused when they are read."""
 
-from __future__ import annotations
-
 import json
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Sensors beside their places on rigs."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Sensors on a stand, which are posed as one."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Umbrellas in rain."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import pytest

@@ -1,7 +1,5 @@
 """Paint and lights of vehicles, by the roles of their slots."""
 
-from __future__ import annotations
-
 from collections import Counter
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Weather, time of day and street lights: what they put into a scene."""
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """What cameras see by Embree, from the same bodies and rays."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from gen_data.core.interfaces import AssetLibrary

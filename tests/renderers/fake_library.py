@@ -1,7 +1,5 @@
 """A small library of procedural test assets: boxes, spheres, planes, checkers."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 

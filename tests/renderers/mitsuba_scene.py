@@ -1,7 +1,5 @@
 """Translation of a Scene to Mitsuba 3: the same triangles, lights and camera."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Any

@@ -1,7 +1,5 @@
 """Test scenes in which bodies and the camera move uniformly."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

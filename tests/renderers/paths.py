@@ -1,7 +1,5 @@
 """Path-traced radiance for tests: by the renderer, or by one technique and seed at a time."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from gen_data.core.capture import Channel

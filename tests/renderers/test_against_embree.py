@@ -1,7 +1,5 @@
 """Depth and ids against Intel Embree, on constructed and on shipped scenes."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Holes by texture coverage, against the same mesh with the holes cut out."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Amodal silhouettes: complete, independent, and consistent with visible pixels."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

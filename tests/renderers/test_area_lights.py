@@ -1,7 +1,5 @@
 """Panels: one-sided rectangles and disks, against quadrature over their area."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Eight boxes are tested at once as they would be one by one."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import warp as wp

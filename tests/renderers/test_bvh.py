@@ -1,7 +1,5 @@
 """Bounding volume hierarchies and their traversal, against brute force and Embree."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import trimesh

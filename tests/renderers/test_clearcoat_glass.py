@@ -1,7 +1,5 @@
 """Coats, glass, mirrors and further maps, against closed forms and independent ray tracing."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Kernels are compiled once, in parallel, and then found in the cache."""
 
-from __future__ import annotations
-
 import importlib
 import os
 import re

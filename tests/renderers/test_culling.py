@@ -1,7 +1,5 @@
 """Culling before rendering removes only what cannot matter, and edges stay in place."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

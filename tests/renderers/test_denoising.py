@@ -1,7 +1,5 @@
 """The denoiser: closer to the reference than its input, and a clear error if missing."""
 
-from __future__ import annotations
-
 import sys
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Budgets of what crosses between host and device, counted as on a GPU; none is needed."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache
 

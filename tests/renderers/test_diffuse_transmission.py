@@ -1,7 +1,5 @@
 """Light through leaves, paper and cloth: closed forms, furnaces, and one tier against the other."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Dipped beams against the test points of UN Regulation No. 112."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

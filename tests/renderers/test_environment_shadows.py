@@ -1,7 +1,5 @@
 """Shadows of panoramas: the brightest parts become lamps, and light is conserved."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Optical flow and scene flow against homographies, OpenCV and individually traced rays."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import cv2

@@ -1,7 +1,5 @@
 """Damage in the cache of compiled kernels is found before Warp runs it."""
 
-from __future__ import annotations
-
 import errno
 import os
 import stat

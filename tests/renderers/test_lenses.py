@@ -1,7 +1,5 @@
 """Images through lenses with distortion: positions against OpenCV, ranges against Embree."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Laser ranges and labels of random scenes against Intel Embree, and against arithmetic."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

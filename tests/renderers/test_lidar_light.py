@@ -1,7 +1,5 @@
 """Reflectance of materials for lasers, and agreement of scanners with cameras."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Rays traced together return the same hits as rays traced alone."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

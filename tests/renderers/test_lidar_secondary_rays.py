@@ -1,7 +1,5 @@
 """Laser light through glass, by reflection, on wet ground and on snow."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

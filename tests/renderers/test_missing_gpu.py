@@ -3,8 +3,6 @@
 Warp's answers are replaced: no such machine is at hand.
 """
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 from typing import Any
 

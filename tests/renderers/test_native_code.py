@@ -1,7 +1,5 @@
 """Native code of kernels: each header is C++ that another compiler than Warp's accepts."""
 
-from __future__ import annotations
-
 import importlib
 import shutil
 import subprocess

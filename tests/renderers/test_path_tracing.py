@@ -1,7 +1,5 @@
 """The path-traced tier against closed forms, furnaces, and itself by other techniques."""
 
-from __future__ import annotations
-
 import math
 import subprocess
 import sys

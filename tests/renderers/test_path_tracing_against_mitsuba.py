@@ -5,8 +5,6 @@ the eye sees them (FLIP), and pixel by pixel with Welch's t-test, whose level is
 number of pixels (Sidak 1967), as Mitsuba's own tests of its integrators do.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace

@@ -1,7 +1,5 @@
 """Prints are on the outside of sheets: through a rear window nobody reads mirror writing."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Radiance: anti-aliasing, environment and ambient occlusion."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

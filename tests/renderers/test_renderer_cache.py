@@ -1,7 +1,5 @@
 """Caches of the renderer change no pixel and no point."""
 
-from __future__ import annotations
-
 import ctypes
 from collections.abc import Callable
 from dataclasses import replace

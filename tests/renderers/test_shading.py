@@ -1,7 +1,5 @@
 """Light in photometric units, against closed forms."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Smoothing of shadows, by eight points at a time on the CPU and by single ones on a GPU."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

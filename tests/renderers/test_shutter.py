@@ -1,7 +1,5 @@
 """Motion blur and rolling shutter, against the closed forms of uniform motion."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Texture sampling four pixels at a time gives what sampling each pixel alone gives."""
 
-from __future__ import annotations
-
 import numpy as np
 import warp as wp
 

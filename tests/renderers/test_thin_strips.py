@@ -1,7 +1,5 @@
 """Light on strips that are narrower than the distance of lattice points, and at rims."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

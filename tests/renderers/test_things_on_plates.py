@@ -3,8 +3,6 @@
 The photograph is a rendering of the same ground without the things on it.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from functools import cache

@@ -1,7 +1,5 @@
 """Depth, ids, normals and coordinates against geometry computed by hand."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

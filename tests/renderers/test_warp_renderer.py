@@ -1,7 +1,5 @@
 """The renderer as a pure function: reproducible bytes, bounded memory, devices."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Weather in images, against closed forms; and its absence elsewhere."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Any, Literal

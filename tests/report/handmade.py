@@ -1,7 +1,5 @@
 """Small data sets written by hand, without a renderer, whose statistics can be counted on paper."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Reports of data sets written by hand, where every share can be counted on paper."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """The page of a report: figures, checks, near-duplicates, and that it is closed to the outside."""
 
-from __future__ import annotations
-
 import base64
 import hashlib
 import json

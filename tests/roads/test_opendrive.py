@@ -1,7 +1,5 @@
 """OpenDRIVE files: what they say becomes lanes and a surface; what is wrong is named."""
 
-from __future__ import annotations
-
 import math
 import time
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """Records of OpenDRIVE files that change along a road, and newer elements of the standard."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

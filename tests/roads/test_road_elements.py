@@ -1,7 +1,5 @@
 """Roads, junctions, crosswalks and car parks: lanes that people and cars can follow."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 from pathlib import Path

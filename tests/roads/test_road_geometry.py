@@ -1,7 +1,5 @@
 """Curves by arc length, against closed forms and scipy's quadrature."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

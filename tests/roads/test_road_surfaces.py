@@ -1,7 +1,5 @@
 """Meshes of roads: sizes, areas, heights and markings against hand-made sums."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Medians, lanes for those who turn across, and worn surfaces of junctions."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

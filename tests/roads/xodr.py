@@ -1,7 +1,5 @@
 """Small OpenDRIVE files, written by hand."""
 
-from __future__ import annotations
-
 CLOTHOID_TOWN = """<?xml version="1.0"?>
 <OpenDRIVE>
   <header revMajor="1" revMinor="4"/>

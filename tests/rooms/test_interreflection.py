@@ -1,7 +1,5 @@
 """Light that rooms reflect: against closed formulas, and against path-traced images."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -3,8 +3,6 @@
 Bodies are measured by their boxes in the scene; the layout's own rectangles are not asked.
 """
 
-from __future__ import annotations
-
 import math
 from collections import deque
 from functools import cache

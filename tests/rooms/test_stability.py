@@ -3,8 +3,6 @@
 Bullet simulates them with exact triangle meshes of what is fixed, and the convex hulls of all else.
 """
 
-from __future__ import annotations
-
 import math
 import os
 from collections.abc import Iterator, Sequence

@@ -1,7 +1,5 @@
 """Surfaces that carry things and are not tops: seats, rims and trays."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """What covers the walls of rooms: pale paint, one wall that stands out, tiles by worktops."""
 
-from __future__ import annotations
-
 import colorsys
 from functools import cache
 

@@ -1,7 +1,5 @@
 """What is outside rooms, hangs at their windows and runs from their taps."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Light, states, cameras and walks in furnished rooms."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from functools import cache

@@ -1,7 +1,5 @@
 """What hangs on walls: motifs that differ, frames of usual sizes."""
 
-from __future__ import annotations
-
 from functools import cache
 from itertools import combinations
 

@@ -1,7 +1,5 @@
 """Ambient light in the niches of windows."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -5,8 +5,6 @@
 Tests kill it. Exit codes and message are those of the command line.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 

@@ -6,8 +6,6 @@ renames, new and removed names; what is lost beyond that is drawn from a seed, b
 it open.
 """
 
-from __future__ import annotations
-
 import errno
 import os
 import pathlib

@@ -11,8 +11,6 @@ it through a pipe after a delay, its messages arrive late but in order, and its 
 the messages that it sent before. Everything follows from the seed.
 """
 
-from __future__ import annotations
-
 import heapq
 import random
 import sys

@@ -1,7 +1,5 @@
 """Card and metadata at the root of a data set."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import logging

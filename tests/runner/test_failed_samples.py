@@ -1,7 +1,5 @@
 """Runs that go on without the samples that cannot be made."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from dataclasses import replace

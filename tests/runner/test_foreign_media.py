@@ -1,7 +1,5 @@
 """Media of another kind than the manifest declares are refused when they are read."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -3,8 +3,6 @@
 Every test plants a harmless marker file, and looks for it outside.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections.abc import Callable, Iterator

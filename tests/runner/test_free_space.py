@@ -1,7 +1,5 @@
 """Whether a data set fits, before anything is written and while it grows."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import NoReturn
 

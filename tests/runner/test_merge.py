@@ -1,7 +1,5 @@
 """Parts that different machines generated become the data set that one machine generates."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

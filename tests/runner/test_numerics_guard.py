@@ -1,7 +1,5 @@
 """Machines that compute differently take no part in a data set, unless that is accepted."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from pathlib import Path

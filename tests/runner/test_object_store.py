@@ -1,7 +1,5 @@
 """Data sets at URLs: a real S3 server in a process of its own, and storage in memory."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

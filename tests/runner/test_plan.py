@@ -1,7 +1,5 @@
 """The plan: what identifies a data set, and how it is cut into shards."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

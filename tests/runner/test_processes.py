@@ -1,7 +1,5 @@
 """Real worker processes: they die, hang, fail and are interrupted."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

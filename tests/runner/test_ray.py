@@ -1,7 +1,5 @@
 """A cluster of three machines: a run on it is interrupted, loses a machine, and loses a worker."""
 
-from __future__ import annotations
-
 import os
 import signal
 import threading

@@ -1,7 +1,5 @@
 """Damage of every kind is found, set aside and undone; no damage is ever sealed."""
 
-from __future__ import annotations
-
 import json
 import random
 import shutil

@@ -1,7 +1,5 @@
 """Returning memory to the system loses no byte."""
 
-from __future__ import annotations
-
 import ctypes
 import mmap
 import subprocess

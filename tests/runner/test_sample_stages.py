@@ -1,7 +1,5 @@
 """The first stage that differs is named, and decoded contents are told apart from bytes."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Callable

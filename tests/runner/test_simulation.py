@@ -1,7 +1,5 @@
 """Runs with virtual processes, and supervisors with planted faults, which the runs must find."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

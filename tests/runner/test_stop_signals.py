@@ -1,7 +1,5 @@
 """Ctrl-C, SIGTERM and SIGHUP during any command: real processes that run a few lines."""
 
-from __future__ import annotations
-
 import signal
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """LocalStore: commits, resumption, foreign folders, locks, and a disk that fails anywhere."""
 
-from __future__ import annotations
-
 import errno
 import json
 import os

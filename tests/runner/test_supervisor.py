@@ -1,7 +1,5 @@
 """The supervisor's decisions, simulated: virtual workers, virtual clock, seeded faults."""
 
-from __future__ import annotations
-
 from gen_data.core import errors
 from gen_data.runner import worker_events
 from gen_data.runner.supervisor import Limits, Supervisor

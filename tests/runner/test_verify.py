@@ -1,7 +1,5 @@
 """verify: every deviation from the manifest is found and named."""
 
-from __future__ import annotations
-
 import random
 import re
 import shutil

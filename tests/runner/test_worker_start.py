@@ -1,7 +1,5 @@
 """Workers that are hit while they start: the moment when nobody listens yet."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

@@ -1,7 +1,5 @@
 """From elements and their relations to a nominal scene."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Districts: elements that a scene lacks, land before houses, and the streets of the template."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

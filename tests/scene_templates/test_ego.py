@@ -1,7 +1,5 @@
 """The vehicle that carries the sensors: its place, its rig, and how a configuration adds it."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

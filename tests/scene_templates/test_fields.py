@@ -1,7 +1,5 @@
 """Fields and power lines: places, sizes and heights; roads stay free."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Horizons: where the pieces stand, and that they are reproducible background."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

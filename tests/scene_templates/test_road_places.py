@@ -1,7 +1,5 @@
 """Bridges, level crossings, petrol stations and squares: lanes stay free, the rest makes room."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

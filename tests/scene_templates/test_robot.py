@@ -1,7 +1,5 @@
 """Robots in scenes: which one, and where its wrist is."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Streets: what stands along lanes, and signals at junctions."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

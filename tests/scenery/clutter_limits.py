@@ -1,7 +1,5 @@
 """Sizes of real street clutter, and the triangles that a street affords for each piece."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 Range = tuple[float, float]

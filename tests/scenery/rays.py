@@ -1,7 +1,5 @@
 """Rays against one mesh, by Embree: which face is met, how far, and from which side."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -1,7 +1,5 @@
 """Cloth over shop windows and stalls."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from gen_data.content.procedural.patches import join_patches

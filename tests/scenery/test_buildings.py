@@ -1,7 +1,5 @@
 """Buildings: facades with depth, storeys at real heights, and no way to look in."""
 
-from __future__ import annotations
-
 import hashlib
 from functools import cache
 

@@ -1,7 +1,5 @@
 """Trees: wood that thins out, leaves in clusters, and light that passes between them."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

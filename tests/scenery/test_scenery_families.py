@@ -1,7 +1,5 @@
 """Everything that lines a street: sizes, budgets, frames, facts and bytes."""
 
-from __future__ import annotations
-
 import hashlib
 from functools import cache
 

@@ -1,7 +1,5 @@
 """Traffic signs: shapes and colours of the Vienna Convention, upright on plates that face +X."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Street clutter: sizes, fronts, tags and variety of every family."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Grime of street furniture: where it lies, by height above the ground."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

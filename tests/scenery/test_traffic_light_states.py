@@ -1,7 +1,5 @@
 """Traffic lights: what is lit, how often, and never green for both."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

@@ -1,7 +1,5 @@
 """A world of boxes with a car that carries devices: rays and motion by a few lines of numpy."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace

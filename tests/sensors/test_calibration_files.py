@@ -4,8 +4,6 @@ Expected values are computed by OpenCV (``projectPoints``, ``fisheye``) from the
 files, or by hand.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Depth cameras against published formulas and geometry."""
 
-from __future__ import annotations
-
 import json
 import math
 from typing import Any

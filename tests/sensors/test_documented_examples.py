@@ -1,7 +1,5 @@
 """Examples in the documentation of sensors are valid configurations."""
 
-from __future__ import annotations
-
 import importlib
 import inspect
 import re

@@ -1,7 +1,5 @@
 """Events against brightness that is known at every instant."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import replace

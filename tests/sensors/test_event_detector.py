@@ -1,7 +1,5 @@
 """What happens to an ego car, against arithmetic."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Inertial units, satellite receivers and odometers against analytic motion."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

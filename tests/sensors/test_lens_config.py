@@ -1,7 +1,5 @@
 """Lenses as configurations name them."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Data sheets and tables of beams of the user's own, and sensors where they cannot see."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

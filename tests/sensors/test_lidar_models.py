@@ -1,7 +1,5 @@
 """Models of laser scanners against the numbers of their manuals."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from pydantic import ValidationError

@@ -1,7 +1,5 @@
 """Sweeps of scanners that move, past things that move: against closed forms."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What laser scanners report of what their rays hit: light, weather, chance, noise."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Cameras that look through photographs, and what else a photograph refuses."""
 
-from __future__ import annotations
-
 import json
 from typing import Any
 

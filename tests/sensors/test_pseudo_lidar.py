@@ -1,7 +1,5 @@
 """Pseudo-LiDAR, against the depth image of its camera and against geometry."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from functools import cache

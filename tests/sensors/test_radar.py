@@ -1,7 +1,5 @@
 """Radar detections against the radar equation, kinematics and the statistics of data sheets."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

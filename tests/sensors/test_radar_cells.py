@@ -1,7 +1,5 @@
 """Cells of a radar and the peaks that are reported."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

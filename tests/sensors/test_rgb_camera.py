@@ -1,7 +1,5 @@
 """The RGB camera: what it mounts, what it asks a renderer for."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """From ``exposure`` and ``rolling_shutter`` in YAML to a camera's shutter."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -4,8 +4,6 @@ Seeds are fixed, so each test passes or fails for good. ALPHA is the rate at whi
 would have been refused by one test, had the seed been chosen at random.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -3,8 +3,6 @@
 Seeds are fixed; ALPHA is the false-alarm rate of each single comparison.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Small folders of labelled pictures."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """A curriculum draws more of what was missed, and says exactly what it did."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from pathlib import Path

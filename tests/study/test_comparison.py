@@ -1,7 +1,5 @@
 """Differences of average precision have intervals that mean what they say."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray

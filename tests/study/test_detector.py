@@ -1,7 +1,5 @@
 """The loss that the small detector is trained with."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

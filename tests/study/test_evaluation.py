@@ -1,7 +1,5 @@
 """Average precision is COCO's; misses and false alarms are those of COCO's matching."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import json

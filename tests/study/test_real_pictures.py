@@ -1,7 +1,5 @@
 """Folders of users are read as they are, and what cannot be used is counted."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """Weights move towards what is missed, only where misses depend on a parameter."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Studies compare, resume, and refuse what cannot be compared."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

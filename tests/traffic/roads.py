@@ -1,7 +1,5 @@
 """Small streets for traffic tests."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Traffic around roundabouts."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

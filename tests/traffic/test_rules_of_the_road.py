@@ -1,7 +1,5 @@
 """Signals are obeyed, junctions are shared, people are let over."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Pure pursuit with a kinematic bicycle: geometry that does not depend on speed."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

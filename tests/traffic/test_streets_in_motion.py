@@ -1,7 +1,5 @@
 """Whole streets: random layouts that move, and what labels say of them."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

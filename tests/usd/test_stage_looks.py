@@ -1,7 +1,5 @@
 """Colours, shapes, copies and labels of stages, as OpenUSD defines them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

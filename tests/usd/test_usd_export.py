@@ -1,7 +1,5 @@
 """The stage shows what the labels say; read by OpenUSD's own classes."""
 
-from __future__ import annotations
-
 import json
 import shutil
 import subprocess

@@ -1,7 +1,5 @@
 """What becomes of dipped headlights in USD, which has no cut-off."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

@@ -1,7 +1,5 @@
 """Stages as assets: import matches OpenUSD's own files, and bad files have distinct errors."""
 
-from __future__ import annotations
-
 import zipfile
 from pathlib import Path
 

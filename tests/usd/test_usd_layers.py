@@ -1,7 +1,5 @@
 """Coats, glass, holes and further maps: what is exported comes back, and nonsense is refused."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

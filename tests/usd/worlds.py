@@ -1,7 +1,5 @@
 """A small world of the library's own things, and its stage on disk."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from gen_data.assets.library import Library

@@ -1,7 +1,5 @@
 """Riders of bicycles: girth and luggage."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Luminous intensities of lamps of cars, against UN Regulations No. 7 and No. 112."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

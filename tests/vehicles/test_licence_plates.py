@@ -1,7 +1,5 @@
 """Licence plates: what is on them, where they are, who has which."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

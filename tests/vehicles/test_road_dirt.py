@@ -1,7 +1,5 @@
 """Dirt that gathers on vehicles, by place on the mesh."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

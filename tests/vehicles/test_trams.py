@@ -1,7 +1,5 @@
 """Trams: sizes, ends, doors, and a pantograph at the contact wire."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

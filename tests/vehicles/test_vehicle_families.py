@@ -1,7 +1,5 @@
 """Everything on wheels: sizes, budgets, frames, slots, keypoints and bytes."""
 
-from __future__ import annotations
-
 import hashlib
 import math
 from functools import cache

@@ -1,7 +1,5 @@
 """Noise reduction in cameras, against the statistics of photons."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray

@@ -1,7 +1,5 @@
 """Exposure values and metering."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

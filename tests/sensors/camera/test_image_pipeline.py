@@ -1,7 +1,5 @@
 """The image pipeline as one chain: its order, its presets, its place in configurations."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

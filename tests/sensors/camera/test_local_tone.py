@@ -1,7 +1,5 @@
 """Local tone mapping: bright and dark parts of one picture are both shown."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Images that are reduced from a larger photograph: against the mean of that photograph."""
 
-from __future__ import annotations
-
 import json
 from typing import Any
 

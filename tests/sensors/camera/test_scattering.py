@@ -1,7 +1,5 @@
 """Light that lenses scatter and drops that bend it."""
 
-from __future__ import annotations
-
 import math
 
 import cv2

@@ -1,7 +1,5 @@
 """Stages of the image pipeline: each does what physics and standards say."""
 
-from __future__ import annotations
-
 import json
 import math
 from typing import Any

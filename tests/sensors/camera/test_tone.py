@@ -1,7 +1,5 @@
 """Tone curves against the formulas of their sources."""
 
-from __future__ import annotations
-
 import math
 from typing import get_args
 

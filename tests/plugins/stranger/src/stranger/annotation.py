@@ -1,7 +1,5 @@
 """Annotation: distance from the camera to every object."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import ClassVar, Literal
 

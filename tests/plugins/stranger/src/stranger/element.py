@@ -1,7 +1,5 @@
 """Element that places one object at a fixed position."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Literal
 

@@ -1,7 +1,5 @@
 """Asset family of blocks."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from gen_data.assets.family import Family, Provenance, Solid

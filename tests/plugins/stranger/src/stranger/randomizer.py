@@ -1,7 +1,5 @@
 """Randomizer that replaces the asset of one object."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Literal
 

@@ -1,7 +1,5 @@
 """A renderer in numpy that shows every annotated instance as its bounding box, in one colour."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from typing import Any, Literal
 

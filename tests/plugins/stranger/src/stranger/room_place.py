@@ -1,7 +1,5 @@
 """Place of pieces in rooms: a quarter of the room's length from its middle."""
 
-from __future__ import annotations
-
 from gen_data.rooms.layout import Layout, Options
 from gen_data.rooms.places import Place, draw_asset
 from gen_data.rooms.rules import Rule

@@ -1,7 +1,5 @@
 """Type of room: a gallery with two pieces."""
 
-from __future__ import annotations
-
 from gen_data.rooms.rules import RoomType, Rule
 
 GALLERY = RoomType(

@@ -1,7 +1,5 @@
 """Sensor that measures the mean luminance in the image of a camera."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Literal
 

@@ -1,7 +1,5 @@
 """Asset family of striped textures."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from gen_data.assets.family import Provenance, TextureFamily
