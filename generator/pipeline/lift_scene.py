@@ -133,7 +133,8 @@ def _foot(body: Body, assets: AssetLibrary) -> _Foot:
         axles = find_axles(assets, body.asset, body.scale)
         rear = axles.T_body_rear.translation_m[0]
         return _Foot("tilted", (rear, rear + axles.wheelbase_m), (y0, y1))
-    if max(x1 - x0, y1 - y0) > z1 - z0 and body.instance_id:
+    is_low = max(x1 - x0, y1 - y0) > z1 - z0 and "tree" not in tags
+    if is_low and min(x1 - x0, y1 - y0) > 0.0 and body.instance_id:
         return _Foot("tilted", (x0, x1), (y0, y1))
     if "pedestrian" in tags:
         return _Foot("centred", (x0, x1), (y0, y1))
