@@ -146,8 +146,10 @@ def _refined(corners: Array, faces: Ints, slots: Ints, ground: _Ground) -> tuple
     """Halve edges whose middles are too far from the ground; neighbours agree on every edge."""
     for _ in range(_ROUNDS):
         height = ground.height(corners[:, :3])
-        edges = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2)
-        edges, which = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True)
+        one, other = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+        key = np.minimum(one, other) * len(corners) + np.maximum(one, other)
+        key, which = np.unique(key, return_inverse=True)
+        edges = np.stack(np.divmod(key, len(corners)), axis=1)
         middles = 0.5 * (corners[edges[:, 0]] + corners[edges[:, 1]])
         off = ground.height(middles[:, :3]) - height[edges].mean(axis=1)
         halved = np.abs(off) > LAND_M

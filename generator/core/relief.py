@@ -1,24 +1,30 @@
 """Relief of the ground: a profile along every road, blended into the land around them.
 
 Streets are laid out on level ground and lifted once. The ground is a smooth field, sampled on a
-grid of the world and linear on each triangle of it. Meshes are cut along the lines of that grid: all
-layers of a street, such as asphalt and paint, follow the same planes; no crack opens and no layer
-sinks into another one.
+grid of the world and linear on each triangle of it. Meshes are cut along the lines of that grid:
+all layers of a street, such as asphalt and paint, follow the same planes; no crack opens and no
+layer sinks into another one.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
+from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gen_data.core.se3 import Array
+
+Ints = NDArray[np.int64]
 
 CELL_M = 4.0
 """Cells of the grid. On a crest of K = 2, the tightest one at 30 km/h, the planes are up to 10 mm
 below the parabola; whatever stands on the ground stands on the planes."""
 _END_M = 1.5 * CELL_M
+_REACH_M = 160.0
+"""Distance from all roads beyond which the ground has the height of its rim."""
 _SOFT_M2 = 0.25
 """Squared distance at which the weight of a road falls to a quarter."""
 _BANK_M, _SHOULDER_M = 25.0, 70.0
@@ -76,6 +82,16 @@ class RoadProfile:
     def _bends(self) -> Iterator[tuple[float, float, float]]:
         return zip(self.curves[0::3], self.curves[1::3], self.curves[2::3], strict=True)
 
+    def line(self) -> Array:
+        """Points [n, 2] of its reference line, a few metres apart."""
+        s = np.linspace(0.0, self.length_m, 2 + int(self.length_m / CELL_M))
+        turn = self.curvature_per_m * s
+        chord = s * np.sinc(turn / (2.0 * np.pi))
+        heading = self.yaw_rad + 0.5 * turn
+        return np.column_stack(
+            [self.x_m + chord * np.cos(heading), self.y_m + chord * np.sin(heading)]
+        )
+
     def weigh(self, x_m: Array, y_m: Array) -> tuple[Array, Array]:
         """Its heights at places [n], and their weights, which fall with the distance from it."""
         s, t = self._along_and_left(x_m, y_m)
@@ -114,41 +130,26 @@ class Relief:
 
     def height(self, points_m: Array) -> Array:
         """Heights [n] of the ground at places [n, 2 or more], x and y first."""
-        if len(points_m) == 0:
-            return np.zeros(0)
-        i, j, u, v, z = self._look_up(points_m)
-        east, north = z[i + 1, j] - z[i, j], z[i, j + 1] - z[i, j]
-        cross = z[i + 1, j + 1] - z[i, j]
+        grid = _sampled(self)
+        i, j, u, v = grid.find(points_m)
+        z = grid.heights_m
+        here = z[i, j]
+        east, north, cross = z[i + 1, j] - here, z[i, j + 1] - here, z[i + 1, j + 1] - here
         # The diagonal of a cell runs from its corner of least to that of largest x and y.
         lower: Array = u * east + v * (cross - east)
         upper: Array = v * north + u * (cross - north)
-        heights: Array = z[i, j] + np.where(u >= v, lower, upper)
+        heights: Array = here + np.where(u >= v, lower, upper)
         return heights
 
     def gradient(self, points_m: Array) -> Array:
         """Slopes [n, 2] along x and y of the smooth ground, for shading."""
-        i, j, u, v, z = self._look_up(points_m)
-        along = np.stack([np.gradient(z, CELL_M, axis=k) for k in (0, 1)], axis=2)
-        u, v = u[:, None], v[:, None]
-        near = (1.0 - u) * along[i, j] + u * along[i + 1, j]
-        far = (1.0 - u) * along[i, j + 1] + u * along[i + 1, j + 1]
-        slopes: Array = (1.0 - v) * near + v * far
-        return slopes
-
-    def _look_up(self, points_m: Array) -> tuple[Array, Array, Array, Array, Array]:
-        """Cells and places in them [n], and heights of all nodes around the points."""
-        at = np.asarray(points_m, np.float64)[:, :2] / CELL_M
-        cell = np.floor(at).astype(np.int64)
-        low, high = cell.min(axis=0) - 1, cell.max(axis=0) + 3
-        x, y = (CELL_M * np.arange(a, b) for a, b in zip(low, high, strict=True))
-        grid = np.meshgrid(x, y, indexing="ij")
-        weighed = [road.weigh(*grid) for road in self.roads]
-        total = sum(weight for _, weight in weighed)
-        nodes = sum(height * weight for height, weight in weighed) / total
-        # Rounded as poses are: the same bits on every processor.
-        i, j = (cell - low).T
-        u, v = (at - cell).T
-        return i, j, u, v, np.round(nodes, 6)
+        grid = _sampled(self)
+        i, j, u, v = grid.find(points_m)
+        slopes, u, v = grid.slopes, u[:, None], v[:, None]
+        near = (1.0 - u) * slopes[i, j] + u * slopes[i + 1, j]
+        far = (1.0 - u) * slopes[i, j + 1] + u * slopes[i + 1, j + 1]
+        blended: Array = (1.0 - v) * near + v * far
+        return blended
 
     def numbers(self) -> tuple[float, ...]:
         """All values in a row, for ids of assets."""
@@ -175,3 +176,44 @@ def _bend(past_m: Array, length_m: float) -> Array:
     within = np.clip(past_m, 0.0, length_m)
     rise: Array = within * within / (2.0 * length_m) + np.maximum(past_m - length_m, 0.0)
     return rise
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Grid:
+    """The smooth ground at the nodes of the grid, as far as roads shape it.
+
+    Attributes:
+        first: Numbers of the first node along x and y; node k is at ``k * CELL_M``.
+        heights_m: [m, n].
+        slopes: Along x and y, [m, n, 2].
+    """
+
+    first: Array
+    heights_m: Array
+    slopes: Array
+
+    def find(self, points_m: Array) -> tuple[Ints, Ints, Array, Array]:
+        """Cells of places [n, 2 or more], and where in them they are; outside, at the rim."""
+        last = np.array(self.heights_m.shape) - 1.0
+        at = np.asarray(points_m, np.float64)[:, :2] / CELL_M - self.first
+        at = np.clip(at, 0.0, last)
+        cell = np.minimum(np.floor(at), last - 1.0)
+        u, v = (at - cell).T
+        i, j = cell.astype(np.int64).T
+        return i, j, u, v
+
+
+@lru_cache(maxsize=4)
+def _sampled(relief: Relief) -> _Grid:
+    """The grid of a relief, which all meshes, lanes and bodies of a scene ask."""
+    lines = np.concatenate([road.line() for road in relief.roads])
+    first = np.floor((lines.min(axis=0) - _REACH_M) / CELL_M)
+    last = np.ceil((lines.max(axis=0) + _REACH_M) / CELL_M)
+    x, y = (CELL_M * np.arange(a, b + 1.0) for a, b in zip(first, last, strict=True))
+    places = np.meshgrid(x, y, indexing="ij")
+    weighed = [road.weigh(*places) for road in relief.roads]
+    total = sum(weight for _, weight in weighed)
+    # Rounded as poses are: the same bits on every processor.
+    heights = np.round(sum(height * weight for height, weight in weighed) / total, 6)
+    slopes = np.stack([np.gradient(heights, CELL_M, axis=k) for k in (0, 1)], axis=2)
+    return _Grid(first, heights, slopes)
