@@ -55,7 +55,6 @@ class ReliefOfRoads(RandomizerBase):
     """
 
     type: Literal["relief"] = "relief"
-    stage: Literal["scene"] = "scene"
     grade: Annotated[dist.Scalar, dist.Bounds(-GRADE_MAX, GRADE_MAX)] = dist.Normal(
         0.0, 0.04, clip=(-0.12, 0.12)
     )
@@ -65,7 +64,9 @@ class ReliefOfRoads(RandomizerBase):
     )
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
-        """Return the scene with its relief; nothing is moved yet."""
+        """Return the scene with its relief; nothing is moved yet. Without roads it stays level."""
+        if not any(_family(body) == "road" for body in scene.bodies):
+            return scene
         self.check(scene, assets)
         places = _junction_arms(scene)
         known: dict[str, _End] = {}
