@@ -678,7 +678,7 @@ class Scene:
     tracks: tuple[Trajectory, ...] = ()
     changes: tuple[StateChange, ...] = ()
     box3d: Box3dExtent = "all"
-    relief: Relief | None = field(default=None, metadata={SPARSE: True})
+    relief: Relief | None = field(default=None, metadata={serialization.SPARSE: True})
 
     def body(self, name: str) -> Body:
         """The body of that name; KeyError if there is none."""

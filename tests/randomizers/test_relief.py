@@ -120,7 +120,10 @@ def test_a_road_too_short_for_its_speed_still_ends_level() -> None:
 
 def test_a_ring_of_roads_is_refused() -> None:
     """Two halves of a circle."""
-    half = {"length_m": math.pi * 50.0, "curvature_per_m": 0.02}
-    scene = _street(Road(name="one", **half), Road(name="other", after="one", **half))
+    half_m = math.pi * 50.0
+    scene = _street(
+        Road(name="one", length_m=half_m, curvature_per_m=0.02),
+        Road(name="other", after="one", length_m=half_m, curvature_per_m=0.02),
+    )
     with pytest.raises(ConfigError, match="the road 'other' closes a ring of roads"):
         _profiles(scene, 0)
