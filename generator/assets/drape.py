@@ -27,7 +27,7 @@ FACT = "draped"
 """Families declare under this name how their meshes follow the ground: ``layers`` are cut along the
 lines of its grid, and stay as far apart as they are on level ground; ``land`` is divided only where
 it would deviate from the ground by more than ``LAND_M``."""
-LAND_M = 0.01
+LAND_M = 0.02
 _ROUNDS = 12
 _KEYS = ("at", "relief")
 _NEAR = 1e-7
@@ -144,6 +144,7 @@ def _draped_mesh(mesh: MeshData, ground: _Ground, divide: _Cut) -> MeshData:
 
 def _refined(corners: Array, faces: Ints, slots: Ints, ground: _Ground) -> tuple[Array, Ints, Ints]:
     """Halve edges whose middles are too far from the ground; neighbours agree on every edge."""
+    done_faces, done_slots = [], []
     for _ in range(_ROUNDS):
         height = ground.height(corners[:, :3])
         one, other = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
@@ -153,17 +154,22 @@ def _refined(corners: Array, faces: Ints, slots: Ints, ground: _Ground) -> tuple
         middles = 0.5 * (corners[edges[:, 0]] + corners[edges[:, 1]])
         off = ground.height(middles[:, :3]) - height[edges].mean(axis=1)
         halved = np.abs(off) > LAND_M
-        if not halved.any():
-            break
         number = np.full(len(edges), -1)
         number[halved] = len(corners) + np.arange(int(halved.sum()))
         corners = np.concatenate([corners, middles[halved]])
-        faces, slots = _divide(faces, slots, number[which.reshape(-1, 3)])
-    return corners, faces, slots
+        inner = number[which.reshape(-1, 3)]
+        # Nothing will divide a triangle whose edges are all near enough.
+        active = (inner >= 0).any(axis=1)
+        done_faces.append(faces[~active])
+        done_slots.append(slots[~active])
+        if not active.any():
+            return corners, np.concatenate(done_faces), np.concatenate(done_slots)
+        faces, slots = _divide(faces[active], slots[active], inner[active])
+    return corners, np.concatenate([*done_faces, faces]), np.concatenate([*done_slots, slots])
 
 
 def _divide(faces: Ints, slots: Ints, middles: Ints) -> tuple[Ints, Ints]:
-    """Triangles with the middles [m, 3] of some edges, from corner k to k + 1, as corners; -1 = no.
+    """Triangles with the middles [m, 3] of edges, from corner k to k + 1, as corners; -1 = none.
 
     Of two halved edges, the first corner after the whole edge decides on the diagonal.
     """
@@ -174,7 +180,6 @@ def _divide(faces: Ints, slots: Ints, middles: Ints) -> tuple[Ints, Ints]:
     a, b, c = np.take_along_axis(faces, order, axis=1).T
     ab, bc, ca = np.take_along_axis(middles, order, axis=1).T
     cases = (
-        (count == 0, ((a, b, c),)),
         (count == 1, ((a, ab, c), (ab, b, c))),
         (count == 2, ((a, b, bc), (a, bc, ca), (ca, bc, c))),
         (count == 3, ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))),

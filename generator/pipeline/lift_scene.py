@@ -21,7 +21,6 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -339,10 +338,10 @@ def _lifted_lane(lane: Lane, relief: Relief) -> Lane:
 
 def _refined(points: Array) -> tuple[Array, NDArray[np.bool_]]:
     """A line [n, 3] with further points, no two farther apart than a cell, and which were given."""
-    parts, given = [points[:1]], [True]
-    for a, b in pairwise(points):
-        count = max(1, math.ceil(math.hypot(*(b - a)[:2]) / CELL_M))
-        share = (np.arange(1, count + 1) / count)[:, None]
-        parts.append(a + share * (b - a))
-        given += [False] * (count - 1) + [True]
-    return np.concatenate(parts), np.array(given)
+    step = np.diff(points, axis=0)
+    count = np.maximum(np.ceil(np.hypot(step[:, 0], step[:, 1]) / CELL_M), 1.0).astype(np.int64)
+    piece = np.repeat(np.arange(len(step)), count)
+    number = 1 + np.arange(len(piece)) - np.repeat(np.cumsum(count) - count, count)
+    share = (number / count[piece])[:, None]
+    line = np.concatenate([points[:1], points[piece] + share * step[piece]])
+    return line, np.concatenate([[True], number == count[piece]])

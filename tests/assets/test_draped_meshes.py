@@ -51,7 +51,7 @@ def test_land_has_no_crack(library: Library) -> None:
     assert at_rim.all()
 
 
-def test_land_is_a_centimetre_from_the_ground_at_most(library: Library) -> None:
+def test_land_is_near_the_ground(library: Library) -> None:
     """Near the road, by rays from above; its hollows are those of the level mesh."""
     rng = np.random.default_rng(1)
     places = np.column_stack([rng.uniform(0.0, 120.0, 4000), rng.uniform(-40.0, 40.0, 4000)])
