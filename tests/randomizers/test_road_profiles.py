@@ -20,6 +20,7 @@ from gen_data.randomizers.relief import ReliefOfRoads
 from gen_data.scene_templates.builder import build_scene
 from gen_data.scene_templates.junction import Junction
 from gen_data.scene_templates.road import Road
+from tests.randomizers.doubles import rng_of
 
 STOPPING_M = {30: 35, 50: 65, 60: 85, 80: 130, 100: 185, 120: 250}
 """Design stopping sight distance by design speed [km/h]: Green Book, 2011, table 3-1."""
@@ -39,7 +40,7 @@ def _street(*elements: Any) -> Scene:
 
 def _profiles(scene: Scene, seed: int, **fields: Any) -> Sequence[RoadProfile]:
     relief = ReliefOfRoads(name="relief", **fields)
-    made = relief(scene, _library(), np.random.default_rng(seed)).relief
+    made = relief(scene, _library(), rng_of(f"relief {seed}")).relief
     assert made is not None
     return made.roads
 
