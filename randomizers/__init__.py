@@ -35,6 +35,7 @@ TABLE = PluginTable[Randomizer](
         "physics_properties": "gen_data.randomizers.physics_properties:PhysicsProperties",
         "plate": "gen_data.randomizers.plate:PhotoPlate",
         "reaching_hand": "gen_data.randomizers.reaching_hand:ReachingHand",
+        "relief": "gen_data.randomizers.relief:ReliefOfRoads",
         "rig_calibration": "gen_data.randomizers.rig_calibration:RigCalibration",
         "street_lights": "gen_data.randomizers.street_lights:StreetLights",
         "textures": "gen_data.randomizers.textures:Textures",

@@ -14,7 +14,9 @@ from gen_data.roads.roundabout_shape import RoundaboutShape
 
 def _surface(path: str, **parameters: object) -> Family:
     build, name = Lazy(f"gen_data.content.roads.{path}"), path.partition(":")[2]
-    facts = {"letters": Lazy(f"{__name__}.painted_signs:LETTERS")} if name == "road_marking" else {}
+    facts: dict[str, object] = {"draped": "land" if name == "ground" else "layers"}
+    if name == "road_marking":
+        facts["letters"] = Lazy(f"{__name__}.painted_signs:LETTERS")
     return Family(name, name, ("street",), 0, 0.0, False, 2, parameters, build, declares=facts)
 
 

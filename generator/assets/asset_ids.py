@@ -18,7 +18,8 @@ _KEY = re.compile(r"[a-z][a-z0-9_]*")
 _INTEGER = re.compile(r"[-+]?[0-9]{1,18}")
 _NUMBER = re.compile(r"[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]{1,3})?")
 _WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_.\-]*")
-_MAX_LENGTH = 400
+_NAME_MAX, _LENGTH_MAX = 400, 2000
+"""Names become paths; parameters hold the profiles of roads."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +51,7 @@ def parse_asset_id(text: str) -> AssetId:
         AssetError: if it is malformed.
     """
     name, question_mark, query = text.partition("?")
-    if len(text) > _MAX_LENGTH or not _NAME.fullmatch(name):
+    if len(name) > _NAME_MAX or len(text) > _LENGTH_MAX or not _NAME.fullmatch(name):
         raise AssetError(
             f"asset '{text[:60]}': not an asset id; expected a name such as 'pybullet/teddy' or "
             "'mug?seed=3'"

@@ -1,10 +1,11 @@
 """Procedural assets: families of objects, textures and environments."""
 
 from collections.abc import Callable, Collection, Iterator, Mapping
+from dataclasses import replace
 from functools import partial
 from typing import Any, TypeVar
 
-from gen_data.assets import asset_arrays, asset_cache, family_parameters, importer
+from gen_data.assets import asset_arrays, asset_cache, drape, family_parameters, importer
 from gen_data.assets.asset_ids import AssetId, ParameterValue, format_parameter
 from gen_data.assets.families import AnyFamily, kind_of, own_families, third_party_families
 from gen_data.assets.family import EnvironmentFamily, Facts, Family, TextureFamily
@@ -56,6 +57,11 @@ class ProceduralLibrary:
     def get(self, asset_id: AssetId) -> Asset:
         """Describe the asset of an id with a known name. Raises AssetError on wrong parameters."""
         family = self._families[asset_id.name]
+        parts = self._split_draped(asset_id)
+        if parts:
+            level = self.get(parts[0])
+            digest = _draped_key(level.sha256, parts[1])
+            return replace(level, asset_id=str(asset_id), sha256=digest)
         if not _is_offered(asset_id, family):
             return self._describe(asset_id, family)
         # The family is held beside its id(), which no other object can have as long.
@@ -99,6 +105,12 @@ class ProceduralLibrary:
     def imported(self, asset_id: AssetId) -> importer.ImportedMesh:
         """Geometry of an object."""
         family = self._find(asset_id, Family, "an object")
+        parts = self._split_draped(asset_id)
+        if parts:
+            level, place = parts
+            kind = str(family.declares[drape.FACT])
+            key = _draped_key(self._key(level, family), place)
+            return self._store.computed(key, lambda: drape.drape(self.imported(level), place, kind))
 
         def compute() -> importer.ImportedMesh:
             solid = _make(asset_id, family)
@@ -128,8 +140,17 @@ class ProceduralLibrary:
     def is_stored(self, asset_id: AssetId) -> bool:
         """Whether the asset is kept on disk: others are too many, or quick to compute."""
         family = self._families[asset_id.name]
+        if self._split_draped(asset_id):
+            return False
         is_kept = set(asset_id.parameters) <= {"seed", *family.stored_parameters}
         return family.stored or (family.variants > 0 and is_kept)
+
+    def _split_draped(self, asset_id: AssetId) -> tuple[AssetId, AssetId] | None:
+        """See ``drape.split_draped``; None for families that do not lie on the ground."""
+        family = self._families[asset_id.name]
+        if drape.FACT not in family.declares:
+            return None
+        return drape.split_draped(asset_id)
 
     def _find(self, asset_id: AssetId, kind: type[F], expected: str) -> F:
         """The id's family. Raises AssetError if it is of another kind."""
@@ -167,6 +188,10 @@ class ProceduralLibrary:
             # Another release of a package, or another package, may use the same version number.
             content["package"] = self._packages[asset_id.name]
         return asset_cache.content_key(content)
+
+
+def _draped_key(level: str, place: AssetId) -> str:
+    return asset_cache.content_key({"level": level, "place": str(place), "version": drape.VERSION})
 
 
 def _is_offered(asset_id: AssetId, family: AnyFamily) -> bool:

@@ -14,6 +14,7 @@ from gen_data.core import asset_types, serialization
 from gen_data.core.boxes import OrientedBox
 from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.motion import STILL, JointTrajectory, StateChange, Trajectory, Twist
+from gen_data.core.relief import Relief
 from gen_data.core.se3 import IDENTITY, SE3, Vec3
 from gen_data.core.shutter import INSTANT, Shutter
 
@@ -651,6 +652,8 @@ class Scene:
         box3d: What the 3D boxes of its instances enclose.
         tracks: Trajectories of bodies; at most one per body.
         changes: Changes of state, in order of time.
+        relief: Height of its ground above the level world of its layout; None = it is level. A
+            view is lifted once, after it was drawn.
     """
 
     template: str
@@ -675,6 +678,7 @@ class Scene:
     tracks: tuple[Trajectory, ...] = ()
     changes: tuple[StateChange, ...] = ()
     box3d: Box3dExtent = "all"
+    relief: Relief | None = field(default=None, metadata={serialization.SPARSE: True})
 
     def body(self, name: str) -> Body:
         """The body of that name; KeyError if there is none."""

@@ -60,7 +60,7 @@ def scene_at(scene: Scene, time_s: float) -> Scene:
     }
     articulations = tuple(_moved_joints(a, time_s) for a in scene.articulations)
     lights = tuple(
-        _moved_light(light, moved[light.body]) if light.body in moved else light
+        moved_light(light, moved[light.body]) if light.body in moved else light
         for light in scene.lights
     )
     scene = replace(
@@ -222,7 +222,8 @@ def _moved_joints(arm: Articulation, time_s: float) -> Articulation:
     return replace(arm, joint_positions=arm.joint_track.positions(time_s))
 
 
-def _moved_light(light: Light, T_new_old: SE3) -> Light:
+def moved_light(light: Light, T_new_old: SE3) -> Light:
+    """The light after a motion of what carries it, rounded as in files."""
     x, y, z = (T_new_old @ SE3(light.position_m)).translation_m
     dx, dy, dz = (float(v) for v in T_new_old.rotate(light.direction))  # type: ignore[arg-type]
     moved = replace(

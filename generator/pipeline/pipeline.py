@@ -19,6 +19,7 @@ from gen_data.core.scene import LABEL_IDS_MAX, Scene
 from gen_data.core.streams import Streams
 from gen_data.pipeline import checked_renderer, splits
 from gen_data.pipeline.finalize_scene import Timeline, finalize_scene
+from gen_data.pipeline.lift_scene import lift_scene
 from gen_data.pipeline.numerics import numerics_digests
 
 if TYPE_CHECKING:
@@ -295,6 +296,9 @@ class Pipeline:
             scene = self._randomize(
                 accepted.scene, accepted.randomizers, interfaces.Stage.VIEW, streams
             )
+            if scene.relief is not None:
+                lifted = lift_scene(scene, self.assets)
+                scene = finalize_scene(lifted, self.assets, self._category_ids)
             return DrawnView(number, scene_time.place_sensors(scene), streams)
 
         self._view = self._first_accepted(accepted.index, draw)

@@ -35,6 +35,7 @@ from gen_data.randomizers import TABLE
 from gen_data.scene_templates.builder import build_scene
 from gen_data.scene_templates.carrier import Carrier
 from gen_data.scene_templates.objects import AssetChoice, Objects
+from gen_data.scene_templates.road import Road
 from gen_data.scene_templates.robot import Robot
 from gen_data.scene_templates.room import Room
 from gen_data.scene_templates.room_layout import RoomLayout
@@ -98,12 +99,29 @@ def houses_and_garden() -> Scene:
     return add_members(scene, houses, [Member(house, place) for place in places], library)
 
 
+@cache
+def straight_road() -> Scene:
+    """A road with a bench and two cameras."""
+    bench = Body("bench", "bench?seed=0", SE3((20.0, 6.0, 0.0)), instance_id=1)
+    lens = Intrinsics.from_hfov(64, 48, 1.0)
+    cameras = tuple(Camera(name, SE3((0.0, 0.0, 1.5)), lens) for name in ("left", "right"))
+    scene = build_scene("test", (Road(name="main"),), open_library(()))
+    return replace(
+        scene,
+        bodies=(*scene.bodies, bench),
+        instances=(Instance(1, "bench", "bench", 0, bench.asset),),
+        cameras=cameras,
+    )
+
+
 def world_of(kind: str) -> tuple[Scene, AssetIndex]:
     """A scene that a randomizer can change, and its assets."""
     if kind == "door_paths":
         return houses_and_garden(), open_library(())
     if kind in IN_ROOMS:
         return furnished_room(), open_library(())
+    if kind == "relief":
+        return straight_road(), open_library(())
     return nominal_scene(), FakeAssets()
 
 
@@ -226,7 +244,7 @@ def test_names_and_ids_stay_in_order(kind: str) -> None:
         assert min(ids) == 1
         assert {body.instance_id for body in scene.bodies} <= {0, *ids}
         assert [camera.name for camera in scene.cameras] == ["left", "right"]
-        arms = [] if kind in (*IN_ROOMS, "door_paths") else ["arm"]
+        arms = [] if kind in (*IN_ROOMS, "door_paths", "relief") else ["arm"]
         assert [arm.name for arm in scene.articulations] == arms
 
 

@@ -1,0 +1,219 @@
+"""Relief of the ground: a profile along every road, blended into the land around them.
+
+Streets are laid out on level ground and lifted once. The ground is a smooth field, sampled on a
+grid of the world and linear on each triangle of it. Meshes are cut along the lines of that grid:
+all layers of a street, such as asphalt and paint, follow the same planes; no crack opens and no
+layer sinks into another one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, fields
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gen_data.core.se3 import Array
+
+Ints = NDArray[np.int64]
+
+CELL_M = 4.0
+"""Cells of the grid. On a crest of K = 2, the tightest one at 30 km/h, the planes are up to 10 mm
+below the parabola; whatever stands on the ground stands on the planes."""
+_END_M = 1.5 * CELL_M
+_REACH_M = 160.0
+"""Distance from all roads beyond which the ground has the height of its rim."""
+_SOFT_M2 = 0.25
+"""Squared distance at which the weight of a road falls to a quarter."""
+_BANK_M, _SHOULDER_M = 25.0, 70.0
+"""Next to a road, the land bends to its slope over the first distance, and back to level from there
+to the second one."""
+
+
+@dataclass(frozen=True, slots=True)
+class RoadProfile:
+    """Heights along one road, level across it, and slopes of the land on its sides.
+
+    Attributes:
+        x_m, y_m, yaw_rad: Start of its reference line.
+        curvature_per_m: Of its reference line, positive to the left.
+        length_m: Of its reference line.
+        half_width_m: Distance from the reference line within which the profile alone decides; cells
+            that end within it are level across.
+        left, right: Rise of the land on its sides, away from the road, per metre.
+        start_m: Height at its start.
+        grade: Rise per metre at its start.
+        curves: Three vertical curves, in order, each ``start_m, length_m, change``: parabolas
+            along which the grade changes by so much.
+    """
+
+    x_m: float
+    y_m: float
+    yaw_rad: float
+    curvature_per_m: float
+    length_m: float
+    half_width_m: float
+    left: float
+    right: float
+    start_m: float
+    grade: float
+    curves: tuple[float, float, float, float, float, float, float, float, float]
+
+    def height(self, s_m: Array) -> Array:
+        """Heights [n] at arc lengths [n] of the reference line, constant beyond its ends.
+
+        Both end grades go on for a little more than the diagonal of a cell, in which the road ends.
+        """
+        s = np.clip(s_m, -_END_M, self.length_m + _END_M)
+        z: Array = self.start_m + self.grade * s
+        for start, length, change in self._bends():
+            z = z + change * _bend(s - start, length)
+        return z
+
+    def slope(self, s_m: float) -> float:
+        """Grade at an arc length within the road."""
+        return self.grade + sum(
+            change * min(max((s_m - start) / length, 0.0), 1.0)
+            for start, length, change in self._bends()
+        )
+
+    def _bends(self) -> Iterator[tuple[float, float, float]]:
+        return zip(self.curves[0::3], self.curves[1::3], self.curves[2::3], strict=True)
+
+    def line(self) -> Array:
+        """Points [n, 2] of its reference line, a few metres apart."""
+        s = np.linspace(0.0, self.length_m, 2 + int(self.length_m / CELL_M))
+        turn = self.curvature_per_m * s
+        chord = s * np.sinc(turn / (2.0 * np.pi))
+        heading = self.yaw_rad + 0.5 * turn
+        return np.column_stack(
+            [self.x_m + chord * np.cos(heading), self.y_m + chord * np.sin(heading)]
+        )
+
+    def weigh(self, x_m: Array, y_m: Array) -> tuple[Array, Array]:
+        """Its heights at places [n], and their weights, which fall with the distance from it."""
+        s, t = self._along_and_left(x_m, y_m)
+        beyond = s - np.clip(s, 0.0, self.length_m)
+        aside = np.maximum(np.abs(t) - self.half_width_m, 0.0)
+        rise = np.where(t > 0.0, self.left, self.right)
+        bank = _bend(aside, _BANK_M) - _bend(aside - _BANK_M, _SHOULDER_M - _BANK_M)
+        weight = 1.0 / np.square(beyond * beyond + aside * aside + _SOFT_M2)
+        return self.height(s) + rise * bank, weight
+
+    def _along_and_left(self, x_m: Array, y_m: Array) -> tuple[Array, Array]:
+        """Arc lengths and distances to the left of the nearest points of the line."""
+        c, s = np.cos(self.yaw_rad), np.sin(self.yaw_rad)
+        u = c * (x_m - self.x_m) + s * (y_m - self.y_m)
+        v = c * (y_m - self.y_m) - s * (x_m - self.x_m)
+        if self.curvature_per_m == 0.0:
+            return u, v
+        side, radius = np.sign(self.curvature_per_m), 1.0 / abs(self.curvature_per_m)
+        along = radius * np.arctan2(u, radius - side * v)
+        return along, side * (radius - np.hypot(u, radius - side * v))
+
+
+@dataclass(frozen=True, slots=True)
+class Relief:
+    """Height of the ground of a street above the level world in which it is laid out.
+
+    Where roads overlap, at junctions, their profiles are level and at the same height.
+    Source of the weights: Shepard, "A two-dimensional interpolation function for irregularly-spaced
+    data", ACM National Conference, 1968.
+
+    Attributes:
+        roads: At least one.
+    """
+
+    roads: tuple[RoadProfile, ...]
+
+    def height(self, points_m: Array) -> Array:
+        """Heights [n] of the ground at places [n, 2 or more], x and y first."""
+        grid = _sampled(self)
+        i, j, u, v = grid.find(points_m)
+        z = grid.heights_m
+        here = z[i, j]
+        east, north, cross = z[i + 1, j] - here, z[i, j + 1] - here, z[i + 1, j + 1] - here
+        # The diagonal of a cell runs from its corner of least to that of largest x and y.
+        lower: Array = u * east + v * (cross - east)
+        upper: Array = v * north + u * (cross - north)
+        heights: Array = here + np.where(u >= v, lower, upper)
+        return heights
+
+    def gradient(self, points_m: Array) -> Array:
+        """Slopes [n, 2] along x and y of the smooth ground, for shading."""
+        grid = _sampled(self)
+        i, j, u, v = grid.find(points_m)
+        slopes, u, v = grid.slopes, u[:, None], v[:, None]
+        near = (1.0 - u) * slopes[i, j] + u * slopes[i + 1, j]
+        far = (1.0 - u) * slopes[i, j + 1] + u * slopes[i + 1, j + 1]
+        blended: Array = (1.0 - v) * near + v * far
+        return blended
+
+    def numbers(self) -> tuple[float, ...]:
+        """All values in a row, for ids of assets."""
+        return tuple(
+            float(number)
+            for road in self.roads
+            for field in fields(road)
+            for number in np.atleast_1d(getattr(road, field.name))
+        )
+
+    @classmethod
+    def of(cls, numbers: Sequence[float]) -> Relief:
+        """The inverse of ``numbers``. Raises ValueError if they are of another number."""
+        plain = len(fields(RoadProfile)) - 1
+        each = plain + 9
+        if not numbers or len(numbers) % each:
+            raise ValueError(f"{len(numbers)} numbers are no relief; expected {each} per road")
+        rows = [tuple(numbers[k : k + each]) for k in range(0, len(numbers), each)]
+        return cls(tuple(RoadProfile(*row[:plain], row[plain:]) for row in rows))  # type: ignore[call-arg, arg-type]
+
+
+def _bend(past_m: Array, length_m: float) -> Array:
+    """Rise of a line whose slope turns from 0 to 1 over a length, at distances from its start."""
+    within = np.clip(past_m, 0.0, length_m)
+    rise: Array = within * within / (2.0 * length_m) + np.maximum(past_m - length_m, 0.0)
+    return rise
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Grid:
+    """The smooth ground at the nodes of the grid, as far as roads shape it.
+
+    Attributes:
+        first: Numbers of the first node along x and y; node k is at ``k * CELL_M``.
+        heights_m: [m, n].
+        slopes: Along x and y, [m, n, 2].
+    """
+
+    first: Array
+    heights_m: Array
+    slopes: Array
+
+    def find(self, points_m: Array) -> tuple[Ints, Ints, Array, Array]:
+        """Cells of places [n, 2 or more], and where in them they are; outside, at the rim."""
+        last = np.array(self.heights_m.shape) - 1.0
+        at = np.asarray(points_m, np.float64)[:, :2] / CELL_M - self.first
+        at = np.clip(at, 0.0, last)
+        cell = np.minimum(np.floor(at), last - 1.0)
+        u, v = (at - cell).T
+        i, j = cell.astype(np.int64).T
+        return i, j, u, v
+
+
+@lru_cache(maxsize=4)
+def _sampled(relief: Relief) -> _Grid:
+    """The grid of a relief, which all meshes, lanes and bodies of a scene ask."""
+    lines = np.concatenate([road.line() for road in relief.roads])
+    first = np.floor((lines.min(axis=0) - _REACH_M) / CELL_M)
+    last = np.ceil((lines.max(axis=0) + _REACH_M) / CELL_M)
+    x, y = (CELL_M * np.arange(a, b + 1.0) for a, b in zip(first, last, strict=True))
+    places = np.meshgrid(x, y, indexing="ij")
+    weighed = [road.weigh(*places) for road in relief.roads]
+    total = sum(weight for _, weight in weighed)
+    # Rounded as poses are: the same bits on every processor.
+    heights = np.round(sum(height * weight for height, weight in weighed) / total, 6)
+    slopes = np.stack([np.gradient(heights, CELL_M, axis=k) for k in (0, 1)], axis=2)
+    return _Grid(first, heights, slopes)

@@ -1,0 +1,347 @@
+"""Scenes laid out on level ground, lifted onto their relief.
+
+Randomizers find places, routes and views in a level world. The finished view is lifted once, by
+four rules:
+
+- Ground surfaces, and lines that hang from masts, are bent point by point (``assets/drape.py``).
+- Buildings stay level at the height of the ground before their fronts, on a base that reaches down
+  to the lowest ground below them.
+- Vehicles, and objects that are wider than high, turn with the plane through four points of the
+  ground: below the wheels, or below the corners. Cameras on driving lanes belong to a vehicle.
+- All others stay upright: people at the height of the ground below their middle, objects at
+  its lowest height below them.
+
+Trajectories follow the same rules at each knot. What flies is raised by the height of the highest
+lane, and keeps its motion.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gen_data.assets.asset_ids import AssetId, parse_asset_id
+from gen_data.assets.drape import FACT, draped_id
+from gen_data.assets.families import declared
+from gen_data.core.asset_types import Material
+from gen_data.core.interfaces import AssetLibrary
+from gen_data.core.lane_geometry import left_normals
+from gen_data.core.motion import Trajectory
+from gen_data.core.relief import CELL_M, Relief
+from gen_data.core.scene import Body, Camera, Lane, Light, Scene
+from gen_data.core.scene_time import moved_light
+from gen_data.core.se3 import SE3, Array, Vec3
+from gen_data.traffic.axles import find_axles
+
+Stance = Literal["tilted", "upright", "centred", "built", "flown"]
+_FOOT_MAX_M = 1.5
+"""Half extents of what stands upright are cut to this: crowns of trees hang over other ground."""
+_CAR_M = (2.7, 1.5)
+"""Wheelbase and track of the vehicle that carries a camera: means of passenger cars, assumed."""
+_STOREY_M = 1.0
+"""Height up to which the walls of a building stand on the ground."""
+_BASE_STEP_M, _SUNK_M, _INSET_M = 0.5, 0.05, 0.02
+"""Depths of bases are multiples of the first; they reach below the lowest ground by the second, and
+are narrower than the building by the third."""
+_CONCRETE = Material(
+    (0.75, 0.73, 0.7), 0.9, texture="texture/concrete?seed=1", texture_scale_m=3.0, role="facade"
+)
+_TURN = 5e-4
+"""Points of a lane are kept where its grade has changed by this much since the last one."""
+_FLYING = frozenset({"drone", "gimbal"})
+_HOUSES = frozenset({"building", "garage"})
+
+
+def lift_scene(scene: Scene, assets: AssetLibrary) -> Scene:
+    """The scene on its relief; unchanged if its ground is level.
+
+    Instances keep their old frames: they are measured afterwards.
+    """
+    relief = scene.relief
+    if relief is None:
+        return scene
+    lanes = tuple(_lifted_lane(lane, relief) for lane in scene.lanes)
+    heights_m = [point[2] for lane in lanes for point in lane.center_m] or [0.0]
+    sky_m = max(heights_m)
+    bodies, moves = _lift_bodies(scene, assets, relief, sky_m)
+    tracks = tuple(
+        _lifted_track(track, scene.body(track.body), assets, relief, sky_m)
+        for track in scene.tracks
+    )
+    tracked = {track.body: track.pose(scene.time_s).rounded() for track in tracks}
+    low, high = scene.interior_m
+    return replace(
+        scene,
+        bodies=tuple(
+            replace(b, T_world_body=tracked[b.name]) if b.name in tracked else b for b in bodies
+        ),
+        tracks=tracks,
+        lanes=lanes,
+        lights=tuple(_lifted_light(light, moves, relief) for light in scene.lights),
+        cameras=tuple(_lifted_camera(camera, scene.lanes, relief) for camera in scene.cameras),
+        rigs=tuple(
+            rig if rig.body else replace(rig, T_body_rig=_raised(rig.T_body_rig, relief))
+            for rig in scene.rigs
+        ),
+        surfaces=tuple(
+            replace(s, T_world_surface=(moves[s.body] @ s.T_world_surface).rounded())
+            for s in scene.surfaces
+        ),
+        interior_m=(
+            (low[0], low[1], low[2] + min(heights_m)),
+            (high[0], high[1], high[2] + sky_m),
+        ),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Foot:
+    """Points of a body on the ground, in its frame: the corners of a rectangle.
+
+    Attributes:
+        stance: How it stands.
+        x_m, y_m: From rear to front and from right to left.
+    """
+
+    stance: Stance
+    x_m: tuple[float, float]
+    y_m: tuple[float, float]
+
+    def corners(self, poses: Sequence[SE3]) -> Array:
+        """Rear right, rear left, front right, front left of a body at poses, [n, 4, 3]."""
+        own = np.array([[x, y, 0.0] for x in self.x_m for y in self.y_m])
+        return np.array([pose.apply(own) for pose in poses])
+
+
+def _foot(body: Body, assets: AssetLibrary) -> _Foot:
+    asset = assets.get(body.asset)
+    tags = frozenset(asset.tags)
+    (x0, y0, z0), (x1, y1, z1) = _scaled(assets.bounds_m(body.asset), body.scale)
+    if tags & _FLYING:
+        return _Foot("flown", (0.0, 0.0), (0.0, 0.0))
+    if tags & _HOUSES:
+        low, high = _scaled(_ground_floor(body.asset, assets), body.scale)
+        return _Foot("built", (low[0], high[0]), (low[1], high[1]))
+    if "vehicle" in tags:
+        axles = find_axles(assets, body.asset, body.scale)
+        rear = axles.T_body_rear.translation_m[0]
+        return _Foot("tilted", (rear, rear + axles.wheelbase_m), (y0, y1))
+    is_low = max(x1 - x0, y1 - y0) > z1 - z0 and "tree" not in tags
+    if is_low and min(x1 - x0, y1 - y0) > 0.0 and body.instance_id:
+        return _Foot("tilted", (x0, x1), (y0, y1))
+    if "pedestrian" in tags:
+        return _Foot("centred", (x0, x1), (y0, y1))
+    most = _FOOT_MAX_M if body.instance_id else math.inf
+    (x0, x1), (y0, y1) = ((max(a, -most), min(b, most)) for a, b in ((x0, x1), (y0, y1)))
+    return _Foot("upright", (x0, x1), (y0, y1))
+
+
+@lru_cache(maxsize=4096)
+def _ground_floor(asset: str, assets: AssetLibrary) -> tuple[Vec3, Vec3]:
+    """Bounds of a building below balconies and eaves."""
+    points = assets.vertices_m(asset)
+    low = points[points[:, 2] < points[:, 2].min() + _STOREY_M]
+    (x0, y0, z0), (x1, y1, z1) = (
+        (float(x), float(y), float(z)) for x, y, z in (low.min(axis=0), low.max(axis=0))
+    )
+    return (x0, y0, z0), (x1, y1, z1)
+
+
+def _scaled(bounds_m: tuple[Vec3, Vec3], scale: float) -> tuple[Vec3, Vec3]:
+    (x0, y0, z0), (x1, y1, z1) = bounds_m
+    return (scale * x0, scale * y0, scale * z0), (scale * x1, scale * y1, scale * z1)
+
+
+def _lift_bodies(
+    scene: Scene, assets: AssetLibrary, relief: Relief, sky_m: float
+) -> tuple[tuple[Body, ...], dict[str, SE3]]:
+    """The bodies on the relief, with the bases of buildings, and their moves by name."""
+    # All bodies of an instance, such as a person with an umbrella, move as its first one does.
+    first: dict[int, Body] = {}
+    for body in scene.bodies:
+        first.setdefault(body.instance_id, body)
+    leaders = {
+        body.name: first[body.instance_id] if body.instance_id else body for body in scene.bodies
+    }
+    standing = [b for b in scene.bodies if leaders[b.name] is b and not _is_draped(b)]
+    feet = [_foot(body, assets) for body in standing]
+    corners = np.concatenate(
+        [foot.corners([b.T_world_body]) for foot, b in zip(feet, standing, strict=True)]
+        or [np.zeros((0, 4, 3))]
+    )
+    heights = relief.height(corners.reshape(-1, 3)).reshape(-1, 4)
+    moves = {
+        body.name: _move(foot.stance, points, z, sky_m)
+        for body, foot, points, z in zip(standing, feet, corners, heights, strict=True)
+    }
+    bodies: list[Body] = []
+    for body in scene.bodies:
+        if _is_draped(body):
+            parsed = parse_asset_id(body.asset)
+            asset = draped_id(parsed, body.T_world_body, body.scale, relief)
+            bodies.append(replace(body, asset=asset))
+            moves[body.name] = _rise(body.T_world_body, relief)
+        else:
+            move = moves[leaders[body.name].name]
+            moves[body.name] = move
+            bodies.append(replace(body, T_world_body=(move @ body.T_world_body).rounded()))
+    for body, foot, z in zip(standing, feet, heights, strict=True):
+        if foot.stance == "built" and np.ptp(z) > 0.0:
+            bodies += _base(body, foot, z, assets)
+    return tuple(bodies), moves
+
+
+def _is_draped(body: Body) -> bool:
+    """Whether its mesh follows the ground: its family declares it, and it is upright."""
+    _, x, y, _ = body.T_world_body.quaternion_wxyz
+    return x == y == 0.0 and declared(body.asset, FACT, None) is not None
+
+
+def _move(stance: Stance, corners: Array, z: Array, sky_m: float) -> SE3:
+    """``T_lifted_level`` of something by its points on the ground [4, 3] and their heights [4]."""
+    if stance == "flown":
+        return SE3((0.0, 0.0, sky_m))
+    if stance == "upright":
+        return SE3((0.0, 0.0, float(z.min())))
+    if stance == "built":
+        return SE3((0.0, 0.0, float(0.5 * (z[2] + z[3]))))
+    if stance == "centred":
+        return SE3((0.0, 0.0, float(z.mean())))
+    return _tilt(corners, z)
+
+
+def _tilt(corners: Array, z: Array) -> SE3:
+    """The motion of a plane, level at 0, onto the one nearest to the raised corners.
+
+    Headings in plan stay: it turns about the level line across the steepest slope.
+    """
+    ahead = 0.5 * (corners[2] + corners[3] - corners[0] - corners[1])[:2]
+    left = 0.5 * (corners[1] + corners[3] - corners[0] - corners[2])[:2]
+    rise = 0.5 * np.array([z[2] + z[3] - z[0] - z[1], z[1] + z[3] - z[0] - z[2]])
+    # Slopes along x and y from the rises along both sides of the rectangle.
+    area = ahead[0] * left[1] - ahead[1] * left[0]
+    slope_x = float((rise[0] * left[1] - rise[1] * ahead[1]) / area)
+    slope_y = float((rise[1] * ahead[0] - rise[0] * left[0]) / area)
+    steepness = slope_x * slope_x + slope_y * slope_y
+    cosine = 1.0 / math.sqrt(1.0 + steepness)
+    # The quaternion of the shortest turn of Z to the normal, (-slope_x, -slope_y, 1) * cosine.
+    w = math.sqrt(0.5 * (1.0 + cosine))
+    turn = (w, slope_y * cosine / (2.0 * w), -slope_x * cosine / (2.0 * w), 0.0)
+    middle = corners.mean(axis=0)
+    x, y = float(middle[0]), float(middle[1])
+    return SE3((x, y, float(z.mean())), turn) @ SE3((-x, -y, 0.0))
+
+
+def _base(body: Body, foot: _Foot, z: Array, assets: AssetLibrary) -> list[Body]:
+    """A block below a building whose floor is above the lowest ground; none if nothing is open."""
+    floor_m = float(0.5 * (z[2] + z[3]))
+    depth_m = math.ceil((floor_m - float(z.min()) + _SUNK_M) / _BASE_STEP_M) * _BASE_STEP_M
+    length_m, width_m = (round(b - a - _INSET_M, 2) for a, b in (foot.x_m, foot.y_m))
+    if floor_m - float(z.min()) < _SUNK_M or min(length_m, width_m) <= 0.0:
+        return []
+    asset = str(AssetId("box", {"size_m": (length_m, width_m, depth_m)}))
+    _, high = assets.bounds_m(asset)
+    middle = (0.5 * sum(foot.x_m), 0.5 * sum(foot.y_m), -high[2] - 0.001)
+    pose = SE3((0.0, 0.0, floor_m)) @ body.T_world_body @ SE3(middle)
+    name = f"{body.name}/base"
+    return [Body(name, asset, pose.rounded(), collides=False, materials=(_CONCRETE,))]
+
+
+def _rise(pose: SE3, relief: Relief) -> SE3:
+    return SE3((0.0, 0.0, float(relief.height(np.array([pose.translation_m]))[0])))
+
+
+def _raised(pose: SE3, relief: Relief) -> SE3:
+    return (_rise(pose, relief) @ pose).rounded()
+
+
+def _lifted_camera(camera: Camera, lanes: Iterable[Lane], relief: Relief) -> Camera:
+    """A camera that no rig carries: it moves as a car does if it is above a driving lane."""
+    pose = camera.T_world_camera
+    if camera.rig:
+        return camera
+    place = np.array(pose.translation_m[:2])
+    if not any(lane.kind == "driving" and _is_on(place, lane) for lane in lanes):
+        return replace(camera, T_world_camera=_raised(pose, relief))
+    x, y, _ = pose.rotate(np.array([0.0, 0.0, 1.0])).tolist()
+    move = _ridden(pose, math.atan2(y, x), relief)
+    return replace(camera, T_world_camera=(move @ pose).rounded())
+
+
+def _ridden(pose: SE3, yaw_rad: float, relief: Relief) -> SE3:
+    """The motion of a car's passenger at a place."""
+    x, y, _ = pose.translation_m
+    half = (0.5 * _CAR_M[0], 0.5 * _CAR_M[1])
+    foot = _Foot("tilted", (-half[0], half[0]), (-half[1], half[1]))
+    corners = foot.corners([SE3.about_z(yaw_rad, (x, y, 0.0))])[0]
+    return _tilt(corners, relief.height(corners))
+
+
+def _is_on(place: Array, lane: Lane) -> bool:
+    points = np.asarray(lane.center_m)[:, :2]
+    start, step = points[:-1], np.diff(points, axis=0)
+    share = ((place - start) * step).sum(axis=1) / (step * step).sum(axis=1)
+    nearest = start + np.clip(share, 0.0, 1.0)[:, None] * step
+    off = ((place - nearest) ** 2).sum(axis=1)
+    return bool(off.min() <= (0.5 * lane.width_m) ** 2)
+
+
+def _lifted_track(
+    track: Trajectory, body: Body, assets: AssetLibrary, relief: Relief, sky_m: float
+) -> Trajectory:
+    foot = _foot(body, assets)
+    corners = foot.corners(track.knots)
+    heights = relief.height(corners.reshape(-1, 3)).reshape(-1, 4)
+    knots = tuple(
+        _move(foot.stance, points, z, sky_m) @ knot
+        for knot, points, z in zip(track.knots, corners, heights, strict=True)
+    )
+    return replace(track, knots=knots)
+
+
+def _lifted_light(light: Light, moves: dict[str, SE3], relief: Relief) -> Light:
+    if light.kind == "sun":
+        return light
+    if light.body in moves:
+        return moved_light(light, moves[light.body])
+    pose = SE3(light.position_m)
+    if light.cutoff:
+        # A headlight without a body: that of the car that carries the camera.
+        yaw_rad = math.atan2(light.direction[1], light.direction[0])
+        return moved_light(light, _ridden(pose, yaw_rad, relief))
+    return moved_light(light, _rise(pose, relief))
+
+
+def _lifted_lane(lane: Lane, relief: Relief) -> Lane:
+    """The lane with its points on the ground, and more of them where that bends."""
+    points, given = _refined(np.asarray(lane.center_m, np.float64))
+    across_m = max(lane.width_m, 1.0)
+    half = 0.5 * across_m * left_normals(points)
+    points[:, 2] += relief.height(points)
+    rise = relief.height(points + half) - relief.height(points - half)
+    bank = lane.bank + float(rise.mean()) / across_m
+    steps = np.diff(points, axis=0)
+    grades = steps[:, 2] / np.hypot(steps[:, 0], steps[:, 1])
+    turned = np.floor(np.concatenate([[0.0], np.cumsum(np.abs(np.diff(grades)))]) / _TURN)
+    given[1:-1] |= np.diff(turned) > 0.0
+    center = [
+        (round(float(x), 6), round(float(y), 6), round(float(z), 6)) for x, y, z in points[given]
+    ]
+    return replace(lane, center_m=tuple(center), bank=round(bank, 9) + 0.0)
+
+
+def _refined(points: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """A line [n, 3] with further points, no two farther apart than a cell, and which were given."""
+    step = np.diff(points, axis=0)
+    count = np.maximum(np.ceil(np.hypot(step[:, 0], step[:, 1]) / CELL_M), 1.0).astype(np.int64)
+    piece = np.repeat(np.arange(len(step)), count)
+    number = 1 + np.arange(len(piece)) - np.repeat(np.cumsum(count) - count, count)
+    share = (number / count[piece])[:, None]
+    line = np.concatenate([points[:1], points[piece] + share * step[piece]])
+    return line, np.concatenate([[True], number == count[piece]])

@@ -1,0 +1,330 @@
+"""Streets on their relief: everything stands on the ground, in views, images and scans.
+
+The ground is found by rays of Embree that fall onto the meshes of a scene; the same street without
+relief tells how high a surface or an object is above level ground.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import ArrayLike, NDArray
+
+from gen_data.assemble.config import load_config
+from gen_data.assemble.pipeline_factory import PipelineFactory, open_pipeline
+from gen_data.core.capture import Channel
+from gen_data.core.errors import ConfigError
+from gen_data.core.interfaces import AssetLibrary
+from gen_data.core.lane_geometry import LaneLine
+from gen_data.core.sample import Sample
+from gen_data.core.scene import Instance, Scene
+from gen_data.core.scene_time import scene_at
+from gen_data.core.se3 import SE3, turns_of
+from gen_data.core.serialization import to_plain
+from gen_data.pipeline import Pipeline
+from tests.embree import RayCaster
+from tests.streets import thin_street
+
+STREET = (
+    "shared.district=residential", "shared.junction=none", "shared.curvature_per_m=0",
+    "shared.landmark=none", "randomizers.parked.count=8", "randomizers.traffic.count=8",
+    "randomizers.people.count=12", "sensors.color.size_px=[160, 96]",
+)  # fmt: skip
+GRADE = 0.08
+SLOPE = ("randomizers.relief.grade=0.08", "randomizers.relief.side_slope=0")
+HILLS = (
+    "randomizers.relief.grade={uniform: [-0.12, 0.12]}",
+    "randomizers.relief.side_slope={uniform: [-0.15, 0.15]}",
+)
+FLAT = ("relief",)
+
+
+class Street:
+    """A view of a street with its ground."""
+
+    def __init__(self, scene: Scene, assets: AssetLibrary) -> None:
+        self.scene = scene
+        ground = [
+            b for b in self.scene.bodies
+            if b.instance_id == 0 and b.asset.partition("?")[0] in ("road", "junction", "ground")
+        ]  # fmt: skip
+        meshes = [assets.mesh(b.asset) for b in ground]
+        self._caster = RayCaster(*(
+            (b.T_world_body.apply(m.vertices_m.astype(np.float64)), m.faces)
+            for b, m in zip(ground, meshes, strict=True)
+        ))  # fmt: skip
+
+    @classmethod
+    def first(cls, pipeline: Pipeline) -> Street:
+        """The first view of a pipeline."""
+        return cls(pipeline.drawn_view(pipeline.accepted_scene(0), 0).scene, pipeline.assets)
+
+    def ground_m(self, places_m: ArrayLike) -> NDArray[np.float64]:
+        """Height of the uppermost ground at places [n, 2 or more]."""
+        places = np.asarray(places_m, np.float64)
+        above = np.column_stack([places[:, :2], np.full(len(places), 60.0)])
+        return np.asarray(60.0 - self._caster.cast(above, (0.0, 0.0, -1.0)).distance, np.float64)
+
+    def vehicles(self) -> list[Instance]:
+        """Those with wheels."""
+        return [i for i in self.scene.instances if _wheels_m(i) is not None]
+
+
+def _wheels_m(instance: Instance) -> NDArray[np.float64] | None:
+    """Lowest points of four wheels in the world, [4, 3]; None for what has none."""
+    hubs = [k.position_m for k in instance.keypoints if k.name.startswith("wheel")]
+    if len(hubs) != 4:
+        return None
+    low = np.array([(x, y, instance.box_min_m[2]) for x, y, _ in hubs])
+    return instance.T_world_instance.apply(low)
+
+
+@pytest.fixture(scope="module")
+def streets() -> dict[str, Street]:
+    """The same street level, on a slope of 8 %, and on hills."""
+    configs = {
+        "flat": thin_street("street.yaml", *STREET, without=FLAT),
+        "slope": thin_street("street.yaml", *STREET, *SLOPE),
+        "hills": thin_street("street.yaml", *STREET, *HILLS),
+    }
+    made = {}
+    for name, config in configs.items():
+        with open_pipeline(config) as pipeline:
+            made[name] = Street.first(pipeline)
+    return made
+
+
+def _places(scene: Scene, kinds: Sequence[str] = ("driving", "sidewalk")) -> NDArray[np.float64]:
+    """Places on the lanes of a level street, [n, 3]."""
+    rng = np.random.default_rng(0)
+    lines = [LaneLine(lane) for lane in scene.lanes if lane.kind in kinds]
+    poses = [
+        line.pose(float(at), float(0.4 * line.lane.width_m * side))
+        for line in lines
+        for at, side in zip(
+            rng.uniform(1.0, line.length_m - 1.0, 60), rng.uniform(-1, 1, 60), strict=True
+        )
+    ]
+    return np.array([pose.translation_m for pose in poses])
+
+
+def test_carriageways_and_pavements_rise_with_the_grade(streets: dict[str, Street]) -> None:
+    """The main road starts at x = -150 m: at x it is 0.08 (x + 150) higher than a level one."""
+    places = _places(streets["flat"].scene)
+    places = places[places[:, 0] < -1.0]
+    rise_m = streets["slope"].ground_m(places) - streets["flat"].ground_m(places)
+    assert len(places) > 150
+    np.testing.assert_allclose(rise_m, GRADE * (places[:, 0] + 150.0), atol=0.001)
+
+
+def test_ground_of_hills_is_the_level_ground_raised_by_the_relief(
+    streets: dict[str, Street],
+) -> None:
+    """Rays meet all layers, paint, asphalt and kerbs, as far apart as on level ground."""
+    hills = streets["hills"]
+    assert hills.scene.relief is not None
+    places = _places(streets["flat"].scene)
+    rise_m = hills.ground_m(places) - streets["flat"].ground_m(places)
+    np.testing.assert_allclose(rise_m, hills.scene.relief.height(places), atol=0.001)
+    assert np.ptp(rise_m) > 2.0
+
+
+@pytest.mark.parametrize("relief", ["slope", "hills"])
+def test_all_wheels_of_cars_stand_on_the_ground(streets: dict[str, Street], relief: str) -> None:
+    """Within 2 mm of their place on level ground; 15 mm where planes of the ground meet."""
+    level = {i.name: i for i in streets["flat"].vehicles()}
+    on = streets[relief]
+    cars = on.vehicles()
+    assert len(cars) >= 8
+    assert {i.name for i in cars} == set(level)
+    for car in cars:
+        before, after = _wheels_m(level[car.name]), _wheels_m(car)
+        assert before is not None
+        assert after is not None
+        gap_m = after[:, 2] - on.ground_m(after)
+        flat_gap_m = before[:, 2] - streets["flat"].ground_m(before)
+        np.testing.assert_allclose(gap_m, flat_gap_m, atol=0.002 if relief == "slope" else 0.015)
+
+
+def test_cars_pitch_with_the_grade(streets: dict[str, Street]) -> None:
+    """Up axes of all cars on the slope are its normal: (-0.08, 0, 1) / |...|."""
+    normal = np.array([-GRADE, 0.0, 1.0]) / math.hypot(GRADE, 1.0)
+    cars = [
+        i
+        for i in streets["slope"].vehicles()
+        if -140.0 < i.T_world_instance.translation_m[0] < -5.0
+    ]
+    assert len(cars) >= 4
+    for car in cars:
+        up = car.T_world_instance.rotate(np.array([0.0, 0.0, 1.0]))
+        np.testing.assert_allclose(up, normal, atol=1e-5)
+
+
+def test_people_walk_upright_on_the_ground(streets: dict[str, Street]) -> None:
+    """As high above the ground at their middle as on level ground."""
+    level = {i.name: i for i in streets["flat"].scene.instances if i.category == "person"}
+    hills = streets["hills"]
+    people = [i for i in hills.scene.instances if i.category == "person"]
+    assert len(people) >= 3
+    for person in people:
+        before = level[person.name].T_world_instance
+        _, pitch, roll = turns_of(person.T_world_instance)
+        assert (pitch, roll) == turns_of(before)[1:]
+        places = [before.translation_m, person.T_world_instance.translation_m]
+        flat = places[0][2] - streets["flat"].ground_m(places[:1])[0]
+        assert places[1][2] - hills.ground_m(places[1:])[0] == pytest.approx(flat, abs=0.025)
+
+
+def test_lanes_lie_on_the_ground(streets: dict[str, Street]) -> None:
+    """Centre lines are within 5 mm as high above the meshes as on level ground."""
+    hills, flat = streets["hills"], streets["flat"]
+    level = {lane.name: lane for lane in flat.scene.lanes}
+    checked = 0
+    for lane in hills.scene.lanes:
+        if lane.kind not in ("driving", "sidewalk"):
+            continue
+        line = LaneLine(lane)
+        at = np.linspace(0.5, line.length_m - 0.5, 80)
+        points = np.array([line.pose(float(s)).translation_m for s in at])
+        gap_m = points[:, 2] - hills.ground_m(points)
+        # Level lanes have one height; their ground has ruts and joints.
+        flat_gap_m = level[lane.name].center_m[0][2] - flat.ground_m(points)
+        np.testing.assert_allclose(gap_m, flat_gap_m, atol=0.005)
+        checked += 1
+    assert checked >= 6
+
+
+def test_view_of_a_dash_camera_pitches_with_its_car(streets: dict[str, Street]) -> None:
+    """The axis of the camera climbs by atan(0.08) more than on level ground, along +X."""
+    slope, flat = (streets[name].scene.cameras[0].T_world_camera for name in ("slope", "flat"))
+    ahead, before = (T.rotate(np.array([0.0, 0.0, 1.0])) for T in (slope, flat))
+    uphill = math.copysign(1.0, before[0])
+    turned = math.asin(ahead[2]) - math.asin(before[2])
+    assert turned == pytest.approx(uphill * math.atan(GRADE), abs=0.003)
+
+
+@pytest.fixture(scope="module")
+def hilly_samples() -> Iterator[tuple[Pipeline, list[Sample]]]:
+    """Two samples of different streets on hills."""
+    config = thin_street("street.yaml", *STREET, *HILLS, "views_per_scene=1")
+    with open_pipeline(config, frozenset({Channel.RANGE, Channel.INSTANCE})) as pipeline:
+        yield pipeline, [pipeline.sample(0), pipeline.sample(1)]
+
+
+def _cast_to_ground(
+    pipeline: Pipeline, sample: Sample, T_world_eye: SE3, rays: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Distances along unit rays [..., 3] of an eye to the ground that it sees; NaN = none."""
+    here, bodies = T_world_eye.inverse(), sample.scene.bodies
+    meshes = [pipeline.assets.mesh(b.asset) for b in bodies]
+    caster = RayCaster(*(
+        ((here @ b.T_world_body).apply(m.vertices_m * np.float64(b.scale)), m.faces)
+        for b, m in zip(bodies, meshes, strict=True)
+    ))  # fmt: skip
+    hits = caster.cast((0.0, 0.0, 0.0), rays)
+    is_ground = np.array([b.asset.partition("?")[0] in ("road", "ground") for b in bodies])
+    met = is_ground[np.maximum(hits.mesh, 0)] & (hits.mesh >= 0)
+    return np.where(met, hits.distance.astype(np.float64), np.nan)
+
+
+@pytest.mark.slow
+def test_ground_of_hills_in_depth_images_is_where_rays_meet_it(
+    hilly_samples: tuple[Pipeline, list[Sample]],
+) -> None:
+    """Points of pixels are on it, to 6 mm: layers of paint and covers are up to 5 mm thick."""
+    pipeline, samples = hilly_samples
+    for sample in samples:
+        reading = sample.capture.readings["color"]
+        rays = reading.camera.intrinsics.pixel_rays()
+        met_m = _cast_to_ground(pipeline, sample, reading.camera.T_world_camera, rays)
+        ground = np.isfinite(met_m)
+        seen = rays[ground] * reading.channels[Channel.RANGE][ground][:, None]
+        points = reading.camera.T_world_camera.apply(seen)
+        below_m = Street(sample.scene, pipeline.assets).ground_m(points)
+        assert ground.sum() > 2000
+        assert np.abs(points[:, 2] - below_m).max() < 0.006
+        assert np.abs(np.linalg.norm(seen, axis=1) / met_m[ground] - 1.0).max() < 0.005
+
+
+@pytest.mark.slow
+def test_points_of_a_scan_lie_on_the_ground_of_hills() -> None:
+    """A scanner without noise measures the distance at which its rays meet the ground."""
+    sensors = (
+        "sensors.image_02.size_px=[64, 32]", "sensors.image_03.size_px=[64, 32]",
+        "sensors.velodyne.ideal=true", "sensors.velodyne.motion_distortion=none",
+        "sensors.velodyne.model=VLP-16",
+    )  # fmt: skip
+    config = thin_street("kitti_rig.yaml", *STREET[:-1], *HILLS, *sensors, "steps_per_scene=1")
+    with open_pipeline(config) as pipeline:
+        sample = pipeline.sample(0)
+        points = sample.capture.clouds["velodyne"].points["position_m"].astype(np.float64)
+        range_m = np.linalg.norm(points, axis=1)
+        scanner = sample.scene.lidar("velodyne").T_world_lidar
+        met_m = _cast_to_ground(pipeline, sample, scanner, points / range_m[:, None])
+    ground = np.isfinite(met_m)
+    off_m = np.abs(range_m - met_m)[ground]
+    heights_m = scanner.apply(points[ground])[:, 2]
+    assert ground.sum() > 3000
+    assert (off_m > 0.005).mean() < 0.002
+    assert np.ptp(heights_m) > 2.0
+
+
+@pytest.mark.slow
+def test_samples_on_relief_do_not_depend_on_the_order_of_their_making(
+    hilly_samples: tuple[Pipeline, list[Sample]],
+) -> None:
+    """Sample 1 of a pipeline that made no other one has the same scene and the same pixels."""
+    _, samples = hilly_samples
+    config = thin_street("street.yaml", *STREET, *HILLS, "views_per_scene=1")
+    with open_pipeline(config, frozenset({Channel.RANGE, Channel.INSTANCE})) as pipeline:
+        again = pipeline.sample(1)
+    assert to_plain(again.scene) == to_plain(samples[1].scene)
+    for channel, values in samples[1].capture.readings["color"].channels.items():
+        np.testing.assert_array_equal(again.capture.readings["color"].channels[channel], values)
+
+
+def test_level_relief_is_no_relief() -> None:
+    """A scene whose grades and slopes are 0 is that of a configuration without relief."""
+    level = ("randomizers.relief.grade=0", "randomizers.relief.side_slope=0")
+    with open_pipeline(thin_street("street.yaml", *STREET, *level)) as pipeline:
+        one = Street.first(pipeline).scene
+    with open_pipeline(thin_street("street.yaml", *STREET, without=FLAT)) as pipeline:
+        assert to_plain(one) == to_plain(Street.first(pipeline).scene)
+
+
+def test_traffic_follows_the_ground_at_every_instant() -> None:
+    """Wheels of the ego vehicle and of others, at seven instants of two seconds."""
+    small = (*STREET[:-1], "steps_per_scene=1")
+    config = thin_street("street_sequence.yaml", *small, *HILLS)
+    with open_pipeline(config) as pipeline:
+        street = Street.first(pipeline)
+    names = {track.body for track in street.scene.tracks}
+    travelled, checked = [], 0
+    for time_s in np.linspace(0.0, 2.0, 7):
+        scene = scene_at(street.scene, float(time_s))
+        moved = replace(scene, instances=scene.instances)
+        for instance in moved.instances:
+            wheels = _wheels_m(instance)
+            if wheels is None or instance.name not in names:
+                continue
+            gap_m = wheels[:, 2] - street.ground_m(wheels)
+            # Ruts are up to 5 mm deep; planes of the ground meet below cars.
+            assert np.abs(gap_m).max() < 0.03
+            travelled.append(float(wheels[0, 2]))
+            checked += 1
+    assert checked >= 14
+    assert np.ptp(travelled) > 0.2
+
+
+def test_relief_without_roads_is_refused(tmp_path: Path) -> None:
+    """At its place in the file."""
+    path = tmp_path / "table.yaml"
+    path.write_text("extends: tabletop.yaml\nrandomizers:\n  - {type: relief, name: hills}\n")
+    config = load_config(str(path))
+    with pytest.raises(ConfigError, match=r"table\.yaml:3:5: .*no element of type road"):
+        PipelineFactory(config, n=1).check()
