@@ -4,6 +4,7 @@ Campaigns that need a program or a privilege that is not there are not collected
 table of the command say why.
 """
 
+import ast
 import os
 import shutil
 from pathlib import Path
@@ -65,4 +66,9 @@ def test_every_campaign_exists(name: str) -> None:
     module, function = CAMPAIGNS[name].split(":")
     path = Path(__file__).parents[2] / f"benchmarks/faults/{module}.py"
 
-    assert f"\ndef {function}(scale: Scale, folder: Path) -> Result:" in path.read_text("utf-8")
+    functions = {
+        node.name: [argument.arg for argument in node.args.args]
+        for node in ast.parse(path.read_text("utf-8")).body
+        if isinstance(node, ast.FunctionDef)
+    }
+    assert functions[function] == ["scale", "folder"]

@@ -113,6 +113,7 @@ def _places(scene: Scene, kinds: Sequence[str] = ("driving", "sidewalk")) -> NDA
     return np.array([pose.translation_m for pose in poses])
 
 
+@pytest.mark.slow
 def test_carriageways_and_pavements_rise_with_the_grade(streets: dict[str, Street]) -> None:
     """The main road starts at x = -150 m: at x it is 0.08 (x + 150) higher than a level one."""
     places = _places(streets["flat"].scene)
@@ -122,6 +123,7 @@ def test_carriageways_and_pavements_rise_with_the_grade(streets: dict[str, Stree
     np.testing.assert_allclose(rise_m, GRADE * (places[:, 0] + 150.0), atol=0.001)
 
 
+@pytest.mark.slow
 def test_ground_of_hills_is_the_level_ground_raised_by_the_relief(
     streets: dict[str, Street],
 ) -> None:
@@ -134,6 +136,7 @@ def test_ground_of_hills_is_the_level_ground_raised_by_the_relief(
     assert np.ptp(rise_m) > 2.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("relief", ["slope", "hills"])
 def test_all_wheels_of_cars_stand_on_the_ground(streets: dict[str, Street], relief: str) -> None:
     """Within 2 mm of their place on level ground; 15 mm where planes of the ground meet."""
@@ -151,6 +154,7 @@ def test_all_wheels_of_cars_stand_on_the_ground(streets: dict[str, Street], reli
         np.testing.assert_allclose(gap_m, flat_gap_m, atol=0.002 if relief == "slope" else 0.015)
 
 
+@pytest.mark.slow
 def test_cars_pitch_with_the_grade(streets: dict[str, Street]) -> None:
     """Up axes of all cars on the slope are its normal: (-0.08, 0, 1) / |...|."""
     normal = np.array([-GRADE, 0.0, 1.0]) / math.hypot(GRADE, 1.0)
@@ -165,6 +169,7 @@ def test_cars_pitch_with_the_grade(streets: dict[str, Street]) -> None:
         np.testing.assert_allclose(up, normal, atol=1e-5)
 
 
+@pytest.mark.slow
 def test_people_walk_upright_on_the_ground(streets: dict[str, Street]) -> None:
     """As high above the ground at their middle as on level ground."""
     level = {i.name: i for i in streets["flat"].scene.instances if i.category == "person"}
@@ -180,6 +185,7 @@ def test_people_walk_upright_on_the_ground(streets: dict[str, Street]) -> None:
         assert places[1][2] - hills.ground_m(places[1:])[0] == pytest.approx(flat, abs=0.025)
 
 
+@pytest.mark.slow
 def test_lanes_lie_on_the_ground(streets: dict[str, Street]) -> None:
     """Centre lines are within 5 mm as high above the meshes as on level ground."""
     hills, flat = streets["hills"], streets["flat"]
@@ -199,6 +205,7 @@ def test_lanes_lie_on_the_ground(streets: dict[str, Street]) -> None:
     assert checked >= 6
 
 
+@pytest.mark.slow
 def test_view_of_a_dash_camera_pitches_with_its_car(streets: dict[str, Street]) -> None:
     """The axis of the camera climbs by atan(0.08) more than on level ground, along +X."""
     slope, flat = (streets[name].scene.cameras[0].T_world_camera for name in ("slope", "flat"))
