@@ -151,6 +151,7 @@ def test_numbers_are_those_in_the_picture(config: str, index: int) -> None:
         assert said.answer == str(sum(own == name for own in seen.names.values()))
 
 
+@pytest.mark.slow
 @each
 def test_existence_has_both_answers_and_they_are_true(config: str, index: int) -> None:
     """An absent category is nowhere in the scene, not even hidden."""

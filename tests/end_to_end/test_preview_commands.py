@@ -119,6 +119,7 @@ def test_a_report_counts_the_annotations_of_a_dataset(dataset: Path, tmp_path: P
     assert "Occlusion and truncation" in (tmp_path / "report.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 @needs_rerun
 @pytest.mark.parametrize("signal_number", cases([signal.SIGINT, signal.SIGKILL], {signal.SIGINT}))
 def test_a_preview_listens_on_this_machine_only(

@@ -9,6 +9,7 @@ from gen_data import annotations
 from gen_data.exporters import TABLE
 from gen_data.exporters.label_map import LabelMap, MappedExporter
 from tests.exporters.drives import drive_info
+from tests.tiers import sampled
 
 PACKED = {"huggingface", "rlds", "tfrecord", "webdataset", "rerun"}
 """Formats with several samples in a file."""
@@ -38,7 +39,7 @@ def given(exporter: Any, world: Any) -> tuple[Any, Any]:
     return world.info(7, lidars=("top",)), world.samples
 
 
-@pytest.fixture(scope="module", params=TABLE.names())
+@pytest.fixture(scope="module", params=sampled(TABLE.names(), 2))
 def exporter(request: pytest.FixtureRequest) -> Any:
     return TABLE.load(request.param)()
 

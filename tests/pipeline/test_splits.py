@@ -78,6 +78,7 @@ def test_splits_that_nobody_asked_for_may_be_empty_below_a_whole_scene() -> None
         warn_of_empty_splits(10, SHARES, "random", 7, stated=False)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("overrides", "warned"), [((), 0), (("splits={train: 0.6, val: 0.2, test: 0.2}",), 1)]
 )

@@ -295,6 +295,7 @@ def test_samples_on_relief_do_not_depend_on_the_order_of_their_making(
         np.testing.assert_array_equal(again.capture.readings["color"].channels[channel], values)
 
 
+@pytest.mark.slow
 def test_level_relief_is_no_relief() -> None:
     """A scene whose grades and slopes are 0 is that of a configuration without relief."""
     level = ("randomizers.relief.grade=0", "randomizers.relief.side_slope=0")

@@ -135,6 +135,7 @@ def test_what_cannot_be_compared_is_refused(
         prepare(Experiment(tmp_path / "real", **given))  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 def test_a_folder_of_another_study_is_refused(tmp_path: Path) -> None:
     """Its runs would be taken for those of this one."""
     write_coco(tmp_path / "real", BOXES)
