@@ -49,9 +49,8 @@ _STOREY_M = 1.0
 _BASE_STEP_M, _SUNK_M, _INSET_M = 0.5, 0.05, 0.02
 """Depths of bases are multiples of the first; they reach below the lowest ground by the second, and
 are narrower than the building by the third."""
-_CONCRETE = Material(
-    (0.75, 0.73, 0.7), 0.9, texture="texture/concrete?seed=1", texture_scale_m=3.0, role="facade"
-)
+# Without a texture, which further views of a scene would have to fetch.
+_CONCRETE = Material((0.36, 0.35, 0.33), 0.9, role="facade")
 _TURN = 5e-4
 """Points of a lane are kept where its grade has changed by this much since the last one."""
 _FLYING = frozenset({"drone", "gimbal"})
