@@ -15,7 +15,7 @@ import numpy as np
 from gen_data.core import errors, interfaces, scene_time
 from gen_data.core.capture import Capture, Channel, Measurements, PointCloud, SensorReading
 from gen_data.core.sample import EgoTruth, ImageTruth, Sample
-from gen_data.core.scene import LABEL_IDS_MAX, Scene
+from gen_data.core.scene import LABEL_IDS_MAX, Body, Scene
 from gen_data.core.streams import Streams
 from gen_data.pipeline import checked_renderer, splits
 from gen_data.pipeline.finalize_scene import Timeline, finalize_scene
@@ -118,6 +118,7 @@ class Pipeline:
         self._resources = ExitStack()
         self._latest: AcceptedScene | None = None
         self._view: DrawnView | None = None
+        self._lifted_bodies: tuple[Body, ...] = ()
         self._offsets_s = {s.name: s.time_offset_s for s in config.info.sensors}
         self._category_ids = {name: i for i, name in enumerate(config.info.categories, 1)}
 
@@ -299,6 +300,10 @@ class Pipeline:
             if scene.relief is not None:
                 lifted = lift_scene(scene, self.assets)
                 scene = finalize_scene(lifted, self.assets, self._category_ids)
+                # Renderers keep what they packed of the same tuple; further views share it.
+                if scene.bodies == self._lifted_bodies:
+                    scene = replace(scene, bodies=self._lifted_bodies)
+                self._lifted_bodies = scene.bodies
             return DrawnView(number, scene_time.place_sensors(scene), streams)
 
         self._view = self._first_accepted(accepted.index, draw)
