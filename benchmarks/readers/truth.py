@@ -101,10 +101,12 @@ class Cubes:
     Attributes:
         cameras: Names; without them one view per instant, in the frame of the world.
         name_of: Class of an instance in the format.
+        upright: The smallest boxes that turn about the camera's y axis only instead.
     """
 
     cameras: tuple[str, ...] = ()
     name_of: Callable[[Instance], str] = own_category
+    upright: bool = False
 
     def __call__(self, folder: Path) -> Iterator[View]:
         """All images of the cameras."""
@@ -117,8 +119,20 @@ class Cubes:
             }
             for name, (T_frame_world, inner) in (frames or {"world": (SE3(), None)}).items():
                 boxes = ((self.name_of(one), one.box3d.seen_from(T_frame_world)) for one in things)
-                listed = (cube(category, b.T_frame_box, b.size_m) for category, b in boxes)
+                listed = [cube(category, b.T_frame_box, b.size_m) for category, b in boxes]
+                if self.upright:
+                    listed = list(map(upright_around, listed))
                 yield View(image_name(sample.index, name), tuple(listed), inner)
+
+
+def upright_around(box: Thing) -> Thing:
+    """The smallest box around one in space that shares its centre and heading; y points down."""
+    centre, *axes = box.numbers.reshape(4, 3)
+    forward = axes[0] * (1, 0, 1) / np.hypot(*axes[0][[0, 2]])
+    up = np.array([0.0, -1.0, 0.0])
+    # A box reaches as far along a direction as its half axes do together.
+    sides = [d * np.abs(np.array(axes) @ d).sum() for d in (forward, np.cross(up, forward), up)]
+    return thing(box.category, np.vstack([centre, *sides]))
 
 
 def scans(folder: Path) -> Iterator[View]:
