@@ -1,12 +1,16 @@
-"""Boxes in label files of users, in the layouts of COCO and KITTI."""
+"""Boxes in label files of users, in the layouts of COCO, KITTI, YOLO and Pascal VOC."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
+
+import yaml
 
 from gen_data.core.errors import StorageError
+from gen_data.exporters.kitti_boxes import UprightBox
 
 OCCLUSION_LEVELS = ("visible", "partly occluded", "largely occluded")
 """KITTI's levels 0, 1 and 2; its level 3 is "unknown"."""
@@ -23,12 +27,16 @@ class RealObject:
         box: ``x_min, y_min, x_max, y_max`` [px], half-open.
         is_ignored: It counts neither as an object nor as background.
         occlusion: One of ``OCCLUSION_LEVELS``; empty = not annotated.
+        truncation: Share outside the image; VOC has 0 and 1 only. None = not annotated.
+        box3d: In the frame of the camera; None = not annotated.
     """
 
     name: str
     box: Box
     is_ignored: bool = False
     occlusion: str = ""
+    truncation: float | None = None
+    box3d: UprightBox | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,6 +87,7 @@ def read_coco(path: Path) -> CocoLabels:
                     (x, y, x + width, y + height),
                     bool(row.get("iscrowd", 0)),
                     _occlusion(row.get("occlusion")),
+                    row.get("truncation"),
                 )
             )
         images = tuple(
@@ -106,9 +115,10 @@ def read_kitti(path: Path) -> tuple[RealObject, ...]:
 
 def _kitti_object(place: str, line: str) -> RealObject:
     try:
-        kind, _, level, _, *sides = line.split()[:8]
+        kind, truncated, level, _, *sides = line.split()[:8]
         x0, y0, x1, y1 = map(float, sides)
-        occluded = int(float(level))
+        outside, occluded = float(truncated), int(float(level))
+        metric = tuple(map(float, line.split()[8:15]))
     except ValueError as error:
         raise StorageError(f"{place}: not a label in KITTI's format: {error}") from error
     # KITTI's sides are inclusive pixel numbers.
@@ -116,7 +126,100 @@ def _kitti_object(place: str, line: str) -> RealObject:
     if kind == "DontCare":
         return RealObject("", box, True)
     known = 0 <= occluded < len(OCCLUSION_LEVELS)
-    return RealObject(kind, box, False, OCCLUSION_LEVELS[occluded] if known else "")
+    return RealObject(
+        kind,
+        box,
+        False,
+        OCCLUSION_LEVELS[occluded] if known else "",
+        outside if outside >= 0.0 else None,
+        # Labels of 2D boxes alone have no further columns, or -1 as sizes.
+        UprightBox(metric[:3], metric[3:6], metric[6])
+        if len(metric) == 7 and metric[0] > 0.0
+        else None,
+    )
+
+
+def read_yolo_classes(path: Path) -> tuple[list[str], bool]:
+    """Class names of ``data.yaml`` or ``classes.txt``, and whether rows have keypoints.
+
+    Raises:
+        StorageError: the file has another layout.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+        if path.suffix == ".txt":
+            return text.splitlines(), False
+        content = yaml.safe_load(text)
+        names = content["names"]
+        listed = [names[k] for k in range(len(names))]
+        return [str(name) for name in listed], "kpt_shape" in content
+    except (OSError, ValueError, KeyError, TypeError, yaml.YAMLError) as error:
+        raise StorageError(f"{path}: no list of classes in YOLO's format: {error!r}") from error
+
+
+def read_yolo(path: Path, names: Sequence[str], has_keypoints: bool) -> tuple[RealObject, ...]:
+    """Read the labels of one image; boxes are in shares of its width and height.
+
+    Rows have a class and a box (centre and size), or the corners of a polygon, whose tight box is
+    taken, as Ultralytics does.
+
+    Raises:
+        StorageError: a line has another layout.
+    """
+    objects = []
+    try:
+        lines = path.read_text(encoding="utf-8").splitlines()
+    except (OSError, ValueError) as error:
+        raise StorageError(f"{path}: not labels in YOLO's format: {error}") from error
+    for number, line in enumerate(filter(str.strip, lines), 1):
+        try:
+            kind, *values = map(float, line.split())
+            if len(values) == 4 or has_keypoints:
+                x, y, w, h = values[:4]
+                box = (x - 0.5 * w, y - 0.5 * h, x + 0.5 * w, y + 0.5 * h)
+            elif len(values) >= 6 and len(values) % 2 == 0:
+                xs, ys = values[::2], values[1::2]
+                box = (min(xs), min(ys), max(xs), max(ys))
+            else:
+                raise ValueError(f"{len(values) + 1} columns")
+            if not 0 <= int(kind) < len(names):
+                raise ValueError(f"class {kind:g}, expected 0 to {len(names) - 1}")
+        except ValueError as error:
+            raise StorageError(f"{path}:{number}: not a label in YOLO's format: {error}") from error
+        objects.append(RealObject(names[int(kind)], box))
+    return tuple(objects)
+
+
+def read_voc(path: Path) -> tuple[str, tuple[int, int], tuple[RealObject, ...]]:
+    """Read one XML file: name of the image, its size (0 = not stated), and its objects.
+
+    Raises:
+        StorageError: it has another layout.
+    """
+    try:
+        root = ElementTree.parse(path).getroot()
+        size = [int(root.findtext(f"size/{side}") or 0) for side in ("width", "height")]
+        objects = tuple(_voc_object(item) for item in root.iter("object"))
+    except (OSError, ValueError, ElementTree.ParseError) as error:
+        raise StorageError(f"{path}: not annotations in VOC's format: {error}") from error
+    return root.findtext("filename") or "", (size[0], size[1]), objects
+
+
+def _voc_object(item: ElementTree.Element) -> RealObject:
+    name = item.findtext("name")
+    sides = [item.findtext(f"bndbox/{side}") for side in ("xmin", "ymin", "xmax", "ymax")]
+    if name is None or None in sides:
+        raise ValueError("an object without a name or a box")
+    x0, y0, x1, y1 = (float(side or "") for side in sides)
+    occluded, truncated = item.findtext("occluded"), item.findtext("truncated")
+    return RealObject(
+        name,
+        # Pixels count from 1, and the last one is included.
+        (x0 - 1.0, y0 - 1.0, x1, y1),
+        item.findtext("difficult") == "1",
+        {"0": OCCLUSION_LEVELS[0], "1": OCCLUSION_LEVELS[1]}.get(occluded or "", ""),
+        {"0": 0.0, "1": 1.0}.get(truncated or ""),
+    )
 
 
 def _occlusion(value: Any) -> str:

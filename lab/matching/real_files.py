@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,8 @@ from gen_data.core.capture import POINT, Channel
 from gen_data.core.errors import AssetError, StorageError
 from gen_data.lab.matching import label_files, point_files
 from gen_data.lab.matching.recordings import ImageLabels, Photo, Scan
+
+T = TypeVar("T")
 
 PHOTO_ENDINGS = frozenset({".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".webp"})
 SCAN_ENDINGS = frozenset({".bin", ".pcd", ".ply", ".npy"})
@@ -103,7 +105,7 @@ def find_files(folder: Path) -> RealFiles:
     return RealFiles(folder, tuple(photos), tuple(scans), tuple(instances or coco), tuple(kitti))
 
 
-def choose_evenly(files: Sequence[Path], limit: int) -> list[Path]:
+def choose_evenly(files: Sequence[T], limit: int) -> list[T]:
     """At most so many of the files, spread evenly."""
     if len(files) <= limit:
         return list(files)

@@ -1,17 +1,19 @@
-"""Labelled pictures of users: folders in the layout of COCO or of KITTI."""
+"""Labelled pictures of users: folders in the layout of COCO, KITTI, YOLO or Pascal VOC."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from gen_data.core.asset_types import UInt8
 from gen_data.core.errors import AssetError, ConfigError, StorageError, list_names
-from gen_data.lab.matching.label_files import RealObject, read_coco, read_kitti
-from gen_data.lab.matching.real_files import read_rgb
+from gen_data.lab.matching import label_files
+from gen_data.lab.matching.label_files import RealObject
+from gen_data.lab.matching.real_files import choose_evenly, read_rgb
 
 _UNSTATED = (0, 0)
 _SUFFIXES = (".png", ".jpg", ".jpeg", ".webp", ".bmp")
@@ -24,12 +26,14 @@ class RealPicture:
     Attributes:
         image_id: Its id in results: that of COCO's file, or a number from 1 in KITTI's order.
         size_px: Width and height.
+        scan: Points of KITTI's laser scanner; None = there are none.
     """
 
     image_id: int
     path: Path
     size_px: tuple[int, int]
     objects: tuple[RealObject, ...]
+    scan: Path | None = None
 
 
 @dataclass(frozen=True)
@@ -41,12 +45,14 @@ class RealSet:
         pictures: Pictures that can be read, ordered by their id.
         category_ids: Ids of the classes in results.
         skipped: Numbers of what was left out, by reason.
+        layout: One of ``LAYOUTS``.
     """
 
     source: Path
     pictures: tuple[RealPicture, ...]
     category_ids: Mapping[str, int]
     skipped: Mapping[str, int]
+    layout: str = "coco"
 
     def restrict(self, classes: Collection[str]) -> RealSet:
         """The same pictures with the objects of these classes; others are counted as skipped.
@@ -65,13 +71,11 @@ class RealSet:
                 name = by_fold.get(thing.name.casefold(), "")
                 if name or not thing.name:
                     objects.append(
-                        RealObject(name, thing.box, thing.is_ignored or not name, thing.occlusion)
+                        replace(thing, name=name, is_ignored=thing.is_ignored or not name)
                     )
                 else:
                     skipped[f"object of class '{thing.name}', which the configuration lacks"] += 1
-            pictures.append(
-                RealPicture(picture.image_id, picture.path, picture.size_px, tuple(objects))
-            )
+            pictures.append(replace(picture, objects=tuple(objects)))
         if not any(not thing.is_ignored for picture in pictures for thing in picture.objects):
             found = sorted({thing.name for p in self.pictures for thing in p.objects if thing.name})
             wanted, known = list_names(sorted(classes)), list_names(found) or "none"
@@ -84,7 +88,7 @@ class RealSet:
             for name, number in self.category_ids.items()
             if name.casefold() in by_fold
         }
-        return RealSet(self.source, tuple(pictures), ids, skipped)
+        return replace(self, pictures=tuple(pictures), category_ids=ids, skipped=skipped)
 
     def to_coco(self, chosen: Sequence[RealPicture] | None = None) -> dict[str, Any]:
         """COCO's annotations of some pictures, None = all.
@@ -120,31 +124,32 @@ def _coco_box(thing: RealObject) -> dict[str, Any]:
     return box | {"iscrowd": int(thing.is_ignored), "occlusion": thing.occlusion}
 
 
-def read_real(folder: Path, split: str = "") -> RealSet:
-    """Read a folder with labels in the layout of COCO or KITTI.
+def read_real(
+    folder: Path, split: str | None = "", *, layout: str = "", most: int | None = None
+) -> RealSet:
+    """Read a folder with labels, in the first of ``LAYOUTS`` that it has.
 
     COCO: ``annotations/*.json`` or ``*.json``, and the images anywhere below. KITTI: ``label_2``
-    and ``image_2``, there or in ``training``. Of a data set with both, COCO's labels are read.
+    and ``image_2``. YOLO: a YAML file with ``names``, or ``classes.txt``; labels are in ``labels``
+    where images are in ``images``, else next to them. VOC: ``Annotations`` and ``JPEGImages``.
 
     Args:
-        folder: The folder; also one that contains a folder ``coco`` or ``kitti``.
-        split: Part of the name of COCO's file, where there are several.
+        folder: The folder; also one that contains the folders of an export.
+        split: Part of the name of COCO's file, where there are several; None = read all of them.
+        layout: The only layout to look for; empty = any.
+        most: Largest number of pictures, chosen evenly; None = all.
 
     Raises:
         ConfigError: there are no labels, or several files and the split names none of them.
-        StorageError: a file does not have the expected layout.
+        StorageError: a file does not have the expected layout, or no picture can be read.
     """
-    for root in (folder, folder / "coco"):
-        files = sorted(root.glob("annotations/*.json")) or sorted(root.glob("*.json"))
-        files = [path for path in files if _is_instances(path)]
-        if files:
-            return _read_coco(root, _choose(root, files, split))
-    for root in (folder, folder / "training", folder / "kitti/training"):
-        if (root / "label_2").is_dir():
-            return _read_kitti(root)
+    for name, find in LAYOUTS.items():
+        if layout in ("", name) and (read := find(folder, split, most)):
+            return replace(read(), layout=name)
     raise ConfigError(
-        f"{folder}: there are no labels; expected annotations/*.json in COCO's format, or label_2 "
-        "and image_2 in KITTI's"
+        f"{folder}: there are no labels; expected annotations/*.json in COCO's format, label_2 "
+        "and image_2 in KITTI's, labels and data.yaml in YOLO's, or Annotations and JPEGImages "
+        "in VOC's"
     )
 
 
@@ -172,6 +177,54 @@ def read_image(path: Path) -> UInt8:
         raise StorageError(str(error)) from error
 
 
+Found = Callable[[], RealSet] | None
+"""Reads the labels that were found; None = there are none."""
+
+
+def _find_coco(folder: Path, split: str | None, most: int | None) -> Found:
+    for root in (folder, folder / "coco"):
+        listed = (root.glob(at) for at in ("annotations/*.json", "*.json", "*/_annotations.*.json"))
+        files = next(filter(None, map(sorted, listed)), [])
+        files = [path for path in files if _is_instances(path)]
+        if files:
+            return partial(_read_coco, root, _choose(root, files, split), most)
+    return None
+
+
+def _find_kitti(folder: Path, _: str | None, most: int | None) -> Found:
+    for root in (folder, folder / "training", folder / "kitti/training"):
+        if (root / "label_2").is_dir():
+            return partial(_read_kitti, root, most)
+    return None
+
+
+def _find_yolo(folder: Path, _: str | None, most: int | None) -> Found:
+    for root in (folder, folder / "detect", folder / "yolo/detect"):
+        files = [*sorted(root.glob("*.yaml")), *sorted(root.glob("*.yml"))]
+        files = [path for path in files if b"names:" in path.read_bytes()]
+        files += [root / name for name in ("classes.txt", "labels/classes.txt")]
+        classes = next(filter(Path.is_file, files), None)
+        if classes is not None:
+            return partial(_read_yolo, root, classes, most)
+    return None
+
+
+def _find_voc(folder: Path, _: str | None, most: int | None) -> Found:
+    for root in (folder, *sorted(folder.glob("VOC*/VOC*")), *sorted(folder.glob("voc/VOC*/VOC*"))):
+        if files := sorted((root / "Annotations").glob("*.xml")):
+            return partial(_read_voc, root, files, most)
+    return None
+
+
+LAYOUTS: Mapping[str, Callable[[Path, str | None, int | None], Found]] = {
+    "coco": _find_coco,
+    "kitti": _find_kitti,
+    "yolo": _find_yolo,
+    "voc": _find_voc,
+}
+"""Layouts by the name of the exporter that writes them."""
+
+
 def _is_instances(path: Path) -> bool:
     """Whether a file can hold annotations of boxes: not those of keypoints, nor other JSON."""
     with path.open("rb") as file:
@@ -181,8 +234,10 @@ def _is_instances(path: Path) -> bool:
     return b'"images"' in head or path.parent.name == "annotations"
 
 
-def _choose(root: Path, files: Sequence[Path], split: str) -> Path:
-    """The only file, the one of the split, or that of the validation set."""
+def _choose(root: Path, files: Sequence[Path], split: str | None) -> Sequence[Path]:
+    """The only file, the one of the split, or the one of the validation set; None = all files."""
+    if split is None:
+        return files
     chosen = [path for path in files if split in path.stem]
     if not split and len(files) > 1:
         chosen = [path for path in files if "val" in path.stem]
@@ -191,19 +246,42 @@ def _choose(root: Path, files: Sequence[Path], split: str) -> Path:
         raise ConfigError(
             f"{root}: expected one annotation file, or a split that names one; found {names}"
         )
-    return chosen[0]
+    return chosen
 
 
-def _read_coco(root: Path, path: Path) -> RealSet:
-    labels = read_coco(path)
-    skipped = Counter({"object with an empty box": labels.empty} if labels.empty else {})
-    files = _find_images(root, path, [image.file_name for image in labels.images])
-    frames = [
-        (image.image_id, file, image.objects, image.size_px)
-        for image, file in zip(labels.images, files, strict=True)
-    ]
-    pictures = sorted(_readable(frames, skipped), key=_by_id)
-    return _checked(RealSet(path, tuple(pictures), labels.category_ids, skipped))
+@dataclass(frozen=True, slots=True)
+class _Frame:
+    """A picture that is to be read; see ``RealPicture``.
+
+    Attributes:
+        stated_px: Size that the labels state.
+        is_relative: Boxes are in shares of width and height.
+    """
+
+    image_id: int
+    path: Path
+    objects: tuple[RealObject, ...]
+    stated_px: tuple[int, int] = _UNSTATED
+    is_relative: bool = False
+    scan: Path | None = None
+
+
+def _read_coco(root: Path, paths: Sequence[Path], most: int | None) -> RealSet:
+    frames: list[_Frame] = []
+    skipped, ids = Counter[str](), dict[str, int]()
+    for path in paths:
+        labels = label_files.read_coco(path)
+        ids |= labels.category_ids
+        if labels.empty:
+            skipped["object with an empty box"] += labels.empty
+        files = _find_images(root, path, [image.file_name for image in labels.images])
+        frames += (
+            _Frame(image.image_id, file, image.objects, image.size_px)
+            for image, file in zip(labels.images, files, strict=True)
+        )
+    pictures = sorted(_readable(frames, most, skipped), key=_by_id)
+    source = paths[0] if len(paths) == 1 else paths[0].parent
+    return _checked(RealSet(source, tuple(pictures), ids, skipped))
 
 
 def _by_id(picture: RealPicture) -> int:
@@ -231,17 +309,54 @@ def _find_images(root: Path, annotations: Path, names: Sequence[str]) -> list[Pa
     return images
 
 
-def _read_kitti(root: Path) -> RealSet:
+def _read_kitti(root: Path, most: int | None) -> RealSet:
     images = {path.stem: path for path in sorted((root / "image_2").glob("*")) if _is_image(path)}
-    frames, skipped = [], Counter[str]()
-    names: set[str] = set()
+    frames = []
     for number, path in enumerate(sorted((root / "label_2").glob("*.txt")), 1):
-        objects = read_kitti(path)
-        names |= {thing.name for thing in objects if thing.name}
         image = images.get(path.stem, root / f"image_2/{path.stem}.png")
-        frames.append((number, image, objects, _UNSTATED))
+        scan = root / f"velodyne/{path.stem}.bin"
+        objects = label_files.read_kitti(path)
+        frames.append(_Frame(number, image, objects, scan=scan if scan.is_file() else None))
+    return _numbered(root / "label_2", frames, most)
+
+
+def _read_yolo(root: Path, classes: Path, most: int | None) -> RealSet:
+    names, has_keypoints = label_files.read_yolo_classes(classes)
+    images = {_yolo_labels(path): path for path in sorted(root.rglob("*.*")) if _is_image(path)}
+    listed = {path for path in root.rglob("*.txt") if "labels" in path.parts or path in images}
+    skipped, frames = Counter[str](), []
+    for number, path in enumerate(sorted((listed | images.keys()) - {classes}), 1):
+        if path not in listed:
+            skipped["image without a label file, read as one without objects"] += 1
+        objects = label_files.read_yolo(path, names, has_keypoints) if path in listed else ()
+        image = images.get(path, path.with_suffix(".png"))
+        frames.append(_Frame(number, image, objects, is_relative=True))
+    ids = {name: number for number, name in enumerate(names, 1)}
+    return _checked(RealSet(classes, tuple(_readable(frames, most, skipped)), ids, skipped))
+
+
+def _yolo_labels(image: Path) -> Path:
+    """Ultralytics' rule: the last folder ``images`` becomes ``labels``; without one, no change."""
+    before, images, after = image.with_suffix("").as_posix().rpartition("/images/")
+    return Path(f"{before}/labels/{after}.txt" if images else f"{after}.txt")
+
+
+def _read_voc(root: Path, paths: Sequence[Path], most: int | None) -> RealSet:
+    frames = []
+    images = {path.stem: path for path in sorted((root / "JPEGImages").glob("*"))}
+    for number, path in enumerate(paths, 1):
+        name, size_px, objects = label_files.read_voc(path)
+        image = images.get(path.stem, root / "JPEGImages" / Path(name).name)
+        frames.append(_Frame(number, image, objects, size_px))
+    return _numbered(root / "Annotations", frames, most)
+
+
+def _numbered(source: Path, frames: Sequence[_Frame], most: int | None) -> RealSet:
+    """A set whose classes are the sorted names of its objects."""
+    skipped = Counter[str]()
+    names = {thing.name for frame in frames for thing in frame.objects if thing.name}
     ids = {name: number for number, name in enumerate(sorted(names), 1)}
-    return _checked(RealSet(root / "label_2", tuple(_readable(frames, skipped)), ids, skipped))
+    return _checked(RealSet(source, tuple(_readable(frames, most, skipped)), ids, skipped))
 
 
 def _is_image(path: Path) -> bool:
@@ -249,30 +364,44 @@ def _is_image(path: Path) -> bool:
 
 
 def _readable(
-    frames: Iterable[tuple[int, Path, tuple[RealObject, ...], tuple[int, int]]],
-    skipped: Counter[str],
+    frames: Sequence[_Frame], most: int | None, skipped: Counter[str]
 ) -> Iterator[RealPicture]:
-    """Pictures of (id, path, objects, stated size) whose images exist and can be decoded.
+    """Pictures whose images exist and can be decoded.
 
     Boxes do not fit images that were resized since.
     """
-    for number, path, objects, stated_px in frames:
-        if not path.is_file():
+    chosen = choose_evenly(frames, len(frames) if most is None else most)
+    if len(chosen) < len(frames):
+        skipped["picture beyond the largest number"] += len(frames) - len(chosen)
+    for frame in chosen:
+        if not frame.path.is_file():
             skipped["image that is missing"] += 1
             continue
         try:
-            height, width = read_image(path).shape[:2]
+            height, width = read_image(frame.path).shape[:2]
         except StorageError:
             skipped["image that cannot be read"] += 1
             continue
-        if stated_px not in (_UNSTATED, (width, height)):
+        if frame.stated_px not in (_UNSTATED, (width, height)):
             skipped["image of another size than its labels state"] += 1
             continue
-        yield RealPicture(number, path, (width, height), objects)
+        objects = _scaled(frame.objects, width, height) if frame.is_relative else frame.objects
+        yield RealPicture(frame.image_id, frame.path, (width, height), objects, frame.scan)
+
+
+def _scaled(objects: Iterable[RealObject], width: int, height: int) -> tuple[RealObject, ...]:
+    return tuple(
+        replace(thing, box=(x0 * width, y0 * height, x1 * width, y1 * height))
+        for thing in objects
+        for x0, y0, x1, y1 in [thing.box]
+    )
 
 
 def _checked(real: RealSet) -> RealSet:
     if not real.pictures:
         reasons = ", ".join(f"{count} x {reason}" for reason, count in real.skipped.items())
-        raise ConfigError(f"{real.source}: no picture can be used ({reasons or 'it lists none'})")
+        raise StorageError(
+            f"{real.source}: no picture can be used ({reasons or 'it lists none'}); expected the "
+            "images that the labels name, below the same folder"
+        )
     return real

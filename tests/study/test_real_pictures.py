@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from gen_data.core.errors import ConfigError, StorageError
+from gen_data.exporters.kitti_boxes import UprightBox
 from gen_data.lab.matching.label_files import RealObject
 from gen_data.lab.study.real_pictures import check_judges, read_real
 from tests.study.conftest import write_coco, write_picture
@@ -47,12 +48,124 @@ def test_kittis_inclusive_sides_and_regions_are_read(tmp_path: Path) -> None:
 
     (picture,) = real.pictures
     assert picture.objects == (
-        RealObject("car", (10, 12, 30, 32), False, "partly occluded"),
+        RealObject(
+            "car",
+            (10, 12, 30, 32),
+            False,
+            "partly occluded",
+            0.0,
+            UprightBox((1.5, 1.6, 3.9), (1.0, 1.7, 20.0), -1.5),
+        ),
         RealObject("", (0, 0, 10, 10), True, ""),
     )
     assert real.skipped == {"object of class 'Pedestrian', which the configuration lacks": 1}
     assert real.category_ids == {"car": 1}
     assert [row["iscrowd"] for row in real.to_coco()["annotations"]] == [0, 1]
+
+
+def test_yolos_boxes_and_polygons_are_read_in_pixels(tmp_path: Path) -> None:
+    """Shares of 64 x 48 px; of a polygon its tight box; an image without a file has no object."""
+    for number in range(3):
+        write_picture(tmp_path / f"images/train/{number}.png")
+    (tmp_path / "labels/train").mkdir(parents=True)
+    (tmp_path / "data.yaml").write_text("names: {0: cup, 1: plate}\n")
+    (tmp_path / "labels/train/0.txt").write_text("1 0.5 0.5 0.25 0.5\n")
+    (tmp_path / "labels/train/1.txt").write_text("0 0.25 0 0.5 0.5 0.125 0.75\n")
+    (tmp_path / "labels/train/9.txt").write_text("0 0.5 0.5 0.1 0.1\n")
+
+    real = read_real(tmp_path)
+
+    assert [p.objects for p in real.pictures] == [
+        (RealObject("plate", (24, 12, 40, 36)),),
+        (RealObject("cup", (8, 0, 32, 36)),),
+        (),
+    ]
+    assert (real.layout, real.category_ids) == ("yolo", {"cup": 1, "plate": 2})
+    assert real.skipped == {
+        "image without a label file, read as one without objects": 1,
+        "image that is missing": 1,
+    }
+
+
+def test_yolos_rows_with_keypoints_begin_with_the_box(tmp_path: Path) -> None:
+    """``kpt_shape`` tells them from polygons, which have as many columns."""
+    write_picture(tmp_path / "images/0.png")
+    (tmp_path / "labels").mkdir()
+    (tmp_path / "data.yaml").write_text("kpt_shape: [1, 2]\nnames: [cup]\n")
+    (tmp_path / "labels/0.txt").write_text("0 0.5 0.5 0.25 0.5 0.5 0.5\n")
+
+    (picture,) = read_real(tmp_path).pictures
+
+    assert picture.objects == (RealObject("cup", (24, 12, 40, 36)),)
+
+
+@pytest.mark.parametrize(
+    ("row", "fact"),
+    [("2 0.5 0.5 0.1 0.1", "class 2, expected 0 to 1"), ("0 0.5 0.5 0.1", "4 columns")],
+)
+def test_a_wrong_row_of_yolo_is_named(row: str, fact: str, tmp_path: Path) -> None:
+    write_picture(tmp_path / "a.png")
+    (tmp_path / "classes.txt").write_text("cup\nplate\n")
+    (tmp_path / "a.txt").write_text(f"0 0.5 0.5 0.1 0.1\n{row}\n")
+
+    with pytest.raises(StorageError, match=rf"a\.txt:2: not a label in YOLO's format: {fact}"):
+        read_real(tmp_path)
+
+
+VOC = """\
+<annotation><filename>7.png</filename><size><width>64</width><height>48</height></size>
+<object><name>cup</name><truncated>1</truncated><difficult>0</difficult>
+<bndbox><xmin>1</xmin><ymin>3</ymin><xmax>20</xmax><ymax>30</ymax></bndbox></object>
+<object><name>cup</name><difficult>1</difficult><occluded>1</occluded>
+<bndbox><xmin>5</xmin><ymin>5</ymin><xmax>5</xmax><ymax>5</ymax></bndbox></object></annotation>
+"""
+
+
+def test_vocs_boxes_and_flags_are_read(tmp_path: Path) -> None:
+    """Pixels count from 1, the last one included; difficult objects are ignored."""
+    folder = tmp_path / "VOCdevkit/VOC2012"
+    write_picture(folder / "JPEGImages/7.png")
+    (folder / "Annotations").mkdir()
+    (folder / "Annotations/7.xml").write_text(VOC)
+
+    real = read_real(tmp_path)
+
+    assert (real.layout, [p.objects for p in real.pictures]) == (
+        "voc",
+        [
+            (
+                RealObject("cup", (0, 2, 20, 30), truncation=1.0),
+                RealObject("cup", (4, 4, 5, 5), True, "partly occluded"),
+            )
+        ],
+    )
+
+
+@pytest.mark.parametrize("text", ["<annotation>", "<annotation><object/></annotation>"])
+def test_a_file_that_is_not_vocs_is_named(text: str, tmp_path: Path) -> None:
+    (tmp_path / "Annotations").mkdir()
+    (tmp_path / "Annotations/7.xml").write_text(text)
+
+    with pytest.raises(StorageError, match=r"7\.xml: not annotations in VOC's format"):
+        read_real(tmp_path)
+
+
+def test_a_largest_number_of_pictures_is_chosen_evenly(tmp_path: Path) -> None:
+    """And all files of COCO are read, if asked."""
+    write_coco(tmp_path, [[{"bbox": [1, 2, 10, 20]}] for _ in range(4)])
+
+    real = read_real(tmp_path, None, most=2)
+
+    assert [p.image_id for p in real.pictures] == [10, 12]
+    assert real.skipped == {"picture beyond the largest number": 2}
+
+
+def test_labels_without_any_image_are_refused(tmp_path: Path) -> None:
+    write_coco(tmp_path, [[{"bbox": [1, 2, 10, 20]}]])
+    (tmp_path / "images/0.png").unlink()
+
+    with pytest.raises(StorageError, match=r"no picture can be used \(1 x image that is missing\)"):
+        read_real(tmp_path)
 
 
 def test_what_cannot_be_used_is_counted(tmp_path: Path) -> None:
@@ -100,8 +213,9 @@ def test_a_folder_without_labels_is_refused(tmp_path: Path) -> None:
         read_real(tmp_path)
 
     assert str(caught.value) == (
-        f"{tmp_path}: there are no labels; expected annotations/*.json in COCO's format, or "
-        "label_2 and image_2 in KITTI's"
+        f"{tmp_path}: there are no labels; expected annotations/*.json in COCO's format, label_2 "
+        "and image_2 in KITTI's, labels and data.yaml in YOLO's, or Annotations and JPEGImages "
+        "in VOC's"
     )
 
 
