@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +18,9 @@ if TYPE_CHECKING:
 
 PAGE = Path("run/report/index.html")
 """Default path of the page in the folder of a data set."""
+REAL_PAGE = PAGE.with_name("carry_over.html")
+COMPARE_REAL = "gen_data.lab.carry_over.carry_over_report"
+"""Module of the laboratory behind ``--compare-real``, imported on demand."""
 
 
 @click.command()
@@ -26,6 +30,33 @@ PAGE = Path("run/report/index.html")
     type=click.Path(path_type=Path),
     metavar="FOLDER2",
     help="Show a second data set next to it in the page.",
+)
+@click.option(
+    "--compare-real",
+    type=click.Path(path_type=Path),
+    metavar="REAL_FOLDER",
+    help="Compare with labelled real pictures instead: COCO, KITTI, YOLO or VOC.",
+)
+@click.option(
+    "--classes",
+    multiple=True,
+    metavar="REAL=OURS",
+    help="With --compare-real: class names that correspond.",
+)
+@click.option(
+    "--pictures",
+    type=click.IntRange(min=2),
+    default=500,
+    show_default=True,
+    help="With --compare-real: pictures of each side to read at most.",
+)
+@click.option(
+    "--n",
+    "-n",
+    type=click.IntRange(min=2),
+    default=60,
+    show_default=True,
+    help="With --compare-real: samples of a configuration in place of FOLDER.",
 )
 @click.option(
     "--html",
@@ -39,20 +70,40 @@ PAGE = Path("run/report/index.html")
     show_default=True,
     help="Scenes whose parameters are drawn again for the page; 0 = none.",
 )
-def report(folder: Path, compare: Path | None, html: Path | None, scenes: int) -> None:
+def report(
+    folder: Path,
+    compare: Path | None,
+    compare_real: Path | None,
+    classes: tuple[str, ...],
+    pictures: int,
+    n: int,
+    html: Path | None,
+    scenes: int,
+) -> None:
     """Print statistics of a data set, and write an HTML page with its samples.
 
     FOLDER is a finished data set, or any folder with labels in the layout of the formats coco or
     kitti. The page shows labelled samples, drawn parameters next to their distributions, checks of
     labels, near-duplicates, costs and licences. It is one file that requests nothing.
+
+    With --compare-real, FOLDER may also be a configuration. The tables list the statistics that
+    differ from those of real pictures most, and the fields to change; the page has all.
     """
     from rich.console import Console
     from threadpoolctl import threadpool_limits
 
+    is_stored = (folder / "plan.json").is_file()
+    if compare_real is not None:
+        if compare is not None:
+            raise ConfigError("--compare and --compare-real exclude each other; give one of them")
+        page = folder / REAL_PAGE if html is None and is_stored else html
+        lab = import_module(COMPARE_REAL)
+        lab.report_real(folder, compare_real, classes, pictures, n, page)
+        return
     if scenes < 0:
         raise ConfigError(f"--scenes: {scenes} is negative; expected 0 or more")
     folders = [folder] if compare is None else [folder, compare]
-    page = folder / PAGE if html is None and (folder / "plan.json").is_file() else html
+    page = folder / PAGE if html is None and is_stored else html
     # Poses of scenes that are drawn again must have the last bits of the stored ones.
     with threadpool_limits(limits=1):
         sets = [_describe(one, scenes, len(folders), Console(stderr=True)) for one in folders]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -16,6 +17,8 @@ from gen_data.lab.matching.label_files import RealObject
 from gen_data.lab.matching.real_files import choose_evenly, read_rgb
 
 _UNSTATED = (0, 0)
+_IMAGES = re.compile(rb'"images"\s*:\s*\[\s*[{\]]')
+"""A list of objects: plans of data sets have lists of names there."""
 _SUFFIXES = (".png", ".jpg", ".jpeg", ".webp", ".bmp")
 
 
@@ -231,7 +234,7 @@ def _is_instances(path: Path) -> bool:
         head = file.read(4096)
     if "keypoints" in path.stem:
         return False
-    return b'"images"' in head or path.parent.name == "annotations"
+    return bool(_IMAGES.search(head)) or path.parent.name == "annotations"
 
 
 def _choose(root: Path, files: Sequence[Path], split: str | None) -> Sequence[Path]:
@@ -386,6 +389,9 @@ def _readable(
             skipped["image of another size than its labels state"] += 1
             continue
         objects = _scaled(frame.objects, width, height) if frame.is_relative else frame.objects
+        if empty := sum(not _has_area(thing) for thing in objects):
+            skipped["object with an empty box"] += empty
+            objects = tuple(filter(_has_area, objects))
         yield RealPicture(frame.image_id, frame.path, (width, height), objects, frame.scan)
 
 
@@ -395,6 +401,11 @@ def _scaled(objects: Iterable[RealObject], width: int, height: int) -> tuple[Rea
         for thing in objects
         for x0, y0, x1, y1 in [thing.box]
     )
+
+
+def _has_area(thing: RealObject) -> bool:
+    x0, y0, x1, y1 = thing.box
+    return x0 < x1 and y0 < y1
 
 
 def _checked(real: RealSet) -> RealSet:
