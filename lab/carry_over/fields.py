@@ -6,33 +6,25 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
+from gen_data.config.data_files import load_data
 from gen_data.lab.carry_over.differences import Direction, Row
 from gen_data.lab.carry_over.statistics import WHOLE
 
 if TYPE_CHECKING:
     from gen_data.assemble.config import Config
 
+_TABLE: Mapping[str, Mapping[str, Any]] = load_data(__package__, "fields")
 FIELDS_MAX = 3
 """Fields that are named for one row."""
 
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """A field of a kind of plug-in, or of ``labels``.
-
-    Attributes:
-        kind: ``randomizer``, ``sensor``, ``element`` or ``labels``.
-        type: Of the plug-in; empty for ``labels``.
-        path: Dotted path in it.
-        sign: 1 = larger values of the field make the quantity larger, -1 = smaller, 0 = neither.
-        needs: Field that must be set, too; empty = none.
-        without: Field that takes the place of this one if it is set; empty = none.
-        of_group: The plug-in draws objects of one group, whose classes alone it changes.
-    """
+    """A field of a kind of plug-in, or of ``labels``; ``fields.yaml`` explains the attributes."""
 
     kind: str
-    type: str
     path: str
+    type: str = ""
     sign: int = 0
     needs: str = ""
     without: str = ""
@@ -41,110 +33,16 @@ class Field:
     @property
     def name(self) -> str:
         """Place in a configuration, for plug-ins of any name."""
-        return f"{self.kind} {self.type}: {self.path}".replace(" :", ":")
+        return f"{self.kind} {self.type}: {self.path}" if self.type else f"{self.kind}: {self.path}"
 
 
-def _of_groups(kind: str, *rows: tuple[str, str, int]) -> tuple[Field, ...]:
-    return tuple(Field(kind, type_, path, sign, of_group=True) for type_, path, sign in rows)
-
-
-_NEARER = (
-    Field("randomizer", "camera_pose", "distance_m", -1, without="fills"),
-    Field("randomizer", "camera_pose", "fills", 1),
-    Field("randomizer", "room_camera", "away_m", -1),
-    Field("randomizer", "ceiling_camera", "below_m", 1),
-    Field("randomizer", "drone_flight", "height_m", -1),
-    Field("randomizer", "camera_on_lane", "near_m", -1),
-)
-_FARTHER = tuple(replace(field, sign=-field.sign) for field in _NEARER)
-_LARGER = (
-    *_NEARER,
-    Field("randomizer", "camera_intrinsics", "hfov_deg", -1),
-    Field("sensor", "rgb_camera", "hfov_deg", -1),
-    Field("labels", "", "min_box_px", 1),
-)
-_OBJECTS = _of_groups(
-    "randomizer",
-    ("objects", "count", 1),
-    ("lane_objects", "count", 1),
-    ("lane_objects", "occupancy", 1),
-    ("lane_objects", "gap_m", -1),
-    ("furnish", "clutter", 1),
-)
-_SCALES = _of_groups("randomizer", ("objects", "scale", 1), ("lane_objects", "scale", 1))
-_ASSETS = (
-    *_of_groups("element", ("objects", "assets", 0), ("lane_objects", "assets", 0)),
-    *_of_groups("randomizer", ("objects", "weights", 0), ("lane_objects", "weights", 0)),
-)
-_OFF_CENTER = (Field("randomizer", "camera_pose", "off_center", needs="fills"),)
-_ELEVATION = (Field("randomizer", "camera_pose", "elevation_deg"),)
-_BRIGHTER = (
-    Field("sensor", "rgb_camera", "image_pipeline.exposure_compensation_ev", 1),
-    Field("sensor", "rgb_camera", "image_pipeline.metered_mean", 1),
-    Field("sensor", "rgb_camera", "ev100", -1),
-    Field("randomizer", "exposure", "ev100", -1),
-    Field("randomizer", "lighting", "illuminance_lux", 1),
-    Field("randomizer", "environment", "luminance_cd_m2", 1),
-    Field("randomizer", "weather", "preset"),
-)
-_DARKER = (
-    Field("sensor", "rgb_camera", "image_pipeline.contrast", 1),
-    *(replace(field, sign=-field.sign) for field in _BRIGHTER),
-)
-_ECHOES = (
-    Field("sensor", "lidar", "window", 1),
-    Field("sensor", "lidar", "model"),
-    *_ASSETS,
-)
-
-FIELDS: Mapping[str, Sequence[Field]] = {
-    "long side": (*_LARGER, *_SCALES),
-    "height px": (*_LARGER, Field("sensor", "rgb_camera", "size_px", 1), *_SCALES),
-    "width / height": (
-        *_of_groups("randomizer", ("objects", "upright", 0), ("lane_objects", "yaw_deg", 0)),
-        *_ELEVATION,
-        *_ASSETS,
-    ),
-    "centre x": (
-        *_OFF_CENTER,
-        Field("randomizer", "camera_on_lane", "yaw_deg"),
-        Field("sensor", "rgb_camera", "yaw_deg", needs="rig"),
-        *_of_groups("randomizer", ("lane_objects", "lateral", 0)),
-    ),
-    "centre y": (
-        *_OFF_CENTER,
-        *_ELEVATION,
-        Field("randomizer", "camera_on_lane", "pitch_deg", 1),
-        Field("randomizer", "room_camera", "pitch_deg", 1),
-        Field("randomizer", "drone_flight", "pitch_deg", 1),
-        Field("sensor", "rgb_camera", "pitch_deg", 1, needs="rig"),
-    ),
-    "count": (*_OBJECTS, *_FARTHER),
-    "area share": (*_OBJECTS, *_NEARER),
-    "grey in box": _BRIGHTER,
-    "dark in box": _DARKER,
-    "grey": _BRIGHTER,
-    "dark share": _DARKER,
-    "occlusion": (*_OBJECTS, Field("randomizer", "distractors", "count", 1), *_ELEVATION),
-    "truncation": (*_OFF_CENTER, *_NEARER),
-    "distance m": (
-        *_FARTHER,
-        Field("labels", "", "min_box_px", -1),
-        *_of_groups("randomizer", ("lane_objects", "roads", 0), ("lane_objects", "gap_m", 0)),
-    ),
-    "bottom m": (
-        Field("randomizer", "relief", "grade"),
-        Field("randomizer", "camera_on_lane", "height_m", 1),
-        Field("sensor", "rgb_camera", "offset_m", needs="rig"),
-    ),
-    "height m": (*_SCALES, *_ASSETS),
-    "width m": (*_SCALES, *_ASSETS),
-    "length m": (*_SCALES, *_ASSETS),
-    "points 5-15 m": _ECHOES,
-    "points 15-30 m": _ECHOES,
-    "points 30-60 m": _ECHOES,
-}
-"""By quantity; the most direct field first."""
+def fields_of(quantity: str) -> list[Field]:
+    """Fields that set a quantity, the most direct first."""
+    fields = []
+    for name in _TABLE["quantities"][quantity]:
+        listed = [Field(**row) for row in _TABLE["sets"][name.removeprefix("-")]]
+        fields += [replace(f, sign=-f.sign) if name[0] == "-" else f for f in listed]
+    return fields
 
 
 def remedies(row: Row, config: Config | None, groups: Collection[str]) -> list[str]:
@@ -155,7 +53,7 @@ def remedies(row: Row, config: Config | None, groups: Collection[str]) -> list[s
         config: Our configuration; None = unknown.
         groups: Names of the groups that draw objects of the row's class; empty = unknown.
     """
-    fields = FIELDS[row.quantity]
+    fields = fields_of(row.quantity)
     named = [] if config is None else [*_in_use(fields, config, groups, row.label)]
     if not named:
         return [f"set {field.name}" for field in fields[:FIELDS_MAX]]

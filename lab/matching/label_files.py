@@ -147,7 +147,7 @@ def read_yolo_classes(path: Path) -> tuple[list[str], bool]:
     """
     try:
         text = path.read_text(encoding="utf-8")
-        if path.suffix == ".txt":
+        if path.suffix not in (".yaml", ".yml"):
             return text.splitlines(), False
         content = yaml.safe_load(text)
         names = content["names"]

@@ -134,7 +134,8 @@ def read_real(
 
     COCO: ``annotations/*.json`` or ``*.json``, and the images anywhere below. KITTI: ``label_2``
     and ``image_2``. YOLO: a YAML file with ``names``, or ``classes.txt``; labels are in ``labels``
-    where images are in ``images``, else next to them. VOC: ``Annotations`` and ``JPEGImages``.
+    where images are in ``images``, else next to them. VOC: ``Annotations`` and ``JPEGImages``, or
+    any XML files with the images next to them.
 
     Args:
         folder: The folder; also one that contains the folders of an export.
@@ -189,6 +190,8 @@ def _find_coco(folder: Path, split: str | None, most: int | None) -> Found:
         listed = (root.glob(at) for at in ("annotations/*.json", "*.json", "*/_annotations.*.json"))
         files = next(filter(None, map(sorted, listed)), [])
         files = [path for path in files if _is_instances(path)]
+        # COCO's own folder has captions, too.
+        files = [path for path in files if path.stem.startswith("instances")] or files
         if files:
             return partial(_read_coco, root, _choose(root, files, split), most)
     return None
@@ -205,7 +208,7 @@ def _find_yolo(folder: Path, _: str | None, most: int | None) -> Found:
     for root in (folder, folder / "detect", folder / "yolo/detect"):
         files = [*sorted(root.glob("*.yaml")), *sorted(root.glob("*.yml"))]
         files = [path for path in files if b"names:" in path.read_bytes()]
-        files += [root / name for name in ("classes.txt", "labels/classes.txt")]
+        files += [root / name for name in ("classes.txt", "labels/classes.txt", "obj.names")]
         classes = next(filter(Path.is_file, files), None)
         if classes is not None:
             return partial(_read_yolo, root, classes, most)
@@ -213,10 +216,11 @@ def _find_yolo(folder: Path, _: str | None, most: int | None) -> Found:
 
 
 def _find_voc(folder: Path, _: str | None, most: int | None) -> Found:
-    for root in (folder, *sorted(folder.glob("VOC*/VOC*")), *sorted(folder.glob("voc/VOC*/VOC*"))):
-        if files := sorted((root / "Annotations").glob("*.xml")):
-            return partial(_read_voc, root, files, most)
-    return None
+    for at in ("Annotations/*.xml", "VOC*/*/Annotations/*.xml", "voc/VOC*/*/Annotations/*.xml"):
+        if files := sorted(folder.glob(at)):
+            return partial(_read_voc, files, most)
+    files = [path for path in sorted(folder.rglob("*.xml")) if _is_voc(path)]
+    return partial(_read_voc, files, most) if files else None
 
 
 LAYOUTS: Mapping[str, Callable[[Path, str | None, int | None], Found]] = {
@@ -235,6 +239,11 @@ def _is_instances(path: Path) -> bool:
     if "keypoints" in path.stem:
         return False
     return bool(_IMAGES.search(head)) or path.parent.name == "annotations"
+
+
+def _is_voc(path: Path) -> bool:
+    with path.open("rb") as file:
+        return b"<annotation" in file.read(512)
 
 
 def _choose(root: Path, files: Sequence[Path], split: str | None) -> Sequence[Path]:
@@ -344,14 +353,20 @@ def _yolo_labels(image: Path) -> Path:
     return Path(f"{before}/labels/{after}.txt" if images else f"{after}.txt")
 
 
-def _read_voc(root: Path, paths: Sequence[Path], most: int | None) -> RealSet:
+def _read_voc(paths: Sequence[Path], most: int | None) -> RealSet:
     frames = []
-    images = {path.stem: path for path in sorted((root / "JPEGImages").glob("*"))}
     for number, path in enumerate(paths, 1):
         name, size_px, objects = label_files.read_voc(path)
-        image = images.get(path.stem, root / "JPEGImages" / Path(name).name)
+        near = path.parent.parent
+        folders = (near / "JPEGImages", path.parent, near / "images", near)
+        listed = (
+            at
+            for place in folders
+            for at in (place / Path(name).name, *(place / f"{path.stem}{s}" for s in _SUFFIXES))
+        )
+        image = next(filter(Path.is_file, listed), near / "JPEGImages" / f"{path.stem}.jpg")
         frames.append(_Frame(number, image, objects, size_px))
-    return _numbered(root / "Annotations", frames, most)
+    return _numbered(paths[0].parent, frames, most)
 
 
 def _numbered(source: Path, frames: Sequence[_Frame], most: int | None) -> RealSet:

@@ -19,7 +19,7 @@ def write_coco(
     exposure: float = 1.0,
     names: tuple[str, ...] = ("cup", "plate"),
 ) -> Path:
-    """Pictures of grey noise with boxes; ``scale`` of their sides, at most ``most`` of each class."""
+    """Pictures of grey noise with boxes, at most ``most`` of each class; ``scale`` their sides."""
     rng = np.random.default_rng(seed)
     rows = []
     (folder / "images").mkdir(parents=True, exist_ok=True)
