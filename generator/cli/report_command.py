@@ -87,7 +87,7 @@ def report(
     labels, near-duplicates, costs and licences. It is one file that requests nothing.
 
     With --compare-real, FOLDER may also be a configuration. The tables list the statistics that
-    differ from those of real pictures most, and the fields to change; the page has all.
+    differ most between both, and the fields to change; the page has all.
     """
     from rich.console import Console
     from threadpoolctl import threadpool_limits

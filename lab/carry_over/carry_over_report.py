@@ -1,6 +1,7 @@
 """``gen-data report SOURCE --compare-real FOLDER``: tables for the terminal, and a page."""
 
 import json
+import re
 from collections.abc import Sequence
 from dataclasses import asdict, replace
 from html import escape
@@ -15,8 +16,8 @@ from gen_data.lab.carry_over.statistics import DARK_GREY, HEIGHTS_PX
 from gen_data.report.html_page import format_document, format_table
 from gen_data.report.report_tables import Table
 
-ALIKE = "Without a difference"
-"""Title of the table that only the page has."""
+FIELDS, ALIKE = "Fields to change", "Without a difference"
+"""Titles of the table that the terminal has as lines, and of the one that only the page has."""
 ROWS_MAX = 16
 """Rows of each table on the terminal."""
 _NOTE = (
@@ -62,22 +63,34 @@ def report_real(
 
 
 def _shortened(table: Table) -> Table:
-    if len(table.rows) <= ROWS_MAX:
-        return table
-    more = (f"and {len(table.rows) - ROWS_MAX} more", *[""] * (len(table.header) - 1))
-    return replace(table, rows=(*table.rows[:ROWS_MAX], more))
+    """The table with the rows that the terminal shows; paths of fields stay whole on its lines."""
+    rows = table.rows[:ROWS_MAX]
+    if len(table.rows) > ROWS_MAX:
+        more = (f"and {len(table.rows) - ROWS_MAX} more", *[""] * (len(table.header) - 1))
+        rows = (*rows, more)
+    if table.title != FIELDS:
+        return replace(table, rows=rows)
+    lines = (
+        (line,)
+        for name, direction, change in rows
+        for line in (
+            f"{name}, ours are {direction}" if direction else name,
+            *(f"  {one}" for one in change.split("; ") if one),
+        )
+    )
+    return Table(FIELDS, ("statistic and fields",), tuple(lines), table.note)
 
 
 def make_tables(found: CarryOver) -> tuple[Table, ...]:
     """Tables of differences, fields, boxes by height, other rows, and files."""
     differing = [row for row in found.rows if row.differs]
-    changes = tuple(
-        (_name(row), f"ours are {row.direction}: {'; '.join(change)}")
-        for row, change in zip(differing, found.remedies, strict=True)
-    )
+    changes: dict[tuple[str, str], list[str]] = {}
+    for row, change in zip(differing, found.remedies, strict=True):
+        changes.setdefault((row.direction, "; ".join(change)), []).append(_name(row))
+    fields = tuple((", ".join(names), *key) for key, names in changes.items())
     tables = (
         _rows("Differences", differing or ["none"], _NOTE),
-        Table("Fields to change", ("statistic", "fields"), changes, _FIELDS_NOTE),
+        Table(FIELDS, ("statistic", "ours are", "fields"), fields, _FIELDS_NOTE),
         _heights(found),
         _rows(ALIKE, [row for row in found.rows if not row.differs], ""),
         _files(found),
@@ -102,7 +115,8 @@ def _name(row: Row) -> str:
 
 
 def _quantiles(values: Sequence[float]) -> str:
-    return "/".join(f"{value:.2f}" if abs(value) < 9.995 else f"{value:.0f}" for value in values)
+    texts = (f"{value:.2f}" if abs(value) < 9.995 else f"{value:.0f}" for value in values)
+    return "/".join(re.sub(r"^(-?)0\.", r"\1.", text) for text in texts)
 
 
 def _heights(found: CarryOver) -> Table:

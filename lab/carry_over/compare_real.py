@@ -1,4 +1,4 @@
-"""A data set or configuration beside the labelled pictures of a user: ``--compare-real``."""
+"""A data set or configuration next to the labelled pictures of a user: ``--compare-real``."""
 
 from __future__ import annotations
 
@@ -167,7 +167,7 @@ def _open_ours(
 
 
 def _stored(folder: Path, labels: RealSet) -> Ours:
-    """Pictures of a finished data set: those of one scene are one unit."""
+    """Pictures of a finished data set; the pictures of one scene are one unit."""
     from gen_data.assemble.config import load_config
     from gen_data.core.scene import Instance
     from gen_data.exporters.kitti import official_type

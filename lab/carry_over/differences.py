@@ -6,10 +6,9 @@ on the line", Theory of Probability and Its Applications 18, 1974), divided by t
 deviation of the real values. Logarithms are compared where ratios count.
 
 Chance: pictures are exchanged between both sides at random, all of one scene together. A row
-differs if the logarithm of its distance, in standard deviations of its exchanged ones, exceeds the
-largest one of all rows in 95 of 100 exchanges (Westfall and Young, "Resampling-Based Multiple
-Testing", 1993): of twenty comparisons of sets of one kind, one names a row, whatever the number of
-rows. Logarithms make the skewed distances of small and large rows alike.
+differs if its distance, in standard deviations of its exchanged distances, exceeds the largest one
+of all rows in 95 of 100 exchanges (Westfall and Young, "Resampling-Based Multiple Testing", 1993):
+of twenty comparisons of sets of one kind, one names a row, whatever the number of rows.
 """
 
 from collections.abc import Iterable
@@ -32,7 +31,7 @@ SMALL = 0.2
 Power Analysis for the Behavioral Sciences, 1988)."""
 
 LEAST = 1e-3
-"""Smaller distances and deviations count as this."""
+"""Smaller deviations count as this, where all values are equal."""
 
 Direction = Literal["larger", "smaller", "wider", "narrower"]
 
@@ -71,7 +70,7 @@ class _Pooled:
     """Values of both sides, sorted.
 
     Attributes:
-        units: Numbers of the units [n]; of our side after those of the real one.
+        units: Numbers of the units [n]; ours follow the real ones.
         gaps: Distances to the next value [n - 1].
         spread: Standard deviation of the real values, at least the quantity's grain.
     """
@@ -147,10 +146,9 @@ def _chance(pooled: Iterable[_Pooled], is_real: NDArray[np.bool_]) -> Array:
     drawn = np.array([[one.distance(units) for units in exchanged] for one in pooled])
     if not drawn.size:
         return np.zeros(0)
-    logs = np.log(np.maximum(drawn, LEAST))
-    mean, deviation = logs.mean(axis=1), np.maximum(logs.std(axis=1), LEAST)
-    largest = ((logs - mean[:, None]) / deviation[:, None]).max(axis=0)
-    return np.asarray(np.exp(mean + deviation * np.quantile(largest, CONFIDENCE, method="higher")))
+    mean, deviation = drawn.mean(axis=1), np.maximum(drawn.std(axis=1), LEAST)
+    largest = ((drawn - mean[:, None]) / deviation[:, None]).max(axis=0)
+    return np.asarray(mean + deviation * np.quantile(largest, CONFIDENCE, method="higher"))
 
 
 def _row(key: tuple[str, str], real: Array, ours: Array, apart: float, chance: float) -> Row:

@@ -1,4 +1,4 @@
-"""Fields of configurations that change a quantity: what to change where two sets differ."""
+"""Fields of configurations that change a quantity: remedies where two sets differ."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Statistics of labelled pictures, by class: a table of quantities, and their values in a set.
 
-Both sides are read by the same reader from the same layout, so that rules of a format, such as
-KITTI's boxes around projected 3D boxes, hold for both.
+One reader reads both sides from one layout: rules of a format, such as KITTI's boxes around
+projected 3D boxes, hold for both.
 """
 
 import math

@@ -329,7 +329,9 @@ def _read_kitti(root: Path, most: int | None) -> RealSet:
         scan = root / f"velodyne/{path.stem}.bin"
         objects = label_files.read_kitti(path)
         frames.append(_Frame(number, image, objects, scan=scan if scan.is_file() else None))
-    return _numbered(root / "label_2", frames, most)
+    missing = sum(frame.scan is None for frame in frames)
+    skipped = Counter({"scan that is missing": missing} if 0 < missing < len(frames) else {})
+    return _numbered(root / "label_2", frames, most, skipped)
 
 
 def _read_yolo(root: Path, classes: Path, most: int | None) -> RealSet:
@@ -348,9 +350,10 @@ def _read_yolo(root: Path, classes: Path, most: int | None) -> RealSet:
 
 
 def _yolo_labels(image: Path) -> Path:
-    """Ultralytics' rule: the last folder ``images`` becomes ``labels``; without one, no change."""
-    before, images, after = image.with_suffix("").as_posix().rpartition("/images/")
-    return Path(f"{before}/labels/{after}.txt" if images else f"{after}.txt")
+    """A file next to the image, or by Ultralytics' rule: the last ``images`` becomes ``labels``."""
+    nearby = image.with_suffix(".txt")
+    before, images, after = nearby.as_posix().rpartition("/images/")
+    return nearby if nearby.is_file() or not images else Path(f"{before}/labels/{after}")
 
 
 def _read_voc(paths: Sequence[Path], most: int | None) -> RealSet:
@@ -366,12 +369,13 @@ def _read_voc(paths: Sequence[Path], most: int | None) -> RealSet:
         )
         image = next(filter(Path.is_file, listed), near / "JPEGImages" / f"{path.stem}.jpg")
         frames.append(_Frame(number, image, objects, size_px))
-    return _numbered(paths[0].parent, frames, most)
+    return _numbered(paths[0].parent, frames, most, Counter())
 
 
-def _numbered(source: Path, frames: Sequence[_Frame], most: int | None) -> RealSet:
+def _numbered(
+    source: Path, frames: Sequence[_Frame], most: int | None, skipped: Counter[str]
+) -> RealSet:
     """A set whose classes are the sorted names of its objects."""
-    skipped = Counter[str]()
     names = {thing.name for frame in frames for thing in frame.objects if thing.name}
     ids = {name: number for number, name in enumerate(sorted(names), 1)}
     return _checked(RealSet(source, tuple(_readable(frames, most, skipped)), ids, skipped))

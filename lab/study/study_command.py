@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 
 HELP = """Measure the value of changes of a configuration on real labelled pictures.
 
-REAL_FOLDER has labels in the layout of COCO or KITTI. A small detector is trained on data of
-CONFIG, the baseline, and of every variant, with several seeds; all are judged on the real
+REAL_FOLDER has labels in the layout of COCO, KITTI, YOLO or VOC. A small detector is trained on
+data of CONFIG, the baseline, and of every variant, with several seeds; all are judged on the real
 pictures. The same command goes on after an interruption.
 
 \b

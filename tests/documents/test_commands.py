@@ -44,6 +44,10 @@ NOT_RUN = {
 """Beginnings of commands, and why they are not run here."""
 
 BEFORE = {
+    "carry_over": (
+        "gen-data --config tabletop.yaml --n 2 {small}",
+        "gen-data --config tabletop.yaml --n 2 --seed 8 --out real {small}",
+    ),
     "certificates": ("gen-data --config tabletop.yaml --n 2 --out out/table {small}",),
     "report": (
         "gen-data --config tabletop.yaml --n 2 {small}",
@@ -57,6 +61,7 @@ SMALLER = {
     "--n 1380": f"--n 1 {SMALL}",
     "--n 60": f"--n 1 {SMALL} --out out/suction",
     "--n 60 --seed 1 --out out/table": "--n 1 --seed 1 --out out/small",
+    "--n 60 --html carry_over.html": "--n 2 --html carry_over.html",
     "--probe 20": "--probe 1",
     "certify out/table": "certify out/table --samples 1 --rays 10 --scenes 0",
 }

@@ -63,6 +63,29 @@ def test_kittis_inclusive_sides_and_regions_are_read(tmp_path: Path) -> None:
     assert [row["iscrowd"] for row in real.to_coco()["annotations"]] == [0, 1]
 
 
+def test_kittis_scans_belong_to_their_frames_and_missing_ones_are_counted(tmp_path: Path) -> None:
+    (tmp_path / "label_2").mkdir()
+    (tmp_path / "velodyne").mkdir()
+    for name in ("000000", "000001"):
+        write_picture(tmp_path / f"image_2/{name}.png")
+        (tmp_path / f"label_2/{name}.txt").write_text(LABELS)
+    (tmp_path / "velodyne/000001.bin").write_bytes(b"")
+
+    real = read_real(tmp_path)
+
+    assert [p.scan for p in real.pictures] == [None, tmp_path / "velodyne/000001.bin"]
+    assert real.skipped == {"scan that is missing": 1}
+
+
+def test_of_cocos_own_folder_the_instances_are_read(tmp_path: Path) -> None:
+    """Beside captions and keypoints; a plan of a data set that lists ``images`` is none of them."""
+    source = write_coco(tmp_path / "coco", [[{"bbox": [1, 2, 10, 20]}]])
+    (source.parent / "captions_val.json").write_text('{"images": [], "annotations": []}')
+    (tmp_path / "plan.json").write_text('{"randomizers": [{"images": ["indoor"]}]}')
+
+    assert read_real(tmp_path).source == source
+
+
 def test_yolos_boxes_and_polygons_are_read_in_pixels(tmp_path: Path) -> None:
     """Shares of 64 x 48 px; of a polygon its tight box; an image without a file has no object."""
     for number in range(3):
