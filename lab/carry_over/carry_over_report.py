@@ -2,6 +2,7 @@
 
 import json
 import re
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict, replace
 from html import escape
@@ -120,7 +121,10 @@ def _quantiles(values: Sequence[float]) -> str:
 
 
 def _heights(found: CarryOver) -> Table:
-    header = ("class", *(f"{low:g}-{high:g}" for low, high in pairwise(HEIGHTS_PX)))
+    header = (
+        "class",
+        *(f"{low:g}-{high:g}".removesuffix("-inf") for low, high in pairwise(HEIGHTS_PX)),
+    )
     rows = tuple(
         (f"{label}, {side}", *(f"{count:.2f}" for count in counts))
         for label, both in found.heights.items()
@@ -136,13 +140,15 @@ def _files(found: CarryOver) -> Table:
         rows.append((f"skipped: {reason}", *(str(side.skipped.get(reason, 0)) for side in sides)))
     ignored = [sum(o.is_ignored for p in side.pictures for o in p.objects) for side in sides]
     rows.append(("ignored regions", *map(str, ignored)))
-    for name in dict.fromkeys((*found.unmatched[0], *found.unmatched[1])):
+    for fact, listed in (
+        (f"statistics of fewer than {VALUES_MIN} values", found.few),
+        ("stated by the labels of one side", found.one_sided),
+    ):
+        rows += [(f"{fact}: {', '.join(listed)}", "", "")] if listed else []
+    boxes = Counter(found.unmatched[0]) + Counter(found.unmatched[1])
+    for name, _ in boxes.most_common():
         counts = (str(of.get(name, 0)) for of in found.unmatched)
         rows.append((f"not compared: class {name}", *counts))
-    if found.few:
-        rows.append(
-            (f"statistics of fewer than {VALUES_MIN} values: {', '.join(found.few)}", "", "")
-        )
     note = f"Real: {found.folder}, read as {found.real.layout}. Ours: {found.source}."
     return Table("Read", ("files", "real", "ours"), tuple(rows), note)
 

@@ -51,6 +51,7 @@ class CarryOver:
         source, folder: Our data set or configuration, and the real folder.
         rows: The largest difference first.
         few: Classes with statistics of too few values.
+        one_sided: Quantities that the labels of one side alone state.
         heights: Boxes a picture by bins of ``HEIGHTS_PX``, real and ours, by class.
         remedies: Changes of fields for each row that differs, in order.
         unmatched: Numbers of boxes of classes without a counterpart, real and ours.
@@ -62,6 +63,7 @@ class CarryOver:
     ours: RealSet
     rows: tuple[Row, ...]
     few: tuple[str, ...]
+    one_sided: tuple[str, ...]
     heights: Mapping[str, tuple[list[float], list[float]]]
     remedies: tuple[tuple[str, ...], ...]
     unmatched: tuple[Mapping[str, int], Mapping[str, int]]
@@ -102,7 +104,7 @@ def compare_real(
         measured = statistics.measure(real.pictures, units, label_of_real)
         progress("our pictures")
         mine = statistics.measure(ours.labels.pictures, ours.units, label_of_ours)
-        rows, few = compare(measured, mine, len(units), max(ours.units) + 1)
+        rows, few, one_sided = compare(measured, mine, len(units), max(ours.units) + 1)
         return CarryOver(
             source,
             folder,
@@ -110,6 +112,7 @@ def compare_real(
             ours.labels,
             rows,
             few,
+            one_sided,
             _heights(measured, mine),
             tuple(_remedies(row, ours) for row in rows if row.differs),
             (_without(real, label_of_real), _without(ours.labels, label_of_ours)),
@@ -145,7 +148,7 @@ def _open_ours(
     folder = Path(source)
     with TemporaryDirectory() as scratch:
         if folder.is_dir() and not (folder / "plan.json").is_file():
-            labels = read_real(folder, None, layout=layout, most=pictures)
+            labels = read_real(folder, None, most=pictures)
             yield Ours(labels, range(len(labels.pictures)), None, {})
             return
         if not folder.is_dir():
@@ -217,10 +220,14 @@ def _match(
     )
     own = {name.casefold(): name for name in mine}
     label_of = {name: own[name.casefold()] for name in theirs if name.casefold() in own}
+    given: set[str] = set()
     for pair in classes:
         left, separator, right = pair.partition("=")
         if not separator:
             raise errors.ConfigError(f"--classes {pair}: expected REAL=OURS")
+        if left in given:
+            raise errors.ConfigError(f"--classes {pair}: '{left}' has a class; expected one each")
+        given.add(left)
         for name, known, place in ((left, theirs, folder), (right, mine, source)):
             if name not in known:
                 raise errors.ConfigError(
@@ -259,6 +266,7 @@ def make_figures(found: CarryOver) -> dict[str, Any]:
         "skipped": {"real": found.real.skipped, "ours": found.ours.skipped},
         "unmatched": dict(zip(("real", "ours"), found.unmatched, strict=True)),
         "few": found.few,
+        "one_sided": found.one_sided,
         "heights": found.heights,
         "rows": [
             asdict(row) | {"change": next(changes) if row.differs else (), "differs": row.differs}

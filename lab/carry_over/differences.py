@@ -92,8 +92,8 @@ class _Pooled:
 
 def compare(
     real: Measured, ours: Measured, units_real: int, units_ours: int
-) -> tuple[tuple[Row, ...], tuple[str, ...]]:
-    """Compare all quantities that both sides have.
+) -> tuple[tuple[Row, ...], tuple[str, ...], tuple[str, ...]]:
+    """Compare all quantities that both sides state.
 
     Args:
         real: Real values.
@@ -102,11 +102,13 @@ def compare(
         units_ours: Number of our units.
 
     Returns:
-        Rows, the largest difference first; and classes with rows of too few values.
+        Rows, the largest difference first; classes with rows of too few values; and quantities
+        that one side alone states.
     """
     every = {**real, **ours}
+    one_sided = {name for _, name in real} ^ {name for _, name in ours}
     keys = [key for key in every if _least(real, ours, key) >= VALUES_MIN]
-    few = dict.fromkeys(label for label, name in every if (label, name) not in keys)
+    few = dict.fromkeys(k[0] for k in every if k not in keys and k[1] not in one_sided)
     pooled = [_pool(key[1], real[key], ours[key], units_real) for key in keys]
     is_real = np.arange(units_real + units_ours) < units_real
     apart = np.array([one.distance(is_real) for one in pooled])
@@ -116,7 +118,7 @@ def compare(
         for key, a, c in zip(keys, apart, chance, strict=True)
     ]
     ordered = sorted(rows, key=lambda row: (not row.differs, -row.apart))
-    return tuple(ordered), tuple(few)
+    return tuple(ordered), tuple(few), tuple(sorted(one_sided))
 
 
 def _least(real: Measured, ours: Measured, key: tuple[str, str]) -> int:
