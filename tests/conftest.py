@@ -72,6 +72,12 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 
 @pytest.fixture(scope="session")
+def library() -> Any:
+    """What comes with the package; imported when asked for, as it looks for packs."""
+    return importlib.import_module("tests.libraries").library()
+
+
+@pytest.fixture(scope="session")
 def open3d() -> Any:
     """The package; tests that use it are skipped, with the remedy, where it cannot be loaded."""
     try:

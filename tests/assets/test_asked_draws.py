@@ -13,11 +13,6 @@ from gen_data.core.errors import AssetError, UnknownAsset
 from gen_data.core.variant_rng import Draw
 
 
-@pytest.fixture
-def library(tmp_path: Path) -> Library:
-    return open_library(cache_dir=tmp_path)
-
-
 def size_m(library: Library, asset_id: str) -> np.ndarray:
     low, high = library.bounds_m(asset_id)
     return np.subtract(high, low)

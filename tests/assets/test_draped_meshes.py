@@ -12,7 +12,6 @@ from gen_data.core.asset_types import MeshData
 from gen_data.core.errors import AssetError
 from gen_data.core.relief import Relief, RoadProfile
 from gen_data.core.se3 import SE3
-from gen_data.packs.provision import open_assets
 from tests.embree import RayCaster
 
 HILL = Relief((
@@ -22,12 +21,6 @@ HILL = Relief((
     ),
 ))  # fmt: skip
 PLACE = SE3.about_z(0.3, (-60.0, 3.0, 0.2))
-
-
-@pytest.fixture(scope="module")
-def library() -> Library:
-    """The shipped assets."""
-    return open_assets(())
 
 
 def _on_hill(library: Library, asset: str) -> MeshData:

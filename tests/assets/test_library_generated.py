@@ -8,11 +8,6 @@ from gen_data.assets.library import Library, open_library
 from gen_data.core.errors import AssetError
 
 
-@pytest.fixture
-def library(tmp_path: Path) -> Library:
-    return open_library(cache_dir=tmp_path / "cache")
-
-
 def test_defaults_count_as_parameters(library: Library) -> None:
     """Leaving a default out and writing it gives the same content."""
     assert library.get("mug").sha256 == library.get("mug?seed=0").sha256

@@ -7,15 +7,10 @@ import numpy as np
 import pybullet_data
 import pytest
 
-from gen_data.assets.library import Library, open_library
+from gen_data.assets.library import Library
 from gen_data.core.errors import AssetError
 
 OBJECTS = ("domino", "jenga", "lego", "mug", "soccerball", "table", "teddy", "tray")
-
-
-@pytest.fixture(scope="module")
-def library(tmp_path_factory: pytest.TempPathFactory) -> Library:
-    return open_library(cache_dir=tmp_path_factory.mktemp("cache"))
 
 
 def size_m(library: Library, asset_id: str) -> np.ndarray:

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gen_data.assets.library import Library, open_library
+from gen_data.assets.library import Library
 from gen_data.core.asset_types import MeshData, Symmetry
 from gen_data.core.se3 import SE3
 from tests.distances import distances_m
@@ -39,11 +39,6 @@ STATED = {
     "wine_glass": {0},
 }
 """Folds by family that may occur."""
-
-
-@pytest.fixture(scope="module")
-def library() -> Library:
-    return open_library(())
 
 
 def turned(points_m: np.ndarray, symmetry: Symmetry) -> np.ndarray:

@@ -5,18 +5,13 @@ import math
 import numpy as np
 import pytest
 
-from gen_data.assets.library import Library, open_library
+from gen_data.assets.library import Library
 from gen_data.core.asset_types import RobotModel
 from gen_data.core.se3 import SE3
 
 ROBOTS = ("franka_panda", "kuka_iiwa", "xarm6")
 TOOLED = ("franka_panda_suction", "kuka_iiwa_gripper", "kuka_iiwa_suction", "xarm6_gripper")
 """The same arms with tools made by code."""
-
-
-@pytest.fixture(scope="module")
-def library(tmp_path_factory: pytest.TempPathFactory) -> Library:
-    return open_library(cache_dir=tmp_path_factory.mktemp("cache"))
 
 
 def link_poses(robot: RobotModel, positions: tuple[float, ...]) -> dict[str, SE3]:

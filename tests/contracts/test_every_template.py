@@ -11,7 +11,7 @@ from gen_data import configs, scene_templates
 from gen_data.assemble.config import Config, load_config
 from gen_data.assemble.config_schema import config_schema
 from gen_data.assemble.pipeline_factory import nominal_scene
-from gen_data.assets.library import Library, open_library
+from gen_data.assets.library import open_library
 from gen_data.config.describe import describe
 from gen_data.config.schema import json_schema
 from gen_data.config.yaml_tree import load_yaml
@@ -21,18 +21,13 @@ from gen_data.core.scene import Body, Scene
 from gen_data.core.scene_time import place_sensors
 from gen_data.core.serialization import canonical_json
 from gen_data.core.streams import Streams
+from tests.libraries import library
 from tests.tiers import cases, sampled, slow
 
 CONFIGS = sorted(path.stem for path in Path(configs.__path__[0]).glob("*.yaml"))
 QUICK = ("bin_picking", "tabletop")
 """Configurations of which the default run draws scenes; ``tests/traffic`` draws streets."""
 TEMPLATES = sorted(path.stem for path in Path(scene_templates.__path__[0]).glob("*.yaml"))
-
-
-@cache
-def library() -> Library:
-    """The assets that come with the package and its dependencies."""
-    return open_library(())
 
 
 @cache

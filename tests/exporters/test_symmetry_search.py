@@ -8,18 +8,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from gen_data.assets.library import Library, open_library
+from gen_data.assets.library import Library
 from gen_data.core.se3 import IDENTITY, SE3
 from gen_data.exporters.rigid_models import Model, Piece, build_model
 from gen_data.exporters.symmetry_search import Samples, find_symmetries, sample_triangles
 
 CUBE = np.array([[x, y, z] for x in (-1.0, 1) for y in (-1.0, 1) for z in (-1.0, 1)])
 FACES = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-
-
-@pytest.fixture(scope="module")
-def library() -> Library:
-    return open_library(())
 
 
 def corners(points: NDArray[np.float64]) -> NDArray[np.float64]:

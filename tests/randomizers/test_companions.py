@@ -22,12 +22,6 @@ ASSETS = tuple(f"simple_person?seed={k}" for k in range(4))
 APART_M = 12.0
 
 
-@pytest.fixture(scope="module")
-def library(tmp_path_factory: pytest.TempPathFactory) -> AssetLibrary:
-    folder: Path = tmp_path_factory.mktemp("companions")
-    return open_library(cache_dir=folder)
-
-
 def people(library: AssetLibrary, pose: str, count: int) -> Scene:
     """People in a row, far from each other, who face +X."""
     group = ObjectGroup("people", (), ASSETS, 0, "along", lanes=("sidewalk",))

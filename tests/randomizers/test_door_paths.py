@@ -1,12 +1,10 @@
 """Paths from gardens' street edges to doors."""
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from gen_data.assets.library import open_library
 from gen_data.core.interfaces import AssetLibrary
 from gen_data.core.members import Member, add_members
 from gen_data.core.scene import Lane, ObjectGroup, Scene
@@ -18,12 +16,6 @@ HOUSE = "building/villa?seed=0"
 PATHS = tuple(f"garden_path?length_m=4&seed={k}" for k in range(3))
 GARDEN_M = 6.0
 RISE_M = 0.3
-
-
-@pytest.fixture(scope="module")
-def library(tmp_path_factory: pytest.TempPathFactory) -> AssetLibrary:
-    folder: Path = tmp_path_factory.mktemp("paths")
-    return open_library(cache_dir=folder)
 
 
 def garden(y_m: float, ahead: float) -> Lane:

@@ -1,12 +1,11 @@
 """Hands that hold things: contact without penetration, room for others, labels."""
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from gen_data.assets.library import Library, open_library
+from gen_data.assets.library import Library
 from gen_data.config.distributions import Constant, Probability
 from gen_data.content.procedural import FAMILIES
 from gen_data.content.procedural.hands import JOINTS, held_axis_m
@@ -20,12 +19,6 @@ from tests.randomizers.doubles import rng_of
 TABLE_Z_M = 0.74
 PENETRATION_M = 0.003
 HELD = ("can?seed=9", "jar?seed=18", "cup?seed=9", "mug?seed=27")
-
-
-@pytest.fixture(scope="module")
-def library(tmp_path_factory: pytest.TempPathFactory) -> Library:
-    folder: Path = tmp_path_factory.mktemp("hands")
-    return open_library(cache_dir=folder)
 
 
 def table(things: tuple[str, ...]) -> Scene:

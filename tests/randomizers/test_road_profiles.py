@@ -4,22 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from functools import cache
 from typing import Any
 
 import numpy as np
 import pytest
 
-from gen_data.assets.library import Library
 from gen_data.config.distributions import Constant, Uniform
 from gen_data.core.errors import ConfigError
 from gen_data.core.relief import RoadProfile
 from gen_data.core.scene import Scene
-from gen_data.packs.provision import open_assets
 from gen_data.randomizers.relief import ReliefOfRoads
 from gen_data.scene_templates.builder import build_scene
 from gen_data.scene_templates.junction import Junction
 from gen_data.scene_templates.road import Road
+from tests.libraries import library
 from tests.randomizers.doubles import rng_of
 
 STOPPING_M = {30: 35, 50: 65, 60: 85, 80: 130, 100: 185, 120: 250}
@@ -29,18 +27,13 @@ SAG = {30: 6, 50: 13, 60: 18, 80: 30, 100: 45, 120: 63}
 """Rates K [m per % of change]: tables 3-34 and 3-36."""
 
 
-@cache
-def _library() -> Library:
-    return open_assets(())
-
-
 def _street(*elements: Any) -> Scene:
-    return build_scene("street", elements, _library())
+    return build_scene("street", elements, library())
 
 
 def _profiles(scene: Scene, seed: int, **fields: Any) -> Sequence[RoadProfile]:
     relief = ReliefOfRoads(name="relief", **fields)
-    made = relief(scene, _library(), rng_of("relief", scene=seed)).relief
+    made = relief(scene, library(), rng_of("relief", scene=seed)).relief
     assert made is not None
     return made.roads
 

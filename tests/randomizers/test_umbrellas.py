@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from gen_data.assets.library import Library, open_library
+from gen_data.assets.library import Library
 from gen_data.core.errors import ConfigError
 from gen_data.core.members import Member, add_members
 from gen_data.core.scene import ObjectGroup, Scene, Weather
@@ -14,11 +14,6 @@ from tests.randomizers.doubles import rng_of
 
 POSES = ("walk", "stand", "walk_cup", "sit", "walk_slow")
 COUNT = 60
-
-
-@pytest.fixture(scope="module")
-def library() -> Library:
-    return open_library(())
 
 
 def street(library: Library, rain_mm_h: float) -> Scene:

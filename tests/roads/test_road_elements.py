@@ -2,7 +2,6 @@
 
 import math
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gen_data.assets.library import Library, open_library
+from gen_data.assets.library import Library
 from gen_data.core.errors import ConfigError
 from gen_data.core.scene import Lane, Scene
 from gen_data.scene_templates import TABLE
@@ -18,11 +17,6 @@ from gen_data.scene_templates.builder import build_scene
 from gen_data.scene_templates.element import Element
 
 ROAD = {"type": "road", "name": "main", "length_m": 100.0}
-
-
-@pytest.fixture(scope="module")
-def library(tmp_path_factory: pytest.TempPathFactory) -> Library:
-    return open_library((), Path(tmp_path_factory.mktemp("cache")))
 
 
 def built(library: Library, *lines: dict[str, Any]) -> Scene:

@@ -22,6 +22,7 @@ from gen_data.core.streams import Streams
 from gen_data.randomizers.furnish import Furnish
 from gen_data.scene_templates.builder import build_scene
 from gen_data.scene_templates.room_layout import RoomLayout
+from tests.libraries import library
 from tests.tiers import seeds as of_seeds
 
 KINDS = (
@@ -57,12 +58,6 @@ MOVABLE = {"armchair", "chair", "clothes_pile", "office_chair", "stool"}
 STRUCTURE = {"floor", "ceiling", "wall", "door", "window"}
 SHOULDERS_M = 0.4
 CELL_M = 0.1
-
-
-@cache
-def library() -> Library:
-    """The assets that come with the package."""
-    return open_library(())
 
 
 @cache

@@ -5,17 +5,12 @@ from pathlib import Path
 import pytest
 
 from gen_data.assemble.config import load_config
-from gen_data.assets.library import Library, open_library
+from gen_data.assets.library import Library
 from gen_data.core.errors import ConfigError
 from gen_data.core.scene import Scene
 from gen_data.scene_templates.builder import build_scene
 from gen_data.scene_templates.ego import Ego
 from gen_data.scene_templates.road import Road
-
-
-@pytest.fixture(scope="module")
-def library() -> Library:
-    return open_library(())
 
 
 def street(library: Library, ego: Ego) -> Scene:

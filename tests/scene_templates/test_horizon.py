@@ -6,16 +6,11 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from gen_data.assets.library import Library, open_library
+from gen_data.assets.library import Library
 from gen_data.core.errors import ConfigError
 from gen_data.core.scene import Scene
 from gen_data.scene_templates.horizon import Horizon, convex_outline, offset_outline
 from gen_data.scene_templates.road import Road
-
-
-@pytest.fixture(scope="module")
-def library() -> Library:
-    return open_library(())
 
 
 @pytest.fixture(scope="module")

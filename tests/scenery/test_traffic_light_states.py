@@ -6,7 +6,7 @@ from collections.abc import Callable
 import pytest
 from scipy.stats import chisquare
 
-from gen_data.assets.library import Library, open_library
+from gen_data.assets.library import Library
 from gen_data.content.scenery.traffic_lights import (
     PEDESTRIAN_LENSES,
     VEHICLE_LENSES,
@@ -20,11 +20,6 @@ from gen_data.randomizers.traffic_lights import COLORS, TrafficLights
 
 Draw = Callable[..., Scene]
 WEIGHTS = {"red": 0.46, "green": 0.44, "yellow": 0.06, "red_yellow": 0.04}
-
-
-@pytest.fixture(scope="module")
-def library(tmp_path_factory: pytest.TempPathFactory) -> Library:
-    return open_library(cache_dir=tmp_path_factory.mktemp("cache"))
 
 
 @pytest.fixture

@@ -7,7 +7,6 @@ import pytest
 
 from gen_data.assemble.config import Config, load_config
 from gen_data.assemble.pipeline_factory import PipelineFactory, pipeline_config, scene_source
-from gen_data.assets.library import Library, open_library
 from gen_data.core.errors import ConfigError, LayoutRejected
 from gen_data.core.sample import Sample
 from gen_data.core.scene import Body, ObjectGroup, Scene
@@ -19,6 +18,7 @@ from gen_data.randomizers.free_space import Footprint, Ground
 from gen_data.randomizers.traffic_actors import find_drivers
 from gen_data.randomizers.traffic_flow import TrafficFlow
 from gen_data.traffic.lane_routes import LaneGraph
+from tests.libraries import library
 from tests.streets import thin_street
 from tests.traffic.roads import lane
 
@@ -32,12 +32,6 @@ SMALL = (
 STEPS, STEP_S = 40, 0.1
 FLAT = ("tree", "street_light", "traffic_light", "traffic_sign")
 """Things whose bounding boxes reach over the road above what drives there."""
-
-
-@cache
-def library() -> Library:
-    """The assets that need no pack."""
-    return open_library(())
 
 
 @cache
