@@ -91,13 +91,11 @@ def open3d() -> Any:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_makereport() -> Generator[None, pytest.TestReport, pytest.TestReport]:
-    """Turn skips of single tests into failures."""
     return _skips_fail((yield))
 
 
 @pytest.hookimpl(wrapper=True)
 def pytest_make_collect_report() -> Generator[None, pytest.CollectReport, pytest.CollectReport]:
-    """Turn skips of whole modules into failures."""
     return _skips_fail((yield))
 
 

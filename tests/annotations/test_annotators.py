@@ -335,8 +335,6 @@ def test_an_annotated_instance_without_a_category_stops_the_sample() -> None:
 
 
 class _Liar:
-    """An annotator that changes what others found."""
-
     channels = frozenset({Channel.INSTANCE})
 
     def __init__(self, **changes: Any) -> None:

@@ -208,7 +208,6 @@ def test_sentences_state_relations() -> None:
 
 
 def thing(number: int, category: str, x_min: int, x_max: int, **changes: Any) -> Thing:
-    """A clearly visible thing at some columns."""
     facts = {"clear": True, "annotated": True} | changes
     return Thing(number, category, BoxPx(x_min, 0, x_max, 10), **facts)
 

@@ -29,12 +29,10 @@ class Numbers(Sequence[int]):
         return positions // VIEWS
 
     def __len__(self) -> int:
-        """Number of samples."""
         assert self.n is not None
         return self.n
 
     def __getitem__(self, index: Any) -> Any:
-        """Note the index and return it."""
         self.read.append(index)
         return index
 
@@ -136,7 +134,6 @@ def test_a_data_set_without_a_size_has_new_samples_in_every_epoch() -> None:
 
 
 def process_of(number: int) -> int:
-    """The process that reads a sample."""
     return os.getpid()
 
 

@@ -26,7 +26,6 @@ def rig_scene(name: str, *overrides: str) -> Scene:
 
 
 def on_rig(scene: Scene, pose: SE3) -> SE3:
-    """A pose in the ego's frame."""
     return scene.rig_pose("ego").inverse() @ pose
 
 

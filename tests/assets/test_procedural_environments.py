@@ -27,7 +27,6 @@ def test_mean_luminance_is_one_by_solid_angle(name: str, seed: int) -> None:
 
 @pytest.mark.parametrize("name", sorted(ENVIRONMENTS))
 def test_equal_seeds_make_equal_environments_and_others_differ(name: str) -> None:
-    """A pure function of the seed."""
     build = ENVIRONMENTS[name].build
 
     assert build(1).tobytes() == build(1).tobytes()

@@ -168,7 +168,6 @@ def test_collision_is_few_small_convex_parts(built: tuple[str, Solid]) -> None:
 
 @for_every_variant
 def test_collision_has_the_bounds_of_what_is_seen(built: tuple[str, Solid]) -> None:
-    """Things rest where they seem to rest."""
     mesh = built[1].mesh
     points = np.concatenate(built[1].collision.parts_m)
     low, high = mesh.bounds_m()

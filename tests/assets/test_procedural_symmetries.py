@@ -118,7 +118,6 @@ def test_parametric_objects_turn_about_centre(
     ],
 )
 def test_other_turns_are_found_out(asset: str, wrong: Any, library: Library) -> None:
-    """The measure tells symmetries from other turns."""
     assert deviation(library.mesh(asset), wrong) > TOLERANCE
 
 

@@ -51,7 +51,6 @@ def texture(name: str, seed: int) -> TextureData:
 
 @pytest.fixture(params=sampled(sorted(TEXTURES), 6), scope="module")
 def made(request: pytest.FixtureRequest) -> tuple[str, TextureData]:
-    """The first variant of a family."""
     return request.param, texture(request.param, 0)
 
 

@@ -98,7 +98,6 @@ def test_every_exporter_has_a_reader() -> None:
 
 @pytest.mark.slow
 def test_readers_find_what_data_sets_state() -> None:
-    """All readers that are installed."""
     command = [sys.executable, "-m", "benchmarks.readers"]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
 

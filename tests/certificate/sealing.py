@@ -24,7 +24,6 @@ SMALL: dict[str, Any] = {
 
 
 def digest(data: bytes) -> str:
-    """SHA-256."""
     return hashlib.sha256(data).hexdigest()
 
 

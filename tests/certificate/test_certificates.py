@@ -38,7 +38,6 @@ def certified(dataset: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def findings(certificate: Certificate) -> dict[str, Finding]:
-    """Findings by claim and subject."""
     return {
         f"{claim.name}: {finding.subject}".rstrip(": "): finding
         for claim, finding in certificate.findings()
@@ -46,7 +45,6 @@ def findings(certificate: Certificate) -> dict[str, Finding]:
 
 
 def failed(certificate: Certificate) -> set[str]:
-    """Claims that failed."""
     return {claim.name for claim, _ in certificate.findings(Status.FAILED)}
 
 

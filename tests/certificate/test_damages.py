@@ -39,12 +39,10 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def certify(folder: Path) -> Certificate:
-    """Check everything."""
     return gen_data.certify(folder, samples=N, rays=100, scenes=N // 2)
 
 
 def edit_json(path: Path, change: Callable[[dict[str, Any]], None]) -> None:
-    """Change a file of JSON."""
     plain = json.loads(path.read_bytes())
     change(plain)
     path.write_text(json.dumps(plain, separators=(",", ":"), sort_keys=True) + "\n")
@@ -100,7 +98,6 @@ def move_export_box(folder: Path) -> None:
 
 
 def mirror_export_picture(folder: Path) -> None:
-    """A picture of an export."""
     path = next((folder / "coco").glob("*/000000007_color.png"))
     mirrored = cv2.imread(str(path))[:, ::-1]
     path.unlink()
@@ -108,7 +105,6 @@ def mirror_export_picture(folder: Path) -> None:
 
 
 def exchange_pictures(folder: Path) -> None:
-    """Two pictures, in shards and exports alike."""
     first, second = (
         (folder / f"{SHARD}/color/rgb/{k:09d}.png").read_bytes() for k in (2, 9)
     )  # fmt: skip
@@ -193,7 +189,6 @@ def add_to_shard(folder: Path) -> None:
 
 
 def edit_card(folder: Path) -> None:
-    """The data card."""
     path = folder / "README.md"
     path.write_text(path.read_text().replace(str(N), str(N + 1)))
 

@@ -73,7 +73,6 @@ DISTRIBUTIONS: list[tuple[Distribution[Any], int]] = [
 
 
 def stream(name: str) -> Rng:
-    """A fixed stream per test."""
     return Streams(seed=20_261_123, scene=0).rng(name)
 
 
@@ -144,7 +143,6 @@ def test_values_that_cannot_be_drawn_have_no_scores(
 def test_values_without_randomness_have_nothing_to_test(
     distribution: Distribution[Any], value: Any
 ) -> None:
-    """An empty tuple."""
     assert uniform_scores(distribution, value, stream("fixed")) == ()
 
 
@@ -219,12 +217,10 @@ def examined(*parameters: Parameter, scenes: int = 100) -> Any:
 
 
 def drawn(name: str, distribution: Distribution[Any], values: Any) -> Parameter:
-    """A parameter with its first values."""
     return Parameter(name, firsts=[(distribution, value) for value in values])
 
 
 def check(*parameters: Parameter) -> Finding:
-    """The finding about some parameters."""
     (finding,) = check_parameters(examined(*parameters))
     return finding
 

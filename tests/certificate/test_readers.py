@@ -38,7 +38,6 @@ def is_read(path: Path) -> bool:
 
 @pytest.fixture(scope="module")
 def exported(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Two samples in all formats with readers."""
     folder = tmp_path_factory.mktemp("readers") / "table"
     overrides = (*SMALL["overrides"], f"exporters=[{FORMATS}]")
     with pytest.warns(gen_data.ConfigWarning, match="empty"):

@@ -31,8 +31,6 @@ from gen_data.config.yaml_tree import parse_yaml
 
 
 class Falloff(str, Enum):
-    """A closed set."""
-
     NONE = "none"
     SQUARE = "square"
 
@@ -90,8 +88,6 @@ def test_a_description_is_summary_table_and_example() -> None:
 
 
 class Demanding(Strict):
-    """Everything is required."""
-
     scalar: Scalar
     count: Count
     name: Name
@@ -129,8 +125,6 @@ def test_a_model_that_refuses_every_made_up_value_has_no_example() -> None:
     """Nothing is shown rather than something wrong."""
 
     class Picky(Strict):
-        """Only one word will do."""
-
         word: str = Field(pattern="^sesame$")
 
     assert make_example(Picky) is None
@@ -145,7 +139,6 @@ def test_a_class_without_fields_is_described_by_its_summary() -> None:
 
 
 def validator_of(model: type[Strict]) -> Any:
-    """A JSON Schema validator of a model."""
     jsonschema = pytest.importorskip("jsonschema")
     schema = json_schema(model)
     jsonschema.Draft202012Validator.check_schema(schema)
@@ -211,8 +204,6 @@ def test_a_default_may_be_any_value() -> None:
     """Constants are shown as the plain value they stand for."""
 
     class Defaults(Strict):
-        """Two defaults."""
-
         a: Scalar = Constant(0.5)
         b: Position = Constant((0.0, 0.0, 1.0))
 
@@ -226,8 +217,6 @@ def test_fields_are_described_by_the_docstring_below_them() -> None:
     """Or by the section of attributes, which goes first; inherited fields come last."""
 
     class Format(Strict):
-        """A format."""
-
         cameras: tuple[str, ...] = ()
         """All of them if
         empty."""
@@ -256,20 +245,14 @@ def test_models_that_a_field_tells_apart_are_told_by_it() -> None:
     """Rather than by all their fields."""
 
     class Disc(Strict):
-        """Round."""
-
         shape: Literal["disc"]
         radius_m: float = 1.0
 
     class Square(Strict):
-        """Not round."""
-
         shape: Literal["square"]
         side_m: float = 1.0
 
     class Outline(Strict):
-        """One of both."""
-
         outline: Annotated[Disc | Square, Field(discriminator="shape")]
 
     assert "mapping with shape: disc or square" in describe(Outline)

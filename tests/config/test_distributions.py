@@ -55,8 +55,6 @@ def rng_of(index: int) -> Rng:
 
 
 class Fields(Strict):
-    """One field of each kind."""
-
     scalar: Scalar = Constant(0.0)
     count: Count = Constant(0)
     name: Name = Constant("a")
@@ -386,8 +384,6 @@ def test_a_distribution_of_a_plugin_needs_fields_and_draw(
 
     @base.parameters
     class Triangular(Numeric[float], key="triangular", kinds=("number",)):
-        """Rises to a peak and falls again."""
-
         peak: float
         reach: float = 1.0
 
@@ -477,8 +473,6 @@ def test_a_scalar_is_drawn_in_microseconds() -> None:
 
 
 class Sides(Strict):
-    """A field with few names."""
-
     side: Annotated[Name, OneOf(("left", "right"))] = Constant("left")
 
 

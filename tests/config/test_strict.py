@@ -10,8 +10,6 @@ from gen_data.config.base_model import Strict
 
 
 class Values(Strict):
-    """One field of each simple type."""
-
     number: float = 0.5
     whole: int = 1
     text: str = "x"

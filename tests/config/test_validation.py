@@ -29,37 +29,27 @@ from gen_data.core.errors import ConfigError
 
 
 class Mode(str, Enum):
-    """A closed set."""
-
     FAST = "fast"
     GOOD = "good"
 
 
 class Camera(Strict):
-    """A nested mapping."""
-
     fov_deg: float = Field(gt=1, lt=170)
     size_px: tuple[int, int] = (640, 480)
     mode: Mode = Mode.FAST
 
 
 class Coco(Strict):
-    """One alternative of a tagged union."""
-
     type: Literal["coco"]
     crowd: int = 1
 
 
 class Kitti(Strict):
-    """The other one."""
-
     type: Literal["kitti"]
     index: int = 1
 
 
 class Config(Strict):
-    """Every kind of field."""
-
     camera: Camera | None = None
     style: Literal["matte", "glossy"] = "matte"
     n: int = Field(default=1, ge=1)

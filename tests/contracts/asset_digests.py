@@ -80,7 +80,6 @@ def _digest(arrays: Arrays) -> str:
 
 
 def main() -> None:
-    """Renew the digests of all families."""
     # As tests do: no pack that is installed here.
     os.environ["GEN_DATA_ASSETS"] = tempfile.mkdtemp(prefix="gen-data-no-packs-")
     with tempfile.TemporaryDirectory() as folder:

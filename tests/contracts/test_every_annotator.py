@@ -62,12 +62,10 @@ def world() -> World:
 
 
 def made(name: str) -> AnyAnnotator:
-    """Make an annotator with its defaults."""
     return ANNOTATORS[name]()
 
 
 def annotated(name: str, of: World | None = None) -> tuple[ImageTruth, EgoTruth | None]:
-    """Fields that one annotator fills in."""
     given = of or world()
     image = annotate_reading(given.scene, given.reading, [made(name)], FEW_PX, given.assets)
     return image, annotate_ego({"": given.scene}, [made(name)], given.assets)

@@ -38,7 +38,6 @@ def test_every_description_fits_a_terminal(kind: str) -> None:
 
 
 def test_the_list_of_all_names_fits_a_terminal() -> None:
-    """Plug-ins, sections, distributions."""
     lines = list_names_of({"kind": [f"name_{k}" for k in range(99)]}).splitlines()
     assert max(map(len, lines)) <= COLUMNS
     assert " ".join(lines).count("name_") == 99
@@ -70,6 +69,5 @@ def test_nested_mappings_and_sections_are_described(name: str, contains: str) ->
      ("rgb_camera.lense", "lens"), ("lidars", "lidar")],
 )  # fmt: skip
 def test_unknown_names_give_the_nearest(name: str, nearest: Any) -> None:
-    """Of everything that has a description."""
     with pytest.raises(ConfigError, match=rf"did you mean '([a-z_]+\.)?{nearest}'"):
         describe_name(name)

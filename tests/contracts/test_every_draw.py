@@ -71,7 +71,6 @@ class Variants:
         self._made: dict[int, Made] = {}
 
     def first(self, most: int = SEEDS) -> Iterator[tuple[int, Made]]:
-        """The first variants and their seeds."""
         for seed in range(min(most, self.family.variants)):
             if seed not in self._made:
                 self._made[seed] = self.make(seed)
@@ -119,7 +118,6 @@ def variants(request: pytest.FixtureRequest) -> Variants:
 
 
 def every(names: Iterable[str]) -> pytest.MarkDecorator:
-    """A test of each of some families."""
     return pytest.mark.parametrize("variants", cases(sorted(names), QUICK), indirect=True)
 
 

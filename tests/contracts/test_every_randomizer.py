@@ -185,7 +185,6 @@ def made(kind: str) -> Any:
 
 
 def drawn(kind: str, stream: str = "stream", scene_index: int = 0) -> Scene:
-    """The nominal scene after one draw."""
     return made(kind)(*world_of(kind), rng_of(stream, scene_index))
 
 
@@ -195,7 +194,6 @@ each = pytest.mark.parametrize("kind", cases(TABLE, set(TABLE) - SLOW))
 
 @each
 def test_scene_that_is_handed_in_stays_as_it_is(kind: str) -> None:
-    """A randomizer returns a new scene."""
     scene, assets = world_of(kind)
     before = canonical_json(scene)
 
@@ -274,7 +272,6 @@ def test_unknown_fields_are_refused(kind: str) -> None:
 
 @each
 def test_values_do_not_change_after_it_is_made(kind: str) -> None:
-    """Parameters are frozen."""
     with pytest.raises(ValidationError):
         made(kind).name = "other"
 
@@ -290,7 +287,6 @@ def test_what_physics_has_to_see_is_drawn_per_scene_only(kind: str) -> None:
 
 @pytest.mark.parametrize("kind", [kind for kind in TABLE if kind not in PHYSICS_BOUND])
 def test_looks_can_be_drawn_per_scene_or_per_view(kind: str) -> None:
-    """``stage`` is scene or view."""
     for word, stage in (("scene", Stage.BUILD), ("view", Stage.VIEW)):
         plain = {"type": kind, "name": kind, "stage": word, **GIVEN.get(kind, {})}
         assert TABLE.load(kind).model_validate_json(json.dumps(plain)).stage == stage

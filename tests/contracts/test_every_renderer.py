@@ -53,13 +53,11 @@ def opened(name: str) -> Renderer:
 
 
 def fresh(name: str) -> Renderer:
-    """A renderer that has rendered nothing."""
     settings = SETTINGS[name]()
     return settings.open(FakeLibrary({"box": box_mesh(SIZE_M)}))
 
 
 def box(instance_id: int, pose: SE3) -> tuple[Body, Instance]:
-    """A labelled box."""
     low, high = (tuple(sign * 0.5 * side for side in SIZE_M) for sign in (-1.0, 1.0))
     name = f"box{instance_id}"
     body = Body(name, "box", pose, instance_id=instance_id)
@@ -83,12 +81,10 @@ CAMERA = camera_at((-1.0, 0.0, 0.0), (1.0, 0.0, 0.0), (WIDTH_PX, HEIGHT_PX))
 def rendered(
     name: str, scene: Scene = SCENE, channels: frozenset[Channel] = CHANNELS, new: bool = False
 ) -> SensorReading:
-    """One reading."""
     return (fresh(name) if new else opened(name)).render(scene, CAMERA, channels)
 
 
 def assert_same(one: SensorReading, other: SensorReading) -> None:
-    """Byte by byte."""
     assert one.channels.keys() == other.channels.keys()
     for channel, image in one.channels.items():
         assert image.tobytes() == other.channels[channel].tobytes(), channel
@@ -115,7 +111,6 @@ def test_a_requested_channel_has_the_documented_type(name: str, channel: Channel
 
 @each
 def test_the_reading_says_who_took_it_and_when(name: str) -> None:
-    """Camera, its name, the scene's instant."""
     reading = rendered(name, replace(SCENE, time_s=0.25), frozenset({Channel.INSTANCE}))
 
     assert (reading.sensor, reading.camera, reading.time_s) == ("camera", CAMERA, 0.25)
@@ -208,7 +203,6 @@ def test_labels_do_not_depend_on_what_else_is_requested(name: str) -> None:
 
 @each
 def test_arguments_stay_as_they_are(name: str) -> None:
-    """Scene and camera are values."""
     before = canonical_json(SCENE), canonical_json(CAMERA)
     rendered(name)
 

@@ -46,7 +46,6 @@ device = pytest.mark.parametrize(
 
 @cache
 def renderer() -> Renderer:
-    """The project's renderer, for small images."""
     meshes = {"box": box_mesh((4.0, 1.8, 1.0)), "ground": plane_mesh(300.0)}
     return WarpRenderer(FakeLibrary(meshes), "cpu")
 
@@ -88,7 +87,6 @@ def made(kind: str, **fields: Any) -> Any:
 
 
 def seen(sensor: Any, step: int = 3, seed: int = 0) -> SensorReading | PointCloud | Measurements:
-    """Reading of the sensor at one step."""
     scene = place_sensors(sensor.mount(street()))
     rng = Streams(seed, scene=0, view=0, step=step).rng("sensor/unit")
     channels = frozenset({Channel.INSTANCE})
@@ -96,7 +94,6 @@ def seen(sensor: Any, step: int = 3, seed: int = 0) -> SensorReading | PointClou
 
 
 def data(returned: SensorReading | PointCloud | Measurements) -> bytes:
-    """All bytes of a reading."""
     if isinstance(returned, SensorReading):
         return b"".join(returned.channels[c].tobytes() for c in sorted(returned.channels))
     return (returned.rows if isinstance(returned, Measurements) else returned.points).tobytes()
@@ -206,7 +203,6 @@ def test_rows_are_of_the_type_that_is_documented(kind: str) -> None:
 
 @device
 def test_rows_lie_between_the_last_step_and_this_one(kind: str) -> None:
-    """In order of time."""
     for step in range(4):
         returned = seen(made(kind), step)
         assert isinstance(returned, Measurements)
@@ -226,7 +222,6 @@ def test_a_rate_that_does_not_fit_is_told_with_one_that_does(kind: str) -> None:
 
 
 def test_points_of_laser_scanners_are_of_the_type_that_is_documented() -> None:
-    """For completeness of the table."""
     returned = seen(made("lidar"))
 
     assert isinstance(returned, PointCloud)

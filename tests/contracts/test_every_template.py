@@ -32,19 +32,16 @@ TEMPLATES = sorted(path.stem for path in Path(scene_templates.__path__[0]).glob(
 
 @cache
 def spec(name: str) -> Config:
-    """A shipped configuration."""
     return load_config(name)
 
 
 @cache
 def scene_of(name: str) -> Scene:
-    """Its nominal scene."""
     return nominal_scene(spec(name), spec(name).probes[0], library())
 
 
 @cache
 def validator() -> Draft202012Validator:
-    """Checks documents against the schema of configurations."""
     return Draft202012Validator(config_schema())
 
 
@@ -141,7 +138,6 @@ def test_nominal_objects_stand_on_their_surfaces_inside_the_room(name: str) -> N
 
 @pytest.mark.parametrize("name", cases(CONFIGS, QUICK))
 def test_nominal_scene_is_the_same_every_time(name: str) -> None:
-    """Built twice, from two libraries."""
     again = nominal_scene(spec(name), spec(name).probes[0], open_library(()))
 
     assert canonical_json(again) == canonical_json(scene_of(name))

@@ -12,7 +12,6 @@ NAME = "tabletop"
 
 @pytest.fixture(autouse=True)
 def _made(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A data set like the stored one."""
     stored = read_stored()
     monkeypatch.setattr(stage_digests, "digests_of", lambda _: dict(stored["samples"][NAME]))
     monkeypatch.setattr(stage_digests, "numerics_of", lambda _: dict(stored["numerics"]))

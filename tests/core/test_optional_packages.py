@@ -22,7 +22,6 @@ PROJECT = Path(__file__).parents[2] / "pyproject.toml"
 
 @pytest.fixture
 def bare(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A machine without any optional package."""
     monkeypatch.setattr(optional_packages, "find_spec", lambda name: None)
 
 

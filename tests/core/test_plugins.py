@@ -44,8 +44,6 @@ class Complete(BaseModel):
 
 
 class Lacking(BaseModel):
-    """The same without a method."""
-
     type: Literal["lacking"] = "lacking"
     size: int = 0
 
@@ -55,8 +53,6 @@ class Misnamed(Complete):
 
 
 class Plain:
-    """Nothing that YAML could be read as."""
-
     type = "plain"
     size = 0
 
@@ -65,8 +61,6 @@ class Plain:
 
 
 class Square(Protocol):
-    """The contract of these plug-ins."""
-
     @property
     def size(self) -> int: ...
 

@@ -18,11 +18,9 @@ class Strict:
         self.__dict__["own"] = CREATE()
 
     def __getattr__(self, name: str) -> Any:
-        """All else is Expat's."""
         return getattr(self.__dict__["own"], name)
 
     def __setattr__(self, name: str, value: Any) -> None:
-        """Handlers are Expat's."""
         setattr(self.__dict__["own"], name, value)
 
     def Parse(self, data: bytes, is_final: bool) -> None:  # noqa: N802  (the parser's own name)

@@ -18,15 +18,11 @@ from gen_data.core.serialization import canonical_json, from_plain, to_plain
 
 
 class Colour(str, Enum):
-    """A closed set."""
-
     RED = "red"
 
 
 @dataclass(frozen=True)
 class Inner:
-    """A leaf."""
-
     pose: SE3 = IDENTITY
     ratio: float = 1.0
 
@@ -83,8 +79,6 @@ def test_a_scene_survives_json() -> None:
 
 @dataclass(frozen=True)
 class Labelled:
-    """A value with a binary mask."""
-
     mask: NDArray[np.bool_]
 
 

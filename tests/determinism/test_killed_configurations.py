@@ -16,7 +16,6 @@ WAIT_S = 600
 
 
 def generate(name: str, out: Path) -> list[str]:
-    """Arguments that generate a shard per sample."""
     options = f"--config {name}.yaml --n {N} --workers 1 --set shard_size=1 --out"
     return [*options.split(), str(out)]
 

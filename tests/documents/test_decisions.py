@@ -37,7 +37,6 @@ def parts(entry: str) -> list[str]:
 
 @cache
 def paths() -> frozenset[str]:
-    """Files of the repository and their folders."""
     files = map(PurePosixPath, repository_files())
     return frozenset(str(path) for file in files for path in (file, *file.parents))
 
@@ -52,7 +51,6 @@ def source() -> str:
 
 @cache
 def words() -> frozenset[str]:
-    """Words of the sources."""
     return frozenset(WORD.findall(source()))
 
 

@@ -45,7 +45,6 @@ def files() -> list[Path]:
 
 
 def name_of(path: Path) -> str:
-    """Path of a file in the repository."""
     return path.relative_to(ROOT).as_posix()
 
 
@@ -66,7 +65,6 @@ def tics(text: str) -> Counter[str]:
 
 
 def allowed() -> dict[str, int]:
-    """Numbers by file, from the table."""
     read: dict[str, int] = yaml.safe_load(TABLE.read_text("utf-8")) or {}
     return read
 

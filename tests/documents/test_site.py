@@ -36,7 +36,6 @@ ROOT = Path(__file__).parents[2]
 
 @cache
 def page_of(kind: str) -> str:
-    """Page of the plug-ins of one kind."""
     return plugin_page(kind, TABLES[kind])
 
 

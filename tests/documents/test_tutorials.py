@@ -123,7 +123,6 @@ def test_the_page_runs(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 
 
 def run(words: list[str], folder: Path) -> None:
-    """Run one command; an unknown one fails."""
     site = folder / "site-packages"
     command, *arguments = words
     if command == "gen-data" and not site.exists():

@@ -40,7 +40,6 @@ OPENED: list[Env] = []
 
 
 def small(engine: str = INSTALLED[0], task: str = "reach", **options: Any) -> Env:
-    """A new environment."""
     shared = {**CONFIG["shared"], "task": task}
     env = Env({**CONFIG, "shared": shared, "physics": {"engine": engine}}, **options)
     OPENED.append(env)
@@ -62,13 +61,11 @@ def arm_of(env: Env) -> Articulation:
 
 
 def simulation_of(env: Env) -> ArmSimulation:
-    """The simulation of the running episode."""
     assert env.rollout is not None
     return env.rollout.simulation
 
 
 def same(one: dict[str, Any], other: dict[str, Any]) -> bool:
-    """Whether two observations have the same bytes."""
     return one.keys() == other.keys() and all(
         np.asarray(one[k]).tobytes() == np.asarray(other[k]).tobytes() for k in one
     )

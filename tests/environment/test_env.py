@@ -25,7 +25,6 @@ from tests.wheels import INSTALLED
 
 @pytest.fixture(params=INSTALLED)
 def engine(request: pytest.FixtureRequest) -> str:
-    """Name of an engine."""
     return str(request.param)
 
 

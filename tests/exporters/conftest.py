@@ -500,7 +500,6 @@ class Props:
         return Asset(asset_id, "object", category, (), *nobody, symmetries=tuple(turns))
 
     def mesh(self, asset_id: str) -> MeshData:
-        """On the ground, as the instances are."""
         import trimesh
 
         _, shape, category = asset_id.split("/")

@@ -16,7 +16,6 @@ def drive_info(world: Any) -> Any:
 
 
 def stems(folder: Path) -> list[str]:
-    """Names of files without their ends, sorted."""
     return sorted(path.stem for path in folder.iterdir())
 
 

@@ -21,8 +21,6 @@ RECALLS = np.arange(1, 41) / 40.0
 
 @dataclass(frozen=True)
 class Difficulty:
-    """Limits of the truth that counts."""
-
     height_min_px: float
     occlusion_max: int
     truncation_max: float

@@ -248,7 +248,6 @@ def reach(world: Any) -> tuple[Any, Any]:
 
 
 def slips(world: Any) -> tuple[Any, Any]:
-    """The same, where the task fails."""
     return drive_info(world), test_demonstrations.demonstrated(world)
 
 
@@ -257,7 +256,6 @@ def graspable(world: Any) -> tuple[Any, Any]:
 
 
 def labels(made: Made) -> None:
-    """Objects that readers of labelled images find."""
     assert_objects(made.kind, made.folder, made.samples)
 
 
@@ -373,7 +371,6 @@ class Copied:
         return self._folder
 
     def __getattr__(self, name: str) -> Any:
-        """Return everything else that the world has."""
         return getattr(self._world, name)
 
 

@@ -57,7 +57,6 @@ def readings(folder: Path, channel: str) -> list[dict[str, Any]]:
 
 @pytest.fixture(scope="module")
 def every(exported: Any) -> Path:
-    """Every step is a key frame."""
     folder: Path = exported(NuScenes(key_frame_s=0.1))
     return folder
 

@@ -40,7 +40,6 @@ def fitted() -> Part:
 
 
 def row(part: Part, name: str) -> FittedQuantity:
-    """The row of a quantity."""
     return next(one for one in part.quantities if one.name == name)
 
 

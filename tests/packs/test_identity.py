@@ -24,7 +24,6 @@ def factory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> PipelineFactory:
 
 
 def installed_box(tmp_path: Path, side: str) -> None:
-    """A pack with one household object."""
     archive = tmp_path / f"{side}.zip"
     with zipfile.ZipFile(archive, "w") as file:
         file.writestr("data/box.obj", BOX.replace("v 1", f"v {side}"))

@@ -13,13 +13,11 @@ from tests.wheels import INSTALLED
 
 @pytest.fixture(params=INSTALLED)
 def engine_name(request: pytest.FixtureRequest) -> EngineName:
-    """Name of an engine."""
     name: EngineName = request.param
     return name
 
 
 @pytest.fixture
 def engine(engine_name: EngineName) -> Iterator[Engine]:
-    """An engine with default settings."""
     with Engine(Solids(), PhysicsConfig(engine=engine_name)) as opened:
         yield opened

@@ -21,11 +21,9 @@ class Solids:
     """An asset library whose ids are sizes: ``box 0.1 0.2 0.3``, ``cylinder 0.03 0.12``."""
 
     def convex_parts(self, asset_id: str) -> ConvexParts:
-        """Collision geometry of an id."""
         return _parts(asset_id)
 
     def robot(self, asset_id: str) -> RobotModel:
-        """``panda`` or ``gantry``."""
         if asset_id not in ROBOTS:
             raise AssetError(f"no robot '{asset_id}'")
         return ROBOTS[asset_id]()

@@ -26,13 +26,11 @@ def armed(scene: Scene, goal: ArmGoal | None, positions: tuple[float, ...] = HOM
 
 
 def above_table(x: float, y: float, height_m: float, yaw_rad: float = 0.0) -> SE3:
-    """A grasp pose that looks straight down."""
     turn = multiply_quaternions(SE3.about_z(yaw_rad).quaternion_wxyz, DOWN)
     return SE3((x, y, TABLE_TOP_Z_M + height_m), turn)
 
 
 def hand_pose(scene: Scene) -> SE3:
-    """``T_world_grasp`` of a settled scene."""
     arm = scene.articulations[0]
     assert ROBOT.gripper is not None
     poses = link_poses(ROBOT, arm.T_world_base, arm.joint_positions)

@@ -45,7 +45,6 @@ def put_scene(failure: FailureKind = "") -> Scene:
 
 @cache
 def shown(engine_name: EngineName, failure: FailureKind = "") -> Scene:
-    """The demonstration of ``put_scene``."""
     with Engine(Solids(), PhysicsConfig(engine=engine_name)) as engine:
         settled = engine.settle(put_scene(failure))
     assert settled.rejection is None, settled.rejection
@@ -53,7 +52,6 @@ def shown(engine_name: EngineName, failure: FailureKind = "") -> Scene:
 
 
 def final(scene: Scene, name: str) -> SE3:
-    """Pose of a body after everything."""
     return scene_at(scene, 60.0).body(name).T_world_body
 
 

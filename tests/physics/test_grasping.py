@@ -87,7 +87,6 @@ def world(engine_name: EngineName) -> Iterator[World]:
 
 
 def hand(world: World) -> Hand:
-    """The hand in the world."""
     robot = hand_robot()
     assert robot.gripper is not None
     return Hand(robot, robot.gripper, world, lambda link: link)

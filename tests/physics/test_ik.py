@@ -18,7 +18,6 @@ CHAIN: Chain = make_chain(ROBOT, GRIPPER)
 
 
 def grasp_pose(arm_positions: tuple[float, ...]) -> SE3:
-    """``T_base_grasp`` by forward kinematics."""
     poses = link_poses(ROBOT, SE3(), all_positions(ROBOT, arm_positions, 1.0))
     return poses[GRIPPER.link] @ GRIPPER.T_link_grasp
 

@@ -25,7 +25,6 @@ from tests.physics.panda import HOME, panda, urdf_path
 
 @pytest.fixture
 def client() -> Iterator[int]:
-    """A pybullet connection of its own."""
     pybullet = pytest.importorskip("pybullet")
     number: int = pybullet.connect(pybullet.DIRECT)
     yield number

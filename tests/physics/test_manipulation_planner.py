@@ -34,7 +34,6 @@ def going(scene: Scene, *way: ArmGoal, start: ArmGoal | None = START) -> Scene:
 
 
 def spot(x: float, y: float, yaw_rad: float = 0.0) -> SE3:
-    """A point on the table."""
     return SE3.about_z(yaw_rad, (x, y, TABLE_TOP_Z_M))
 
 
@@ -52,7 +51,6 @@ def pick_and_place(asset: str = "box 0.05 0.03 0.06") -> Scene:
 
 @cache
 def moved(engine_name: EngineName, asset: str = "box 0.05 0.03 0.06") -> Scene:
-    """``pick_and_place`` after physics."""
     with Engine(Solids(), PhysicsConfig(engine=engine_name)) as engine:
         settled = engine.settle(pick_and_place(asset))
     assert settled.rejection is None

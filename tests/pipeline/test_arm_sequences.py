@@ -16,7 +16,6 @@ SMALL = (
 
 @pytest.fixture(scope="module")
 def sequence() -> list[Sample]:
-    """All ten instants, in order."""
     with open_pipeline(load_config("tabletop_sequence.yaml", overrides=SMALL)) as pipeline:
         return [pipeline.sample(index) for index in range(10)]
 

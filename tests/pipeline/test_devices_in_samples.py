@@ -40,33 +40,26 @@ class Boxes:
     """Assets that are all as large as a car."""
 
     def get(self, asset_id: str) -> SimpleNamespace:
-        """An entry without facts."""
         return SimpleNamespace(attributes=(), subcategory="")
 
     def body_bounds_m(self, asset_id: str) -> None:
         """None: there are no mirrors."""
 
     def bounds_m(self, asset_id: str) -> tuple:
-        """A car's."""
         return CAR_M
 
     def keypoints(self, asset_id: str) -> tuple:
-        """None."""
         return ()
 
 
 class AtRest:
-    """Physics that finds every scene at rest."""
-
     def __enter__(self) -> AtRest:
-        """Nothing to start."""
         return self
 
     def __exit__(self, *exception: object) -> None:
         """Nor to stop."""
 
     def settle(self, scene: object) -> Settled:
-        """The scene as it is."""
         return Settled(scene)  # type: ignore[arg-type]
 
 

@@ -21,7 +21,6 @@ SMALL = (
 
 @pytest.fixture(scope="module")
 def samples() -> Iterator[list[Sample]]:
-    """Two views of the tabletop."""
     with open_pipeline(load_config("tabletop", overrides=SMALL)) as pipeline:
         yield [pipeline.sample(index) for index in range(2)]
 

@@ -90,7 +90,6 @@ def test_a_sample_made_again_has_the_same_points(samples: list[Sample]) -> None:
 
 @pytest.mark.slow
 def test_scenes_with_scanners_survive_serialisation(samples: list[Sample]) -> None:
-    """Provenance holds their poses."""
     scene = samples[0].scene
 
     assert from_plain(Scene, to_plain(scene)).lidars == scene.lidars

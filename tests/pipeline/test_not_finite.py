@@ -32,14 +32,11 @@ NAN, INF = math.nan, math.inf
 
 @dataclass(frozen=True)
 class Plant:
-    """A randomizer that changes a finished view."""
-
     change: Callable[[Scene], Scene]
     name: str = "plant"
     stage: Stage = Stage.VIEW
 
     def __call__(self, scene: Scene, assets: AssetLibrary, rng: Rng) -> Scene:
-        """Change it."""
         del assets, rng
         return self.change(scene)
 
@@ -69,8 +66,6 @@ def planted(pipeline: Pipeline, change: Callable[[Scene], Scene]) -> Pipeline:
 
 
 def dim_light(value: float) -> Callable[[Scene], Scene]:
-    """Give the first light this illuminance."""
-
     def change(scene: Scene) -> Scene:
         light = replace(scene.lights[0], illuminance_lux=value, intensity_cd=value)
         return replace(scene, lights=(light, *scene.lights[1:]))
@@ -79,8 +74,6 @@ def dim_light(value: float) -> Callable[[Scene], Scene]:
 
 
 def rough_body(value: float) -> Callable[[Scene], Scene]:
-    """Give all bodies this roughness."""
-
     def change(scene: Scene) -> Scene:
         bodies = tuple(
             replace(
@@ -94,8 +87,6 @@ def rough_body(value: float) -> Callable[[Scene], Scene]:
 
 
 def moved_camera(value: float) -> Callable[[Scene], Scene]:
-    """Put the camera there."""
-
     def change(scene: Scene) -> Scene:
         camera = scene.cameras[0]
         pose = SE3.about_z(0.0, (value, 0.0, 1.0))
@@ -134,14 +125,12 @@ class Broken:
     value: float = NAN
 
     def render(self, *arguments: Any) -> SensorReading:
-        """Render, and spoil one pixel."""
         reading: SensorReading = self.renderer.render(*arguments)
         image = reading.channels[self.channel].copy()
         image[3, 5] = self.value
         return replace(reading, channels={**reading.channels, self.channel: image})
 
     def scan(self, scene: Scene, lidar: Lidar, beams: Any) -> LidarHits:
-        """Find one wrong range."""
         del scene, lidar, beams
         near = np.ones((2, 1), np.float32)
         ids = np.zeros((2, 1), np.uint16)
@@ -179,7 +168,6 @@ class Undefined:
     """A distribution of a plug-in that draws NaN."""
 
     def draw(self, rng: Rng) -> float:
-        """Draw it."""
         del rng
         return NAN
 

@@ -35,7 +35,6 @@ class Draws:
     stage: Stage
 
     def __call__(self, scene: Scene, assets: object, rng: Any) -> Scene:
-        """Add one uniform draw."""
         yaw_rad = scene.environment.yaw_rad + rng.uniform()
         return replace(scene, environment=replace(scene.environment, yaw_rad=yaw_rad))
 
@@ -49,7 +48,6 @@ class Refuses:
     threshold: float
 
     def __call__(self, scene: Scene, assets: object, rng: Any) -> Scene:
-        """Reject unless the draw is large."""
         if rng.uniform() < self.threshold:
             raise LayoutRejected(Rejection("draw too small", "lower the threshold"))
         return scene
@@ -62,30 +60,24 @@ class AcceptingPhysics:
         self.settled = 0
 
     def __enter__(self) -> AcceptingPhysics:
-        """Nothing to start."""
         return self
 
     def __exit__(self, *exception: object) -> None:
         """Nor to stop."""
 
     def settle(self, scene: Scene) -> Settled:
-        """The scene as it is."""
         self.settled += 1
         return Settled(scene)
 
 
 class RefusingPhysics:
-    """Physics that never finds rest."""
-
     def __enter__(self) -> RefusingPhysics:
-        """Nothing to start."""
         return self
 
     def __exit__(self, *exception: object) -> None:
         """Nor to stop."""
 
     def settle(self, scene: Scene) -> Settled:
-        """A rejection with alternating reasons."""
         reason = "object fell off" if scene.environment.yaw_rad % 1 < 0.5 else "still moving"
         return Settled(scene, Rejection(reason, "fewer objects (randomizers.clutter.count)"))
 
@@ -97,7 +89,6 @@ class OneCamera:
     name: str = "color"
 
     def mount(self, scene: Scene) -> Scene:
-        """The scene with the camera in it."""
         return replace(scene, cameras=(CAMERA,))
 
     def capture(self, scene: Scene, renderer: Any, channels: Any, rng: Any) -> SensorReading:
@@ -113,7 +104,6 @@ def pipeline(
     views_per_scene: int = 3,
     splits: Mapping[str, float] | None = None,
 ) -> Pipeline:
-    """A pipeline of test doubles."""
     sensor = OneCamera()
     recipe = PipelineConfig(
         open_scene=lambda streams: (sensor.mount(Scene("test")), randomizers, (sensor,)),
@@ -131,7 +121,6 @@ def pipeline(
 
 
 def seen(made: Pipeline, index: int) -> np.ndarray:
-    """What the sensor returned for one sample."""
     return made.sample(index).capture.readings["color"].channels[Channel.RGB]
 
 
@@ -211,7 +200,6 @@ def test_more_instances_than_label_images_hold_are_refused() -> None:
         count: int = 65_536
 
         def __call__(self, scene: Scene, assets: Any, rng: Any) -> Scene:
-            """Many instances."""
             return replace(scene, instances=(Instance(1, "it", "it", 1, "it"),) * self.count)
 
     text = r"scene 0: 65536 instances.*room for 65535; place fewer"
@@ -235,21 +223,18 @@ class TwoBoxes:
     """Assets of which every one is a box of 2 x 4 x 6 cm with a point at its top."""
 
     def get(self, asset_id: str) -> Asset:
-        """Every one is of the kind ``small``."""
         return Asset(
             asset_id, "object", "mug", (), "", "", "", "",
             subcategory="small", attributes=(("lid", "open"), ("state", "new")),
         )  # fmt: skip
 
     def keypoints(self, asset_id: str) -> tuple[Keypoint, ...]:
-        """One."""
         return (Keypoint("top", (0.0, 0.0, 0.03)),)
 
     def body_bounds_m(self, asset_id: str) -> None:
         """None: there are no mirrors."""
 
     def bounds_m(self, asset_id: str) -> Any:
-        """Bounds of the box."""
         return (-0.01, -0.02, -0.03), (0.01, 0.02, 0.03)
 
     def mesh(self, asset_id: str) -> MeshData:
@@ -294,7 +279,6 @@ class WithMirrors(TwoBoxes):
     """Boxes of 4 cm width, 1 cm of which are mirrors on both sides."""
 
     def body_bounds_m(self, asset_id: str) -> Any:
-        """Bounds without them."""
         return (-0.01, -0.01, -0.03), (0.01, 0.01, 0.03)
 
 

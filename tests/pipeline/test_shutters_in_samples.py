@@ -21,7 +21,6 @@ SIZE_PX = (240, 136)
 
 @pytest.fixture(scope="module")
 def pipeline() -> Iterator[Pipeline]:
-    """With small images of a clear day."""
     overrides = [
         "sensors.dash.size_px=[240, 136]",
         "shared.district=arterial",
@@ -34,7 +33,6 @@ def pipeline() -> Iterator[Pipeline]:
 
 @pytest.fixture(scope="module")
 def sample(pipeline: Pipeline) -> Sample:
-    """In the middle of a drive."""
     return pipeline.sample(6)
 
 

@@ -61,7 +61,6 @@ class Street:
 
     @classmethod
     def first(cls, pipeline: Pipeline) -> Street:
-        """The first view of a pipeline."""
         return cls(pipeline.drawn_view(pipeline.accepted_scene(0), 0).scene, pipeline.assets)
 
     def ground_m(self, places_m: ArrayLike) -> NDArray[np.float64]:
@@ -71,7 +70,6 @@ class Street:
         return np.asarray(60.0 - self._caster.cast(above, (0.0, 0.0, -1.0)).distance, np.float64)
 
     def vehicles(self) -> list[Instance]:
-        """Those with wheels."""
         return [i for i in self.scene.instances if _wheels_m(i) is not None]
 
 

@@ -94,7 +94,6 @@ def scenes(dataset: Path) -> list[dict[str, object]]:
 
 
 def lines(dataset: Path) -> list[dict[str, object]]:
-    """Lines written by the third-party exporter."""
     text = (dataset / "stranger_lines/objects.jsonl").read_text()
     return [json.loads(line) for line in text.splitlines()]
 
@@ -143,7 +142,6 @@ def test_the_contact_sheet_shows_the_drawing_of_the_device(dataset: Path, instal
 
 
 def test_the_data_set_verifies(dataset: Path, installed: str) -> None:
-    """Every byte of it."""
     done = run("verify", str(dataset), "--full", path=installed, cwd=dataset)
 
     assert done.returncode == 0, done.stderr

@@ -68,8 +68,6 @@ def test_every_channel_of_flow_can_be_looked_at(channel: Channel, depth: int) ->
 
 
 class _Stream:
-    """What a recorder logs."""
-
     def __init__(self) -> None:
         self.logged: dict[str, object] = {}
 

@@ -18,8 +18,6 @@ ARM = Articulation("arm", "two_link", 1, SE3((-0.5, 0.0, 0.74)), two_link_arm().
 
 
 class NoGripper(FakeAssets):
-    """The same arm without a hand."""
-
     def robot(self, asset_id: str) -> RobotModel:
         return replace(super().robot(asset_id), gripper=None)
 

@@ -165,8 +165,6 @@ def test_things_lie_where_the_workspace_of_the_arm_begins(begins_m: float) -> No
     """As much nearer or farther than those of an arm whose workspace begins at 0.3 m."""
 
     class Reaching(FakeAssets):
-        """Has the arm with another workspace."""
-
         def robot(self, asset_id: str) -> RobotModel:
             return replace(super().robot(asset_id), workspace_from_m=begins_m)
 

@@ -128,7 +128,6 @@ def test_clouds_dim_and_soften_the_sun() -> None:
 
 
 def street() -> Scene:
-    """A lamp and a house, at night."""
     window = Material(role="window")
     house = Body("house", "brick", materials=(Material(role="facade"), window))
     lamp = Body("lamp", "street_lamp", SE3((2.0, 1.0, 0.5)), materials=(Material(role="lamp"),))

@@ -52,7 +52,6 @@ def sphere_mesh(
     rings: int = 32,
     materials: tuple[asset_types.Material, ...] = (asset_types.Material(),),
 ) -> asset_types.MeshData:
-    """A UV sphere with smooth normals."""
     polar = np.linspace(0.0, np.pi, rings + 1)
     azimuth = np.linspace(0.0, 2 * np.pi, 2 * rings + 1)
     p, a = np.meshgrid(polar, azimuth, indexing="ij")
@@ -93,7 +92,6 @@ def _mesh(vertices, faces, normals, uvs, materials) -> asset_types.MeshData:  # 
 
 
 def uniform_sky(height: int = 16) -> asset_types.Float32:
-    """Radiance 1 everywhere."""
     return np.ones((height, 2 * height, 3), np.float32)
 
 
@@ -154,7 +152,6 @@ def camera_at(
     hfov_deg: float = 60.0,
     ev100: float | None = None,
 ) -> Camera:
-    """A camera that looks at a point."""
     intrinsics = Intrinsics.from_hfov(*size_px, math.radians(hfov_deg))
     return Camera("camera", look_at(eye_m, target_m), intrinsics, ev100)
 

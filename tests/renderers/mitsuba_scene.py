@@ -63,7 +63,6 @@ def mitsuba_scene(
 
 
 def mitsuba_images(loaded: Any, samples: int, count: int, first_seed: int = 0) -> np.ndarray:
-    """Independent images, float64 [count, h, w, 3]."""
     mi = mitsuba()
     return np.stack(
         [

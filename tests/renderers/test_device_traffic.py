@@ -44,12 +44,10 @@ def frames_of(config: str, samples: int, *overrides: str) -> list[Frame]:
 
 
 def tabletop() -> list[Frame]:
-    """Two views of one scene."""
     return frames_of("tabletop.yaml", 2, "views_per_scene=2")
 
 
 def street() -> list[Frame]:
-    """Two views of one scene."""
     return frames_of("street.yaml", 2, "views_per_scene=2")
 
 

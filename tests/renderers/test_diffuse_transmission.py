@@ -43,7 +43,6 @@ def from_above() -> Camera:
 
 
 def drawn(scene: Scene, library: FakeLibrary, settings: RenderSettings = NO_SHADE) -> Float32:
-    """Mean radiance of the realtime tier, [3]."""
     reading = WarpRenderer(library, "cpu", settings).render(
         scene, from_above(), frozenset({Channel.RADIANCE})
     )

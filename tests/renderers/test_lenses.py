@@ -41,7 +41,6 @@ CAMERAS = {
 
 
 def ahead(intrinsics: Intrinsics) -> Camera:
-    """At the origin, its frame the world's."""
     return Camera("camera", SE3(), intrinsics)
 
 

@@ -33,7 +33,6 @@ AHEAD = np.array([[1.0, 0.0, 0.0]], np.float32)
 def scan(
     scene: Scene, directions: np.ndarray, height_m: float = 0.0, subrays: int = 1
 ) -> LidarHits:
-    """From the origin, or above it."""
     lidar = Lidar("top", "color", T_world_lidar=SE3((0.0, 0.0, height_m)))
     beams = LidarRays(np.asarray(directions, np.float32), 0.002, subrays, 200.0)
     return WarpRenderer(LIBRARY, "cpu").scan(scene, lidar, beams)

@@ -109,7 +109,6 @@ class StoringLibrary(FakeLibrary):
     def derived(
         self, asset_id: str, name: str, compute: Callable[[], dict[str, np.ndarray]]
     ) -> dict[str, np.ndarray]:
-        """Arrays computed at the first request."""
         if (asset_id, name) not in self.stored:
             arrays = compute()
             for array in arrays.values():

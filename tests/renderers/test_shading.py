@@ -32,7 +32,6 @@ OPEN = RenderSettings(ambient_occlusion_radius_m=0.0)
 def luminance_of(
     scene: Scene, camera: Camera, library: FakeLibrary, settings: RenderSettings = OPEN
 ) -> np.ndarray:
-    """cd/m^2 of every pixel and channel."""
     renderer = WarpRenderer(library, "cpu", settings)
     reading = renderer.render(scene, camera, frozenset({Channel.RADIANCE}))
     return reading.channels[Channel.RADIANCE]

@@ -91,7 +91,6 @@ def flat(weather: Weather, *bodies: Body) -> Scene:
 
 
 def luminance(reading: SensorReading) -> np.ndarray:
-    """Mean of grey surfaces [cd/m^2]."""
     return reading.channels[Channel.RADIANCE][..., 1].astype(float)
 
 

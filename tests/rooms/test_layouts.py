@@ -62,7 +62,6 @@ CELL_M = 0.1
 
 @cache
 def nominal(kind: str) -> Scene:
-    """An empty room of a type."""
     return build_scene("test", (RoomLayout(name="room", kind=kind),), library())
 
 
@@ -79,7 +78,6 @@ def furnished(kind: str, seed: int, assets: Library | None = None) -> Scene:
 
 
 def family(body: Body) -> str:
-    """Family of a body's asset."""
     return body.asset.partition("?")[0]
 
 
@@ -115,7 +113,6 @@ def distance_m(body: Body, x: float, y: float) -> float:
 
 
 def heights_m(body: Body) -> tuple[float, float]:
-    """Lowest and highest point of a body."""
     if is_tilted(body):
         z_m = world_vertices(body)[:, 2]
         return float(z_m.min()), float(z_m.max())
@@ -125,7 +122,6 @@ def heights_m(body: Body) -> tuple[float, float]:
 
 
 def pieces(scene: Scene) -> list[Body]:
-    """Furniture and things, without parts that open."""
     return [b for b in scene.bodies if b.group == "room" and b.part_id < 2]
 
 

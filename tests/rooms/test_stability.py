@@ -61,7 +61,6 @@ DENSITY_KG_M3 = 300.0
 
 
 def mesh_of(bodies: Sequence[Body], assets: AssetLibrary) -> trimesh.Trimesh:
-    """The meshes of bodies in the world."""
     parts = []
     for body in bodies:
         mesh = assets.mesh(body.asset)
@@ -71,8 +70,6 @@ def mesh_of(bodies: Sequence[Body], assets: AssetLibrary) -> trimesh.Trimesh:
 
 
 class Bullet:
-    """A world under gravity."""
-
     def __init__(self, client: int) -> None:
         self.pb = pytest.importorskip("pybullet")
         self.here = {"physicsClientId": client}
@@ -128,7 +125,6 @@ class Bullet:
 
 @contextmanager
 def bullet() -> Iterator[Bullet]:
-    """A world of its own."""
     pb = pytest.importorskip("pybullet")
     client = pb.connect(pb.DIRECT)
     pb.setGravity(0.0, 0.0, -9.81 * SCALE, physicsClientId=client)

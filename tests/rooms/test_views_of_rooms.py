@@ -47,7 +47,6 @@ def flat(seed: int = 1, kind: str = "apartment") -> Scene:
 
 
 def states(scene: Scene, **fields: dist.Numeric[bool]) -> Scene:
-    """The apartment with states drawn."""
     return ObjectStates(name="s", **fields)(scene, library(), Streams(5, 1).rng("s"))
 
 
@@ -163,7 +162,6 @@ def test_cameras_stand_on_free_floor_at_the_drawn_height() -> None:
 
 
 def walk(**fields: object) -> Scene:
-    """The apartment with a walk through it."""
     return RoomPath(name="p", **fields)(flat(), library(), Streams(5, 4).rng("p"))
 
 
@@ -254,7 +252,6 @@ def test_the_map_of_a_room_agrees_with_outlines() -> None:
 
 
 def _area_m2(scene: Scene) -> float:
-    """Area of all floors and doorways."""
     area = 0.0
     for body in scene.bodies:
         if body.name.endswith("/floor") or body.asset.startswith("door_frame"):

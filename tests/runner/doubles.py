@@ -109,7 +109,6 @@ class FakePipeline:
         return DatasetInfo("fake", 7, self.n, 2, CATEGORIES, (color,))
 
     def __enter__(self) -> FakePipeline:
-        """Die, if that is the trouble."""
         folder = tempfile.mkdtemp(prefix="gen-data-engine-")
         if self.trouble.start_fails:
             os.kill(os.getpid(), signal.SIGKILL)
@@ -117,7 +116,6 @@ class FakePipeline:
         return self
 
     def __exit__(self, *exception: object) -> None:
-        """Remove the engine's files."""
         self._closing.close()
 
     def sample(self, index: int) -> Sample:
@@ -152,13 +150,10 @@ class FakePipeline:
 
 @dataclass(frozen=True)
 class FakeFactory:
-    """Makes the fake pipeline in any process."""
-
     n: int
     trouble: Trouble = Trouble()
 
     def __call__(self) -> FakePipeline:
-        """The pipeline."""
         return FakePipeline(self.n, self.trouble)
 
 

@@ -196,7 +196,6 @@ def edit(path: Path, old: str, new: str) -> None:
     ids=["no such column", "no such folder", "another key", "image missing"],
 )
 def test_damage_is_found(damage: Callable[[Path], Any], dataset: Path, tmp_path: Path) -> None:
-    """The same reader fails on damaged copies."""
     copy = tmp_path / "copy"
     shutil.copytree(dataset, copy)
     damage(copy)

@@ -30,14 +30,12 @@ from tests.runner.test_processes import ROOT, wait_for
 
 @pytest.fixture(autouse=True)
 def staging(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The staging folder of this test alone."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     return tmp_path / "cache"
 
 
 @pytest.fixture
 def memory() -> Iterator[str]:
-    """A URL of storage in this process."""
     system = fsspec.filesystem("memory")
     yield "memory://bucket/set"
     system.store.clear()

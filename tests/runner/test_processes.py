@@ -240,13 +240,10 @@ def test_handlers_are_given_back(tmp_path: Path) -> None:
 
 
 class Stubborn(SceneRejected):
-    """A plug-in's error that cannot be unpickled."""
-
     def __init__(self) -> None:
         super().__init__(3, ())
 
     def __reduce__(self) -> tuple[object, ...]:
-        """What does not fit the constructor."""
         return (Stubborn, ("one argument too many",))
 
 

@@ -32,8 +32,6 @@ def make_sample() -> Sample:
 
 
 class OneSample:
-    """A pipeline with this sample only."""
-
     exporters = FakePipeline(1, Trouble()).exporters
 
     def __init__(self, sample: Sample) -> None:

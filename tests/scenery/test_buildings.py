@@ -169,7 +169,6 @@ def test_no_two_variants_have_the_same_design_and_materials(style: str) -> None:
 
 @pytest.mark.slow
 def test_no_two_of_200_buildings_have_the_same_mesh() -> None:
-    """Digest of the vertices, over all styles."""
     digests = {
         hashlib.sha256(building(seed, style).mesh.vertices_m.tobytes()).hexdigest()
         for style in STYLES

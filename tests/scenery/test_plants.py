@@ -24,7 +24,6 @@ def summer_mesh(species: str) -> MeshData:
 
 
 def leaves_of(mesh: MeshData) -> np.ndarray:
-    """Whether each face is a leaf."""
     slots = [k for k, m in enumerate(mesh.materials) if m.role == "leaf"]
     return np.isin(mesh.face_slots, slots)
 
@@ -41,7 +40,6 @@ def test_leaves_come_and_go_but_the_trunk_stays(species: str) -> None:
 
 
 def foot_of(mesh: MeshData) -> np.ndarray:
-    """Vertices of the trunk on the ground."""
     slots = [k for k, m in enumerate(mesh.materials) if m.texture.startswith("texture/bark")]
     wood = mesh.vertices_m[np.unique(mesh.faces[np.isin(mesh.face_slots, slots)])]
     return wood[wood[:, 2] < 0.01]
@@ -117,7 +115,6 @@ def blocked_share(mesh: MeshData, eyes: np.ndarray) -> float:
 
 @cache
 def cover_of(texture: str) -> np.ndarray:
-    """Coverage of a texture of leaves."""
     alpha = leaves(0, texture.partition("kind=")[2].partition("&")[0]).alpha
     assert alpha is not None
     return alpha

@@ -124,7 +124,6 @@ def test_it_stands_on_the_ground_around_its_origin(built: tuple[str, Solid]) -> 
 
 @for_every_variant
 def test_arrays_are_finite_typed_and_normals_unit(built: tuple[str, Solid]) -> None:
-    """Shapes and types are the contract's."""
     mesh = built[1].mesh
     n = len(mesh.vertices_m)
 
@@ -172,14 +171,12 @@ def test_collision_lies_within_the_mesh_bounds(built: tuple[str, Solid]) -> None
 @pytest.mark.slow
 @for_every(FAMILIES)
 def test_a_variant_has_the_same_bytes_every_time_and_others_than_its_neighbour(name: str) -> None:
-    """A pure function of family and seed."""
     assert digest(variant(name, 1)) == digest(build(name, 1))
     assert digest(variant(name, 1)) != digest(variant(name, 2))
 
 
 @for_every(FAMILIES)
 def test_facts_are_known_without_building(name: str) -> None:
-    """Every variant says what it is."""
     family = FAMILIES[name]
     assert family.facts is not None
     for seed in range(family.variants):

@@ -12,7 +12,6 @@ VARIANTS = [(name, seed) for name in GRIMY for seed in range(FAMILIES[name].vari
 
 
 def test_boxes_and_posts_of_streets_are_grimy() -> None:
-    """The families that stand low on pavements."""
     assert {"bollard", "cabinet", "hydrant", "litter_bin", "post_box"} <= set(GRIMY)
 
 

@@ -43,7 +43,6 @@ def circle(radius_m: float, speed_m_s: float) -> Way:
 
 
 def track_of(body: str, pose: Way, seconds: float = 4.0) -> Trajectory:
-    """Knots of a way from time 0."""
     count = round(seconds / KNOT_S)
     return Trajectory(body, KNOT_S, tuple(pose(k * KNOT_S) for k in range(count + 1)))
 

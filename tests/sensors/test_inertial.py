@@ -69,8 +69,6 @@ def test_lever_arm_adds_its_own_centripetal_acceleration() -> None:
 
 
 def test_braking_is_felt_backwards() -> None:
-    """At 3 m/s^2."""
-
     def braking(t: float) -> SE3:
         return SE3((20.0 * t - 1.5 * t * t, 0.0, 0.0))
 

@@ -89,5 +89,4 @@ class FakeVehicles(FakeAssets):
     """Fake assets whose vehicles are found by every tag."""
 
     def find(self, tags: Any, kind: str = "object") -> Any:
-        """The wagon for any tags of objects."""
         return (self.get("wagon"),) if kind == "object" else super().find(tags, kind)

@@ -121,7 +121,6 @@ class AtRest:
     """Physics that leaves every scene as it is."""
 
     def __enter__(self) -> AtRest:
-        """Nothing to start."""
         return self
 
     def __exit__(self, *exception: object) -> None:

@@ -92,8 +92,6 @@ def test_values_without_weight_are_never_drawn() -> None:
     """Also at the very ends of the unit interval."""
 
     class Ends:
-        """Stands for a generator at its extremes."""
-
         def __init__(self, value: float) -> None:
             self.value = value
 
@@ -113,8 +111,6 @@ def test_a_normal_is_finite_at_the_ends_of_the_unit_interval() -> None:
     """The smallest and largest random number give the far tails, not infinity."""
 
     class Ends:
-        """Stands for a generator at its extremes."""
-
         def __init__(self, value: float) -> None:
             self.value = value
 

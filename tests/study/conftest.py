@@ -13,7 +13,6 @@ from gen_data.lab.study.real_pictures import RealPicture, RealSet
 
 
 def write_picture(path: Path, size_px: tuple[int, int] = (64, 48), value: int = 128) -> None:
-    """Write a grey picture."""
     path.parent.mkdir(parents=True, exist_ok=True)
     cv2.imwrite(str(path), np.full((size_px[1], size_px[0], 3), value, np.uint8))
 

@@ -34,7 +34,6 @@ splits: {train: 1, val: 0, test: 0}
 
 @pytest.fixture(scope="module")
 def config(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A small tabletop."""
     path = tmp_path_factory.mktemp("config") / "small.yaml"
     path.write_text(CONFIG)
     return path
@@ -42,7 +41,6 @@ def config(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def data(config: Path) -> Path:
-    """Forty samples of it."""
     out = config.parent / "data"
     gen_data.generate(config, 40, out=out, workers=0)
     return out
@@ -63,7 +61,6 @@ def weak_results(data: Path) -> list[dict[str, Any]]:
 
 @pytest.fixture(scope="module")
 def results(data: Path) -> Path:
-    """Its detections."""
     path = data.parent / "results.json"
     path.write_text(json.dumps(weak_results(data)))
     return path

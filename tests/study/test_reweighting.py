@@ -34,7 +34,6 @@ DECLARED: list[Distribution[Any]] = [
 
 
 def draw(distribution: Distribution[Any], count: int, seed: int = 0) -> list[Any]:
-    """Values of a distribution."""
     rng = Streams(seed, 0).rng("test")
     return [distribution.draw(rng) for _ in range(count)]
 

@@ -17,7 +17,6 @@ REACH_M = 400.0
 
 
 def rng_of(name: str = "test") -> Rng:
-    """Random stream."""
     return Streams(3, 0).rng(name)
 
 
@@ -63,7 +62,6 @@ def car(graph: LaneGraph, name: str, on: str, at_m: float, **changes: float) -> 
 def fleet(
     lanes: Sequence[Lane], *cars: tuple[str, float], obstacles: np.ndarray = NO_BOXES
 ) -> Vehicles:
-    """Cars on lanes at stations."""
     graph = LaneGraph.of(lanes, "driving")
     vehicles = [car(graph, f"car/{k}", on, at_m) for k, (on, at_m) in enumerate(cars)]
     return make_vehicles(vehicles, graph, LaneGraph.of(lanes, "crosswalk"), obstacles, REACH_M)
@@ -77,7 +75,6 @@ def driven(
     walkers: Sequence[Pedestrian] = (),
     obstacles: np.ndarray = NO_BOXES,
 ) -> tuple[Vehicles, SimulatedMotion]:
-    """Simulated motion of cars and pedestrians."""
     made = fleet(lanes, *cars, obstacles=obstacles)
     return made, simulate(made, walkers, obstacles, approaches or {}, duration_s)
 

@@ -36,7 +36,6 @@ FLAT = ("tree", "street_light", "traffic_light", "traffic_sign")
 
 @cache
 def spec() -> Config:
-    """The shipped configuration."""
     return load_config("street_sequence", overrides=SMALL)
 
 
@@ -69,12 +68,10 @@ def moving_scene(seed: int, of: Config | None = None) -> Scene:
 
 @cache
 def scene_of(seed: int) -> Scene:
-    """The same, kept."""
     return moving_scene(seed)
 
 
 def category(body: Body) -> str:
-    """Of a body's asset."""
     return library().get(body.asset).category
 
 
@@ -131,7 +128,6 @@ def test_what_moves_stands_on_the_ground() -> None:
 
 @pytest.mark.slow
 def test_same_stream_gives_the_same_traffic_and_another_one_another() -> None:
-    """Byte for byte, tracks and changes included."""
     assert canonical_json(moving_scene(2)) == canonical_json(scene_of(2))
     assert canonical_json(scene_of(3)) != canonical_json(scene_of(2))
 

@@ -41,7 +41,6 @@ def add_quad(stage: Usd.Stage, path: str) -> UsdGeom.Mesh:
 
 
 def surface(stage: Usd.Stage, path: str) -> tuple[UsdShade.Material, UsdShade.Shader]:
-    """A material with an empty UsdPreviewSurface."""
     material = UsdShade.Material.Define(stage, path)
     shader = UsdShade.Shader.Define(stage, f"{path}/S")
     shader.CreateIdAttr("UsdPreviewSurface")
@@ -214,7 +213,6 @@ def test_an_archive_brings_its_images(tmp_path: Path) -> None:
 
 
 def shiny(stage: Usd.Stage, path: str, roughness: float) -> UsdShade.Material:
-    """A preview surface of some roughness."""
     material = UsdShade.Material.Define(stage, path)
     surface = UsdShade.Shader.Define(stage, f"{path}/Surface")
     surface.CreateIdAttr("UsdPreviewSurface")
@@ -224,7 +222,6 @@ def shiny(stage: Usd.Stage, path: str, roughness: float) -> UsdShade.Material:
 
 
 def broken(folder: Path, kind: str) -> None:
-    """A file ``bad.*`` with one fault."""
     stage = new_stage(folder / "bad.usda")
     if kind == "no mesh":
         UsdLux.SphereLight.Define(stage, "/Lamp")

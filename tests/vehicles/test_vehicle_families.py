@@ -101,7 +101,6 @@ def test_every_variant_is_as_big_as_real_ones_and_in_budget(name: str, how_many:
 @pytest.mark.slow
 @for_every_variant
 def test_tyres_touch_the_ground_and_nothing_reaches_below(built: tuple[str, Solid]) -> None:
-    """The ground is z = 0."""
     mesh = built[1].mesh
 
     assert mesh.vertices_m[:, 2].min() == pytest.approx(0.0, abs=1e-4)
@@ -121,7 +120,6 @@ def test_the_origin_is_the_middle_of_the_footprint(built: tuple[str, Solid]) -> 
 
 @for_every_variant
 def test_wheel_keypoints_are_the_middles_of_the_tyres(built: tuple[str, Solid]) -> None:
-    """Found again from the tyres' own triangles."""
     name, solid = built
     tyres = with_role(solid.mesh, "tyre").reshape(-1, 3)
     wheels = [point for point in solid.keypoints if point.name.startswith("wheel")]
@@ -138,7 +136,6 @@ def test_wheel_keypoints_are_the_middles_of_the_tyres(built: tuple[str, Solid]) 
 
 @for_every_variant
 def test_keypoints_are_named_in_the_vocabulary(built: tuple[str, Solid]) -> None:
-    """Front is +X and left is +Y."""
     name, solid = built
     points = {point.name: np.array(point.position_m) for point in solid.keypoints}
     if name in FOUR_WHEELED:
@@ -206,7 +203,6 @@ def test_indicators_are_on_their_own_sides(built: tuple[str, Solid]) -> None:
 
 @pytest.mark.parametrize("name", ["car", "van"])
 def test_shell_and_glass_are_symmetric(name: str) -> None:
-    """Each triangle has a mirror image."""
     for seed in range(3):
         shell = np.round(with_role(variant(name, seed).mesh, "paint", "glass") * 1e5)
         keys = {tuple(sorted(map(tuple, face))) for face in shell.astype(int).tolist()}
@@ -261,7 +257,6 @@ def test_nothing_inside_sticks_out(name: str, seed: int) -> None:
 
 @for_every_variant
 def test_arrays_are_finite_typed_and_normals_unit(built: tuple[str, Solid]) -> None:
-    """Shapes and types are the contract's."""
     mesh = built[1].mesh
 
     assert mesh.vertices_m.dtype == np.float32

@@ -18,7 +18,6 @@ WHITE_E, READ_NOISE_E = 200.0, 3.0
 
 
 def noisy(image: Float32) -> Float32:
-    """Poisson photons and normal read noise."""
     rng = np.random.default_rng(5)
     electrons = rng.poisson(image * WHITE_E) + READ_NOISE_E * rng.standard_normal(image.shape)
     return (electrons / WHITE_E).astype(np.float32)
