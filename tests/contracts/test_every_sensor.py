@@ -8,10 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from pydantic import ValidationError
 
-from gen_data.config.describe import describe
-from gen_data.config.schema import json_schema
 from gen_data.core.capture import POINT, Channel, Measurements, PointCloud, SensorReading
 from gen_data.core.errors import ConfigError
 from gen_data.core.interfaces import Modality, Renderer
@@ -161,29 +158,6 @@ def test_a_step_made_alone_has_the_same_bytes_in_any_process(kind: str) -> None:
     seen(copy, step=2)
 
     assert data(seen(copy)) == data(seen(sensor))
-
-
-@each
-def test_it_explains_itself(kind: str) -> None:
-    """Schema and description exist, and every field has a description."""
-    model = TABLE.load(kind)
-    schema = json_schema(model)
-    undescribed = [
-        name
-        for name, entry in schema["properties"].items()
-        if not entry.get("description") and name != "type"
-    ]
-
-    assert not undescribed
-    assert describe(model)
-    assert schema["properties"]["type"]["const"] == kind
-
-
-@each
-def test_unknown_fields_are_refused(kind: str) -> None:
-    """A misspelt field is an error, never ignored."""
-    with pytest.raises(ValidationError, match="no_such_field"):
-        made(kind, no_such_field=1)
 
 
 @device

@@ -121,6 +121,25 @@ def test_every_damage_is_found_and_repaired(dataset: Path, rounds: int) -> None:
         shutil.rmtree(dataset / "run/quarantine", ignore_errors=True)
 
 
+@pytest.mark.parametrize("name", ["000001.json", "000001/scenes.jsonl", "000001"])
+@pytest.mark.parametrize("damage", [flip, truncate, delete, add_file])
+def test_a_damaged_shard_is_made_again_without_the_option(
+    dataset: Path, damage: Callable[[Path, int], None], name: str
+) -> None:
+    """The same command hashes what it finds; extra files count in unfinished data sets."""
+    before, path = tree_digest(dataset), dataset / "shards" / name
+    if damage is add_file:
+        (dataset / "manifest.json").unlink()
+        path = dataset / "shards/000001/scenes.jsonl"
+    if path.is_file():
+        damage(path, 100)
+    else:
+        shutil.rmtree(path)
+
+    assert make(dataset, N, SHARD_SIZE).made == SHARD_SIZE
+    assert tree_digest(dataset) == before
+
+
 def test_damage_of_an_unfinished_data_set_is_not_sealed(dataset: Path) -> None:
     """Resumption hashes what it did not generate itself; the log names the shard."""
     before = tree_digest(dataset)

@@ -21,6 +21,14 @@ def make_supervisor(shards: int, workers: int, **limits: float) -> Supervisor:
     )
 
 
+def with_ready_workers(shards: int, workers: int, **limits: float) -> Supervisor:
+    supervisor = make_supervisor(shards, workers, **limits)
+    supervisor.start(0.0)
+    for number in range(workers):
+        supervisor.handle(worker_events.Ready(number), 1.0)
+    return supervisor
+
+
 def test_no_more_processes_than_shards_are_started() -> None:
     """Two shards need two of eight workers."""
     assert make_supervisor(shards=2, workers=8).start(0.0) == [
@@ -47,9 +55,7 @@ def test_a_ready_worker_gets_the_first_shard_and_goes_home_after_the_last() -> N
 
 def test_a_dead_workers_shard_goes_to_the_next_one() -> None:
     """The replacement gets the same shard, before any new one."""
-    supervisor = make_supervisor(shards=3, workers=1)
-    supervisor.start(0.0)
-    supervisor.handle(worker_events.Ready(0), 1.0)
+    supervisor = with_ready_workers(shards=3, workers=1)
 
     after_death = supervisor.handle(worker_events.Exited(0, -9), 2.0)
 
@@ -101,10 +107,7 @@ def test_a_shard_finished_just_before_the_kill_is_not_made_again() -> None:
 
 
 def test_a_rejected_scene_lets_the_others_finish_their_shard() -> None:
-    supervisor = make_supervisor(shards=9, workers=2)
-    supervisor.start(0.0)
-    supervisor.handle(worker_events.Ready(0), 1.0)
-    supervisor.handle(worker_events.Ready(1), 1.0)
+    supervisor = with_ready_workers(shards=9, workers=2)
     error = errors.SceneRejected(3, ())
 
     assert supervisor.handle(worker_events.Failed(0, error), 2.0) == []
@@ -119,10 +122,7 @@ def test_a_rejected_scene_lets_the_others_finish_their_shard() -> None:
 
 def test_a_storage_fault_stops_all_at_once() -> None:
     """The others would only meet the same full disk."""
-    supervisor = make_supervisor(shards=9, workers=2)
-    supervisor.start(0.0)
-    supervisor.handle(worker_events.Ready(0), 1.0)
-    supervisor.handle(worker_events.Ready(1), 1.0)
+    supervisor = with_ready_workers(shards=9, workers=2)
 
     assert worker_events.Kill(1) in supervisor.handle(
         worker_events.Failed(0, errors.StorageError("disk full")), 2.0
@@ -144,10 +144,7 @@ def test_processes_that_never_start_end_the_run() -> None:
 
 def test_out_of_memory_continues_with_fewer_workers() -> None:
     """Two workers, one killed by the kernel: one goes on alone."""
-    supervisor = make_supervisor(shards=9, workers=2)
-    supervisor.start(0.0)
-    supervisor.handle(worker_events.Ready(0), 1.0)
-    supervisor.handle(worker_events.Ready(1), 1.0)
+    supervisor = with_ready_workers(shards=9, workers=2)
 
     actions = supervisor.handle(worker_events.Exited(0, -9, out_of_memory=True), 2.0)
 
@@ -156,9 +153,7 @@ def test_out_of_memory_continues_with_fewer_workers() -> None:
 
 def test_a_worker_that_grew_too_large_is_replaced_between_shards() -> None:
     """Dismissed after its shard, and a new one is started."""
-    supervisor = make_supervisor(shards=9, workers=1, rss_bytes=1000)
-    supervisor.start(0.0)
-    supervisor.handle(worker_events.Ready(0), 1.0)
+    supervisor = with_ready_workers(shards=9, workers=1, rss_bytes=1000)
     assert supervisor.handle(worker_events.ShardDone(0, 0, 4, 100, 0, rss_bytes=600), 2.0) == [
         worker_events.Assign(0, 1)
     ]
@@ -171,9 +166,7 @@ def test_a_worker_that_grew_too_large_is_replaced_between_shards() -> None:
 
 def test_a_worker_that_was_as_large_from_the_start_is_kept() -> None:
     """Its scenes need the memory: a new worker would need it again."""
-    supervisor = make_supervisor(shards=9, workers=1, rss_bytes=1000)
-    supervisor.start(0.0)
-    supervisor.handle(worker_events.Ready(0), 1.0)
+    supervisor = with_ready_workers(shards=9, workers=1, rss_bytes=1000)
 
     for shard, rss_bytes in enumerate((1200, 1790)):
         event = worker_events.ShardDone(0, shard, 4, 100, 0, rss_bytes=rss_bytes)

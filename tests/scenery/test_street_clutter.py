@@ -15,7 +15,7 @@ from gen_data.core.se3 import SE3, Vec3
 from gen_data.randomizers.free_space import Footprint, is_clear, make_ground
 from tests.randomizers.doubles import FakeAssets
 from tests.scenery.clutter_limits import CLUTTER
-from tests.scenery.test_scenery_families import digest, variant
+from tests.solids import digest, variant, volume_m3
 from tests.tiers import sampled
 
 ACROSS = (
@@ -63,7 +63,8 @@ def test_all_variants_differ(name: str) -> None:
 def test_surfaces_face_outward(name: str) -> None:
     """Closed parts prevail, so triangles turned inside out would make the volume negative."""
     for seed in range(4):
-        assert signed_volume_m3(variant(name, seed)) > 0.0, seed
+        mesh = variant(name, seed).mesh
+        assert volume_m3(mesh.vertices_m[mesh.faces].astype(np.float64)) > 0.0, seed
 
 
 @pytest.mark.parametrize("name", [*ACROSS, *ALONG])
@@ -152,12 +153,6 @@ def cable_ends(solid: Solid, half_m: float) -> list[tuple[float, float]]:
         else:
             groups.append([point])
     return [tuple(np.mean(group, axis=0).tolist()) for group in groups]
-
-
-def signed_volume_m3(solid: Solid) -> float:
-    """Sum of the signed tetrahedra between the origin and every triangle."""
-    corners = solid.mesh.vertices_m[solid.mesh.faces].astype(np.float64)
-    return float((corners[:, 0] * np.cross(corners[:, 1], corners[:, 2])).sum() / 6.0)
 
 
 def variant_is_upright_and_single(name: str, seed: int) -> bool:

@@ -7,19 +7,18 @@ from gen_data.content.vehicles import FAMILIES
 from gen_data.content.vehicles.bicycle import cyclist, cyclist_facts
 from gen_data.core.asset_types import MeshData
 from gen_data.core.errors import AssetError
+from tests.solids import with_role
 
 VARIANTS = [cyclist(seed).mesh for seed in range(FAMILIES["cyclist"].variants)]
 
 
-def with_role(mesh: MeshData, role: str) -> np.ndarray:
-    slots = [k for k, material in enumerate(mesh.materials) if material.role == role]
-    faces = mesh.faces[np.isin(mesh.face_slots, slots)]
-    return np.asarray(mesh.vertices_m[faces.ravel()], np.float64)
+def points_of(mesh: MeshData, role: str) -> np.ndarray:
+    return with_role(mesh, role).reshape(-1, 3)
 
 
 def test_some_carry_bags_of_several_colours() -> None:
     """About two thirds; backpacks are above the saddle, panniers beside the rear wheel."""
-    bags = [with_role(mesh, "canvas") for mesh in VARIANTS]
+    bags = [points_of(mesh, "canvas") for mesh in VARIANTS]
     floors = [mesh.bounds_m()[0][2] for mesh in VARIANTS]
     carried = [(b, z) for b, z in zip(bags, floors, strict=True) if len(b)]
     materials = [material for mesh in VARIANTS for material in mesh.materials]
@@ -39,7 +38,7 @@ def test_some_carry_bags_of_several_colours() -> None:
 def test_racing_bicycles_have_no_panniers() -> None:
     """Their bags are all on backs."""
     for seed, mesh in enumerate(VARIANTS):
-        bag = with_role(mesh, "canvas")
+        bag = points_of(mesh, "canvas")
         if "road" in str(cyclist_facts(seed)) and len(bag):
             assert bag[:, 2].min() - mesh.bounds_m()[0][2] > 0.9
 
@@ -48,7 +47,7 @@ def test_racing_bicycles_have_no_panniers() -> None:
 def test_who_waits_has_one_foot_on_the_ground(seed: int) -> None:
     """The left one, beside the bicycle; the other one is on a pedal; heads are below a rider's."""
     mesh = cyclist(seed, "wait").mesh
-    shoes = with_role(mesh, "shoes")
+    shoes = points_of(mesh, "shoes")
     left, right = shoes[shoes[:, 1] > 0.0], shoes[shoes[:, 1] < 0.0]
 
     assert left[:, 2].min() == pytest.approx(0.0, abs=0.02)
@@ -63,7 +62,7 @@ def test_who_waits_has_one_foot_on_the_ground(seed: int) -> None:
 
 def test_girth_varies() -> None:
     """Widths of trunks in their clothes, from lean to padded: within the drawn fifth."""
-    widths = [np.ptp(with_role(mesh, "top")[:, 1]) for mesh in VARIANTS]
+    widths = [np.ptp(points_of(mesh, "top")[:, 1]) for mesh in VARIANTS]
 
     assert max(widths) / min(widths) > 1.05
     assert max(widths) == pytest.approx(0.6, abs=0.15)

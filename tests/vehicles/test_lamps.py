@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from gen_data.content.vehicles.cars import car
 from gen_data.randomizers.vehicle_lights import VehicleLights
+from tests.solids import build, with_role
 
 LIMITS_CD = {
     # Zone III of a dipped beam, above its cut-off: 0.1 to 0.7 lx at 25 m; class B.
@@ -16,9 +16,7 @@ LIMITS_CD = {
 
 def lens_area_m2(seed: int, role: str) -> float:
     """Of one of the two lamps of a car, seen from before or behind it."""
-    mesh = car(seed, steer_deg=0.0).mesh
-    slots = [k for k, material in enumerate(mesh.materials) if material.role == role]
-    corners = mesh.vertices_m[mesh.faces[np.isin(mesh.face_slots, slots)]].astype(np.float64)
+    corners = with_role(build("car", seed).mesh, role)
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     ahead = normals[:, 0] if role == "headlight" else -normals[:, 0]
     return float(0.5 * np.maximum(ahead, 0.0).sum() / 2.0)

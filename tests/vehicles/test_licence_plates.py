@@ -18,7 +18,7 @@ from gen_data.core.asset_types import Material
 from gen_data.core.scene import Body, ObjectGroup, Scene
 from gen_data.randomizers.vehicle_paint import VehiclePaint
 from tests.randomizers.doubles import FakeAssets, rng_of
-from tests.vehicles.test_vehicle_families import variant
+from tests.solids import variant
 
 
 def face(seed: int, rows: int = 1, country: str = "gb") -> np.ndarray:
