@@ -15,7 +15,6 @@ from gen_data.core.se3 import SE3
 from gen_data.sensors.camera.rgb_camera import RgbCamera
 from gen_data.sensors.lidar.lidar_sensor import LidarSensor
 from tests.libraries import library
-from tests.tiers import sampled
 
 
 @cache
@@ -78,12 +77,6 @@ def test_nuscenes_cameras_are_released_as_the_scanner_passes_them() -> None:
         looks_deg = scanner.yaw_deg - 360.0 * scanner.rotation_hz * after_s
         assert abs(math.remainder(looks_deg - camera.yaw_deg, 360.0)) < 1.0
     assert len({camera.time_offset_s for camera in cameras}) == 6
-
-
-@pytest.mark.parametrize("name", sampled(["kitti_rig", "nuscenes_rig", "carla_table"], 3))
-def test_a_sensor_on_a_rig_that_is_not_there_is_refused(name: str) -> None:
-    with pytest.raises(ConfigError, match=r"the scene has no rig 'eg'; its rigs: ego .*'ego'"):
-        rig_scene(name, "sensors[0].rig=eg")
 
 
 @pytest.mark.slow

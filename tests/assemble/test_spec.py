@@ -41,15 +41,6 @@ def test_shipped_configurations_are_valid_from_any_folder(
     )
 
 
-def test_a_users_file_comes_before_a_shipped(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (tmp_path / "tabletop.yaml").write_text("template: tabletop\nseed: 41\n" + CAMERA)
-    monkeypatch.chdir(tmp_path)
-
-    assert load_config("tabletop.yaml").general.seed == 41
-
-
 def test_configuration_overrides_its_template_by_element_name(tmp_path: Path) -> None:
     """Only what is named changes; the rest of the element stays the template's."""
     source = written(tmp_path, "template: tabletop\nelements: {table: {height_m: 0.9}}\n" + CAMERA)

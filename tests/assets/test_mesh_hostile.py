@@ -369,16 +369,6 @@ def test_a_roughness_that_does_not_exist_is_told_by_name(tmp_path: Path) -> None
         assert library.materials(f"user/{name}")[0].roughness == value
 
 
-def test_a_missing_texture_is_told(tmp_path: Path) -> None:
-    folder = tmp_path / "assets"
-    folder.mkdir()
-    (folder / "a.mtl").write_text("newmtl m\nmap_Kd gone.png\n")
-    (folder / "a.obj").write_text("mtllib a.mtl\nusemtl m\n" + TETRAHEDRON)
-    library = open_library([folder], cache_dir=tmp_path / "cache")
-    with pytest.raises(AssetError, match=r"gone\.png: no such image"):
-        library.texture(library.materials("user/a")[0].texture)
-
-
 @pytest.mark.hostile
 @pytest.mark.parametrize("reference", ["../secret.mtl", "/etc/passwd", "C:\\x.png", "http://a/b"])
 def test_a_texture_outside_the_folder_is_refused(tmp_path: Path, reference: str) -> None:

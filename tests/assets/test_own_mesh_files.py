@@ -74,16 +74,6 @@ def test_obj_names_match_across_encodings(tmp_path: Path, encodings: tuple[str, 
     assert material_of(tmp_path).base_color == (1.0, 0.0, 0.0)
 
 
-def test_a_material_that_the_mtl_lacks_is_refused_by_name(tmp_path: Path) -> None:
-    """The message names the file, the material, the MTL, and what it has."""
-    (tmp_path / "a.obj").write_text(f"mtllib a.mtl\n{TRIANGLE}usemtl rod\nf 1 2 3\n")
-    (tmp_path / "a.mtl").write_text("newmtl rot\nKd 1 0 0\n")
-    with pytest.raises(
-        AssetError, match=r"a\.obj: material 'rod' is not defined in a\.mtl .*'rot'"
-    ):
-        imported(tmp_path, "a.obj")
-
-
 @pytest.mark.parametrize("name", ["None", "(null)"])
 def test_names_for_no_material_are_grey_without_a_remark(tmp_path: Path, name: str) -> None:
     """As Blender and ShapeNet's converter write faces without a material."""

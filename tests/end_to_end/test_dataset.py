@@ -5,13 +5,10 @@ import os
 import shutil
 import signal
 import subprocess
-import sys
 import time
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import pytest
 from PIL import Image
 
 from tests.end_to_end.running import SMALL, command, digest, environment, gen_data
@@ -61,56 +58,6 @@ def test_killed_run_resumes_to_the_same_bytes(dataset: Path, tmp_path: Path) -> 
 
     assert done.returncode == 0, done.stderr
     assert digest(tmp_path / "killed") == digest(dataset)
-
-
-@pytest.mark.slow
-def test_sample_made_alone_equals_the_one_in_its_shard(dataset: Path) -> None:
-    """Pixels of sample 7, made in another process with no other sample before it."""
-    program = (
-        "import sys, numpy as np\n"
-        "from gen_data.assemble.pipeline_factory import open_pipeline\n"
-        "from gen_data.assemble.config import load_config as config_of_source\n"
-        "from gen_data.core.capture import Channel\n"
-        f"with open_pipeline(config_of_source({str(dataset)!r})) as pipeline:\n"
-        "    reading = pipeline.sample(7).capture.readings['color']\n"
-        "np.savez('alone.npz', rgb=reading.channels[Channel.RGB],\n"
-        "         instance=reading.channels[Channel.INSTANCE])\n"
-    )
-    run_folder = dataset / "run"
-    subprocess.run([sys.executable, "-c", program], cwd=run_folder, env=environment(), check=True)
-    alone = np.load(run_folder / "alone.npz")
-    shard = dataset / "shards" / "000001" / "color"
-
-    rgb = np.asarray(Image.open(shard / "rgb" / "000000007.png"))
-    instance = np.asarray(Image.open(shard / "instance" / "000000007.png"))
-
-    assert np.array_equal(rgb, alone["rgb"])
-    assert np.array_equal(instance, alone["instance"])
-
-
-def test_kept_scene_renders_to_the_same_pixels(dataset: Path) -> None:
-    """The Scene in scenes.jsonl is the whole provenance: no randomizer, no physics needed."""
-    from gen_data.assemble.config import load_config
-    from gen_data.assemble.pipeline_factory import PipelineFactory
-    from gen_data.core.capture import Channel
-    from gen_data.core.streams import Streams
-    from gen_data.runner.stored import StoredSamples
-
-    kept = StoredSamples(dataset).kept_scene(13)
-    scene = kept.scene
-    config = load_config(str(dataset))
-    pipeline = PipelineFactory(config, n=15)()
-    (camera,) = (sensor for sensor in config.sensors if sensor.name == "color")
-    # Errors of the camera are drawn again, from the stream of the sample.
-    place = kept.scene_index, kept.view_index, kept.view_attempts - 1
-    streams = Streams(config.general.seed, *place)
-    stream = replace(streams, index=13).rng("sensor/color")
-
-    reading = camera.capture(scene, pipeline.renderer, frozenset({Channel.RGB}), stream)
-
-    name = f"{kept.index:09d}.png"
-    path = dataset / "shards" / "000002" / "color" / "rgb" / name
-    assert np.array_equal(np.asarray(Image.open(path)), reading.channels[Channel.RGB])
 
 
 def test_every_object_is_labelled_where_it_is_seen(dataset: Path) -> None:

@@ -1,7 +1,6 @@
 """``gen-data assets``: output and exit codes."""
 
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -75,16 +74,3 @@ def test_errors_have_one_message_and_their_exit_code(
     assert done.returncode == code
     assert said in done.stderr and "Traceback" not in done.stderr
     assert not (tmp_path / "packs" / "hdri").exists()
-
-
-def test_help_imports_nothing_heavy(tmp_path: Path) -> None:
-    """``--help`` must be fast: neither numpy nor pydantic is loaded."""
-    code = (
-        "import sys; from gen_data.cli.main import cli;"
-        "cli.main(['--help'], standalone_mode=False);"
-        "sys.exit(any(name in sys.modules for name in ('numpy', 'pydantic', 'yaml')))"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", code], cwd=running.ROOT, capture_output=True, check=False
-    )
-    assert done.returncode == 0

@@ -98,16 +98,6 @@ def test_a_stack_of_three_boxes_stays_a_stack(engine: Engine) -> None:
         assert tilt_rad(body) < math.radians(0.5)
 
 
-def test_a_ball_dropped_at_the_rim_of_an_open_table_stays_on_it(engine: Engine) -> None:
-    """Guard walls keep it, and it also rests once they are gone."""
-    scene = settled(engine, table_scene(thing("ball", "ball 0.035", x=0.56, y=0.36)))
-
-    x, y, z = scene.body("ball").T_world_body.translation_m
-    assert abs(x) <= 0.6
-    assert abs(y) <= 0.4
-    assert z == pytest.approx(TABLE_TOP_Z_M + 0.035, abs=HALF_A_MM)
-
-
 def test_nothing_leans_on_a_wall_that_is_not_there(engine: Engine) -> None:
     """A board that would lean on a guard wall is dropped again farther in, and lies flat."""
     half = math.radians(8)

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from gen_data.assemble.config import load_config
-from gen_data.assemble.pipeline_factory import open_pipeline, pipeline_config
+from gen_data.assemble.pipeline_factory import pipeline_config
 from gen_data.assets.library import open_library
 from gen_data.core.capture import Channel
-from gen_data.core.errors import ConfigError
-from gen_data.core.interfaces import DatasetInfo, Settled
-from gen_data.core.scene import Instance
+from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.se3 import SE3
 from gen_data.core.streams import Streams
 from gen_data.pipeline import Pipeline
@@ -24,6 +22,7 @@ from gen_data.sensors.navigation.gnss import Gnss
 from gen_data.sensors.navigation.imu import Imu
 from gen_data.sensors.navigation.odometer import Odometer
 from gen_data.sensors.radar.radar_sensor import Radar
+from tests.pipeline.test_pipeline import AcceptingPhysics, TwoBoxes
 from tests.sensors.streetcar import CAR_M, BoxRays, thing, world
 
 SENSORS: tuple[Instrument, ...] = (
@@ -36,31 +35,11 @@ SENSORS: tuple[Instrument, ...] = (
 STEPS = 4
 
 
-class Boxes:
+class Cars(TwoBoxes):
     """Assets that are all as large as a car."""
 
-    def get(self, asset_id: str) -> SimpleNamespace:
-        return SimpleNamespace(attributes=(), subcategory="")
-
-    def body_bounds_m(self, asset_id: str) -> None:
-        """None: there are no mirrors."""
-
-    def bounds_m(self, asset_id: str) -> tuple:
+    def bounds_m(self, asset_id: str) -> Any:
         return CAR_M
-
-    def keypoints(self, asset_id: str) -> tuple:
-        return ()
-
-
-class AtRest:
-    def __enter__(self) -> AtRest:
-        return self
-
-    def __exit__(self, *exception: object) -> None:
-        """Nor to stop."""
-
-    def settle(self, scene: object) -> Settled:
-        return Settled(scene)  # type: ignore[arg-type]
 
 
 def pipeline(seed: int = 3) -> Pipeline:
@@ -86,7 +65,7 @@ def pipeline(seed: int = 3) -> Pipeline:
         exporters={},
         strides={"gnss": 2},
     )
-    return Pipeline(recipe, Boxes(), AtRest, BoxRays)  # type: ignore[arg-type]
+    return Pipeline(recipe, Cars(), AcceptingPhysics, BoxRays)  # type: ignore[arg-type]
 
 
 def test_every_device_reports_at_its_rate() -> None:
@@ -99,17 +78,6 @@ def test_every_device_reports_at_its_rate() -> None:
     assert all(2 in t["radar"].rows["instance_id"] for t in tables)
     gap_m = [float(t["watcher"].rows["value"].min()) for t in tables]
     assert gap_m == pytest.approx([15.0 - 4.4 - k for k in range(STEPS)], abs=1e-4)
-
-
-def test_a_sample_made_alone_has_the_rows_of_the_sequence() -> None:
-    """Byte by byte."""
-    with pipeline() as one, pipeline() as other:
-        for k in range(STEPS - 1):
-            one.sample(k)
-        after, alone = one.sample(STEPS - 1), other.sample(STEPS - 1)
-
-    for name, table in alone.capture.tables.items():
-        assert table.rows.tobytes() == after.capture.tables[name].rows.tobytes()
 
 
 def test_views_have_sequences_of_their_own() -> None:
@@ -130,13 +98,6 @@ def test_streams_of_a_sequence_are_the_same_at_every_step() -> None:
     assert shared[0] not in [rng.random() for rng in steps]
 
 
-def test_configurations_without_the_rig_are_told_so() -> None:
-    """Before anything is made."""
-    spec = load_config("tabletop.yaml", overrides=("sensors=[{type: radar}]", "exporters=[]"))
-    with pytest.raises(ConfigError, match="the scene has no rig 'ego'; its rigs: arm_wrist"):
-        open_pipeline(spec)
-
-
 def test_rates_reach_the_recipe() -> None:
     """A slow event camera reads at every fifth step."""
     sensors = "sensors=[{type: rgb_camera}, {type: event_camera, rate_hz: 2}]"
@@ -145,11 +106,3 @@ def test_rates_reach_the_recipe() -> None:
 
     assert recipe.strides["events"] == 5
     assert recipe.info.devices == {"events": "event_camera"}
-
-
-def test_boxes_of_instances_are_those_of_their_assets() -> None:
-    """What the doubles of this file rest on."""
-    with pipeline() as made:
-        instance: Instance = made.sample(0).scene.instance(2)
-
-    assert (instance.box_min_m, instance.box_max_m) == CAR_M

@@ -70,13 +70,7 @@ class AcceptingPhysics:
         return Settled(scene)
 
 
-class RefusingPhysics:
-    def __enter__(self) -> RefusingPhysics:
-        return self
-
-    def __exit__(self, *exception: object) -> None:
-        """Nor to stop."""
-
+class RefusingPhysics(AcceptingPhysics):
     def settle(self, scene: Scene) -> Settled:
         reason = "object fell off" if scene.environment.yaw_rad % 1 < 0.5 else "still moving"
         return Settled(scene, Rejection(reason, "fewer objects (randomizers.clutter.count)"))

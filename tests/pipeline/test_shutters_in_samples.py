@@ -47,16 +47,6 @@ def reading(sample: Sample) -> SensorReading:
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("following")
-def test_a_step_made_alone_is_the_step_of_the_sequence(pipeline: Pipeline, sample: Sample) -> None:
-    """Whatever was rendered before: the same bytes in every channel."""
-    again = reading(pipeline.sample(6))
-
-    for channel, image in reading(sample).channels.items():
-        assert np.array_equal(image, again.channels[channel], equal_nan=True), channel
-
-
-@pytest.mark.slow
 def test_every_label_of_a_rolling_image_agrees_with_it(sample: Sample) -> None:
     """Boxes and masks are those of the id image, and every share is one."""
     truth, ids = sample.truth["dash"], reading(sample).channels[Channel.INSTANCE]

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from gen_data.core.asset_types import Material
 from gen_data.core.capture import Channel
-from gen_data.core.scene import Body, Environment, Instance, Scene
+from gen_data.core.scene import Body, Instance, Scene
 from gen_data.core.se3 import SE3
 from gen_data.renderers.warp.device import open_device
 from gen_data.renderers.warp.renderer import WarpRenderer
@@ -13,7 +12,6 @@ from gen_data.renderers.warp.scene.bvh import face_boxes
 from gen_data.renderers.warp.scene.device_assets import boxes_around
 from gen_data.renderers.warp.scene.device_cache import DeviceCache
 from gen_data.renderers.warp.scene.scene_packing import pack_view, pack_world
-from gen_data.renderers.warp.settings import RenderSettings
 from gen_data.renderers.warp.visibility.gbuffer import bodies_within, project_vertices
 from tests.renderers import fake_library
 
@@ -112,26 +110,3 @@ def test_every_face_lies_in_one_of_the_boxes(name: str) -> None:
     within = (corners[:, None] >= lows[None, :, None]) & (corners[:, None] <= highs[None, :, None])
     assert within.all(axis=(2, 3)).any(axis=1).all()
     assert len(lows) <= len(mesh.faces)
-
-
-@pytest.mark.parametrize("visibility", ["raster", "rays"])
-def test_a_pixel_on_an_edge_is_mixed_by_coverage(visibility: str) -> None:
-    """A glowing square whose left edge leaves a quarter, half, three quarters of a pixel column.
-
-    Emission is the only light: the samples of 4 rooks give exact quarters of its luminance.
-    """
-    glow = Material((0.0, 0.0, 0.0), 1.0, specular=0.0, emission_cd_m2=(0.6, 0.6, 0.6))
-    meshes = {"square": fake_library.plane_mesh(10.0, (glow,))}
-    dark = Environment(luminance_cd_m2=0.0, visible=False)
-    camera = fake_library.forward_camera(focal_px=64.0)
-    for quarters in (1, 2, 3):
-        edge_m = (1.0 - quarters / 4.0) / 64.0
-        pose = SE3((edge_m + 5.0, 0.0, 1.0), (0.0, 1.0, 0.0, 0.0))
-        scene = Scene("test", (Body("square", "square", pose),), environment=dark)
-        settings = RenderSettings(visibility=visibility, antialias=4)
-        reading = WarpRenderer(fake_library.FakeLibrary(meshes), "cpu", settings).render(
-            scene, camera, frozenset({Channel.RADIANCE})
-        )
-        row = reading.channels[Channel.RADIANCE][24, :, 0]
-        assert (row[31], row[34]) == (0.0, pytest.approx(0.6, rel=1e-5))
-        assert row[32] == pytest.approx(0.6 * quarters / 4.0, rel=1e-5)

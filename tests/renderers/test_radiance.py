@@ -35,13 +35,15 @@ def glowing(pose: SE3, asset: str = "box", scale: float = 1.0, emission: float =
     return Body("glow", asset, pose, scale, materials=(material,))
 
 
-def test_an_edge_is_as_grey_as_it_is_covered() -> None:
+@pytest.mark.parametrize("visibility", ["raster", "rays"])
+def test_an_edge_is_as_grey_as_it_is_covered(visibility: str) -> None:
     """A quarter of a pixel on a glowing box of 300 cd/m^2 in front of black: 75 cd/m^2."""
     left_m = (22.75 - 32.0) / 50.0 * 2.0
     scene = Scene("t", (glowing(SE3((left_m + 0.5, 0.0, 2.5)), emission=300.0),), environment=DARK)
     camera = forward_camera()
 
-    smooth = radiance_of(scene, camera)[24, 20:25, 0]
+    settings = RenderSettings(visibility=visibility)
+    smooth = radiance_of(scene, camera, settings)[24, 20:25, 0]
     rough = radiance_of(scene, camera, RenderSettings(antialias=1))[24, 20:25, 0]
 
     np.testing.assert_allclose(rough, [0.0, 0.0, 0.0, 300.0, 300.0], rtol=1e-5)

@@ -1,12 +1,11 @@
 """Robots in scenes: which one, and where its wrist is."""
 
-import numpy as np
 import pytest
 
 from gen_data.core.errors import AssetError
 from gen_data.core.scene import Scene
 from gen_data.scene_templates.robot import Robot
-from tests.randomizers.doubles import FakeAssets, two_link_arm
+from tests.randomizers.doubles import FakeAssets
 
 
 def scene(asset: str | tuple[str, ...]) -> Scene:
@@ -25,18 +24,3 @@ def test_of_several_robots_the_first_that_is_installed_stands_there() -> None:
 def test_a_robot_that_is_not_there_is_a_mistake(asset: str | tuple[str, ...]) -> None:
     with pytest.raises(AssetError, match=r"two_lnk.*did you mean 'two_link'"):
         scene(asset)
-
-
-def test_the_wrist_is_a_rig_that_looks_out_of_the_hand() -> None:
-    """X along the grasp frame's Z, Y along the fingers' way, on the hand's link."""
-    built = scene("two_link")
-    gripper = two_link_arm().gripper
-    assert gripper is not None
-    rig = built.rig("arm_wrist")
-
-    assert rig.body == "arm/hand"
-    for axis, wanted in (([1.0, 0, 0], [0, 0, 1.0]), ([0, 1.0, 0], [0, 1.0, 0])):
-        direction = rig.T_body_rig.rotate(np.array(axis))
-        np.testing.assert_allclose(
-            direction, gripper.T_link_grasp.rotate(np.array(wanted)), atol=1e-9
-        )

@@ -111,13 +111,15 @@ def test_what_is_no_lens_is_refused_before_anything(given: dict[str, Any], messa
 @pytest.mark.parametrize(
     "given",
     [
+        {"hfov_deg": 30},
+        {"hfov_deg": 90},
         {"lens": {"model": "kannala_brandt"}, "hfov_deg": 150},
         {"lens": {"model": "kannala_brandt", "field_deg": 60}, "hfov_deg": 120},
         {"lens": {"model": "equirectangular"}, "hfov_deg": 360},
     ],
 )
-def test_a_wide_camera_is_mounted_with_the_focus_in_view(given: dict[str, Any]) -> None:
-    """However wide: all of the region is in the image."""
+def test_a_camera_is_mounted_with_the_whole_focus_in_view(given: dict[str, Any]) -> None:
+    """However wide: all of the region is in the image, its centre in the middle."""
     focus = Region((0.5, -0.2, 0.75), (1.2, 0.8, 0.4))
     sensor = RgbCamera.model_validate({"name": "eye", "size_px": (640, 480), **given})
 
@@ -127,6 +129,8 @@ def test_a_wide_camera_is_mounted_with_the_focus_in_view(given: dict[str, Any]) 
     corners = np.asarray(focus.center_m) + 0.5 * signs * np.asarray(focus.size_m)
     image = found.intrinsics.project(found.T_world_camera.inverse().apply(corners))
     assert ((image > 0) & (image < [640, 480])).all()
+    centre = found.T_world_camera.inverse().apply(np.asarray(focus.center_m))
+    np.testing.assert_allclose(found.intrinsics.project(centre), [320, 240], atol=0.01)
 
 
 class Rendering:

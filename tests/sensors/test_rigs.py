@@ -13,7 +13,7 @@ import pytest
 from gen_data.assets.library import open_library
 from gen_data.core.capture import POINT, PointCloud, SensorReading
 from gen_data.core.errors import ConfigError, ConfigWarning
-from gen_data.core.interfaces import DatasetInfo, Modality, SensorInfo, Settled
+from gen_data.core.interfaces import DatasetInfo, Modality, SensorInfo
 from gen_data.core.motion import StateChange, Trajectory
 from gen_data.core.sample import EgoTruth, ImageTruth, Sample
 from gen_data.core.scene import Body, Lane, Rig, Scene
@@ -28,6 +28,7 @@ from gen_data.scene_templates.robot import Robot
 from gen_data.sensors.camera.rgb_camera import RgbCamera
 from gen_data.sensors.lidar.lidar_sensor import LidarSensor
 from gen_data.sensors.mounting import stride, warn_of_early_readings
+from tests.pipeline.test_pipeline import AcceptingPhysics
 from tests.randomizers.doubles import FakeAssets, rng_of
 
 CAR = "car?seed=0"
@@ -117,19 +118,6 @@ class Watching:
         return SensorReading(self.name, scene.camera(self.name), {}, time_s=scene.time_s)
 
 
-class AtRest:
-    """Physics that leaves every scene as it is."""
-
-    def __enter__(self) -> AtRest:
-        return self
-
-    def __exit__(self, *exception: object) -> None:
-        """Nor to stop."""
-
-    def settle(self, scene: Scene) -> Settled:
-        return Settled(scene)
-
-
 def sampled(
     index: int, offsets_s: Mapping[str, float] = {}, **recipe: Any
 ) -> tuple[Sample, dict[str, float], dict[str, float]]:
@@ -170,7 +158,7 @@ def sampled(
         exporters={},
         **recipe,
     )
-    pipeline = Pipeline(made, open_library(()), AtRest, lambda: None)  # type: ignore[arg-type]
+    pipeline = Pipeline(made, open_library(()), AcceptingPhysics, lambda: None)  # type: ignore[arg-type]
     with pipeline:
         return pipeline.sample(index), annotated, swept
 
