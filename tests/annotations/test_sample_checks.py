@@ -2,7 +2,6 @@
 
 import math
 import random
-import time
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -296,15 +295,3 @@ def test_a_contradiction_is_refused(name: str) -> None:
     for seed in range(3):
         with pytest.raises(SampleError, match=r"^[\w.' \[\]()-]+: "):
             check_sample(make_info(), MUTATIONS[name](random.Random(seed)))
-
-
-def test_the_checks_take_little_time() -> None:
-    """Less than 3 ms of CPU on an idle core; the limit allows for a busy one."""
-    info, sample = make_info(), make_sample()
-    seconds = []
-    for _ in range(10):
-        started_s = time.process_time()
-        check_sample(info, sample)
-        seconds.append(time.process_time() - started_s)
-
-    assert min(seconds) < 0.010

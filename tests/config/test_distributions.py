@@ -442,26 +442,6 @@ def test_bounds_can_be_set_on_any_field_type() -> None:
     ]
 
 
-def test_a_scalar_is_drawn_in_microseconds() -> None:
-    """A scene draws some 300 values; that must not be felt."""
-    import timeit
-
-    rng = rng_of(0)
-    distributions: list[Distribution[Any]] = [
-        Uniform(0, 1),
-        LogUniform(1, 2),
-        Normal(0, 1, clip=(-1, 1)),
-        UniformInteger(0, 9),
-        Choice({"a": 3, "b": 1}),
-        So3(),
-        Shell((0, 0, 0), (1, 2)),
-    ]
-
-    seconds = min(timeit.repeat(lambda: [d.draw(rng) for d in distributions], number=200, repeat=5))
-
-    assert seconds / (200 * len(distributions)) < 50e-6
-
-
 class Sides(Strict):
     side: Annotated[Name, OneOf(("left", "right"))] = Constant("left")
 

@@ -338,28 +338,6 @@ def _walk(scene: Scene, blocked: list[Body]) -> list[tuple[float, float]]:
 
 
 @pytest.mark.slow
-def test_books_cover_most_of_the_boards_of_bookcases() -> None:
-    """Sums of widths along the boards, over ten living rooms with their usual clutter."""
-    shares = []
-    for seed in range(10):
-        placed = pieces(furnished("living_room", seed))
-        for case in (b for b in placed if b.asset.startswith("bookcase?")):
-            (x0, y0, _), (x1, y1, top) = library().bounds_m(case.asset)
-            to_case = case.T_world_body.inverse()
-            levels: dict[float, float] = {}
-            for thing in placed:
-                x, y, _ = to_case.apply(np.array([thing.T_world_body.translation_m]))[0]
-                if x0 < x < x1 and y0 < y < y1 and heights_m(thing)[0] < top - 0.1:
-                    low, high = library().bounds_m(thing.asset)
-                    level = round(heights_m(thing)[0], 2)
-                    levels[level] = levels.get(level, 0.0) + (high[1] - low[1]) / (y1 - y0)
-            shares += [share for level, share in levels.items() if level > 0.01]
-
-    assert len(shares) > 20
-    assert 0.5 < np.median(shares) < 0.95
-
-
-@pytest.mark.slow
 @of_seeds(2, 6)
 def test_what_stands_behind_doors_is_within_its_cupboard(seeds: range) -> None:
     """Boxes of crockery, food and clothes lie in the box of a cupboard, 3 cm behind its front."""
