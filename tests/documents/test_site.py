@@ -10,16 +10,9 @@ import pytest
 from PIL import Image
 
 from docs import pictures
+from docs.hooks import plugin_reference
 from docs.hooks.command_reference import command_page
 from docs.hooks.family_reference import family_section
-from docs.hooks.plugin_reference import (
-    KINDS,
-    distribution_page,
-    field_range,
-    field_unit,
-    plugin_page,
-    template_page,
-)
 from gen_data import configs, scene_templates
 from gen_data.assemble.plugin_tables import TABLES
 from gen_data.assets.families import own_families
@@ -36,7 +29,7 @@ ROOT = Path(__file__).parents[2]
 
 @cache
 def page_of(kind: str) -> str:
-    return plugin_page(kind, TABLES[kind])
+    return plugin_reference.plugin_page(kind, TABLES[kind])
 
 
 def sections(page: str) -> dict[str, str]:
@@ -57,7 +50,7 @@ def test_every_plugin_is_there_with_every_field_and_a_valid_example(kind: str) -
         assert sorted(rows) == sorted(model.model_fields)
         block = re.findall(r"^```yaml\n(.*?)^```$", texts[name], re.MULTILINE | re.DOTALL)[0]
         example: Any = parse_yaml(block, name).plain()
-        entry = example[KINDS[kind][1]]
+        entry = example[plugin_reference.KINDS[kind][1]]
         entry = entry if isinstance(entry, dict) else entry[0]
         plain = {table.tag: entry} if isinstance(entry, str) else entry
         assert plain[table.tag] == name
@@ -84,20 +77,20 @@ def test_headings_are_unique_and_links_lead_to_them(kind: str) -> None:
 
 def test_ranges_and_units_are_those_of_the_fields() -> None:
     """Hand-picked fields of a light."""
-    assert field_range(Lighting, "temperature_k") == "[1667, 25000]"
-    assert field_range(Lighting, "illuminance_lux") == ">= 0"
-    assert field_range(Lighting, "kind") == ""
-    assert field_unit("illuminance_lux") == "lx"
-    assert field_unit("luminance_cd_m2") == "cd/m²"
-    assert field_unit("speed_m_s") == "m/s"
-    assert field_unit("name") == ""
+    assert plugin_reference.field_range(Lighting, "temperature_k") == "[1667, 25000]"
+    assert plugin_reference.field_range(Lighting, "illuminance_lux") == ">= 0"
+    assert plugin_reference.field_range(Lighting, "kind") == ""
+    assert plugin_reference.field_unit("illuminance_lux") == "lx"
+    assert plugin_reference.field_unit("luminance_cd_m2") == "cd/m²"
+    assert plugin_reference.field_unit("speed_m_s") == "m/s"
+    assert plugin_reference.field_unit("name") == ""
 
 
 def test_distributions_templates_and_commands_are_complete() -> None:
     """The other generated pages list everything that the program knows."""
-    assert set(sections(distribution_page())) == set(DISTRIBUTIONS.entries)
+    assert set(sections(plugin_reference.distribution_page())) == set(DISTRIBUTIONS.entries)
     templates = {path.stem for path in Path(scene_templates.__path__[0]).glob("*.yaml")}
-    assert set(sections(template_page())) == templates
+    assert set(sections(plugin_reference.template_page())) == templates
     commands = sections(command_page())
     for name in cli.list_commands(click.Context(cli)):
         assert f"gen-data {name}" in commands

@@ -18,16 +18,7 @@ from numpy.typing import NDArray
 from gen_data import annotations
 from gen_data.annotations.annotate import Thresholds, annotate_objects
 from gen_data.annotations.language import Language
-from gen_data.core.asset_types import (
-    SURFACES,
-    Asset,
-    Joint,
-    Keypoint,
-    Material,
-    MeshData,
-    RobotModel,
-    Symmetry,
-)
+from gen_data.core import asset_types
 from gen_data.core.boxes import BoxPx, tight_box
 from gen_data.core.capture import (
     POINT,
@@ -70,13 +61,13 @@ MEDIA = (Channel.RGB, Channel.Z_DEPTH, Channel.INSTANCE, Channel.CATEGORY)
 SIZES_M = {"car": (4.0, 1.8, 1.5), "pedestrian": (0.5, 0.6, 1.8), "crate": (1.0, 1.4, 0.9)}
 
 
-def _keypoints(category: str, names: str) -> tuple[Keypoint, ...]:
+def _keypoints(category: str, names: str) -> tuple[asset_types.Keypoint, ...]:
     """At left front and right rear edges of a box by turns, from the ground up, 1 cm inside."""
     listed = names.split()
     length, width, height = SIZES_M[category]
     x_m, y_m = 0.5 * length - 0.01, 0.5 * width - 0.01
     return tuple(
-        Keypoint(name, (side * x_m, side * y_m, height * (k + 0.5) / len(listed)))
+        asset_types.Keypoint(name, (side * x_m, side * y_m, height * (k + 0.5) / len(listed)))
         for k, name in enumerate(listed)
         for side in (1 - 2 * (k % 2),)
     )
@@ -411,7 +402,7 @@ def scan(scene: Scene, lidar: Lidar) -> NDArray[Any]:
     points["position_m"] = rays[near] * nearest[near, None]
     points["intensity"] = 1.0 / (1.0 + nearest[near])
     points["instance_id"], points["category_id"] = ids[near], categories[near]
-    points["surface"] = np.where(ids[near] > 0, 0, SURFACES.index("asphalt"))
+    points["surface"] = np.where(ids[near] > 0, 0, asset_types.SURFACES.index("asphalt"))
     points["return_number"] = points["return_count"] = 1
     return points
 
@@ -479,27 +470,29 @@ def ignoring(sample: Sample) -> Sample:
 class Props:
     """A library of light, of one arm and of the meshes of ``with_bodies``."""
 
-    def robot(self, asset_id: str) -> RobotModel:
+    def robot(self, asset_id: str) -> asset_types.RobotModel:
         links = ("base", *(f"{name}_link" for name in ARM_JOINTS))
         joints = tuple(
-            Joint(name, "revolute", links[k], links[k + 1], SE3(), (0.0, 0.0, 1.0), -3.0, 3.0)
+            asset_types.Joint(
+                name, "revolute", links[k], links[k + 1], SE3(), (0.0, 0.0, 1.0), -3.0, 3.0
+            )
             for k, name in enumerate(ARM_JOINTS)
         )
-        return RobotModel(links, joints, {}, {}, (0.0, 0.0), None, frozenset())
+        return asset_types.RobotModel(links, joints, {}, {}, (0.0, 0.0), None, frozenset())
 
-    def get(self, asset_id: str) -> Asset:
+    def get(self, asset_id: str) -> asset_types.Asset:
         """Crates look the same after half a turn about Z, and ellipsoids about X too."""
         if asset_id.count("/") != 2:
             licence = "CC0-1.0" if asset_id.startswith("environment/") else "Apache-2.0"
-            return Asset(asset_id, "object", "", (), licence, "nobody", "nowhere", "")
+            return asset_types.Asset(asset_id, "object", "", (), licence, "nobody", "nowhere", "")
         _, shape, category = asset_id.split("/")
         middle = (0.0, 0.0, 0.5 * SIZES_M[category][2])
-        turns = [Symmetry((0.0, 0.0, 1.0), 2)] if category == "crate" else []
-        turns += [Symmetry((1.0, 0.0, 0.0), 2, middle)] if shape == "ellipsoid" else []
+        turns = [asset_types.Symmetry((0.0, 0.0, 1.0), 2)] if category == "crate" else []
+        turns += [asset_types.Symmetry((1.0, 0.0, 0.0), 2, middle)] if shape == "ellipsoid" else []
         nobody = ("CC0-1.0", "", "", "")
-        return Asset(asset_id, "object", category, (), *nobody, symmetries=tuple(turns))
+        return asset_types.Asset(asset_id, "object", category, (), *nobody, symmetries=tuple(turns))
 
-    def mesh(self, asset_id: str) -> MeshData:
+    def mesh(self, asset_id: str) -> asset_types.MeshData:
         import trimesh
 
         _, shape, category = asset_id.split("/")
@@ -507,16 +500,16 @@ class Props:
         box = shape == "box"
         solid = trimesh.creation.box() if box else trimesh.creation.icosphere(4, radius=0.5)
         vertices = (solid.vertices + np.array([0.0, 0.0, 0.5])) * (length, width, height)
-        return MeshData(
+        return asset_types.MeshData(
             np.asarray(vertices, np.float32),
             np.asarray(solid.faces, np.int32),
             np.asarray(solid.vertex_normals, np.float32),
             np.zeros((len(vertices), 2), np.float32),
             np.zeros(len(solid.faces), np.int32),
-            (Material(),),
+            (asset_types.Material(),),
         )
 
-    def materials(self, asset_id: str) -> tuple[Material, ...]:
+    def materials(self, asset_id: str) -> tuple[asset_types.Material, ...]:
         return ()
 
     def environment(self, environment_id: str) -> NDArray[np.float32]:

@@ -6,18 +6,8 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
+from gen_data.core import kinematics
 from gen_data.core.asset_types import Gripper, Joint, RobotModel
-from gen_data.core.kinematics import (
-    all_positions,
-    finger_links,
-    gripper_opening,
-    is_within_limits,
-    link_poses,
-    make_link_bodies,
-    position_limits,
-    rigid_group,
-    round_positions,
-)
 from gen_data.core.scene import Articulation
 from gen_data.core.se3 import SE3
 from tests.physics.panda import HOME, panda, urdf_path
@@ -48,7 +38,7 @@ def test_link_poses_are_those_of_an_independent_simulator(client: int) -> None:
 
     for _ in range(20):
         positions = [float(rng.uniform(j.lower, j.upper)) for j in robot.movable]
-        poses = link_poses(robot, base, positions)
+        poses = kinematics.link_poses(robot, base, positions)
         values = dict(zip((j.name for j in robot.movable), positions, strict=True))
         joints = range(pybullet.getNumJoints(number, physicsClientId=client))
         names = {}
@@ -70,7 +60,7 @@ def test_link_poses_are_those_of_an_independent_simulator(client: int) -> None:
 def test_a_wrong_number_of_positions_is_refused() -> None:
     """Nine joints need nine numbers."""
     with pytest.raises(ValueError, match="9 joint positions needed, got 2"):
-        link_poses(panda(), SE3(), (0.0, 0.0))
+        kinematics.link_poses(panda(), SE3(), (0.0, 0.0))
 
 
 def test_link_bodies_carry_the_part_ids_of_the_instance() -> None:
@@ -78,7 +68,7 @@ def test_link_bodies_carry_the_part_ids_of_the_instance() -> None:
     robot = panda()
     arm = Articulation("arm", "panda", 7, SE3(), HOME)
 
-    bodies = make_link_bodies(arm, robot, ("panda_link0", "panda_hand"))
+    bodies = kinematics.make_link_bodies(arm, robot, ("panda_link0", "panda_hand"))
 
     assert [body.name for body in bodies] == [f"arm/{link}" for link in robot.visuals]
     part_ids = {body.name: body.part_id for body in bodies}
@@ -93,26 +83,26 @@ def test_fingers_follow_the_opening_and_the_arm_its_own_positions() -> None:
     """Half open is half the range of each finger; the seven arm joints keep their order."""
     arm = (0.1, -0.2, 0.3, -1.4, 0.5, 1.6, 0.7)
 
-    assert all_positions(panda(), arm, opening=0.5) == (*arm, 0.02, 0.02)
+    assert kinematics.all_positions(panda(), arm, opening=0.5) == (*arm, 0.02, 0.02)
 
 
 def test_limits_bound_every_joint() -> None:
     """The fourth joint of the Panda cannot bend backwards."""
-    assert is_within_limits(panda(), HOME)
-    assert not is_within_limits(panda(), (*HOME[:3], 0.1, *HOME[4:]))
+    assert kinematics.is_within_limits(panda(), HOME)
+    assert not kinematics.is_within_limits(panda(), (*HOME[:3], 0.1, *HOME[4:]))
 
 
 def test_hand_flange_and_last_link_move_as_one_and_fingers_do_not() -> None:
     """Fixed joints glue links together, finger joints do not."""
-    group = rigid_group(panda(), "panda_hand")
+    group = kinematics.rigid_group(panda(), "panda_hand")
 
     assert group == {"panda_link7", "panda_link8", "panda_hand", "panda_grasptarget"}
-    assert finger_links(panda()) == ("panda_leftfinger", "panda_rightfinger")
+    assert kinematics.finger_links(panda()) == ("panda_leftfinger", "panda_rightfinger")
 
 
 def test_positions_are_rounded_to_six_decimals_without_negative_zero() -> None:
     """What is written to files is what was simulated."""
-    rounded = round_positions((math.pi, -1e-9))
+    rounded = kinematics.round_positions((math.pi, -1e-9))
 
     assert rounded == (3.141593, 0.0)
     assert math.copysign(1.0, rounded[1]) == 1.0
@@ -142,7 +132,7 @@ def test_a_joint_follows_with_its_multiplier_and_offset() -> None:
     """As a Robotiq hand: half closed, 0.4, the other side is at -1 * 0.4 + 0.1 = -0.3."""
     hand = linkage(turning("knuckle", "right", "finger", -1.0, 0.1))
 
-    assert all_positions(hand, (), opening=0.5) == (0.4, -0.3)
+    assert kinematics.all_positions(hand, (), opening=0.5) == (0.4, -0.3)
 
 
 def test_a_joint_may_follow_one_that_follows() -> None:
@@ -150,30 +140,30 @@ def test_a_joint_may_follow_one_that_follows() -> None:
     knuckle = turning("knuckle", "right", "finger", -1.0, 0.1)
     tip = turning("tip", "tip", "knuckle", 2.0, -0.05)
 
-    assert all_positions(linkage(knuckle, tip), (), opening=0.0) == (0.8, -0.7, -1.45)
-    assert all_positions(linkage(tip, knuckle), (), opening=0.0) == (0.8, -1.45, -0.7)
+    assert kinematics.all_positions(linkage(knuckle, tip), (), opening=0.0) == (0.8, -0.7, -1.45)
+    assert kinematics.all_positions(linkage(tip, knuckle), (), opening=0.0) == (0.8, -1.45, -0.7)
 
 
 def test_a_leader_stays_where_its_followers_are_within_their_limits() -> None:
     """-q + 0.1 within [-0.5, 0.05] leaves q within [0.05, 0.6]."""
     hand = linkage(turning("knuckle", "right", "finger", -1.0, 0.1, lower=-0.5, upper=0.05))
 
-    assert position_limits(hand.joints[0], hand) == pytest.approx((0.05, 0.6))
+    assert kinematics.position_limits(hand.joints[0], hand) == pytest.approx((0.05, 0.6))
 
 
 def test_links_that_follow_a_finger_are_fingers() -> None:
     """A joint that the gripper does not list moves with it all the same."""
     hand = linkage(turning("knuckle", "right", "finger", -1.0), turning("wrist", "palm"))
 
-    assert finger_links(hand) == ("left", "right")
+    assert kinematics.finger_links(hand) == ("left", "right")
 
 
 @pytest.mark.parametrize("opening", [0.0, 0.25, 1.0])
 def test_the_opening_is_read_back_from_positions(opening: float) -> None:
     """Whichever limit is the open one."""
     for robot, arm in ((panda(), HOME[:7]), (linkage(), ())):
-        positions = all_positions(robot, arm, opening)
-        assert gripper_opening(robot, positions) == pytest.approx(opening, abs=1e-5)
+        positions = kinematics.all_positions(robot, arm, opening)
+        assert kinematics.gripper_opening(robot, positions) == pytest.approx(opening, abs=1e-5)
 
 
 @pytest.mark.parametrize(
@@ -187,4 +177,4 @@ def test_the_opening_is_read_back_from_positions(opening: float) -> None:
 def test_followers_without_a_leader_are_refused(followers: list[Joint], fault: str) -> None:
     """Unknown joints, and circles of any length."""
     with pytest.raises(ValueError, match=fault):
-        all_positions(linkage(*followers), (), opening=0.5)
+        kinematics.all_positions(linkage(*followers), (), opening=0.5)
