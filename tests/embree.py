@@ -78,6 +78,5 @@ def _rays(
 
 
 def placed(body: Body, assets: AssetLibrary) -> tuple[NDArray[np.float64], NDArray[np.integer]]:
-    """Corners of a body in the world, and its faces."""
     mesh = assets.mesh(body.asset)
     return body.T_world_body.apply(mesh.vertices_m.astype(np.float64) * body.scale), mesh.faces

@@ -15,8 +15,6 @@ VIEWS = 3
 
 
 class Numbers(Sequence[int]):
-    """Samples that are their own indices; three views per scene."""
-
     def __init__(self, n: int | None) -> None:
         self.n = n
         self.read: list[int] = []

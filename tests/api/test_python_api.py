@@ -37,7 +37,6 @@ MINIMAL = {
 
 @pytest.fixture(scope="module")
 def data() -> gen_data.Dataset:
-    """Small tabletop samples without an end."""
     return gen_data.Dataset("tabletop.yaml", seed=1, overrides=SMALL)
 
 

@@ -18,7 +18,6 @@ BENT = {**CAMERA, "lens": {"model": "kannala_brandt", "k1": 0.01}}
 
 
 def cart(*sensors: dict[str, Any], **sections: Any) -> dict[str, Any]:
-    """A room with sensors on a carrier."""
     on_rig = [{"rig": "cart", "offset_m": [1.0, 0, 0.9], **sensor} for sensor in sensors]
     elements = [
         {"type": "room", "name": "room", "size_m": [5, 4, 2.8]},

@@ -35,7 +35,6 @@ ENTRY = """robots:
 def robot(
     tmp_path: Path, hand: str = "hand.urdf", joint: str = "open", more: str = ""
 ) -> RobotModel:
-    """The arm with the hand of a file."""
     (tmp_path / "arm.urdf").write_text(ARM)
     (tmp_path / "hand.urdf").write_text(HAND)
     (tmp_path / "hand.xml").write_text(HAND_MJCF)

@@ -61,7 +61,6 @@ def reseal(folder: Path) -> None:
 
 
 def edit_lines(path: Path, change: Callable[[int, dict[str, Any]], None]) -> None:
-    """Change every line of a file of JSON lines."""
     rows = [json.loads(line) for line in path.read_text().splitlines()]
     for number, row in enumerate(rows):
         change(number, row)

@@ -31,7 +31,6 @@ QUICK = {"samples": 2, "rays": 400, "scenes": 0}
 
 @pytest.fixture(scope="session")
 def certified(dataset: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A copy of the data set with its certificate."""
     copy = Path(shutil.copytree(dataset, tmp_path_factory.mktemp("good") / "table"))
     gen_data.certify(copy, samples=4, rays=200, scenes=32)
     return copy

@@ -49,13 +49,11 @@ def edit_json(path: Path, change: Callable[[dict[str, Any]], None]) -> None:
 
 
 def edit_labels(folder: Path, index: int, change: Callable[[dict[str, Any]], None]) -> None:
-    """Change the labels of one sample of the first shard."""
     path = folder / SHARD / "labels.jsonl"
     edit_lines(path, lambda number, row: change(row) if number == index else None)
 
 
 def edit_scene(folder: Path, index: int, change: Callable[[dict[str, Any]], None]) -> None:
-    """Change the stored scene of one sample of the first shard."""
     path = folder / SHARD / "scenes.jsonl"
     edit_lines(path, lambda number, row: change(row["scene"]) if number == index else None)
 

@@ -311,7 +311,6 @@ ALPHABET = "abc:,-[]{}&*!|>'\"%@#? \n\t\\0123456789.~\x00\x85\ufeff\ud800é😀"
 
 
 def outcome_of(text: str) -> str:
-    """``read``, or the message of the error."""
     try:
         node = parse_yaml(text, "f.yaml")
         node.plain()

@@ -60,7 +60,6 @@ def digests_of(library: ProceduralLibrary) -> Mapping[str, dict[str, str]]:
 
 
 def open_procedural(folder: Path) -> ProceduralLibrary:
-    """The procedural library with an empty cache in a folder."""
     return ProceduralLibrary(Store(DiskCache(folder)))
 
 

@@ -26,13 +26,11 @@ SCENE_NUMERICS = ("draws", "arrays", "physics")
 
 
 def read_stored() -> dict[str, Any]:
-    """``{"numerics": ..., "samples": {configuration: {stage: sha256}}}``."""
     stored: dict[str, Any] = json.loads(FILE.read_text("utf-8"))
     return stored
 
 
 def digests_of(dataset: Path) -> dict[str, str]:
-    """SHA-256 by stage of sample 0 of a data set."""
     digests = SampleFiles(dataset / "shards/000000", 0).digests()
     return {stage: digests[stage] for stage in STAGES}
 

@@ -20,7 +20,6 @@ CONFIGS = sorted(path.stem for path in Path(configs.__path__[0]).glob("*.yaml"))
 
 
 def reduced(name: str) -> list[str]:
-    """Options that make one sample of a configuration quick."""
     spec = load_config(name)
     texts = ["shard_size=1"]
     if "tier" in spec.resolved["render"]:
@@ -40,7 +39,6 @@ def smaller(sensor: Sensor) -> list[str]:
 
 
 def generate_reduced(name: str, folder: Path) -> subprocess.CompletedProcess[str]:
-    """Generate one reduced sample of a configuration in ``folder / "out"``."""
     options = ("--n", "1", "--workers", "0", "--out", "out", *reduced(name))
     return gen_data("--config", name, *options, cwd=folder)
 

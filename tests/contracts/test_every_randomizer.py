@@ -71,7 +71,6 @@ IN_ROOMS = (
 
 @cache
 def furnished_room() -> Scene:
-    """An office with two cameras; ``furnish`` draws another one in its place."""
     library = open_library(())
     elements = (RoomLayout(name="room", kind="office"), Carrier(name="carrier"))
     scene = build_scene("test", elements, library)
@@ -99,7 +98,6 @@ def houses_and_garden() -> Scene:
 
 @cache
 def straight_road() -> Scene:
-    """A road with a bench and two cameras."""
     bench = Body("bench", "bench?seed=0", SE3((20.0, 6.0, 0.0)), instance_id=1)
     lens = Intrinsics.from_hfov(64, 48, 1.0)
     cameras = tuple(Camera(name, SE3((0.0, 0.0, 1.5)), lens) for name in ("left", "right"))
@@ -177,7 +175,6 @@ def _walker(k: int) -> Body:
 
 
 def made(kind: str) -> Any:
-    """Make a randomizer of a type, as from YAML."""
     plain = {"type": kind, "name": kind, **GIVEN.get(kind, {})}
     return TABLE.load(kind).model_validate_json(json.dumps(plain))
 

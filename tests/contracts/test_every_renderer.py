@@ -48,7 +48,6 @@ SIZE_M = (0.4, 0.6, 0.8)
 
 @cache
 def opened(name: str) -> Renderer:
-    """A renderer shared by all tests: its caches must not affect results."""
     return fresh(name)
 
 

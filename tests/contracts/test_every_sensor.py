@@ -78,7 +78,6 @@ def street() -> Scene:
 
 
 def made(kind: str, **fields: Any) -> Any:
-    """Make a sensor of a type on the rig, as from YAML."""
     plain = {"type": kind, "name": "unit", "rig": "ego", **GIVEN.get(kind, {}), **fields}
     return TABLE.load(kind).model_validate_json(json.dumps(plain))
 

@@ -94,7 +94,6 @@ def test_phrases_are_found_and_plain_english_is_not() -> None:
 
 
 def main() -> None:
-    """Write the table; exit with the files whose numbers would rise."""
     before = allowed() if TABLE.exists() else {}
     found = {name_of(path): tics(prose(path)).total() for path in files()}
     risen = [name for name, number in found.items() if number > before.get(name, 0)]

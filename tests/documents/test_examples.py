@@ -14,7 +14,6 @@ EXAMPLES = ROOT / "examples"
 
 
 def run(folder: Path, *arguments: str, path: str = "") -> str:
-    """Output of Python in a folder, with another folder of packages."""
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), path])}
     done = subprocess.run(
         [sys.executable, *arguments],

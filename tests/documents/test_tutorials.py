@@ -191,7 +191,6 @@ class YoloStandIn:
         assert model == "yolo11n.yaml"
 
     def train(self, *, data: str, epochs: int, imgsz: int) -> None:
-        """Every image has a label file of normalised boxes of known classes."""
         assert epochs > 0 and imgsz > 0
         self.read_labels(data, "train")
 

@@ -17,7 +17,6 @@ SMALL = ("--set", "sensors[0].size_px=[160, 120]", "--set", "shard_size=5")
 
 
 def command(*arguments: str) -> list[str]:
-    """The command line of ``gen-data`` with these arguments, in this environment."""
     return [sys.executable, "-m", "gen_data.cli", *arguments]
 
 
@@ -68,7 +67,6 @@ def _answer(server: subprocess.Popen[str], request: str) -> int:
 
 
 def digest(folder: Path) -> dict[str, str]:
-    """sha256 of every file of a data set except those in ``run/``."""
     return {
         str(path.relative_to(folder)): hashlib.sha256(path.read_bytes()).hexdigest()
         for path in sorted(folder.rglob("*"))

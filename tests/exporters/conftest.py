@@ -541,8 +541,6 @@ def export(
 
 
 class World:
-    """What tests of exporters build with; handed out by the fixture ``world``."""
-
     categories = CATEGORIES
     box = BoxPx
     instance = staticmethod(instance)

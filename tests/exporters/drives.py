@@ -30,7 +30,6 @@ def calibration(path: Path) -> dict[str, Any]:
 
 
 def rigid(values: dict[str, Any]) -> Any:
-    """[4, 4] of ``R`` and ``T``."""
     matrix = np.eye(4)
     matrix[:3, :3], matrix[:3, 3] = values["R"].reshape(3, 3), values["T"]
     return matrix

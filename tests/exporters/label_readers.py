@@ -87,7 +87,6 @@ def in_coco(folder: Path) -> Images:
 
 
 def segments_of(path: Path) -> NDArray[np.int64]:
-    """Ids as panopticapi's rgb2id reads them."""
     r, g, b = np.moveaxis(pixels(path, "RGB").astype(np.int64), -1, 0)
     return r + 256 * g + 65_536 * b
 
@@ -267,7 +266,6 @@ def parquet(path: Path) -> pyarrow.Table:
 
 
 def in_parquet(folder: Path) -> Images:
-    """Classes by the features in the metadata."""
     for path in folder.glob("data/*.parquet"):
         table = parquet(path)
         features = json.loads(table.schema.metadata[b"huggingface"])["info"]["features"]

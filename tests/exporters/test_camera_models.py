@@ -51,7 +51,6 @@ def in_coco(folder: Path) -> Camera:
 
 
 def in_croissant(folder: Path) -> Camera:
-    """Columns ``lens`` and ``distortion`` for bent ones, described in the metadata."""
     row = csv_rows(folder / "images.csv")[0]
     fields = json.loads((folder / "croissant.json").read_text())["recordSet"][0]["field"]
     assert ({"images/lens", "images/distortion"} <= {f["@id"] for f in fields}) == ("lens" in row)
@@ -67,7 +66,6 @@ def in_hdf5(folder: Path) -> Camera:
 
 
 def in_kitti(folder: Path) -> Camera:
-    """The left three columns of P2."""
     return calibration(folder / "training/calib/000000.txt")["P2"].reshape(3, 4)[:, :3], "", ()
 
 
@@ -90,12 +88,10 @@ def in_records(folder: Path) -> Camera:
 
 
 def in_scannet(folder: Path) -> Camera:
-    """Upper left of a matrix [4, 4]."""
     return np.loadtxt(min(folder.rglob("intrinsic_depth.txt")))[:3, :3], "", ()
 
 
 def in_tum(folder: Path) -> Camera:
-    """The line that is no comment."""
     lines = min(folder.rglob("calibration.txt")).read_text().splitlines()
     return pinhole(*next(line.split()[:4] for line in lines if not line.startswith("#")))
 

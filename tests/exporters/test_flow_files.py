@@ -19,7 +19,6 @@ H, W = 7, 9
 
 
 def read(data: bytes) -> NDArray[np.uint16]:
-    """Pixels in the order of the file: red, green, blue."""
     image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
     return image[..., ::-1] if image.ndim == 3 else image
 

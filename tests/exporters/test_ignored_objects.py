@@ -27,7 +27,6 @@ def in_coco(folder: Path) -> list[Row]:
 
 
 def in_parquet(folder: Path) -> list[Row]:
-    """Classes are counted from 0; ids stay unique."""
     (row,) = parquet(folder / "data/train-00000-of-00001.parquet").to_pylist()
     objects = row["objects"]
     assert len(set(objects["id"])) == len(objects["id"])
@@ -36,7 +35,6 @@ def in_parquet(folder: Path) -> list[Row]:
 
 
 def in_records(folder: Path) -> list[Row]:
-    """Label 0 is the background of TensorFlow's readers."""
     (record,) = records(folder / "train-00000-of-00001.tfrecord")
     labels, texts, crowds = (
         record[f"image/object/{key}"][1] for key in ("class/label", "class/text", "is_crowd")

@@ -167,14 +167,12 @@ def in_mcap(folder: Path) -> Found:
 
 
 def in_cvat(folder: Path) -> Found:
-    """By the name in the XML file."""
     image = ElementTree.parse(folder / "train/annotations.xml").find("image")
     assert image is not None
     return file_of(folder / "train/images" / image.attrib["name"])
 
 
 def in_label_studio(folder: Path) -> Found:
-    """By the address in the first task."""
     url = json.loads((folder / "train/tasks.json").read_text())[0]["data"]["image"]
     return file_of(folder / unquote(url).partition("=label_studio/")[2])
 
@@ -196,7 +194,6 @@ def in_solo(folder: Path) -> Found:
 
 
 def in_clips(folder: Path) -> Found:
-    """By the line of the first frame."""
     return file_of(
         folder / "train" / json_lines(folder / "train/metadata.jsonl")[0]["image_file_name"]
     )
@@ -249,13 +246,11 @@ def in_coco(folder: Path) -> Found:
 
 
 def in_yolo(folder: Path) -> Found:
-    """The image of the only label."""
     (path,) = (folder / "detect/images/train").iterdir()
     return file_of(path)
 
 
 def in_voc(folder: Path) -> Found:
-    """By the name in the annotation."""
     root = folder / "VOCdevkit/VOC2012"
     (path,) = (root / "Annotations").iterdir()
     return file_of(root / "JPEGImages" / str(ElementTree.parse(path).findtext("filename")))

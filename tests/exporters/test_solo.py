@@ -37,7 +37,6 @@ def unity(vector: Any) -> Any:
 
 
 def problems(root: Path, frames: Sequence[Any], samples: Sequence[Any]) -> Iterator[str]:
-    """Contradictions between a split and the samples that it shows."""
     if len(list(root.glob("sequence.*/*.frame_data.json"))) != len(frames):
         yield "metadata counts other frames"
     for number, (frame, sample) in enumerate(zip(frames, samples, strict=True), 1):

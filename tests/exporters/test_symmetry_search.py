@@ -96,8 +96,6 @@ def test_what_assets_state_is_found_without_them(library: Library) -> None:
         stated = model_of(library, asset).info["symmetries_discrete"]
 
         class Silent:
-            """The library, whose assets state no symmetries."""
-
             mesh, texture = library.mesh, library.texture
 
             @staticmethod

@@ -58,7 +58,6 @@ def _parts(asset_id: str) -> ConvexParts:
 
 
 def box(x: float, y: float, z: float, at: tuple[float, float, float] = (0, 0, 0)) -> np.ndarray:
-    """Corners of a box with these edges [m] around a point."""
     signs = [[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)]
     return 0.5 * np.array(signs) * (x, y, z) + at
 
@@ -66,7 +65,6 @@ def box(x: float, y: float, z: float, at: tuple[float, float, float] = (0, 0, 0)
 def cylinder(
     radius_m: float, height_m: float, top_radius_m: float | None = None, z_m: float = 0.0
 ) -> np.ndarray:
-    """A prism of 24 sides around Z."""
     angle = np.arange(24) * 2 * math.pi / 24
     ring = np.stack([np.cos(angle), np.sin(angle), np.zeros(24)], axis=1)
     top = radius_m if top_radius_m is None else top_radius_m
@@ -79,7 +77,6 @@ def cylinder(
 
 
 def ball(radius_m: float) -> np.ndarray:
-    """200 points on a sphere (Fibonacci lattice)."""
     i = np.arange(200) + 0.5
     z, turn = 1 - 2 * i / 200, math.pi * (1 + math.sqrt(5)) * i
     r = np.sqrt(1 - z * z)
@@ -187,7 +184,6 @@ def random_turn(rng: np.random.Generator) -> SE3:
 
 
 def world_vertices(body: Body) -> np.ndarray:
-    """Vertices of a body in the world [m], shape [n, 3]."""
     vertices = np.concatenate(_parts(body.asset).parts_m) * body.scale
     return body.T_world_body.apply(vertices)
 

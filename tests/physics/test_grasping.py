@@ -76,7 +76,6 @@ THINGS = {
 
 @pytest.fixture
 def world(engine_name: EngineName) -> Iterator[World]:
-    """A hand and things, all at the origin."""
     world = open_world(PhysicsConfig(engine=engine_name))
     world.reset()
     for name, parts in (*COLLISIONS.items(), *THINGS.items()):

@@ -21,7 +21,6 @@ from tests.physics.panda import HOME
 
 
 def with_arm(scene: Scene) -> Scene:
-    """A Panda reaches over the clutter."""
     targets = tuple(SE3((0.1, 0.1 * k, TABLE_TOP_Z_M + 0.35), (0, 1, 0, 0)) for k in (0, 1, 2))
     base = SE3((-0.5, 0.0, TABLE_TOP_Z_M))
     goal = ArmGoal("reach", pose_candidates=targets)
@@ -29,12 +28,10 @@ def with_arm(scene: Scene) -> Scene:
 
 
 def digest(engine: Engine, scene: Scene) -> str:
-    """Of every bit of the outcome."""
     return hashlib.sha256(canonical_json(engine.settle(scene)).encode()).hexdigest()
 
 
 def settle_alone(name: EngineName, seed: int) -> str:
-    """What a process of its own makes of a scene."""
     with open_engine(Solids(), PhysicsConfig(engine=name)) as engine:
         return digest(engine, with_arm(dropped_clutter(seed)))
 

@@ -25,7 +25,6 @@ HALF_A_MM = 0.0005
 
 
 def settled(engine: Engine, scene: Scene) -> Scene:
-    """The scene at rest; it must not be refused."""
     outcome = engine.settle(scene)
     assert outcome.rejection is None, outcome.rejection
     return outcome.scene
@@ -122,7 +121,6 @@ def test_a_body_dropped_beside_the_table_is_refused_as_fallen_off(engine: Engine
 
 
 def ball_on_a_slope() -> Scene:
-    """A ball that will roll down a board towards the table's rim."""
     slope = thing("slope", "box 0.2 0.2 0.01", x=0.45, above_m=0.06)
     turn = (math.cos(math.radians(15)), 0.0, math.sin(math.radians(15)), 0.0)
     slope = replace(slope, T_world_body=SE3(slope.T_world_body.translation_m, turn))
@@ -179,7 +177,6 @@ def test_a_few_objects_in_a_bin_stay_inside(engine: Engine) -> None:
 
 
 def bin_scene(size_m: tuple[float, float, float], bodies: list[Body]) -> Scene:
-    """A bin on a floor and bodies that belong in it."""
     x, y, z = size_m
     surface = SupportSurface(
         "bin", "bin", SE3((0, 0, 0.01)), (x - 0.02, y - 0.02), 3.0, walled=True

@@ -33,7 +33,6 @@ NONE_FAIL = ("randomizers.things.failures={}", "shared.robot=franka_panda")
 
 
 def demonstrated(task: str, scene_index: int = 0, failures: str = "{}") -> Scene:
-    """A scene of one task, at time 0."""
     robot = "franka_panda_suction" if tasks()[task].hand == "suction" else "franka_panda"
     changes = (
         f"shared.task={task}",

@@ -36,8 +36,6 @@ STEPS = 4
 
 
 class Cars(TwoBoxes):
-    """Assets that are all as large as a car."""
-
     def bounds_m(self, asset_id: str) -> Any:
         return CAR_M
 

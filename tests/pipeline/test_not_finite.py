@@ -118,8 +118,6 @@ def test_a_scene_with_nan_or_infinity_is_an_error_with_its_field(
 
 @dataclass(frozen=True)
 class Broken:
-    """A renderer with one wrong value in each reading."""
-
     renderer: Any
     channel: Channel = Channel.RADIANCE
     value: float = NAN
@@ -165,8 +163,6 @@ def test_a_ray_without_a_hit_is_no_fault(pipeline: Pipeline) -> None:
 
 
 class Undefined:
-    """A distribution of a plug-in that draws NaN."""
-
     def draw(self, rng: Rng) -> float:
         del rng
         return NAN

@@ -54,8 +54,6 @@ class Refuses:
 
 
 class AcceptingPhysics:
-    """Physics that finds every scene at rest, and counts."""
-
     def __init__(self) -> None:
         self.settled = 0
 

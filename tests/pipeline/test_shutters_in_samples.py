@@ -38,7 +38,6 @@ def sample(pipeline: Pipeline) -> Sample:
 
 @pytest.fixture(scope="module")
 def following(pipeline: Pipeline, sample: Sample) -> Sample:
-    """The one after it, made after it."""
     return pipeline.sample(sample.index + 1)
 
 

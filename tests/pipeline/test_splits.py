@@ -15,7 +15,6 @@ SHARES = {"train": 0.8, "val": 0.1, "test": 0.1}
 
 
 def turns(count: int, shares: dict[str, float]) -> list[str]:
-    """Splits of the first scenes, in turns."""
     return [split_of(k, shares, "round_robin", 7) for k in range(count)]
 
 

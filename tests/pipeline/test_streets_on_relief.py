@@ -215,7 +215,6 @@ def test_view_of_a_dash_camera_pitches_with_its_car(streets: dict[str, Street]) 
 
 @pytest.fixture(scope="module")
 def hilly_samples() -> Iterator[tuple[Pipeline, list[Sample]]]:
-    """Two samples of different streets on hills."""
     config = thin_street("street.yaml", *STREET, *HILLS, "views_per_scene=1")
     with open_pipeline(config, frozenset({Channel.RANGE, Channel.INSTANCE})) as pipeline:
         yield pipeline, [pipeline.sample(0), pipeline.sample(1)]

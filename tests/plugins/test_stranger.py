@@ -78,7 +78,6 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 @pytest.fixture(scope="session")
 def dataset(installed: str, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Two samples made with every plug-in of the package."""
     folder = tmp_path_factory.mktemp("strangers-data")
     (folder / "strange.yaml").write_text(CONFIG)
     arguments = ("--config", "strange.yaml", "--n", "2", "--workers", "1", "--out", "out")
@@ -88,7 +87,6 @@ def dataset(installed: str, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def scenes(dataset: Path) -> list[dict[str, object]]:
-    """Scene of every sample, as stored in the data set."""
     paths = sorted(dataset.glob("shards/*/scenes.jsonl"))
     return [json.loads(line)["scene"] for path in paths for line in path.read_text().splitlines()]
 

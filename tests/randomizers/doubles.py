@@ -262,7 +262,6 @@ def box_of(body: Body) -> tuple[Array, Array, Array]:
 
 
 def corners_of(body: Body) -> Array:
-    """Corners of a body's box in the world [m], shape [8, 3]."""
     center, axes, half = box_of(body)
     signs = np.array([[a, b, c] for a in (-1, 1) for b in (-1, 1) for c in (-1, 1)])
     corners: Array = center + (signs * half) @ axes.T
@@ -283,6 +282,5 @@ def overlap_m(one: Body, other: Body) -> float:
 
 
 def deepest_overlap_m(bodies: Sequence[Body]) -> float:
-    """Largest penetration depth of any two bodies [m]."""
     pairs = combinations(bodies, 2)
     return max((overlap_m(one, other) for one, other in pairs), default=-np.inf)

@@ -48,7 +48,6 @@ def library(tmp_path: Path) -> Library:
 
 
 def placed(library: Library) -> Scene:
-    """The cabinet at (1, 2), turned by 90 degrees, on the floor."""
     prop = Prop(name="cabinet", asset="user/cabinet", annotate=True, at_m=(1.0, 2.0), yaw_deg=90.0)
     return prop.add(Scene("test"), library)
 

@@ -21,7 +21,6 @@ from tests.randomizers.doubles import FakeAssets, rng_of
 
 
 def street(**group: Any) -> Scene:
-    """Two lanes of 40 m in opposite directions, 3 m apart."""
     there = Lane("a", "driving", ((0.0, -1.5, 0.0), (40.0, -1.5, 0.0)), 3.0, road="street")
     back = Lane("b", "driving", ((40.0, 1.5, 0.0), (0.0, 1.5, 0.0)), 3.0, road="street")
     things = ObjectGroup("things", (), ("brick",), 0, "along", lanes=("driving",), **group)

@@ -16,7 +16,6 @@ def box_mesh(
     size_m: Vec3 = (1.0, 1.0, 1.0),
     materials: tuple[asset_types.Material, ...] = (asset_types.Material(),),
 ) -> asset_types.MeshData:
-    """A box around the origin with split edges, 12 triangles."""
     corners, normals, uvs, faces = [], [], [], []
     for axis in range(3):
         for sign in (-1.0, 1.0):
@@ -73,7 +72,6 @@ def sphere_mesh(
 def plane_mesh(
     size_m: float = 10.0, materials: tuple[asset_types.Material, ...] = (asset_types.Material(),)
 ) -> asset_types.MeshData:
-    """A square in the XY plane, facing +Z."""
     h = 0.5 * size_m
     corners = [(-h, -h, 0), (h, -h, 0), (h, h, 0), (-h, h, 0)]
     uvs = [(0, 0), (1, 0), (1, 1), (0, 1)]

@@ -23,7 +23,6 @@ def settings_of(samples: int, max_bounces: int = 16) -> RenderSettings:
 def radiance_of(
     scene: Scene, camera: Camera, library: FakeLibrary, samples: int, max_bounces: int = 16
 ) -> np.ndarray:
-    """Radiance [cd/m^2] of the renderer, float64 [h, w, 3]."""
     renderer = WarpRenderer(library, "cpu", settings_of(samples, max_bounces))
     reading = renderer.render(scene, camera, frozenset({Channel.RADIANCE}))
     return reading.channels[Channel.RADIANCE].astype(np.float64)

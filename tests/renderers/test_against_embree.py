@@ -70,7 +70,6 @@ def test_bodies_that_cut_each_other_agree_with_embree(seed: int) -> None:
 
 @pytest.fixture(scope="module")
 def tabletop() -> Iterator[Pipeline]:
-    """Random scenes of the shipped tabletop, one view each."""
     spec = load_config("tabletop.yaml", seed=3, overrides=("views_per_scene=1",))
     with open_pipeline(spec) as pipeline:
         yield pipeline

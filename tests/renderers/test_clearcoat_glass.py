@@ -44,7 +44,6 @@ def radiance_of(
     lights: tuple[Light, ...] = (),
     environment: Environment = DARK,
 ) -> np.ndarray:
-    """cd/m^2 of every pixel, [h, w, 3]."""
     scene = Scene("t", bodies, lights=lights, environment=environment)
     camera = replace(camera, ev100=8.0)
     reading = WarpRenderer(library, "cpu", SHARP).render(scene, camera, RADIANCE)

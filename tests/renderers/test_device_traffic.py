@@ -57,7 +57,6 @@ def rig() -> list[Frame]:
 
 
 def plates() -> list[Frame]:
-    """Two photographs, each with things on its ground."""
     return frames_of("photo_plates.yaml", 2)
 
 

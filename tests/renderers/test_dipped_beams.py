@@ -50,7 +50,6 @@ def lamp_records(lights: list[Light]) -> np.ndarray:
 
 
 def directions(up_deg: float, right_deg: float) -> np.ndarray:
-    """Unit, world; +X is ahead, so the right is -Y."""
     up, right = math.tan(math.radians(up_deg)), math.tan(math.radians(right_deg))
     d = np.array([1.0, -right, up])
     return d / np.linalg.norm(d)

@@ -113,7 +113,6 @@ def composite() -> SensorReading:
 
 @cache
 def whole() -> SensorReading:
-    """The cube on the ground with stones."""
     return seen(PlateLibrary(empty_photo()), world(cube=True, photo=False))
 
 
@@ -150,7 +149,6 @@ def test_things_and_ground_have_labels_and_the_rest_has_none() -> None:
 
 
 def half_mask() -> NDArray[np.uint8]:
-    """A foreground over the left half."""
     mask = np.zeros(SIZE_PX[::-1], np.uint8)
     mask[:, : SIZE_PX[0] // 2] = 255
     return mask

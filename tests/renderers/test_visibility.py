@@ -33,7 +33,6 @@ def scene_of(*bodies: Body, instances: tuple[Instance, ...] = ()) -> Scene:
 
 
 def facing_plane(z_m: float) -> Body:
-    """A plane at right angles to the axis of ``forward_camera``, facing it."""
     return Body("plane", "plane", SE3((0.0, 0.0, z_m), (0.0, 1.0, 0.0, 0.0)))
 
 

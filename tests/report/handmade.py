@@ -60,7 +60,6 @@ def make_object(number: int, category: str, x_px: int = 20, side_px: int = 8) ->
 
 
 def make_image(rng: np.random.Generator) -> NDArray[np.uint8]:
-    """An image of large random patches, uint8 [48, 64, 3]."""
     patches = rng.integers(0, 256, (6, 8, 3), dtype=np.uint8)
     image: NDArray[np.uint8] = np.repeat(np.repeat(patches, 8, axis=0), 8, axis=1)
     return image

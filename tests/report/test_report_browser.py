@@ -42,7 +42,6 @@ class Opened:
 
 @pytest.fixture(scope="module")
 def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Opened]:
-    """The page of two data sets in headless Chromium."""
     playwright = pytest.importorskip("playwright.sync_api")
     program = next((path for path in CHROMIUM if Path(path).exists()), None)
     if program is None:

@@ -32,7 +32,6 @@ def road(  # noqa: PLR0917
     link: str = "",
     center: str = "",
 ) -> str:
-    """A straight road of 100 m along +X."""
     return (
         f'<road length="100" id="{number}" junction="-1"><link>{link}</link>{types}'
         f'<planView><geometry s="0" x="{x}" y="0" hdg="0" length="100"><line/></geometry>'

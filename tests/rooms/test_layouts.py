@@ -86,7 +86,6 @@ def is_tilted(body: Body) -> bool:
 
 
 def world_vertices(body: Body) -> NDArray[np.float64]:
-    """Vertices of a body in the world [m]."""
     return body.T_world_body.apply(library().vertices_m(body.asset).astype(np.float64))
 
 

@@ -24,7 +24,6 @@ def walls(scene: Scene) -> list[Body]:
 
 
 def saturation_and_value(material: Material) -> tuple[float, float]:
-    """Of the base colour, in sRGB."""
     red, green, blue = srgb_encode(np.array(material.base_color)).tolist()
     return colorsys.rgb_to_hsv(red, green, blue)[1:]
 

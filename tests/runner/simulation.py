@@ -347,7 +347,6 @@ def simulate_cluster(workers: int, shards: int, loss: float) -> str:
 
 
 def main() -> None:
-    """Simulate the runs of the command line and print how they ended."""
     if sys.argv[1] == "cluster":
         print(simulate_cluster(int(sys.argv[2]), int(sys.argv[3]), float(sys.argv[4])))
         return

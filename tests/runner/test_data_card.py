@@ -124,7 +124,6 @@ def test_size_does_not_depend_on_the_number_of_samples() -> None:
 
 @pytest.fixture(scope="module")
 def dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Ten samples of a fake pipeline, with real images."""
     out = tmp_path_factory.mktemp("card") / "out"
     make(out, settings=Settings())
     return out

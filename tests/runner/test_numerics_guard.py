@@ -16,14 +16,11 @@ from tests.runner.doubles import FakeFactory, FakePipeline, Trouble, fake_plan
 
 
 class Machine(FakePipeline):
-    """A fake pipeline on a machine of a kind."""
-
     def __init__(self, kind: str) -> None:
         super().__init__(10, Trouble())
         object.__setattr__(self, "kind", kind)
 
     def numerics(self) -> Mapping[str, str]:
-        """Digests that depend on the kind of machine."""
         return {"draws": "equal", "render": self.kind}  # type: ignore[attr-defined]
 
 

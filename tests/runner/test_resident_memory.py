@@ -15,7 +15,6 @@ SIZE = 8 << 20
 
 
 def pattern() -> np.ndarray:
-    """Eight megabytes without a repeated page."""
     return np.arange(SIZE // 4, dtype=np.uint32)
 
 

@@ -20,7 +20,6 @@ def street(library: Library) -> Scene:
 
 
 def lane_points(scene: Scene) -> np.ndarray:
-    """Points of all centre lines, [n, 2]."""
     return np.concatenate([np.array(lane.center_m)[:, :2] for lane in scene.lanes])
 
 

@@ -19,7 +19,6 @@ LEAFY = [name for name in SPECIES if name != "conifer"]
 
 @cache
 def summer_mesh(species: str) -> MeshData:
-    """The tree of seed 1 with all of its leaves."""
     return tree(1, species, 1.0).mesh
 
 

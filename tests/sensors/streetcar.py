@@ -109,7 +109,6 @@ class BoxRays:
     """A renderer whose world are the boxes of instances; reflectance 0.5 everywhere."""
 
     def scan(self, scene: Scene, lidar: Lidar, beams: LidarRays) -> LidarHits:
-        """First hits by the slab method."""
         shape = (len(beams.directions), beams.subrays)
         best = np.full(len(beams.directions), np.inf)
         ids, categories = np.zeros(len(best), int), np.zeros(len(best), int)

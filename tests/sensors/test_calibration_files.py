@@ -39,7 +39,6 @@ def sensor(folder: Path, text: str, name: str = "camera.yaml", **files: str) -> 
 
 
 def told(folder: Path, text: str, name: str = "camera.yaml", **files: str) -> str:
-    """What a user is told, without folders."""
     with pytest.raises(ConfigError) as refused:
         sensor(folder, text, name, **files)
     return str(refused.value).replace(f"{folder}/", "")

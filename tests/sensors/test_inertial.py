@@ -209,7 +209,6 @@ def test_errors_of_position_wander_slowly() -> None:
 
 
 def canyon(walls: int) -> Scene:
-    """Tall walls around a car that stands."""
     tall = ((-1.0, -60.0, 0.0), (1.0, 60.0, 80.0))
     poses = [SE3.about_z(k * 0.5 * math.pi) @ SE3((4.0, 0.0, 0.0)) for k in range(walls)]
     others = [thing(k + 2, f"wall/{k}", "building", p, tall) for k, p in enumerate(poses)]

@@ -63,7 +63,6 @@ def scanner_poses(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def turned(yaw: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """Vectors turned to the left about Z."""
     c, s = np.cos(yaw), np.sin(yaw)
     return np.stack([c * v[:, 0] - s * v[:, 1], s * v[:, 0] + c * v[:, 1], v[:, 2]], axis=1)
 

@@ -17,7 +17,6 @@ def patches(levels: np.ndarray, side_px: int = 64) -> np.ndarray:
 
 
 def bytes_of(image: np.ndarray, contrast: float = 1.0) -> np.ndarray:
-    """Display values in bytes, without rounding."""
     return 255.0 * fuse_exposures(image, 1.0, WHITE, contrast)
 
 
