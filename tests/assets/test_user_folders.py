@@ -102,24 +102,6 @@ def test_a_wrong_index_is_told_with_line_and_column(folder: Path, tmp_path: Path
     assert "flie" in message
 
 
-def test_scale_and_size_exclude_each_other(folder: Path, tmp_path: Path) -> None:
-    """Only one way to state the size is accepted."""
-    (folder / "assets.yaml").write_text(
-        "assets: [{id: a, file: a.obj, category: x, size_m: 1, scale: 2}]\n"
-    )
-    with pytest.raises(ConfigError, match="not both"):
-        open_library([folder], cache_dir=tmp_path / "cache").get("user/a")
-
-
-def test_two_folders_may_not_claim_one_id(tmp_path: Path) -> None:
-    """Silently preferring one would make data sets differ between machines."""
-    for name in ("one", "two"):
-        write_box(tmp_path / name / "cup.stl", (0.1, 0.1, 0.1))
-    library = open_library([tmp_path / "one", tmp_path / "two"], cache_dir=tmp_path / "cache")
-    with pytest.raises(AssetError, match=r"user/cup.*one.*two"):
-        library.get("user/cup")
-
-
 def test_a_changed_file_is_another_asset(folder: Path, tmp_path: Path) -> None:
     """The content hash follows the bytes, and the cache follows the hash."""
     write_box(folder / "cup.stl", (0.1, 0.1, 0.1))
@@ -274,6 +256,7 @@ def test_axes_that_are_named_come_to_z_and_x(up: str, front: str) -> None:
     ("entry", "fault"),
     [
         ("size_m: 1, unit: mm", "size_m or unit, not both"),
+        ("size_m: 1, scale: 2", "not both"),
         ("scale: 2, unit: mm", "scale or unit, not both"),
         ("front: x, yaw_deg: 90", "front or yaw_deg, not both"),
         ("front: -z", "front is -z, but z points up"),

@@ -19,6 +19,7 @@ from gen_data.core.capture import Channel
 from gen_data.core.scene import Weather
 from gen_data.core.se3 import SE3
 from gen_data.exporters.coco import Coco
+from tests.exporters.datasets import street_in
 from tests.exporters.label_readers import opened
 
 
@@ -49,10 +50,7 @@ def average_precision(truth: COCO, kind: str, path: Path | None = None) -> float
     return float(evaluation.stats[0])
 
 
-@pytest.fixture(scope="module")
-def dataset(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("coco")
-    return world.export(Coco(), world.info(7), world.samples, folder)
+dataset = street_in(Coco())
 
 
 @pytest.fixture(scope="module")

@@ -13,6 +13,7 @@ import pytest
 from gen_data.core.capture import Channel
 from gen_data.core.errors import ConfigError
 from gen_data.exporters.control_clips import ControlClips, inverse_depth
+from tests.exporters.datasets import street_in
 
 FIXED = ControlClips(near_m=5.0, far_m=60.0)
 
@@ -68,10 +69,7 @@ def wrong_frame(split: Path, row: Any, clip: Any, channels: Any) -> Iterator[str
         yield "edges"
 
 
-@pytest.fixture(scope="module")
-def dataset(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("clips")
-    return world.export(ControlClips(), world.info(7), world.samples, folder)
+dataset = street_in(ControlClips())
 
 
 def test_signals_follow_from_the_images(dataset: Path, world: Any) -> None:

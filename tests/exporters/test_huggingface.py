@@ -11,13 +11,10 @@ import yaml
 
 from gen_data.exporters import huggingface
 from gen_data.exporters.huggingface import HuggingFace
+from tests.exporters.datasets import street_in
 from tests.exporters.label_readers import parquet
 
-
-@pytest.fixture(scope="module")
-def dataset(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("huggingface")
-    return world.export(HuggingFace(rows_per_file=2), world.info(7), world.samples, folder)
+dataset = street_in(HuggingFace(rows_per_file=2))
 
 
 def test_parquet_files_embed_images(dataset: Path, world: Any) -> None:

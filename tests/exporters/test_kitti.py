@@ -21,6 +21,7 @@ from gen_data.core.scene import Camera, Instance
 from gen_data.core.se3 import IDENTITY, SE3
 from gen_data.exporters import kitti
 from tests.exporters import kitti_evaluation
+from tests.exporters.datasets import street_in
 from tests.exporters.drives import calibration
 
 Array = NDArray[np.float64]
@@ -62,11 +63,7 @@ def row_of(box3d_camera: OrientedBox, style: kitti.Kitti = STYLE, **changes: Any
     return kitti.label_row(ObjectTruth(crate, **fields), ImageTruth(CAMERA, ()), style)
 
 
-@pytest.fixture(scope="module")
-def dataset(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Seven frames of a street; the images are so small that everything is labelled."""
-    folder = tmp_path_factory.mktemp("kitti")
-    return world.export(kitti.Kitti(low_px=2), world.info(7), world.samples, folder)
+dataset = street_in(kitti.Kitti(low_px=2))
 
 
 def test_the_evaluation_scores_the_labels_as_perfect(dataset: Path) -> None:

@@ -15,16 +15,12 @@ from gen_data.core.errors import StorageError
 from gen_data.core.interfaces import media_path
 from gen_data.exporters.rerun import Rerun
 from gen_data.exporters.rrd_container import write_recording, xxh32
+from tests.exporters.datasets import street_in
 
 CLI = (sys.executable, "-c", "import sys; from rerun_cli.__main__ import main; sys.exit(main())")
 """The tool ``rerun`` of this environment."""
 Table = dict[str, dict[int, Any]]
-
-
-@pytest.fixture(scope="module")
-def dataset(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("rerun")
-    return world.export(Rerun(samples_per_file=3), world.info(7), world.samples, folder)
+dataset = street_in(Rerun(samples_per_file=3))
 
 
 def tables(path: Path) -> dict[str, Table]:

@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from gen_data.exporters.id_colors import id_color, id_colors
 from gen_data.exporters.solo import Solo
+from tests.exporters.datasets import street_in
 
 SIGNS = np.stack(np.meshgrid([-1, 1], [-1, 1], [-1, 1]), -1).reshape(-1, 3)
 
@@ -122,9 +123,7 @@ def wrong_colors(folder: Path, flat: Any, instances: Any, labels: Any) -> Iterat
             yield f"label of {box.instanceId}"
 
 
-@pytest.fixture(scope="module")
-def dataset(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return world.export(Solo(), world.info(7), world.samples, tmp_path_factory.mktemp("solo"))
+dataset = street_in(Solo())
 
 
 def of_split(world: Any, split: str) -> list[Any]:

@@ -5,18 +5,13 @@ from pathlib import Path
 from typing import Any
 
 import crc32c
-import pytest
 
 from gen_data.exporters import tfrecord
 from gen_data.exporters.tfrecord import TfRecord, encode_features, frame_record, label_map
+from tests.exporters.datasets import street_in
 from tests.exporters.label_readers import features, records
 
-
-@pytest.fixture(scope="module")
-def dataset(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("tfrecord")
-    exporter = TfRecord(rows_per_file=2, masks="png")
-    return world.export(exporter, world.info(7), world.samples, folder)
+dataset = street_in(TfRecord(rows_per_file=2, masks="png"))
 
 
 def sums_are_right(path: Path) -> bool:

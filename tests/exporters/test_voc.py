@@ -4,17 +4,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
 from PIL import Image
 
 from gen_data.exporters.label_colors import voc_palette
 from gen_data.exporters.voc import YEAR, Voc
+from tests.exporters.datasets import street_in
 from tests.exporters.label_readers import voc_objects
 
-
-@pytest.fixture(scope="module")
-def dataset(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return world.export(Voc(), world.info(7), world.samples, tmp_path_factory.mktemp("voc"))
+dataset = street_in(Voc())
 
 
 def test_the_palette_is_that_of_the_development_kit(dataset: Path) -> None:

@@ -10,15 +10,10 @@ from numpy.typing import NDArray
 
 from gen_data.core.capture import POINT, Channel
 from gen_data.exporters.webdataset import WebDataset
+from tests.exporters.datasets import street_in
 from tests.exporters.label_readers import tar_samples
 
-
-@pytest.fixture(scope="module")
-def dataset(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    info = world.info(7, lidars=("top",))
-    return world.export(
-        WebDataset(samples_per_tar=2), info, world.samples, tmp_path_factory.mktemp("tars")
-    )
+dataset = street_in(WebDataset(samples_per_tar=2), lidars=("top",))
 
 
 def same_columns(matrix: NDArray[Any], columns: list[str], truth: Any) -> bool:
