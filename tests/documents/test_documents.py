@@ -17,6 +17,7 @@ from tests.tiers import slow
 ROOT = Path(__file__).parents[2]
 FOLDERS = ("*.md", "docs/*.md", "docs/decisions/*.md", "examples/**/*.md")
 PAGES = sorted(path for pattern in FOLDERS for path in ROOT.glob(pattern))
+TUTORIALS = sorted(ROOT.glob("docs/tutorials/*.md"))
 OLD_NAMES = {ROOT / "docs/migration.md", ROOT / "CHANGELOG.md"}
 """Pages that list names which no longer exist."""
 
@@ -65,7 +66,7 @@ def test_configurations_are_valid(page: Path, text: str, tmp_path: Path) -> None
     assert PipelineFactory(load_config(str(path)), n=1).nominal
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+@pytest.mark.parametrize("page", [*PAGES, *TUTORIALS], ids=lambda page: page.name)
 def test_links_lead_to_files(page: Path) -> None:
     """Relative links and pictures exist; an anchor is a heading of its page."""
     for target in re.findall(r"\]\(([^)\s]+)\)", page.read_text("utf-8")):
@@ -83,7 +84,9 @@ def test_links_lead_to_files(page: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "page", [page for page in PAGES if page not in OLD_NAMES], ids=lambda page: page.name
+    "page",
+    [page for page in [*PAGES, *TUTORIALS] if page not in OLD_NAMES],
+    ids=lambda page: page.name,
 )
 def test_modules_exist(page: Path) -> None:
     """Dotted names below ``gen_data``, and paths of files in the repository."""

@@ -20,7 +20,6 @@ import yaml
 
 from docs import pictures
 from gen_data.cli.main import cli
-from tests.documents import test_documents
 
 ROOT = Path(__file__).parents[2]
 PAGES = {path.stem: path for path in sorted(ROOT.glob("docs/tutorials/*.md"))}
@@ -70,13 +69,6 @@ def shortened(name: str) -> str:
         assert long in text, f"{name}: '{long}' is not in the page"
         text = text.replace(long, short)
     return text
-
-
-@pytest.mark.parametrize("page", PAGES.values(), ids=PAGES)
-def test_links_and_names_exist(page: Path) -> None:
-    """As on the other pages."""
-    test_documents.test_links_lead_to_files(page)
-    test_documents.test_modules_exist(page)
 
 
 @pytest.mark.parametrize("page", PAGES.values(), ids=PAGES)
