@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from gen_data.api.export import export
     from gen_data.api.generate import generate
     from gen_data.api.loader import Loader
+    from gen_data.api.recipes import pull, recipe
     from gen_data.api.rerender import rerender
     from gen_data.api.sample import Box2d, Box3d, CameraReading, Sample
     from gen_data.api.write_sample import write_sample
@@ -72,6 +73,8 @@ _HOMES = {
     "write_sample": "gen_data.api.write_sample",
     "make_vec": "gen_data.lab.environment.env",
     "match": "gen_data.lab.matching.api",
+    "pull": "gen_data.api.recipes",
+    "recipe": "gen_data.api.recipes",
     "rerender": "gen_data.api.rerender",
     "AssetError": "gen_data.core.errors",
     "CertificationError": "gen_data.core.errors",
@@ -122,6 +125,8 @@ __all__ = [
     "make_vec",
     "match",
     "open",
+    "pull",
+    "recipe",
     "rerender",
     "write_sample",
 ]

@@ -18,6 +18,7 @@ from gen_data.core import errors, urls
 if TYPE_CHECKING:
     from gen_data.assemble.config import Config
     from gen_data.assemble.pipeline_factory import PipelineFactory
+    from gen_data.runner.plan import Plan
     from gen_data.runner.processes import Pool, StandbyWorker
     from gen_data.runner.progress import RunProgress, Summary
     from gen_data.runner.ray_cluster import RayCluster
@@ -82,42 +83,73 @@ def generate(  # noqa: PLR0913  (keywords of one front door)
             or a class of the label map, has no label.
         AssetWarning: a file of the user holds something that is not used, such as a skeleton.
     """
-    with _standby_worker(cluster, workers) as standby:
-        _check_arguments(config, n, out, workers, repair)
+    with standby_worker(cluster, workers) as standby:
+        check_arguments(config, n, out, workers, repair)
         _check_time_limit(sample_timeout_s)
         # Before the imports below: errors of a configuration come at once.
         loaded = load_config(config, seed=seed, overrides=overrides, without=without)
-        factory = _make_factory(loaded, n)
+        factory = make_factory(loaded, n)
         settings = replace(
-            _settings(factory, skip_failed, sample_timeout_s),
+            make_settings(factory, skip_failed, sample_timeout_s),
             repair=repair,
             allow_mixed_numerics=allow_mixed_numerics,
             is_forced=force,
         )
-        with _opened(cluster, workers, standby) as (pool, count), _folder(loaded, out) as folder:
-            settings = replace(settings, open_pool=pool)
-            summary = _run(factory, folder, count, shards, resume_command, settings, on_progress)
-        return check_label_gaps(summary)
+        return run_factory(
+            factory,
+            settings,
+            standby,
+            out=out,
+            workers=workers,
+            shards=shards,
+            cluster=cluster,
+            on_progress=on_progress,
+            resume_command=resume_command,
+        )
+
+
+def run_factory(  # noqa: PLR0913  (all choices of a run)
+    factory: PipelineFactory,
+    settings: Settings,
+    standby: StandbyWorker | None,
+    *,
+    plan: Plan | None = None,
+    out: str | PathLike[str] | None,
+    workers: int | None,
+    shards: tuple[int, int] | None,
+    cluster: RayCluster | None,
+    on_progress: Callable[[RunProgress], None] | None,
+    resume_command: str,
+) -> Summary:
+    """Generate the data set of a checked factory; see ``generate``. Without a plan it makes one."""
+    from gen_data.runner.identity import make_plan
+
+    with (
+        _opened(cluster, workers, standby) as (pool, count),
+        _folder(factory.config, out) as folder,
+    ):
+        plan = plan or make_plan(factory)
+        part = None if shards is None else check_shards(shards, plan.shard_count)
+        settings = replace(settings, open_pool=pool, shards=part)
+        summary = _run(factory, plan, folder, count, resume_command, settings, on_progress)
+    return check_label_gaps(summary)
 
 
 def _run(
     factory: PipelineFactory,
+    plan: Plan,
     folder: Path | str,
     workers: int,
-    shards: tuple[int, int] | None,
     resume_command: str,
     settings: Settings,
     on_progress: Callable[[RunProgress], None] | None,
 ) -> Summary:
     """Run the plan of a factory, and name unused contents of the user's files."""
     from gen_data.assets.file_remarks import warn_of_remarks
-    from gen_data.runner.identity import format_licences, make_plan
+    from gen_data.runner.identity import format_licences
     from gen_data.runner.run import run
 
-    plan = make_plan(factory)
     told = warn_of_remarks(factory.library, plan.assets)
-    if shards is not None:
-        settings = replace(settings, shards=check_shards(shards, plan.shard_count))
     summary = run(
         plan,
         factory,
@@ -133,9 +165,10 @@ def _run(
     return summary
 
 
-def _settings(
+def make_settings(
     factory: PipelineFactory, skip_failed: bool, sample_timeout_s: float | None
 ) -> Settings:
+    """Settings of a run, with the size of a sample and the configuration's own limits."""
     from gen_data.assemble.size_estimate import estimate_sample_bytes
     from gen_data.runner.run import Limits, Settings
 
@@ -148,7 +181,7 @@ def _settings(
 
 
 @contextmanager
-def _standby_worker(
+def standby_worker(
     cluster: RayCluster | None, workers: int | None
 ) -> Iterator[StandbyWorker | None]:
     """The first worker of this machine, which prepares itself during planning; None if unused."""
@@ -193,7 +226,7 @@ def _opened(
             yield cluster.open_pool, workers or cluster.worker_count()
 
 
-def _check_arguments(
+def check_arguments(
     config: ConfigLike, n: int, out: str | PathLike[str] | None, workers: int | None, repair: bool
 ) -> None:
     """Refuse wrong numbers, repair at a URL, and a folder in which another run writes."""
@@ -218,7 +251,7 @@ def _check_time_limit(limit_s: float | None) -> None:
         )
 
 
-def _make_factory(loaded: Config, n: int) -> PipelineFactory:
+def make_factory(loaded: Config, n: int) -> PipelineFactory:
     """A checked factory of pipelines; warns of splits that stay empty."""
     from gen_data.assemble.pipeline_factory import PipelineFactory
     from gen_data.pipeline.splits import warn_of_empty_splits

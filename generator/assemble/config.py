@@ -277,7 +277,7 @@ def load_config(source: str, **changes: Unpack[Changes]) -> Config:
     """
     plan = Path(source) / PLAN
     if not _is_file(plan):
-        return _make_config(documents.load_config_document(source), Path(source).stem, changes)
+        return config_of(documents.load_config_document(source), Path(source).stem, **changes)
     try:
         kept = json.loads(plan.read_bytes())
         text, name = json.dumps(kept["config"], ensure_ascii=False), str(kept["name"])
@@ -300,10 +300,15 @@ def parse_config(text: str, file: str, name: str, **changes: Unpack[Changes]) ->
     Raises:
         ConfigError: the message lists all errors with their positions.
     """
-    return _make_config(documents.parse_config_document(text, file), name, changes)
+    return config_of(documents.parse_config_document(text, file), name, **changes)
 
 
-def _make_config(document: Node, name: str, changes: Changes) -> Config:
+def config_of(document: Node, name: str, **changes: Unpack[Changes]) -> Config:
+    """The configuration in a document that extends no other one.
+
+    Raises:
+        ConfigError: the message lists all errors with their positions.
+    """
     seed = changes.get("seed")
     if seed is not None and seed < 0:
         raise errors.ConfigError(f"--seed: {seed} is negative; expected 0 or more")

@@ -26,8 +26,8 @@ from gen_data.core import errors, processes, version
 from gen_data.core.urls import is_url, needs_folder
 
 FOLDERS_ONLY = frozenset(
-    "adapt certify contact-sheet diff export match merge preview repair report repro".split()  # noqa: SIM905
-) | {"rerender", "sample", "study"}
+    "adapt certify contact-sheet diff export match merge preview recipe repair report".split()  # noqa: SIM905
+) | {"repro", "rerender", "sample", "study"}
 """Commands that read no data set at a URL."""
 
 
@@ -50,6 +50,8 @@ class LazyCommands(click.Group):
         "match": "gen_data.lab.matching.match_command:match",
         "verify": "gen_data.cli.verification_commands:verify",
         "certify": "gen_data.lab.certificate.certify_command:certify",
+        "recipe": "gen_data.cli.recipe_commands:recipe",
+        "pull": "gen_data.cli.recipe_commands:pull",
         "merge": "gen_data.cli.merge_command:merge",
         "repair": "gen_data.cli.verification_commands:repair",
         "diff": "gen_data.cli.verification_commands:diff",
@@ -76,6 +78,8 @@ class LazyCommands(click.Group):
         "match": "Fit exposure, colour, noise, blur and laser to real recordings.",
         "verify": "Check a data set: sizes, checksums, labels, reproducibility.",
         "certify": "Check a data set by independent means; write its certificate.",
+        "recipe": "Print the recipe of a data set: a few kilobytes that make it again.",
+        "pull": "Make the data set of a recipe, and prove that it is the same.",
         "merge": "Join parts that were generated with --shards.",
         "repair": "Restore damaged files of a data set, byte for byte.",
         "diff": "Name the first difference of two data sets.",

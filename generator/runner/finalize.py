@@ -30,7 +30,7 @@ def finalize(
     store: LocalStore,
     pipeline: PipelineLike,
     licences: LicencesOf | None,
-    sealed_before: seal.SealedBefore,
+    expected: seal.Expectation,
 ) -> str:
     """Merge, summarise and seal a data set whose shards are all committed.
 
@@ -39,7 +39,7 @@ def finalize(
         store: Its folder.
         pipeline: For its exporters and facts.
         licences: Makes the text of ``LICENSES-ASSETS.md``; None = no such file.
-        sealed_before: Seal of the same data set before it was damaged; no ids if there was none.
+        expected: Judges the files before they are sealed.
 
     Returns:
         Id of the data set; see ``seal.dataset_id``.
@@ -47,7 +47,7 @@ def finalize(
     Raises:
         StorageError: a shard is not committed, or a file cannot be written.
         SampleError: every sample failed.
-        DeterminismError: the result is not what was sealed before; nothing is sealed.
+        DeterminismError: the result is not what was expected; nothing is sealed.
     """
     with store.errors():
         records = _all_records(plan, store)
@@ -73,7 +73,7 @@ def finalize(
         entries += _entries(plan, store, records, record_bytes, names, known)
         entries.sort(key=_by_path)
         sums = seal.sums_text(entries)
-        sealed_before.expect(entries)
+        expected.expect(entries)
         folders = [
             f"{n}/{inner}" for n in names for inner in durable_files.empty_folders(store.root / n)
         ]

@@ -65,8 +65,7 @@ def make_plan(factory: PipelineFactory) -> Plan:
         n=factory.n,
         shard_size=config.general.shard_size,
         versions={
-            "gen-data": __version__,
-            **{name: _release(name) for name in BYTES_DEPEND_ON.values()},
+            **{name: release(name) for name in ("gen-data", *BYTES_DEPEND_ON.values())},
             **_packs(assets),
             **third_party_packages((*config.plugins(), *annotators_of(config))),
         },
@@ -76,7 +75,7 @@ def make_plan(factory: PipelineFactory) -> Plan:
 
 def installation_differences(plan: Plan) -> list[str]:
     """Packages whose release here is not that of the plan, one line each; none if all are equal."""
-    here = {"gen-data": __version__, **{name: _release(name) for name in BYTES_DEPEND_ON.values()}}
+    here = {name: release(name) for name in ("gen-data", *BYTES_DEPEND_ON.values())}
     return [
         f"{name}: {wanted} expected, {here[name]} here"
         for name, wanted in plan.versions.items()
@@ -122,8 +121,10 @@ def _asset_ids(scene: Scene) -> set[str]:
     return placed | robots | bodies | drawn
 
 
-def _release(package: str) -> str:
+def release(package: str) -> str:
+    """Installed version of a package; ``absent`` if there is none."""
     try:
-        return version(package)
+        # Another project has this name on the package index.
+        return __version__ if package == "gen-data" else version(package)
     except PackageNotFoundError:
         return "absent"

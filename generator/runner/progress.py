@@ -13,6 +13,7 @@ from gen_data.runner import durable_files, free_space, layout, worker_events
 
 if TYPE_CHECKING:
     from gen_data.runner.failed_sample import FailedSample
+    from gen_data.runner.proof import Proof
     from gen_data.runner.store import LocalStore, Scan
 
 
@@ -132,6 +133,7 @@ class RunMonitor:
         report: Callable[[RunProgress], None],
         space: free_space.SpaceCheck,
         clock: Callable[[], float] = time.monotonic,
+        proof: Proof | None = None,
     ) -> None:
         self._store = store
         self._scan = scan
@@ -139,6 +141,7 @@ class RunMonitor:
         self._report = report
         self._space = space
         self._clock = clock
+        self._proof = proof
         self._started_s = clock()
         self._in_flight: dict[int, tuple[int, int]] = {}
         self._workers: set[int] = set()
@@ -243,6 +246,10 @@ class RunMonitor:
                 "cpu_s_per_sample": self.mean_cpu_s(),
             }
         )
+        if self._proof is not None:
+            found = self._proof.objection(event.shard, event.record_sha256, event.labels_sha256)
+            if found is not None:
+                return found
         samples = self._scan.samples + self.made
         sample_bytes = (self._scan.bytes + self.bytes) / max(samples, 1)
         return self._space.after_shard(sample_bytes, self._total - samples - len(self.failed))

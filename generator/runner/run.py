@@ -12,14 +12,16 @@ from gen_data.core.sample import Sample
 from gen_data.runner.failed_sample import FailedSample, parse_failed
 from gen_data.runner.finalize import LicencesOf, finalize
 from gen_data.runner.free_space import DOCUMENTS_BYTES, SpaceCheck
+from gen_data.runner.labels import LABELS_NAME
 from gen_data.runner.layout import MANIFEST_NAME, PLAN_NAME, SUMS_NAME
 from gen_data.runner.numerics_guard import admit_numerics
 from gen_data.runner.object_store import open_store
 from gen_data.runner.plan import Plan, plan_bytes
 from gen_data.runner.processes import Pool, open_worker_pool, run_supervisor
 from gen_data.runner.progress import RunMonitor, RunProgress, Summary
+from gen_data.runner.proof import Proof
 from gen_data.runner.repair import quarantine_extra, restore_plan
-from gen_data.runner.seal import SealedBefore, parse_seal
+from gen_data.runner.seal import Expectation, SealedBefore, parse_seal
 from gen_data.runner.shard import (
     EnteredPipeline,
     Job,
@@ -62,6 +64,7 @@ class Settings:
         skip_failed: Record samples that cannot be made in the manifest, and go on without them.
             Shards that earlier runs made without some samples are kept, but ``repair`` tries these
             again. Errors of storage, lack of memory and exporters end the run as without it.
+        proof: What the data set must be; None = whatever the plan makes.
         allow_mixed_numerics, failed, write_media, write_records, linked_digests: See ``Job``;
             picklable.
     """
@@ -69,6 +72,7 @@ class Settings:
     repair: bool = False
     allow_mixed_numerics: bool = False
     skip_failed: bool = False
+    proof: Proof | None = None
     failed: tuple[FailedSample, ...] = ()
     sample_bytes: float = 0.0
     is_forced: bool = False
@@ -188,16 +192,21 @@ class _Run:
                 retried = self.settings.repair and finished and read_failed(store)
                 is_checked = finished and not retried
                 if is_checked and store.is_intact(self.settings.repair, self._show_checked):
+                    self._prove(None)
                     return self._summarize_finished()
                 sealed_before = UNSEALED if retried else _read_seal(store, plan)
             store.prepare(plan)
             hashed = finished or self.settings.repair
             whole = store.scan(plan, hashed, whole_only=self.settings.repair)
+            self._prove(whole)
             scan = whole.within(self.settings.shards)
         samples = self._count(scan.missing)
         if scan.samples == 0:
             self._space.before_start(samples)
-        monitor = RunMonitor(store, scan, scan.samples + samples, self.progress, self._space)
+        total = scan.samples + samples
+        monitor = RunMonitor(
+            store, scan, total, self.progress, self._space, proof=self.settings.proof
+        )
         monitor.show("samples")
         try:
             self._generate(scan, monitor)
@@ -209,7 +218,9 @@ class _Run:
                 monitor.show("merging")
                 pipeline = self.job.make_pipeline()
                 store.fetch_shards(plan, with_files=bool(pipeline.exporters))
-                dataset_id = finalize(plan, store, pipeline, licences, sealed_before)
+                dataset_id = finalize(
+                    plan, store, pipeline, licences, self._expected(sealed_before)
+                )
                 store.publish()
                 if self.settings.repair:
                     quarantine_extra(store)
@@ -218,6 +229,24 @@ class _Run:
             with suppress(OSError):
                 store.clear_scratch()
         return self._summarize(dataset_id, scan, monitor)
+
+    def _expected(self, sealed_before: SealedBefore) -> Expectation:
+        proof = self.settings.proof
+        return sealed_before if proof is None or proof.semantic else proof
+
+    def _prove(self, existing: Scan | None) -> None:
+        """Refuse shards of earlier runs that others were expected for; None = scan them first."""
+        if self.settings.proof is None:
+            return
+        existing = existing or self.job.store.scan(self.job.plan)
+        missing = set(existing.missing)
+        for shard in range(self.job.plan.shard_count):
+            record = None if shard in missing else self.job.store.record(shard)
+            if record is not None:
+                labels = record.sha256_of(LABELS_NAME)
+                found = self.settings.proof.objection(shard, record.sha256, labels)
+                if found is not None:
+                    raise found
 
     def _show_checked(self, share: float) -> None:
         n = self.job.plan.n

@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from gen_data.core.errors import DeterminismError
 from gen_data.runner.layout import MANIFEST_NAME, SHARDS_NAME, SUMS_NAME
@@ -78,6 +78,14 @@ def parse_object(data: bytes) -> dict[str, Any] | None:
     except ValueError:
         return None
     return value if isinstance(value, dict) else None
+
+
+class Expectation(Protocol):
+    """What a data set must be to be sealed."""
+
+    def expect(self, entries: Sequence[Entry]) -> None:
+        """Raise DeterminismError if it is another one; its files are sorted by path."""
+        ...
 
 
 @dataclass(frozen=True)

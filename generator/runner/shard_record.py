@@ -85,6 +85,15 @@ class ShardRecord:
         return self.end - self.first - len(self.failed)
 
     @property
+    def sha256(self) -> str:
+        """SHA-256 of its file."""
+        return hashlib.sha256(self.to_bytes()).hexdigest()
+
+    def sha256_of(self, path: str) -> str:
+        """SHA-256 of a file of the shard; empty if there is none."""
+        return next((file.sha256 for file in self.files if file.path == path), "")
+
+    @property
     def size_bytes(self) -> int:
         """Size of all its files."""
         return sum(file.bytes for file in self.files)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import faulthandler
 import gc
-import hashlib
 import os
 import pickle
 import sys
@@ -26,6 +25,7 @@ from typing import TYPE_CHECKING, Any
 from gen_data.core.errors import CacheWarning, ConfigWarning, GenDataError
 from gen_data.core.processes import end_with_parent, forbid_core_dumps, ignore_interrupts
 from gen_data.runner import error_context, resident_memory
+from gen_data.runner.labels import LABELS_NAME
 from gen_data.runner.worker_events import Failed, Ready, SampleDone, SampleSkipped, ShardDone
 
 if TYPE_CHECKING:
@@ -196,6 +196,7 @@ def done_event(number: int, made: MadeShard) -> ShardDone:
         record.rejections,
         resident_memory.resident_bytes(),
         made.timings_s,
-        hashlib.sha256(record.to_bytes()).hexdigest(),
+        record.sha256,
         record.failed,
+        record.sha256_of(LABELS_NAME),
     )

@@ -61,6 +61,7 @@ class ShardDone:
         rss_bytes: Memory of the worker's process, 0 if unknown.
         timings_s: CPU seconds of the shard as a whole, by stage.
         failed: Samples that it does not have.
+        labels_sha256: Of its labels; empty = unknown.
     """
 
     worker: int
@@ -72,6 +73,7 @@ class ShardDone:
     timings_s: Mapping[str, float] = field(default_factory=dict)
     record_sha256: str = ""
     failed: tuple[FailedSample, ...] = ()
+    labels_sha256: str = ""
 
 
 @dataclass(frozen=True, slots=True)

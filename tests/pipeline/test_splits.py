@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from gen_data.api.generate import _make_factory
+from gen_data.api.generate import make_factory
 from gen_data.assemble.config import load_config
 from gen_data.core.errors import ConfigWarning
 from gen_data.pipeline.splits import Assignment, split_of, warn_of_empty_splits
@@ -89,7 +89,7 @@ def test_a_short_run_of_a_shipped_configuration_warns_of_nothing(
 
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        _make_factory(config, 20)
+        make_factory(config, 20)
 
     assert len(caught) == warned
 
