@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from os import PathLike, fspath
 from pathlib import Path
@@ -95,43 +95,40 @@ def generate(  # noqa: PLR0913  (keywords of one front door)
             allow_mixed_numerics=allow_mixed_numerics,
             is_forced=force,
         )
-        return run_factory(
-            factory,
-            settings,
-            standby,
-            out=out,
-            workers=workers,
-            shards=shards,
-            cluster=cluster,
-            on_progress=on_progress,
-            resume_command=resume_command,
-        )
+        choice = RunChoice(out, workers, shards, cluster, on_progress, resume_command)
+        return run_factory(factory, settings, standby, choice)
 
 
-def run_factory(  # noqa: PLR0913  (all choices of a run)
+@dataclass(frozen=True)
+class RunChoice:
+    """Where and how a data set is generated; see ``generate``."""
+
+    out: str | PathLike[str] | None
+    workers: int | None
+    shards: tuple[int, int] | None
+    cluster: RayCluster | None
+    on_progress: Callable[[RunProgress], None] | None
+    resume_command: str
+
+
+def run_factory(
     factory: PipelineFactory,
     settings: Settings,
     standby: StandbyWorker | None,
-    *,
+    choice: RunChoice,
     plan: Plan | None = None,
-    out: str | PathLike[str] | None,
-    workers: int | None,
-    shards: tuple[int, int] | None,
-    cluster: RayCluster | None,
-    on_progress: Callable[[RunProgress], None] | None,
-    resume_command: str,
 ) -> Summary:
     """Generate the data set of a checked factory; see ``generate``. Without a plan it makes one."""
     from gen_data.runner.identity import make_plan
 
     with (
-        _opened(cluster, workers, standby) as (pool, count),
-        _folder(factory.config, out) as folder,
+        _opened(choice.cluster, choice.workers, standby) as (pool, workers),
+        _folder(factory.config, choice.out) as folder,
     ):
         plan = plan or make_plan(factory)
-        part = None if shards is None else check_shards(shards, plan.shard_count)
-        settings = replace(settings, open_pool=pool, shards=part)
-        summary = _run(factory, plan, folder, count, resume_command, settings, on_progress)
+        shards = choice.shards and check_shards(choice.shards, plan.shard_count)
+        settings = replace(settings, open_pool=pool, shards=shards)
+        summary = _run(factory, plan, folder, workers, settings, choice)
     return check_label_gaps(summary)
 
 
@@ -140,9 +137,8 @@ def _run(
     plan: Plan,
     folder: Path | str,
     workers: int,
-    resume_command: str,
     settings: Settings,
-    on_progress: Callable[[RunProgress], None] | None,
+    choice: RunChoice,
 ) -> Summary:
     """Run the plan of a factory, and name unused contents of the user's files."""
     from gen_data.assets.file_remarks import warn_of_remarks
@@ -155,10 +151,10 @@ def _run(
         factory,
         folder,
         workers=workers,
-        resume_command=resume_command,
+        resume_command=choice.resume_command,
         licences=partial(format_licences, factory),
         settings=settings,
-        progress=on_progress,
+        progress=choice.on_progress,
     )
     # Of files that workers were the first to read.
     warn_of_remarks(factory.library, plan.assets, read_max=0, told=told)

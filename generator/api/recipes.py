@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from os import PathLike, fspath
+from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -86,7 +86,7 @@ def requirements(recipe_text: str) -> str:
     """Requirements file for pip, with the versions of the text of a recipe.
 
     Raises:
-        ConfigError: the text is no recipe.
+        ConfigError: the text holds no recipe.
     """
     from gen_data.config.yaml_tree import parse_yaml
     from gen_data.runner.recipe import check_recipe, requirements_text
@@ -136,50 +136,50 @@ def pull(  # noqa: PLR0913  (keywords of one front door)
     Warns:
         ConfigWarning: with ``semantic``, the differences of this installation.
     """
-    from gen_data.runner.recipe import read_recipe
-
     with generation.standby_worker(cluster, workers) as standby:
-        file = read_recipe(Path(path_text("recipe", recipe)))
+        file = _read(Path(path_text("recipe", recipe)), semantic)
         out = Path("out") / file.recipe.name if out is None else out
         if against is not None and urls.is_url(out):
             raise errors.ConfigError("against: compares folders; expected out without a URL")
         generation.check_arguments(recipe, file.recipe.n, out, workers, False)
-        proof = file.recipe.proof(semantic)
-        if semantic and (proof is None or not proof.labels):
-            raise errors.ConfigError(
-                f"{file.path}: names no digests of labels, which semantic compares; expected the "
-                "recipe of a finished data set"
-            )
         factory, plan = _prepare(file, semantic, trust)
         settings = generation.make_settings(factory, bool(file.recipe.failed), None)
-        settings = replace(settings, proof=proof)
+        settings = replace(settings, proof=file.recipe.proof(semantic))
+        choice = generation.RunChoice(out, workers, shards, cluster, on_progress, resume_command)
         try:
-            summary = generation.run_factory(
-                factory,
-                settings,
-                standby,
-                plan=plan,
-                out=out,
-                workers=workers,
-                shards=shards,
-                cluster=cluster,
-                on_progress=on_progress,
-                resume_command=resume_command,
-            )
+            summary = generation.run_factory(factory, settings, standby, choice, plan)
         except errors.DeterminismError as error:
             found = "" if against is None else _first_difference(plan, Path(against), Path(out))
             if not found:
                 raise
             raise errors.DeterminismError(f"{error}\n  {found}") from None
-    wanted = file.recipe.dataset_id
-    if summary.dataset_id and wanted and not semantic and summary.dataset_id != wanted:
-        raise errors.DeterminismError(
-            f"{fspath(out)}: was finished before with other exports, id {summary.dataset_id}; "
-            f"expected {wanted}: choose another folder with --out"
-        )
-    if semantic and against is not None:
+    if not semantic:
+        _check_identity(summary, file.recipe.dataset_id)
+    elif against is not None:
         _compare_images(plan, Path(against), Path(out))
     return summary
+
+
+def _read(path: Path, semantic: bool) -> RecipeFile:
+    """Read a recipe. Raises ConfigError if it is wrong, or has no labels to compare."""
+    from gen_data.runner.recipe import read_recipe
+
+    file = read_recipe(path)
+    if semantic and not file.recipe.labels:
+        raise errors.ConfigError(
+            f"{path}: names no digests of labels, which semantic compares; expected the recipe of "
+            "a finished data set"
+        )
+    return file
+
+
+def _check_identity(summary: Summary, expected: str) -> None:
+    """Refuse a data set that was finished before, from the same plan with other exports."""
+    if summary.dataset_id and expected and summary.dataset_id != expected:
+        raise errors.DeterminismError(
+            f"{summary.folder}: was finished before with other exports, id {summary.dataset_id}; "
+            f"expected {expected}: choose another folder with --out"
+        )
 
 
 def _prepare(file: RecipeFile, semantic: bool, trust: bool) -> tuple[PipelineFactory, Plan]:
@@ -308,9 +308,8 @@ def _other_assets(file: RecipeFile, plan: Plan, known: bool) -> Iterator[str]:
             )
     here = shared_assets(plan.assets)
     if not known and here != expected.shared.model_dump():
-        fact = (
-            f"{here['count']} assets are {here['sha256'][:16]} here; expected those of the recipe"
-        )
+        wanted = f"{expected.shared.count}, {expected.shared.sha256[:16]}"
+        fact = f"{here['count']} assets, {here['sha256'][:16]}, are here; expected {wanted}"
         yield file.line(f"{fact}: install gen-data as the author had it", "assets", "shared")
 
 

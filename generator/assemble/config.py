@@ -28,6 +28,7 @@ from gen_data.config.base_model import Strict
 from gen_data.config.paths import PLAN, find_path
 from gen_data.config.problems import Problems
 from gen_data.config.validation import validate
+from gen_data.config.yaml_scalars import json_as_yaml
 from gen_data.config.yaml_tree import Node
 from gen_data.core import bounded_cache, errors, interfaces, scene
 from gen_data.core.plugins import PluginTable
@@ -280,7 +281,7 @@ def load_config(source: str, **changes: Unpack[Changes]) -> Config:
         return config_of(documents.load_config_document(source), Path(source).stem, **changes)
     try:
         kept = json.loads(plan.read_bytes())
-        text, name = json.dumps(kept["config"], ensure_ascii=False), str(kept["name"])
+        text, name = json_as_yaml(kept["config"]), str(kept["name"])
     except (ValueError, KeyError, TypeError, OSError) as error:
         raise errors.ConfigError(f"{plan}: is not the plan of a data set: {error}") from error
     return parse_config(text, str(plan), name, **changes)

@@ -58,7 +58,7 @@ def to_flow_yaml(value: Any) -> str:
     if isinstance(value, str):
         if _SAFE_TEXT.fullmatch(value) and resolve_scalar(value) == value:
             return value
-        return json.dumps(value, ensure_ascii=False)
+        return json_as_yaml(value)
     if value is None or isinstance(value, bool):
         return {None: "null", True: "true", False: "false"}[value]
     if isinstance(value, (int, float)):
@@ -72,6 +72,18 @@ def to_flow_yaml(value: Any) -> str:
     if isinstance(value, (list, tuple)):
         return "[" + ", ".join(to_flow_yaml(item) for item in value) + "]"
     raise TypeError(f"{type(value).__name__} has no YAML form")
+
+
+def json_as_yaml(value: Any) -> str:
+    """A plain value as JSON that is also YAML: characters that no document may have are escaped.
+
+    Numbers keep their form: ``5.0`` has a fraction, ``5`` has none.
+    """
+    return json.dumps(value, ensure_ascii=False).translate(_ESCAPES)
+
+
+_ESCAPES = {code: f"\\u{code:04x}" for code in (0x2028, 0x2029, 0xFEFF)}
+"""Line and paragraph separators, and the byte order mark."""
 
 
 def format_number(value: float) -> str:

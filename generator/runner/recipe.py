@@ -13,7 +13,7 @@ from gen_data.assemble.config import Config, config_of
 from gen_data.config.base_model import Strict
 from gen_data.config.problems import FieldPath, Position, Problems, format_path, refuse
 from gen_data.config.validation import validate
-from gen_data.config.yaml_scalars import to_flow_yaml
+from gen_data.config.yaml_scalars import json_as_yaml, to_flow_yaml
 from gen_data.config.yaml_tree import Node, load_yaml
 from gen_data.core import errors, path_names, serialization
 from gen_data.runner import failed_sample, labels, layout, licence_table, plan, proof, seal, verify
@@ -50,7 +50,7 @@ class Assets(Strict):
     """Assets that a sample may contain.
 
     Attributes:
-        shared: Of gen-data, of pybullet and of packs.
+        shared: Assets of gen-data, pybullet and packs.
         packs: ``{name: "version digest"}`` of installed packs.
         own: ``{id: sha256}`` of the user's assets.
         urls: Where to get the user's folders, by their names in the configuration; empty = unknown.
@@ -69,7 +69,7 @@ class Recipe(Strict):
         config: The resolved configuration, as in ``plan.json``.
         failed: Samples that the data set does not have.
         dataset_id, files, shards, labels: See ``proof.Proof``; empty if nothing was generated.
-        licences: Of the assets.
+        licences: Names of the licences of its assets.
         checksums: See ``checksums_of``.
     """
 
@@ -90,7 +90,7 @@ class Recipe(Strict):
     checksums: dict[str, Annotated[str, Field(pattern=r"^[0-9a-f]{16}$")]]
 
     def proof(self, semantic: bool) -> proof.Proof | None:
-        """What its data set must equal; None if nothing was generated yet."""
+        """Digests that its data set must have; None if nothing was generated yet."""
         if not self.dataset_id:
             return None
         return proof.Proof(self.dataset_id, self.shards, self.labels, self.files, semantic)
@@ -103,7 +103,7 @@ COMMENTS = {
     "versions": "Everything that can change a byte.",
     "assets": "The author may add URLs of the folders to 'urls'.",
     "files": "SHA-256 of files outside of shards.",
-    "shards": "SHA-256 of shards/000000.json and so on, which have those of all their files.",
+    "shards": "SHA-256 of shards/000000.json and so on, which list the SHA-256 of all files.",
     "labels": "SHA-256 of labels.jsonl of each shard, which pull --semantic compares.",
     "checksums": "Beginnings of the SHA-256 of the values above: an edited one is named.",
 }
@@ -154,7 +154,7 @@ def describe_dataset(folder: Path) -> dict[str, Any]:
     if made.scenes_of or made.format_version != plan.FORMAT_VERSION:
         why = "has the scenes of another data set" if made.scenes_of else "is of an old format"
         raise errors.ConfigError(
-            f"{folder}: {why}, so that its recipe would not give its bytes; expected a data set "
+            f"{folder}: {why}: its recipe would not give its bytes; expected a data set "
             "that this gen-data generated"
         )
     table = seal.read_or_empty(folder / layout.LICENCES_NAME).decode(errors="replace")
@@ -230,12 +230,12 @@ def _lines(value: Mapping[str, Any] | list[Any]) -> Iterator[str]:
 
 
 def _flow(value: Any) -> str:
-    """A value on one line; numbers as in JSON, whose canonical form tells 5 from 5.0."""
+    """A value on one line; numbers as in JSON, where 5 and 5.0 differ."""
     if isinstance(value, Mapping):
         return "{" + ", ".join(f"{to_flow_yaml(k)}: {_flow(v)}" for k, v in value.items()) + "}"
     if isinstance(value, list):
         return "[" + ", ".join(map(_flow, value)) + "]"
-    return to_flow_yaml(value) if isinstance(value, str) else json.dumps(value)
+    return to_flow_yaml(value) if isinstance(value, str) else json_as_yaml(value)
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,6 @@
 """Pipelines that make the samples of an existing data set again: by generation or rendering."""
 
 import ast
-import json
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
@@ -11,6 +10,7 @@ from pathlib import Path
 
 from gen_data.assemble.config import parse_config
 from gen_data.assemble.pipeline_factory import PipelineFactory
+from gen_data.config.yaml_scalars import json_as_yaml
 from gen_data.core.errors import ConfigError, StorageError
 from gen_data.runner import finalize, rerender
 from gen_data.runner.identity import format_licences, make_plan
@@ -52,8 +52,7 @@ def plan_regeneration(folder: Path, plan: Plan, source: Path | None = None) -> R
         ConfigError: its configuration is not valid here, or ``source`` is missing or another one.
         AssetError: an asset is missing.
     """
-    text = json.dumps(plan.config, ensure_ascii=False)
-    config = parse_config(text, str(folder / PLAN_NAME), plan.name)
+    config = parse_config(json_as_yaml(plan.config), str(folder / PLAN_NAME), plan.name)
     if not plan.scenes_of:
         factory = PipelineFactory(config, plan.n)
         made = make_plan(factory)
@@ -72,7 +71,7 @@ def plan_regeneration(folder: Path, plan: Plan, source: Path | None = None) -> R
             f"whose scenes {folder} has"
         )
     was = parse_config(
-        json.dumps(stored.plan.config, ensure_ascii=False), str(source / PLAN_NAME), plan.name
+        json_as_yaml(stored.plan.config), str(source / PLAN_NAME), plan.name
     )
     made, maker = rerender.rerender_plan(stored, was, config, ast.literal_eval(redrawn))
     licences = partial(format_licences, maker.factory)

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gen_data.config.yaml_scalars import quote_value, resolve_scalar, to_flow_yaml
+from gen_data.config.yaml_scalars import json_as_yaml, quote_value, resolve_scalar, to_flow_yaml
 from gen_data.config.yaml_tree import parse_yaml
 
 # Expected values: YAML 1.2.2, sections 10.2.1 and 10.3.2.
@@ -126,3 +126,11 @@ def test_flow_style_is_what_a_person_would_write(value: object, text: str) -> No
 def test_messages_quote_values_on_one_printable_line(value: object, text: str) -> None:
     """A value cannot break a message apart or steer the terminal."""
     assert quote_value(value) == text
+
+
+@pytest.mark.parametrize("text", ["x\u2028y", "x\u2029y", "\ufeffx", "ä 🚗"])
+def test_values_of_a_plan_are_read_back_as_yaml(text: str) -> None:
+    """JSON leaves characters unescaped that no YAML document may have; numbers keep their form."""
+    plain = {text: [text, 5, 5.0, 1e-05]}
+
+    assert repr(parse_yaml(json_as_yaml(plain), "plan.json").plain()) == repr(plain)
