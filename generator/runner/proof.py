@@ -44,10 +44,10 @@ class Proof:
             )
         )
         return DeterminismError(
-            f"{fact}; nothing was sealed.\n  Versions, assets and configuration are equal: this "
-            "machine computes otherwise, or a digest of the recipe was changed.\n"
+            f"{fact}.\n  Versions, assets and configuration are equal: this machine computes "
+            "otherwise, or a digest of the recipe was changed.\n"
             "  --against FOLDER, with the author's files, names sample and field; --semantic "
-            "compares labels only"
+            "compares labels only. Pull into another folder then"
         )
 
     def expect(self, entries: Sequence[Entry]) -> None:

@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -13,7 +13,7 @@ from gen_data.runner.failed_sample import FailedSample, parse_failed
 from gen_data.runner.finalize import LicencesOf, finalize
 from gen_data.runner.free_space import DOCUMENTS_BYTES, SpaceCheck
 from gen_data.runner.labels import LABELS_NAME
-from gen_data.runner.layout import MANIFEST_NAME, PLAN_NAME, SUMS_NAME
+from gen_data.runner.layout import MANIFEST_NAME, PLAN_NAME, SHARDS_NAME, SUMS_NAME
 from gen_data.runner.numerics_guard import admit_numerics
 from gen_data.runner.object_store import open_store
 from gen_data.runner.plan import Plan, plan_bytes
@@ -21,7 +21,7 @@ from gen_data.runner.processes import Pool, open_worker_pool, run_supervisor
 from gen_data.runner.progress import RunMonitor, RunProgress, Summary
 from gen_data.runner.proof import Proof
 from gen_data.runner.repair import quarantine_extra, restore_plan
-from gen_data.runner.seal import Expectation, SealedBefore, parse_seal
+from gen_data.runner.seal import Expectation, SealedBefore, parse_seal, parse_sums
 from gen_data.runner.shard import (
     EnteredPipeline,
     Job,
@@ -192,13 +192,13 @@ class _Run:
                 retried = self.settings.repair and finished and read_failed(store)
                 is_checked = finished and not retried
                 if is_checked and store.is_intact(self.settings.repair, self._show_checked):
-                    self._prove(None)
+                    self._prove(self._sealed_shards())
                     return self._summarize_finished()
                 sealed_before = UNSEALED if retried else _read_seal(store, plan)
             store.prepare(plan)
             hashed = finished or self.settings.repair
             whole = store.scan(plan, hashed, whole_only=self.settings.repair)
-            self._prove(whole)
+            self._prove(self._committed_shards(whole))
             scan = whole.within(self.settings.shards)
         samples = self._count(scan.missing)
         if scan.samples == 0:
@@ -234,19 +234,29 @@ class _Run:
         proof = self.settings.proof
         return sealed_before if proof is None or proof.semantic else proof
 
-    def _prove(self, existing: Scan | None) -> None:
-        """Refuse shards of earlier runs that others were expected for; None = scan them first."""
-        if self.settings.proof is None:
-            return
-        existing = existing or self.job.store.scan(self.job.plan)
+    def _prove(self, shards: Iterator[tuple[int, str, str]]) -> None:
+        """Refuse shards of earlier runs that others were expected for.
+
+        ``shards`` has their numbers, and the digests of their records and labels.
+        """
+        if self.settings.proof is not None:
+            for shard, record, labels in shards:
+                found = self.settings.proof.objection(shard, record, labels)
+                if found is not None:
+                    raise found
+
+    def _sealed_shards(self) -> Iterator[tuple[int, str, str]]:
+        digests = parse_sums(self.job.store.read_documents((SUMS_NAME,))[SUMS_NAME]).digests
+        for shard in range(self.job.plan.shard_count):
+            place = f"{SHARDS_NAME}/{shard:06d}"
+            yield shard, digests.get(f"{place}.json", ""), digests.get(f"{place}/{LABELS_NAME}", "")
+
+    def _committed_shards(self, existing: Scan) -> Iterator[tuple[int, str, str]]:
         missing = set(existing.missing)
         for shard in range(self.job.plan.shard_count):
             record = None if shard in missing else self.job.store.record(shard)
             if record is not None:
-                labels = record.sha256_of(LABELS_NAME)
-                found = self.settings.proof.objection(shard, record.sha256, labels)
-                if found is not None:
-                    raise found
+                yield shard, record.sha256, record.sha256_of(LABELS_NAME)
 
     def _show_checked(self, share: float) -> None:
         n = self.job.plan.n

@@ -217,6 +217,25 @@ def test_a_shard_that_differs_is_named_and_nothing_is_sealed(author: Path, reade
         assert lines[0].startswith("shards/000001: differs from the recipe in an image")
 
 
+@pytest.mark.parametrize("out", ["out", "memory://recipes/set"])
+def test_a_finished_data_set_is_proven_again(reader: Path, out: str) -> None:
+    """In a folder and in object storage."""
+    recipe = read_recipe(reader / "recipe.yaml").recipe
+    made = gen_data.pull("recipe.yaml", out=out, workers=0)
+    again = gen_data.pull("recipe.yaml", out=out, workers=0)
+    assert (made.dataset_id, again.already_complete) == (recipe.dataset_id, True)
+
+    edit(reader, recipe.labels[2], "1" * 64)
+    with pytest.raises(gen_data.VerificationError, match=r"shards/000002/labels\.jsonl: differs"):
+        gen_data.pull("recipe.yaml", out=out, workers=0, semantic=True)
+    edit(reader, recipe.dataset_id, "2" * 64)
+    with pytest.raises(gen_data.DeterminismError, match=f"id {recipe.dataset_id}; expected 222"):
+        gen_data.pull("recipe.yaml", out=out, workers=0)
+    edit(reader, recipe.shards[1], "0" * 64)
+    with pytest.raises(gen_data.DeterminismError, match="shards/000001: differs from the recipe"):
+        gen_data.pull("recipe.yaml", out=out, workers=0)
+
+
 def test_the_files_of_the_author_name_sample_and_field(author: Path, reader: Path) -> None:
     gen_data.generate(author / "tiny.yaml", N, out=reader / "author", seed=4, workers=0)
     first = read_recipe(reader / "recipe.yaml").recipe.shards[0]
