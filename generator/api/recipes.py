@@ -298,7 +298,7 @@ def _other_assets(file: RecipeFile, plan: Plan, known: bool) -> Iterator[str]:
     from gen_data.runner.recipe import OWN, packs_of, shared_assets
 
     expected = file.recipe.assets
-    for name in packs_of(plan).keys() - expected.packs.keys():
+    for name in sorted(packs_of(plan).keys() - expected.packs.keys()):
         known = True
         yield file.line(f"lacks {name}; gen-data assets remove {name}", "assets", "packs")
     for asset_id in plan.assets:
