@@ -189,6 +189,7 @@ def _prepare(file: RecipeFile, semantic: bool, trust: bool) -> tuple[PipelineFac
     versions, assets = list(_other_versions(file)), [*_other_packs(file, semantic)]
     folders = list(_other_folders(file, trust))
     assets += folders
+    invalid: list[str] = []
     made: tuple[PipelineFactory, Plan] | None = None
     try:
         if not folders:
@@ -203,15 +204,16 @@ def _prepare(file: RecipeFile, semantic: bool, trust: bool) -> tuple[PipelineFac
     except (errors.ConfigError, errors.AssetError) as error:
         if not versions and not assets:
             raise
-        assets.append(str(error))
+        invalid.append(str(error))
     if semantic and versions:
         warnings.warn("\n".join(versions), errors.ConfigWarning, stacklevel=3)
         versions = []
-    lines = [*versions, *assets]
+    lines = [*versions, *assets, *invalid]
     if made is None or lines:
         kind = errors.AssetError if assets else errors.DeterminismError
         hint = "\n  --semantic accepts other versions, and compares labels only" if versions else ""
-        raise kind("\n".join([*lines, f"{len(lines)} differences; nothing was generated{hint}"]))
+        lines.append(f"{len(lines)} difference(s); nothing was generated{hint}")
+        raise kind("\n".join(lines))
     return made
 
 

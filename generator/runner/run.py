@@ -136,8 +136,10 @@ def run(  # noqa: PLR0913  (every argument is the choice of the caller)
                 settings.write_media,
                 settings.write_records,
                 settings.linked_digests,
-                # Bytes that must equal those sealed before need no other guard.
-                settings.allow_mixed_numerics or bool(_read_seal(store, plan).ids),
+                # Bytes that must equal known ones need no other guard.
+                settings.allow_mixed_numerics
+                or (settings.proof is not None and not settings.proof.semantic)
+                or bool(_read_seal(store, plan).ids),
                 settings.skip_failed,
                 settings.failed,
             )

@@ -168,8 +168,7 @@ def test_all_other_versions_packs_and_assets_are_named_at_once(reader: Path) -> 
         "assets.packs.people: is missing; gen-data assets install people",
         f"config.assets.folders[0]: there is no folder {reader / 'meshes'}; get it from "
         "https://example.org/meshes.zip",
-        "4 differences; nothing was generated\n  --semantic accepts other versions, and compares "
-        "labels only".splitlines()[0],
+        "4 difference(s); nothing was generated",
         "  --semantic accepts other versions, and compares labels only",
     ]
     assert not (reader / "out").exists()
@@ -392,7 +391,6 @@ def rewritten(reader: Path, **config: Any) -> None:
 
 @pytest.mark.parametrize("kind", ["absolute", "parent", "link", "home"])
 def test_folders_outside_of_the_recipes_own_are_not_read(reader: Path, kind: str) -> None:
-    """A fifo in the folder would block a reader of its files."""
     outside = reader.parent / f"{reader.name}-private"
     outside.mkdir()
     (outside / "secret.obj").write_text(BLOCK)
