@@ -70,9 +70,7 @@ def plan_regeneration(folder: Path, plan: Plan, source: Path | None = None) -> R
             f"--source {source}: is the data set {stored.dataset_id[:16]}; expected {wanted[:16]}, "
             f"whose scenes {folder} has"
         )
-    was = parse_config(
-        json_as_yaml(stored.plan.config), str(source / PLAN_NAME), plan.name
-    )
+    was = parse_config(json_as_yaml(stored.plan.config), str(source / PLAN_NAME), plan.name)
     made, maker = rerender.rerender_plan(stored, was, config, ast.literal_eval(redrawn))
     licences = partial(format_licences, maker.factory)
     return Regeneration(made, maker, licences, tuple(compare_plans(plan, made)))
