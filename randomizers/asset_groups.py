@@ -51,6 +51,16 @@ class GroupRandomizer(RandomizerBase):
         return groups[name], kept
 
 
+def draw_kinds(weights: CategoryWeights, count: int, rng: streams.Rng) -> CategoryWeights:
+    """The weights of some categories, drawn one by one in proportion to them; 0 = all."""
+    if not 0 < count < len(weights):
+        return weights
+    left, kept = list(weights), []
+    for _ in range(count):
+        kept.append(left.pop(pick_by_weight([w for w, _ in left], float(rng.uniform()))))
+    return tuple(kept)
+
+
 def draw_asset(weights: CategoryWeights, rng: streams.Rng) -> str:
     """Draw a category in proportion to its weight, then one of its assets uniformly."""
     index = pick_by_weight([weight for weight, _ in weights], float(rng.uniform()))

@@ -51,6 +51,8 @@ class CameraPose(RandomizerBase):
         fills: Share of the image's longer side that the longer side of the projected box of the
             aimed object spans, hidden parts and parts outside the image included; above 1 it is
             truncated. Takes the place of ``distance_m`` and ``jitter_m``.
+        nearest_m: With ``fills``: shortest distance from the object's centre, as lenses cannot focus
+            on anything nearer; smaller objects fill less of the image then.
         off_center: With ``fills``: displacement of the object's centre from the middle of the
             image, along both axes, drawn for each; 1 = a square of the object's size touches
             the border.
@@ -69,6 +71,7 @@ class CameraPose(RandomizerBase):
     rig: str = ""
     aim: dist.Name = dist.Constant("")
     fills: Annotated[dist.Scalar, dist.Bounds(0, 4, open_low=True)] | None = None
+    nearest_m: float = Field(0.0, ge=0)
     off_center: Annotated[dist.Scalar, dist.Bounds(-1, 1)] = dist.Normal(0.0, 0.35, clip=(-1, 1))
     distance_m: dist.Positive = dist.Uniform(0.8, 1.3)
     azimuth_deg: dist.Scalar = dist.Uniform(0.0, 360.0)
@@ -83,6 +86,8 @@ class CameraPose(RandomizerBase):
         if self.fills is None:
             if "off_center" in given:
                 raise ValueError("off_center: needs fills; displace the look-at point by jitter_m")
+            if "nearest_m" in given:
+                raise ValueError("nearest_m: needs fills; distance_m states the distance itself")
             return self
         for name in ("distance_m", "jitter_m"):
             if name in given:
@@ -174,7 +179,7 @@ class CameraPose(RandomizerBase):
         for _ in range(TRIES):
             thing = self._draw_thing(scene, assets, rng)
             framing = self._draw_framing(share, camera, rng)
-            pose = frame(thing, framing, camera.intrinsics)
+            pose = frame(thing, framing, camera.intrinsics, self.nearest_m)
             seen = seen or pose is not None
             if pose is not None and self._is_free(camera, pose, scene, assets):
                 return replace(camera, T_world_camera=pose.rounded())

@@ -108,8 +108,13 @@ class Framing:
     roll_rad: float
 
 
-def frame(thing: Thing, framing: Framing, intrinsics: Intrinsics) -> SE3 | None:
-    """``T_world_camera`` that shows an object as wanted; None if no distance does."""
+def frame(
+    thing: Thing, framing: Framing, intrinsics: Intrinsics, nearest_m: float = 0.0
+) -> SE3 | None:
+    """``T_world_camera`` that shows an object as wanted; None if no distance does.
+
+    From ``nearest_m`` on, where the share needs a shorter distance to the object's centre.
+    """
     ray = intrinsics.rays(np.array(framing.at_px))
     if np.isnan(ray).any():
         return None
@@ -123,6 +128,7 @@ def frame(thing: Thing, framing: Framing, intrinsics: Intrinsics) -> SE3 | None:
     distance_m = distance_for_share(share_at, framing.share, max(thing.reach_m, 1e-4))
     if distance_m is None:
         return None
+    distance_m = max(distance_m, nearest_m)
     x, y, z = (c + distance_m * t for c, t in zip(thing.center_m, framing.toward, strict=True))
     return SE3((x, y, z), turned.quaternion_wxyz)
 

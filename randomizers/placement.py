@@ -5,11 +5,13 @@ from bisect import insort
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+
 from gen_data.config import distributions as dist
 from gen_data.core.errors import LayoutRejected, Rejection
 from gen_data.core.interfaces import AssetIndex
 from gen_data.core.scene import Body, ObjectGroup, Scene, SupportSurface
-from gen_data.core.se3 import SE3, Vec3
+from gen_data.core.se3 import SE3, Array, Vec3
 from gen_data.core.streams import Rng
 
 GAP_M = 0.004
@@ -19,8 +21,14 @@ DROP_M = (0.01, 0.05)
 DROP_TRIES = 24
 """Attempts to find a free place before an object is dropped on top of others."""
 SCATTER_TRIES = 200
+BESIDE_M = (0.0005, 0.006)
+"""Range of gaps in a row."""
 
 _LIFT_M = 0.0005
+_OPEN_M, _FRONT = 1.0, 0.15
+"""Below a board at less than this height, rows stand in this front share of the free depth."""
+_TIDY = 0.6
+"""Share of rows in which all objects face the same way (assumed)."""
 _TOO_HIGH = Rejection("object higher than the space above the surface", "smaller objects or scale")
 
 
@@ -31,10 +39,13 @@ class Item:
     Attributes:
         half_m: Scaled half extents along its own axes.
         stackable: Whether top and bottom are flat.
+        outline_m: Its scaled vertices seen from above, around its centre, [n, 2]; None = a
+            rectangle.
     """
 
     half_m: Vec3
     stackable: bool = False
+    outline_m: Array | None = None
 
     @property
     def radius_m(self) -> float:
@@ -46,6 +57,17 @@ class Item:
         """Radius of the bounding sphere, at any rotation."""
         return math.hypot(*self.half_m)
 
+    def span_m(self, yaw_rad: float) -> tuple[Vec3, Vec3]:
+        """Smallest and largest coordinates of the upright object, turned about its centre."""
+        hx, hy, hz = self.half_m
+        outline = self.outline_m
+        if outline is None:
+            outline = np.array([[-hx, -hy], [-hx, hy], [hx, -hy], [hx, hy]])
+        c, s = math.cos(yaw_rad), math.sin(yaw_rad)
+        turned = outline @ np.array([[c, s], [-s, c]])
+        (x0, y0), (x1, y1) = turned.min(axis=0).tolist(), turned.max(axis=0).tolist()
+        return (x0, y0, -hz), (x1, y1, hz)
+
 
 @dataclass
 class Floor:
@@ -54,6 +76,8 @@ class Floor:
     surface: SupportSurface
     taken: list[tuple[float, float, float, float]] = field(default_factory=list)
     closed: list[Vec3] = field(default_factory=list)
+    spot: Vec3 | None = None
+    """Disc ``(x, y, radius)`` [m] with the centres of a pile; None = the whole surface."""
 
     def top_under(self, x: float, y: float, radius_m: float) -> float:
         """Height of the objects below a disc [m]; 0 where the surface is bare."""
@@ -75,6 +99,12 @@ class Floor:
         """Draw a point where a disc fits on the surface; the centre along axes too short for it."""
         room_x = max(0.0, 0.5 * self.surface.size_m[0] - radius_m)
         room_y = max(0.0, 0.5 * self.surface.size_m[1] - radius_m)
+        if self.spot is not None:
+            x, y, reach_m = self.spot
+            away = reach_m * math.sqrt(float(rng.uniform()))
+            turn = 2.0 * math.pi * float(rng.uniform())
+            x, y = x + away * math.cos(turn), y + away * math.sin(turn)
+            return min(max(x, -room_x), room_x), min(max(y, -room_y), room_y)
         return float(rng.uniform(-room_x, room_x)), float(rng.uniform(-room_y, room_y))
 
 
@@ -134,6 +164,10 @@ def _place_all(
         return _arrange_in_grid(group, items, floors, rng)
     if group.placement == "scatter":
         return _scatter(group, items, floors, rng)
+    if group.placement == "row":
+        return _line_up(group, items, floors, rng)
+    if group.placement == "pile" and items:
+        floors = [_choose_spot(items, floors, rng, upright)]
     return [
         _drop(group, item, floors[_draw_floor(floors, item, rng)], rng, stands)
         for item, stands in zip(items, upright, strict=True)
@@ -241,6 +275,66 @@ def _find_cells(floor: Floor, items: Sequence[Item]) -> list[tuple[float, float]
     return []
 
 
+def _choose_spot(
+    items: Sequence[Item], floors: list[Floor], rng: Rng, upright: Sequence[bool]
+) -> Floor:
+    """A surface with a spot on which the items of a pile have about half the room they need."""
+    floor = floors[_draw_floor(floors, max(items, key=lambda item: item.half_m[2]), rng)]
+    radii_m = [i.radius_m if up else i.reach_m for i, up in zip(items, upright, strict=True)]
+    reach_m = math.sqrt(0.6 * sum(r * r for r in radii_m[1:])) if len(items) > 1 else 0.0
+    x, y = floor.place(rng, reach_m + max(radii_m))
+    return replace(floor, spot=(x, y, reach_m))
+
+
+def _line_up(group: ObjectGroup, items: Sequence[Item], floors: list[Floor], rng: Rng) -> list[SE3]:
+    """Upright poses side by side along a surface, all facing -Y or turned in any way.
+
+    A row that is full continues behind the one before; the block of rows has a random place.
+    """
+    if not items:
+        return []
+    tidy = bool(rng.uniform() < _TIDY)
+    for _ in range(SCATTER_TRIES):
+        floor = floors[_draw_floor(floors, max(items, key=lambda item: item.half_m[2]), rng)]
+        poses = _rows_at_a_place(items, floor, rng, tidy)
+        if poses is not None:
+            return poses
+    raise _no_place(group)
+
+
+def _rows_at_a_place(
+    items: Sequence[Item], floor: Floor, rng: Rng, tidy: bool
+) -> list[SE3] | None:
+    """Poses of a block of rows at a drawn place; None if it is taken."""
+    length_m, width_m = floor.surface.size_m
+    row_m = max(length_m / 3.0, length_m * float(rng.uniform()))
+    x = y = deep = wide = 0.0
+    places: list[tuple[Item, float, Vec3]] = []
+    for item in items:
+        turn = float(rng.uniform(-1.0, 1.0))
+        yaw = -0.5 * math.pi + 0.06 * turn if tidy else math.pi * turn
+        gap_m = float(rng.uniform(*BESIDE_M))
+        low, high = item.span_m(yaw)
+        if places and x + high[0] - low[0] > row_m:
+            x, y, deep = 0.0, y + deep + gap_m, 0.0
+        places.append((item, yaw, (x - low[0], y - low[1], 0.0)))
+        x, deep = x + high[0] - low[0] + gap_m, max(deep, high[1] - low[1])
+        wide = max(wide, x)
+    room_x, room_y = length_m - wide, width_m - y - deep
+    if min(room_x, room_y) < 0.0:
+        return None
+    to_x = room_x * float(rng.uniform()) - 0.5 * length_m
+    back = float(rng.uniform()) * (1.0 if floor.surface.clearance_m >= _OPEN_M else _FRONT)
+    to_y = room_y * back - 0.5 * width_m
+    middle = (to_x + 0.5 * wide, to_y + 0.5 * (y + deep), 0.5 * math.hypot(wide, y + deep))
+    if floor.is_closed(*middle) or floor.top_under(*middle) > 0.0:
+        return None
+    return [
+        _stand(item, floor, (to_x + at[0], to_y + at[1], 0.0), SE3.about_z(yaw))
+        for item, yaw, at in places
+    ]
+
+
 def _stack(group: ObjectGroup, items: Sequence[Item], floors: list[Floor], rng: Rng) -> list[SE3]:
     """Poses in towers of two to four, the widest at the bottom; items not flat stand alone."""
     poses: dict[int, SE3] = {}
@@ -304,6 +398,13 @@ def half_extents_m(low: Vec3, high: Vec3, scale: float) -> Vec3:
     """Half extents of a scaled bounding box."""
     x, y, z = (0.5 * scale * (b - a) for a, b in zip(low, high, strict=True))
     return (x, y, z)
+
+
+def outline_m(asset: str, scale: float, assets: AssetIndex) -> Array:
+    """Scaled vertices of an upright asset seen from above, around the middle of its bounds."""
+    (x0, y0, _), (x1, y1, _) = assets.bounds_m(asset)
+    middle = np.array([0.5 * (x0 + x1), 0.5 * (y0 + y1)])
+    return scale * (assets.vertices_m(asset)[:, :2].astype(np.float64) - middle)
 
 
 def _yaw(rng: Rng) -> SE3:

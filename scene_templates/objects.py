@@ -19,7 +19,9 @@ from gen_data.core.scene import ObjectGroup, Placement, Scene, SupportSurface
 from gen_data.core.se3 import SE3, Vec3
 from gen_data.scene_templates import element
 
-LAYERS: dict[Placement, int] = {"drop": 4, "scatter": 1, "grid": 1, "stack": 4}
+LAYERS: dict[Placement, int] = {
+    "drop": 4, "scatter": 1, "grid": 1, "stack": 4, "row": 1, "pile": 4,
+}  # fmt: skip
 """Largest number of objects that start above one another, by placement."""
 MARGIN_M = 0.02
 """Gap between objects and other elements on the surface."""
@@ -101,7 +103,8 @@ class Objects(element.Element):
         count: Nominal number of objects.
         assets: Assets to choose from.
         placement: drop: objects fall from above; scatter: they stand apart; grid: they stand in
-            rows; stack: they stand in towers.
+            cells; stack: they stand in towers; row: they stand side by side and touch, one row
+            behind another; pile: they fall on one spot, next to and on top of one another.
         annotate: Whether to write labels for them.
     """
 

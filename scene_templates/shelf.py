@@ -19,14 +19,14 @@ class Shelf(PlacedElement):
     Attributes:
         size_m: Width, depth and height.
         levels: Number of boards.
-        style: Type of shelf: bookcase or rack.
+        style: Type of shelf: bookcase, rack, or the inside of an open refrigerator.
         annotate: Whether to write labels for it.
     """
 
     type: Literal["shelf"] = "shelf"
     size_m: tuple[float, float, float] = (0.9, 0.32, 1.6)
     levels: int = Field(4, ge=1, le=12)
-    style: Literal["bookcase", "rack"] = "bookcase"
+    style: Literal["bookcase", "rack", "refrigerator"] = "bookcase"
     annotate: bool = False
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:

@@ -30,13 +30,14 @@ Box = tuple[Vec3, Vec3]
 
 PANEL_SHAPES = ("rectangle", "disk")
 TABLE_STYLES = ("legs", "trestle", "bench")
-SHELF_STYLES = ("bookcase", "rack")
+SHELF_STYLES = ("bookcase", "rack", "refrigerator")
 
 COLORS = load_table(__package__, "furniture_colors", str)
 _CORNERS = ((-1, -1), (-1, 1), (1, -1), (1, 1))
 _BOARD_M = 0.02
 _PLINTH_M = 0.06
 _BIN_WALL_M = 0.008
+_PANE = Material((0.86, 0.93, 0.9), 0.05, transmission=0.85)
 
 
 def table(size_m: Vec3 = (1.2, 0.8, 0.74), style: str = "legs") -> Solid:
@@ -67,7 +68,8 @@ def shelf(size_m: Vec3 = (0.9, 0.32, 1.6), levels: int = 4, style: str = "bookca
     Args:
         size_m: Width (X), depth (Y), height.
         levels: Number of boards that carry objects; see ``shelf_levels_m``.
-        style: ``bookcase`` (side and back panels) or ``rack`` (steel posts, open all around).
+        style: ``bookcase`` (side and back panels), ``rack`` (steel posts, open all around) or
+            ``refrigerator`` (white walls, panes of glass as boards).
     """
     x, y, z = check_size("shelf", size_m, 0.1)
     check_option("shelf", "style", style, SHELF_STYLES)
@@ -90,6 +92,8 @@ def shelf(size_m: Vec3 = (0.9, 0.32, 1.6), levels: int = 4, style: str = "bookca
     ]
     wood = patterned_material("texture/wood_grain?seed=8", 0.0, 0.45)
     posts = painted_material("#2f3338", 0.4) if style == "rack" else wood
+    if style == "refrigerator":
+        wood, posts = _PANE, painted_material("#e9ecec", 0.3)
     return make_solid_in_place(patches, (wood, posts), [hulls.box(*b) for b in (*boards, *frame)])
 
 

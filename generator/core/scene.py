@@ -20,7 +20,7 @@ from gen_data.core.shutter import INSTANT, Shutter
 
 SharedValue = str | float | int | bool
 Motion = Literal["static", "dynamic", "kinematic"]
-Placement = Literal["drop", "scatter", "grid", "stack", "along"]
+Placement = Literal["drop", "scatter", "grid", "stack", "row", "pile", "along"]
 PanelKind = Literal["rectangle", "disk"]
 LampKind = Literal["sphere", "spot", PanelKind]
 LightKind = Literal["sphere", "spot", "sun", PanelKind]

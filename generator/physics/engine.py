@@ -277,5 +277,5 @@ def _held_by(arm: Arm, state: ArmState) -> str:
 
 def _resting_bodies(scene: Scene, falling: list[Body]) -> list[str]:
     """Names of dynamic bodies that start near their resting pose, which arms must avoid."""
-    dropped = {group.name for group in scene.groups if group.placement == "drop"}
+    dropped = {group.name for group in scene.groups if group.placement in ("drop", "pile")}
     return [body.name for body in falling if body.group not in dropped]
