@@ -25,6 +25,7 @@ TABLE = PluginTable[Randomizer](
         "environment": "gen_data.randomizers.environment:EnvironmentLight",
         "exposure": "gen_data.randomizers.exposure:Exposure",
         "furnish": "gen_data.randomizers.furnish:Furnish",
+        "hand_held": "gen_data.randomizers.hand_held:HandHeld",
         "lighting": "gen_data.randomizers.lighting:Lighting",
         "object_states": "gen_data.randomizers.object_states:ObjectStates",
         "room_camera": "gen_data.randomizers.room_camera:RoomCamera",

@@ -10,7 +10,7 @@ women, 88 mm of men). Thickness of fingers and places of the knuckles are assume
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -26,6 +26,8 @@ from gen_data.content.procedural.implicit_surfaces import (
 from gen_data.content.procedural.patches import Array, Indices, Patch
 
 FINGERS = ("index", "middle", "ring", "little")
+Distance = Callable[[Array, Array], Array]
+"""Distances [m] of points (x, z) of a hand's plane X-Z from a section of what is held."""
 # Knuckles, then bones with the flesh of the tip [m].
 _KNUCKLES = np.array([[0.0952, 0.0245, 0.0], [0.0926, 0.003, 0.0025], [0.0851, -0.0178, 0.001],
                       [0.0782, -0.0352, -0.004]])  # fmt: skip
@@ -38,6 +40,7 @@ _THUMB_FOOT = np.array([0.021, 0.021, -0.009])
 _RADII = np.array([[0.0104, 0.0092, 0.0079, 0.0064], [0.0106, 0.0095, 0.0081, 0.0066],
                    [0.01, 0.0089, 0.0077, 0.0062], [0.0089, 0.0078, 0.0068, 0.0056]])  # fmt: skip
 _THUMB_RADII = np.array([0.0135, 0.0112, 0.0104, 0.0082])
+_THUMB_AZIMUTHS = (math.radians(24.0), math.radians(10.0), math.radians(0.0))
 # Splay of the fingers at spread 0 [degree].
 _SPLAY = (2.0, 0.0, -3.0, -8.0)
 # Largest bends of knuckle, middle and end joint [degree]: Bain et al., "The functional range of
@@ -109,28 +112,59 @@ def grasp_bones(radii_m: Sequence[float], lift_deg: float) -> Bones:
     widest = max(radii_m)
     x = 0.0926 - 0.012 - 0.3 * widest
     z = -(0.0145 + widest + 0.08 * max(0.0, widest - 0.033))
-    chains = []
+
+    def away(px: Array, pz: Array) -> Array:
+        return np.asarray(np.sqrt((px - x) ** 2 + (pz - z) ** 2))
+
+    turns = [close_finger(k, away, radii_m[k]) for k in range(4)]
+    thumb = close_thumb(away, max(radii_m[:2]))
+    bones = closed_bones(turns, thumb, lift_deg)
+    ends = np.array([[x, _KNUCKLES[0, 1], z], [x, _KNUCKLES[3, 1], z]])
+    return bones._replace(held=(ends, tuple(radii_m)))
+
+
+def closed_bones(
+    turns: Sequence[Sequence[float]], thumb: Sequence[float], lift_deg: float
+) -> Bones:
+    """The joints of a hand closed on something.
+
+    Args:
+        turns: Dip [rad] below the palm of the three bones of index, middle, ring, little finger.
+        thumb: The same of the thumb's bones.
+        lift_deg: Angle of the forearm towards the thumb's side.
+    """
+    made = [_chain(_THUMB_FOOT, _THUMB_BONES, _THUMB_AZIMUTHS, thumb)]
     for k in range(4):
-        middle = np.array([x, z])
-        joint, turn, points = _KNUCKLES[k], 0.0, [_KNUCKLES[k]]
-        splay = math.radians(0.6 * _SPLAY[k])
-        for bone in range(3):
-            reach = radii_m[k], _RADII[k, bone], _RADII[k, bone + 1]
-            turn = _close(
-                joint, _BONES[k, bone], turn, math.radians(_BEND_MAX[bone]), middle, reach
-            )
-            joint = joint + _BONES[k, bone] * _direction(splay, turn)
-            points.append(joint)
-        chains.append(np.array(points))
-    thumb = _thumb_around(np.array([x, z]), max(radii_m[:2]))
+        splay = (math.radians(0.6 * _SPLAY[k]),) * 3
+        made.append(_chain(_KNUCKLES[k], _BONES[k], splay, turns[k]))
     lift = math.radians(lift_deg)
     arm = np.array([-math.cos(lift), math.sin(lift), 0.0])
-    ends = np.array([[x, _KNUCKLES[0, 1], z], [x, _KNUCKLES[3, 1], z]])
-    last = thumb[3] - thumb[2]
+    last = made[0][3] - made[0][2]
     # Out of the bend, and a little towards the thumb's side.
-    nail = np.array([last[2], 0.0, -last[0]]) / math.dist(thumb[3], thumb[2]) + [0.0, 0.4, 0.0]
-    made = [thumb, *chains]
-    return Bones(np.array(made), _backs(made, nail), arm, (ends, tuple(radii_m)))
+    nail = np.array([last[2], 0.0, -last[0]]) / math.dist(made[0][3], made[0][2])
+    return Bones(np.array(made), _backs(made, nail + [0.0, 0.4, 0.0]), arm)
+
+
+def _chain(
+    joint: Array, lengths: Array, azimuths: Sequence[float], turns: Sequence[float]
+) -> Array:
+    points = [joint]
+    for length, azimuth, turn in zip(lengths, azimuths, turns, strict=True):
+        joint = joint + length * _direction(azimuth, turn)
+        points.append(joint)
+    return np.array(points)
+
+
+def close_finger(k: int, away: Distance, radius_m: float = 0.0) -> list[float]:
+    """Dips [rad] of the bones of a finger, 0 = index, that bends until each bone touches."""
+    joint, turn, turns = _KNUCKLES[k], 0.0, []
+    splay = math.radians(0.6 * _SPLAY[k])
+    for bone in range(3):
+        reach = radius_m, _RADII[k, bone], _RADII[k, bone + 1]
+        turn = _close(joint, _BONES[k, bone], turn, math.radians(_BEND_MAX[bone]), away, reach)
+        joint = joint + _BONES[k, bone] * _direction(splay, turn)
+        turns.append(turn)
+    return turns
 
 
 def _backs(chains: Sequence[Array], nail: Array) -> Array:
@@ -172,38 +206,68 @@ def _thumb(angles: Sequence[tuple[float, float]]) -> Array:
     return np.array(points)
 
 
-def _thumb_around(middle: Array, radius: float) -> Array:
-    """The thumb on the other side of a cylinder along Y through ``middle`` (x, z)."""
-    joint, turn, points = _THUMB_FOOT, math.radians(128.0), [_THUMB_FOOT]
-    azimuths = (math.radians(24.0), math.radians(10.0), math.radians(0.0))
-    for bone, azimuth in enumerate(azimuths):
-        reach = radius, _THUMB_RADII[bone], _THUMB_RADII[bone + 1]
+def close_thumb(away: Distance, radius_m: float = 0.0) -> list[float]:
+    """Dips [rad] of the thumb's bones, which closes from the other side."""
+    joint, turn, turns = _THUMB_FOOT, math.radians(128.0), []
+    for bone, azimuth in enumerate(_THUMB_AZIMUTHS):
+        reach = radius_m, _THUMB_RADII[bone], _THUMB_RADII[bone + 1]
         limit = math.radians((100.0, 62.0, 70.0)[bone])
-        turn = _close(joint, _THUMB_BONES[bone], turn, -limit, middle, reach, azimuth)
+        turn = _close(joint, _THUMB_BONES[bone], turn, -limit, away, reach, azimuth)
         joint = joint + _THUMB_BONES[bone] * _direction(azimuth, turn)
-        points.append(joint)
-    return np.array(points)
+        turns.append(turn)
+    return turns
+
+
+def close_straight(number: int, away: Distance) -> list[float]:
+    """Dips [rad] of the bones of a digit, 0 = thumb, that lies against flat sides.
+
+    Joint by joint, the rest of the digit turns in line until any of it touches.
+    """
+    joint = _THUMB_FOOT if number == 0 else _KNUCKLES[number - 1]
+    lengths = _THUMB_BONES if number == 0 else _BONES[number - 1]
+    splay = _THUMB_AZIMUTHS if number == 0 else (math.radians(0.6 * _SPLAY[number - 1]),) * 3
+    limits = (-100.0, -62.0, -70.0) if number == 0 else _BEND_MAX
+    radii, turns = bone_radii(number), [math.radians(128.0 if number == 0 else 0.0)]
+    share = np.linspace(0.15, 1.0, 12)
+    for bone in range(3):
+        swept = turns[-1] + math.radians(limits[bone]) * np.linspace(0.0, 1.0, 181)
+        x, z, gap = joint[0] + 0.0 * swept, joint[2] + 0.0 * swept, np.full(len(swept), np.inf)
+        for k in range(bone, 3):
+            dx, dz = lengths[k] * np.cos(swept) * math.cos(splay[k]), -lengths[k] * np.sin(swept)
+            flesh = radii[k] + (radii[k + 1] - radii[k]) * share
+            px, pz = x[:, None] + share * dx[:, None], z[:, None] + share * dz[:, None]
+            gap = np.minimum(gap, (away(px, pz) - flesh).min(axis=1))
+            x, z = x + dx, z + dz
+        touching = np.flatnonzero(gap < -_YIELD_M)
+        last = len(swept) - 1 if not len(touching) else max(int(touching[0]) - 1, 0)
+        turns.append(float(swept[last]))
+        joint = joint + lengths[bone] * _direction(splay[bone], turns[-1])
+    return turns[1:]
 
 
 def _close(
-    joint: Array, length: float, turn: float, limit: float, middle: Array,
+    joint: Array, length: float, turn: float, limit: float, away: Distance,
     reach: tuple[float, float, float], azimuth: float = 0.0,
 ) -> float:  # fmt: skip
     """The dip [rad] of a bone that bends from ``turn`` by up to ``limit`` until it touches.
 
-    ``reach``: radius of the cylinder, and of the flesh at both ends of the bone.
+    ``reach``: radius around what is held, and of the flesh at both ends of the bone.
     """
     turns = turn + limit * np.linspace(0.0, 1.0, 91)
     share = np.linspace(0.15, 1.0, 9)
     along = length * share[None] * np.cos(turns)[:, None]
     x = joint[0] + along * math.cos(azimuth)
     z = joint[2] - length * share[None] * np.sin(turns)[:, None]
-    away = np.sqrt((x - middle[0]) ** 2 + (z - middle[1]) ** 2)
     flesh = reach[1] + (reach[2] - reach[1]) * share
-    gap = (away - flesh - reach[0]).min(axis=1)
+    gap = (away(x, z) - flesh - reach[0]).min(axis=1)
     touching = np.flatnonzero(gap < -_YIELD_M)
     last = len(turns) - 1 if not len(touching) else max(int(touching[0]) - 1, 0)
     return float(turns[last])
+
+
+def bone_radii(k: int) -> Array:
+    """Radii of a digit at its joints and tip [m], shape [4]; 0 = thumb, 1 = index finger ..."""
+    return np.array(_THUMB_RADII if k == 0 else _RADII[k - 1])
 
 
 def tip_radii(k: int) -> tuple[float, float]:

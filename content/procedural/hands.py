@@ -30,6 +30,8 @@ from gen_data.core.se3 import Vec3
 from gen_data.core.variant_rng import VariantRng, in_turn, variant_rng
 
 GRASP = "grasp"
+HOLD = "hold"
+"""Closed on something, by ``bends_deg``; its axes are those of the hand frame."""
 OPEN = "open"
 """Flat with the palm up, to receive something; the forearm's end is lower than the hand."""
 POSE_NAMES = ("relaxed", "flat", GRASP, "point", "pinch", "fist")
@@ -45,14 +47,21 @@ _MARGIN = 0.01
 _SLEEVES = ("", "long", "pushed_up", "long", "", "short")
 
 
-def hand(seed: int, pose: str = "any", radii_mm: Sequence[float] = (0.0,) * 4) -> Solid:
+def hand(
+    seed: int,
+    pose: str = "any",
+    radii_mm: Sequence[float] = (0.0,) * 4,
+    bends_deg: Sequence[float] = (0.0,) * 15,
+) -> Solid:
     """A left or right hand. Slots: skin, arm, nails, then sleeve.
 
     Args:
         seed: Draws size, skin, side and sleeve; with pose ``any`` also the pose.
-        pose: One of ``POSE_NAMES``, ``open``, or ``any``, which is never ``open``.
+        pose: One of ``POSE_NAMES``, ``open``, ``hold``, or ``any``, which is neither of the two.
         radii_mm: For ``grasp``: radius of what is held beside index, middle, ring and little
             finger; all 0 = drawn.
+        bends_deg: For ``hold``: dips below the palm of the bones of index, middle, ring, little
+            finger and thumb.
 
     Raises:
         AssetError: if there is no such pose.
@@ -61,10 +70,16 @@ def hand(seed: int, pose: str = "any", radii_mm: Sequence[float] = (0.0,) * 4) -
     pose, rng = hand_pose(seed, pose), variant_rng("hand", seed)
     # Beside what is held the hand has the size of the table, so that it fits.
     stout = rng.between(0.9, 1.04, "stout")
-    size = 1.0 if pose == GRASP else rng.between(0.9, 1.06, "size_scale")
+    size = 1.0 if pose in (GRASP, HOLD) else rng.between(0.9, 1.06, "size_scale")
     held = draw_radii(seed, radii_mm) if pose == GRASP else ()
     shown = "flat" if pose == OPEN else pose
-    bones = hand_shape.grasp_bones(held, _lift_deg(seed)) if held else hand_shape.pose_bones(shown)
+    if pose == HOLD:
+        dips = np.radians(np.array(bends_deg, dtype=np.float64).reshape(5, 3)).tolist()
+        bones = hand_shape.closed_bones(dips[:4], dips[4], _lift_deg(seed))
+    elif held:
+        bones = hand_shape.grasp_bones(held, _lift_deg(seed))
+    else:
+        bones = hand_shape.pose_bones(shown)
     flesh = hand_shape.make_flesh_mesh(bones, stout, _STEP_M)
     skin, owner = _map_texture(flesh, bones, stout)
     plates = [_nail(bones, k, stout, rng).painted(2) for k in range(5)]
@@ -77,7 +92,7 @@ def hand(seed: int, pose: str = "any", radii_mm: Sequence[float] = (0.0,) * 4) -
 
 def hand_pose(seed: int, pose: str = "any") -> str:
     """The pose of a variant. Raises AssetError if there is no such pose."""
-    return pose if pose == OPEN else choose_option("hand", "pose", pose, POSE_NAMES, seed)
+    return pose if pose in (HOLD, OPEN) else choose_option("hand", "pose", pose, POSE_NAMES, seed)
 
 
 def is_left(seed: int) -> bool:
@@ -113,9 +128,14 @@ def held_axis_m(seed: int, radii_m: Sequence[float]) -> Vec3:
     return (float(turned[0]), float(turned[1]), 0.0)
 
 
-def hand_facts(seed: int, pose: str = "any", radii_mm: Sequence[float] = ()) -> Facts:
+def hand_facts(
+    seed: int,
+    pose: str = "any",
+    radii_mm: Sequence[float] = (),
+    bends_deg: Sequence[float] = (),
+) -> Facts:
     """Pose, side, and skin tone on the scale of Monk (1 light to 10 dark)."""
-    del radii_mm
+    del radii_mm, bends_deg
     side = "left" if is_left(seed) else "right"
     return Facts(hand_pose(seed, pose), {"monk_skin_tone": str(_tone(seed) + 1), "side": side})
 
