@@ -20,12 +20,17 @@ from gen_data.randomizers import asset_groups, base
 from gen_data.randomizers.free_space import is_in_the_open
 from gen_data.randomizers.reaching_hand import measure_radii
 
-_THINGS, _PLACES = 12, 40
+_THINGS, _PLACES = 12, 200
 _THICKEST_M, _LONGEST_M = 0.09, 0.45
 """Thickness between thumb and fingers, and largest extent, of what is tried in one hand."""
 _TOUCH_M, _PRESS_M = 0.003, 0.0035
 """Flesh nearer than this touches; it yields by this much at most."""
 _CLEAR_M = 0.03
+_FACES, _FACES_THUMB = 0.3, 0.7
+"""Smallest cosines of the angles between the view of a hand and its palm's or thumb's side."""
+_RAISED_RAD = 0.25
+_LOW_M, _TALL_M = 0.05, 0.08
+"""Least heights of vessels and of other round things that a hand holds around their wall."""
 _ARM_M = (0.05, 0.14, 0.24, 0.34, 0.44)
 """Points of the forearm that keep clear of bodies, from the wrist."""
 
@@ -54,6 +59,8 @@ class HandHeld(asset_groups.GroupRandomizer):
         elbow_azimuth_deg: Direction from the hand to its elbow: 0 = +X, 90 = +Y.
         elbow_elevation_deg: The same against the horizon; an elbow is below its hand, as a rule.
         roll_deg: Turn about the forearm; 0 = the thumb is above.
+        viewer_azimuth_deg: Direction from the hand to somebody to whom its palm or its thumb is
+            turned, which shows what it holds; without it, the back of the hand may hide it.
         spill_deg: Largest tilt of open vessels, whose contents are level.
     """
 
@@ -65,6 +72,7 @@ class HandHeld(asset_groups.GroupRandomizer):
     elbow_azimuth_deg: dist.Scalar = dist.Uniform(0.0, 360.0)
     elbow_elevation_deg: dist.Scalar = dist.Normal(-25.0, 25.0, clip=(-80.0, 40.0))
     roll_deg: dist.Scalar = dist.Normal(0.0, 60.0, clip=(-150.0, 150.0))
+    viewer_azimuth_deg: dist.Scalar | None = None
     spill_deg: dist.NonNegative = dist.Uniform(0.0, 12.0)
 
     def check(self, scene: Scene, assets: AssetIndex) -> None:
@@ -87,8 +95,11 @@ class HandHeld(asset_groups.GroupRandomizer):
             return scene
         held = self._draw_held(weights, group.assets, assets, rng)
         surface = scene.surface(group.surfaces[0])
+        viewer = None if self.viewer_azimuth_deg is None else self.viewer_azimuth_deg.draw(rng)
         for _ in range(_PLACES):
             T_world_hand = self._draw_pose(held, surface, assets, rng)
+            if viewer is not None and not _shows(T_world_hand, held, math.radians(viewer)):
+                continue
             if _is_free(T_world_hand, held, scene, assets):
                 break
         else:
@@ -152,6 +163,14 @@ class HandHeld(asset_groups.GroupRandomizer):
         return SE3((float(x), float(y), float(z))) @ T_world_hand
 
 
+def _shows(T_world_hand: SE3, held: _Held, azimuth_rad: float) -> bool:
+    """Whether the palm or the thumb of a hand faces somebody, whose eyes are a little above it."""
+    eyes = _RAISED_RAD
+    to = math.cos(eyes) * math.cos(azimuth_rad), math.cos(eyes) * math.sin(azimuth_rad)
+    _, along_thumb, out_of_back = T_world_hand.inverse().rotate(np.array([*to, math.sin(eyes)]))
+    return bool(out_of_back < -_FACES or _is_left(held) * along_thumb > _FACES_THUMB)
+
+
 def _is_left(held: _Held) -> float:
     """-1 for a left hand, whose thumb is at -Y, else 1."""
     return -1.0 if declared("hand", "is_left")(_seed(held.asset)) else 1.0
@@ -201,7 +220,7 @@ def _ways(
     low, high = points.min(axis=0), points.max(axis=0)
     middle, size = 0.5 * (low + high), high - low
     levels = np.array(declared("hand", "levels_m"))
-    if size[2] > 0.05:
+    if size[2] > (_LOW_M if upright else _TALL_M):
         at = np.array([0.0, 0.0, low[2] + max(share, min(0.5, 0.036 / size[2])) * size[2]])
         radii = measure_radii(points, at[2] + levels)
         if radii is not None and (upright or rng.uniform() < 0.7):
@@ -258,9 +277,7 @@ def _carry(hand: str, thing: str, assets: AssetIndex, rng: Rng) -> _Held | None:
     laid = turned.apply(points)
     palm = np.array(_palm_m(asset, assets))
     laid += palm - 0.5 * (laid.min(axis=0) + laid.max(axis=0))
-    flesh = assets.vertices_m(asset).astype(np.float64)
-    under = (flesh[:, :2] >= laid.min(axis=0)[:2]) & (flesh[:, :2] <= laid.max(axis=0)[:2])
-    rise = float(flesh[under.all(axis=1), 2].max()) - float(laid[:, 2].min()) + 0.0005
+    rise = _overlap_m(laid, assets.vertices_m(asset).astype(np.float64))
     offset = laid[0] - turned.apply(points[:1])[0] + np.array([0.0, 0.0, rise])
     x, y, z = (float(v) for v in offset)
     # The palm faces where a hand that holds has its thumb: up.
@@ -269,6 +286,19 @@ def _carry(hand: str, thing: str, assets: AssetIndex, rng: Rng) -> _Held | None:
     T_hand_asset = about_x @ _wrist(asset, assets)
     T_asset_thing = SE3((x, y, z)) @ turned
     return _Held(asset, thing, T_hand_asset @ T_asset_thing, T_hand_asset, upright=True)
+
+
+def _overlap_m(thing: Array, flesh: Array) -> float:
+    """How far a thing's vertices must rise until their convex hull rests on those of a hand [m]."""
+    from scipy.spatial import ConvexHull
+
+    planes = ConvexHull(thing).equations
+    low, high = planes[planes[:, 2] < -1e-6], planes[planes[:, 2] > 1e-6]
+    here = np.insert(flesh[:, :2], 2, 1.0, axis=1)
+    bottom = (here @ (-low[:, (0, 1, 3)] / low[:, 2:3]).T).max(axis=1)
+    top = (here @ (-high[:, (0, 1, 3)] / high[:, 2:3]).T).min(axis=1)
+    under = bottom < top
+    return float((flesh[:, 2] - bottom)[under].max()) if under.any() else 0.0
 
 
 def _turned(R: Array) -> SE3:

@@ -21,6 +21,7 @@ LEVELS_M = (0.0285, 0.007, -0.0138, -0.0312)
 """Heights of the sections along the hand's Y, from the middle of the grip at Y = -4 mm [m]."""
 _MIDDLE_M = -0.004
 _PALM_M = 0.0145
+_WIDTH_M = (-0.004, 0.0, 0.004)
 _BAND_M = 0.015
 """Dense meshes are convex over this distance at most."""
 _DENSE = 10
@@ -54,9 +55,14 @@ def sections(points_m: Array) -> list[Array | None]:
 
     Thing and hand have the same axes; the grip is around the points' origin. A section is that of
     the convex hull of the vertices within 15 mm if there are many, else of all: the extent in 48
-    directions from X to Z [m].
+    directions from X to Z [m], the largest one over half the width of a finger.
     """
-    return [_section(points_m, level) for level in LEVELS_M]
+    made: list[Array | None] = []
+    for level in LEVELS_M:
+        beside = [_section(points_m, level + offset) for offset in _WIDTH_M]
+        found = [section for section in beside if section is not None]
+        made.append(np.max(found, axis=0) if found else None)
+    return made
 
 
 def _section(points_m: Array, level_m: float) -> Array | None:
