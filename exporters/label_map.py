@@ -7,7 +7,7 @@ of the data set under its own category.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from functools import cache, cached_property
@@ -27,7 +27,7 @@ from gen_data.core.scene import Instance, Scene
 
 PublicList = Literal["coco80", "kitti", "nuscenes", "cityscapes", "nyu40", "ade20k"]
 Sources = tuple[str, ...]
-"""Categories of the data set."""
+"""Categories of the data set, or ``category/subcategory``."""
 
 
 class LabelMap(Strict):
@@ -40,10 +40,12 @@ class LabelMap(Strict):
         classes: ``{class: categories}``, in the order of class ids; a class without categories
             takes the category of its name. Or the name of a public list: ``coco80``,
             ``kitti``, ``nuscenes``, ``cityscapes``, ``nyu40``, ``ade20k``. Without it, all
-            categories keep their names.
+            categories keep their names. ``category/subcategory`` stands for these objects only,
+            and goes before their category, here and below.
         others: Objects of all other categories: left out, or kept as ignored regions (in formats
             that have such regions without a class, such as KITTI's DontCare).
         ignore: Categories whose objects become ignored regions.
+        drop: Categories whose objects are left out, such as ``apple/half``.
         min_visible_fraction: Smallest visible share of the silhouette (annotation ``visibility``).
         min_box_px: Smallest side of the box of the visible pixels.
         max_truncation: Largest share of the silhouette outside the image (annotation
@@ -54,6 +56,7 @@ class LabelMap(Strict):
     classes: PublicList | Mapping[str, Sources | None] | None = None
     others: Literal["drop", "ignore"] = "drop"
     ignore: tuple[str, ...] = ()
+    drop: tuple[str, ...] = ()
     min_visible_fraction: float = Field(0.0, ge=0.0, le=1.0)
     min_box_px: int = Field(1, ge=1)
     max_truncation: float = Field(1.0, ge=0.0, le=1.0)
@@ -85,10 +88,11 @@ class LabelMap(Strict):
                         f"'{name}'; expected one class"
                     )
                 seen[category] = name
-        for category in self.ignore:
+        fates = {**dict.fromkeys(self.ignore, "ignored"), **dict.fromkeys(self.drop, "dropped")}
+        for category, fate in fates.items():
             if isinstance(self.classes, Mapping) and category in seen:
                 raise ValueError(
-                    f"category '{category}' is ignored and belongs to the class "
+                    f"category '{category}' is {fate} and belongs to the class "
                     f"'{seen[category]}'; expected one of the two"
                 )
         return self
@@ -128,13 +132,14 @@ class LabelMap(Strict):
             texts = (f"labels.map.classes.{name}: {fact}" for name, fact in faults.items())
             raise ConfigError("\n".join(texts))
         named = self.classes_of if isinstance(self.classes, Mapping) else {}
-        for category in (*(c for own in named.values() for c in own), *self.ignore):
-            if category not in categories:
+        listed = (c for own in named.values() for c in own)
+        for category in (*listed, *self.ignore, *self.drop):
+            if category_of(category) not in categories:
                 text = f"labels.map: the data set has no category '{category}'"
                 warnings.warn(
                     text + did_you_mean(category, categories), ConfigWarning, stacklevel=2
                 )
-        used = {c for own in self.classes_of.values() for c in own}
+        used = {category_of(c) for own in self.classes_of.values() for c in own}
         if self.classes is not None and not used & set(categories):
             raise ConfigError(
                 "labels.map.classes: no class has a category of the data set; expected some of: "
@@ -148,7 +153,7 @@ class LabelMap(Strict):
         any_case = {category.lower(): category for category in categories}
         found = {}
         for name, own in self.classes_of.items():
-            if own and not set(own) & set(categories):
+            if own and not set(map(category_of, own)) & set(categories):
                 near = [k for c in own for k in get_close_matches(c.lower(), any_case, n=1)]
                 guess = f" (did you mean '{any_case[near[0]]}'?)" if near else ""
                 named = ", ".join(f"'{category}'" for category in own)
@@ -157,6 +162,17 @@ class LabelMap(Strict):
                     f"{list_names(categories, 40)}; or [] for a class without objects"
                 )
         return found
+
+
+def category_of(source: str) -> str:
+    """The category of ``category`` or ``category/subcategory``."""
+    return source.partition("/")[0]
+
+
+def _find(instance: Instance, sources: Container[str]) -> str:
+    """The source that stands for an instance, its subcategory first; empty if there is none."""
+    finer = f"{instance.category}/{instance.subcategory}"
+    return next((name for name in (finer, instance.category) if name in sources), "")
 
 
 @cache
@@ -271,10 +287,13 @@ class AppliedLabelMap:
                 yield replace(thing, instance=instance, ignored=fate == "ignore")
 
     def _fate(self, thing: ObjectTruth) -> Literal["keep", "ignore", "drop"]:
-        label_map, category = self.label_map, thing.instance.category
-        if category in label_map.ignore:
+        label_map, instance = self.label_map, thing.instance
+        found = _find(instance, {*label_map.ignore, *label_map.drop, *self._class_of})
+        if found in label_map.drop:
+            return "drop"
+        if found in label_map.ignore:
             return "ignore"
-        if label_map.classes is not None and category not in self._class_of:
+        if label_map.classes is not None and not found:
             return label_map.others
         return label_map.below if self._is_below(thing) else "keep"
 
@@ -295,16 +314,18 @@ class AppliedLabelMap:
         """The instance under its class; ignored ones without a class have id 0."""
         if not self._has_classes:
             return instance
-        name, number = self._class_of.get(instance.category, (instance.category, 0))
+        found = _find(instance, self._class_of)
+        name, number = self._class_of.get(found, (instance.category, 0))
         return replace(instance, category=name, category_id=number)
 
     def map_scene(self, scene: Scene) -> Scene:
         """The scene whose instances are mapped; instances of other categories are not annotated."""
-        known = self._class_of if self.label_map.classes is not None else None
+        drop, known = self.label_map.drop, self._class_of
         instances = tuple(
-            self._map_instance(one)
-            if known is None or one.category in known
-            else replace(one, annotated=False, category_id=0)
+            replace(one, annotated=False, category_id=0)
+            if (found := _find(one, {*drop, *known})) in drop
+            or (self.label_map.classes is not None and not found)
+            else self._map_instance(one)
             for one in scene.instances
         )
         return replace(scene, instances=instances)

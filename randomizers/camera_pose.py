@@ -51,8 +51,8 @@ class CameraPose(RandomizerBase):
         fills: Share of the image's longer side that the longer side of the projected box of the
             aimed object spans, hidden parts and parts outside the image included; above 1 it is
             truncated. Takes the place of ``distance_m`` and ``jitter_m``.
-        nearest_m: With ``fills``: shortest distance from the object's centre, as lenses cannot focus
-            on anything nearer; smaller objects fill less of the image then.
+        nearest_m: With ``fills``: shortest distance from the object's centre, for lenses that focus
+            on nothing nearer; smaller objects fill less of the image then.
         off_center: With ``fills``: displacement of the object's centre from the middle of the
             image, along both axes, drawn for each; 1 = a square of the object's size touches
             the border.

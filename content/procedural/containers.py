@@ -68,10 +68,9 @@ def bowl(size_m: Vec3 = (0.28, 0.28, 0.09), seed: int = 0) -> Solid:
     """
     x, y, z = check_size("serving_bowl", size_m, 0.04)
     r, t = 0.5 * min(x, y), 0.006
-    steps = [k / 8 for k in range(9)]
     # A quarter of an ellipse from the foot to the rim.
-    outer = [(r * (0.45 + 0.55 * math.sin(0.5 * math.pi * s)), z * (1 - math.cos(0.5 * math.pi * s)))
-             for s in steps]  # fmt: skip
+    turns = [k * math.pi / 16 for k in range(9)]
+    outer = [(r * (0.45 + 0.55 * math.sin(a)), z * (1.0 - math.cos(a))) for a in turns]
     inner = [(radius - t, max(high + 0.3 * t, _FOOT_M)) for radius, high in outer[::-1]]
     profile = [(0.0, 0.0), *outer, (r - 0.5 * t, z + 0.003), *inner, (0.0, _FOOT_M)]
     rings = [

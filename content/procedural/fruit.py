@@ -22,12 +22,14 @@ from gen_data.content.procedural.material_presets import (
 from gen_data.content.procedural.patches import (
     Array,
     Patch,
+    centre_m,
     join_patches,
     make_centred_solid,
     rotate,
 )
 from gen_data.content.procedural.surface_shapes import Point2
 from gen_data.core.asset_types import Material
+from gen_data.core.se3 import Vec3
 from gen_data.core.variant_rng import VariantRng, in_turn, variant_rng
 
 _STALK = Material(hex_to_linear("#5a4329"), 0.8, printed=True)
@@ -144,6 +146,21 @@ def fruit_kind(group: str, seed: int) -> str:
 def apple_facts(seed: int) -> Facts:
     """Whether it is cut."""
     return Facts(fruit_kind("apple", seed).partition("/")[2])
+
+
+def lemon_facts(seed: int) -> Facts:
+    """Whether it is cut."""
+    return Facts(fruit_kind("lemon", seed).partition("/")[2])
+
+
+def lime_facts(seed: int) -> Facts:
+    """Whether it is cut."""
+    return Facts(fruit_kind("lime", seed).partition("/")[2])
+
+
+def kiwi_facts(seed: int) -> Facts:
+    """Whether it is cut."""
+    return Facts(fruit_kind("kiwi", seed).partition("/")[2])
 
 
 def orange_facts(seed: int) -> Facts:
@@ -326,8 +343,36 @@ def pear(seed: int) -> Solid:
     return make_centred_solid([body, stalk.painted(1)], (skin, _STALK), parts)
 
 
-def banana(seed: int) -> Solid:
-    """A banana on its side, or a hand of up to seven resting on its tips. Slots: peels, crown."""
+def banana(seed: int, piece: int = -1) -> Solid:
+    """A banana on its side, or a hand of up to seven resting on its tips. Slots: peels, crown.
+
+    Args:
+        seed: Draws all.
+        piece: Number of a single banana of the hand; -1 = the whole hand.
+    """
+    bananas, materials = _bananas(seed)
+    if piece >= 0:
+        patches, parts = bananas[piece]
+        return make_centred_solid(patches, materials, parts)
+    patches = [patch for own, _ in bananas for patch in own]
+    return make_centred_solid(patches, materials, [part for _, own in bananas for part in own])
+
+
+def banana_pieces(seed: int, piece: int = -1) -> tuple[tuple[str, Vec3], ...]:
+    """Ids of the bananas of a hand, and their middles from that of the hand [m]."""
+    if piece >= 0 or banana_count(seed) == 1:
+        return ()
+    bananas, _ = _bananas(seed)
+    x, y, z = centre_m(join_patches(patch for own, _ in bananas for patch in own))
+    middles = [centre_m(join_patches(own)) for own, _ in bananas]
+    return tuple(
+        (f"banana?piece={k}&seed={seed}", (round(a - x, 6), round(b - y, 6), round(c - z, 6)))
+        for k, (a, b, c) in enumerate(middles)
+    )
+
+
+def _bananas(seed: int) -> tuple[list[tuple[list[Patch], list[Array]]], tuple[Material, ...]]:
+    """Patches and convex parts of every banana, and the materials of all."""
     rng = variant_rng("banana", seed)
     count = banana_count(seed)
     length, thick = rng.between(0.15, 0.205, "length_m"), rng.between(0.0165, 0.02, "radius_m")
@@ -339,8 +384,8 @@ def banana(seed: int) -> Solid:
     bend = rng.between(0.7, 1.35, "bend_rad")
     if count == 1:
         skin, parts = _banana(length, thick, bend, 5)
-        return make_centred_solid([skin], (peels[0],), parts)
-    patches, hands = [], []
+        return [([skin], parts)], (peels[0],)
+    made: list[tuple[list[Patch], list[Array]]] = []
     for i in range(count):
         at = i - 0.5 * (count - 1)
         turn = at * rng.between(0.19, 0.25) + rng.between(-0.04, 0.04)
@@ -350,14 +395,14 @@ def banana(seed: int) -> Solid:
         # rise by turns, since they grow in two rows.
         shift = np.array([0.0, 0.42 * thick * at, 0.45 * thick * (i % 2)])
         skin = skin.rotated("x", 0.5 * math.pi).rotated("z", turn).moved(*shift.tolist())
-        patches.append(skin.painted(i % 2))
-        hands += [_turn_up(part, turn) + shift for part in parts]
+        made.append(([skin.painted(i % 2)], [_turn_up(part, turn) + shift for part in parts]))
     wide = 0.45 * thick * count + 0.012
     crown = shapes.rounded_box((0.03, wide, 0.02), 0.008, 2).moved(0.008, 0.0, 0.004)
-    patches.append(crown.painted(2))
-    hands[0] = hulls.extreme(np.concatenate([hands[0], crown.corners_m.reshape(-1, 3)]))
+    first = made[0][1]
+    first[0] = hulls.extreme(np.concatenate([first[0], crown.corners_m.reshape(-1, 3)]))
     tan = Material(draw_linear(("#8a8a3a", "#6b5a2c", "#a9a24a"), 0.1, rng), 0.7, printed=True)
-    return make_centred_solid(patches, (*peels, tan), hands)
+    made[-1][0].append(crown.painted(2))
+    return made, (*peels, tan)
 
 
 def banana_count(seed: int) -> int:
@@ -365,8 +410,9 @@ def banana_count(seed: int) -> int:
     return in_turn((1, 4, 1, 2, 6, 1, 3, 5), seed)
 
 
-def banana_facts(seed: int) -> Facts:
-    """Single or hand, and the number."""
+def banana_facts(seed: int, piece: int = -1) -> Facts:
+    """Single or of a hand, and the number in the hand."""
+    del piece
     count = banana_count(seed)
     return Facts("single" if count == 1 else "hand", {"count": str(count)})
 

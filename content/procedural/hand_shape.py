@@ -142,7 +142,7 @@ def closed_bones(
     last = made[0][3] - made[0][2]
     # Out of the bend, and a little towards the thumb's side.
     nail = np.array([last[2], 0.0, -last[0]]) / math.dist(made[0][3], made[0][2])
-    return Bones(np.array(made), _backs(made, nail + [0.0, 0.4, 0.0]), arm)
+    return Bones(np.array(made), _backs(made, nail + np.array([0.0, 0.4, 0.0])), arm)
 
 
 def _chain(

@@ -102,12 +102,20 @@ def make_centred_solid(
 ) -> family.Solid:
     """A solid whose origin is the centre of its bounding box."""
     patch = join_patches(patches)
-    low, high = patch.bounds_m()
-    # On the vertex grid, so that the shift does not change which vertices coincide.
-    x, y, z = (round(float(v) / GRID_M) * GRID_M for v in round_values(0.5 * (low + high)))
+    x, y, z = centre_m(patch)
     moved = patch.moved(-x, -y, -z)
     hulls = tuple(hull - np.array([x, y, z]) for hull in hulls_m)
     return make_solid_in_place((moved,), materials, hulls, crease_deg)
+
+
+def centre_m(patch: Patch) -> Vec3:
+    """Centre of a patch's bounding box [m].
+
+    On the vertex grid, so that a shift by it does not change which vertices coincide.
+    """
+    low, high = patch.bounds_m()
+    x, y, z = (round(float(v) / GRID_M) * GRID_M for v in round_values(0.5 * (low + high)))
+    return (x, y, z)
 
 
 def make_solid_in_place(

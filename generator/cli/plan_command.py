@@ -12,6 +12,7 @@ import click
 from gen_data.cli import cost_estimate, options, tables
 from gen_data.core.errors import ConfigError, NoLabels
 from gen_data.core.system_calls import usable_cores
+from gen_data.exporters.label_map import category_of
 
 if TYPE_CHECKING:
     from gen_data.assemble.config import Config
@@ -102,9 +103,10 @@ def _rows(config: Config, n: int) -> Iterator[tuple[str, str]]:
 def _class_rows(config: Config, factory: PipelineFactory) -> Iterator[tuple[str, str]]:
     """Classes of the label map, and how many assets each has in the groups of objects."""
     assets = {a for scene in factory.nominal for g in scene.groups if g.annotated for a in g.assets}
-    counts = Counter(factory.library.get(asset).category for asset in assets)
+    found = [factory.library.get(asset) for asset in assets]
+    counts = Counter(name for a in found for name in {a.category, f"{a.category}/{a.subcategory}"})
     for name, own in config.general.labels.map.classes_of.items():
-        used = [category for category in own if category in factory.categories]
+        used = [source for source in own if category_of(source) in factory.categories]
         drawn = sum(counts[category] for category in used)
         text = ", ".join(used) or "no category: it stays empty"
         yield f"class {name}", f"{text}; {drawn} of {len(assets)} assets to draw from"

@@ -21,6 +21,7 @@ from gen_data.pipeline import checked_renderer, splits
 from gen_data.pipeline.finalize_scene import Timeline, finalize_scene
 from gen_data.pipeline.lift_scene import lift_scene
 from gen_data.pipeline.numerics import numerics_digests
+from gen_data.pipeline.separate_pieces import separate_pieces
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -269,7 +270,8 @@ class Pipeline:
                 settled = physics.settle(scene)
             if settled.rejection is not None:
                 raise errors.LayoutRejected(settled.rejection)
-            scene = finalize_scene(settled.scene, self.assets, self._category_ids)
+            separated = separate_pieces(settled.scene)
+            scene = finalize_scene(separated, self.assets, self._category_ids)
             return AcceptedScene(scene_index, scene, randomizers, sensors, attempt, timings)
 
         return self._first_accepted(scene_index, settle)

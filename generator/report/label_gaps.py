@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from gen_data.core.sample import ImageTruth
-from gen_data.exporters.label_map import AppliedLabelMap, LabelMap
+from gen_data.exporters.label_map import AppliedLabelMap, LabelMap, category_of
 from gen_data.runner.layout import MANIFEST_NAME
 from gen_data.runner.stored import LabelledImages, StoredSamples
 
@@ -120,7 +120,8 @@ def _has_label(sample: LabelledImages, name: str, applied: AppliedLabelMap) -> b
 def count_objects(stored: StoredSamples) -> dict[str, int]:
     """Numbers of visible annotated objects in all images, as the manifest states them.
 
-    By class of the label map, before its limits; by category if the map has no classes.
+    By class of the label map, before its limits; by category if the map has no classes. A class of
+    subcategories has the number of their categories.
     """
     manifest = json.loads((stored.folder / MANIFEST_NAME).read_bytes())
     counts = dict.fromkeys(stored.categories, 0)
@@ -130,4 +131,7 @@ def count_objects(stored: StoredSamples) -> dict[str, int]:
     classes = read_label_map(stored.config).classes_of
     if not classes:
         return counts
-    return {name: sum(counts.get(c, 0) for c in own) for name, own in classes.items()}
+    return {
+        name: sum(counts.get(category, 0) for category in {category_of(source) for source in own})
+        for name, own in classes.items()
+    }
