@@ -3,6 +3,7 @@
 import math
 from collections import Counter
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -23,7 +24,7 @@ from tests.randomizers.doubles import (
     surface_scene,
 )
 
-PLACEMENTS = ("drop", "scatter", "grid", "stack")
+PLACEMENTS = ("drop", "scatter", "grid", "stack", "row", "pile")
 KEEP_OUT: tuple[Vec3, ...] = ((0.0, 0.0, 0.15),)
 
 
@@ -76,6 +77,61 @@ def test_nothing_starts_where_it_is_kept_out(placement: str) -> None:
             nearest_m = float(np.hypot(edges[..., 0], edges[..., 1]).min())
 
             assert nearest_m > KEEP_OUT[0][2] - 1e-6
+
+
+def test_objects_in_a_row_touch() -> None:
+    """Neighbours of a row are 6 mm apart at most along the surface, fronts or not."""
+    for scene_index in range(12):
+        scene = surface_scene((3.0, 0.3), placement="row", assets=("brick", "can?seed=0"))
+        spans = sorted(
+            (corners[:, 0].min(), corners[:, 0].max())
+            for corners in map(corners_of, bodies_of(drawn(scene, Constant(5), scene_index)))
+        )
+        rows = sum(b - a for (_, a), (b, _) in pairwise(spans) if b > a)
+
+        assert 0.0 <= rows <= 4 * 0.006
+
+
+def test_rows_under_a_board_stand_at_its_front() -> None:
+    """The shelf is open towards -Y; 15 % of the free depth is behind its edge."""
+    for scene_index in range(12):
+        scene = surface_scene(
+            (0.9, 0.5), placement="row", assets=("can?seed=0",), clearance_m=0.3
+        )
+        bodies = bodies_of(drawn(scene, Constant(4), scene_index))
+        front_m = min(corners_of(body)[:, 1].min() for body in bodies)
+        front_m -= scene.surface("s0").T_world_surface.translation_m[1]
+
+        assert -0.25 <= front_m <= -0.25 + 0.15 * 0.5
+
+
+def test_piles_are_narrower_than_what_lies_apart() -> None:
+    """Median distance from the middle of all, 8 objects on 4 m x 4 m."""
+    away: dict[str, list[float]] = {"pile": [], "drop": []}
+    for placement, distances in away.items():
+        for scene_index in range(10):
+            scene = surface_scene((4.0, 4.0), placement=placement, assets=("brick", "can?seed=1"))
+            bodies = bodies_of(drawn(scene, Constant(8), scene_index))
+            places = np.array([body.T_world_body.translation_m[:2] for body in bodies])
+            distances += np.linalg.norm(places - places.mean(axis=0), axis=1).tolist()
+
+    assert np.median(away["pile"]) < 0.15
+    assert np.median(away["drop"]) > 1.0
+
+
+@pytest.mark.parametrize("kinds", [1, 2])
+def test_kinds_limit_the_categories_of_a_scene(kinds: int) -> None:
+    """Scenes differ in the categories, and all occur."""
+    seen: Counter[str] = Counter()
+    for scene_index in range(30):
+        scene = surface_scene((4.0, 4.0))
+        objects = Objects(name="clutter", count=Constant(8), kinds=Constant(kinds))
+        made = objects(scene, FakeAssets(), rng_of("objects", scene_index, index=scene_index))
+        found = {THINGS[body.asset].category for body in bodies_of(made)}
+        seen.update(found)
+
+        assert len(found) <= kinds
+    assert len(seen) > 2
 
 
 def test_standing_objects_rest_on_the_surface() -> None:
