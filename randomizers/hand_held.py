@@ -134,9 +134,7 @@ class HandHeld(asset_groups.GroupRandomizer):
             f"most {_LONGEST_M:g} m"
         )
 
-    def _draw_pose(
-        self, held: _Held, surface: SupportSurface, assets: AssetIndex, rng: Rng
-    ) -> SE3:
+    def _draw_pose(self, held: _Held, surface: SupportSurface, assets: AssetIndex, rng: Rng) -> SE3:
         """``T_world_hand`` with the thing's middle above the surface."""
         azimuth = math.radians(self.elbow_azimuth_deg.draw(rng))
         elevation = math.radians(self.elbow_elevation_deg.draw(rng))
@@ -182,7 +180,7 @@ def _seed(hand: str) -> int:
 
 def _middle_m(asset: str, assets: AssetIndex) -> Array:
     low, high = assets.bounds_m(asset)
-    return 0.5 * (np.array(low) + np.array(high))
+    return np.asarray(0.5 * (np.array(low) + np.array(high)))
 
 
 def _hold(hand: str, thing: str, assets: AssetIndex, rng: Rng) -> _Held | None:

@@ -302,9 +302,7 @@ def _line_up(group: ObjectGroup, items: Sequence[Item], floors: list[Floor], rng
     raise _no_place(group)
 
 
-def _rows_at_a_place(
-    items: Sequence[Item], floor: Floor, rng: Rng, tidy: bool
-) -> list[SE3] | None:
+def _rows_at_a_place(items: Sequence[Item], floor: Floor, rng: Rng, tidy: bool) -> list[SE3] | None:
     """Poses of a block of rows at a drawn place; None if it is taken."""
     length_m, width_m = floor.surface.size_m
     row_m = max(length_m / 3.0, length_m * float(rng.uniform()))
@@ -404,7 +402,7 @@ def outline_m(asset: str, scale: float, assets: AssetIndex) -> Array:
     """Scaled vertices of an upright asset seen from above, around the middle of its bounds."""
     (x0, y0, _), (x1, y1, _) = assets.bounds_m(asset)
     middle = np.array([0.5 * (x0 + x1), 0.5 * (y0 + y1)])
-    return scale * (assets.vertices_m(asset)[:, :2].astype(np.float64) - middle)
+    return np.asarray(scale * (assets.vertices_m(asset)[:, :2].astype(np.float64) - middle))
 
 
 def _yaw(rng: Rng) -> SE3:

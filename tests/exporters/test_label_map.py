@@ -2,6 +2,7 @@
 
 import json
 from collections import Counter
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from pydantic import ValidationError
 from gen_data.assemble.config import load_config
 from gen_data.assemble.pipeline_factory import PipelineFactory
 from gen_data.core.errors import ConfigError, ConfigWarning
+from gen_data.core.scene import Scene
 from gen_data.exporters.coco import Coco
 from gen_data.exporters.kitti import Kitti
 from gen_data.exporters.label_map import AppliedLabelMap, LabelMap, MappedExporter, public_classes
@@ -69,6 +71,41 @@ def test_other_and_ignored_categories_can_stay_as_ignored_regions(world: Any) ->
         is_ignored = {t.instance.category for t in things if t.ignored}
         assert second in is_ignored
         assert first not in is_ignored
+
+
+def test_subcategories_go_before_their_category(world: Any) -> None:
+    """Halves of apples are left out, ignored or a class; whole ones follow the category."""
+    image = max((i for s in world.samples for i in s.truth.values()), key=lambda i: len(i.objects))
+    kinds = ("half", "round", "half", "")
+    objects = tuple(
+        replace(thing, instance=replace(thing.instance, category="apple", subcategory=kind))
+        for thing, kind in zip(image.objects, kinds, strict=False)
+    )
+    info = replace(world.info(7), categories=("apple",))
+
+    def mapped(label_map: LabelMap) -> list[Any]:
+        return [
+            *AppliedLabelMap(label_map, info).map_image(replace(image, objects=objects)).objects
+        ]
+
+    classes = {"classes": {"whole": "apple", "cut": "apple/half"}}
+    assert len(objects) == 4
+    assert [t.instance.subcategory for t in mapped(LabelMap(drop=("apple/half",)))] == ["round", ""]
+    assert [t.ignored for t in mapped(LabelMap(ignore=("apple/half",)))] == [1, 0, 1, 0]
+    assert [t.instance.category for t in mapped(parse(json.dumps(classes)))] == [
+        "cut", "whole", "cut", "whole",
+    ]  # fmt: skip
+    assert [t.instance.category_id for t in mapped(parse(json.dumps(classes)))] == [2, 1, 2, 1]
+    only = mapped(parse('{"classes": {"cut": ["apple/half"]}}'))
+    assert [t.instance.subcategory for t in only] == ["half", "half"]
+    scene = Scene("test", instances=tuple(thing.instance for thing in objects))
+    kept = AppliedLabelMap(LabelMap(drop=("apple/half",)), info).map_scene(scene).instances
+    assert [i.annotated for i in kept] == [False, True, False, True]
+
+
+def test_a_subcategory_of_two_fates_is_refused() -> None:
+    with pytest.raises(ValidationError, match="'apple/half' is dropped and belongs to the class"):
+        parse('{"classes": {"cut": ["apple/half"]}, "drop": ["apple/half"]}')
 
 
 def test_limits_apply_to_the_visible_part(world: Any) -> None:

@@ -144,6 +144,20 @@ def test_thing_fills_its_share_at_its_place_through_any_lens(
     assert away / np.linalg.norm(away) == pytest.approx(toward, abs=1e-6)
 
 
+def test_lenses_that_focus_on_nothing_nearer_keep_their_distance() -> None:
+    """A brick of 6 cm fills 0.8 from 7 cm only; small shares are met as before."""
+    bricks = replace(SCENE, bodies=SCENE.bodies[:2])
+    for number in range(8):
+        camera = framed(bricks, number, fills=Constant(0.8), nearest_m=0.4)
+        away_m = math.dist(
+            camera.T_world_camera.translation_m, SCENE.bodies[1].T_world_body.translation_m
+        )
+        freely = framed(bricks, number, fills=Constant(0.02), nearest_m=0.4)
+
+        assert away_m == pytest.approx(0.4, abs=1e-6)
+        assert share_of(SCENE.bodies[1], freely) == pytest.approx(0.02, rel=1e-4)
+
+
 @pytest.mark.parametrize("roll_deg", [-8.0, 0.0, 5.0])
 def test_camera_stays_level_beside_the_thing(roll_deg: float) -> None:
     """Its X axis leans by the roll alone, wherever in the image the thing is."""

@@ -158,11 +158,9 @@ def test_sections_of_a_cylinder_are_its_circles(radius_m: float) -> None:
 def test_sections_keep_to_one_side_of_a_bend() -> None:
     """A bent tube of 10 mm: between its ends lies nothing, though its hull spans 30 mm there."""
     path, turn = np.linspace(-0.6, 0.6, 41), 2.0 * math.pi * np.arange(16) / 16
-    bent = np.array([
-        [(0.12 + 0.01 * math.cos(t)) * math.cos(a) - 0.12, (0.12 + 0.01 * math.cos(t)) * math.sin(a),
-         0.01 * math.sin(t)]
-        for a in path for t in turn
-    ])  # fmt: skip
+    a, t = (grid.ravel() for grid in np.meshgrid(path, turn, indexing="ij"))
+    out = 0.12 + 0.01 * np.cos(t)
+    bent = np.stack([out * np.cos(a) - 0.12, out * np.sin(a), 0.01 * np.sin(t)], axis=1)
     hull_m = np.ptp(bent[:, 0])
     for section in hand_grip.sections(bent):
         assert section is not None

@@ -95,9 +95,7 @@ def test_objects_in_a_row_touch() -> None:
 def test_rows_under_a_board_stand_at_its_front() -> None:
     """The shelf is open towards -Y; 15 % of the free depth is behind its edge."""
     for scene_index in range(12):
-        scene = surface_scene(
-            (0.9, 0.5), placement="row", assets=("can?seed=0",), clearance_m=0.3
-        )
+        scene = surface_scene((0.9, 0.5), placement="row", assets=("can?seed=0",), clearance_m=0.3)
         bodies = bodies_of(drawn(scene, Constant(4), scene_index))
         front_m = min(corners_of(body)[:, 1].min() for body in bodies)
         front_m -= scene.surface("s0").T_world_surface.translation_m[1]
@@ -113,7 +111,7 @@ def test_piles_are_narrower_than_what_lies_apart() -> None:
             scene = surface_scene((4.0, 4.0), placement=placement, assets=("brick", "can?seed=1"))
             bodies = bodies_of(drawn(scene, Constant(8), scene_index))
             places = np.array([body.T_world_body.translation_m[:2] for body in bodies])
-            distances += np.linalg.norm(places - places.mean(axis=0), axis=1).tolist()
+            distances.extend(np.linalg.norm(places - places.mean(axis=0), axis=1).tolist())
 
     assert np.median(away["pile"]) < 0.15
     assert np.median(away["drop"]) > 1.0
