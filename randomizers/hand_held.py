@@ -22,7 +22,7 @@ from gen_data.randomizers.reaching_hand import measure_radii
 
 _THINGS, _PLACES = 12, 200
 _THICKEST_M, _LONGEST_M = 0.09, 0.45
-"""Thickness between thumb and fingers, and largest extent, of what is tried in one hand."""
+"""Thickness between thumb and fingers, and largest extent, of an object in one hand."""
 _TOUCH_M, _PRESS_M = 0.003, 0.0035
 """Flesh nearer than this touches; it yields by this much at most."""
 _CLEAR_M = 0.03
@@ -30,13 +30,13 @@ _FACES, _FACES_THUMB = 0.3, 0.7
 """Smallest cosines of the angles between the view of a hand and its palm's or thumb's side."""
 _RAISED_RAD = 0.25
 _LOW_M, _TALL_M = 0.05, 0.08
-"""Least heights of vessels and of other round things that a hand holds around their wall."""
+"""Least heights of vessels and of other round objects that a hand holds around their wall."""
 _ARM_M = (0.05, 0.14, 0.24, 0.34, 0.44)
 """Points of the forearm that keep clear of bodies, from the wrist."""
 
 
 class _Held(NamedTuple):
-    """A hand around a thing: ids, and ``T_hand_thing``, ``T_asset_hand``."""
+    """A hand around an object: ids, and poses of both in the axes of the hand."""
 
     asset: str
     thing: str
@@ -50,23 +50,23 @@ class HandHeld(asset_groups.GroupRandomizer):
 
     Fingers and thumb close on the sections of the object until they touch, whatever its shape;
     objects that are too thick for them lie on the open palm. Both stay where they are in physics.
-    The template needs ``objects`` elements with ``count: 0`` of hands and of things to hold.
+    The template needs ``objects`` elements with ``count: 0`` of hands and of objects to hold.
 
     Attributes:
-        things: Name of the object group that is held.
+        objects: Name of the object group that is held.
         probability: Whether there is a hand.
         height_m: Height of the object's centre above the surface.
         elbow_azimuth_deg: Direction from the hand to its elbow: 0 = +X, 90 = +Y.
         elbow_elevation_deg: The same against the horizon; an elbow is below its hand, as a rule.
         roll_deg: Turn about the forearm; 0 = the thumb is above.
         viewer_azimuth_deg: Direction from the hand to somebody to whom its palm or its thumb is
-            turned, which shows what it holds; without it, the back of the hand may hide it.
+            turned, which shows the held object; without it, the back of the hand may hide it.
         spill_deg: Largest tilt of open vessels, whose contents are level.
     """
 
     type: Literal["hand_held"] = "hand_held"
     stage: Literal["scene"] = "scene"
-    things: str = "held"
+    objects: str = "held"
     probability: dist.Flag = dist.Constant(True)
     height_m: dist.NonNegative = dist.Uniform(0.15, 0.5)
     elbow_azimuth_deg: dist.Scalar = dist.Uniform(0.0, 360.0)
@@ -79,18 +79,18 @@ class HandHeld(asset_groups.GroupRandomizer):
         """Raise ConfigError if a group or category is unknown."""
         self.find_group(scene, assets)
         names = [group.name for group in scene.groups]
-        fault = f"randomizers.{self.name}.things: there is no object group"
-        base.check_known(self.things, names, fault)
+        fault = f"randomizers.{self.name}.objects: there is no object group"
+        base.check_known(self.objects, names, fault)
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
-        """Return the scene with a hand and what it holds.
+        """Return the scene with a hand and the object in it.
 
         Raises:
             LayoutRejected: no free place above the surface was found.
-            ConfigError: no hand can hold what was drawn.
+            ConfigError: no hand can hold the drawn objects.
         """
         hands, weights = self.find_group(scene, assets)
-        group = next(g for g in scene.groups if g.name == self.things)
+        group = next(g for g in scene.groups if g.name == self.objects)
         if not weights or not group.assets or not self.probability.draw(rng):
             return scene
         held = self._draw_held(weights, group.assets, assets, rng)
@@ -130,12 +130,12 @@ class HandHeld(asset_groups.GroupRandomizer):
             if held is not None:
                 return held
         raise errors.ConfigError(
-            f"randomizers.{self.name}.things: no hand can hold '{thing}'; expected objects of at "
+            f"randomizers.{self.name}.objects: no hand can hold '{thing}'; expected objects of at "
             f"most {_LONGEST_M:g} m"
         )
 
     def _draw_pose(self, held: _Held, surface: SupportSurface, assets: AssetIndex, rng: Rng) -> SE3:
-        """``T_world_hand`` with the thing's middle above the surface."""
+        """``T_world_hand`` with the object's middle above the surface."""
         azimuth = math.radians(self.elbow_azimuth_deg.draw(rng))
         elevation = math.radians(self.elbow_elevation_deg.draw(rng))
         roll = math.radians(self.roll_deg.draw(rng))
@@ -184,7 +184,7 @@ def _middle_m(asset: str, assets: AssetIndex) -> Array:
 
 
 def _hold(hand: str, thing: str, assets: AssetIndex, rng: Rng) -> _Held | None:
-    """A hand closed on a thing, gripped along one of its axes; None if it fits none."""
+    """A hand closed on an object, gripped along one of its axes; None if it fits none."""
     points = assets.vertices_m(thing).astype(np.float64)
     size = np.ptp(points, axis=0)
     if float(size.max()) > _LONGEST_M:
@@ -210,9 +210,9 @@ def _hold(hand: str, thing: str, assets: AssetIndex, rng: Rng) -> _Held | None:
 def _ways(
     points: Array, mirror: Array, share: float, upright: bool, rng: Rng
 ) -> Iterator[tuple[Array, tuple[Array, list[Array | None]]]]:
-    """Rotations of a thing into a hand's axes, with the gripped point and the sections there.
+    """Rotations of an object into a hand's axes, with the gripped point and the sections there.
 
-    Upright round things are held around their wall, as cups and bottles are, their handle away
+    Upright round objects are held around their wall, as cups and bottles are, their handle away
     from the palm; everything else along any axis that leaves it thin enough.
     """
     low, high = points.min(axis=0), points.max(axis=0)
@@ -226,7 +226,7 @@ def _ways(
             at[:2] = 0.5 * (foot[:, :2].min(axis=0) + foot[:, :2].max(axis=0))
             jitter = float(rng.uniform(-0.25, 0.25))
             c, s = math.cos(jitter), math.sin(jitter)
-            # The thing's Z along the thumb's side, its X away from the palm.
+            # The object's Z along the thumb's side, its X away from the palm.
             R = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [-1.0, 0.0, 0.0]]) @ np.array(
                 [[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]
             )
@@ -259,7 +259,7 @@ def _is_firm(gaps_m: Sequence[float]) -> bool:
 
 
 def _carry(hand: str, thing: str, assets: AssetIndex, rng: Rng) -> _Held | None:
-    """A thing that lies on an open palm on one of its sides; None if it is too large."""
+    """An object that lies on an open palm on one of its sides; None if it is too large."""
     points = assets.vertices_m(thing).astype(np.float64)
     if float(np.ptp(points, axis=0).max()) > _LONGEST_M:
         return None
@@ -287,7 +287,7 @@ def _carry(hand: str, thing: str, assets: AssetIndex, rng: Rng) -> _Held | None:
 
 
 def _overlap_m(thing: Array, flesh: Array) -> float:
-    """How far a thing's vertices must rise until their convex hull rests on those of a hand [m]."""
+    """How far an object must rise until its convex hull rests on the vertices of a hand [m]."""
     from scipy.spatial import ConvexHull
 
     planes = ConvexHull(thing).equations
@@ -319,7 +319,7 @@ def _wrist(asset: str, assets: AssetIndex) -> SE3:
 
 
 def _is_free(T_world_hand: SE3, held: _Held, scene: Scene, assets: AssetIndex) -> bool:
-    """Whether hand, forearm and thing keep clear of everything."""
+    """Whether hand, forearm and object keep clear of everything."""
     low, high = assets.bounds_m(held.thing)
     corners = np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1])
                         for z in (low[2], high[2])])  # fmt: skip

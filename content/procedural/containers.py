@@ -1,4 +1,4 @@
-"""Open containers for piles of things: crates of slats, and round bowls."""
+"""Open containers for piles: crates of slats, and round bowls."""
 
 import math
 

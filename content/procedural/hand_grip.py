@@ -1,7 +1,7 @@
-"""Grips on things of any shape: where they lie in a hand, and how far fingers and thumb close.
+"""Grips on objects of any shape: where they lie in a hand, and how far fingers and thumb close.
 
-Grips are found in the frame of a right hand, see ``hand_shape``. A thing is described by its
-sections across the palm, one beside each finger; every section is convex.
+Grips are found in the frame of a right hand, see ``hand_shape``. An object is described by
+its sections across the palm, one next to each finger; every section is convex.
 """
 
 import math
@@ -36,8 +36,8 @@ class Grip(NamedTuple):
 
     Attributes:
         bends_deg: Dips of the bones of index, middle, ring, little finger and thumb [degree].
-        shift_m: From the point of the thing around which it was gripped to the hand's frame.
-        gaps_m: Distance between flesh and thing of the same digits; infinite = nothing there.
+        shift_m: From the point of the object around which it was gripped to the hand's frame.
+        gaps_m: Distance of the object from the same digits; infinite = nothing there.
     """
 
     bends_deg: tuple[float, ...]
@@ -46,15 +46,15 @@ class Grip(NamedTuple):
 
 
 def round_sections(radii_m: Sequence[float]) -> list[Array | None]:
-    """Sections of a body of revolution about Y, by its radius beside each finger [m]."""
+    """Sections of a body of revolution about Y, by its radius next to each finger [m]."""
     return [np.full(_DIRECTIONS, radius) for radius in radii_m]
 
 
 def sections(points_m: Array) -> list[Array | None]:
-    """Sections of a thing's vertices, [n, 3]; None beside a finger that has nothing to hold.
+    """Sections of an object's vertices, [n, 3]; None next to a finger with nothing to hold.
 
-    Thing and hand have the same axes; the grip is around the points' origin. A section is that of
-    the convex hull of the vertices within 15 mm if there are many, else of all: the extent in 48
+    Object and hand have the same axes; the grip is around the points' origin. A section belongs
+    to the convex hull of the vertices within 15 mm if there are many, else of all: the extent in 48
     directions from X to Z [m], the largest one over half the width of a finger.
     """
     made: list[Array | None] = []
@@ -88,13 +88,13 @@ def _section(points_m: Array, level_m: float) -> Array | None:
 def close_on(across: Sequence[Array | None]) -> Grip | None:
     """Close a hand on sections, in the palm below the knuckles; None if there is nothing.
 
-    The thing is pushed out of the palm and of the ball of the thumb, and the hand closes anew.
+    The object is pushed out of the palm and of the ball of the thumb, and the hand closes again.
     """
     solid = [section for section in across if section is not None]
     if not solid:
         return None
     reach = np.max(solid, axis=0)
-    # Slim things lie across the roots of the fingers, thick ones further back.
+    # Slim objects lie across the roots of the fingers, thick ones further back.
     half = 0.5 * min(reach[_FRONT] + reach[_BACK], reach[_TOP] + reach[_LOW])
     x = 0.0806 - 1.3 * half + reach[_BACK]
     z = -_PALM_M - reach[_TOP]
@@ -122,7 +122,7 @@ def _close(placed: Sequence[Array | None]) -> list[list[float]]:
 
 
 def _beside_thumb(placed: Sequence[Array | None]) -> Array:
-    """The section that the thumb closes on: that beside the index, or the nearest one."""
+    """The section that the thumb closes on: the index finger's, or the nearest one."""
     return next(section for section in placed if section is not None)
 
 

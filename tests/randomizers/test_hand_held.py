@@ -140,7 +140,7 @@ def test_hands_need_room(library: Library) -> None:
         HandHeld(name="hands")(small, library, rng_of())
 
 
-def test_things_that_no_hand_can_hold_are_named(library: Library) -> None:
+def test_objects_that_no_hand_can_hold_are_named(library: Library) -> None:
     with pytest.raises(ConfigError, match=r"no hand can hold 'table.*at most 0\.45 m"):
         HandHeld(name="hands")(table("table?size_m=1.2,0.8,0.74"), library, rng_of())
 
