@@ -76,8 +76,14 @@ class HandHeld(asset_groups.GroupRandomizer):
     spill_deg: dist.NonNegative = dist.Uniform(0.0, 12.0)
 
     def check(self, scene: Scene, assets: AssetIndex) -> None:
-        """Raise ConfigError if a group or category is unknown."""
-        self.find_group(scene, assets)
+        """Raise ConfigError if a group or category is unknown, or hands do not close."""
+        hands, _ = self.find_group(scene, assets)
+        stiff = [asset for asset in hands.assets if declared(asset, "close_on", None) is None]
+        if stiff:
+            raise errors.ConfigError(
+                f"randomizers.{self.name}.group: '{stiff[0]}' has no fingers that close; expected "
+                "assets of the family 'hand'"
+            )
         names = [group.name for group in scene.groups]
         fault = f"randomizers.{self.name}.objects: there is no object group"
         base.check_known(self.objects, names, fault)

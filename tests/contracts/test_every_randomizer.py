@@ -48,6 +48,7 @@ GIVEN: dict[str, dict[str, Any]] = {
     "distractors": {"count": {"uniform_integer": [1, 4]}},
     "colors": {"probability": True},
     "drone_flight": {"from_end_m": 10},
+    "hand_held": {"group": "hands", "objects": "objects"},
     "materials": {"probability": True},
     "reaching_hand": {"group": "objects", "things": "objects", "probability": True},
     "street_lights": {"when": "always"},
@@ -57,7 +58,7 @@ GIVEN: dict[str, dict[str, Any]] = {
 
 PHYSICS_BOUND = (
     "arm_configuration", "arm_motion", "arm_task", "companions", "distractors", "door_paths",
-    "ego_on_lane", "furnish", "lane_objects", "objects", "physics_properties", "plate",
+    "ego_on_lane", "furnish", "hand_held", "lane_objects", "objects", "physics_properties", "plate",
     "reaching_hand", "traffic_flow",
 )  # fmt: skip
 """Randomizers that must run before physics."""
@@ -97,6 +98,20 @@ def houses_and_garden() -> Scene:
 
 
 @cache
+def table_with_hands() -> Scene:
+    """A table, a group of hands and one of fruit, and two cameras."""
+    elements = (
+        Room(name="room"),
+        SurfaceElement(name="table"),
+        Objects(name="hands", on="table", count=0, assets=AssetChoice(tags=("body_part",))),
+        Objects(name="objects", on="table", count=0, assets=AssetChoice(ids=("apple", "carton"))),
+    )
+    lens = Intrinsics.from_hfov(64, 48, 1.0)
+    cameras = tuple(Camera(name, SE3((0.0, 0.0, 1.5)), lens) for name in ("left", "right"))
+    return replace(build_scene("test", elements, open_library(())), cameras=cameras)
+
+
+@cache
 def straight_road() -> Scene:
     bench = Body("bench", "bench?seed=0", SE3((20.0, 6.0, 0.0)), instance_id=1)
     lens = Intrinsics.from_hfov(64, 48, 1.0)
@@ -116,6 +131,8 @@ def world_of(kind: str) -> tuple[Scene, AssetIndex]:
         return houses_and_garden(), open_library(())
     if kind in IN_ROOMS:
         return furnished_room(), open_library(())
+    if kind == "hand_held":
+        return table_with_hands(), open_library(())
     if kind == "relief":
         return straight_road(), open_library(())
     return nominal_scene(), FakeAssets()
@@ -183,7 +200,7 @@ def drawn(kind: str, stream: str = "stream", scene_index: int = 0) -> Scene:
     return made(kind)(*world_of(kind), rng_of(stream, scene_index))
 
 
-SLOW = {"ceiling_camera", "furnish", "object_states", "room_camera", "room_lighting"}
+SLOW = {"ceiling_camera", "furnish", "hand_held", "object_states", "room_camera", "room_lighting"}
 each = pytest.mark.parametrize("kind", cases(TABLE, set(TABLE) - SLOW))
 
 
@@ -237,7 +254,7 @@ def test_names_and_ids_stay_in_order(kind: str) -> None:
         assert min(ids) == 1
         assert {body.instance_id for body in scene.bodies} <= {0, *ids}
         assert [camera.name for camera in scene.cameras] == ["left", "right"]
-        arms = [] if kind in (*IN_ROOMS, "door_paths", "relief") else ["arm"]
+        arms = [] if kind in (*IN_ROOMS, "door_paths", "hand_held", "relief") else ["arm"]
         assert [arm.name for arm in scene.articulations] == arms
 
 

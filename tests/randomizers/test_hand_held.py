@@ -1,6 +1,7 @@
 """Objects held in a hand: contact from two sides, no flesh inside, room around, what shows."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -143,6 +144,13 @@ def test_hands_need_room(library: Library) -> None:
 def test_objects_that_no_hand_can_hold_are_named(library: Library) -> None:
     with pytest.raises(ConfigError, match=r"no hand can hold 'table.*at most 0\.45 m"):
         HandHeld(name="hands")(table("table?size_m=1.2,0.8,0.74"), library, rng_of())
+
+
+def test_only_hands_with_fingers_hold(library: Library) -> None:
+    scene = table("apple?seed=33")
+    swapped = replace(scene, groups=(replace(scene.groups[0], assets=("mug?seed=1",)),))
+    with pytest.raises(ConfigError, match=r"'mug\?seed=1' has no fingers that close; expected"):
+        HandHeld(name="hands").check(swapped, library)
 
 
 @pytest.mark.parametrize("radius_m", [0.015, 0.03, 0.046])
