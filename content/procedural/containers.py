@@ -43,7 +43,7 @@ def crate(size_m: Vec3 = (0.5, 0.34, 0.2), seed: int = 0) -> Solid:
         for sy in (-1, 1):
             px, py = sx * (x / 2 - _WALL_M - w / 2), sy * (y / 2 - _WALL_M - w / 2)
             boxes.append(((px - w / 2, py - w / 2, _WALL_M), (px + w / 2, py + w / 2, z - 0.012)))
-    patches = [shapes.map_along_grain(shapes.block(*b, 0.0015, 1), 0.5) for b in boxes]
+    patches = [shapes.map_along_grain(shapes.block(*b, 0.0015), 0.5) for b in boxes]
     return make_solid_in_place(patches, (_crate_look(seed),), [hulls.box(*b) for b in boxes])
 
 
