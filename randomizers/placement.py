@@ -278,10 +278,10 @@ def _find_cells(floor: Floor, items: Sequence[Item]) -> list[tuple[float, float]
 def _choose_spot(
     items: Sequence[Item], floors: list[Floor], rng: Rng, upright: Sequence[bool]
 ) -> Floor:
-    """A surface with a spot on which the items of a pile have about half the room they need."""
+    """A surface with a spot on which the items of a pile have less than half the room they need."""
     floor = floors[_draw_floor(floors, max(items, key=lambda item: item.half_m[2]), rng)]
     radii_m = [i.radius_m if up else i.reach_m for i, up in zip(items, upright, strict=True)]
-    reach_m = math.sqrt(0.6 * sum(r * r for r in radii_m[1:])) if len(items) > 1 else 0.0
+    reach_m = math.sqrt(0.3 * sum(r * r for r in radii_m[1:])) if len(items) > 1 else 0.0
     x, y = floor.place(rng, reach_m + max(radii_m))
     return replace(floor, spot=(x, y, reach_m))
 
