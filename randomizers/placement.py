@@ -167,7 +167,7 @@ def _place_all(
     if group.placement == "row":
         return _line_up(group, items, floors, rng)
     if group.placement == "pile" and items:
-        floors = [_choose_spot(items, floors, rng, upright)]
+        floors = [_choose_spot(group, items, floors, rng, upright)]
     return [
         _drop(group, item, floors[_draw_floor(floors, item, rng)], rng, stands)
         for item, stands in zip(items, upright, strict=True)
@@ -276,14 +276,21 @@ def _find_cells(floor: Floor, items: Sequence[Item]) -> list[tuple[float, float]
 
 
 def _choose_spot(
-    items: Sequence[Item], floors: list[Floor], rng: Rng, upright: Sequence[bool]
+    group: ObjectGroup,
+    items: Sequence[Item],
+    floors: list[Floor],
+    rng: Rng,
+    upright: Sequence[bool],
 ) -> Floor:
     """A surface with a spot on which the items of a pile have less than half the room they need."""
     floor = floors[_draw_floor(floors, max(items, key=lambda item: item.half_m[2]), rng)]
     radii_m = [i.radius_m if up else i.reach_m for i, up in zip(items, upright, strict=True)]
-    reach_m = math.sqrt(0.3 * sum(r * r for r in radii_m[1:])) if len(items) > 1 else 0.0
-    x, y = floor.place(rng, reach_m + max(radii_m))
-    return replace(floor, spot=(x, y, reach_m))
+    reach_m = math.sqrt(0.45 * sum(r * r for r in radii_m[1:])) if len(items) > 1 else 0.0
+    for _ in range(SCATTER_TRIES):
+        x, y = floor.place(rng, reach_m + max(radii_m))
+        if not floor.is_closed(x, y, reach_m):
+            return replace(floor, spot=(x, y, reach_m))
+    raise _no_place(group)
 
 
 def _line_up(group: ObjectGroup, items: Sequence[Item], floors: list[Floor], rng: Rng) -> list[SE3]:
