@@ -11,14 +11,17 @@ from gen_data.core.errors import ConfigError
 from gen_data.core.interfaces import AssetIndex
 from gen_data.core.lane_geometry import LaneLine
 from gen_data.core.scene import Camera, LaneKind, Scene
-from gen_data.core.se3 import SE3, look_at
+from gen_data.core.se3 import SE3, Vec3, look_at
 from gen_data.core.streams import Rng
-from gen_data.randomizers.base import RandomizerBase, pick_by_weight
+from gen_data.randomizers.base import RandomizerBase, check_known, pick_by_weight
 from gen_data.randomizers.daylight import is_dark
 from gen_data.randomizers.free_space import Footprint, Ground, hidden_share, is_clear, make_ground
 from gen_data.randomizers.vehicle_lights import dipped_beam
+from gen_data.traffic.lane_routes import project_on_lane
 
 TRIES = 64
+BESIDE_M = 12.0
+"""Distance from a lane's middle within which objects count as ahead of a camera on it."""
 HIDDEN_MAX = 0.1
 """Largest share of an image that near bodies may hide."""
 
@@ -41,6 +44,11 @@ class CameraOnLane(RandomizerBase):
         clearance_m: Smallest distance to any body.
         near_m: Distance within which bodies may hide a tenth of the image at most, tested with
             their bounding boxes: no view out of a tree; 0 = not tested.
+        towards: Name of an object group, such as people: one of its members is ahead of the camera,
+            near the same lane; empty = the camera is anywhere.
+        towards_m: Distance to that member along the lane.
+        sought: Whether a view is drawn towards the group; otherwise, or without a free place
+            before any member, the camera is anywhere.
         beam_cd: Luminous intensity of each of the carrier's two dipped beams, lit in the dark; 0 =
             no beams.
     """
@@ -61,6 +69,9 @@ class CameraOnLane(RandomizerBase):
     free_m: tuple[float, float] = (4.6, 1.9)
     clearance_m: float = Field(0.3, ge=0)
     near_m: float = Field(0.0, ge=0)
+    towards: str = ""
+    towards_m: dist.Positive = dist.Uniform(6.0, 30.0)
+    sought: dist.Flag = dist.Constant(True)
     beam_cd: dist.NonNegative = dist.Constant(0.0)
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
@@ -79,8 +90,10 @@ class CameraOnLane(RandomizerBase):
             )
         groups = {group.name for group in scene.groups}
         ground = make_ground((b for b in scene.bodies if b.group in groups), assets)
-        for _ in range(TRIES):
-            pose = self._draw_pose(lines, ground, scene, assets, rng)
+        targets = self._draw_targets(scene, rng)
+        for number in range(TRIES):
+            wanted = targets if 2 * number < TRIES else ()
+            pose = self._draw_pose(lines, wanted, ground, scene, assets, rng)
             if pose is not None:
                 cameras = tuple(c if c.rig else _move_camera(c, pose[1]) for c in scene.cameras)
                 lit = replace(scene, cameras=cameras)
@@ -88,8 +101,42 @@ class CameraOnLane(RandomizerBase):
         remedy = "other lanes, a smaller free_m or near_m, or less traffic"
         raise self.reject("no free place for a camera on a lane", remedy)
 
+    def check(self, scene: Scene, assets: AssetIndex) -> None:
+        """Raise ConfigError if the group to look at is unknown."""
+        super().check(scene, assets)
+        if self.towards:
+            known = {group.name: group for group in scene.groups}
+            where = f"randomizers.{self.name}.towards: the template has no object group"
+            check_known(self.towards, known, where)
+
+    def _draw_targets(self, scene: Scene, rng: Rng) -> tuple[Vec3, ...]:
+        """Places of the objects one of which the view is to have ahead; empty = none of them."""
+        if not self.towards or not self.sought.draw(rng):
+            return ()
+        members = (body for body in scene.bodies if body.group == self.towards)
+        return tuple(body.T_world_body.translation_m for body in members)
+
+    def _draw_station_before(
+        self, target: Vec3, lines: list[LaneLine], rng: Rng, *, turned: bool
+    ) -> tuple[LaneLine, float] | None:
+        """Lane and arc length from where a point is ahead; None if there is no such place."""
+        found = [(line, project_on_lane(line, target[0], target[1])) for line in lines]
+        near = [pair for pair in found if pair[1].away_m <= BESIDE_M]
+        away_m = self.towards_m.draw(rng)
+        if not near:
+            return None
+        line, place = near[pick_by_weight([1.0] * len(near), float(rng.uniform()))]
+        at_m = place.at_m + (away_m if turned else -away_m)
+        return (line, at_m) if 0.0 <= at_m <= line.length_m else None
+
     def _draw_pose(
-        self, lines: list[LaneLine], ground: Ground, scene: Scene, assets: AssetIndex, rng: Rng
+        self,
+        lines: list[LaneLine],
+        targets: tuple[Vec3, ...],
+        ground: Ground,
+        scene: Scene,
+        assets: AssetIndex,
+        rng: Rng,
     ) -> tuple[SE3, SE3] | None:
         """Draw ``T_world_rig`` on the ground and ``T_world_camera``; None if not free."""
         weights = [line.length_m for line in lines]
@@ -98,6 +145,12 @@ class CameraOnLane(RandomizerBase):
         ahead_m = min(self.ahead_m, 0.5 * line.length_m)
         low, high = (ahead_m, line.length_m) if turned else (0.0, line.length_m - ahead_m)
         at_m = float(rng.uniform(low, high))
+        if targets:
+            target = targets[pick_by_weight([1.0] * len(targets), float(rng.uniform()))]
+            station = self._draw_station_before(target, lines, rng, turned=turned)
+            if station is None:
+                return None
+            line, at_m = station
         left_m = 0.5 * line.lane.width_m * self.lateral.draw(rng)
         height_m = self.height_m.draw(rng)
         yaw, pitch, roll = (

@@ -66,6 +66,8 @@ class LaneObjects(GroupRandomizer):
             one garden; 0 = every object is drawn by itself.
         passes: Number of times to fill every lane: several passes let people walk abreast.
         occupancy: Whether a place is occupied; its probability is how full a parking lane is.
+        fade_m: Distance from the ego vehicle over which the share of occupied places falls to 1/e:
+            pictures then show fewer far objects; null = it does not fall.
         count: Largest number of objects, chosen at random from all places; null = no limit.
         min_count: Smallest number of free places; a layout with fewer is rejected.
         lateral: Position across the free width of the lane: -1 right edge, 0 middle, 1 left edge.
@@ -90,6 +92,7 @@ class LaneObjects(GroupRandomizer):
     run_m: dist.NonNegative = dist.Constant(0.0)
     passes: int = Field(1, ge=1, le=8)
     occupancy: dist.Flag = dist.Constant(True)
+    fade_m: float | None = Field(None, gt=0)
     count: Annotated[dist.Count, dist.Bounds(0, COUNT_MAX)] | None = None
     min_count: int = Field(0, ge=0, le=COUNT_MAX)
     lateral: Annotated[dist.Scalar, dist.Bounds(-1, 1)] = dist.Constant(0.0)
@@ -113,6 +116,8 @@ class LaneObjects(GroupRandomizer):
         fill = self._scatter if self.uniform_area else self._fill_rows
         bounds_of = cache(partial(_bounds_m, assets))
         members = list(fill(lines, group, weights, ground, bounds_of, rng))
+        if self.fade_m is not None:
+            members = self._thin_out(members, scene, self.fade_m, rng)
         if len(members) < self.min_count:
             remedy = "a smaller min_count, gap_m or min_clearance_m, or longer roads"
             raise self.reject("too few free places along lanes", remedy)
@@ -120,6 +125,24 @@ class LaneObjects(GroupRandomizer):
             wanted = self.count.draw(rng)
             members = [members[k] for k in sorted(rng.permutation(len(members))[:wanted].tolist())]
         return add_members(scene, group, members, assets)
+
+    def _thin_out(
+        self, members: list[Member], scene: Scene, fade_m: float, rng: Rng
+    ) -> list[Member]:
+        """Leave out members at random, more of them far from the ego vehicle."""
+        egos = [scene.body(rig.body).T_world_body for rig in scene.rigs if rig.body]
+        if not egos:
+            raise errors.ConfigError(
+                f"randomizers.{self.name}.fade_m: the template has no ego vehicle; list an element "
+                "of type ego, or leave fade_m out"
+            )
+        ego_x, ego_y, _ = egos[0].translation_m
+
+        def stays(member: Member) -> bool:
+            x, y, _ = member.T_world_body.translation_m
+            return float(rng.uniform()) < math.exp(-math.hypot(x - ego_x, y - ego_y) / fade_m)
+
+        return [member for member in members if stays(member)]
 
     def _select_lanes(self, scene: Scene, group: ObjectGroup) -> list[LaneLine]:
         kinds = self.lanes or group.lanes

@@ -1,4 +1,4 @@
-"""Private cars of twenty kinds and five decades, delivery vans and minibuses."""
+"""Private cars of twenty-one kinds and five decades, delivery vans and minibuses."""
 
 from dataclasses import replace
 
@@ -13,6 +13,7 @@ from gen_data.core.variant_rng import VariantRng, in_turn, variant_rng
 
 CARS, VANS = MODELS["car"], MODELS["van"]
 SUBCATEGORIES = {
+    "micro_car": "city_car",
     "supermini": "hatchback",
     "three_door": "hatchback",
     "compact_estate": "estate",
