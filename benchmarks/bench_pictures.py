@@ -3,8 +3,8 @@
 Pictures come from the first step of every view of a configuration, or (``--kitti FOLDER``) from
 ``label_2`` of KITTI's object format. Objects are the rows of KITTI's labels: image boxes around the
 projected 3D box, ``DontCare`` left out. Heights are in pixels of KITTI's camera (focal length
-721.5 px): pictures of our cameras are rendered small, since labels need few pixels. ``--light`` adds the
-grey levels of people, at full size, which takes ten times as long.
+721.5 px): pictures of our cameras are rendered small, since labels need few pixels. ``--light`` adds
+the grey levels of people, at full size, which takes ten times as long.
 
 The column ``real`` was counted in KITTI's drives (Geiger et al., IJRR 2013); the camera's height
 above the ground below a car is that of its front-view drives.
@@ -12,11 +12,13 @@ above the ground below a car is that of its front-view drives.
 
 import argparse
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gen_data.assemble.config import load_config
 from gen_data.assemble.pipeline_factory import open_pipeline
@@ -113,7 +115,8 @@ def pictures_of_config(name: str, n: int, given: list[str], *, light: bool) -> I
         "exporters=[]",
         "steps_per_scene=1",
     ]
-    style = Kitti(low_px=math.ceil(10 / shrunk))
+    kitti = next((e for e in config.exporters if isinstance(e, Kitti)), Kitti())
+    style = kitti.model_copy(update={"low_px": math.ceil(kitti.low_px / shrunk)})
     with open_pipeline(load_config(name, overrides=[*given, *changes])) as pipeline:
         for scene in range(n):
             accepted = pipeline.accepted_scene(scene)
@@ -133,8 +136,9 @@ def _picture(rows: Sequence[str], focal_px: float, grey: tuple[int, ...] = ()) -
     return Picture(tuple(thing for thing in found if thing is not None), grey)
 
 
-def _grey_of_people(truth: ImageTruth, pixels: dict[Channel, np.ndarray]) -> tuple[int, ...]:
-    people = [o.instance.instance_id for o in truth.objects if o.instance.category in ("person", "pedestrian")]
+def _grey_of_people(truth: ImageTruth, pixels: Mapping[Channel, NDArray[Any]]) -> tuple[int, ...]:
+    seen = (thing.instance for thing in truth.objects)
+    people = [one.instance_id for one in seen if one.category in ("person", "pedestrian")]
     rgb = pixels[Channel.RGB][np.isin(pixels[Channel.INSTANCE], people)]
     return tuple(np.rint(rgb @ (0.299, 0.587, 0.114)).astype(int).tolist())
 

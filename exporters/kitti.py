@@ -17,7 +17,9 @@ Where KITTI's conventions differ from ours (https://www.cvlibs.net/datasets/kitt
   object stands upright before a level camera. Exact poses are in the COCO export.
 * **Image boxes** bound the projection of the 3D box, as KITTI's own do (frame 000001's car, 1.67 m
   wide at 46.7 m, is labelled 27 pixels wide: 721 x 1.67 / 44.9); ``boxes: tight`` writes the tight
-  box of the visible pixels, which COCO has.
+  box of the visible pixels, which COCO has. With ``labels.box3d: annotated`` they bound people
+  without the room for their stride, as KITTI's do: half of those are narrower than .38 of their
+  height, or .67 m, though the 3D boxes are .67 m wide and .9 m long.
 * **Distant objects** are not labelled, as KITTI's annotators worked on laser scans. They become
   ``DontCare`` regions; so do objects without laser points, in rain or behind others.
 * **Truncation** is the fraction of that projection outside the image; for tight boxes, of the
@@ -347,6 +349,9 @@ def label_row(thing: ObjectTruth, truth: ImageTruth, style: LabelStyle) -> str:
     metric = (*box.size_hwl_m, x, y, z, box.heading_rad)
     truncation, corners = thing.truncation, _format_corners(thing.box)
     if style.boxes == "projected":
+        tight = instance.tight_box3d
+        if tight != instance.box3d:
+            box = upright_box(tight.seen_from(truth.camera.T_world_camera.inverse()))
         truncation, corners = projected_box(box, k)
     return " ".join(
         (

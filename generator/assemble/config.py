@@ -86,7 +86,8 @@ class LabelSettings(Thresholds):
     box3d: scene.Box3dExtent = Field(
         "body",
         description="3D boxes of vehicles: body, without exterior mirrors, as annotators draw "
-        "them; or all of the geometry.",
+        "them; all of the geometry; or annotated, the body, and people with room for their whole "
+        "stride and 5 cm on each side, as in tracks of KITTI and nuScenes.",
     )
     map: LabelMap = LabelMap()
 

@@ -81,6 +81,10 @@ class AssetIndex(Protocol):
         """The same without a vehicle's exterior mirrors or a pole's cables; None without such."""
         ...
 
+    def stride_bounds_m(self, asset_id: str) -> tuple[se3.Vec3, se3.Vec3]:
+        """Bounds over a whole stride of a person who walks; those of the mesh for all others."""
+        ...
+
     def vertices_m(self, asset_id: str) -> asset_types.Float32:
         """Vertices of the asset's mesh in its own frame [m], float32 [n, 3]; not to be written to.
 

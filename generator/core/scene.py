@@ -40,8 +40,9 @@ LaneKind = Literal[
 ]
 
 
-Box3dExtent = Literal["body", "all"]
-"""What 3D boxes enclose: the body of a vehicle, without exterior mirrors, or all of it."""
+Box3dExtent = Literal["body", "all", "annotated"]
+"""What 3D boxes enclose: the body of a vehicle, without exterior mirrors; all of it; or the body,
+and people as widely as annotators of tracks draw them."""
 
 LABEL_IDS_MAX = 65_535
 """Largest instance id and category id: label images have 16 bits."""
@@ -90,6 +91,16 @@ class Instance:
         (x0, y0, z0), (x1, y1, z1) = low_m, high_m
         T_instance_box = SE3((0.5 * (x0 + x1), 0.5 * (y0 + y1), 0.5 * (z0 + z1)))
         return OrientedBox(self.T_world_instance @ T_instance_box, (x1 - x0, y1 - y0, z1 - z0))
+
+    @property
+    def tight_box3d(self) -> OrientedBox:
+        """The part of ``box3d`` that geometry fills: smaller where annotators draw wide boxes."""
+        if self.body_bounds_m is None:
+            return self.box3d
+        (x0, y0, z0), (x1, y1, z1) = self.body_bounds_m
+        (a0, b0, c0), (a1, b1, c1) = self.box_min_m, self.box_max_m
+        inner = (max(x0, a0), max(y0, b0), max(z0, c0)), (min(x1, a1), min(y1, b1), min(z1, c1))
+        return replace(self, body_bounds_m=inner).box3d
 
 
 @dataclass(frozen=True, slots=True)

@@ -192,8 +192,11 @@ def _label_limits(plan: Plan) -> Iterator[str]:
     if given.get("map"):
         listed = ", ".join(f"{key}: {to_flow_yaml(value)}" for key, value in given["map"].items())
         yield f"Formats also follow the label map `{listed}`."
-    if given.get("box3d", "body") == "body":
-        yield "3D boxes of vehicles leave out exterior mirrors (`labels.box3d: body`)."
+    extent = given.get("box3d", "body")
+    if extent != "all":
+        yield f"3D boxes of vehicles leave out exterior mirrors (`labels.box3d: {extent}`)."
+        if extent == "annotated":
+            yield "3D boxes of people enclose a whole stride and 5 cm on each side."
     else:
         yield "3D boxes enclose all of an object, with the mirrors of vehicles."
 
