@@ -87,7 +87,7 @@ class LabelSettings(Thresholds):
         "body",
         description="3D boxes of vehicles: body, without exterior mirrors, as annotators draw "
         "them; all of the geometry; or annotated, the body, and people with room for their whole "
-        "stride and 5 cm on each side, as in tracks of KITTI and nuScenes.",
+        "stride and 5 cm on each side and above, as in tracks of KITTI and nuScenes.",
     )
     map: LabelMap = LabelMap()
 

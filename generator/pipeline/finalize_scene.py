@@ -13,8 +13,8 @@ from gen_data.core.se3 import SE3, Array, Vec3
 
 PEOPLE = frozenset({"person", "pedestrian"})
 MARGIN_M = 0.05
-"""What annotators leave on each side of a person: KITTI's boxes are .66 m wide on average (sizes of
-Frustum PointNets, CVPR 2018), people with their swinging arms .57 m."""
+"""What annotators leave on each side of a person and above: KITTI's boxes are .66 m wide on average
+(sizes of Frustum PointNets, CVPR 2018), people with their swinging arms .57 m."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,7 +134,7 @@ def _labelled_bounds(
         (x0, y0, z0), (x1, y1, z1) = assets.stride_bounds_m(body.asset)
         bounds_m = (
             (x0 - MARGIN_M, y0 - MARGIN_M, z0),
-            (x1 + MARGIN_M, y1 + MARGIN_M, z1),
+            (x1 + MARGIN_M, y1 + MARGIN_M, z1 + MARGIN_M),
         )
     if bounds_m is None:
         return None

@@ -196,7 +196,7 @@ def _label_limits(plan: Plan) -> Iterator[str]:
     if extent != "all":
         yield f"3D boxes of vehicles leave out exterior mirrors (`labels.box3d: {extent}`)."
         if extent == "annotated":
-            yield "3D boxes of people enclose a whole stride and 5 cm on each side."
+            yield "3D boxes of people enclose a whole stride and 5 cm on each side and above."
     else:
         yield "3D boxes enclose all of an object, with the mirrors of vehicles."
 

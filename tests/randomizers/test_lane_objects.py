@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from gen_data.config.distributions import Constant, Probability, Uniform
 from gen_data.core.errors import ConfigError, LayoutRejected
 from gen_data.core.intrinsics import Intrinsics
-from gen_data.core.scene import Body, Camera, Lane, ObjectGroup, Scene
+from gen_data.core.scene import Body, Camera, Lane, ObjectGroup, Rig, Scene
 from gen_data.core.se3 import SE3, look_at
 from gen_data.randomizers.camera_on_lane import CameraOnLane
 from gen_data.randomizers.free_space import Footprint, Ground, hidden_share
@@ -133,6 +133,69 @@ def test_the_camera_rides_where_nothing_stands() -> None:
         assert (y, z) == pytest.approx((-1.5, 1.65))
         assert 15.0 < x < 25.0
         assert camera.T_world_camera.rotation()[:, 2] == pytest.approx((1.0, 0.0, 0.0), abs=1e-5)
+
+
+def test_a_camera_is_as_far_before_a_member_of_the_group_as_drawn() -> None:
+    """One brick on the verge: the cameras of both lanes have it 12 m ahead, to their side."""
+    brick = Body("things/0", "brick", SE3((20.0, -4.0, 0.0)), instance_id=1, group="things")
+    scene = replace(street(), bodies=(brick,))
+    rider = CameraOnLane(
+        name="dash", towards="things", towards_m=Constant(12.0), yaw_deg=Constant(0.0)
+    )
+    seen = set()
+    for k in range(12):
+        view = rider(scene, FakeAssets(), rng_of(f"{k}"))
+        seen.add(tuple(np.round(view.camera("color").T_world_camera.translation_m, 3).tolist()))
+
+    assert seen == {(8.0, -1.5, 1.65), (32.0, 1.5, 1.65)}
+
+
+def test_views_towards_a_group_are_as_frequent_as_drawn() -> None:
+    """A brick 12 m ahead in 30 % of 400 views, give or take four standard errors."""
+    brick = Body("things/0", "brick", SE3((20.0, -4.0, 0.0)), instance_id=1, group="things")
+    scene = replace(street(), bodies=(brick,))
+    fields: dict[str, Any] = {"towards": "things", "towards_m": Constant(12.0), "ahead_m": 1.0}
+    rider = CameraOnLane(name="dash", sought=Probability(0.3), **fields)
+    views = (rider(scene, FakeAssets(), rng_of(f"{k}")) for k in range(400))
+    xs = np.array([view.camera("color").T_world_camera.translation_m[0] for view in views])
+    aimed = np.isclose(xs, 8.0) | np.isclose(xs, 32.0)
+
+    assert abs(aimed.sum() - 0.3 * 400) < 4 * (400 * 0.3 * 0.7) ** 0.5
+
+
+def test_a_camera_is_anywhere_where_no_member_has_a_place_before_it() -> None:
+    """The only brick stands beside the start of a lane of 40 m, and no camera is 60 m before it."""
+    brick = Body("things/0", "brick", SE3((1.0, -4.0, 0.0)), instance_id=1, group="things")
+    scene = replace(street(), bodies=(brick,))
+    rider = CameraOnLane(name="dash", towards="things", towards_m=Constant(60.0))
+
+    assert rider(scene, FakeAssets(), rng_of()).camera("color").T_world_camera != SE3()
+
+
+def test_an_unknown_group_to_look_at_is_refused_by_name() -> None:
+    rider = CameraOnLane(name="dash", towards="peple")
+    with pytest.raises(ConfigError, match=r"randomizers\.dash\.towards: .*'peple'.*things"):
+        rider.check(street(), FakeAssets())
+
+
+def test_objects_become_fewer_by_a_factor_e_over_the_distance_that_fades() -> None:
+    """Bricks every 0.2 m: the expected number is the sum of exp(-distance / 8 m)."""
+    ego = Body("ego", "ball", SE3((0.0, -1.5, 0.0)))
+    scene = replace(street(), bodies=(ego,), rigs=(Rig("ego", "ego"),))
+    full, faded = (
+        [b for b in drawn(scene, gap_m=Constant(0.14), min_clearance_m=0.1, fade_m=fade_m).bodies
+         if b.group == "things"]
+        for fade_m in (None, 8.0)
+    )  # fmt: skip
+    p = np.exp([-math.dist(b.T_world_body.translation_m[:2], (0.0, -1.5)) / 8.0 for b in full])
+
+    assert len(full) > 380
+    assert abs(len(faded) - p.sum()) < 4 * (p * (1.0 - p)).sum() ** 0.5
+
+
+def test_fading_needs_an_ego_vehicle() -> None:
+    with pytest.raises(ConfigError, match=r"randomizers\.things\.fade_m: .*no ego vehicle"):
+        drawn(street(), fade_m=10.0)
 
 
 def test_hidden_shares_are_those_of_boxes_seen_in_perspective() -> None:

@@ -24,7 +24,7 @@ FAMILIES = {name: family for name, family in VEHICLES.items() if name != "tram"}
 
 # Length, width without mirrors (from paint and glass), height [m], and triangles.
 LIMITS = {
-    "car": ((3.25, 5.6), (1.42, 2.02), (1.4, 2.3), 8190),
+    "car": ((2.5, 5.6), (1.42, 2.02), (1.4, 2.3), 8190),
     "van": ((4.1, 6.6), (1.78, 2.1), (1.78, 2.75), 8200),
     "truck": ((6.5, 10.0), (2.2, 2.6), (2.5, 3.8), 8190),
     "taxi": ((4.2, 5.1), (1.76, 1.97), (1.5, 2.0), 8450),
@@ -317,12 +317,49 @@ def test_no_two_cars_are_of_the_same_design() -> None:
     assert len(set(designs)) == len(MODELS["car"]) == FAMILIES["car"].variants >= 120
 
 
+def test_cars_come_from_segments_as_often_as_cars_in_use() -> None:
+    """Within a factor of two of the stock of Germany on 1 January 2015 (Kraftfahrt-Bundesamt).
+
+    Minis and small cars, of which southern Europe has more, are within that factor, too.
+    """
+    stock = {  # per cent
+        ("city_car", "kei_car", "micro_car"): 6.6,
+        ("supermini", "three_door"): 19.9,
+        ("hatchback", "compact_estate"): 26.4,
+        ("sedan", "estate"): 16.3,
+        ("executive", "limousine"): 5.4,
+        ("small_suv", "suv", "large_suv", "coupe_suv", "off_roader"): 7.2,
+        ("coupe", "convertible"): 1.8,
+        ("mpv", "box_mpv"): 12.6,
+    }
+    drawn = [body for body, _ in MODELS["car"]]
+    for bodies, share in stock.items():
+        found = 100.0 * sum(map(drawn.count, bodies)) / len(drawn)
+        assert 0.5 < found / share < 2.0, bodies
+
+
+def test_cars_are_about_as_big_as_those_that_annotators_of_scans_measured() -> None:
+    """Mean sizes of KITTI's cars (Frustum PointNets, CVPR 2018): within 8 %, and not of one size.
+
+    Shortest and longest: a two-seater of 2.69 m, a limousine of 5.26 m.
+    """
+    designs = [
+        draw_car(*MODELS["car"][k], variant_rng("car", k)) for k in range(len(MODELS["car"]))
+    ]
+    sizes_m = np.array([(d.length_m, d.width_m, d.height_m) for d in designs])
+
+    np.testing.assert_allclose(sizes_m.mean(axis=0), (3.883, 1.629, 1.526), rtol=0.08)
+    assert sizes_m[:, 0].min() == pytest.approx(2.69, rel=0.05)
+    assert sizes_m[:, 0].max() == pytest.approx(5.26, rel=0.05)
+
+
 @pytest.mark.parametrize(
     ("body", "lengths_m", "widths_m"),
     [("city_car", (3.3, 3.75), (1.5, 1.7)), ("hatchback", (3.9, 4.5), (1.65, 1.86)),
      ("sedan", (4.3, 4.9), (1.68, 1.9)), ("large_suv", (4.7, 5.1), (1.87, 2.0)),
      ("kei_car", (3.3, 3.6), (1.43, 1.54)), ("pickup", (5.0, 5.6), (1.8, 1.93)),
-     ("limousine", (5.0, 5.5), (1.85, 1.95))],
+     ("limousine", (5.0, 5.5), (1.85, 1.95)), ("micro_car", (2.5, 2.8), (1.5, 1.7)),
+     ("supermini", (3.6, 4.15), (1.56, 1.78))],
 )  # fmt: skip
 def test_cars_of_a_class_are_as_big_as_real_ones(
     body: str, lengths_m: tuple[float, float], widths_m: tuple[float, float]
