@@ -17,9 +17,9 @@ Where KITTI's conventions differ from ours (https://www.cvlibs.net/datasets/kitt
   object stands upright before a level camera. Exact poses are in the COCO export.
 * **Image boxes** bound the projection of the 3D box, as KITTI's own do (frame 000001's car, 1.67 m
   wide at 46.7 m, is labelled 27 pixels wide: 721 x 1.67 / 44.9); ``boxes: tight`` writes the tight
-  box of the visible pixels, which COCO has. With ``labels.box3d: annotated`` they bound people
-  without the room for their stride, as KITTI's do: half of those are narrower than .38 of their
-  height, or .67 m, though the 3D boxes are .67 m wide and .9 m long.
+  box of the visible pixels, which COCO has. With ``labels.box3d: annotated`` people have the
+  box of their silhouette and the margin instead: KITTI's are narrower than .38 of their height in
+  the median, which is less than any projection of 3D boxes of .67 x .9 m.
 * **Distant objects** are not labelled, as KITTI's annotators worked on laser scans. They become
   ``DontCare`` regions; so do objects without laser points, in rain or behind others.
 * **Truncation** is the fraction of that projection outside the image; for tight boxes, of the
@@ -349,10 +349,10 @@ def label_row(thing: ObjectTruth, truth: ImageTruth, style: LabelStyle) -> str:
     metric = (*box.size_hwl_m, x, y, z, box.heading_rad)
     truncation, corners = thing.truncation, _format_corners(thing.box)
     if style.boxes == "projected":
-        tight = instance.tight_box3d
-        if tight != instance.box3d:
-            box = upright_box(tight.seen_from(truth.camera.T_world_camera.inverse()))
-        truncation, corners = projected_box(box, k)
+        if instance.tight_box3d != instance.box3d and thing.amodal_box is not None:
+            truncation, corners = figure_box(thing.amodal_box, scene.PERSON_MARGIN_M / z, k)
+        else:
+            truncation, corners = projected_box(box, k)
     return " ".join(
         (
             kind,
@@ -381,6 +381,22 @@ def projected_box(box: UprightBox, camera: intrinsics.Intrinsics) -> tuple[float
     x = np.clip([left, right], 0.0, camera.width_px - 1.0)
     y = np.clip([top, bottom], 0.0, camera.height_px - 1.0)
     inside = (x[1] - x[0]) * (y[1] - y[0]) / ((right - left) * (bottom - top))
+    return max(1.0 - float(inside), 0.0), f"{x[0]:.2f} {y[0]:.2f} {x[1]:.2f} {y[1]:.2f}"
+
+
+def figure_box(
+    silhouette: BoxPx, margin: float, camera: intrinsics.Intrinsics
+) -> tuple[float, str]:
+    """Truncation and columns, as of ``projected_box``, of a silhouette's box with a margin.
+
+    The margin, on both sides and above, is in units of the focal lengths.
+    """
+    wide_px, high_px = margin * camera.fx_px, margin * camera.fy_px
+    left, right = silhouette.x_min - wide_px, silhouette.x_max + wide_px
+    top, bottom = silhouette.y_min - high_px, float(silhouette.y_max)
+    x = np.clip([left, right - 1.0], 0.0, camera.width_px - 1.0)
+    y = np.clip([top, bottom - 1.0], 0.0, camera.height_px - 1.0)
+    inside = (x[1] - x[0] + 1.0) * (y[1] - y[0] + 1.0) / ((right - left) * (bottom - top))
     return max(1.0 - float(inside), 0.0), f"{x[0]:.2f} {y[0]:.2f} {x[1]:.2f} {y[1]:.2f}"
 
 

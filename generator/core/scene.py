@@ -44,6 +44,10 @@ Box3dExtent = Literal["body", "all", "annotated"]
 """What 3D boxes enclose: the body of a vehicle, without exterior mirrors; all of it; or the body,
 and people as widely as annotators of tracks draw them."""
 
+PERSON_MARGIN_M = 0.05
+"""What annotators leave on each side of a person and above: KITTI's boxes are .66 m wide on average
+(sizes of Frustum PointNets, CVPR 2018), people with their swinging arms .57 m."""
+
 LABEL_IDS_MAX = 65_535
 """Largest instance id and category id: label images have 16 bits."""
 

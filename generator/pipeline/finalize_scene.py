@@ -8,13 +8,10 @@ import numpy as np
 
 from gen_data.core import asset_types, scene_time
 from gen_data.core.interfaces import AssetLibrary
-from gen_data.core.scene import Body, Box3dExtent, Instance, Scene
+from gen_data.core.scene import PERSON_MARGIN_M, Body, Box3dExtent, Instance, Scene
 from gen_data.core.se3 import SE3, Array, Vec3
 
 PEOPLE = frozenset({"person", "pedestrian"})
-MARGIN_M = 0.05
-"""What annotators leave on each side of a person and above: KITTI's boxes are .66 m wide on average
-(sizes of Frustum PointNets, CVPR 2018), people with their swinging arms .57 m."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,10 +129,8 @@ def _labelled_bounds(
     bounds_m = assets.body_bounds_m(body.asset)
     if box3d == "annotated" and assets.get(body.asset).category in PEOPLE:
         (x0, y0, z0), (x1, y1, z1) = assets.stride_bounds_m(body.asset)
-        bounds_m = (
-            (x0 - MARGIN_M, y0 - MARGIN_M, z0),
-            (x1 + MARGIN_M, y1 + MARGIN_M, z1 + MARGIN_M),
-        )
+        m = PERSON_MARGIN_M
+        bounds_m = ((x0 - m, y0 - m, z0), (x1 + m, y1 + m, z1 + m))
     if bounds_m is None:
         return None
     low, high = bounds_m

@@ -255,6 +255,24 @@ def test_calibration_puts_pixel_centres_at_whole_numbers() -> None:
     assert len(rows["Tr_imu_to_velo"].split(" ")) == 12
 
 
+def test_wide_boxes_of_people_leave_the_image_box_at_the_silhouette_and_a_margin() -> None:
+    """10 m away at a focal length of 150 px: 5 cm are .75 px on both sides and above."""
+    person = Instance(1, "person/1", "person", 1, "person", box_max_m=(0.5, 0.5, 1.7))
+    wide = replace(person, body_bounds_m=((-0.3, -0.3, 0.0), (0.8, 0.8, 1.75)))
+    box = OrientedBox(SE3((0.0, 0.0, 10.0)), (1.1, 1.1, 1.75))
+    fields: dict[str, Any] = {"box": BoxPx(110, 20, 116, 46), "box3d_camera": box, "occlusion": 0.0}
+    fields |= {"truncation": 0.0, "amodal_box": BoxPx(108, 20, 116, 46)}
+    style = kitti.Kitti(types="category")
+    rows = [
+        kitti.label_row(ObjectTruth(one, 99, **fields), ImageTruth(CAMERA, ()), style).split()
+        for one in (wide, person)
+    ]
+
+    assert rows[0][4:8] == ["107.25", "19.25", "115.75", "45.00"]
+    assert rows[0][8:] == rows[1][8:]
+    assert float(rows[1][6]) - float(rows[1][4]) > 16.0  # the projection of 1.1 m
+
+
 def test_image_boxes_bound_the_projected_boxes_inside_the_image(dataset: Path) -> None:
     """P2 R0 x, clipped, to the hundredth of a pixel; what is clipped off is the truncation."""
     compared = 0
