@@ -3,8 +3,8 @@
 Pictures come from the first step of every view of a configuration, or (``--kitti FOLDER``) from
 ``label_2`` of KITTI's object format. Objects are the rows of KITTI's labels: image boxes around the
 projected 3D box, ``DontCare`` left out. Heights are in pixels of KITTI's camera (focal length
-721.5 px): pictures of our cameras are rendered small, since labels need few pixels. ``--light`` adds
-the grey levels of people, at full size, which takes ten times as long.
+721.5 px): pictures of our cameras are rendered small, since labels need few pixels. ``--light``
+adds the grey levels of people, at full size, which takes ten times as long.
 
 The column ``real`` was counted in KITTI's drives (Geiger et al., IJRR 2013); the camera's height
 above the ground below a car is that of its front-view drives.
