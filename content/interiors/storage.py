@@ -63,46 +63,6 @@ def carcass(
     return made
 
 
-def wardrobe(seed: int = 0) -> Solid:
-    """A wardrobe without its left door. Slots: carcass, front, handle."""
-    return _cupboard("wardrobe", seed)
-
-
-def wardrobe_door(seed: int = 0) -> Solid:
-    """The left door of the wardrobe of the same seed. Slots: carcass, front, handle."""
-    return _cupboard_door("wardrobe", seed)
-
-
-def kitchen_unit(seed: int = 0) -> Solid:
-    """A base unit of 0.9 m, without its door. Slots: carcass, front, handle, worktop."""
-    return _cupboard("kitchen_unit", seed)
-
-
-def kitchen_unit_door(seed: int = 0) -> Solid:
-    """The door of the base unit of the same seed."""
-    return _cupboard_door("kitchen_unit", seed)
-
-
-def wall_unit(seed: int = 0) -> Solid:
-    """A wall unit, without its left door. Slots: carcass, front, handle."""
-    return _cupboard("wall_unit", seed)
-
-
-def wall_unit_door(seed: int = 0) -> Solid:
-    """The left door of the wall unit of the same seed."""
-    return _cupboard_door("wall_unit", seed)
-
-
-def refrigerator(seed: int = 0) -> Solid:
-    """A refrigerator without its upper door. Slots: carcass, front, handle."""
-    return _cupboard("refrigerator", seed)
-
-
-def refrigerator_door(seed: int = 0) -> Solid:
-    """The upper door of the refrigerator of the same seed."""
-    return _cupboard_door("refrigerator", seed)
-
-
 def _measures(family: str, seed: int) -> tuple[VariantRng, float, float, float, float, int]:
     """Draws, depth, width, lower and upper edge of the fronts, and number of doors."""
     rng = variant_rng(family, seed)
@@ -146,7 +106,8 @@ def _looks(family: str, rng: VariantRng, seed: int) -> list[Material]:
     return [body, body if rng.chance(0.5) else lacquer(rng), steel]
 
 
-def _cupboard(family: str, seed: int) -> Solid:
+def cupboard(family: str, seed: int) -> Solid:
+    """A cupboard without the door that opens. Slots: carcass, front, handle, then worktop."""
     rng, d, w, low, high, doors = _measures(family, seed)
     levels = _levels_m(family, low, high)
     x, half = 0.5 * d, 0.5 * w
@@ -205,7 +166,8 @@ def _levels_m(family: str, low_m: float, high_m: float) -> tuple[float, ...]:
     return tuple(low_m + _T + k * (high_m - low_m - _T) / count for k in range(count))
 
 
-def _cupboard_door(family: str, seed: int) -> Solid:
+def cupboard_door(family: str, seed: int) -> Solid:
+    """The door that opens of the cupboard of the same seed. Slots: carcass, front, handle."""
     rng, _, w, low, high, doors = _measures(family, seed)
     h, width = high - low, w / doors
     thick = 0.045 if family == "refrigerator" else 0.018
@@ -268,46 +230,6 @@ def _grip(low: float, high: float) -> float:
     return high - 0.14 if high < 1.0 else 1.05
 
 
-def dresser(seed: int = 0) -> Solid:
-    """A chest of drawers, without its top drawer. Slots: carcass, front, handle."""
-    return _chest("dresser", seed)
-
-
-def dresser_drawer(seed: int = 0) -> Solid:
-    """The top drawer of the dresser of the same seed."""
-    return _drawer("dresser", seed)
-
-
-def bedside_table(seed: int = 0) -> Solid:
-    """A bedside table, without its top drawer. Slots: carcass, front, handle."""
-    return _chest("bedside_table", seed)
-
-
-def bedside_table_drawer(seed: int = 0) -> Solid:
-    """The top drawer of the bedside table of the same seed."""
-    return _drawer("bedside_table", seed)
-
-
-def filing_cabinet(seed: int = 0) -> Solid:
-    """A steel cabinet for files, without its top drawer. Slots: carcass, front, handle."""
-    return _chest("filing_cabinet", seed)
-
-
-def filing_cabinet_drawer(seed: int = 0) -> Solid:
-    """The top drawer of the filing cabinet of the same seed."""
-    return _drawer("filing_cabinet", seed)
-
-
-def tool_cabinet(seed: int = 0) -> Solid:
-    """A cabinet for tools, without its top drawer. Slots: carcass, front, handle."""
-    return _chest("tool_cabinet", seed)
-
-
-def tool_cabinet_drawer(seed: int = 0) -> Solid:
-    """The top drawer of the tool cabinet of the same seed."""
-    return _drawer("tool_cabinet", seed)
-
-
 def _chest_measures(family: str, seed: int) -> tuple[VariantRng, float, float, float, float, int]:
     """Draws, depth, width, height, height of the feet, number of drawers."""
     rng = variant_rng(family, seed)
@@ -356,7 +278,8 @@ def _chest_looks(family: str, rng: VariantRng) -> list[Material]:
     return [body, body if rng.chance(0.6) else lacquer(rng), steel]
 
 
-def _chest(family: str, seed: int) -> Solid:
+def chest(family: str, seed: int) -> Solid:
+    """A chest without its top drawer. Slots: carcass, front, handle."""
     rng, d, w, z, feet, count = _chest_measures(family, seed)
     boards = carcass(d, w, feet, z)
     patches = [board(*b) for b in boards]
@@ -385,7 +308,8 @@ def _chest(family: str, seed: int) -> Solid:
     return replace(made, keypoints=(slide,))
 
 
-def _drawer(family: str, seed: int) -> Solid:
+def drawer(family: str, seed: int) -> Solid:
+    """The top drawer of the chest of the same seed. Slots: carcass, front, handle."""
     rng, d, w, z, feet, count = _chest_measures(family, seed)
     h, depth, half = (z - feet - _T) / count, d - 0.04, 0.5 * w - 0.022
     boxes: list[Box] = [
