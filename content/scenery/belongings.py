@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from gen_data.assets.family import Facts, Solid
+from gen_data.assets.family import Solid
 from gen_data.content.procedural import collision_hulls as hulls
 from gen_data.content.procedural.material_presets import (
     draw_linear,
@@ -82,11 +82,6 @@ def pram(seed: int) -> Solid:
     )
 
 
-def pram_facts(seed: int) -> Facts:
-    """Its kind."""
-    return Facts("pram", {"kind": variant_rng("pram", seed).turn(PRAMS, "kind")})
-
-
 def _wheel(radius: float) -> list[Patch]:
     """A wheel about the origin, its axle along Y."""
     ring = circle(0.018, 5) + np.array([radius - 0.018, 0.0])
@@ -132,11 +127,6 @@ def suitcase(seed: int) -> Solid:
     return make_solid(
         on_ground(parts), materials, [hulls.box((-0.1, -0.15, 0.0), (0.1, 0.15, 0.9 * high))]
     )
-
-
-def suitcase_facts(seed: int) -> Facts:
-    """Its kind."""
-    return Facts("suitcase", {"kind": variant_rng("suitcase", seed).turn(SUITCASES, "kind")})
 
 
 def _trolley(hard: bool, rng: VariantRng) -> tuple[list[Patch], float]:

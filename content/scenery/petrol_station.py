@@ -166,8 +166,3 @@ def _spout(number: int) -> Patch:
     """A short pipe on one side of the column."""
     pipe = cone((0.03, 0.25), (0.025, 0.55), 8, 2).rotated("y", 0.5 * math.pi)
     return pipe.rotated("z", 0.5 * math.pi * number).moved(z=1.1)
-
-
-def fountain_facts(seed: int) -> Facts:
-    """Its kind."""
-    return Facts("fountain", {"kind": variant_rng("fountain", seed).turn(FOUNTAINS, "kind")})

@@ -75,11 +75,6 @@ def bus_shelter(seed: int) -> Solid:
     return make_solid(parts, materials, walls)
 
 
-def bus_shelter_facts(seed: int) -> Facts:
-    """Kind of its roof."""
-    return Facts("bus_shelter", {"roof": variant_rng("bus_shelter", seed).turn(ROOFS, "roof")})
-
-
 def _shelter_roof(kind: str, x: float, half: float, high: float) -> list[Patch]:
     """A roof with overhang; slot 2."""
     y = half + 0.12
@@ -166,11 +161,6 @@ def phone_box(seed: int) -> Solid:
         presets.printed_material(f"texture/poster?seed={seed % 12}", 0.4),
     )
     return make_solid(parts, materials, [hulls.box((-half, -half, 0.0), (half, half, 2.0))])
-
-
-def phone_box_facts(seed: int) -> Facts:
-    """Its kind."""
-    return Facts("phone_box", {"kind": variant_rng("phone_box", seed).turn(PHONES, "kind")})
 
 
 def _booth(half: float, high: float, rows: int) -> list[Patch]:

@@ -184,6 +184,25 @@ class ConstantFacts:
 
 
 @dataclass(frozen=True)
+class DrawnFacts:
+    """A subcategory, and choices that the variants of a family take in turn.
+
+    Attributes:
+        options: Options of a choice by the name of its draw.
+    """
+
+    family: str
+    subcategory: str
+    options: Mapping[str, Lazy]
+
+    def __call__(self, seed: int) -> Facts:
+        """The facts of a variant."""
+        rng = variant_rng.variant_rng(self.family, seed)
+        chosen = {name: rng.turn(lazy.value, name) for name, lazy in self.options.items()}
+        return Facts(self.subcategory, chosen)
+
+
+@dataclass(frozen=True)
 class ConstantSymmetries:
     """Symmetries that are the same for every variant.
 
@@ -257,13 +276,15 @@ def _object_family(
     *,
     category: str = "",
     subcategory: str = "",
-    facts: bool = False,
+    facts: bool | Mapping[str, Lazy] = False,
     marks: Mapping[int | str, str] | None = None,
     wear: Callable[[Solid, str, int], Solid] | None = None,
     **row: Any,
 ) -> Family:
     known: Callable[..., Facts] | None = None
-    if facts:
+    if isinstance(facts, Mapping):
+        known = DrawnFacts(name, subcategory, facts)
+    elif facts:
         known = replace(row["build"], path=f"{row['build'].path}_facts")
     elif subcategory:
         known = ConstantFacts(subcategory)
@@ -295,6 +316,7 @@ def _arguments(package: str, row: Mapping[str, Any]) -> dict[str, Any]:
         **({"wear": _lazy(package, row["wear"])} if "wear" in row else {}),
         "parameters": parameters,
         "declares": {key: _fact(package, value) for key, value in row.get("declares", {}).items()},
+        **({"facts": _facts(package, row["facts"])} if "facts" in row else {}),
         **_symmetries(package, row.get("symmetries"), dict(fixed)),
     }
 
@@ -302,6 +324,13 @@ def _arguments(package: str, row: Mapping[str, Any]) -> dict[str, Any]:
 def _lazy(package: str, path: str) -> Lazy:
     """A value named by a full path, or by a path in the package of the table."""
     return Lazy(path if path.startswith("gen_data.") else f"{package}.{path}")
+
+
+def _facts(package: str, given: bool | Mapping[str, str]) -> bool | Mapping[str, Lazy]:
+    """Whether there is a function of facts, or the tables of choices by name of the draw."""
+    if isinstance(given, bool):
+        return given
+    return {name: _lazy(package, path) for name, path in given.items()}
 
 
 def _fact(package: str, value: Any) -> Any:
