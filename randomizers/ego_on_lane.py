@@ -1,7 +1,5 @@
 """Start pose of the ego vehicle."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Annotated, Literal
 

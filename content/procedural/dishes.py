@@ -3,8 +3,6 @@
 Measures are those that shops and recipes state (assumed, within 15 %).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
@@ -403,7 +401,7 @@ def _topping(kind: str, size: float, height: float, rng: VariantRng) -> Patch:
     return puck(size, height, rng)
 
 
-def torus(radius: float, halves: Point, around: int, section: int) -> Patch:
+def torus(radius: float, halves: "Point", around: int, section: int) -> Patch:
     """A ring about Z with an elliptical section of half axes (across, up)."""
     turn = np.concatenate([np.arange(section), [0]]) * (2.0 * math.pi / section)
     profile = [(radius + halves[0] * math.cos(t), halves[1] * math.sin(t)) for t in turn.tolist()]

@@ -1,7 +1,5 @@
 """The surface of a road, and patches that lie on it."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass

@@ -3,8 +3,6 @@
 Frame: metres, Z up, X away from the road, origin at the kerb's foot in the middle of the driveway.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from gen_data.assets.family import Solid

@@ -1,7 +1,5 @@
 """Fields beside a road: parcels of crops in rows, headlands, tracks between them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from itertools import pairwise

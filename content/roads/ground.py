@@ -1,7 +1,5 @@
 """The land around: a wide plane with low relief, finer in its middle than at its edges."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from gen_data.assets.family import Solid, check_option

@@ -1,7 +1,5 @@
 """The surface of a junction: carriageway, kerbs, sidewalks, stop lines and crosswalks."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """Traces of age and use on a junction: lanes through it, mended patches, sealed cracks, gutters."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass

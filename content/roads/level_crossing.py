@@ -1,7 +1,5 @@
 """Level crossings: rails and panels across a road; ``scenery.railway`` has the track beside it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The surface of the roads of an OpenDRIVE file."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 

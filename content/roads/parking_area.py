@@ -1,7 +1,5 @@
 """The surface of a car park: asphalt, and the lines of its bays."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

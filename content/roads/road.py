@@ -1,7 +1,5 @@
 """Roads: carriageway, markings, kerbs, sidewalks, verges, traces of use; zebra crossings."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from itertools import pairwise
 from typing import Any

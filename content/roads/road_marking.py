@@ -1,7 +1,5 @@
 """One sign painted on a road: an arrow, a word, a bicycle, a blocked area, a line across a lane."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """The surface of a roundabout: ring, truck apron, planted island, splitter islands, sidewalks."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from itertools import pairwise

@@ -4,8 +4,6 @@ Contact wires of 107 mm^2 are 12 mm thick; heights: assumed, 10 %. Frame: metres
 road, origin on the ground in its middle.
 """
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

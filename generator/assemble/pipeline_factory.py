@@ -1,7 +1,5 @@
 """Construction of pipelines from configurations."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

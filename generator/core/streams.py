@@ -5,8 +5,6 @@ reordering plug-ins changes no other stream, and any sample can be generated on 
 Counter-based generator: Salmon et al., "Parallel random numbers: as easy as 1, 2, 3", SC 2011.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from hashlib import blake2b
 
@@ -25,9 +23,9 @@ class Rng(np.random.Generator):
 
     index: int = 0
     name: str = ""
-    streams: Streams
+    streams: "Streams"
 
-    def of_sequence(self) -> Rng:
+    def of_sequence(self) -> "Rng":
         """A new stream of the same name that is the same at all steps of the sequence.
 
         Processes that continue from step to step, like the bias of a gyroscope, are redrawn from it

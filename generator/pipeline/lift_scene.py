@@ -15,8 +15,6 @@ Trajectories follow the same rules at each knot. What flies is raised by the hei
 lane, and keeps its motion.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Lane graph of an OpenDRIVE file, relative to an origin at its centre."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace

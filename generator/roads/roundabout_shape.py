@@ -1,7 +1,5 @@
 """Shape and lanes of roundabouts: a ring around an island, arms with rounded corners."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 

@@ -36,8 +36,14 @@ from gen_data.core.measurement_dtypes import TIME, Column, table_rows
 from gen_data.core.scene import Lidar, Scene
 from gen_data.core.se3 import SE3, Array
 from gen_data.core.streams import Rng
-from gen_data.sensors import mounting
 from gen_data.sensors.device_presets import check_preset, load_preset
+from gen_data.sensors.mounting import (
+    Instrument,
+    MountMotion,
+    mount_motion,
+    reading_times,
+    remove_carrier,
+)
 
 COLUMNS = (
     TIME,
@@ -92,7 +98,7 @@ class GnssModel(Strict):
     velocity_m_s: float = Field(ge=0)
 
 
-class Gnss(mounting.Instrument):
+class Gnss(Instrument):
     """A GNSS receiver: position and velocity, less accurate where objects occlude the sky.
 
     Attributes:
@@ -121,10 +127,10 @@ class Gnss(mounting.Instrument):
     ) -> Measurements:
         """Read the fixes at the instants since the last step."""
         del channels
-        times_s = mounting.reading_times(scene, self.rate_hz)
+        times_s = reading_times(scene, self.rate_hz)
         shared = rng.of_sequence()
         sky = _draw_constellation(self.satellites, math.radians(self.mask_deg), shared)
-        motion = mounting.mount_motion(scene, self.name)
+        motion = mount_motion(scene, self.name)
         visible = np.stack(
             [_is_visible(scene, self.rig, motion, t, sky, renderer) for t in times_s]
         )
@@ -139,7 +145,7 @@ class Gnss(mounting.Instrument):
     def _columns(
         self,
         model: GnssModel,
-        motion: mounting.MountMotion,
+        motion: MountMotion,
         times_s: Array,
         fixes: Fixes,
         slow: Array,
@@ -200,14 +206,14 @@ def _draw_constellation(count: int, mask_rad: float, rng: Rng) -> Array:
 def _is_visible(
     scene: Scene,
     rig: str,
-    motion: mounting.MountMotion,
+    motion: MountMotion,
     time_s: float,
     sky: Array,
     renderer: interfaces.Renderer,
 ) -> NDArray[np.bool_]:
     """Whether each satellite is visible from the antenna, [satellites]."""
     antenna = Lidar("antenna", "", T_world_lidar=SE3(motion.pose(time_s).translation_m))
-    around = mounting.remove_carrier(scene_time.scene_at(scene, float(time_s)), rig)
+    around = remove_carrier(scene_time.scene_at(scene, float(time_s)), rig)
     rays = LidarRays(sky.astype(np.float32), 0.0, 1, OCCLUSION_RANGE_M)
     return np.asarray(~np.isfinite(renderer.scan(around, antenna, rays).range_m[:, 0]))
 
