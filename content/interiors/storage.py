@@ -327,22 +327,18 @@ def drawer(family: str, seed: int) -> Solid:
 def bookcase(seed: int = 0) -> Solid:
     """A bookcase. Slot: boards."""
     rng = variant_rng("bookcase", seed)
-    d, w, z = (
-        rng.between(0.26, 0.36, "depth_m"),
-        rng.turn((0.4, 0.8, 1.0), "width_m"),
-        rng.between(0.9, 2.05, "height_m"),
-    )
+    d = rng.between(0.26, 0.36, "depth_m")
+    w = rng.turn((0.4, 0.8, 1.0), "width_m")
+    z = rng.between(0.9, 2.05, "height_m")
     return _shelves(d, w, z, [front(rng)])
 
 
 def steel_rack(seed: int = 0) -> Solid:
     """A rack of steel for storage. Slots: boards, posts."""
     rng = variant_rng("steel_rack", seed)
-    d, w, z = (
-        rng.between(0.4, 0.55, "depth_m"),
-        rng.between(0.9, 1.3, "width_m"),
-        rng.between(1.7, 2.0, "height_m"),
-    )
+    d = rng.between(0.4, 0.55, "depth_m")
+    w = rng.between(0.9, 1.3, "width_m")
+    z = rng.between(1.7, 2.0, "height_m")
     paint = painted_material(rng.choose(("#a9adb0", "#3b4046", "#2f5d7c")), 0.4)
     return _shelves(d, w, z, [metal_material(ZINC, 0.45), paint], posts=True)
 
@@ -596,11 +592,9 @@ def _mixed(seed: int, rng: VariantRng) -> tuple[list[Patch], list[Material], flo
 def storage_box(seed: int = 0) -> Solid:
     """A closed box of cardboard or plastic. Slots: body, lid."""
     rng = variant_rng("storage_box", seed)
-    x, y, z = (
-        0.5 * rng.between(0.28, 0.44, "depth_m"),
-        0.5 * rng.between(0.3, 0.56, "width_m"),
-        rng.between(0.18, 0.4, "height_m"),
-    )
+    x = 0.5 * rng.between(0.28, 0.44, "depth_m")
+    y = 0.5 * rng.between(0.3, 0.56, "width_m")
+    z = rng.between(0.18, 0.4, "height_m")
     low: Box = ((-x, -y, 0.0), (x, y, z - 0.03))
     lid: Box = ((-x - 0.006, -y - 0.006, z - 0.06), (x + 0.006, y + 0.006, z))
     if rng.chance(0.5):
@@ -618,11 +612,9 @@ def storage_box(seed: int = 0) -> Solid:
 def tv_stand(seed: int = 0) -> Solid:
     """A low board for a television. Slots: carcass, front, handle."""
     rng = variant_rng("tv_stand", seed)
-    d, w, z = (
-        rng.between(0.38, 0.45, "depth_m"),
-        rng.between(1.2, 1.9, "width_m"),
-        rng.between(0.4, 0.55, "height_m"),
-    )
+    d = rng.between(0.38, 0.45, "depth_m")
+    w = rng.between(1.2, 1.9, "width_m")
+    z = rng.between(0.4, 0.55, "height_m")
     boards = carcass(d, w, 0.1, z, 1)
     patches = [board(*b) for b in boards]
     x = 0.5 * d

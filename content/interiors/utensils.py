@@ -34,11 +34,9 @@ def _plastic(rng: VariantRng) -> Material:
 def toolbox(seed: int = 0) -> Solid:
     """A toolbox with a handle. Slots: body, dark."""
     rng = variant_rng("toolbox", seed)
-    x, y, h = (
-        0.5 * rng.between(0.18, 0.24, "depth_m"),
-        0.5 * rng.between(0.4, 0.54, "width_m"),
-        rng.between(0.17, 0.23, "height_m"),
-    )
+    x = 0.5 * rng.between(0.18, 0.24, "depth_m")
+    y = 0.5 * rng.between(0.4, 0.54, "width_m")
+    h = rng.between(0.17, 0.23, "height_m")
     body: Box = ((-x, -y, 0.0), (x, y, h))
     patches = [
         shapes.block((-x, -y, 0.0), (x, y, 0.68 * h), 0.008),
@@ -79,11 +77,9 @@ def paint_can(seed: int = 0) -> Solid:
 def crate(seed: int = 0) -> Solid:
     """An open crate of slats. Slot: wood."""
     rng = variant_rng("crate", seed)
-    x, y, h = (
-        0.5 * rng.between(0.28, 0.4, "depth_m"),
-        0.5 * rng.between(0.4, 0.6, "width_m"),
-        rng.between(0.18, 0.3, "height_m"),
-    )
+    x = 0.5 * rng.between(0.28, 0.4, "depth_m")
+    y = 0.5 * rng.between(0.4, 0.6, "width_m")
+    h = rng.between(0.18, 0.3, "height_m")
     boxes: list[Box] = [((-x, -y, 0.0), (x, y, 0.014))]
     rows = max(2, round(h / 0.1))
     for k in range(rows):

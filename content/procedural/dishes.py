@@ -549,11 +549,9 @@ def _whole_cake(seed: int, rng: VariantRng) -> Dish:
 
 def _cupcake(seed: int, rng: VariantRng) -> Dish:
     """A cup of paper with a swirl of icing."""
-    foot, rim, high = (
-        rng.between(0.022, 0.026, "foot_m"),
-        rng.between(0.032, 0.037, "rim_m"),
-        rng.between(0.036, 0.044, "height_m"),
-    )
+    foot = rng.between(0.022, 0.026, "foot_m")
+    rim = rng.between(0.032, 0.037, "rim_m")
+    high = rng.between(0.036, 0.044, "height_m")
     pleats = 28
     profile = shapes.fillet(
         [(0.0, 0.0), (foot, 0.0), (rim, high), (0.0, high + 0.003)], [0.0, 0.002, 0.002, 0.0], 2

@@ -184,10 +184,8 @@ def _holdall(rng: VariantRng) -> tuple[list[Patch], float]:
 
 def _backpack(rng: VariantRng) -> tuple[list[Patch], float]:
     high, wide, deep = rng.between(0.48, 0.6, "height_m"), 0.32, 0.2
-    foot, neck = (
-        Rectangle.about(0, 0, deep, wide),
-        Rectangle.about(-0.02, 0, 0.75 * deep, 0.86 * wide),
-    )
+    foot = Rectangle.about(0, 0, deep, wide)
+    neck = Rectangle.about(-0.02, 0, 0.75 * deep, 0.86 * wide)
     lid = rounded_box((0.85 * deep, 0.95 * wide, 0.1), 0.04, 2).moved(-0.02, 0.0, high - 0.04)
     pocket = rounded_box((0.1, 0.75 * wide, 0.42 * high), 0.04, 2)
     pocket = pocket.moved(0.5 * deep, 0.0, 0.28 * high)

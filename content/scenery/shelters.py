@@ -30,11 +30,9 @@ def bus_shelter(seed: int) -> Solid:
     """
     rng = variant_rng("bus_shelter", seed)
     kind = rng.turn(ROOFS, "roof")
-    half, x, high = (
-        0.5 * rng.between(3.0, 5.0, "width_m"),
-        0.5 * rng.between(1.3, 1.7, "depth_m"),
-        rng.between(2.3, 2.5, "height_m"),
-    )
+    half = 0.5 * rng.between(3.0, 5.0, "width_m")
+    x = 0.5 * rng.between(1.3, 1.7, "depth_m")
+    high = rng.between(2.3, 2.5, "height_m")
     bays = 3 if half < 2.1 else 4
     edges = np.linspace(-half, half, bays + 1).tolist()
     parts = [block((-x - 0.03, y - 0.03, 0.0), (-x + 0.03, y + 0.03, high)) for y in edges]
