@@ -11,7 +11,8 @@ from gen_data.config import distributions as dist
 from gen_data.core import errors, interfaces, lane_geometry, motion, scene_time, streams
 from gen_data.core.scene import Scene
 from gen_data.core.se3 import SE3, Vec3
-from gen_data.randomizers.base import RandomizerBase, pick_by_weight
+from gen_data.core.streams import pick_by_weight
+from gen_data.randomizers.base import RandomizerBase
 from gen_data.randomizers.free_space import is_clear
 
 GRAVITY_M_S2 = 9.80665

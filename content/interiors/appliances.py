@@ -296,11 +296,7 @@ def ottoman(seed: int = 0) -> Solid:
     z = rng.between(0.36, 0.44, "height_m")
     body: Box = ((-x, -y, 0.06), (x, y, z))
     patches = [cushion(*body, 0, 0.05)]
-    patches += [
-        disc(sx * (x - 0.06), sy * (y - 0.06), 0.0, 0.07, 0.02, 1)
-        for sx in (-1, 1)
-        for sy in (-1, 1)
-    ]
+    patches += [disc(*at, 0.0, 0.07, 0.02, 1) for at in shapes.at_corners(x - 0.06, y - 0.06)]
     return solid(patches, [cloth(rng), wood(rng)], [((-x, -y, 0.0), (x, y, z))])
 
 

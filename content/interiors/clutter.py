@@ -646,25 +646,10 @@ def trolley(seed: int = 0) -> Solid:
             ((-x, -y, z), (x, -y + 0.004, z + 0.06)), ((-x, y - 0.004, z), (x, y, z + 0.06)),
         ):  # fmt: skip
             patches.append(shapes.block(low, high, 0.0))
-    for sx in (-1, 1):
-        for sy in (-1, 1):
-            patches.append(
-                rod(
-                    (sx * 0.95 * x, sy * 0.97 * y, 0.06),
-                    (sx * 0.95 * x, sy * 0.97 * y, 0.88),
-                    0.01,
-                    1,
-                )
-            )
-            patches.append(
-                rod(
-                    (sx * 0.95 * x, sy * 0.97 * y - 0.012, 0.03),
-                    (sx * 0.95 * x, sy * 0.97 * y + 0.012, 0.03),
-                    0.03,
-                    1,
-                    16,
-                )
-            )
+    for at_x, at_y in shapes.at_corners(0.95 * x, 0.97 * y):
+        patches.append(rod((at_x, at_y, 0.06), (at_x, at_y, 0.88), 0.01, 1))
+        wheel = (at_x, at_y - 0.012, 0.03), (at_x, at_y + 0.012, 0.03)
+        patches.append(rod(*wheel, 0.03, 1, 16))
     paint = painted_material(rng.choose(("#f0efeb", "#26282b", "#7fa39a", "#c9b9a0")), 0.4)
     made = solid(patches, [paint, _DARK], [((-x, -y, 0.0), (x, y, 0.812))])
     corners = (-x + 0.02, -y + 0.02, 0.812), (x - 0.02, y - 0.02, 0.812)

@@ -15,6 +15,7 @@ from gen_data.content.interiors.parts import (
     four_legs,
     front,
     lacquer,
+    posts,
     rod,
     solid,
     upholstery,
@@ -101,9 +102,8 @@ def _upholstered(rng: VariantRng, places: int, seat_m: float) -> Solid:
         )
         patches.append(throw.moved(0.0, side * (0.5 * w - 0.5 * arm), 0.0))
     patches += [
-        disc(sx * (0.5 * depth - 0.09), sy * (0.5 * w - 0.09), 0.0, leg + 0.02, 0.02, 1)
-        for sx in (-1, 1)
-        for sy in (-1, 1)
+        disc(*at, 0.0, leg + 0.02, 0.02, 1)
+        for at in shapes.at_corners(0.5 * depth - 0.09, 0.5 * w - 0.09)
     ]
     seat: Box = ((x0 + 0.17, y0 + arm, leg), (x1, y1 - arm, seat_z))
     looks = [upholstery(rng), wood(rng), fabric(rng, 0.3), fabric(rng, 0.4)]
@@ -461,9 +461,4 @@ def _round_table(rng: VariantRng, radius_m: float, height_m: float) -> Solid:
 
 
 def _legs_under(depth_m: float, width_m: float, height_m: float) -> Sequence[Box]:
-    x, y = 0.5 * depth_m - 0.05, 0.5 * width_m - 0.05
-    return [
-        ((sx * x - 0.03, sy * y - 0.03, 0.0), (sx * x + 0.03, sy * y + 0.03, height_m - 0.03))
-        for sx in (-1, 1)
-        for sy in (-1, 1)
-    ]
+    return posts(0.5 * depth_m - 0.05, 0.5 * width_m - 0.05, height_m - 0.03, 0.03)

@@ -16,6 +16,7 @@ from gen_data.content.interiors.parts import (
     front,
     handle,
     lacquer,
+    posts,
     rod,
     solid,
     wood,
@@ -299,10 +300,7 @@ def chest(family: str, seed: int) -> Solid:
         )
         patches.append(rail)
         boxes.append(face)
-    for sx in (-1, 1):
-        for sy in (-1, 1):
-            px, py = sx * (x - 0.04), sy * (0.5 * w - 0.04)
-            patches.append(board((px - 0.018, py - 0.018, 0.0), (px + 0.018, py + 0.018, feet), 0))
+    patches += [board(*post) for post in posts(x - 0.04, 0.5 * w - 0.04, feet, 0.018)]
     made = solid(patches, _chest_looks(family, rng), boxes)
     slide = Keypoint("slide", (x, 0.0, z - _T * 0.5 - h), 0.05)
     return replace(made, keypoints=(slide,))
@@ -622,14 +620,7 @@ def tv_stand(seed: int = 0) -> Solid:
     for k in (0, 2):
         a = -0.5 * w + k * third
         patches.append(board((x, a + 0.003, 0.103), (x + 0.018, a + third - 0.003, z - 0.003), 1))
-    patches += [
-        board(
-            (sx * (x - 0.05) - 0.02, sy * (0.5 * w - 0.1) - 0.02, 0.0),
-            (sx * (x - 0.05) + 0.02, sy * (0.5 * w - 0.1) + 0.02, 0.1),
-        )
-        for sx in (-1, 1)
-        for sy in (-1, 1)
-    ]
+    patches += [board(*post) for post in posts(x - 0.05, 0.5 * w - 0.1, 0.1, 0.02)]
     body = front(rng)
     whole: Box = ((-x, -0.5 * w, 0.0), (x + 0.018, 0.5 * w, z))
     return solid(patches, [body, body if rng.chance(0.5) else lacquer(rng)], [whole])

@@ -13,6 +13,7 @@ from gen_data.content.interiors.parts import (
     cushion,
     disc,
     handle,
+    posts,
     rod,
     solid,
     wood,
@@ -86,10 +87,7 @@ def crate(seed: int = 0) -> Solid:
         a, b = k * h / rows + 0.006, (k + 1) * h / rows - 0.012
         boxes += [((sx * x - 0.007, -y, a), (sx * x + 0.007, y, b)) for sx in (-1, 1)]
         boxes += [((-x, sy * y - 0.007, a), (x, sy * y + 0.007, b)) for sy in (-1, 1)]
-    for sx in (-1, 1):
-        for sy in (-1, 1):
-            px, py = sx * (x - 0.02), sy * (y - 0.02)
-            boxes.append(((px - 0.012, py - 0.012, 0.0), (px + 0.012, py + 0.012, h)))
+    boxes += posts(x - 0.02, y - 0.02, h, 0.012)
     return solid([board(*b) for b in boxes], [wood(rng, 0.8)], boxes)
 
 

@@ -35,9 +35,9 @@ class Dish(NamedTuple):
     """Food on z = 0 around the Z axis.
 
     Attributes:
-        patches: Their slots count from 0.
+        patches: Their slots count from 0; of helpings on a plate, from the first free one.
         materials: One per slot.
-        hulls: Convex parts in physics.
+        hulls: Convex parts in physics; none of crumbs and smears.
     """
 
     patches: list[Patch]
@@ -166,11 +166,8 @@ def _fillings(width: Array, rng: VariantRng) -> tuple[list[Patch], list[Material
         else:
             r = 0.42 * min(half_x, half_y)
             discs = [
-                puck(r * rng.between(0.85, 1.05), 0.005, rng).moved(
-                    sx * 0.48 * half_x, sy * 0.48 * half_y, z
-                )
-                for sx in (-1.0, 1.0)
-                for sy in (-1.0, 1.0)
+                puck(r * rng.between(0.85, 1.05), 0.005, rng).moved(*at, z)
+                for at in shapes.at_corners(0.48 * half_x, 0.48 * half_y)
             ]
             made.append(join_patches(discs).painted(slot))
             tints.append(
