@@ -131,7 +131,7 @@ class RunMonitor:
         report: Callable[[RunProgress], None],
         space: free_space.SpaceCheck,
         clock: Callable[[], float] = time.monotonic,
-        proof: Proof | None = None,
+        proof: "Proof | None" = None,
     ) -> None:
         self._store = store
         self._scan = scan
