@@ -13,8 +13,6 @@ bpy and pyrender need an older NumPy than this project. They run in an environme
     p=peers/bin/python; python -m benchmarks.bench_peers --python "Blender Cycles=$p" "pyrender=$p"
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os
@@ -77,7 +75,7 @@ class Renderer:
         )
         log.close()
 
-    def __enter__(self) -> Renderer:
+    def __enter__(self) -> "Renderer":
         """Nothing: it starts when it is made."""
         return self
 

@@ -23,8 +23,6 @@ HDL-64E S2. Definitions, the same for all sources:
   the car.
 """
 
-from __future__ import annotations
-
 import argparse
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -83,7 +81,7 @@ class Directions:
     range_m: Float64
 
     @classmethod
-    def of(cls, p_m: Float64) -> Directions:
+    def of(cls, p_m: Float64) -> "Directions":
         """Those of points [n, 3]."""
         level_m = np.hypot(p_m[:, 0], p_m[:, 1])
         return cls(

@@ -7,8 +7,6 @@ background bodies, drawn from above by the roles of their materials. Its resolut
 Overpasses are not told from the road below. Ground beyond the range of the depth image is unknown.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -196,7 +194,7 @@ def _look_up(ground: tuple[_Piece, ...], view: Camera, points_m: tuple[Array, Ar
 @lru_cache(maxsize=6)
 def _map_of(
     ground: tuple[_Piece, ...], middle_m: tuple[float, float], cell_m: float, count: int
-) -> _GroundMap:
+) -> "_GroundMap":
     return _GroundMap(_triangles_of(ground), middle_m, cell_m, count)
 
 

@@ -1,7 +1,5 @@
 """Base class of exporters, with defaults for the optional members of ``Exporter``."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from fnmatch import fnmatchcase
 from typing import ClassVar, TypeVar, get_args
@@ -38,7 +36,7 @@ class Rectify(Strict):
     keep_focal: bool = False
 
     @model_validator(mode="after")
-    def _has_one_choice(self) -> Rectify:
+    def _has_one_choice(self) -> "Rectify":
         if self.keep_focal and self.hfov_deg is not None:
             raise ValueError("give hfov_deg or keep_focal, not both")
         return self

@@ -34,8 +34,6 @@ References: Hodan et al., "BOP: Benchmark for 6D Object Pose Estimation", ECCV 2
 documentation of bop_toolkit.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import groupby
@@ -106,7 +104,7 @@ class Bop(base.AssetExporter):
         sensor_selection.pinhole_camera(info, self.camera, self.type)
         check_frame_names(info, self.type)
 
-    def with_assets(self, assets: AssetLibrary) -> Bop:
+    def with_assets(self, assets: AssetLibrary) -> "Bop":
         """Return the exporter with a library of meshes."""
         bound = super().with_assets(assets)
         bound._built = bounded_cache.ByteCache(MODEL_CACHE_BYTES)

@@ -18,8 +18,6 @@ licence, the licences of the assets in the scenes are stated. Every data set has
 ``croissant.json`` of its files and a data card at its root, with or without this exporter.
 """
 
-from __future__ import annotations
-
 import csv
 import hashlib
 import io
@@ -158,7 +156,7 @@ class _CsvFile:
         self._sha256 = hashlib.sha256()
         self._bytes = 0
 
-    def __enter__(self) -> _CsvFile:
+    def __enter__(self) -> "_CsvFile":
         self._file = self._path.open("wb")
         self.write({name: name for name in self._columns})
         return self

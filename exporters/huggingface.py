@@ -30,8 +30,6 @@ https://huggingface.co/docs/datasets/about_dataset_features; ``datasets`` reads 
 the key ``huggingface`` of the Parquet schema.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -129,7 +127,7 @@ class HuggingFace(base.ExporterBase):
             files.close()
         sequences.write_text(dataset_dir / "README.md", self._card(info, splits))
 
-    def _card(self, info: DatasetInfo, splits: Mapping[str, _SplitFiles]) -> str:
+    def _card(self, info: DatasetInfo, splits: "Mapping[str, _SplitFiles]") -> str:
         """Dataset card; ``datasets`` ignores splits without ``num_bytes``."""
         facts = {
             "license": self.license,
@@ -176,13 +174,13 @@ class _SplitFiles:
     folder: Path
     split: str
     total: int
-    schema: pyarrow.Schema
+    schema: "pyarrow.Schema"
     style: HuggingFace
     bytes: int = 0
     _written: int = 0
     _group: list[dict[str, Any]] = field(default_factory=list)
     _group_bytes: int = 0
-    _writer: ParquetWriter | None = None
+    _writer: "ParquetWriter | None" = None
 
     def add(self, row: dict[str, Any]) -> None:
         self._group.append(row)
@@ -212,7 +210,7 @@ class _SplitFiles:
         self._written += len(self._group)
         self._group, self._group_bytes = [], 0
 
-    def _open(self) -> ParquetWriter:
+    def _open(self) -> "ParquetWriter":
         if self._writer is None:
             per_file = self.style.rows_per_file
             name = fragments.numbered_stem(self.split, self._written, self.total, per_file)

@@ -176,10 +176,8 @@ class KittiRaw(base.ExporterBase):
         return {"02": first, **rest}
 
     def _row(self, info: DatasetInfo, sample: Sample, shard_dir: Path) -> dict[str, Any]:
-        cameras, lidar = (
-            self._cameras(info),
-            sensor_selection.laser_scanner(info, self.lidar, self.type),
-        )
+        cameras = self._cameras(info)
+        lidar = sensor_selection.laser_scanner(info, self.lidar, self.type)
         carrier = camera_mount(sample.scene, cameras["02"]).rig
         unit = navigation_mount(sample.scene, self.oxts, carrier, self.type)
         row = frame_facts(info, sample) | {

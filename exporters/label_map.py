@@ -4,8 +4,6 @@ A label map works between the samples and an exporter: shards and ``labels.jsonl
 of the data set under its own category.
 """
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -74,7 +72,7 @@ class LabelMap(Strict):
         }
 
     @model_validator(mode="after")
-    def _has_each_category_once(self) -> LabelMap:
+    def _has_each_category_once(self) -> "LabelMap":
         seen: dict[str, str] = {}
         for name, categories in self.classes_of.items():
             try:
@@ -209,7 +207,7 @@ class MappedExporter:
         """Refuse as the exporter does."""
         self.exporter.check(self._mapping(info).info)
 
-    def with_assets(self, assets: AssetLibrary) -> MappedExporter:
+    def with_assets(self, assets: AssetLibrary) -> "MappedExporter":
         """The exporter with access to the library."""
         return replace(self, exporter=self.exporter.with_assets(assets))
 
@@ -222,7 +220,7 @@ class MappedExporter:
         """Merge all shards."""
         self.exporter.finalize(self._mapping(info).info, shard_dirs, dataset_dir)
 
-    def _mapping(self, info: DatasetInfo) -> AppliedLabelMap:
+    def _mapping(self, info: DatasetInfo) -> "AppliedLabelMap":
         return AppliedLabelMap(self.label_map, info, renames=not self.exporter.has_own_classes)
 
 

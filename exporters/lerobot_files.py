@@ -7,8 +7,6 @@ Reference: https://github.com/huggingface/lerobot, lerobot/datasets: release 0.4
 lerobot_dataset.py, utils.py) and 0.3.2 (v2.1: utils.py).
 """
 
-from __future__ import annotations
-
 import json
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
@@ -111,7 +109,7 @@ class RobotFiles(ABC):
     @abstractmethod
     def _write_episode(self, episode: _Episode) -> None: ...
 
-    def _write_frames(self, writer: ParquetWriter, episode: _Episode) -> None:
+    def _write_frames(self, writer: "ParquetWriter", episode: _Episode) -> None:
         """Write the rows of an episode with images; one row group is in memory."""
         import pyarrow
 
@@ -242,11 +240,11 @@ class FilesV30(RobotFiles):
 
     version = "v3.0"
 
-    _data: ParquetWriter | None = None
+    _data: "ParquetWriter | None" = None
     _file: int = -1
     _file_bytes: int = 0
     _episode_rows: list[dict[str, Any]] = field(default_factory=list)
-    _episode_writer: ParquetWriter | None = None
+    _episode_writer: "ParquetWriter | None" = None
     _stats: dict[str, Any] = field(default_factory=dict)
 
     def close(self) -> None:
@@ -294,7 +292,7 @@ class FilesV30(RobotFiles):
         stats = episode.stats
         self._stats = merge_statistics(self._stats, stats) if self._stats else dict(stats)
 
-    def _open_data(self, image_bytes: int) -> ParquetWriter:
+    def _open_data(self, image_bytes: int) -> "ParquetWriter":
         """File of frames that has room for an episode."""
         if self._data is None or self._file_bytes + image_bytes > FILE_BYTES:
             if self._data is not None:

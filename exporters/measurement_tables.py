@@ -13,7 +13,6 @@ are the ends of the names. ``nan`` is "nothing".
 """
 
 from collections.abc import Iterable, Iterator, Sequence
-from io import BytesIO
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
@@ -27,6 +26,7 @@ from gen_data.core.sample import Sample
 from gen_data.core.serialization import canonical_json
 from gen_data.exporters.base import ANY_FORMAT, ExporterBase
 from gen_data.exporters.conventions import SAMPLE, Conventions
+from gen_data.exporters.npz import npy_bytes
 from gen_data.exporters.sequences import write_text
 
 INDEX = "sample"
@@ -101,13 +101,6 @@ def read_rows(path: Path, device: SensorInfo) -> NDArray[np.void]:
             f"{path}: contains no rows of kind '{device.kind}'; generate the data set again"
         )
     return rows
-
-
-def npy_bytes(rows: NDArray[np.void]) -> bytes:
-    """Encode rows as a NumPy file, version 1."""
-    file = BytesIO()
-    np.lib.format.write_array(file, rows, version=(1, 0), allow_pickle=False)
-    return file.getvalue()
 
 
 def csv_bytes(rows: NDArray[np.void]) -> bytes:

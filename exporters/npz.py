@@ -28,7 +28,7 @@ def npz_bytes(arrays: Mapping[str, NDArray[Any]], level: int) -> bytes:
     directory: list[bytes] = []
     offset = 0
     for name, array in arrays.items():
-        data = _npy_bytes(array)
+        data = npy_bytes(array)
         packed = bytes(deflate.deflate_compress(data, level))
         file_name = f"{name}.npy".encode("ascii")
         common = struct.pack(
@@ -46,7 +46,8 @@ def npz_bytes(arrays: Mapping[str, NDArray[Any]], level: int) -> bytes:
     return b"".join([*parts, listing, b"PK\x05\x06", end])
 
 
-def _npy_bytes(array: NDArray[Any]) -> bytes:
+def npy_bytes(array: NDArray[Any]) -> bytes:
+    """Encode an array, or rows, as a NumPy file, version 1."""
     file = BytesIO()
     np.lib.format.write_array(file, array, version=(1, 0), allow_pickle=False)
     return file.getvalue()

@@ -1,7 +1,5 @@
 """Rows of one instant of a nuScenes data set: readings with their poses, and boxes of objects."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
@@ -193,7 +191,7 @@ class PulseTimes:
     by_sector: Mapping[int, float]
 
     @classmethod
-    def measure(cls, points: NDArray[np.void], middle_s: float, sweep_s: float) -> PulseTimes:
+    def measure(cls, points: NDArray[np.void], middle_s: float, sweep_s: float) -> "PulseTimes":
         """Average the pulses of a sweep; ``points`` are records of ``POINT`` [n]."""
         x, y = points["position_m"][:, 0], points["position_m"][:, 1]
         times_s = points["time_s"]

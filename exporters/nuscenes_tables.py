@@ -4,8 +4,6 @@ Tokens are hashes of the content's identity (data set, sequence, instant, sensor
 the same data set has the same tokens, whatever the shards.
 """
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack
@@ -53,7 +51,7 @@ class TableFiles(AbstractContextManager["TableFiles"]):
         self._empty = set(TABLES)
         self._calibrations: set[str] = set()
 
-    def __enter__(self) -> TableFiles:
+    def __enter__(self) -> "TableFiles":
         """Create the folder and all files."""
         self._folder.mkdir(parents=True, exist_ok=True)
         for name in TABLES:

@@ -7,8 +7,6 @@ release of pyarrow, which writes its name into each file.
 Reference: https://huggingface.co/docs/datasets/about_dataset_features.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from pathlib import Path
@@ -35,7 +33,7 @@ def list_feature(feature: Mapping[str, Any], length: int = -1) -> dict[str, Any]
     return {"feature": feature, "length": length, "_type": "Sequence"}
 
 
-def table_schema(features: Mapping[str, Any]) -> pyarrow.Schema:
+def table_schema(features: Mapping[str, Any]) -> "pyarrow.Schema":
     """Parquet schema of features, which are also in its metadata."""
     import pyarrow
 
@@ -44,7 +42,7 @@ def table_schema(features: Mapping[str, Any]) -> pyarrow.Schema:
     return pyarrow.schema(columns, metadata={"huggingface": described})
 
 
-def _arrow_type(feature: Mapping[str, Any]) -> pyarrow.DataType:
+def _arrow_type(feature: Mapping[str, Any]) -> "pyarrow.DataType":
     import pyarrow
 
     match feature.get("_type"):
@@ -60,7 +58,7 @@ def _arrow_type(feature: Mapping[str, Any]) -> pyarrow.DataType:
     return pyarrow.struct({name: _arrow_type(inner) for name, inner in feature.items()})
 
 
-def open_parquet(path: Path, schema: pyarrow.Schema) -> ParquetWriter:
+def open_parquet(path: Path, schema: "pyarrow.Schema") -> "ParquetWriter":
     """Open a Parquet file for writing; creates its folder."""
     from pyarrow.parquet import ParquetWriter
 

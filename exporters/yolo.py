@@ -25,8 +25,6 @@ a data set without one of them names the other split twice.
 Reference: https://docs.ultralytics.com/datasets, and ``ultralytics.data.utils``.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
@@ -156,7 +154,7 @@ class Yolo(base.ExporterBase):
             **{task: [form[task](thing) for thing in listed] for task in self.tasks},
         }
 
-    def _pose(self, info: DatasetInfo, folders: Sequence[Path]) -> _Pose | None:
+    def _pose(self, info: DatasetInfo, folders: Sequence[Path]) -> "_Pose | None":
         """Category and keypoints of the task pose; None if no object has keypoints."""
         names: dict[int, dict[str, None]] = {}
         for line in fragments.fragment_lines(folders, "keypoints"):

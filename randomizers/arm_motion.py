@@ -1,7 +1,5 @@
 """Motion of robot arms during a sequence."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Annotated, Literal
@@ -50,7 +48,7 @@ class Stop(Strict):
     place_m: tuple[float, float] | None = None
 
     @model_validator(mode="after")
-    def _has_one_goal(self) -> Stop:
+    def _has_one_goal(self) -> "Stop":
         given = [v for v in (self.joints_deg, self.reach_m, self.grasp, self.place_m) if v]
         if len(given) != 1:
             raise ValueError("give exactly one of joints_deg, reach_m, grasp and place_m")

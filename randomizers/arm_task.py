@@ -1,7 +1,5 @@
 """Tasks of robot arms: their objects, program and conditions of success, from a table."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -61,7 +59,7 @@ class Failures(Strict):
     collision: float = Field(0.0, ge=0, le=1)
 
     @model_validator(mode="after")
-    def _is_a_share(self) -> Failures:
+    def _is_a_share(self) -> "Failures":
         if self.slip + self.miss + self.collision > 1.0:
             raise ValueError("the shares of failures add up to more than 1")
         return self
@@ -208,7 +206,7 @@ class ArmTask(RandomizerBase):
 
     def _place_things(
         self, task: Task, arm: Articulation, assets: interfaces.AssetIndex, rng: streams.Rng
-    ) -> dict[str, _Placed]:
+    ) -> "dict[str, _Placed]":
         """Draw asset and pose of every object, apart from the ones before it."""
         placed: dict[str, _Placed] = {}
         for name, thing in task.things.items():
@@ -241,7 +239,7 @@ class _Placed:
         x, y, z = self.middle_m
         return (x, y, z + self.half_m[2])
 
-    def is_apart(self, other: _Placed) -> bool:
+    def is_apart(self, other: "_Placed") -> bool:
         one, two = math.hypot(*self.half_m[:2]), math.hypot(*other.half_m[:2])
         return math.dist(self.middle_m[:2], other.middle_m[:2]) > one + two + _APART_M
 

@@ -5,8 +5,6 @@ whose content replaces its name there: plans are self-contained, and errors name
 line and column that they come from.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from functools import cache
@@ -43,7 +41,7 @@ class Thing(base_model.Strict):
     near: str = ""
     z_m: float = 0.0
     mass_kg: float | None = None
-    joint: Joint | None = None
+    joint: "Joint | None" = None
 
 
 class Joint(base_model.Strict):
@@ -162,7 +160,7 @@ class Task(base_model.Strict):
         return 6 if tilts else 4
 
     @model_validator(mode="after")
-    def _names_its_things(self) -> Task:
+    def _names_its_things(self) -> "Task":
         used = [step.at for step in self.program] + [t.near for t in self.things.values()]
         used += [name for step in self.program for name in (*step.touches, step.along)]
         used += [name for c in self.success for name in (c.body, c.other)]

@@ -7,7 +7,8 @@ from pydantic import Field
 from gen_data.core import errors, streams
 from gen_data.core.interfaces import AssetIndex
 from gen_data.core.scene import ObjectGroup, Scene
-from gen_data.randomizers.base import RandomizerBase, check_known, choose, pick_by_weight
+from gen_data.core.streams import pick_by_weight
+from gen_data.randomizers.base import RandomizerBase, check_known, choose
 
 CategoryWeights = tuple[tuple[float, tuple[str, ...]], ...]
 """Weight and asset ids of every category with a weight above 0."""

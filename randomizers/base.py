@@ -1,7 +1,7 @@
 """Base classes of randomizers, and helpers for materials and textures."""
 
 from abc import abstractmethod
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any, Literal
 
@@ -192,16 +192,6 @@ def scale_emission(color: se3.Vec3, luminance_cd_m2: float) -> se3.Vec3:
     """Emission [cd/m^2] of a colour of luminance 1, rounded to three decimals."""
     red, green, blue = (round(part * luminance_cd_m2, 3) for part in color)
     return (red, green, blue)
-
-
-def pick_by_weight(weights: Sequence[float], draw: float) -> int:
-    """Index of one of several, in proportion to its weight, for a draw in [0, 1)."""
-    left = draw * sum(weights)
-    for k, weight in enumerate(weights):
-        left -= weight
-        if left < 0.0:
-            return k
-    return len(weights) - 1
 
 
 def choose(options: tuple[str, ...], rng: streams.Rng) -> str:

@@ -12,8 +12,8 @@ from gen_data.core.interfaces import AssetIndex
 from gen_data.core.lane_geometry import LaneLine
 from gen_data.core.scene import Camera, LaneKind, Scene
 from gen_data.core.se3 import SE3, Vec3, look_at
-from gen_data.core.streams import Rng
-from gen_data.randomizers.base import RandomizerBase, check_known, pick_by_weight
+from gen_data.core.streams import Rng, pick_by_weight
+from gen_data.randomizers.base import RandomizerBase, check_known
 from gen_data.randomizers.daylight import is_dark
 from gen_data.randomizers.free_space import Footprint, Ground, hidden_share, is_clear, make_ground
 from gen_data.randomizers.vehicle_lights import dipped_beam

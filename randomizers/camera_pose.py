@@ -1,7 +1,5 @@
 """Camera poses on an orbit around the scene's focus or around an object in it."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import replace
@@ -81,7 +79,7 @@ class CameraPose(RandomizerBase):
     clearance_m: float = Field(0.1, ge=0)
 
     @model_validator(mode="after")
-    def _has_one_distance(self) -> CameraPose:
+    def _has_one_distance(self) -> "CameraPose":
         given = self.model_fields_set
         if self.fills is None:
             if "off_center" in given:

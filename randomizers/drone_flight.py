@@ -1,7 +1,5 @@
 """Flights of a drone over a street, with a gimbal that looks at it."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -13,7 +11,8 @@ from gen_data.config import distributions as dist
 from gen_data.core import errors, interfaces, lane_geometry, motion, scene_time, streams
 from gen_data.core.scene import Scene
 from gen_data.core.se3 import SE3, Vec3
-from gen_data.randomizers.base import RandomizerBase, pick_by_weight
+from gen_data.core.streams import pick_by_weight
+from gen_data.randomizers.base import RandomizerBase
 from gen_data.randomizers.free_space import is_clear
 
 GRAVITY_M_S2 = 9.80665
@@ -100,7 +99,7 @@ class DroneFlight(RandomizerBase):
         remedy = "a larger height_m, a smaller clearance_m or speed_m_s"
         raise self.reject("no free way for the drone", remedy)
 
-    def _select_stretches(self, scene: Scene) -> list[Stretch]:
+    def _select_stretches(self, scene: Scene) -> "list[Stretch]":
         lanes = [lane for lane in scene.lanes if lane.kind == "driving" and not lane.junction]
         chosen = [lane for lane in lanes if not self.roads or lane.road in self.roads]
         if not chosen:
@@ -121,7 +120,7 @@ class DroneFlight(RandomizerBase):
         return stretches
 
     def _draw_flight(
-        self, stretches: Sequence[Stretch], T_gimbal_drone: SE3, rng: streams.Rng
+        self, stretches: "Sequence[Stretch]", T_gimbal_drone: SE3, rng: streams.Rng
     ) -> list[tuple[SE3, SE3]]:
         """Draw poses of the rigs of airframe and gimbal at all knots.
 

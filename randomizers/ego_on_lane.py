@@ -1,18 +1,14 @@
 """Start pose of the ego vehicle."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Annotated, Literal
 
 from pydantic import Field
 
 from gen_data.config import distributions as dist
+from gen_data.core import interfaces, lane_geometry, streams
 from gen_data.core.errors import ConfigError, did_you_mean
-from gen_data.core.interfaces import AssetIndex
-from gen_data.core.lane_geometry import LaneLine
 from gen_data.core.scene import Body, Scene
-from gen_data.core.streams import Rng
 from gen_data.randomizers.base import RandomizerBase
 from gen_data.randomizers.free_space import Footprint, make_ground, standing_bodies
 from gen_data.traffic.axles import find_axles
@@ -46,7 +42,7 @@ class EgoOnLane(RandomizerBase):
     lateral_m: Annotated[dist.Scalar, dist.Bounds(-5, 5)] = dist.Normal(0.0, 0.1, clip=(-0.3, 0.3))
     min_clearance_m: float = Field(0.5, ge=0)
 
-    def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
+    def __call__(self, scene: Scene, assets: interfaces.AssetIndex, rng: streams.Rng) -> Scene:
         """Return the scene with the ego vehicle moved."""
         body = find_ego(scene, self.ego, f"randomizers.{self.name}.ego")
         lines = self._select_lanes(scene)
@@ -69,7 +65,7 @@ class EgoOnLane(RandomizerBase):
         remedy = "other roads, a smaller ahead_m or min_clearance_m"
         raise self.reject("no free place for the ego vehicle", remedy)
 
-    def _select_lanes(self, scene: Scene) -> list[LaneLine]:
+    def _select_lanes(self, scene: Scene) -> list[lane_geometry.LaneLine]:
         """Select the lanes to start on."""
         graph = LaneGraph.of(scene.lanes, "driving")
         if self.route:

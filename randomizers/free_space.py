@@ -1,7 +1,5 @@
 """Free space: footprints of bodies on the ground, and clearance of points."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -31,7 +29,7 @@ class Footprint:
     yaw_rad: float
 
     @classmethod
-    def of(cls, T_world_body: SE3, bounds_m: tuple[Vec3, Vec3], scale: float = 1.0) -> Footprint:
+    def of(cls, T_world_body: SE3, bounds_m: tuple[Vec3, Vec3], scale: float = 1.0) -> "Footprint":
         """Footprint of an upright body with these bounds in its own frame."""
         (x0, y0, _), (x1, y1, _) = bounds_m
         q = T_world_body.quaternion_wxyz
@@ -41,7 +39,7 @@ class Footprint:
         half_x_m, half_y_m = 0.5 * scale * (x1 - x0), 0.5 * scale * (y1 - y0)
         return cls(tx + x, ty + y, half_x_m, half_y_m, 2.0 * math.atan2(q[3], q[0]))
 
-    def expand(self, margin_m: float) -> Footprint:
+    def expand(self, margin_m: float) -> "Footprint":
         """Return the rectangle with a margin on every side."""
         half_x_m, half_y_m = self.half_x_m + margin_m, self.half_y_m + margin_m
         return Footprint(self.x_m, self.y_m, half_x_m, half_y_m, self.yaw_rad)
@@ -66,7 +64,7 @@ class Ground:
         self._rectangles: list[Rectangle] = []
         self._discs = np.zeros((3, 64))
 
-    def copy(self) -> Ground:
+    def copy(self) -> "Ground":
         """A ground with the same footprints."""
         other = Ground()
         other._rectangles, other._discs = self._rectangles.copy(), self._discs.copy()
@@ -209,7 +207,7 @@ class _Boxes:
     inverse: Array
 
     @classmethod
-    def of(cls, bodies: list[Body], assets: AssetIndex, point_m: Vec3) -> _Boxes:
+    def of(cls, bodies: list[Body], assets: AssetIndex, point_m: Vec3) -> "_Boxes":
         bounds_m = {name: standing_bounds_m(assets, name) for name in {b.asset for b in bodies}}
         scales = np.array([body.scale for body in bodies])
         boxes_m = np.array([bounds_m[body.asset] for body in bodies]).reshape(-1, 2, 3)

@@ -1,7 +1,5 @@
 """Lights aimed at the scene's focus: lamps, panels and suns."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Annotated, Literal
@@ -65,7 +63,7 @@ class Lighting(RandomizerBase):
     keep_existing: bool = False
 
     @model_validator(mode="after")
-    def _has_one_strength(self) -> Lighting:
+    def _has_one_strength(self) -> "Lighting":
         if self.luminous_flux_lm is not None and "illuminance_lux" in self.model_fields_set:
             raise ValueError("illuminance_lux and luminous_flux_lm exclude each other")
         low = self.panel_aspect.support()[0]

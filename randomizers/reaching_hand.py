@@ -165,10 +165,8 @@ class ReachingHand(asset_groups.GroupRandomizer):
         hand_low = assets.bounds_m(asset)[0][2]
         at_m = -low[2] + 0.02 * (high[2] - low[2])
         base_m = max(raised_m, _GAP_M - hand_low + middle_z - at_m, 0.0005)
-        yaw, turn = (
-            reach.yaw_rad,
-            0.5 * math.pi * (-1.0 if declared("hand", "is_left")(seed) else 1.0),
-        )
+        yaw = reach.yaw_rad
+        turn = 0.5 * math.pi * (-1.0 if declared("hand", "is_left")(seed) else 1.0)
         x, y = knuckle[0] + axis[0], knuckle[1] + axis[1]
         c, s = math.cos(yaw), math.sin(yaw)
         origin = (

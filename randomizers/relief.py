@@ -11,16 +11,11 @@ from pydantic import Field
 
 from gen_data.assets.asset_ids import parse_asset_id
 from gen_data.config import distributions as dist
-from gen_data.core.errors import ConfigError
-from gen_data.core.interfaces import AssetIndex
-from gen_data.core.relief import Relief, RoadProfile
+from gen_data.core import errors, interfaces, relief, se3, streams
 from gen_data.core.scene import Body, Scene
-from gen_data.core.se3 import SE3
-from gen_data.core.streams import Rng
 from gen_data.randomizers.base import RandomizerBase
+from gen_data.roads import junction_shape, roundabout_shape
 from gen_data.roads.cross_section import RoadShape, strips
-from gen_data.roads.junction_shape import JunctionShape, arm_pose
-from gen_data.roads.roundabout_shape import RoundaboutShape
 
 GRADE_MAX = 0.15
 LEVEL_M = 10.0
@@ -34,9 +29,9 @@ _NOTHING = (0.0, 1.0, 0.0)
 """A vertical curve that changes nothing."""
 _TRIES = 12
 
-_ARMED: dict[str, type[JunctionShape] | type[RoundaboutShape]] = {
-    "junction": JunctionShape,
-    "roundabout": RoundaboutShape,
+_ARMED: dict[str, type[junction_shape.JunctionShape] | type[roundabout_shape.RoundaboutShape]] = {
+    "junction": junction_shape.JunctionShape,
+    "roundabout": roundabout_shape.RoundaboutShape,
 }
 
 
@@ -63,14 +58,14 @@ class ReliefOfRoads(RandomizerBase):
         0.0, 0.06, clip=(-0.15, 0.15)
     )
 
-    def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
+    def __call__(self, scene: Scene, assets: interfaces.AssetIndex, rng: streams.Rng) -> Scene:
         """Return the scene with its relief; nothing is moved yet. Without roads it stays level."""
         if not any(_family(body) == "road" for body in scene.bodies):
             return scene
         self.check(scene, assets)
         places = _junction_arms(scene)
         known: dict[str, _End] = {}
-        profiles: list[RoadProfile] = []
+        profiles: list[relief.RoadProfile] = []
         for body in scene.bodies:
             if _family(body) != "road":
                 continue
@@ -95,9 +90,9 @@ class ReliefOfRoads(RandomizerBase):
             profiles.append(profile)
         if all(not any((p.grade, p.left, p.right, *p.curves[2::3])) for p in profiles):
             return scene
-        return replace(scene, relief=Relief(tuple(profiles)))
+        return replace(scene, relief=relief.Relief(tuple(profiles)))
 
-    def check(self, scene: Scene, assets: AssetIndex) -> None:
+    def check(self, scene: Scene, assets: interfaces.AssetIndex) -> None:
         """Refuse scenes whose ground it cannot bend."""
         del assets
         if any("/" in lane.road for lane in scene.lanes):
@@ -116,12 +111,12 @@ class ReliefOfRoads(RandomizerBase):
                 "scene without robots"
             )
 
-    def _refusal(self, text: str) -> ConfigError:
-        return ConfigError(f"randomizers.{self.name}.grade: {text}, or no relief")
+    def _refusal(self, text: str) -> errors.ConfigError:
+        return errors.ConfigError(f"randomizers.{self.name}.grade: {text}, or no relief")
 
     def _draw_profile(
-        self, course: _Course, start: _End, *, level_end: bool, rng: Rng
-    ) -> RoadProfile:
+        self, course: _Course, start: _End, *, level_end: bool, rng: streams.Rng
+    ) -> relief.RoadProfile:
         """Draw the profile of a road from one of its ends to the other."""
         curves = self._draw_curves(course, start, level_end=level_end, rng=rng)
         left, right = (round(self.side_slope.draw(rng), 4) for _ in range(2))
@@ -130,7 +125,7 @@ class ReliefOfRoads(RandomizerBase):
         plan = (round(x_m, 3), round(y_m, 3), round(yaw, 6), round(course.curvature_per_m, 9))
         flat = tuple(round(number, 4) for curve in curves for number in curve)
         rest = _NOTHING * (_BENDS_MAX - len(curves))
-        return RoadProfile(
+        return relief.RoadProfile(
             *plan,
             round(course.length_m, 3),
             round(course.half_width_m, 2),
@@ -142,7 +137,7 @@ class ReliefOfRoads(RandomizerBase):
         )
 
     def _draw_curves(
-        self, course: _Course, start: _End, *, level_end: bool, rng: Rng
+        self, course: _Course, start: _End, *, level_end: bool, rng: streams.Rng
     ) -> list[tuple[float, float, float]]:
         """Draw vertical curves between straight grades: ``start_m, length_m, change``."""
         lead_m = LEVEL_M if start.is_level else 0.0
@@ -168,7 +163,7 @@ class ReliefOfRoads(RandomizerBase):
             for at, length, change in zip(starts, lengths, changes, strict=True)
         ]
 
-    def _draw_grade(self, rng: Rng) -> float:
+    def _draw_grade(self, rng: streams.Rng) -> float:
         return min(max(self.grade.draw(rng), -self.grade_max), self.grade_max)
 
 
@@ -177,7 +172,7 @@ class _Place:
     """A place where roads meet; at junctions it is level."""
 
     name: str
-    pose: SE3
+    pose: se3.SE3
     is_level: bool
 
 
@@ -194,8 +189,8 @@ class _End:
 class _Course:
     """A road in plan, from the end at which its profile begins."""
 
-    T_world_start: SE3
-    T_world_end: SE3
+    T_world_start: se3.SE3
+    T_world_end: se3.SE3
     length_m: float
     curvature_per_m: float
     half_width_m: float
@@ -206,7 +201,7 @@ class _Course:
         """The course of a road's body."""
         shape = RoadShape(**_shape_values(body, RoadShape))
         x, y, heading = (float(v) for v in shape.line().poses(np.array([shape.length_m]))[0])
-        T_world_end = body.T_world_body @ SE3.about_z(heading, (x, y, 0.0))
+        T_world_end = body.T_world_body @ se3.SE3.about_z(heading, (x, y, 0.0))
         half_m = max(_edge_m(shape, side) for side in (1, -1)) + BESIDE_M
         return cls(
             body.T_world_body,
@@ -219,7 +214,7 @@ class _Course:
 
     def reversed(self) -> _Course:
         """The same road from its other end."""
-        back = SE3.about_z(math.pi)
+        back = se3.SE3.about_z(math.pi)
         return replace(
             self,
             T_world_start=self.T_world_end @ back,
@@ -268,12 +263,12 @@ def _junction_arms(scene: Scene) -> list[_Place]:
         if kind is not None:
             shape = kind(**_shape_values(body, kind))
             for number in range(len(shape.arms_rad())):
-                pose = body.T_world_body @ arm_pose(shape, number)
+                pose = body.T_world_body @ junction_shape.arm_pose(shape, number)
                 arms.append(_Place(body.name, pose, is_level=True))
     return arms
 
 
-def _place(pose: SE3, name: str, places: list[_Place]) -> _Place:
+def _place(pose: se3.SE3, name: str, places: list[_Place]) -> _Place:
     """The known place where a road ends, or else a new one of that name, which is added."""
     for place in places:
         if math.dist(place.pose.translation_m, pose.translation_m) < _MEETING_M:

@@ -121,11 +121,9 @@ class RoomLighting(base.RandomizerBase):
 
     def _draw_sun(self, windows: Sequence[Body], rng: Rng, *, shines: bool) -> tuple[Light, ...]:
         """The sun, from a direction in which it shines through one of the windows."""
-        wanted, lux, altitude = (
-            self.sun.draw(rng),
-            self.sun_lux.draw(rng),
-            self.sun_altitude_deg.draw(rng),
-        )
+        wanted = self.sun.draw(rng)
+        lux = self.sun_lux.draw(rng)
+        altitude = self.sun_altitude_deg.draw(rng)
         number, aside = int(rng.random() * max(1, len(windows))), 2.0 * float(rng.random()) - 1.0
         if not (shines and wanted and windows):
             return ()

@@ -1,7 +1,5 @@
 """Sun and sky by time of day."""
 
-from __future__ import annotations
-
 from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
@@ -39,7 +37,7 @@ class TimeOfDay(base.RandomizerBase):
     sky: Literal["measured", "preetham"] = "measured"
 
     @model_validator(mode="after")
-    def _is_day_and_clear(self) -> TimeOfDay:
+    def _is_day_and_clear(self) -> "TimeOfDay":
         if self.sky == "preetham":
             if self.cloudiness is not None and self.cloudiness.support() != (0.0, 0.0):
                 raise ValueError("sky 'preetham' has no clouds; omit cloudiness")

@@ -1,7 +1,5 @@
 """Motion of vehicles and pedestrians through a sequence."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -44,7 +42,7 @@ class Streets:
     crosswalks: LaneGraph
 
     @classmethod
-    def of(cls, scene: Scene) -> Streets:
+    def of(cls, scene: Scene) -> "Streets":
         """Build the lane graphs of a scene."""
         kinds = (("driving", "bicycle"), ("sidewalk",), ("crosswalk",))
         return cls(*(LaneGraph.of(scene.lanes, *of) for of in kinds))

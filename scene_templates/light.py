@@ -1,7 +1,5 @@
 """Lights at fixed positions."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Literal
@@ -41,7 +39,7 @@ class LightElement(Element):
     visible: bool = True
 
     @model_validator(mode="after")
-    def _is_possible(self) -> LightElement:
+    def _is_possible(self) -> "LightElement":
         if self.luminous_flux_lm is not None and "intensity_cd" in self.model_fields_set:
             raise ValueError("intensity_cd and luminous_flux_lm exclude each other")
         if self.kind == "disk" and self.radius_m <= 0.0:

@@ -1,7 +1,5 @@
 """Groups of objects on surfaces, at first in rows and clear of other elements."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -52,7 +50,7 @@ class AssetChoice(Strict):
     prefer: tuple[str, ...] = ()
 
     @model_validator(mode="after")
-    def _has_a_list(self) -> AssetChoice:
+    def _has_a_list(self) -> "AssetChoice":
         if not (self.tags or self.any_of or self.ids):
             raise ValueError("expected tags, any_of or ids")
         return self

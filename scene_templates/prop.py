@@ -1,7 +1,5 @@
 """Single static objects, and jointed objects."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Literal
 
@@ -32,7 +30,7 @@ class Prop(element.PlacedElement):
     hollow: bool = False
 
     @model_validator(mode="after")
-    def _is_consistent(self) -> Prop:
+    def _is_consistent(self) -> "Prop":
         if self.annotate and self.hollow:
             raise ValueError("annotate and hollow exclude each other")
         return self

@@ -4,8 +4,6 @@ Everything after the samples is the program's own: checks, images, labels, COCO 
 resumption, merging, seal.
 """
 
-from __future__ import annotations
-
 import hashlib
 import os
 import pickle
@@ -37,11 +35,11 @@ class Replay:
     exporters: Mapping[str, interfaces.Exporter]
     samples: Sequence[Sample]
 
-    def __call__(self) -> Replay:
+    def __call__(self) -> "Replay":
         """The pipeline."""
         return self
 
-    def __enter__(self) -> Replay:
+    def __enter__(self) -> "Replay":
         """There are no engines."""
         return self
 

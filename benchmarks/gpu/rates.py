@@ -6,8 +6,6 @@ work for a while, together and fewer of them:
 ``python -m benchmarks.gpu.rates ARGUMENTS``, one line of JSON per request.
 """
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys
@@ -101,7 +99,7 @@ def measure_rates(
 
 
 def _work_together(
-    workers: Sequence[_Worker], place: str, window_s: float, pool: int, end_s: float
+    workers: "Sequence[_Worker]", place: str, window_s: float, pool: int, end_s: float
 ) -> list[Answer]:
     """Answers of workers at work at the same time, of those in time; of none near the end."""
     if time.perf_counter() + window_s > end_s:

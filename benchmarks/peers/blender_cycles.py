@@ -1,7 +1,5 @@
 """Blender's Cycles on the CPU: balls of light, few paths, its denoiser."""
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """pyrender: OpenGL, two spots without size, shadows from shadow maps."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Sequence
 

@@ -1,7 +1,5 @@
 """Read exports with the packages of users: ``python -m benchmarks.readers``; see the package."""
 
-from __future__ import annotations
-
 import argparse
 import os
 import subprocess
@@ -90,7 +88,7 @@ def make_data(folder: Path) -> None:
             gen_data.export(folder / "tabletop", RUNS, folder / "runs")
 
 
-def print_table(results: list[tuple[Reader, Comparison | None]]) -> None:
+def print_table(results: "list[tuple[Reader, Comparison | None]]") -> None:
     """Print one row per reader, then what is wrong, and which packages are absent."""
     from rich.console import Console
     from rich.table import Table

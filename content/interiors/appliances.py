@@ -51,11 +51,9 @@ def _case(rng: VariantRng) -> Material:
 def microwave(seed: int = 0) -> Solid:
     """A microwave oven. Slots: case, glass, steel."""
     rng = variant_rng("microwave", seed)
-    d, w, h = (
-        rng.between(0.32, 0.38, "depth_m"),
-        rng.between(0.44, 0.5, "width_m"),
-        rng.between(0.25, 0.29, "height_m"),
-    )
+    d = rng.between(0.32, 0.38, "depth_m")
+    w = rng.between(0.44, 0.5, "width_m")
+    h = rng.between(0.25, 0.29, "height_m")
     x, y = 0.5 * d, 0.5 * w
     body: Box = ((-x, -y, 0.008), (x, y, h))
     patches = [
@@ -72,11 +70,9 @@ def microwave(seed: int = 0) -> Solid:
 def toaster(seed: int = 0) -> Solid:
     """A toaster with two slots. Slots: case, dark."""
     rng = variant_rng("toaster", seed)
-    d, w, h = (
-        rng.between(0.16, 0.19, "depth_m"),
-        rng.between(0.26, 0.3, "width_m"),
-        rng.between(0.17, 0.2, "height_m"),
-    )
+    d = rng.between(0.16, 0.19, "depth_m")
+    w = rng.between(0.26, 0.3, "width_m")
+    h = rng.between(0.17, 0.2, "height_m")
     body: Box = ((-0.5 * d, -0.5 * w, 0.0), (0.5 * d, 0.5 * w, h))
     patches = [cushion(*body, 0, 0.03)]
     for x in (-0.03, 0.03):
@@ -200,11 +196,9 @@ def printer(seed: int = 0) -> Solid:
 def speaker(seed: int = 0) -> Solid:
     """A loudspeaker. Slots: case, cones."""
     rng = variant_rng("speaker", seed)
-    d, w, h = (
-        rng.between(0.15, 0.25, "depth_m"),
-        rng.between(0.14, 0.22, "width_m"),
-        rng.between(0.24, 0.4, "height_m"),
-    )
+    d = rng.between(0.15, 0.25, "depth_m")
+    w = rng.between(0.14, 0.22, "width_m")
+    h = rng.between(0.24, 0.4, "height_m")
     x = 0.5 * d
     body: Box = ((-x, -0.5 * w, 0.0), (x, 0.5 * w, h))
     patches: list[Patch] = [board(*body, 0, 0.004)]
@@ -297,18 +291,12 @@ def basket(seed: int = 0) -> Solid:
 def ottoman(seed: int = 0) -> Solid:
     """A padded footstool. Slots: cover, legs."""
     rng = variant_rng("ottoman", seed)
-    x, y, z = (
-        0.5 * rng.between(0.4, 0.64, "depth_m"),
-        0.5 * rng.between(0.44, 0.8, "width_m"),
-        rng.between(0.36, 0.44, "height_m"),
-    )
+    x = 0.5 * rng.between(0.4, 0.64, "depth_m")
+    y = 0.5 * rng.between(0.44, 0.8, "width_m")
+    z = rng.between(0.36, 0.44, "height_m")
     body: Box = ((-x, -y, 0.06), (x, y, z))
     patches = [cushion(*body, 0, 0.05)]
-    patches += [
-        disc(sx * (x - 0.06), sy * (y - 0.06), 0.0, 0.07, 0.02, 1)
-        for sx in (-1, 1)
-        for sy in (-1, 1)
-    ]
+    patches += [disc(*at, 0.0, 0.07, 0.02, 1) for at in shapes.at_corners(x - 0.06, y - 0.06)]
     return solid(patches, [cloth(rng), wood(rng)], [((-x, -y, 0.0), (x, y, z))])
 
 

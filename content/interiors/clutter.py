@@ -364,11 +364,9 @@ def toothbrush_cup(seed: int = 0) -> Solid:
 def shampoo(seed: int = 0) -> Solid:
     """A bottle of shampoo or shower gel. Slots: bottle, cap, label."""
     rng = variant_rng("shampoo", seed)
-    x, y, h = (
-        0.5 * rng.between(0.036, 0.052, "depth_m"),
-        0.5 * rng.between(0.056, 0.08, "width_m"),
-        rng.between(0.15, 0.22, "height_m"),
-    )
+    x = 0.5 * rng.between(0.036, 0.052, "depth_m")
+    y = 0.5 * rng.between(0.056, 0.08, "width_m")
+    h = rng.between(0.15, 0.22, "height_m")
     body = shapes.rounded_box((2 * x, 2 * y, h), 0.95 * x, 4).moved(0.0, 0.0, 0.5 * h)
     flat = disc(0.0, 0.0, 0.0, 0.012, 0.9 * x, 0, 20)
     cap = disc(0.0, 0.0, h - 0.006, h + 0.025, 0.6 * x, 1, 20)
@@ -494,11 +492,9 @@ def plush_toy(seed: int = 0) -> Solid:
 def backpack(seed: int = 0) -> Solid:
     """A rucksack that stands. Slots: cloth, straps."""
     rng = variant_rng("backpack", seed)
-    x, y, h = (
-        0.5 * rng.between(0.18, 0.24, "depth_m"),
-        0.5 * rng.between(0.28, 0.34, "width_m"),
-        rng.between(0.4, 0.5, "height_m"),
-    )
+    x = 0.5 * rng.between(0.18, 0.24, "depth_m")
+    y = 0.5 * rng.between(0.28, 0.34, "width_m")
+    h = rng.between(0.4, 0.5, "height_m")
     patches = [
         cushion((-x, -y, 0.0), (x, y, h), 0, 0.06),
         cushion((0.7 * x, -0.75 * y, 0.03), (x + 0.05, 0.75 * y, 0.5 * h), 0, 0.03),
@@ -612,12 +608,10 @@ def tape_roll(seed: int = 0) -> Solid:
 def open_carton(seed: int = 0) -> Solid:
     """An open box with packing paper in it. Slots: cardboard, paper."""
     rng = variant_rng("open_carton", seed)
-    x, y, h, t = (
-        0.5 * rng.between(0.3, 0.48, "depth_m"),
-        0.5 * rng.between(0.36, 0.6, "width_m"),
-        rng.between(0.2, 0.36, "height_m"),
-        0.005,
-    )
+    x = 0.5 * rng.between(0.3, 0.48, "depth_m")
+    y = 0.5 * rng.between(0.36, 0.6, "width_m")
+    h = rng.between(0.2, 0.36, "height_m")
+    t = 0.005
     walls: list[Box] = [
         ((-x, -y, 0.0), (x, y, t)),
         ((-x, -y, t), (-x + t, y, h)),
@@ -652,25 +646,10 @@ def trolley(seed: int = 0) -> Solid:
             ((-x, -y, z), (x, -y + 0.004, z + 0.06)), ((-x, y - 0.004, z), (x, y, z + 0.06)),
         ):  # fmt: skip
             patches.append(shapes.block(low, high, 0.0))
-    for sx in (-1, 1):
-        for sy in (-1, 1):
-            patches.append(
-                rod(
-                    (sx * 0.95 * x, sy * 0.97 * y, 0.06),
-                    (sx * 0.95 * x, sy * 0.97 * y, 0.88),
-                    0.01,
-                    1,
-                )
-            )
-            patches.append(
-                rod(
-                    (sx * 0.95 * x, sy * 0.97 * y - 0.012, 0.03),
-                    (sx * 0.95 * x, sy * 0.97 * y + 0.012, 0.03),
-                    0.03,
-                    1,
-                    16,
-                )
-            )
+    for at_x, at_y in shapes.at_corners(0.95 * x, 0.97 * y):
+        patches.append(rod((at_x, at_y, 0.06), (at_x, at_y, 0.88), 0.01, 1))
+        wheel = (at_x, at_y - 0.012, 0.03), (at_x, at_y + 0.012, 0.03)
+        patches.append(rod(*wheel, 0.03, 1, 16))
     paint = painted_material(rng.choose(("#f0efeb", "#26282b", "#7fa39a", "#c9b9a0")), 0.4)
     made = solid(patches, [paint, _DARK], [((-x, -y, 0.0), (x, y, 0.812))])
     corners = (-x + 0.02, -y + 0.02, 0.812), (x - 0.02, y - 0.02, 0.812)

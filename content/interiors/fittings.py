@@ -209,11 +209,9 @@ def rug(seed: int = 0) -> Solid:
             [pile, edge],
             [((-0.7 * r, -0.7 * r, 0.0), (0.7 * r, 0.7 * r, t))],
         )
-    x, y, b = (
-        0.5 * rng.between(1.2, 2.0, "depth_m"),
-        0.5 * rng.between(1.8, 3.0, "width_m"),
-        rng.between(0.04, 0.14),
-    )
+    x = 0.5 * rng.between(1.2, 2.0, "depth_m")
+    y = 0.5 * rng.between(1.8, 3.0, "width_m")
+    b = rng.between(0.04, 0.14)
     whole: Box = ((-x, -y, 0.0), (x, y, t))
     inner: Box = ((-x + b, -y + b, t - 0.001), (x - b, y - b, t + 0.001))
     return solid([shapes.block(*whole, 0.004, 1), shapes.block(*inner)], [pile, edge], [whole])
@@ -574,11 +572,9 @@ def book_row(seed: int = 0) -> Solid:
     if rng.chance(0.5):
         # The last ones lean against the row.
         for _ in range(int(rng.between(1, 3))):
-            thick, h, lean = (
-                rng.between(0.012, 0.03),
-                rng.between(0.17, 0.24),
-                rng.between(0.1, 0.22),
-            )
+            thick = rng.between(0.012, 0.03)
+            h = rng.between(0.17, 0.24)
+            lean = rng.between(0.1, 0.22)
             book = _standing_book((-0.06, 0.0, 0.08), thick, h, int(rng.random() * 9), rng)
             # About its lower edge on the outer side, towards the row.
             turned = [p.moved(0.0, -thick, 0.0).rotated("x", lean) for p in book]
@@ -624,11 +620,9 @@ def _standing_book(
 def picture_frame(seed: int = 0) -> Solid:
     """A framed photograph that stands, leaning back. Slots: frame, mount, print."""
     rng = variant_rng("picture_frame", seed)
-    w, h, f = (
-        rng.between(0.1, 0.2, "width_m"),
-        rng.between(0.13, 0.24, "height_m"),
-        rng.between(0.008, 0.02),
-    )
+    w = rng.between(0.1, 0.2, "width_m")
+    h = rng.between(0.13, 0.24, "height_m")
+    f = rng.between(0.008, 0.02)
     image = rectangle(
         (0.006, -0.5 * w + f, f), (0.0, w - 2 * f, 0.0), (0.0, 0.0, h - 2 * f)
     ).painted(2)

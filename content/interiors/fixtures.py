@@ -294,11 +294,9 @@ def wash_basin(seed: int = 0) -> Solid:
 def bathtub(seed: int = 0) -> Solid:
     """A bathtub. Slots: ceramic, panel, steel."""
     rng = variant_rng("bathtub", seed)
-    d, w, z = (
-        rng.turn((0.7, 0.75, 0.8), "depth_m"),
-        rng.turn((1.6, 1.7, 1.8), "width_m"),
-        rng.between(0.52, 0.58, "height_m"),
-    )
+    d = rng.turn((0.7, 0.75, 0.8), "depth_m")
+    w = rng.turn((1.6, 1.7, 1.8), "width_m")
+    z = rng.between(0.52, 0.58, "height_m")
     x, y = 0.5 * d, 0.5 * w
     outer = shapes.rounded_box((d, w, z), 0.03, 2).moved(0.0, 0.0, 0.5 * z)
     # The upper side is open: a rim around an inner shell.

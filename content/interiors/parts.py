@@ -88,10 +88,14 @@ def four_legs(
 ) -> list[Patch]:
     """Square legs under a rectangle about the origin."""
     x, y, h = 0.5 * depth_m - inset_m, 0.5 * width_m - inset_m, 0.5 * side_m
+    return [board(*post, slot) for post in posts(x, y, top_m, h)]
+
+
+def posts(x_m: float, y_m: float, top_m: float, half_m: float) -> list[Box]:
+    """Posts from the floor with a square section of twice ``half_m``, see ``at_corners``."""
     return [
-        board((sx * x - h, sy * y - h, 0.0), (sx * x + h, sy * y + h, top_m), slot)
-        for sx in (-1, 1)
-        for sy in (-1, 1)
+        ((x - half_m, y - half_m, 0.0), (x + half_m, y + half_m, top_m))
+        for x, y in shapes.at_corners(x_m, y_m)
     ]
 
 

@@ -15,6 +15,7 @@ from gen_data.content.interiors.parts import (
     four_legs,
     front,
     lacquer,
+    posts,
     rod,
     solid,
     upholstery,
@@ -53,11 +54,9 @@ def armchair(seed: int = 0) -> Solid:
 
 def _upholstered(rng: VariantRng, places: int, seat_m: float) -> Solid:
     arm, depth = rng.between(0.12, 0.22, "arm_width_m"), rng.between(0.82, 0.98, "depth_m")
-    seat_z, back_z, leg = (
-        rng.between(0.4, 0.46, "seat_m"),
-        rng.between(0.72, 0.9, "back_m"),
-        rng.between(0.05, 0.15, "leg_m"),
-    )
+    seat_z = rng.between(0.4, 0.46, "seat_m")
+    back_z = rng.between(0.72, 0.9, "back_m")
+    leg = rng.between(0.05, 0.15, "leg_m")
     arm_z, soft = rng.between(0.54, 0.64, "armrest_m"), rng.between(0.03, 0.07, "softness_m")
     w, x0, x1 = seat_m + 2 * arm, -0.5 * depth, 0.5 * depth
     y0, y1 = -0.5 * w, 0.5 * w
@@ -103,9 +102,8 @@ def _upholstered(rng: VariantRng, places: int, seat_m: float) -> Solid:
         )
         patches.append(throw.moved(0.0, side * (0.5 * w - 0.5 * arm), 0.0))
     patches += [
-        disc(sx * (0.5 * depth - 0.09), sy * (0.5 * w - 0.09), 0.0, leg + 0.02, 0.02, 1)
-        for sx in (-1, 1)
-        for sy in (-1, 1)
+        disc(*at, 0.0, leg + 0.02, 0.02, 1)
+        for at in shapes.at_corners(0.5 * depth - 0.09, 0.5 * w - 0.09)
     ]
     seat: Box = ((x0 + 0.17, y0 + arm, leg), (x1, y1 - arm, seat_z))
     looks = [upholstery(rng), wood(rng), fabric(rng, 0.3), fabric(rng, 0.4)]
@@ -162,11 +160,9 @@ def _bent(patch: Patch, wrap_per_m: float, lumbar_m: float) -> Patch:
 def chair(seed: int = 0) -> Solid:
     """A chair for tables, wooden, upholstered or a shell on steel. Slots: seat, legs."""
     rng = variant_rng("chair", seed)
-    w, d, z = (
-        rng.between(0.4, 0.48, "width_m"),
-        rng.between(0.42, 0.48, "depth_m"),
-        rng.between(0.44, 0.47, "seat_m"),
-    )
+    w = rng.between(0.4, 0.48, "width_m")
+    d = rng.between(0.42, 0.48, "depth_m")
+    z = rng.between(0.44, 0.47, "seat_m")
     back_z = rng.between(0.8, 0.98, "back_m")
     kind = rng.turn(("wood", "upholstered", "shell"), "kind")
     soft, back = kind == "upholstered", kind != "wood"
@@ -217,10 +213,8 @@ def chair(seed: int = 0) -> Solid:
 def stool(seed: int = 0) -> Solid:
     """A stool, low or at bar height. Slots: seat, legs."""
     rng = variant_rng("stool", seed)
-    z, r = (
-        rng.turn((0.45, 0.65), "seat_m") + rng.between(-0.02, 0.02),
-        rng.between(0.15, 0.19, "radius_m"),
-    )
+    z = rng.turn((0.45, 0.65), "seat_m") + rng.between(-0.02, 0.02)
+    r = rng.between(0.15, 0.19, "radius_m")
     patches = [disc(0, 0, z - 0.035, z, r, 0, 32)]
     for k in range(4):
         a = 0.25 * math.pi * (2 * k + 1)
@@ -349,11 +343,9 @@ def meeting_table(seed: int = 0) -> Solid:
 def workbench(seed: int = 0) -> Solid:
     """A workbench with a thick top and a lower board. Slots: top, legs."""
     rng = variant_rng("workbench", seed)
-    d, w, z = (
-        rng.between(0.6, 0.75, "depth_m"),
-        rng.between(1.4, 2.0, "width_m"),
-        rng.between(0.82, 0.92, "height_m"),
-    )
+    d = rng.between(0.6, 0.75, "depth_m")
+    w = rng.between(1.4, 2.0, "width_m")
+    z = rng.between(0.82, 0.92, "height_m")
     top: Box = ((-0.5 * d, -0.5 * w, z - 0.05), (0.5 * d, 0.5 * w, z))
     low: Box = ((-0.5 * d + 0.06, -0.5 * w + 0.06, 0.18), (0.5 * d - 0.08, 0.5 * w - 0.06, 0.21))
     patches = [board(*top, 0, 0.005), board(*low, 0), *four_legs(d, w, z - 0.05, 0.07, 1, 0.06)]
@@ -469,9 +461,4 @@ def _round_table(rng: VariantRng, radius_m: float, height_m: float) -> Solid:
 
 
 def _legs_under(depth_m: float, width_m: float, height_m: float) -> Sequence[Box]:
-    x, y = 0.5 * depth_m - 0.05, 0.5 * width_m - 0.05
-    return [
-        ((sx * x - 0.03, sy * y - 0.03, 0.0), (sx * x + 0.03, sy * y + 0.03, height_m - 0.03))
-        for sx in (-1, 1)
-        for sy in (-1, 1)
-    ]
+    return posts(0.5 * depth_m - 0.05, 0.5 * width_m - 0.05, height_m - 0.03, 0.03)

@@ -255,22 +255,18 @@ def cushion_pillow(seed: int = 0) -> Solid:
 def blanket(seed: int = 0) -> Solid:
     """A folded blanket. Slot: cloth."""
     rng = variant_rng("blanket", seed)
-    x, y, layers = (
-        0.5 * rng.between(0.32, 0.44, "depth_m"),
-        0.5 * rng.between(0.4, 0.6, "width_m"),
-        rng.whole(2, 5, "layers"),
-    )
+    x = 0.5 * rng.between(0.32, 0.44, "depth_m")
+    y = 0.5 * rng.between(0.4, 0.6, "width_m")
+    layers = rng.whole(2, 5, "layers")
     return _folded(rng, [(x, y, rng.between(0.022, 0.035))] * layers, [fabric(rng)])
 
 
 def towel_stack(seed: int = 0) -> Solid:
     """Folded towels on each other. Slots: cloths."""
     rng = variant_rng("towel_stack", seed)
-    x, y, count = (
-        0.5 * rng.between(0.22, 0.3, "depth_m"),
-        0.5 * rng.between(0.3, 0.4, "width_m"),
-        rng.whole(2, 7, "count"),
-    )
+    x = 0.5 * rng.between(0.22, 0.3, "depth_m")
+    y = 0.5 * rng.between(0.3, 0.4, "width_m")
+    count = rng.whole(2, 7, "count")
     sizes = [(x * rng.between(0.93, 1.0), y * rng.between(0.93, 1.0), 0.045)] * count
     return _folded(rng, sizes, [parts.cloth(rng), parts.cloth(rng)])
 
@@ -584,11 +580,9 @@ def _over_rail(
 def bath_mat(seed: int = 0) -> Solid:
     """A mat of tufted cloth. Slot: pile."""
     rng = variant_rng("bath_mat", seed)
-    x, y, t = (
-        0.5 * rng.between(0.44, 0.56, "depth_m"),
-        0.5 * rng.between(0.64, 0.84, "width_m"),
-        0.016,
-    )
+    x = 0.5 * rng.between(0.44, 0.56, "depth_m")
+    y = 0.5 * rng.between(0.64, 0.84, "width_m")
+    t = 0.016
     pile = Material(draw_linear(PALETTES["cloth"], 0.1, rng), 1.0)
     look = patterned_material(f"texture/carpet?seed={int(rng.between(0, 16))}", 0.5, 1.0)
     body: parts.Box = ((-x, -y, 0.0), (x, y, t))

@@ -16,6 +16,7 @@ from gen_data.content.interiors.parts import (
     front,
     handle,
     lacquer,
+    posts,
     rod,
     solid,
     wood,
@@ -63,46 +64,6 @@ def carcass(
     return made
 
 
-def wardrobe(seed: int = 0) -> Solid:
-    """A wardrobe without its left door. Slots: carcass, front, handle."""
-    return _cupboard("wardrobe", seed)
-
-
-def wardrobe_door(seed: int = 0) -> Solid:
-    """The left door of the wardrobe of the same seed. Slots: carcass, front, handle."""
-    return _cupboard_door("wardrobe", seed)
-
-
-def kitchen_unit(seed: int = 0) -> Solid:
-    """A base unit of 0.9 m, without its door. Slots: carcass, front, handle, worktop."""
-    return _cupboard("kitchen_unit", seed)
-
-
-def kitchen_unit_door(seed: int = 0) -> Solid:
-    """The door of the base unit of the same seed."""
-    return _cupboard_door("kitchen_unit", seed)
-
-
-def wall_unit(seed: int = 0) -> Solid:
-    """A wall unit, without its left door. Slots: carcass, front, handle."""
-    return _cupboard("wall_unit", seed)
-
-
-def wall_unit_door(seed: int = 0) -> Solid:
-    """The left door of the wall unit of the same seed."""
-    return _cupboard_door("wall_unit", seed)
-
-
-def refrigerator(seed: int = 0) -> Solid:
-    """A refrigerator without its upper door. Slots: carcass, front, handle."""
-    return _cupboard("refrigerator", seed)
-
-
-def refrigerator_door(seed: int = 0) -> Solid:
-    """The upper door of the refrigerator of the same seed."""
-    return _cupboard_door("refrigerator", seed)
-
-
 def _measures(family: str, seed: int) -> tuple[VariantRng, float, float, float, float, int]:
     """Draws, depth, width, lower and upper edge of the fronts, and number of doors."""
     rng = variant_rng(family, seed)
@@ -146,7 +107,8 @@ def _looks(family: str, rng: VariantRng, seed: int) -> list[Material]:
     return [body, body if rng.chance(0.5) else lacquer(rng), steel]
 
 
-def _cupboard(family: str, seed: int) -> Solid:
+def cupboard(family: str, seed: int) -> Solid:
+    """A cupboard without the door that opens. Slots: carcass, front, handle, then worktop."""
     rng, d, w, low, high, doors = _measures(family, seed)
     levels = _levels_m(family, low, high)
     x, half = 0.5 * d, 0.5 * w
@@ -205,7 +167,8 @@ def _levels_m(family: str, low_m: float, high_m: float) -> tuple[float, ...]:
     return tuple(low_m + _T + k * (high_m - low_m - _T) / count for k in range(count))
 
 
-def _cupboard_door(family: str, seed: int) -> Solid:
+def cupboard_door(family: str, seed: int) -> Solid:
+    """The door that opens of the cupboard of the same seed. Slots: carcass, front, handle."""
     rng, _, w, low, high, doors = _measures(family, seed)
     h, width = high - low, w / doors
     thick = 0.045 if family == "refrigerator" else 0.018
@@ -268,46 +231,6 @@ def _grip(low: float, high: float) -> float:
     return high - 0.14 if high < 1.0 else 1.05
 
 
-def dresser(seed: int = 0) -> Solid:
-    """A chest of drawers, without its top drawer. Slots: carcass, front, handle."""
-    return _chest("dresser", seed)
-
-
-def dresser_drawer(seed: int = 0) -> Solid:
-    """The top drawer of the dresser of the same seed."""
-    return _drawer("dresser", seed)
-
-
-def bedside_table(seed: int = 0) -> Solid:
-    """A bedside table, without its top drawer. Slots: carcass, front, handle."""
-    return _chest("bedside_table", seed)
-
-
-def bedside_table_drawer(seed: int = 0) -> Solid:
-    """The top drawer of the bedside table of the same seed."""
-    return _drawer("bedside_table", seed)
-
-
-def filing_cabinet(seed: int = 0) -> Solid:
-    """A steel cabinet for files, without its top drawer. Slots: carcass, front, handle."""
-    return _chest("filing_cabinet", seed)
-
-
-def filing_cabinet_drawer(seed: int = 0) -> Solid:
-    """The top drawer of the filing cabinet of the same seed."""
-    return _drawer("filing_cabinet", seed)
-
-
-def tool_cabinet(seed: int = 0) -> Solid:
-    """A cabinet for tools, without its top drawer. Slots: carcass, front, handle."""
-    return _chest("tool_cabinet", seed)
-
-
-def tool_cabinet_drawer(seed: int = 0) -> Solid:
-    """The top drawer of the tool cabinet of the same seed."""
-    return _drawer("tool_cabinet", seed)
-
-
 def _chest_measures(family: str, seed: int) -> tuple[VariantRng, float, float, float, float, int]:
     """Draws, depth, width, height, height of the feet, number of drawers."""
     rng = variant_rng(family, seed)
@@ -356,7 +279,8 @@ def _chest_looks(family: str, rng: VariantRng) -> list[Material]:
     return [body, body if rng.chance(0.6) else lacquer(rng), steel]
 
 
-def _chest(family: str, seed: int) -> Solid:
+def chest(family: str, seed: int) -> Solid:
+    """A chest without its top drawer. Slots: carcass, front, handle."""
     rng, d, w, z, feet, count = _chest_measures(family, seed)
     boards = carcass(d, w, feet, z)
     patches = [board(*b) for b in boards]
@@ -376,16 +300,14 @@ def _chest(family: str, seed: int) -> Solid:
         )
         patches.append(rail)
         boxes.append(face)
-    for sx in (-1, 1):
-        for sy in (-1, 1):
-            px, py = sx * (x - 0.04), sy * (0.5 * w - 0.04)
-            patches.append(board((px - 0.018, py - 0.018, 0.0), (px + 0.018, py + 0.018, feet), 0))
+    patches += [board(*post) for post in posts(x - 0.04, 0.5 * w - 0.04, feet, 0.018)]
     made = solid(patches, _chest_looks(family, rng), boxes)
     slide = Keypoint("slide", (x, 0.0, z - _T * 0.5 - h), 0.05)
     return replace(made, keypoints=(slide,))
 
 
-def _drawer(family: str, seed: int) -> Solid:
+def drawer(family: str, seed: int) -> Solid:
+    """The top drawer of the chest of the same seed. Slots: carcass, front, handle."""
     rng, d, w, z, feet, count = _chest_measures(family, seed)
     h, depth, half = (z - feet - _T) / count, d - 0.04, 0.5 * w - 0.022
     boxes: list[Box] = [
@@ -403,22 +325,18 @@ def _drawer(family: str, seed: int) -> Solid:
 def bookcase(seed: int = 0) -> Solid:
     """A bookcase. Slot: boards."""
     rng = variant_rng("bookcase", seed)
-    d, w, z = (
-        rng.between(0.26, 0.36, "depth_m"),
-        rng.turn((0.4, 0.8, 1.0), "width_m"),
-        rng.between(0.9, 2.05, "height_m"),
-    )
+    d = rng.between(0.26, 0.36, "depth_m")
+    w = rng.turn((0.4, 0.8, 1.0), "width_m")
+    z = rng.between(0.9, 2.05, "height_m")
     return _shelves(d, w, z, [front(rng)])
 
 
 def steel_rack(seed: int = 0) -> Solid:
     """A rack of steel for storage. Slots: boards, posts."""
     rng = variant_rng("steel_rack", seed)
-    d, w, z = (
-        rng.between(0.4, 0.55, "depth_m"),
-        rng.between(0.9, 1.3, "width_m"),
-        rng.between(1.7, 2.0, "height_m"),
-    )
+    d = rng.between(0.4, 0.55, "depth_m")
+    w = rng.between(0.9, 1.3, "width_m")
+    z = rng.between(1.7, 2.0, "height_m")
     paint = painted_material(rng.choose(("#a9adb0", "#3b4046", "#2f5d7c")), 0.4)
     return _shelves(d, w, z, [metal_material(ZINC, 0.45), paint], posts=True)
 
@@ -672,11 +590,9 @@ def _mixed(seed: int, rng: VariantRng) -> tuple[list[Patch], list[Material], flo
 def storage_box(seed: int = 0) -> Solid:
     """A closed box of cardboard or plastic. Slots: body, lid."""
     rng = variant_rng("storage_box", seed)
-    x, y, z = (
-        0.5 * rng.between(0.28, 0.44, "depth_m"),
-        0.5 * rng.between(0.3, 0.56, "width_m"),
-        rng.between(0.18, 0.4, "height_m"),
-    )
+    x = 0.5 * rng.between(0.28, 0.44, "depth_m")
+    y = 0.5 * rng.between(0.3, 0.56, "width_m")
+    z = rng.between(0.18, 0.4, "height_m")
     low: Box = ((-x, -y, 0.0), (x, y, z - 0.03))
     lid: Box = ((-x - 0.006, -y - 0.006, z - 0.06), (x + 0.006, y + 0.006, z))
     if rng.chance(0.5):
@@ -694,11 +610,9 @@ def storage_box(seed: int = 0) -> Solid:
 def tv_stand(seed: int = 0) -> Solid:
     """A low board for a television. Slots: carcass, front, handle."""
     rng = variant_rng("tv_stand", seed)
-    d, w, z = (
-        rng.between(0.38, 0.45, "depth_m"),
-        rng.between(1.2, 1.9, "width_m"),
-        rng.between(0.4, 0.55, "height_m"),
-    )
+    d = rng.between(0.38, 0.45, "depth_m")
+    w = rng.between(1.2, 1.9, "width_m")
+    z = rng.between(0.4, 0.55, "height_m")
     boards = carcass(d, w, 0.1, z, 1)
     patches = [board(*b) for b in boards]
     x = 0.5 * d
@@ -706,14 +620,7 @@ def tv_stand(seed: int = 0) -> Solid:
     for k in (0, 2):
         a = -0.5 * w + k * third
         patches.append(board((x, a + 0.003, 0.103), (x + 0.018, a + third - 0.003, z - 0.003), 1))
-    patches += [
-        board(
-            (sx * (x - 0.05) - 0.02, sy * (0.5 * w - 0.1) - 0.02, 0.0),
-            (sx * (x - 0.05) + 0.02, sy * (0.5 * w - 0.1) + 0.02, 0.1),
-        )
-        for sx in (-1, 1)
-        for sy in (-1, 1)
-    ]
+    patches += [board(*post) for post in posts(x - 0.05, 0.5 * w - 0.1, 0.1, 0.02)]
     body = front(rng)
     whole: Box = ((-x, -0.5 * w, 0.0), (x + 0.018, 0.5 * w, z))
     return solid(patches, [body, body if rng.chance(0.5) else lacquer(rng)], [whole])

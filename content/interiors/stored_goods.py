@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -172,7 +173,7 @@ def groceries(seed: int = 0) -> Solid:
     group = _Group()
     makers: tuple[Callable[[int], Solid], ...] = (
         packaging.milk_carton, packaging.carton, packaging.carton, bottles.jar, bottles.jar,
-        bottles.bottle, tableware.bowl,
+        bottles.bottle, partial(tableware.vessel, "bowl"),
     )  # fmt: skip
     for x in (0.1, -0.08):
         y = -0.2

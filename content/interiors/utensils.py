@@ -13,6 +13,7 @@ from gen_data.content.interiors.parts import (
     cushion,
     disc,
     handle,
+    posts,
     rod,
     solid,
     wood,
@@ -34,11 +35,9 @@ def _plastic(rng: VariantRng) -> Material:
 def toolbox(seed: int = 0) -> Solid:
     """A toolbox with a handle. Slots: body, dark."""
     rng = variant_rng("toolbox", seed)
-    x, y, h = (
-        0.5 * rng.between(0.18, 0.24, "depth_m"),
-        0.5 * rng.between(0.4, 0.54, "width_m"),
-        rng.between(0.17, 0.23, "height_m"),
-    )
+    x = 0.5 * rng.between(0.18, 0.24, "depth_m")
+    y = 0.5 * rng.between(0.4, 0.54, "width_m")
+    h = rng.between(0.17, 0.23, "height_m")
     body: Box = ((-x, -y, 0.0), (x, y, h))
     patches = [
         shapes.block((-x, -y, 0.0), (x, y, 0.68 * h), 0.008),
@@ -79,21 +78,16 @@ def paint_can(seed: int = 0) -> Solid:
 def crate(seed: int = 0) -> Solid:
     """An open crate of slats. Slot: wood."""
     rng = variant_rng("crate", seed)
-    x, y, h = (
-        0.5 * rng.between(0.28, 0.4, "depth_m"),
-        0.5 * rng.between(0.4, 0.6, "width_m"),
-        rng.between(0.18, 0.3, "height_m"),
-    )
+    x = 0.5 * rng.between(0.28, 0.4, "depth_m")
+    y = 0.5 * rng.between(0.4, 0.6, "width_m")
+    h = rng.between(0.18, 0.3, "height_m")
     boxes: list[Box] = [((-x, -y, 0.0), (x, y, 0.014))]
     rows = max(2, round(h / 0.1))
     for k in range(rows):
         a, b = k * h / rows + 0.006, (k + 1) * h / rows - 0.012
         boxes += [((sx * x - 0.007, -y, a), (sx * x + 0.007, y, b)) for sx in (-1, 1)]
         boxes += [((-x, sy * y - 0.007, a), (x, sy * y + 0.007, b)) for sy in (-1, 1)]
-    for sx in (-1, 1):
-        for sy in (-1, 1):
-            px, py = sx * (x - 0.02), sy * (y - 0.02)
-            boxes.append(((px - 0.012, py - 0.012, 0.0), (px + 0.012, py + 0.012, h)))
+    boxes += posts(x - 0.02, y - 0.02, h, 0.012)
     return solid([board(*b) for b in boxes], [wood(rng, 0.8)], boxes)
 
 

@@ -31,11 +31,9 @@ SHELF_BRACKET_M = 0.12
 def wall_shelf(seed: int = 0) -> Solid:
     """A board on brackets. Slots: board, brackets."""
     rng = variant_rng("wall_shelf", seed)
-    d, w, t = (
-        rng.between(0.18, 0.26, "depth_m"),
-        rng.between(0.6, 1.2, "width_m"),
-        rng.between(0.02, 0.035, "thickness_m"),
-    )
+    d = rng.between(0.18, 0.26, "depth_m")
+    w = rng.between(0.6, 1.2, "width_m")
+    t = rng.between(0.02, 0.035, "thickness_m")
     top = SHELF_BRACKET_M + t
     shelf: Box = ((0.0, -0.5 * w, SHELF_BRACKET_M), (d, 0.5 * w, top))
     patches = [board(*shelf, 0, 0.003)]
@@ -234,12 +232,10 @@ def wall_calendar(seed: int = 0) -> Solid:
 def bathroom_cabinet(seed: int = 0) -> Solid:
     """A cabinet with mirrors for doors. Slots: body, mirror."""
     rng = variant_rng("bathroom_cabinet", seed)
-    w, h, d, doors = (
-        rng.between(0.55, 0.9, "width_m"),
-        rng.between(0.6, 0.75, "height_m"),
-        0.14,
-        rng.turn((1, 2, 3), "doors"),
-    )
+    w = rng.between(0.55, 0.9, "width_m")
+    h = rng.between(0.6, 0.75, "height_m")
+    d = 0.14
+    doors = rng.turn((1, 2, 3), "doors")
     body: Box = ((0.0, -0.5 * w, 0.0), (d, 0.5 * w, h))
     patches = [board(*body)]
     for k in range(doors):

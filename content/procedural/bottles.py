@@ -105,10 +105,8 @@ def bottle(seed: int) -> Solid:
     """A bottle of one of the styles in ``BOTTLES``. Slots: body, label, cap, then contents."""
     rng, choice = variant_rng("bottle", seed), choose_bottle(seed)
     style = BOTTLES[choice.kind]
-    height, radius = (
-        rng.between(*style.height_m, "height_m"),
-        rng.between(*style.radius_m, "radius_m"),
-    )
+    height = rng.between(*style.height_m, "height_m")
+    radius = rng.between(*style.radius_m, "radius_m")
     neck_z = height * rng.between(*style.neck_share)
     z0, z1 = height * style.label_share[0], min(height * style.label_share[1], neck_z - 0.01)
     shoulder = [

@@ -85,11 +85,9 @@ def knife(seed: int) -> Solid:
     """A table or kitchen knife lying on its side, edge towards -Y. Slots: blade, handle."""
     rng = variant_rng("knife", seed)
     style = KNIVES[knife_kind(seed)]
-    size, grip, deep = (
-        rng.between(*style.size),
-        rng.between(0.9, 1.15, "grip_scale"),
-        rng.between(0.88, 1.1, "deep_scale"),
-    )
+    size = rng.between(*style.size)
+    grip = rng.between(0.9, 1.15, "grip_scale")
+    deep = rng.between(0.88, 1.1, "deep_scale")
     handle = _even(*((x, grip * wide, z, thick) for x, wide, z, thick in style.handle))
     blade = [(x, deep * low, high, style.z, thick, 0.0) for x, low, high, thick in style.blade]
     finish = _GRIPS[rng.choose(style.grips)](rng) if style.grips else None

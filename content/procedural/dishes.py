@@ -3,8 +3,6 @@
 Measures are those that shops and recipes state (assumed, within 15 %).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
@@ -37,9 +35,9 @@ class Dish(NamedTuple):
     """Food on z = 0 around the Z axis.
 
     Attributes:
-        patches: Their slots count from 0.
+        patches: Their slots count from 0; of helpings on a plate, from the first free one.
         materials: One per slot.
-        hulls: Convex parts in physics.
+        hulls: Convex parts in physics; none of crumbs and smears.
     """
 
     patches: list[Patch]
@@ -168,11 +166,8 @@ def _fillings(width: Array, rng: VariantRng) -> tuple[list[Patch], list[Material
         else:
             r = 0.42 * min(half_x, half_y)
             discs = [
-                puck(r * rng.between(0.85, 1.05), 0.005, rng).moved(
-                    sx * 0.48 * half_x, sy * 0.48 * half_y, z
-                )
-                for sx in (-1.0, 1.0)
-                for sy in (-1.0, 1.0)
+                puck(r * rng.between(0.85, 1.05), 0.005, rng).moved(*at, z)
+                for at in shapes.at_corners(0.48 * half_x, 0.48 * half_y)
             ]
             made.append(join_patches(discs).painted(slot))
             tints.append(
@@ -403,7 +398,7 @@ def _topping(kind: str, size: float, height: float, rng: VariantRng) -> Patch:
     return puck(size, height, rng)
 
 
-def torus(radius: float, halves: Point, around: int, section: int) -> Patch:
+def torus(radius: float, halves: "Point", around: int, section: int) -> Patch:
     """A ring about Z with an elliptical section of half axes (across, up)."""
     turn = np.concatenate([np.arange(section), [0]]) * (2.0 * math.pi / section)
     profile = [(radius + halves[0] * math.cos(t), halves[1] * math.sin(t)) for t in turn.tolist()]
@@ -551,11 +546,9 @@ def _whole_cake(seed: int, rng: VariantRng) -> Dish:
 
 def _cupcake(seed: int, rng: VariantRng) -> Dish:
     """A cup of paper with a swirl of icing."""
-    foot, rim, high = (
-        rng.between(0.022, 0.026, "foot_m"),
-        rng.between(0.032, 0.037, "rim_m"),
-        rng.between(0.036, 0.044, "height_m"),
-    )
+    foot = rng.between(0.022, 0.026, "foot_m")
+    rim = rng.between(0.032, 0.037, "rim_m")
+    high = rng.between(0.036, 0.044, "height_m")
     pleats = 28
     profile = shapes.fillet(
         [(0.0, 0.0), (foot, 0.0), (rim, high), (0.0, high + 0.003)], [0.0, 0.002, 0.002, 0.0], 2

@@ -82,93 +82,19 @@ STYLES: Mapping[str, FruitStyle] = load_table(__package__, "fruits", FruitStyle)
 _OWN_SKINS = ("apple_skin", "citrus_peel")
 
 
-def apple(seed: int) -> Solid:
-    """An apple, whole or halved. Slots: skin, then flesh, stalk, leaf."""
-    return _round_fruit("apple", seed)
-
-
-def orange(seed: int) -> Solid:
-    """An orange or mandarin, whole or halved. Slots: peel, then flesh, stalk, leaf."""
-    return _round_fruit("orange", seed)
-
-
-def lemon(seed: int) -> Solid:
-    """A lemon lying along X, or half a one. Slots: peel, then flesh, leaf."""
-    return _round_fruit("lemon", seed)
-
-
-def lime(seed: int) -> Solid:
-    """A lime lying along X, or half a one. Slots: peel, flesh."""
-    return _round_fruit("lime", seed)
-
-
-def kiwi(seed: int) -> Solid:
-    """A kiwi fruit lying along X, or half a one. Slots: skin, flesh."""
-    return _round_fruit("kiwi", seed)
-
-
-def tomato(seed: int) -> Solid:
-    """A tomato with its green star. Slots: skin, calyx."""
-    return _round_fruit("tomato", seed)
-
-
-def bell_pepper(seed: int) -> Solid:
-    """A sweet pepper. Slots: skin, stalk."""
-    return _round_fruit("bell_pepper", seed)
-
-
-def peach(seed: int) -> Solid:
-    """A peach or nectarine. Slots: skin, leaf."""
-    return _round_fruit("peach", seed)
-
-
-def plum(seed: int) -> Solid:
-    """A plum. Slots: skin, stalk."""
-    return _round_fruit("plum", seed)
-
-
-def strawberry(seed: int) -> Solid:
-    """A strawberry, most of them on their side. Slots: skin, calyx."""
-    return _round_fruit("strawberry", seed)
-
-
-def carrot(seed: int) -> Solid:
-    """A carrot lying along X. Slots: skin, stump of the leaves."""
-    return _round_fruit("carrot", seed)
-
-
 def fruit_kind(group: str, seed: int) -> str:
     """Key in ``fruits.yaml`` of a variant of a group."""
     kinds = [name.partition("/")[2] for name in STYLES if name.startswith(f"{group}/")]
     return f"{group}/{variant_rng(group, seed).turn(kinds, 'kind')}"
 
 
-def apple_facts(seed: int) -> Facts:
-    """Whether it is cut."""
-    return Facts(fruit_kind("apple", seed).partition("/")[2])
+def round_fruit_facts(group: str, seed: int) -> Facts:
+    """Kind, such as mandarin, or whether it is cut."""
+    return Facts(fruit_kind(group, seed).partition("/")[2])
 
 
-def lemon_facts(seed: int) -> Facts:
-    """Whether it is cut."""
-    return Facts(fruit_kind("lemon", seed).partition("/")[2])
-
-
-def lime_facts(seed: int) -> Facts:
-    """Whether it is cut."""
-    return Facts(fruit_kind("lime", seed).partition("/")[2])
-
-
-def kiwi_facts(seed: int) -> Facts:
-    """Whether it is cut."""
-    return Facts(fruit_kind("kiwi", seed).partition("/")[2])
-
-
-def orange_facts(seed: int) -> Facts:
-    """Mandarin, or whether it is cut."""
-    return Facts(fruit_kind("orange", seed).partition("/")[2])
-
-
-def _round_fruit(group: str, seed: int) -> Solid:
+def round_fruit(group: str, seed: int) -> Solid:
+    """A fruit of a group, whole or halved. Slots: skin, then flesh, stalk, leaf."""
     rng, style = variant_rng(group, seed), STYLES[fruit_kind(group, seed)]
     shape, top = _draw_shape(style, rng)
     skin = f"texture/fruit_skin?kind={style.skin}&seed={seed}"

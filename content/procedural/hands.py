@@ -245,11 +245,9 @@ def _arm(
         turn = 2.0 * math.pi * np.arange(sides) / sides
         folds = np.zeros((len(steps), sides))
         for _ in range(5):
-            k, tilt, phase = (
-                rng.choose((1, 2, 2, 3)),
-                rng.between(60.0, 160.0),
-                rng.between(0.0, 6.28),
-            )
+            k = rng.choose((1, 2, 2, 3))
+            tilt = rng.between(60.0, 160.0)
+            phase = rng.between(0.0, 6.28)
             folds += 0.0007 * np.sin(k * turn[None] + tilt * steps[:, None] + phase)
         hem = 0.0016 * np.exp(-(((steps - cuff) / 0.012) ** 2))[:, None]
         outer = hand_shape.arm_rings(bones, stout, steps, loose + folds + hem, sides)

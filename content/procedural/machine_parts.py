@@ -192,10 +192,8 @@ class _Gear:
 
 
 def _draw_gear(rng: VariantRng) -> _Gear:
-    teeth, module = (
-        rng.choose((14, 16, 18, 20, 24), "teeth"),
-        rng.choose((0.0015, 0.002, 0.0025), "module_m"),
-    )
+    teeth = rng.choose((14, 16, 18, 20, 24), "teeth")
+    module = rng.choose((0.0015, 0.002, 0.0025), "module_m")
     thick, pitch = rng.between(0.006, 0.014, "thickness_m"), 0.5 * teeth * module
     bore = rng.between(0.25, 0.35) * pitch
     hub = thick + rng.between(0.004, 0.01) if rng.chance(0.6) else 0.0

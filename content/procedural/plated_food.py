@@ -6,7 +6,6 @@ Sizes of portions are assumed from cookbooks, within 25 %; a meal is scaled to i
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -35,26 +34,12 @@ _GREENS = ("#5f8f2e", "#7fae44", "#4f7a2a")
 _SAUCES = ("#a8321a", "#8a4a1c", "#c98a24", "#6a2a14", "#7a8a3a")
 
 
-class Meal(NamedTuple):
-    """Food on z = 0 around the Z axis.
-
-    Attributes:
-        patches: With slots from the first free one.
-        materials: One per slot.
-        hulls: Convex parts in physics; none of crumbs and smears.
-    """
-
-    patches: list[Patch]
-    materials: list[Material]
-    hulls: list[Array]
-
-
 def choose_meal(number: int) -> str:
     """The meal of a number; consecutive numbers take them in turn."""
     return in_turn(tuple(_MEALS), number)
 
 
-def serve(name: str, seed: int, radius: float, slot: int, rng: VariantRng) -> Meal:
+def serve(name: str, seed: int, radius: float, slot: int, rng: VariantRng) -> Dish:
     """A meal on a plate.
 
     Args:
@@ -75,8 +60,8 @@ def serve(name: str, seed: int, radius: float, slot: int, rng: VariantRng) -> Me
     ]
     materials = [material for _, material in helpings]
     if name in _LEFT_OVER:
-        return Meal(patches, [replace(m, role=CONTENTS) for m in materials], [])
-    return Meal(
+        return Dish(patches, [replace(m, role=CONTENTS) for m in materials], [])
+    return Dish(
         patches, materials, [wrap(np.concatenate([p.corners_m.reshape(-1, 3) for p in patches]))]
     )
 

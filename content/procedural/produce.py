@@ -24,10 +24,8 @@ def grapes(seed: int) -> Solid:
     """
     rng = variant_rng("grapes", seed)
     count = grape_count(seed)
-    thick, slim = (
-        rng.between(0.0075, 0.0115, "berry_radius_m"),
-        rng.choose((1.0, 1.05, 1.15, 1.35), "slim"),
-    )
+    thick = rng.between(0.0075, 0.0115, "berry_radius_m")
+    slim = rng.choose((1.0, 1.05, 1.15, 1.35), "slim")
     places = _packed(count, thick, rng)
     berry = shapes.ball(lambda d: thick * d * np.array([1.0, 1.0, slim]), 7, 10)
     groups: tuple[list[Patch], ...] = ([], [], [])
@@ -92,10 +90,8 @@ def _packed(count: int, radius: float, rng: VariantRng) -> Array:
 
 def _stalk(places: Array, rng: VariantRng) -> tuple[Patch, list[Patch]]:
     """The main stalk, out of the bunch towards +X, and short side twigs inside."""
-    end, middle = (
-        places[:, 0].max(),
-        places[places[:, 0] > np.quantile(places[:, 0], 0.7)].mean(axis=0),
-    )
+    end = places[:, 0].max()
+    middle = places[places[:, 0] > np.quantile(places[:, 0], 0.7)].mean(axis=0)
     start = np.quantile(places[:, 0], 0.25)
     out = rng.between(0.02, 0.04)
     knots = [

@@ -225,6 +225,11 @@ def extrude(
     return join_patches([*walls, top, _cap(inner, 0.0, slot).flipped()])
 
 
+def at_corners(x_m: float, y_m: float) -> tuple[Point2, ...]:
+    """Corners of a rectangle about the origin: (-x, -y), (-x, y), (x, -y), (x, y) [m]."""
+    return ((-x_m, -y_m), (-x_m, y_m), (x_m, -y_m), (x_m, y_m))
+
+
 def circle(radius_m: float, sides: int, centre: Point2 = (0.0, 0.0), phase: float = 0.0) -> Array:
     """Counter-clockwise points of a circle, shape [sides, 2]."""
     turn = 2.0 * math.pi * (np.arange(sides) + phase) / sides

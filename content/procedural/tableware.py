@@ -72,61 +72,6 @@ _PARTS_MAX = 24
 HANDLES: Mapping[str, Handle] = load_table(__package__, "handles", Handle)
 
 
-def mug(seed: int) -> Solid:
-    """A mug with its handle towards +X. Slots: outside, inside, handle, contents."""
-    return _vessel("mug", seed)
-
-
-def cup(seed: int) -> Solid:
-    """A cup for hot or cold drinks. Slots: outside, inside, then handle, contents and parts."""
-    return _vessel("cup", seed)
-
-
-def tumbler(seed: int) -> Solid:
-    """A drinking glass with a thick bottom. Slots: outside, inside, then handle and contents."""
-    return _vessel("tumbler", seed)
-
-
-def wine_glass(seed: int) -> Solid:
-    """A glass on a stem. Slots: outside, inside, contents."""
-    return _vessel("wine_glass", seed)
-
-
-def bowl(seed: int) -> Solid:
-    """A bowl, empty or with food. Slots: outside, inside, contents."""
-    return _vessel("bowl", seed)
-
-
-def vase(seed: int) -> Solid:
-    """A vase of ceramic or glass. Slots: outside, inside, contents."""
-    return _vessel("vase", seed)
-
-
-def cup_symmetries(seed: int) -> tuple[Symmetry, ...]:
-    """Any turn about Z of plain cups; see ``vessel_symmetries``."""
-    return vessel_symmetries("cup", seed)
-
-
-def tumbler_symmetries(seed: int) -> tuple[Symmetry, ...]:
-    """Any turn about Z of round glasses, a side of those with flat sides."""
-    return vessel_symmetries("tumbler", seed)
-
-
-def wine_glass_symmetries(seed: int) -> tuple[Symmetry, ...]:
-    """Any turn about Z."""
-    return vessel_symmetries("wine_glass", seed)
-
-
-def bowl_symmetries(seed: int) -> tuple[Symmetry, ...]:
-    """Any turn about Z of plain bowls without food."""
-    return vessel_symmetries("bowl", seed)
-
-
-def vase_symmetries(seed: int) -> tuple[Symmetry, ...]:
-    """Any turn about Z of plain vases."""
-    return vessel_symmetries("vase", seed)
-
-
 def vessel_symmetries(group: str, seed: int) -> tuple[Symmetry, ...]:
     """Any turn about Z, or those of its flat sides; none where a handle or a print shows it."""
     choice = vessels.choose(group, seed)
@@ -140,43 +85,14 @@ _UNEVEN = {*FOODS, "iced_tea", "iced_coffee", "water", "cola", "whisky", "cappuc
            "coffee", "white_coffee", "cocoa", "espresso"}  # fmt: skip
 
 
-def mug_facts(seed: int) -> Facts:
+def vessel_facts(group: str, seed: int) -> Facts:
     """Kind and contents."""
-    return _facts("mug", seed)
-
-
-def cup_facts(seed: int) -> Facts:
-    """Kind and contents."""
-    return _facts("cup", seed)
-
-
-def tumbler_facts(seed: int) -> Facts:
-    """Kind and contents."""
-    return _facts("tumbler", seed)
-
-
-def wine_glass_facts(seed: int) -> Facts:
-    """Kind and contents."""
-    return _facts("wine_glass", seed)
-
-
-def bowl_facts(seed: int) -> Facts:
-    """Kind and contents."""
-    return _facts("bowl", seed)
-
-
-def vase_facts(seed: int) -> Facts:
-    """Kind and contents."""
-    return _facts("vase", seed)
-
-
-def _facts(group: str, seed: int) -> Facts:
     choice = vessels.choose(group, seed)
     contents = {"contents": choice.content} if choice.content else {}
     return Facts(choice.kind.partition("/")[2], contents)
 
 
-def _vessel(group: str, seed: int) -> Solid:
+def vessel(group: str, seed: int) -> Solid:
     """Walls, handle, contents, then parts that stand on, around or under the vessel."""
     choice, rng = vessels.choose(group, seed), variant_rng(group, seed)
     style = vessels.STYLES[choice.kind]

@@ -38,10 +38,8 @@ def screwdriver(seed: int) -> Solid:
     profile = [(0.55 * radius, 0.0), (0.97 * radius, 0.1 * grip), (0.97 * radius, 0.6 * grip),
                (0.7 * radius, 0.82 * grip), (0.6 * radius, grip)]  # fmt: skip
     parts = [*hulls.stack(profile, 16), hulls.frustum((shaft, grip), (shaft, end), 12)]
-    plastic, steel = (
-        presets.plastic_material(rng),
-        presets.metal_material(presets.ZINC, rng.between(0.2, 0.35)),
-    )
+    plastic = presets.plastic_material(rng)
+    steel = presets.metal_material(presets.ZINC, rng.between(0.2, 0.35))
     materials = (plastic, steel, presets.plastic_material(rng, ("#202124",)))
     laid = [piece.rotated("y", _LAID) for piece in pieces]
     return make_centred_solid(laid, materials, [rotate(part, "y", _LAID) for part in parts])

@@ -119,10 +119,8 @@ def choose(group: str, seed: int) -> Choice:
 
 def draw_walls(style: VesselStyle, rng: VariantRng) -> Walls:
     """Draw the measures of a vessel that stands on z = 0."""
-    height, radius = (
-        rng.between(*style.height_m, "height_m"),
-        rng.between(*style.radius_m, "radius_m"),
-    )
+    height = rng.between(*style.height_m, "height_m")
+    radius = rng.between(*style.radius_m, "radius_m")
     wall, floor = rng.between(*style.wall_m, "wall_m"), rng.between(*style.floor_m)
     knots = [(r * radius, z * height) for r, z in style.outline]
     foot, arc = knots[0][0], style.corner * radius

@@ -1,7 +1,5 @@
 """Surfaces of roads and junctions, and their textures."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import fields
 

@@ -1,7 +1,5 @@
 """Iron castings in streets, once across the image: manhole covers, hatches, gratings of gullies."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -4,8 +4,6 @@ Row spacings: maize and potatoes 0.75 m, cereals 0.125 m, furrows 0.4 m, as mach
 (assumed, 10 %). Colours are assumed, from photographs.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The surface of a road, and patches that lie on it."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -10,9 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from gen_data.content.procedural.patches import Array, Patch
-from gen_data.content.roads.lane_textures import TILE_M
-from gen_data.content.roads.painted_signs import split_convex
-from gen_data.content.roads.road_materials import SCALES_M
+from gen_data.content.roads import lane_textures, painted_signs, road_materials
 from gen_data.roads.reference_line import ReferenceLine
 
 PAINT_LIFT_M = 0.003
@@ -83,7 +79,7 @@ class Deck:
         s, t = np.meshgrid(self.rows(*span_m), np.array(t_m), indexing="ij")
         u = (t - t[0, 0]) / (t[0, -1] - t[0, 0])
         u = u if t[0, 0] < -1e-9 else 1.0 - u
-        uv = np.stack([u, s / TILE_M], axis=2)
+        uv = np.stack([u, s / lane_textures.TILE_M], axis=2)
         return mapped_surface(self.at(s, t, lift_m), uv, self.slots[slot])
 
     def edge(
@@ -95,7 +91,7 @@ class Deck:
             self.rows(*span_m), np.array(self.columns_between(low, high)), indexing="ij"
         )
         u = 0.5 * (t - inner_m) / (outer_m - inner_m)
-        uv = np.stack([u, s / SCALES_M[slot]], axis=2)
+        uv = np.stack([u, s / road_materials.SCALES_M[slot]], axis=2)
         return mapped_surface(self.at(s, t, lift_m), uv, self.slots[slot])
 
     def sheet(self, s_m: Array, t_m: Array, slot: str, lift_m: float = 0.0) -> Patch:
@@ -136,14 +132,14 @@ class Deck:
         for polygon in polygons:
             placed = np.array(at_m) + sign * polygon
             rows = self.rows(float(placed[:, 0].min()), float(placed[:, 0].max()))[1:-1]
-            for part in split_convex(placed, 1, columns):
-                for piece in split_convex(part, 0, tuple(float(s) for s in rows)):
+            for part in painted_signs.split_convex(placed, 1, columns):
+                for piece in painted_signs.split_convex(part, 0, tuple(float(s) for s in rows)):
                     patches.append(self._fan(piece, slot, lift_m))
         return patches
 
     def _fan(self, st: Array, slot: str, lift_m: float) -> Patch:
         points = self.at(st[:, 0], st[:, 1], lift_m)
-        uv = st / SCALES_M[slot]
+        uv = st / road_materials.SCALES_M[slot]
         count = len(st) - 2
         index = np.stack(
             [np.zeros(count, int), np.arange(1, count + 1), np.arange(2, count + 2)], 1
@@ -171,8 +167,8 @@ def surface(points: Array, plan_m: Array, slot: str, number: int) -> Patch:
 
     Slots without a scale show their texture once.
     """
-    if slot in SCALES_M:
-        uv = plan_m / SCALES_M[slot]
+    if slot in road_materials.SCALES_M:
+        uv = plan_m / road_materials.SCALES_M[slot]
     else:
         low, high = plan_m.min(axis=(0, 1)), plan_m.max(axis=(0, 1))
         uv = (plan_m - low) / np.maximum(high - low, 1e-9)

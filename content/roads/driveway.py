@@ -3,14 +3,11 @@
 Frame: metres, Z up, X away from the road, origin at the kerb's foot in the middle of the driveway.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from gen_data.assets.family import Solid
 from gen_data.content.procedural.patches import make_solid_in_place
-from gen_data.content.roads.deck import surface
-from gen_data.content.roads.road_materials import ground_material
+from gen_data.content.roads import deck, road_materials
 from gen_data.core.errors import AssetError
 
 RAMP_M = 0.45
@@ -50,7 +47,7 @@ def driveway(
     y = np.array([-half - _FLANK_M, -half, half, half + _FLANK_M])
     plan = np.stack(np.meshgrid(x, y, indexing="ij"), axis=2)
     z = np.stack([covered, crown, crown, covered], axis=1)
-    top = surface(np.concatenate([plan, z[..., None]], axis=2), plan, "pavement", 0)
+    top = deck.surface(np.concatenate([plan, z[..., None]], axis=2), plan, "pavement", 0)
     slab = np.array([[a, b, c] for a in (-RAMP_M, depth_m) for b in (-half, half)
                      for c in (0.0, max(kerb_m, rise_m, _PROUD_M))])  # fmt: skip
-    return make_solid_in_place([top], (ground_material("asphalt", seed),), [slab])
+    return make_solid_in_place([top], (road_materials.ground_material("asphalt", seed),), [slab])

@@ -1,7 +1,5 @@
 """Fields beside a road: parcels of crops in rows, headlands, tracks between them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from itertools import pairwise
@@ -10,9 +8,8 @@ import numpy as np
 
 from gen_data.assets.family import Solid, check_option
 from gen_data.content.procedural.patches import Array, Patch, join_patches, make_solid_in_place
+from gen_data.content.roads import deck, lane_textures
 from gen_data.content.roads.crop_textures import CROP_TILE_M, CROPS, STAND_TILE_M
-from gen_data.content.roads.deck import mapped_surface
-from gen_data.content.roads.lane_textures import TILE_M
 from gen_data.core.asset_types import Material
 from gen_data.core.variant_rng import VariantRng, variant_rng
 from gen_data.roads.fields_shape import TRACK_M, FieldsShape, Parcel
@@ -133,7 +130,7 @@ def _laid(plan: FieldsShape, s_m: Array, away_m: Array, z_m: Array, uv: Array, s
     points = np.concatenate([plan.points(s_m, away_m), z_m[..., None]], axis=2)
     if plan.side < 0.0:
         points, uv = points[:, ::-1], uv[:, ::-1]
-    return mapped_surface(points, uv, slot)
+    return deck.mapped_surface(points, uv, slot)
 
 
 def _edges(
@@ -158,7 +155,7 @@ def _edges(
         heights = np.stack([np.full(12, -0.1), top], axis=1)
         points = np.concatenate([flat, heights[..., None]], axis=2)
         uv = np.stack(np.broadcast_arrays(across[:, None] / STAND_TILE_M, [[0.0, 0.485]]), axis=2)
-        patch = mapped_surface(points, uv, slot)
+        patch = deck.mapped_surface(points, uv, slot)
         # Seen from the road, larger arc lengths are on the right of a left field.
         yield patch if outward * plan.side > 0.0 else patch.flipped()
 
@@ -168,7 +165,7 @@ def _track(plan: FieldsShape, start_m: float, slot: int) -> Patch:
     s, away = np.meshgrid(
         [start_m, start_m + TRACK_M], [-1.0, 0.5 * plan.depth_m, plan.depth_m], indexing="ij"
     )
-    uv = np.stack([(s - start_m) / TRACK_M, away / TILE_M], axis=2)
+    uv = np.stack([(s - start_m) / TRACK_M, away / lane_textures.TILE_M], axis=2)
     return _laid(plan, s, away, np.full(s.shape, 0.5 * _LIFT_M), uv, slot)
 
 

@@ -1,14 +1,11 @@
 """The land around: a wide plane with low relief, finer in its middle than at its edges."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from gen_data.assets.family import Solid, check_option
 from gen_data.content.procedural import collision_hulls as hulls
 from gen_data.content.procedural.patches import make_solid_in_place
-from gen_data.content.roads.deck import surface
-from gen_data.content.roads.road_materials import GROUNDS, ground_material
+from gen_data.content.roads import deck, road_materials
 from gen_data.core.variant_rng import variant_rng
 
 _CELLS = 56
@@ -32,7 +29,7 @@ def ground(
     Raises:
         AssetError: the cover is unknown.
     """
-    check_option("ground", "cover", cover, GROUNDS)
+    check_option("ground", "cover", cover, road_materials.GROUNDS)
     even = np.linspace(-1.0, 1.0, _CELLS + 1)
     graded = even * (0.25 + 0.75 * even * even)
     x, y = np.meshgrid(0.5 * size_m[0] * graded, 0.5 * size_m[1] * graded, indexing="ij")
@@ -40,7 +37,7 @@ def ground(
     soft = 0.25 * sum(np.roll(drawn, shift, axis) for axis in (0, 1) for shift in (0, 1))
     z = -relief_m * (1.0 - np.clip(soft, 0.0, 1.0))
     plan = np.stack([x, y], axis=2)
-    patch = surface(np.stack([x, y, z], axis=2), plan, "ground", 0)
+    patch = deck.surface(np.stack([x, y, z], axis=2), plan, "ground", 0)
     low, high = (-0.5 * size_m[0], -0.5 * size_m[1]), (0.5 * size_m[0], 0.5 * size_m[1])
     slab = hulls.box((*low, -relief_m - 0.5), (*high, 0.0))
-    return make_solid_in_place([patch], (ground_material(cover, seed),), [slab])
+    return make_solid_in_place([patch], (road_materials.ground_material(cover, seed),), [slab])

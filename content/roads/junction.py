@@ -1,7 +1,5 @@
 """The surface of a junction: carriageway, kerbs, sidewalks, stop lines and crosswalks."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
@@ -11,16 +9,10 @@ import numpy as np
 
 from gen_data.assets.family import Solid
 from gen_data.content.procedural.patches import Array, Patch
+from gen_data.content.roads import road_materials
 from gen_data.content.roads.deck import PAINT_LIFT_M, surface
 from gen_data.content.roads.junction_wear import worn_surface
 from gen_data.content.roads.markings import NARROW_M, ZEBRA_BAR_M
-from gen_data.content.roads.road_materials import (
-    SCALES_M,
-    UNPAVED,
-    make_street_solid,
-    number_slots,
-    split_look,
-)
 from gen_data.roads.cross_section import (
     APRON_DROPS,
     APRON_FALL_M,
@@ -51,11 +43,11 @@ def junction(*, crossings: str = "zebra", **others: Any) -> Solid:
         crossings: Style of the crosswalks: ``zebra``, ``ladder``, ``lines`` or ``none``.
         others: Fields of ``StreetLook`` and of ``JunctionShape``.
     """
-    look, shape = split_look(others)
+    look, shape = road_materials.split_look(others)
     profile = JunctionShape(**shape)
-    slots = number_slots(look)
+    slots = road_materials.number_slots(look)
     fan = make_fan(profile)
-    paved = look.carriageway not in UNPAVED
+    paved = look.carriageway not in road_materials.UNPAVED
     patches = [_carriageway(fan, slots["asphalt"]), *worn_surface(profile, fan, look, slots)]
     for number in range(len(profile.arms_rad())):
         if profile.sidewalk_m > 0.0:
@@ -63,7 +55,7 @@ def junction(*, crossings: str = "zebra", **others: Any) -> Solid:
         patches.append(_land(profile, number, slots["ground"]))
         if paved:
             patches += arm_paint(profile, number, crossings, slots["marking"])
-    return make_street_solid(patches, look, _hulls(profile, fan))
+    return road_materials.make_street_solid(patches, look, _hulls(profile, fan))
 
 
 def _carriageway(fan: Fan, slot: int) -> Patch:
@@ -74,7 +66,9 @@ def _fan_patch(center: Array, line: Array, name: str, slot: int) -> Patch:
     after = np.roll(line, -1, axis=0)
     corners = np.stack([np.broadcast_to(center, line.shape), line, after], axis=1)
     return Patch(
-        corners, corners[..., :2] / SCALES_M[name], np.full(len(corners), slot, dtype=np.int64)
+        corners,
+        corners[..., :2] / road_materials.SCALES_M[name],
+        np.full(len(corners), slot, dtype=np.int64),
     )
 
 

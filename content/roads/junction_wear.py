@@ -1,7 +1,5 @@
 """Traces of age and use on a junction: lanes through it, mended patches, sealed cracks, gutters."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -9,11 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gen_data.content.procedural.patches import Array, Patch
-from gen_data.content.roads.deck import mapped_surface
-from gen_data.content.roads.lane_textures import TILE_M
-from gen_data.content.roads.painted_signs import clip_convex
-from gen_data.content.roads.road_materials import SCALES_M, UNPAVED, StreetLook
-from gen_data.content.roads.road_wear import GUTTER_M
+from gen_data.content.roads import deck, lane_textures, painted_signs, road_materials, road_wear
 from gen_data.core.variant_rng import VariantRng, variant_rng
 from gen_data.roads.junction_shape import ArmsShape, Fan, JunctionShape, corner, lane_middle_m
 
@@ -37,11 +31,11 @@ class _Frame:
 
 
 def worn_surface(
-    shape: JunctionShape, fan: Fan, look: StreetLook, slots: dict[str, int]
+    shape: JunctionShape, fan: Fan, look: road_materials.StreetLook, slots: dict[str, int]
 ) -> Iterator[Patch]:
     """All traces on the carriageway of a junction."""
     yield from _lanes(shape, fan, slots)
-    if look.carriageway in UNPAVED:
+    if look.carriageway in road_materials.UNPAVED:
         return
     rng = variant_rng("junction/wear", look.seed)
     reach = shape.curve_end_m()
@@ -143,15 +137,17 @@ def _laid(
     edges = shares @ (triangles[near, 1:] - triangles[near, :1])
     feet = triangles[near, 0] + np.array([0.0, 0.0, lift_m])
     for foot, edge, plan in zip(feet, edges, local[near], strict=True):
-        piece = clip_convex(clip_convex(plan, 0, *x_m), 1, *y_m)
+        piece = painted_signs.clip_convex(painted_signs.clip_convex(plan, 0, *x_m), 1, *y_m)
         if len(piece) < 3:
             continue
         points = foot + (piece - plan[0]) @ edge
         if lane_m > 0.0:
             u = (piece[:, 1] - y_m[0]) / lane_m
-            uv = np.column_stack([u if y_m[0] < 0.0 else 1.0 - u, piece[:, 0] / TILE_M])
+            uv = np.column_stack(
+                [u if y_m[0] < 0.0 else 1.0 - u, piece[:, 0] / lane_textures.TILE_M]
+            )
         else:
-            uv = piece / SCALES_M["asphalt_new"]
+            uv = piece / road_materials.SCALES_M["asphalt_new"]
         count = len(piece) - 2
         index = np.stack(
             [np.zeros(count, int), np.arange(1, count + 1), np.arange(2, count + 2)], 1
@@ -168,10 +164,10 @@ def _triangles(fan: Fan) -> Array:
 
 def gutter_band(shape: ArmsShape, number: int, slot: int) -> Patch:
     """Dirt along the kerb of a corner: half its texture from the clean surface to the kerb."""
-    lines = [corner(shape, number, -GUTTER_M), corner(shape, number, 0.0)]
+    lines = [corner(shape, number, -road_wear.GUTTER_M), corner(shape, number, 0.0)]
     steps = np.sqrt((np.diff(lines[1], axis=0) ** 2).sum(axis=1))
-    along = np.concatenate([[0.0], np.cumsum(steps)]) / SCALES_M["gutter"]
+    along = np.concatenate([[0.0], np.cumsum(steps)]) / road_materials.SCALES_M["gutter"]
     plan = np.stack(lines[::-1], axis=1)
     z = shape.height_m(plan.reshape(-1, 2)).reshape(plan.shape[:2]) + _GUTTER_LIFT_M
     uv = np.stack(np.broadcast_arrays(np.array([[0.5, 0.0]]), along[:, None]), axis=2)
-    return mapped_surface(np.concatenate([plan, z[..., None]], axis=2), uv, slot)
+    return deck.mapped_surface(np.concatenate([plan, z[..., None]], axis=2), uv, slot)

@@ -5,8 +5,6 @@ of different wear follow each other without a seam. Images are 1024 pixels along
 12 mm and 7 mm each in a lane 3.5 m wide, because cameras see roads foreshortened.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

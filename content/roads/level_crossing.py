@@ -1,7 +1,5 @@
 """Level crossings: rails and panels across a road; ``scenery.railway`` has the track beside it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 
@@ -9,9 +7,8 @@ import numpy as np
 
 from gen_data.assets.family import Solid
 from gen_data.content.procedural.patches import Patch
+from gen_data.content.roads import road, road_materials
 from gen_data.content.roads.deck import PAINT_LIFT_M, Deck
-from gen_data.content.roads.road import make_deck
-from gen_data.content.roads.road_materials import make_street_solid, split_look
 from gen_data.roads.cross_section import RoadShape, strips
 
 GAUGE_M, HEAD_M = 1.435, 0.072
@@ -30,9 +27,9 @@ def level_crossing(*, station_m: float = 60.0, **others: Any) -> Solid:
         station_m: Middle of the track along the road.
         others: Fields of ``StreetLook`` and of ``RoadShape``; those of the road.
     """
-    look, shape = split_look(others)
+    look, shape = road_materials.split_look(others)
     profile = RoadShape(**shape)
-    deck = make_deck(profile, look)
+    deck = road.make_deck(profile, look)
     right, left = (_edge_m(profile, side) for side in (-1, 1))
     across = deck.columns_between(-right, left)
     start = station_m - 0.5 * PANEL_M
@@ -53,7 +50,7 @@ def level_crossing(*, station_m: float = 60.0, **others: Any) -> Solid:
     points = np.concatenate([patch.corners_m.reshape(-1, 3) for patch in patches])
     (x0, y0, z0), (x1, y1, z1) = points.min(axis=0), points.max(axis=0)
     ground = np.array([[x, y, z] for x in (x0, x1) for y in (y0, y1) for z in (z0 - 0.02, z1)])
-    return make_street_solid(patches, look, [ground])
+    return road_materials.make_street_solid(patches, look, [ground])
 
 
 def _edge_m(profile: RoadShape, side: int) -> float:

@@ -5,8 +5,6 @@ Narrow lines are 0.12 m wide (0.15 m on motorways), broad ones 0.25 m; dashes ar
 the bars of a zebra crossing 0.50 m with gaps of 0.50 m.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass

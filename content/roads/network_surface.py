@@ -1,7 +1,5 @@
 """The surface of the roads of an OpenDRIVE file."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -9,13 +7,7 @@ import numpy as np
 
 from gen_data.assets.family import Solid
 from gen_data.content.procedural.patches import Array, Patch
-from gen_data.content.roads.deck import PAINT_LIFT_M, surface
-from gen_data.content.roads.road_materials import (
-    SLOT_OF,
-    StreetLook,
-    make_street_solid,
-    number_slots,
-)
+from gen_data.content.roads import deck, road_materials
 from gen_data.roads.lane_graph import stations
 from gen_data.roads.opendrive import Network, Road, Section
 from gen_data.roads.opendrive_lanes import heights_m, origin_m
@@ -30,8 +22,8 @@ def network_solid(network: Network) -> Solid:
 
     Slots are those of ``street_materials``; the origin is ``origin_m``.
     """
-    look = StreetLook()
-    slots = number_slots(look)
+    look = road_materials.StreetLook()
+    slots = road_materials.number_slots(look)
     x, y = origin_m(network)
     patches: list[Patch] = []
     hulls: list[Array] = []
@@ -42,7 +34,7 @@ def network_solid(network: Network) -> Solid:
                 # Parts of a section of the file have the same marks.
                 patches += (p.moved(-x, -y) for p in _marks(road, section, slots["marking"]))
             hulls += (hull - np.array([x, y, 0.0]) for hull in _hulls(road, section))
-    return make_street_solid(patches, look, hulls)
+    return road_materials.make_street_solid(patches, look, hulls)
 
 
 def _strips(road: Road, section: Section, slots: dict[str, int]) -> Iterator[Patch]:
@@ -58,7 +50,7 @@ def _strips(road: Road, section: Section, slots: dict[str, int]) -> Iterator[Pat
             if abs(float(inner[0] - below[0])) > 1e-6:
                 yield kerb.patch((t_in, t_in), (below, inner), "kerb")
             if float(np.abs(t_out - t_in).max()) > 1e-3:
-                slot = SLOT_OF.get(lane.kind, "asphalt")
+                slot = road_materials.SLOT_OF.get(lane.kind, "asphalt")
                 # A profile that bends within a lane takes several strips.
                 parts = _SHAPED_PARTS if road.shape_m.stations else 1
                 shares = np.linspace(0.0, 1.0, parts + 1)
@@ -89,7 +81,7 @@ class _Band:
         points = np.stack(lines, axis=1)
         # The plan is the world's, so that roads that overlap in a junction show one surface.
         plan = points[..., :2] + points[..., 2:] * np.array([1.0, 1.0])
-        return surface(points, plan, slot, self.slots[slot])
+        return deck.surface(points, plan, slot, self.slots[slot])
 
 
 def _marks(road: Road, section: Section, slot: int) -> Iterator[Patch]:
@@ -101,11 +93,11 @@ def _marks(road: Road, section: Section, slot: int) -> Iterator[Patch]:
             whole = (stations(start, end, _STEP_M),)
             for s in _dashes(section.origin_m, start, end) if broken else whole:
                 t = road.boundaries_m(section, s)[number]
-                lift = np.full(len(s), PAINT_LIFT_M + heights_m(lane)[1] * (number != 0))
+                lift = np.full(len(s), deck.PAINT_LIFT_M + heights_m(lane)[1] * (number != 0))
                 half = 0.5 * mark.width_m
                 sides = [road.points(section, s, t + k * half, lift) for k in (-1, 1)]
                 plan = np.stack([np.stack([s, t + k * half], 1) for k in (-1, 1)], axis=1)
-                yield surface(np.stack(sides, 1), plan, "marking", slot)
+                yield deck.surface(np.stack(sides, 1), plan, "marking", slot)
 
 
 def _dashes(origin_m: float, start_m: float, end_m: float) -> Iterator[Array]:

@@ -6,8 +6,6 @@ of blocked areas at 45 degrees in bars of 0.25 or 0.50 m (Austria, Bodenmarkieru
 Arrows of 5 m, letters of 2.4 m and all shapes are assumed, within a fifth of those in Europe.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from itertools import pairwise

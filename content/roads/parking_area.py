@@ -1,7 +1,5 @@
 """The surface of a car park: asphalt, and the lines of its bays."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -9,14 +7,7 @@ import numpy as np
 from gen_data.assets.family import Solid
 from gen_data.content.procedural import collision_hulls as hulls
 from gen_data.content.procedural.patches import Patch
-from gen_data.content.roads.deck import PAINT_LIFT_M, surface
-from gen_data.content.roads.markings import NARROW_M
-from gen_data.content.roads.road_materials import (
-    UNPAVED,
-    make_street_solid,
-    number_slots,
-    split_look,
-)
+from gen_data.content.roads import deck, markings, road_materials
 from gen_data.core.se3 import Vec3
 from gen_data.roads.parking_shape import EDGE_M, ParkingShape
 
@@ -30,16 +21,16 @@ def parking_area(**parameters: Any) -> Solid:
         parameters: Fields of ``StreetLook`` and of ``ParkingShape``. Sidewalks have no area here,
             as all streets share one set of slots.
     """
-    look, shape = split_look(parameters)
+    look, shape = road_materials.split_look(parameters)
     profile = ParkingShape(**{**shape, **_round_counts(shape)})
-    slots = number_slots(look)
+    slots = road_materials.number_slots(look)
     x, y = 0.5 * profile.length_m + EDGE_M, 0.5 * profile.width_m + EDGE_M
     patches = [_rectangle((-x, -y), (x, y), 0.0, "asphalt", slots["asphalt"])]
     patches.append(_skirt(x, y, slots["ground"]))
-    for low, high in _lines(profile) if look.carriageway not in UNPAVED else ():
-        patches.append(_rectangle(low, high, PAINT_LIFT_M, "marking", slots["marking"]))
+    for low, high in _lines(profile) if look.carriageway not in road_materials.UNPAVED else ():
+        patches.append(_rectangle(low, high, deck.PAINT_LIFT_M, "marking", slots["marking"]))
     slab = hulls.box((-x, -y, -0.3), (x, y, 0.0))
-    return make_street_solid(patches, look, [slab])
+    return road_materials.make_street_solid(patches, look, [slab])
 
 
 def _round_counts(shape: dict[str, Any]) -> dict[str, int]:
@@ -51,7 +42,7 @@ Point = tuple[float, float]
 
 def _lines(shape: ParkingShape) -> list[tuple[Point, Point]]:
     """Rectangles of paint: one line between bays, one where two rows meet."""
-    half, made = 0.5 * NARROW_M, []
+    half, made = 0.5 * markings.NARROW_M, []
     for number in range(shape.aisles):
         y = shape.aisle_y_m(number)
         for side in (1.0, -1.0):
@@ -70,7 +61,7 @@ def _lines(shape: ParkingShape) -> list[tuple[Point, Point]]:
 def _rectangle(low: Point, high: Point, z_m: float, name: str, slot: int) -> Patch:
     x, y = np.meshgrid([low[0], high[0]], [low[1], high[1]], indexing="ij")
     plan = np.stack([x, y], axis=2)
-    return surface(np.stack([x, y, np.full_like(x, z_m)], axis=2), plan, name, slot)
+    return deck.surface(np.stack([x, y, np.full_like(x, z_m)], axis=2), plan, name, slot)
 
 
 def _skirt(x: float, y: float, slot: int) -> Patch:
@@ -80,4 +71,4 @@ def _skirt(x: float, y: float, slot: int) -> Patch:
     outer = inner + np.sign(inner) * np.array([_APRON_M, _APRON_M, 0.0])
     outer[:, 2] = _APRON_Z_M
     points = np.stack([outer, inner], axis=1)
-    return surface(points, points[..., :2], "ground", slot)
+    return deck.surface(points, points[..., :2], "ground", slot)

@@ -1,7 +1,5 @@
 """Paved areas beside roads: forecourts and squares."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from gen_data.assets.family import Solid, check_option

@@ -1,7 +1,5 @@
 """Roads: carriageway, markings, kerbs, sidewalks, verges, traces of use; zebra crossings."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from itertools import pairwise
 from typing import Any
@@ -11,17 +9,10 @@ import numpy as np
 from gen_data.assets.family import Solid, check_option
 from gen_data.content.procedural.patches import Array, Patch
 from gen_data.content.procedural.surface_shapes import block
+from gen_data.content.roads import road_materials
 from gen_data.content.roads.deck import PAINT_LIFT_M, Deck, surface
 from gen_data.content.roads.markings import ZEBRA_BAR_M, bay_lines, paint_stripe, stripes
 from gen_data.content.roads.painted_signs import ARROW_M, arrow, bicycle, hatching
-from gen_data.content.roads.road_materials import (
-    SLOT_OF,
-    UNPAVED,
-    StreetLook,
-    make_street_solid,
-    number_slots,
-    split_look,
-)
 from gen_data.content.roads.road_wear import gutters, lane_tiles, wear_patches
 from gen_data.core.variant_rng import VariantRng, variant_rng
 from gen_data.roads.cross_section import (
@@ -66,11 +57,11 @@ def road(  # noqa: PLR0913 - a family's parameters are its function's
         tram: Whether the lanes next to the middle have the rails of a tramway.
         others: Fields of ``StreetLook`` and of ``RoadShape``.
     """
-    look, shape = split_look(others)
+    look, shape = road_materials.split_look(others)
     profile = RoadShape(**shape)
     deck = make_deck(profile, look)
     rng = variant_rng("road", look.seed)
-    paved = look.carriageway not in UNPAVED
+    paved = look.carriageway not in road_materials.UNPAVED
     patches = list(_carriageway(deck, profile, look))
     for side in (1, -1):
         patches += _beside(deck, profile, side, apron_m)
@@ -90,10 +81,10 @@ def road(  # noqa: PLR0913 - a family's parameters are its function's
                 patches += bay_lines(deck, strip, profile)
         if rails[0 if side > 0 else 1]:
             patches += _guard_rail(deck, profile, side)
-    return make_street_solid(patches, look, _hulls(deck, profile))
+    return road_materials.make_street_solid(patches, look, _hulls(deck, profile))
 
 
-def make_deck(profile: RoadShape, look: StreetLook) -> Deck:
+def make_deck(profile: RoadShape, look: road_materials.StreetLook) -> Deck:
     """The surface of a road with the ruts that traffic has worn into it."""
     t = np.array(sorted({round(v, 6) for v in _columns(profile)}))
     z = height_m(profile, t)
@@ -102,7 +93,9 @@ def make_deck(profile: RoadShape, look: StreetLook) -> Deck:
             if strip.kind == "driving":
                 for track in (strip.middle_m - _TRACK_M, strip.middle_m + _TRACK_M):
                     z = z - look.wear * _RUT_M * np.exp(-(((t - track) / _RUT_WIDTH_M) ** 2))
-    return Deck(profile.line(), t, z, abs(profile.curvature_per_m), number_slots(look))
+    return Deck(
+        profile.line(), t, z, abs(profile.curvature_per_m), road_materials.number_slots(look)
+    )
 
 
 def _columns(profile: RoadShape) -> Iterator[float]:
@@ -116,7 +109,9 @@ def _columns(profile: RoadShape) -> Iterator[float]:
                 yield side * (strip.inner_m + _BATTER_M)
 
 
-def _carriageway(deck: Deck, profile: RoadShape, look: StreetLook) -> Iterator[Patch]:
+def _carriageway(
+    deck: Deck, profile: RoadShape, look: road_materials.StreetLook
+) -> Iterator[Patch]:
     whole = (0.0, profile.length_m)
     if any(profile.turn_m):
         yield from _turn_lanes(deck, profile)
@@ -131,7 +126,7 @@ def _carriageway(deck: Deck, profile: RoadShape, look: StreetLook) -> Iterator[P
                 for span, slot in lane_tiles(profile.length_m, look.wear, rng):
                     yield deck.lane(span, t, slot)
             else:
-                slot = SLOT_OF[strip.kind]
+                slot = road_materials.SLOT_OF[strip.kind]
                 coated = strip.kind == "bicycle" and look.coating != "none"
                 yield deck.ribbon(whole, t, "coating" if coated else slot)
 
@@ -378,7 +373,7 @@ def crosswalk(
         others: Fields of ``StreetLook`` and of ``RoadShape``; those of the road.
     """
     check_option("crosswalk", "style", style, ("zebra", "ladder"))
-    look, shape = split_look(others)
+    look, shape = road_materials.split_look(others)
     profile = RoadShape(**shape)
     deck = make_deck(profile, look)
     low, high = -profile.carriageway_m(-1), profile.carriageway_m(1)
@@ -398,7 +393,7 @@ def crosswalk(
     s, t = np.meshgrid(span, [low, high], indexing="ij")
     top = deck.at(s, t).reshape(-1, 3)
     hull = np.concatenate([top, top - np.array([0.0, 0.0, 0.02])])
-    return make_street_solid(patches, look, [hull])
+    return road_materials.make_street_solid(patches, look, [hull])
 
 
 def _cover_lines(deck: Deck, profile: RoadShape, span_m: tuple[float, float]) -> Iterator[Patch]:

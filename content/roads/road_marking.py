@@ -1,7 +1,5 @@
 """One sign painted on a road: an arrow, a word, a bicycle, a blocked area, a line across a lane."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from itertools import pairwise
@@ -11,10 +9,9 @@ import numpy as np
 
 from gen_data.assets.family import Solid, check_option
 from gen_data.content.procedural.patches import Array
+from gen_data.content.roads import road, road_materials
 from gen_data.content.roads.deck import PAINT_LIFT_M
 from gen_data.content.roads.painted_signs import ARROWS, arrow, bicycle, hatching, word_polygons
-from gen_data.content.roads.road import make_deck
-from gen_data.content.roads.road_materials import make_street_solid, split_look
 from gen_data.roads.cross_section import RoadShape
 
 SIGNS = (*ARROWS, "word", "bicycle", "blocked_area", "stop_line", "give_way", "zigzag")
@@ -49,16 +46,16 @@ def road_marking(
         AssetError: the sign or a letter of the text is unknown.
     """
     check_option("road_marking", "sign", sign, SIGNS)
-    look, shape = split_look(others)
+    look, shape = road_materials.split_look(others)
     profile = RoadShape(**shape)
-    deck = make_deck(profile, look)
+    deck = road.make_deck(profile, look)
     polygons = list(_polygons(sign, text.removeprefix("_"), area_m, width_m))
     patches = deck.paint(polygons, (station_m, across_m), turned > 0.0, lift_m=_LIFT_M)
     points = np.concatenate([patch.corners_m.reshape(-1, 3) for patch in patches])
     low, high = points.min(axis=0), points.max(axis=0)
     ground = np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1])
                        for z in (low[2] - 0.02, high[2])])  # fmt: skip
-    return make_street_solid(patches, look, [ground])
+    return road_materials.make_street_solid(patches, look, [ground])
 
 
 def _polygons(sign: str, text: str, length_m: float, width_m: float) -> Iterator[Array]:

@@ -4,8 +4,6 @@ Source: Pomerantz et al., "The effect of pavements' temperatures on air temperat
 cities", LBNL-43442, 2000 (new asphalt 0.04-0.05, aged 0.1-0.15, concrete 0.25-0.4).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any

@@ -3,8 +3,6 @@
 Grounds have 1024 pixels: 6 mm each at their usual repeat of 5 to 7 m.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from gen_data.content.procedural.textures.texture_images import (

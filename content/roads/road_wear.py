@@ -1,7 +1,5 @@
 """Traces of age and use on a road: worn tiles, patches, trenches, seams, gutters, broken edges."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 

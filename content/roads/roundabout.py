@@ -1,7 +1,5 @@
 """The surface of a roundabout: ring, truck apron, planted island, splitter islands, sidewalks."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from itertools import pairwise
@@ -12,22 +10,10 @@ import numpy as np
 from gen_data.assets.family import Solid
 from gen_data.content.procedural.patches import Array, Patch
 from gen_data.content.procedural.surface_shapes import triangulate
+from gen_data.content.roads import road_materials
 from gen_data.content.roads.deck import PAINT_LIFT_M, surface
 from gen_data.content.roads.junction import arm_paint, corner_patches
-from gen_data.content.roads.road_materials import (
-    SCALES_M,
-    UNPAVED,
-    make_street_solid,
-    number_slots,
-    split_look,
-)
-from gen_data.roads.cross_section import (
-    APRON_DROPS,
-    APRON_FALL_M,
-    APRON_M,
-    APRON_STEPS,
-    KERB_WIDTH_M,
-)
+from gen_data.roads import cross_section
 from gen_data.roads.junction_shape import arm_points, corner
 from gen_data.roads.roundabout_shape import RoundaboutShape
 
@@ -44,10 +30,10 @@ def roundabout(*, crossings: str = "zebra", **others: Any) -> Solid:
         crossings: Style of the crosswalks: ``zebra``, ``ladder``, ``lines`` or ``none``.
         others: Fields of ``StreetLook`` and of ``RoundaboutShape``.
     """
-    look, fields = split_look(others)
+    look, fields = road_materials.split_look(others)
     shape = RoundaboutShape(**fields)
-    slots = number_slots(look)
-    paved = look.carriageway not in UNPAVED
+    slots = road_materials.number_slots(look)
+    paved = look.carriageway not in road_materials.UNPAVED
     patches = [*_ring(shape, slots), *_island(shape, slots)]
     for number in range(len(shape.arms_rad())):
         if shape.sidewalk_m > 0.0:
@@ -58,7 +44,7 @@ def roundabout(*, crossings: str = "zebra", **others: Any) -> Solid:
         if paved:
             patches += arm_paint(shape, number, crossings, slots["marking"], stop_line=False)
             patches += _yield_line(shape, number, slots["marking"])
-    return make_street_solid(patches, look, _hulls(shape))
+    return road_materials.make_street_solid(patches, look, _hulls(shape))
 
 
 def _ring(shape: RoundaboutShape, slots: dict[str, int]) -> Iterator[Patch]:
@@ -89,7 +75,7 @@ def _island(shape: RoundaboutShape, slots: dict[str, int]) -> Iterator[Patch]:
     turn = np.linspace(0.0, math.tau, 49)
     unit = np.stack([np.cos(turn), np.sin(turn)], axis=1)
     base = float(shape.height_m(np.array([[shape.island_m, 0.0]]))[0])
-    top, edge = base + shape.kerb_m + 0.02, shape.island_m - KERB_WIDTH_M
+    top, edge = base + shape.kerb_m + 0.02, shape.island_m - cross_section.KERB_WIDTH_M
     kerb = ((shape.island_m, base), (shape.island_m - 0.02, top), (edge, top))
     yield _revolved(unit, kerb, "kerb", slots["kerb"])
     radii = edge * np.linspace(1.0, 0.0, 6)
@@ -122,7 +108,7 @@ def _splitter(shape: RoundaboutShape, number: int, slots: dict[str, int]) -> Ite
     flat = triangulate(rim[:-1])
     corners = np.concatenate([flat, np.full((*flat.shape[:2], 1), z)], axis=2)
     count = np.full(len(flat), slots["pavement"], dtype=np.int64)
-    yield Patch(corners, flat / SCALES_M["pavement"], count)
+    yield Patch(corners, flat / road_materials.SCALES_M["pavement"], count)
 
 
 def _yield_line(shape: RoundaboutShape, number: int, slot: int) -> Iterator[Patch]:
@@ -148,25 +134,25 @@ def _land(shape: RoundaboutShape, number: int, slot: int) -> Patch:
     away = shape.half_m + offset
     ends = []
     for arm, side in ((number, 1.0), ((number + 1) % len(shape.arms_rad()), -1.0)):
-        out = side * (away + APRON_M * np.array(APRON_STEPS[1:]))
+        out = side * (away + cross_section.APRON_M * np.array(cross_section.APRON_STEPS[1:]))
         flat = arm_points(shape, arm, np.full(len(out), shape.reach_m()), out)
         # Gardens before houses are level.
-        drop_m = 0.0 if shape.setback_m > 0.0 else z + APRON_FALL_M
-        fall = np.array(APRON_DROPS[1:]) * drop_m
+        drop_m = 0.0 if shape.setback_m > 0.0 else z + cross_section.APRON_FALL_M
+        fall = np.array(cross_section.APRON_DROPS[1:]) * drop_m
         ends.append(np.column_stack([flat, z - fall]))
     a, b = ends[0][-1, :2], ends[1][-1, :2]
     start = math.atan2(a[1], a[0])
     gap = (math.atan2(b[1], b[0]) - start) % math.tau
     turn = start + np.linspace(0.0, gap, max(3, math.ceil(gap / 0.15)))[1:-1]
     far = math.hypot(*a) * np.stack([np.cos(turn), np.sin(turn)], axis=1)
-    outer = np.column_stack([far, np.full(len(far), -APRON_FALL_M)])
+    outer = np.column_stack([far, np.full(len(far), -cross_section.APRON_FALL_M)])
     edge = np.column_stack([line, np.full(len(line), z)])
     loop = np.concatenate([ends[0], outer, ends[1][::-1], edge[::-1]])
     heights = {(x, y): height for x, y, height in loop.tolist()}
     flat = triangulate(loop[:, :2])
     corners = np.array([[[x, y, heights[x, y]] for x, y in triangle] for triangle in flat.tolist()])
     count = np.full(len(flat), slot, dtype=np.int64)
-    return Patch(corners, flat / SCALES_M["ground"], count)
+    return Patch(corners, flat / road_materials.SCALES_M["ground"], count)
 
 
 def _hulls(shape: RoundaboutShape) -> list[Array]:

@@ -4,8 +4,6 @@ Contact wires of 107 mm^2 are 12 mm thick; heights: assumed, 10 %. Frame: metres
 road, origin on the ground in its middle.
 """
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np
@@ -13,9 +11,8 @@ import numpy as np
 from gen_data.assets.family import Solid
 from gen_data.content.procedural.material_presets import painted_material
 from gen_data.content.procedural.patches import Patch
-from gen_data.content.scenery.basic_shapes import make_solid
+from gen_data.content.scenery import basic_shapes, tram_lines
 from gen_data.content.scenery.clutter_shapes import bar, wire
-from gen_data.content.scenery.tram_lines import ANCHOR_M
 from gen_data.core.errors import AssetError
 
 WIRE_M = 5.5
@@ -44,8 +41,8 @@ def contact_wires(
     half = 0.5 * span_m
     # Flat enough that hangers of 0.3 m reach the contact wires.
     hung_m = WIRE_M + 0.3
-    ends = [(0.0, -right_m, ANCHOR_M), (0.0, -tracks_m, hung_m), (0.0, tracks_m, hung_m),
-            (0.0, left_m, ANCHOR_M)]  # fmt: skip
+    ends = [(0.0, -right_m, tram_lines.ANCHOR_M), (0.0, -tracks_m, hung_m), (0.0, tracks_m, hung_m),
+            (0.0, left_m, tram_lines.ANCHOR_M)]  # fmt: skip
     parts: list[Patch] = [wire(a, b, _RADIUS_M) for a, b in pairwise(ends)]
     for y in (-tracks_m, tracks_m):
         parts.append(wire((-half, y, WIRE_M), (half, y, WIRE_M), _RADIUS_M))
@@ -54,4 +51,4 @@ def contact_wires(
     materials = (painted_material("#2b2724", 0.5), painted_material("#4a3a33", 0.6))
     sheet = np.array([[x, y, z] for x in (-half, half) for y in (-tracks_m, tracks_m)
                       for z in (WIRE_M, hung_m)])  # fmt: skip
-    return make_solid(parts, materials, [sheet])
+    return basic_shapes.make_solid(parts, materials, [sheet])

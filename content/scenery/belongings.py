@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from gen_data.assets.family import Facts, Solid
+from gen_data.assets.family import Solid
 from gen_data.content.procedural import collision_hulls as hulls
 from gen_data.content.procedural.material_presets import (
     draw_linear,
@@ -82,11 +82,6 @@ def pram(seed: int) -> Solid:
     )
 
 
-def pram_facts(seed: int) -> Facts:
-    """Its kind."""
-    return Facts("pram", {"kind": variant_rng("pram", seed).turn(PRAMS, "kind")})
-
-
 def _wheel(radius: float) -> list[Patch]:
     """A wheel about the origin, its axle along Y."""
     ring = circle(0.018, 5) + np.array([radius - 0.018, 0.0])
@@ -132,11 +127,6 @@ def suitcase(seed: int) -> Solid:
     return make_solid(
         on_ground(parts), materials, [hulls.box((-0.1, -0.15, 0.0), (0.1, 0.15, 0.9 * high))]
     )
-
-
-def suitcase_facts(seed: int) -> Facts:
-    """Its kind."""
-    return Facts("suitcase", {"kind": variant_rng("suitcase", seed).turn(SUITCASES, "kind")})
 
 
 def _trolley(hard: bool, rng: VariantRng) -> tuple[list[Patch], float]:
@@ -194,10 +184,8 @@ def _holdall(rng: VariantRng) -> tuple[list[Patch], float]:
 
 def _backpack(rng: VariantRng) -> tuple[list[Patch], float]:
     high, wide, deep = rng.between(0.48, 0.6, "height_m"), 0.32, 0.2
-    foot, neck = (
-        Rectangle.about(0, 0, deep, wide),
-        Rectangle.about(-0.02, 0, 0.75 * deep, 0.86 * wide),
-    )
+    foot = Rectangle.about(0, 0, deep, wide)
+    neck = Rectangle.about(-0.02, 0, 0.75 * deep, 0.86 * wide)
     lid = rounded_box((0.85 * deep, 0.95 * wide, 0.1), 0.04, 2).moved(-0.02, 0.0, high - 0.04)
     pocket = rounded_box((0.1, 0.75 * wide, 0.42 * high), 0.04, 2)
     pocket = pocket.moved(0.5 * deep, 0.0, 0.28 * high)

@@ -33,10 +33,8 @@ def cafe_set(seed: int) -> Solid:
     """
     rng = variant_rng("cafe_set", seed)
     kind, count = rng.turn(CHAIRS, "chairs"), rng.turn((2, 4, 3, 2, 4, 2), "count")
-    half, high = (
-        (0.3 if count == 2 else 0.5 * rng.between(0.68, 0.84, "width_m")),
-        rng.between(0.71, 0.75, "table_m"),
-    )
+    half = 0.3 if count == 2 else 0.5 * rng.between(0.68, 0.84, "width_m")
+    high = rng.between(0.71, 0.75, "table_m")
     round_top = rng.chance(0.55, "round_top")
     parts = _table(half, high, round_top)
     first = rng.choose((0.0, 0.5)) * math.pi

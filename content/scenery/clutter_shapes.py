@@ -3,8 +3,6 @@
 Frame of everything here: metres, Z up, front +X, origin on the ground.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -39,7 +37,7 @@ class Rectangle(NamedTuple):
     y1: float
 
     @classmethod
-    def about(cls, x_m: float, y_m: float, length_m: float, width_m: float) -> Rectangle:
+    def about(cls, x_m: float, y_m: float, length_m: float, width_m: float) -> "Rectangle":
         """The rectangle about a point."""
         return cls(x_m - 0.5 * length_m, x_m + 0.5 * length_m, y_m - 0.5 * width_m,
                    y_m + 0.5 * width_m)  # fmt: skip

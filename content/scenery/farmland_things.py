@@ -75,11 +75,6 @@ def straw_bale(seed: int) -> Solid:
     )
 
 
-def straw_bale_facts(seed: int) -> Facts:
-    """Its kind."""
-    return Facts("straw_bale", {"kind": variant_rng("straw_bale", seed).turn(BALES, "kind")})
-
-
 def power_pylon(seed: int, span_m: float) -> Solid:
     """A lattice pylon of a 110 kV line, with the halves of the two spans that meet at it.
 

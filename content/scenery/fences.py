@@ -180,11 +180,9 @@ def _panel(rng: VariantRng) -> Made:
 
 def _planks(rng: VariantRng) -> Made:
     """Boards across with gaps, on an inner post."""
-    rows, wide, gap = (
-        rng.choose((3, 4, 5), "rows"),
-        rng.between(0.1, 0.15, "board_m"),
-        rng.between(0.05, 0.12, "gap_m"),
-    )
+    rows = rng.choose((3, 4, 5), "rows")
+    wide = rng.between(0.1, 0.15, "board_m")
+    gap = rng.between(0.05, 0.12, "gap_m")
     foot = rng.between(0.06, 0.15, "foot_m")
     parts = []
     for k in range(rows):

@@ -47,11 +47,9 @@ def _garage(seed: int, doors: int, rng: VariantRng) -> Solid:
 def shed(seed: int) -> Solid:
     """A garden shed or a hut of boards, sheet or brick, 1.8-4.5 m wide."""
     rng = variant_rng("shed", seed)
-    wide, deep, high = (
-        rng.between(1.8, 4.5, "width_m"),
-        rng.between(1.8, 3.4, "depth_m"),
-        rng.between(1.95, 2.4, "height_m"),
-    )
+    wide = rng.between(1.8, 4.5, "width_m")
+    deep = rng.between(1.8, 3.4, "depth_m")
+    high = rng.between(1.95, 2.4, "height_m")
     plan = draw_design(
         rng.choose(("farmhouse", "warehouse", "house")), seed + int(40 * rng.random())
     )

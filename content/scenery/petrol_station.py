@@ -31,11 +31,9 @@ def petrol_shop(seed: int) -> Solid:
     Slots: walls, frames, panes, fascia, stripe, posters, base.
     """
     rng = variant_rng("petrol_shop", seed)
-    x, half, high = (
-        0.5 * rng.between(6.5, 9.0, "depth_m"),
-        0.5 * rng.between(10.0, 15.0, "width_m"),
-        rng.between(3.6, 4.2, "height_m"),
-    )
+    x = 0.5 * rng.between(6.5, 9.0, "depth_m")
+    half = 0.5 * rng.between(10.0, 15.0, "width_m")
+    high = rng.between(3.6, 4.2, "height_m")
     parts = [
         block((-x, -half, 0.0), (x, half, high - 0.8), 0.0, 0),
         block((-x - 0.15, -half - 0.15, high - 0.8), (x + 0.9, half + 0.15, high), 0.02, 3),
@@ -81,11 +79,9 @@ def price_sign(seed: int) -> Solid:
     Slots: body, stripe, display, digits, base.
     """
     rng = variant_rng("price_sign", seed)
-    high, half, thick = (
-        rng.between(5.0, 7.5, "height_m"),
-        0.5 * rng.between(1.5, 1.9, "width_m"),
-        0.16,
-    )
+    high = rng.between(5.0, 7.5, "height_m")
+    half = 0.5 * rng.between(1.5, 1.9, "width_m")
+    thick = 0.16
     parts = [
         block((-0.3, -half - 0.1, 0.0), (0.3, half + 0.1, 0.25), 0.02, 4),
         block((-thick, -half, 0.25), (thick, half, high), 0.02, 0),
@@ -166,8 +162,3 @@ def _spout(number: int) -> Patch:
     """A short pipe on one side of the column."""
     pipe = cone((0.03, 0.25), (0.025, 0.55), 8, 2).rotated("y", 0.5 * math.pi)
     return pipe.rotated("z", 0.5 * math.pi * number).moved(z=1.1)
-
-
-def fountain_facts(seed: int) -> Facts:
-    """Its kind."""
-    return Facts("fountain", {"kind": variant_rng("fountain", seed).turn(FOUNTAINS, "kind")})

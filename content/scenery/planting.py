@@ -112,11 +112,9 @@ def grass_tuft(seed: int) -> Solid:
 def flower_bed(seed: int) -> Solid:
     """A bed of 1.2-3 m with an edging of stone or steel, leaves and flowers in drifts."""
     rng = variant_rng("flower_bed", seed)
-    wide, long, rim = (
-        rng.between(0.6, 1.2, "width_m"),
-        rng.between(1.2, 3.0, "length_m"),
-        rng.between(0.05, 0.2, "rim_m"),
-    )
+    wide = rng.between(0.6, 1.2, "width_m")
+    long = rng.between(1.2, 3.0, "length_m")
+    rim = rng.between(0.05, 0.2, "rim_m")
     x, y = 0.5 * wide, 0.5 * long
     soil = block((-x, -y, 0.0), (x, y, max(0.03, rim - 0.03))).painted(1)
     sides = [((-x - 0.06, -y - 0.06), (-x, y + 0.06)), ((x, -y - 0.06), (x + 0.06, y + 0.06)),

@@ -30,11 +30,9 @@ def bus_shelter(seed: int) -> Solid:
     """
     rng = variant_rng("bus_shelter", seed)
     kind = rng.turn(ROOFS, "roof")
-    half, x, high = (
-        0.5 * rng.between(3.0, 5.0, "width_m"),
-        0.5 * rng.between(1.3, 1.7, "depth_m"),
-        rng.between(2.3, 2.5, "height_m"),
-    )
+    half = 0.5 * rng.between(3.0, 5.0, "width_m")
+    x = 0.5 * rng.between(1.3, 1.7, "depth_m")
+    high = rng.between(2.3, 2.5, "height_m")
     bays = 3 if half < 2.1 else 4
     edges = np.linspace(-half, half, bays + 1).tolist()
     parts = [block((-x - 0.03, y - 0.03, 0.0), (-x + 0.03, y + 0.03, high)) for y in edges]
@@ -73,11 +71,6 @@ def bus_shelter(seed: int) -> Solid:
         hulls.box((-x, -half, high - 0.02), (x, half, high + 0.08)),
     ]
     return make_solid(parts, materials, walls)
-
-
-def bus_shelter_facts(seed: int) -> Facts:
-    """Kind of its roof."""
-    return Facts("bus_shelter", {"roof": variant_rng("bus_shelter", seed).turn(ROOFS, "roof")})
 
 
 def _shelter_roof(kind: str, x: float, half: float, high: float) -> list[Patch]:
@@ -166,11 +159,6 @@ def phone_box(seed: int) -> Solid:
         presets.printed_material(f"texture/poster?seed={seed % 12}", 0.4),
     )
     return make_solid(parts, materials, [hulls.box((-half, -half, 0.0), (half, half, 2.0))])
-
-
-def phone_box_facts(seed: int) -> Facts:
-    """Its kind."""
-    return Facts("phone_box", {"kind": variant_rng("phone_box", seed).turn(PHONES, "kind")})
 
 
 def _booth(half: float, high: float, rows: int) -> list[Patch]:

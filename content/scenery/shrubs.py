@@ -43,11 +43,9 @@ def bush(seed: int) -> Solid:
 def planter(seed: int) -> Solid:
     """A tub or trough with a plant, flowering in some. Slots: tub, soil and core, leaves."""
     rng = variant_rng("planter", seed)
-    w, long, h = (
-        rng.between(0.45, 0.6, "width_m"),
-        rng.between(0.6, 1.4, "length_m"),
-        rng.between(0.4, 0.6, "height_m"),
-    )
+    w = rng.between(0.45, 0.6, "width_m")
+    long = rng.between(0.6, 1.4, "length_m")
+    h = rng.between(0.4, 0.6, "height_m")
     x, y = 0.5 * w + 0.03, 0.5 * long + 0.03
     tub = [
         block((-0.5 * w, -0.5 * long, 0.0), (0.5 * w, 0.5 * long, h - 0.05), 0.012),

@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from gen_data.assets.family import Facts, Solid
+from gen_data.assets.family import Solid
 from gen_data.content.procedural import collision_hulls as hulls
 from gen_data.content.procedural.material_presets import printed_material
 from gen_data.content.procedural.patches import Patch
@@ -40,11 +40,6 @@ def billboard(seed: int) -> Solid:
         )
     frame = worn_paint(("#3b3d3f", "#8d9091", "#2f4236", "#55585a"), 0.5, rng)
     return make_solid(parts, (frame, *prints), [hull])
-
-
-def billboard_facts(seed: int) -> Facts:
-    """Its kind."""
-    return Facts("billboard", {"kind": variant_rng("billboard", seed).turn(BILLBOARDS, "kind")})
 
 
 def _posters(seed: int, family: str) -> tuple[Material, Material]:

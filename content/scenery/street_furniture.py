@@ -168,11 +168,9 @@ def traffic_cone(seed: int) -> Solid:
 def post_box(seed: int) -> Solid:
     """A letter box on two legs or on a wall post. Slots: body, flap, legs."""
     rng = variant_rng("post_box", seed)
-    w, d, h = (
-        rng.between(0.45, 0.6, "width_m"),
-        rng.between(0.3, 0.4, "depth_m"),
-        rng.between(0.6, 0.75, "height_m"),
-    )
+    w = rng.between(0.45, 0.6, "width_m")
+    d = rng.between(0.3, 0.4, "depth_m")
+    h = rng.between(0.6, 0.75, "height_m")
     z = rng.between(0.65, 0.8, "legs_m")
     body = rounded_box((d, w, h), 0.03, 2).moved(z=z + 0.5 * h)
     x = 0.5 * d
@@ -190,11 +188,9 @@ def post_box(seed: int) -> Solid:
 def bus_stop(seed: int) -> Solid:
     """A shelter, open to +X, with a seat. Slots: frame, glass, roof, seat, panel."""
     rng = variant_rng("bus_stop", seed)
-    half, d, h = (
-        0.5 * rng.between(3.2, 4.2, "width_m"),
-        rng.between(1.3, 1.6, "depth_m"),
-        rng.between(2.35, 2.55, "height_m"),
-    )
+    half = 0.5 * rng.between(3.2, 4.2, "width_m")
+    d = rng.between(1.3, 1.6, "depth_m")
+    h = rng.between(2.35, 2.55, "height_m")
     x = 0.5 * d
     feet = [(-x, -half), (-x, -half / 3), (-x, half / 3), (-x, half), (x - 0.25, -half),
             (x - 0.25, half)]  # fmt: skip
@@ -230,11 +226,9 @@ def bus_stop(seed: int) -> Solid:
 def cabinet(seed: int) -> Solid:
     """A distribution cabinet with two doors and a lid. Slots: body, seams, plinth."""
     rng = variant_rng("cabinet", seed)
-    w, d, h = (
-        rng.between(0.7, 1.5, "width_m"),
-        rng.between(0.3, 0.45, "depth_m"),
-        rng.between(0.95, 1.35, "height_m"),
-    )
+    w = rng.between(0.7, 1.5, "width_m")
+    d = rng.between(0.3, 0.45, "depth_m")
+    h = rng.between(0.95, 1.35, "height_m")
     x, y = 0.5 * d, 0.5 * w
     body = rounded_box((d, w, h - 0.15), 0.015, 1).moved(z=0.15 + 0.5 * (h - 0.15))
     lid = block((-x - 0.02, -y - 0.02, h - 0.04), (x + 0.02, y + 0.02, h + 0.015), 0.01)

@@ -31,12 +31,10 @@ def terrace(seed: int) -> Solid:
     rng = variant_rng("terrace", seed)
     kind = rng.turn(_KINDS, "kind")
     if kind == "path":
-        wide, long, high, pieces = (
-            rng.between(0.6, 1.1, "width_m"),
-            rng.between(5.0, 10.0, "length_m"),
-            0.03,
-            12,
-        )
+        wide = rng.between(0.6, 1.1, "width_m")
+        long = rng.between(5.0, 10.0, "length_m")
+        high = 0.03
+        pieces = 12
     else:
         wide, long, pieces = rng.between(2.8, 4.0, "width_m"), rng.between(3.2, 5.0, "length_m"), 1
         high = rng.between(0.12, 0.2, "height_m") if kind == "deck" else 0.05

@@ -223,11 +223,9 @@ def _ridged(plan: _Block, rise: float, hip: float, *, along: bool, slot: int) ->
 
 def _church(rng: VariantRng) -> Iterator[Patch]:
     """A nave with a tower under a spire or an onion dome, 25 to 45 m high, behind the houses."""
-    y, width, storey = (
-        rng.between(-18.0, 18.0),
-        rng.between(5.5, 7.0, "width_m"),
-        rng.between(3.4, 4.2, "storey_m"),
-    )
+    y = rng.between(-18.0, 18.0)
+    width = rng.between(5.5, 7.0, "width_m")
+    storey = rng.between(3.4, 4.2, "storey_m")
     tower = _Block(-46.0, y, -46.0 + width, y + width, 0.0, round(rng.between(4.6, 6.4)), storey, 0)
     nave = _Block(-44.0, y + width, -32.0, y + width + rng.between(16.0, 24.0), 0.0, 2, 5.0, 0)
     yield from _walls(tower)

@@ -191,11 +191,6 @@ def power_box(seed: int) -> Solid:
     return make_solid(parts, materials, [hulls.box((-x, -y, 0.0), (x, y, h))])
 
 
-def power_box_facts(seed: int) -> Facts:
-    """Its kind."""
-    return Facts("power_box", {"kind": variant_rng("power_box", seed).turn(BOXES, "kind")})
-
-
 def _roof(kind: str, x: float, y: float, h: float) -> Patch:
     """A flat lid, or a ridged roof on a substation."""
     if kind != "substation":

@@ -237,11 +237,6 @@ def skip_container(seed: int) -> Solid:
     return make_solid(parts, materials, [hulls.box(floor, (wide, half, high))])
 
 
-def skip_container_facts(seed: int) -> Facts:
-    """What it holds."""
-    return Facts("skip", {"load": variant_rng("skip_container", seed).turn(_LOADS, "load")})
-
-
 def _trough(
     shape: list[tuple[float, float]], wide: float, slot: int, *, inside: bool = False
 ) -> list[Patch]:

@@ -57,11 +57,6 @@ def traffic_cone(seed: int) -> Solid:
     return make_solid(parts, materials, [hull, hulls.frustum((0.2 * high, 0.0), (0.04, high), 10)])
 
 
-def traffic_cone_facts(seed: int) -> Facts:
-    """Its kind."""
-    return Facts("cone", {"kind": variant_rng("traffic_cone", seed).turn(CONES, "kind")})
-
-
 def _cone(high: float) -> tuple[list[Patch], float]:
     """A cone with two sleeves on a square foot; also half the foot's width."""
     half = 0.2 * high + 0.05
@@ -265,14 +260,6 @@ def construction_fence(seed: int) -> Solid:
 
 
 _SITE_FENCES = ("plain", "netting", "sign", "sheet")
-
-
-def construction_fence_facts(seed: int) -> Facts:
-    """Its covering."""
-    return Facts(
-        "construction_fence",
-        {"covering": variant_rng("construction_fence", seed).turn(_SITE_FENCES, "covering")},
-    )
 
 
 def scaffold(seed: int) -> Solid:

@@ -125,11 +125,9 @@ def _room_layers(grid: Grid, scene: Scene, assets: interfaces.AssetLibrary, own:
         and not (b.instance_id in doors and b.part_id == 1)
         and _height_m(b, assets, 0) < HEAD_M and _height_m(b, assets, 1) > FLAT_M
     ]  # fmt: skip
-    floor, door, occupied = (
-        outlines("floor"),
-        outlines("door"),
-        covered_cells(grid, footprints(standing, assets)),
-    )
+    floor = outlines("floor")
+    door = outlines("door")
+    occupied = covered_cells(grid, footprints(standing, assets))
     return {
         "floor": floor,
         "wall": outlines("wall") & ~door,

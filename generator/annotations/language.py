@@ -4,8 +4,6 @@ Everything is a function of the scene graph and of what the image shows: nothing
 and nothing is said about what cannot be seen. The grammar is the table ``language.yaml``.
 """
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -73,7 +71,7 @@ class Language(base_model.Strict):
 
     def _things(
         self, scene: Scene, assets: AssetLibrary, reading: SensorReading, truth: ImageTruth
-    ) -> Iterator[Thing]:
+    ) -> "Iterator[Thing]":
         """Everything with a visible pixel; annotated things are clear only if they are listed."""
         listed = {t.instance.instance_id: t for t in truth.objects}
         extents = instance_extents.find_extents(reading.channels[Channel.INSTANCE])

@@ -1,7 +1,5 @@
 """Scene graphs: relations between objects, from their final poses and meshes."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -157,7 +155,7 @@ class Shape:
         z_m = self.triangles_m[..., 2]
         return float(z_m.min()), float(z_m.max())
 
-    def is_around(self, other: Shape) -> bool:
+    def is_around(self, other: "Shape") -> bool:
         """Whether it contains another shape, as ``Relations`` defines it."""
         center = other.center_m
         if (center < self.low_m).any() or (center > self.high_m).any() or self.hull is None:

@@ -5,8 +5,6 @@ The closest features of two disjoint triangles are a vertex and a face, or two e
 are float64 [n, 3, 3]: corners [m] in one frame, counter-clockwise seen from outside.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import cast
@@ -41,7 +39,7 @@ class Contacts:
     normals: Array
     gaps_m: Array
 
-    def inverse(self) -> Contacts:
+    def inverse(self) -> "Contacts":
         """The same contacts of body B with body A."""
         return Contacts(
             self.points_m - self.gaps_m[:, None] * self.normals, -self.normals, self.gaps_m

@@ -1,7 +1,5 @@
 """Configurations of the Python API: files, names, dictionaries, objects."""
 
-from __future__ import annotations
-
 import operator
 from collections.abc import Mapping, Sequence
 from os import PathLike, fspath
@@ -29,7 +27,7 @@ def load_config(
     seed: int | None = None,
     overrides: Sequence[str] = (),
     without: Sequence[str] = (),
-) -> Config:
+) -> "Config":
     """Load and validate a configuration.
 
     Raises:
@@ -45,7 +43,7 @@ def load_config(
     return load_config(path_text("config", config), **choice)
 
 
-def read_document(source: ConfigLike, title: str) -> Node:
+def read_document(source: ConfigLike, title: str) -> "Node":
     """Read a YAML file, or a dictionary, which errors call ``<title>``.
 
     Raises:
@@ -58,7 +56,7 @@ def read_document(source: ConfigLike, title: str) -> Node:
     return load_yaml(Path(path_text(title, source)))
 
 
-def read_model(document: Node, model: type[Model]) -> Model:
+def read_model(document: "Node", model: type[Model]) -> Model:
     """Validate a document as a model.
 
     Raises:

@@ -1,7 +1,5 @@
 """Export of a finished data set: the function behind ``gen-data export``."""
 
-from __future__ import annotations
-
 import json
 import os
 import re
@@ -34,9 +32,9 @@ def export(  # noqa: PLR0913  (keywords of one front door)
     label_map: str | PathLike[str] | None = None,
     workers: int | None = None,
     force: bool = False,
-    on_progress: Callable[[RunProgress], None] | None = None,
+    on_progress: "Callable[[RunProgress], None] | None" = None,
     resume_command: str = "the same call of gen_data.export",
-) -> Summary:
+) -> "Summary":
     """Write a finished data set in other formats, without rendering it again.
 
     The result is another data set, with the same bytes as if it had been generated with these
@@ -126,7 +124,7 @@ def label_map_override(path: Path, categories: Sequence[str]) -> str:
     return f"labels.map={label_map.model_dump_json(exclude_unset=True)}"
 
 
-def _check_annotations(made: Config, wanted: Config) -> None:
+def _check_annotations(made: "Config", wanted: "Config") -> None:
     """Reject exporters that read annotations which the data set was made without."""
     from gen_data.pipeline.exporter_views import needs_of
 

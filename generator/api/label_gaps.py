@@ -1,7 +1,5 @@
 """The end of every run that finishes a data set: labels that it was to have and lacks."""
 
-from __future__ import annotations
-
 import warnings
 from typing import TYPE_CHECKING
 
@@ -11,7 +9,7 @@ if TYPE_CHECKING:
     from gen_data.runner.progress import Summary
 
 
-def check_label_gaps(summary: Summary) -> Summary:
+def check_label_gaps(summary: "Summary") -> "Summary":
     """Warn of sensors and classes without labels in a data set that was just finished.
 
     Data sets at URLs, whose shards would have to be fetched, and unfinished ones are not checked.

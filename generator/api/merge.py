@@ -1,7 +1,5 @@
 """One data set of parts that different machines generated: the function behind ``merge``."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from os import PathLike
 from pathlib import Path
@@ -20,9 +18,9 @@ def merge(
     *,
     workers: int | None = None,
     allow_mixed_numerics: bool = False,
-    on_progress: Callable[[RunProgress], None] | None = None,
+    on_progress: "Callable[[RunProgress], None] | None" = None,
     resume_command: str = "the same call of merge",
-) -> Summary:
+) -> "Summary":
     """Gather parts made by ``generate(..., shards=...)`` into one data set, and finish it.
 
     The result has the same bytes as a data set that one machine generated. Shards that no part has

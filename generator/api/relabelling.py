@@ -1,7 +1,5 @@
 """Samples whose labels a label map has changed."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -28,7 +26,7 @@ class RelabelledSample:
     """A sample with mapped labels; its images are the other sample's."""
 
     record: SampleRecord
-    applied: AppliedLabelMap
+    applied: "AppliedLabelMap"
 
     @property
     def index(self) -> int:
@@ -66,7 +64,7 @@ class RelabelledSamples:
     """Samples of another source, with mapped labels; picklable."""
 
     source: SampleSource
-    label_map: LabelMap
+    label_map: "LabelMap"
 
     def sample(self, index: int) -> SampleRecord:
         """Return the sample of that number."""
@@ -87,7 +85,7 @@ class RelabelledSamples:
         self.source.close()
 
     @cached_property
-    def _applied(self) -> AppliedLabelMap:
+    def _applied(self) -> "AppliedLabelMap":
         from gen_data.exporters.label_map import AppliedLabelMap
 
         categories = self.source.categories
@@ -95,7 +93,7 @@ class RelabelledSamples:
         return AppliedLabelMap(self.label_map, DatasetInfo("", 0, 1, 1, categories, ()))
 
 
-def load_label_map(source: LabelMapLike | None, config: Mapping[str, Any]) -> LabelMap:
+def load_label_map(source: LabelMapLike | None, config: Mapping[str, Any]) -> "LabelMap":
     """Read a label map; None = the configuration's.
 
     Raises:

@@ -1,7 +1,5 @@
 """Reproduction of one sample: the function behind ``gen-data repro``."""
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Callable, Mapping
 from contextlib import nullcontext
@@ -30,7 +28,7 @@ class Reproduction:
 
     digests: Mapping[str, str]
     stored: bool = False
-    difference: Difference | None = None
+    difference: "Difference | None" = None
     changes: tuple[str, ...] = ()
 
 

@@ -1,7 +1,5 @@
 """Configurations: read, merged with their templates, and validated."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -222,7 +220,7 @@ class Config:
         problems.raise_if_any()
         return config
 
-    def _constant_parts(self) -> _Known:
+    def _constant_parts(self) -> "_Known":
         """Parts of scenes that do not depend on shared values."""
         known = _Known()
         _scene_config(self.document, dict(self.probes[0].shared), Problems(), known)
@@ -391,14 +389,14 @@ class _Known:
     items: dict[tuple[int, str], Node] = field(default_factory=dict)
     plugins: dict[tuple[str, int], tuple[Node, Any]] = field(default_factory=dict)
 
-    def constant(self) -> _Known:
+    def constant(self) -> "_Known":
         """Names of all items, and those parts that are the same in all scenes."""
         items = {place: node for place, node in self.items.items() if not self.names[place[0]]}
         kept = {id(node) for node in items.values()}
         plugins = {place: known for place, known in self.plugins.items() if place[1] in kept}
         return _Known(self.names, items, plugins)
 
-    def copy(self) -> _Known:
+    def copy(self) -> "_Known":
         """A copy that may grow by the parts of one scene."""
         return _Known(dict(self.names), dict(self.items), dict(self.plugins))
 

@@ -1,7 +1,5 @@
 """Construction of pipelines from configurations."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -10,37 +8,21 @@ from functools import cached_property, lru_cache, partial
 import cv2
 
 from gen_data.annotations.annotate import annotate_ego, annotate_reading
+from gen_data.assemble import plugin_tables, preflight
 from gen_data.assemble.config import Config, SceneConfig
-from gen_data.assemble.plugin_tables import ANNOTATIONS, default_plugin
-from gen_data.assemble.preflight import cameras_that_look_away, far_sensors, unrectified_pairs
 from gen_data.assets.library import Library
 from gen_data.config.error_positions import located_errors
 from gen_data.config.problems import Problems, refuse
 from gen_data.config.yaml_tree import find_text
+from gen_data.core import interfaces, path_names, plates
 from gen_data.core.capture import Channel
 from gen_data.core.errors import ConfigError, ConfigWarning, Refusals, UnknownAsset
-from gen_data.core.interfaces import (
-    AnyAnnotator,
-    AssetIndex,
-    DatasetInfo,
-    Exporter,
-    Modality,
-    Publication,
-    Randomizer,
-    Renderer,
-    Sensor,
-    SensorInfo,
-)
-from gen_data.core.path_names import CATEGORY_MAX, check_name
-from gen_data.core.plates import has_plate
 from gen_data.core.scene import LABEL_IDS_MAX, Scene, SharedValue
 from gen_data.exporters.base import ExporterBase, check_image_formats
 from gen_data.exporters.label_map import MappedExporter
 from gen_data.packs.provision import open_assets
 from gen_data.physics import missing_engine, open_engine
-from gen_data.pipeline import Pipeline
-from gen_data.pipeline.exporter_views import ExporterView, needs_of, view_of
-from gen_data.pipeline.pipeline import PipelineConfig, SceneSource
+from gen_data.pipeline import Pipeline, exporter_views, pipeline
 from gen_data.randomizers.base import RandomizerBase
 from gen_data.scene_templates.builder import build_scene
 from gen_data.sensors.camera.plate_camera import PlateCamera
@@ -49,7 +31,7 @@ from gen_data.sensors.mounting import check_not_buried, stride, within_steps
 NOMINAL_SCENES_KEPT = 32
 
 
-def _open_renderer(config: Config, library: Library) -> Renderer:
+def _open_renderer(config: Config, library: Library) -> interfaces.Renderer:
     """Open the renderer. Raises ConfigError, with its place, if this machine lacks the device."""
     with located_errors(config.document):
         return config.render.open(library)
@@ -121,7 +103,7 @@ class PipelineFactory:
         for probe, scene in zip(config.probes, self.nominal, strict=True):
             with refused.collected():
                 check_scene(config, scene)
-            for error in unrectified_pairs(probe, scene, self.library):
+            for error in preflight.unrectified_pairs(probe, scene, self.library):
                 with refused.collected(), located_errors(config.document):
                     raise error
         refused.raise_if_any()
@@ -133,13 +115,13 @@ class PipelineFactory:
             return  # Images alone are made on purpose.
         texts: dict[str, None] = {}
         for probe, scene in zip(self.config.probes, self.nominal, strict=True):
-            for find in (far_sensors, cameras_that_look_away):
+            for find in (preflight.far_sensors, preflight.cameras_that_look_away):
                 texts |= dict.fromkeys(find(probe, scene))
         for text in texts:
             warnings.warn(text, ConfigWarning, stacklevel=3)
 
     @property
-    def info(self) -> DatasetInfo:
+    def info(self) -> interfaces.DatasetInfo:
         """Facts about the data set."""
         return dataset_info(self.config, self.n, self.categories)
 
@@ -161,7 +143,9 @@ class PipelineFactory:
         return {**state, "categories": categories}
 
 
-def _check_references(config: Config, scenes: Sequence[Scene], assets: AssetIndex) -> None:
+def _check_references(
+    config: Config, scenes: Sequence[Scene], assets: interfaces.AssetIndex
+) -> None:
     """Refuse names of groups, categories and textures in randomizers that do not exist."""
     problems = Problems()
     for probe, scene in zip(config.probes, scenes, strict=True):
@@ -191,7 +175,7 @@ def pipeline_config(
     n: int,
     categories: tuple[str, ...],
     extra_channels: frozenset[Channel],
-) -> PipelineConfig:
+) -> pipeline.PipelineConfig:
     """Resolve everything that samples depend on.
 
     Raises:
@@ -205,7 +189,7 @@ def pipeline_config(
         )
     annotators = annotators_of(config)
     info = dataset_info(config, n, categories)
-    return PipelineConfig(
+    return pipeline.PipelineConfig(
         info=info,
         open_scene=scene_source(config, library),
         channels=frozenset().union(*(a.channels for a in annotators), extra_channels),
@@ -225,9 +209,9 @@ def pipeline_config(
     )
 
 
-def dataset_info(config: Config, n: int, categories: tuple[str, ...]) -> DatasetInfo:
+def dataset_info(config: Config, n: int, categories: tuple[str, ...]) -> interfaces.DatasetInfo:
     """Facts about the data set of a configuration."""
-    return DatasetInfo(
+    return interfaces.DatasetInfo(
         name=config.name,
         seed=config.general.seed,
         n=n,
@@ -237,7 +221,7 @@ def dataset_info(config: Config, n: int, categories: tuple[str, ...]) -> Dataset
         depth_scale_m=config.general.depth_scale_m,
         steps_per_scene=config.general.steps_per_scene,
         step_s=config.general.step_s,
-        publication=Publication(**config.general.dataset.model_dump()),
+        publication=interfaces.Publication(**config.general.dataset.model_dump()),
     )
 
 
@@ -266,22 +250,22 @@ def _check_engine(config: Config) -> None:
         refuse(node.position, "physics.engine", missing)
 
 
-def _strides(info: DatasetInfo) -> dict[str, int]:
+def _strides(info: interfaces.DatasetInfo) -> dict[str, int]:
     """Steps between the readings of each sensor; devices may have several readings per step."""
     return {
         s.name: stride(s.name, s.rate_hz, info.step_s)
         for s in info.sensors
-        if s.modality is not Modality.DEVICE or not within_steps(s.rate_hz, info.step_s)
+        if s.modality is not interfaces.Modality.DEVICE or not within_steps(s.rate_hz, info.step_s)
     }
 
 
-def scene_source(config: Config, assets: AssetIndex) -> SceneSource:
+def scene_source(config: Config, assets: interfaces.AssetIndex) -> pipeline.SceneSource:
     """Function that makes nominal scene, randomizers and sensors of a scene; it is cached."""
 
     @lru_cache(maxsize=NOMINAL_SCENES_KEPT)
     def make(
         shared: tuple[tuple[str, SharedValue], ...],
-    ) -> tuple[Scene, Sequence[Randomizer], Sequence[Sensor]]:
+    ) -> tuple[Scene, Sequence[interfaces.Randomizer], Sequence[interfaces.Sensor]]:
         scene_config = config.scene_config(shared)
         nominal = nominal_scene(config, scene_config, assets)
         return nominal, scene_config.randomizers, scene_config.sensors
@@ -289,7 +273,9 @@ def scene_source(config: Config, assets: AssetIndex) -> SceneSource:
     return lambda streams: make(config.shared(streams))
 
 
-def nominal_scene(config: Config, scene_config: SceneConfig, assets: AssetIndex) -> Scene:
+def nominal_scene(
+    config: Config, scene_config: SceneConfig, assets: interfaces.AssetIndex
+) -> Scene:
     """Build the scene of the template and mount all sensors.
 
     Raises:
@@ -316,7 +302,7 @@ def nominal_scene(config: Config, scene_config: SceneConfig, assets: AssetIndex)
             scene = sensor.mount(scene)
             info = sensor.describe()
             _check_mounted(scene, info)
-            if has_plate(scene):
+            if plates.has_plate(scene):
                 _check_on_plate(sensor)
             if info.needs_clear_view:
                 check_not_buried(scene, info.name, assets)
@@ -324,12 +310,12 @@ def nominal_scene(config: Config, scene_config: SceneConfig, assets: AssetIndex)
     return scene
 
 
-def _check_mounted(scene: Scene, info: SensorInfo) -> None:
+def _check_mounted(scene: Scene, info: interfaces.SensorInfo) -> None:
     """Raise ConfigError if ``mount`` and ``describe`` of a plug-in contradict each other."""
     mounted = {
-        Modality.CAMERA: [camera.name for camera in scene.cameras],
-        Modality.LIDAR: [lidar.name for lidar in scene.lidars],
-        Modality.DEVICE: [device.name for device in scene.devices],
+        interfaces.Modality.CAMERA: [camera.name for camera in scene.cameras],
+        interfaces.Modality.LIDAR: [lidar.name for lidar in scene.lidars],
+        interfaces.Modality.DEVICE: [device.name for device in scene.devices],
     }
     if info.name not in mounted[info.modality]:
         raise ConfigError(
@@ -338,7 +324,7 @@ def _check_mounted(scene: Scene, info: SensorInfo) -> None:
         )
 
 
-def _check_on_plate(sensor: Sensor) -> None:
+def _check_on_plate(sensor: interfaces.Sensor) -> None:
     """Refuse a sensor that would need more of the world than a photograph shows.
 
     Raises:
@@ -351,7 +337,7 @@ def _check_on_plate(sensor: Sensor) -> None:
         )
 
 
-def collect_categories(scenes: Sequence[Scene], assets: AssetIndex) -> tuple[str, ...]:
+def collect_categories(scenes: Sequence[Scene], assets: interfaces.AssetIndex) -> tuple[str, ...]:
     """Sorted names of all categories that a sample may contain."""
     placed = {i.category for scene in scenes for i in scene.instances if i.annotated}
     possible = {
@@ -363,19 +349,19 @@ def collect_categories(scenes: Sequence[Scene], assets: AssetIndex) -> tuple[str
     }
     for category in sorted(placed | possible):
         try:
-            check_name(category, CATEGORY_MAX)
+            path_names.check_name(category, path_names.CATEGORY_MAX)
         except ValueError as error:
             raise ConfigError(f"category {error}") from None
     return tuple(sorted(placed | possible))
 
 
-def annotators_of(config: Config) -> Sequence[AnyAnnotator]:
+def annotators_of(config: Config) -> Sequence[interfaces.AnyAnnotator]:
     """Annotators of the configuration, then the others that exporters need."""
     annotators = dict(config.annotations)
     label_map = config.general.labels.map
-    for needs in (label_map.needs, *map(needs_of, config.exporters)):
+    for needs in (label_map.needs, *map(exporter_views.needs_of, config.exporters)):
         for name in sorted(needs - annotators.keys()):
-            annotators[name] = default_plugin(ANNOTATIONS, name)
+            annotators[name] = plugin_tables.default_plugin(plugin_tables.ANNOTATIONS, name)
     return list(annotators.values())
 
 
@@ -390,8 +376,8 @@ def check_scene(config: Config, scene: Scene) -> None:
         if isinstance(exporter, ExporterBase):
             with refused.collected(), located_errors(config.document):
                 exporter.check_scene(scene)
-                view = view_of(exporter, exporter, config.general.labels)
-                if isinstance(view, ExporterView):
+                view = exporter_views.view_of(exporter, exporter, config.general.labels)
+                if isinstance(view, exporter_views.ExporterView):
                     view.check_scene(scene)
     refused.raise_if_any()
 
@@ -406,24 +392,26 @@ def _check_label_map(config: Config, categories: Sequence[str]) -> None:
     label_map.check(categories)
 
 
-def ready_exporters(config: Config, info: DatasetInfo, library: Library) -> dict[str, Exporter]:
+def ready_exporters(
+    config: Config, info: interfaces.DatasetInfo, library: Library
+) -> dict[str, interfaces.Exporter]:
     """Exporters of a configuration by name, with its label map and the library.
 
     Raises:
         ConfigError: formats cannot hold the data set, or one is listed twice.
     """
     refused = Refusals()
-    exporters: dict[str, Exporter] = {}
+    exporters: dict[str, interfaces.Exporter] = {}
     label_map = config.general.labels.map
     with refused.collected():
         _check_label_map(config, info.categories)
     for own in config.exporters:
         exporter = own if label_map.is_identity else MappedExporter(own, label_map)
-        exporter = view_of(own, exporter, config.general.labels)
+        exporter = exporter_views.view_of(own, exporter, config.general.labels)
         if exporter.type in exporters:
             raise ConfigError(f"exporters: '{exporter.type}' is listed twice")
         with refused.collected(), located_errors(config.document):
-            if not isinstance(exporter, ExporterView):
+            if not isinstance(exporter, exporter_views.ExporterView):
                 check_image_formats(own, info)
         with refused.collected(), located_errors(config.document):
             exporter.check(info)

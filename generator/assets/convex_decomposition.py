@@ -7,8 +7,6 @@ decomposition of polyhedra", SPM 2007). Only the surface is cut, because a clipp
 clipped solid have the same hull.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 
@@ -111,7 +109,7 @@ class _Piece:
     volume: float
 
     @classmethod
-    def of(cls, corners: Float64) -> _Piece:
+    def of(cls, corners: Float64) -> "_Piece":
         return cls(corners, _hull_volume(corners.reshape(-1, 3)))
 
 

@@ -4,8 +4,6 @@
 that relief: each point is raised by the height of the ground below it; upright edges stay upright.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

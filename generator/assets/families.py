@@ -68,7 +68,9 @@ def known_families() -> Mapping[str, AnyFamily]:
 
 
 def family_summary(family: AnyFamily) -> str:
-    """First line of the docstring of a family's function."""
+    """One line on a family: the one of its row, or the first of its function's docstring."""
+    if isinstance(family, Family) and family.about:
+        return family.about
     build: Any = family.build
     while isinstance(build, (Worn, Lazy)):
         build = build.build if isinstance(build, Worn) else build.value

@@ -2,7 +2,7 @@
 
 import importlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -77,6 +77,7 @@ class Family:
             false where hardly any is used twice.
         stored_parameters: Parameters that stored results may have beside a seed, even so.
         origin: Source and licence, if not all is ours.
+        about: One line on its objects; empty = first line of the docstring of ``build``.
     """
 
     name: str
@@ -94,6 +95,7 @@ class Family:
     origin: Provenance = OURS
     symmetries: Callable[..., tuple[asset_types.Symmetry, ...]] | None = None
     declares: Mapping[str, object] = field(default_factory=dict)
+    about: str = ""
 
 
 @dataclass(frozen=True)
@@ -134,9 +136,11 @@ class Lazy:
 
     Attributes:
         path: Full name of the module, and the name in it.
+        arguments: Arguments that calls of the function do not give, by name.
     """
 
     path: str
+    arguments: Mapping[str, object] = field(default_factory=dict, hash=False)
 
     @property
     def value(self) -> Any:
@@ -146,7 +150,7 @@ class Lazy:
 
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
         """Call the function."""
-        return self.value(*args, **kwargs)
+        return self.value(*args, **self.arguments, **kwargs)
 
 
 @dataclass(frozen=True)
@@ -177,6 +181,25 @@ class ConstantFacts:
     def __call__(self, **_: Any) -> Facts:
         """The facts, whatever the arguments."""
         return Facts(self.subcategory)
+
+
+@dataclass(frozen=True)
+class DrawnFacts:
+    """A subcategory, and choices that the variants of a family take in turn.
+
+    Attributes:
+        options: Options of a choice by the name of its draw.
+    """
+
+    family: str
+    subcategory: str
+    options: Mapping[str, Lazy]
+
+    def __call__(self, seed: int) -> Facts:
+        """The facts of a variant."""
+        rng = variant_rng.variant_rng(self.family, seed)
+        chosen = {name: rng.turn(lazy.value, name) for name, lazy in self.options.items()}
+        return Facts(self.subcategory, chosen)
 
 
 @dataclass(frozen=True)
@@ -253,14 +276,16 @@ def _object_family(
     *,
     category: str = "",
     subcategory: str = "",
-    facts: bool = False,
+    facts: bool | Mapping[str, Lazy] = False,
     marks: Mapping[int | str, str] | None = None,
     wear: Callable[[Solid, str, int], Solid] | None = None,
     **row: Any,
 ) -> Family:
     known: Callable[..., Facts] | None = None
-    if facts:
-        known = Lazy(f"{row['build'].path}_facts")
+    if isinstance(facts, Mapping):
+        known = DrawnFacts(name, subcategory, facts)
+    elif facts:
+        known = replace(row["build"], path=f"{row['build'].path}_facts")
     elif subcategory:
         known = ConstantFacts(subcategory)
     row = {"mass_kg": 0.0, "stackable": False, **row}
@@ -272,7 +297,12 @@ def _object_family(
 
 
 def _arguments(package: str, row: Mapping[str, Any]) -> dict[str, Any]:
-    """A row of the table as keywords: lists become tuples, ``build`` a function."""
+    """A row of the table as keywords: lists become tuples, ``build`` a function.
+
+    Facts and symmetries take the arguments that ``build: {use: ...}`` fixes, as ``build`` does.
+    """
+    build = row["build"]
+    use, *fixed = build.items() if isinstance(build, Mapping) else (("use", build),)
     parameters = {
         key: tuple(value) if isinstance(value, list) else value
         for key, value in row.get("parameters", {}).items()
@@ -281,18 +311,26 @@ def _arguments(package: str, row: Mapping[str, Any]) -> dict[str, Any]:
         "version": 1,
         "variants": 0,
         **row,
-        "build": _lazy(package, row["build"]),
+        "build": replace(_lazy(package, use[1]), arguments=dict(fixed)),
         "tags": tuple(sorted(row["tags"])),
         **({"wear": _lazy(package, row["wear"])} if "wear" in row else {}),
         "parameters": parameters,
         "declares": {key: _fact(package, value) for key, value in row.get("declares", {}).items()},
-        **_symmetries(package, row.get("symmetries")),
+        **({"facts": _facts(package, row["facts"])} if "facts" in row else {}),
+        **_symmetries(package, row.get("symmetries"), dict(fixed)),
     }
 
 
 def _lazy(package: str, path: str) -> Lazy:
     """A value named by a full path, or by a path in the package of the table."""
     return Lazy(path if path.startswith("gen_data.") else f"{package}.{path}")
+
+
+def _facts(package: str, given: bool | Mapping[str, str]) -> bool | Mapping[str, Lazy]:
+    """Whether there is a function of facts, or the tables of choices by name of the draw."""
+    if isinstance(given, bool):
+        return given
+    return {name: _lazy(package, path) for name, path in given.items()}
 
 
 def _fact(package: str, value: Any) -> Any:
@@ -302,10 +340,12 @@ def _fact(package: str, value: Any) -> Any:
     return _lazy(package, value) if isinstance(value, str) and ":" in value else value
 
 
-def _symmetries(package: str, given: str | Mapping[str, int] | None) -> dict[str, Any]:
+def _symmetries(
+    package: str, given: str | Mapping[str, int] | None, fixed: Mapping[str, object]
+) -> dict[str, Any]:
     """A function for ``module:function``, or for folds by axis; nothing for None."""
     if given is None:
         return {}
     if isinstance(given, str):
-        return {"symmetries": _lazy(package, given)}
+        return {"symmetries": replace(_lazy(package, given), arguments=fixed)}
     return {"symmetries": ConstantSymmetries(given)}

@@ -1,7 +1,5 @@
 """Asset library: every mesh, texture, environment and robot by id, in the normal form."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -32,7 +30,7 @@ def open_library(
     cache_dir: Path | None = None,
     packs: Path | None = None,
     provide: Callable[[Path], object] | None = None,
-) -> Library:
+) -> "Library":
     """Open a library of procedural assets, pybullet's, installed packs', and the user's own.
 
     Files are read on first use.

@@ -3,8 +3,6 @@
 Readers: ``urdf``, ``mjcf``, ``sdf``.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -81,7 +79,7 @@ class DescriptionParts:
     included: tuple[str, ...]
     remarks: tuple[str, ...]
 
-    def whole(self) -> RobotDescription:
+    def whole(self) -> "RobotDescription":
         """The description."""
         links, home = {link.name: link for link in self.links}, dict(self.home)
         return RobotDescription(links, self.joints, home, self.included, self.remarks)

@@ -1,7 +1,5 @@
 """Textures made of several images, and the image channels they use."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any
@@ -57,7 +55,7 @@ class TextureMaps:
         """Names of the images, each once, sorted."""
         return tuple(sorted({image.partition("!")[0] for image in self._given().values()}))
 
-    def renamed(self, names: Mapping[str, str]) -> TextureMaps:
+    def renamed(self, names: Mapping[str, str]) -> "TextureMaps":
         """The same maps, whose images have other names, ``{old: new}``."""
         changes: dict[str, Any] = {}
         for key, image in self._given().items():

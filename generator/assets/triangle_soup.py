@@ -1,7 +1,5 @@
 """Triangle soup: the common intermediate of all mesh formats before the normal form."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -69,7 +67,7 @@ class TriangleSoup:
     @classmethod
     def of(
         cls, corners: Float64, slot: MaterialSlot | None = None, colors: Float64 | None = None
-    ) -> TriangleSoup:
+    ) -> "TriangleSoup":
         """Make a soup of one slot without UVs and normals from corners [m, 3, 3]."""
         zeros = np.zeros(len(corners), dtype=np.int64)
         return cls(corners, None, None, zeros, zeros, (slot or MaterialSlot(),), (), colors)
@@ -78,7 +76,7 @@ class TriangleSoup:
         """Number of triangles."""
         return len(self.corners)
 
-    def transformed(self, matrix: Float64) -> TriangleSoup:
+    def transformed(self, matrix: Float64) -> "TriangleSoup":
         """Apply an affine map [3, 4]; mirroring maps also reverse the winding."""
         linear = matrix[:, :3]
         corners = apply_affine(matrix, self.corners)
@@ -91,7 +89,7 @@ class TriangleSoup:
         mirrors = float((linear[0] * np.cross(linear[1], linear[2])).sum()) < 0.0
         return moved.flipped() if mirrors else moved
 
-    def flipped(self) -> TriangleSoup:
+    def flipped(self) -> "TriangleSoup":
         """Reverse the winding of every triangle."""
         return replace(
             self,
@@ -101,7 +99,7 @@ class TriangleSoup:
             colors=None if self.colors is None else self.colors[:, ::-1],
         )
 
-    def select(self, chosen: Bools) -> TriangleSoup:
+    def select(self, chosen: Bools) -> "TriangleSoup":
         """Select triangles by a mask [m]."""
         return replace(
             self,

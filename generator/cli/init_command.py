@@ -1,7 +1,5 @@
 """``gen-data init`` and ``gen-data completion``: the first five minutes."""
 
-from __future__ import annotations
-
 import re
 import shlex
 import shutil
@@ -96,7 +94,7 @@ def _move(staging: Path, out: Path) -> None:
         shutil.copyfile(staging / name, out / name)
 
 
-def starter_files(template: str, meshes: Sequence[OwnMesh]) -> Iterator[tuple[str, str]]:
+def starter_files(template: str, meshes: "Sequence[OwnMesh]") -> Iterator[tuple[str, str]]:
     """Names and texts of the files; the first one is the configuration.
 
     Raises:

@@ -1,7 +1,5 @@
 """Options of all commands with a configuration."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -32,7 +30,7 @@ class ConfigurationOptions:
     overrides: tuple[str, ...]
     without: tuple[str, ...]
 
-    def config(self) -> Config:
+    def config(self) -> "Config":
         """Load and validate the configuration."""
         from gen_data.assemble.config import load_config
 
@@ -91,7 +89,7 @@ def cluster_options(command: F) -> F:
 
 def choose_cluster(
     runner: str, address: str | None, cpus: float | None, gpus: float | None
-) -> RayCluster | None:
+) -> "RayCluster | None":
     """The cluster that the options of ``cluster_options`` name; None = this machine.
 
     Raises:

@@ -1,7 +1,5 @@
 """``gen-data plan``: size, cost and contents of a run, before it starts."""
 
-from __future__ import annotations
-
 import time
 from collections import Counter
 from collections.abc import Iterator
@@ -60,7 +58,7 @@ def plan(
     tables.print_facts(Console(), f"{config.name}: {n} samples", facts)
 
 
-def _rows(config: Config, n: int) -> Iterator[tuple[str, str]]:
+def _rows(config: "Config", n: int) -> Iterator[tuple[str, str]]:
     from gen_data.assemble.pipeline_factory import PipelineFactory
     from gen_data.assemble.size_estimate import estimate_image_bytes
     from gen_data.assets.file_remarks import collect_remarks
@@ -100,7 +98,7 @@ def _rows(config: Config, n: int) -> Iterator[tuple[str, str]]:
     yield "size, estimated", f"{format_bytes(estimate_image_bytes(config, info) * n)} of images"
 
 
-def _class_rows(config: Config, factory: PipelineFactory) -> Iterator[tuple[str, str]]:
+def _class_rows(config: "Config", factory: "PipelineFactory") -> Iterator[tuple[str, str]]:
     """Classes of the label map, and how many assets each has in the groups of objects."""
     assets = {a for scene in factory.nominal for g in scene.groups if g.annotated for a in g.assets}
     found = [factory.library.get(asset) for asset in assets]
@@ -128,7 +126,7 @@ def _measure(choice: options.ConfigurationOptions, count: int) -> cost_estimate.
 
     done_s: dict[int, float] = {}
 
-    def note(progress: RunProgress) -> None:
+    def note(progress: "RunProgress") -> None:
         done_s.setdefault(progress.done, time.monotonic())
 
     with temporary_folder("plan") as folder:

@@ -1,7 +1,5 @@
 """Commands that show samples: ``preview`` and ``contact-sheet``."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
@@ -46,7 +44,7 @@ def preview(
     n: int,
     first: int,
     save: Path | None,
-    points: PointColors,
+    points: "PointColors",
     web: bool,
     host: str,
     seed: int | None,

@@ -1,7 +1,5 @@
 """Commands ``recipe`` and ``pull``: a data set as a few kilobytes, and made from them."""
 
-from __future__ import annotations
-
 import shlex
 import sys
 from pathlib import Path

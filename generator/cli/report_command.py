@@ -1,7 +1,5 @@
 """``gen-data report``: statistics of a data set, as tables and as an HTML page."""
 
-from __future__ import annotations
-
 import json
 from importlib import import_module
 from pathlib import Path
@@ -119,7 +117,7 @@ def report(
         click.echo(f"wrote {page}")
 
 
-def _describe(folder: Path, scenes: int, sets: int, console: Console) -> dict[str, Any]:
+def _describe(folder: Path, scenes: int, sets: int, console: "Console") -> dict[str, Any]:
     from gen_data.report.report_data import BROWSER_BYTES_MAX, describe_dataset, describe_folder
 
     if not (folder / "plan.json").is_file():

@@ -1,7 +1,5 @@
 """Tables of commands, printed."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +14,7 @@ TEXT_WIDTH = 40
 _UNLIMITED = 10_000
 
 
-def print_tables(console: Console, tables: Iterable[Mapping[str, Any]]) -> None:
+def print_tables(console: "Console", tables: Iterable[Mapping[str, Any]]) -> None:
     """Print tables, given by ``title``, ``header``, ``rows`` of texts, and ``note``.
 
     Long texts are wrapped between words. Columns that do not fit into the terminal follow in
@@ -49,7 +47,7 @@ def print_tables(console: Console, tables: Iterable[Mapping[str, Any]]) -> None:
             _print_whole(console, shown)
 
 
-def print_facts(console: Console, title: str, facts: Iterable[tuple[str, str]]) -> None:
+def print_facts(console: "Console", title: str, facts: Iterable[tuple[str, str]]) -> None:
     """Print names and their values as a table; values are wrapped between words."""
     from rich.table import Table
     from rich.text import Text
@@ -63,7 +61,7 @@ def print_facts(console: Console, title: str, facts: Iterable[tuple[str, str]]) 
     _print_whole(console, table)
 
 
-def _print_whole(console: Console, table: Table) -> None:
+def _print_whole(console: "Console", table: "Table") -> None:
     """Print a table without cutting a word: files have lines as long as paths need."""
     if not console.is_terminal:
         needed = console.measure(table, options=console.options.update(width=_UNLIMITED)).minimum

@@ -1,7 +1,5 @@
 """Commands that check and restore data sets: ``verify``, ``repair``, ``diff``, ``repro``."""
 
-from __future__ import annotations
-
 import json
 import shlex
 import sys
@@ -131,13 +129,13 @@ def _verify(
         click.echo(f"{place}: {'; '.join([str(report), *notes])}")
 
 
-def _find_invalid(folder: Path) -> list[Finding]:
+def _find_invalid(folder: Path) -> "list[Finding]":
     from gen_data.runner.deep_verify import find_invalid_samples
 
     return list(find_invalid_samples(folder))
 
 
-def _check_certificate(folder: Path, deep: bool, notes: list[str]) -> list[Finding]:
+def _check_certificate(folder: Path, deep: bool, notes: list[str]) -> "list[Finding]":
     """Compare a certificate with the manifest, and with ``deep`` with one that is made now."""
     from gen_data.core.plugins import loaded
     from gen_data.runner.layout import CERTIFICATE_NAME
@@ -150,7 +148,7 @@ def _check_certificate(folder: Path, deep: bool, notes: list[str]) -> list[Findi
 
 def _find_irreproducible(
     folder: Path, indices: list[int], semantic: bool, source: Path | None
-) -> list[Finding]:
+) -> "list[Finding]":
     from threadpoolctl import threadpool_limits
 
     from gen_data.runner.deep_verify import find_irreproducible_samples
@@ -159,7 +157,7 @@ def _find_irreproducible(
         return list(find_irreproducible_samples(folder, indices, semantic, source))
 
 
-def _print_json(facts: dict[str, object], found: list[Finding]) -> None:
+def _print_json(facts: dict[str, object], found: "list[Finding]") -> None:
     deviations = [
         {"kind": f.kind, "path": f.path, "samples": f.samples, "text": f.text} for f in found
     ]

@@ -1,7 +1,5 @@
 """Errors of a configuration with their positions, collected and reported together."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass, field
 from typing import NoReturn
@@ -72,7 +70,7 @@ class Problems:
         path = field if isinstance(field, str) else format_path(field)
         self._problems[Problem(position, path, fact)] = None
 
-    def extend(self, others: Problems) -> None:
+    def extend(self, others: "Problems") -> None:
         """Add all problems of another collection."""
         for problem in others.sorted():
             self.add(problem.position, problem.field, problem.fact)

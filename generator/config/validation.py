@@ -4,8 +4,6 @@ Pydantic finds the errors. This module traces each one back to its place in the 
 its field, and states it in terms of the YAML file instead of pydantic's.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -55,7 +53,7 @@ def validate(
     return None
 
 
-def _position(node: Node, fault: Fault) -> Position:
+def _position(node: Node, fault: "Fault") -> Position:
     """Position of the value; of its key if that is wrong; of its parent if it is missing."""
     path = (*fault.path, *fault.below)
     key = path[-1] if fault.at_key and path and isinstance(path[-1], str) else None
@@ -83,7 +81,7 @@ class Fault:
     """
 
     kind: str
-    detail: ErrorDetails
+    detail: "ErrorDetails"
     path: FieldPath
     owner: FieldSchema
     below: FieldPath = ()
@@ -102,7 +100,7 @@ class Fault:
         return self.detail.get("ctx", {})
 
 
-def locate_error(detail: ErrorDetails, model: type[BaseModel]) -> Fault:
+def locate_error(detail: "ErrorDetails", model: type[BaseModel]) -> Fault:
     """Follow an error's ``loc`` through the types, and drop the names of union branches from it."""
     owner = FieldSchema.of(model)
     path: FieldPath = ()

@@ -22,8 +22,6 @@ Forbidden operations are impossible by design: randomizers get no engine, annota
 exporters process one shard at a time and compute ids instead of counting.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
@@ -259,7 +257,7 @@ class Settled:
 class PhysicsEngine(Protocol):
     """Settles bodies and moves arms: a pure function of the scene, without state."""
 
-    def __enter__(self) -> PhysicsEngine:
+    def __enter__(self) -> "PhysicsEngine":
         """Start the engine."""
         ...
 
@@ -600,7 +598,7 @@ class Exporter(Protocol):
         """
         ...
 
-    def with_assets(self, assets: AssetLibrary) -> Exporter:
+    def with_assets(self, assets: AssetLibrary) -> "Exporter":
         """The exporter with access to the library, for formats with geometry."""
         ...
 

@@ -5,8 +5,6 @@ so a centred principal point is ``W / 2``. KITTI, nuScenes and OpenCV put pixel 
 their exporters subtract 0.5 from ``cx_px`` and ``cy_px``.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -38,7 +36,7 @@ class Intrinsics:
     @classmethod
     def from_hfov(
         cls, width_px: int, height_px: int, hfov_rad: float, lens: Lens = PINHOLE
-    ) -> Intrinsics:
+    ) -> "Intrinsics":
         """Square pixels, centred principal point, horizontal field of view ``hfov_rad``.
 
         Raises:

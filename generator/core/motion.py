@@ -4,8 +4,6 @@ Poses are computed with ``+ - * / sqrt`` only, without transcendental functions,
 the same bits on every processor.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -29,7 +27,7 @@ class Twist:
     acceleration_m_s2: se3.Vec3 = (0.0, 0.0, 0.0)
     angular_velocity_rad_s: se3.Vec3 = (0.0, 0.0, 0.0)
 
-    def seen_along(self, T_world_frame: se3.SE3) -> Twist:
+    def seen_along(self, T_world_frame: se3.SE3) -> "Twist":
         """The same motion, expressed in the axes of another frame."""
         w, x, y, z = T_world_frame.quaternion_wxyz
         inverse = (w, -x, -y, -z)

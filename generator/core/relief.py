@@ -6,8 +6,6 @@ all layers of a street, such as asphalt and paint, follow the same planes; no cr
 layer sinks into another one.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
 from functools import lru_cache
@@ -161,7 +159,7 @@ class Relief:
         )
 
     @classmethod
-    def of(cls, numbers: Sequence[float]) -> Relief:
+    def of(cls, numbers: Sequence[float]) -> "Relief":
         """The inverse of ``numbers``. Raises ValueError if they are of another number."""
         plain = len(fields(RoadProfile)) - 1
         each = plain + 9

@@ -5,8 +5,6 @@ up, metres, seconds, radians. Template elements become bodies, lights and labels
 depends on the types of elements.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 from typing import Literal, Protocol, TypeVar, get_args
 
@@ -306,7 +304,7 @@ class Assignment:
     instruction: str
     success: tuple[Condition, ...] = ()
     failure: FailureKind = ""
-    joints: tuple[BodyJoint, ...] = ()
+    joints: "tuple[BodyJoint, ...]" = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -735,7 +733,7 @@ class Scene:
                 return instance
         raise KeyError(instance_id)
 
-    def with_bodies(self, *changed: Body) -> Scene:
+    def with_bodies(self, *changed: Body) -> "Scene":
         """The scene with bodies replaced by those of the same name."""
         by_name = {body.name: body for body in changed}
         return replace(self, bodies=tuple(by_name.get(b.name, b) for b in self.bodies))

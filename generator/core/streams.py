@@ -5,8 +5,7 @@ reordering plug-ins changes no other stream, and any sample can be generated on 
 Counter-based generator: Salmon et al., "Parallel random numbers: as easy as 1, 2, 3", SC 2011.
 """
 
-from __future__ import annotations
-
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from hashlib import blake2b
 
@@ -25,9 +24,9 @@ class Rng(np.random.Generator):
 
     index: int = 0
     name: str = ""
-    streams: Streams
+    streams: "Streams"
 
-    def of_sequence(self) -> Rng:
+    def of_sequence(self) -> "Rng":
         """A new stream of the same name that is the same at all steps of the sequence.
 
         Processes that continue from step to step, like the bias of a gyroscope, are redrawn from it
@@ -64,3 +63,13 @@ class Streams:
         rng = Rng(np.random.Philox(key=int.from_bytes(key, "little")))
         rng.index, rng.name, rng.streams = self.index, name, self
         return rng
+
+
+def pick_by_weight(weights: Sequence[float], draw: float) -> int:
+    """Index of one of several, in proportion to its weight, for a draw in [0, 1)."""
+    left = draw * sum(weights)
+    for k, weight in enumerate(weights):
+        left -= weight
+        if left < 0.0:
+            return k
+    return len(weights) - 1

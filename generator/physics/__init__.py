@@ -1,7 +1,5 @@
 """Physics: objects settle and arms accomplish their goals; a pure function of the Scene."""
 
-from __future__ import annotations
-
 from typing import TYPE_CHECKING
 
 from gen_data.core.interfaces import AssetLibrary
@@ -13,7 +11,7 @@ if TYPE_CHECKING:
 __all__ = ["PhysicsConfig", "missing_engine", "open_engine"]
 
 
-def open_engine(assets: AssetLibrary, config: PhysicsConfig) -> Engine:
+def open_engine(assets: AssetLibrary, config: PhysicsConfig) -> "Engine":
     """Open the physics engine, to be used as a context manager.
 
     Raises:

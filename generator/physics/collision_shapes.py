@@ -5,8 +5,6 @@ that thickness: hull and margin together end where the mesh does, and nothing fl
 support.
 """
 
-from __future__ import annotations
-
 import contextlib
 import math
 from collections.abc import Mapping, Sequence
@@ -254,7 +252,7 @@ def _measure(parts_m: Sequence[Array]) -> list[_Part]:
     return measured
 
 
-def _width_m(hull: ConvexHull) -> float:
+def _width_m(hull: "ConvexHull") -> float:
     """Smallest distance [m] between a face and the vertex farthest behind it."""
     depths = np.einsum("kf,kn->fn", hull.equations[:, :3].T, hull.points.T, optimize=False)
     return float((depths.max(axis=1) - depths.min(axis=1)).min())

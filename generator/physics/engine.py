@@ -1,7 +1,5 @@
 """The physics engine: settles objects and plans the motion of arms in a Scene."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from types import TracebackType
 
@@ -38,7 +36,7 @@ class Engine:
         self._world = open_world(config)
         self._shapes: CountCache[collision_shapes.CollisionShape] = CountCache(_SHAPES)
 
-    def __enter__(self) -> Engine:
+    def __enter__(self) -> "Engine":
         """Return the engine, ready to settle."""
         return self
 

@@ -6,8 +6,6 @@ else. Shards and ``labels.jsonl`` keep every sensor as it is. Rectified images a
 folder is the shard of the data set that the exporter sees. Exporters with equal settings share it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
@@ -112,7 +110,7 @@ class ExporterView:
         for camera in scene.cameras:
             self._camera(camera)
 
-    def with_assets(self, assets: AssetLibrary) -> ExporterView:
+    def with_assets(self, assets: AssetLibrary) -> "ExporterView":
         """The exporter with access to the library."""
         return replace(self, exporter=self.exporter.with_assets(assets))
 

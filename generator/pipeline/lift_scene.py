@@ -15,8 +15,6 @@ Trajectories follow the same rules at each knot. What flies is raised by the hei
 lane, and keeps its motion.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -26,16 +24,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.assets.asset_ids import AssetId, parse_asset_id
-from gen_data.assets.drape import FACT, draped_id
-from gen_data.assets.families import declared
-from gen_data.core.asset_types import Material
+from gen_data.assets import asset_ids, drape, families
+from gen_data.core import asset_types, lane_geometry, motion, scene_time
 from gen_data.core.interfaces import AssetLibrary
-from gen_data.core.lane_geometry import left_normals
-from gen_data.core.motion import Trajectory
 from gen_data.core.relief import CELL_M, Relief
 from gen_data.core.scene import Body, Camera, Lane, Light, Scene
-from gen_data.core.scene_time import moved_light
 from gen_data.core.se3 import SE3, Array, Vec3
 from gen_data.traffic.axles import find_axles
 
@@ -50,7 +43,7 @@ _BASE_STEP_M, _SUNK_M, _INSET_M = 0.5, 0.05, 0.02
 """Depths of bases are multiples of the first; they reach below the lowest ground by the second, and
 are narrower than the building by the third."""
 # Without a texture, which further views of a scene would have to fetch.
-_CONCRETE = Material((0.36, 0.35, 0.33), 0.9, role="facade")
+_CONCRETE = asset_types.Material((0.36, 0.35, 0.33), 0.9, role="facade")
 _TURN = 5e-4
 """Points of a lane are kept where its grade has changed by this much since the last one."""
 _FLYING = frozenset({"drone", "gimbal"})
@@ -182,8 +175,8 @@ def _lift_bodies(
     bodies: list[Body] = []
     for body in scene.bodies:
         if _is_draped(body):
-            parsed = parse_asset_id(body.asset)
-            asset = draped_id(parsed, body.T_world_body, body.scale, relief)
+            parsed = asset_ids.parse_asset_id(body.asset)
+            asset = drape.draped_id(parsed, body.T_world_body, body.scale, relief)
             bodies.append(replace(body, asset=asset))
             moves[body.name] = _rise(body.T_world_body, relief)
         else:
@@ -199,7 +192,7 @@ def _lift_bodies(
 def _is_draped(body: Body) -> bool:
     """Whether its mesh follows the ground: its family declares it, and it is upright."""
     _, x, y, _ = body.T_world_body.quaternion_wxyz
-    return x == y == 0.0 and declared(body.asset, FACT, None) is not None
+    return x == y == 0.0 and families.declared(body.asset, drape.FACT, None) is not None
 
 
 def _move(stance: Stance, corners: Array, z: Array, sky_m: float) -> SE3:
@@ -244,7 +237,7 @@ def _base(body: Body, foot: _Foot, z: Array, assets: AssetLibrary) -> list[Body]
     length_m, width_m = (round(b - a - _INSET_M, 2) for a, b in (foot.x_m, foot.y_m))
     if floor_m - float(z.min()) < _SUNK_M or min(length_m, width_m) <= 0.0:
         return []
-    asset = str(AssetId("box", {"size_m": (length_m, width_m, depth_m)}))
+    asset = str(asset_ids.AssetId("box", {"size_m": (length_m, width_m, depth_m)}))
     _, high = assets.bounds_m(asset)
     middle = (0.5 * sum(foot.x_m), 0.5 * sum(foot.y_m), -high[2] - 0.001)
     pose = SE3((0.0, 0.0, floor_m)) @ body.T_world_body @ SE3(middle)
@@ -292,8 +285,8 @@ def _is_on(place: Array, lane: Lane) -> bool:
 
 
 def _lifted_track(
-    track: Trajectory, body: Body, assets: AssetLibrary, relief: Relief, sky_m: float
-) -> Trajectory:
+    track: motion.Trajectory, body: Body, assets: AssetLibrary, relief: Relief, sky_m: float
+) -> motion.Trajectory:
     foot = _foot(body, assets)
     corners = foot.corners(track.knots)
     heights = relief.height(corners.reshape(-1, 3)).reshape(-1, 4)
@@ -308,20 +301,20 @@ def _lifted_light(light: Light, moves: dict[str, SE3], relief: Relief) -> Light:
     if light.kind == "sun":
         return light
     if light.body in moves:
-        return moved_light(light, moves[light.body])
+        return scene_time.moved_light(light, moves[light.body])
     pose = SE3(light.position_m)
     if light.cutoff:
         # A headlight without a body: that of the car that carries the camera.
         yaw_rad = math.atan2(light.direction[1], light.direction[0])
-        return moved_light(light, _ridden(pose, yaw_rad, relief))
-    return moved_light(light, _rise(pose, relief))
+        return scene_time.moved_light(light, _ridden(pose, yaw_rad, relief))
+    return scene_time.moved_light(light, _rise(pose, relief))
 
 
 def _lifted_lane(lane: Lane, relief: Relief) -> Lane:
     """The lane with its points on the ground, and more of them where that bends."""
     points, given = _refined(np.asarray(lane.center_m, np.float64))
     across_m = max(lane.width_m, 1.0)
-    half = 0.5 * across_m * left_normals(points)
+    half = 0.5 * across_m * lane_geometry.left_normals(points)
     points[:, 2] += relief.height(points)
     rise = relief.height(points + half) - relief.height(points - half)
     bank = lane.bank + float(rise.mean()) / across_m

@@ -1,7 +1,5 @@
 """One sample from one index."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
@@ -128,7 +126,7 @@ class Pipeline:
         """The renderer, opened by the context or on first use; merging shards needs none."""
         return checked_renderer.CheckedRenderer(self._open_renderer())
 
-    def __enter__(self) -> Pipeline:
+    def __enter__(self) -> "Pipeline":
         """Start the engines."""
         engine = self._open_physics()
         # Open the renderer now, so that a machine that cannot render fails early.
@@ -350,7 +348,7 @@ def _count_lidar_points(
 
 
 @contextmanager
-def _timed(timings_s: dict[str, float], stage: str) -> Iterator[None]:
+def _timed(timings_s: dict[str, float], stage: str) -> "Iterator[None]":
     """Add the CPU time of a block to a stage. Timings are logged, never part of a data file.
 
     An error of the block remembers the stage.

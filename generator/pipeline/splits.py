@@ -1,7 +1,5 @@
 """Assignment of scenes to splits."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Mapping
 from functools import lru_cache
@@ -45,7 +43,7 @@ class Splits(Strict):
         return given
 
     @model_validator(mode="after")
-    def _sums_to_one(self) -> Splits:
+    def _sums_to_one(self) -> "Splits":
         total = self.train + self.val + self.test
         if abs(total - 1.0) > 1e-9:
             raise ValueError(f"shares must sum to 1, got {total:g}")

@@ -5,8 +5,6 @@ here instead of being kept in every data set: scenes are drawn and settled again
 by distributions that record their values. Repeated scenes are compared with the stored ones.
 """
 
-from __future__ import annotations
-
 import copy
 import math
 from collections import Counter
@@ -116,7 +114,7 @@ def draw_parameters(stored: StoredSamples, scenes_max: int) -> DrawnParameters:
     return DrawnParameters(parameters, replay.scenes, len(replay.differences), replay.rejections)
 
 
-def replay_scenes(stored: StoredSamples, scenes_max: int) -> Replay:
+def replay_scenes(stored: StoredSamples, scenes_max: int) -> "Replay":
     """Draw some scenes again, chosen evenly, and all their views.
 
     Raises:

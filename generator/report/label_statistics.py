@@ -1,7 +1,5 @@
 """Statistics of labels by category, collected from a stream."""
 
-from __future__ import annotations
-
 import math
 from array import array
 from collections import Counter
@@ -33,7 +31,7 @@ class Survey:
     """
 
     images: Counter[tuple[str, str]] = field(default_factory=Counter)
-    numbers: dict[tuple[str, str], array[float]] = field(default_factory=dict)
+    numbers: "dict[tuple[str, str], array[float]]" = field(default_factory=dict)
     points: dict[str, list[int]] = field(default_factory=dict)
     assets: Counter[tuple[str, str]] = field(default_factory=Counter)
 

@@ -4,8 +4,6 @@ Lines of ``labels.jsonl`` are parsed as plain JSON, one at a time: building ever
 typed value would take most of the time of a report.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from array import array
@@ -70,7 +68,7 @@ class ObjectStatistics:
     cameras: tuple[str, ...]
     categories: tuple[str, ...]
     survey: Survey = field(default_factory=Survey)
-    rows: array[float] = field(default_factory=lambda: array("d"))
+    rows: "array[float]" = field(default_factory=lambda: array("d"))
     splits: dict[int, str] = field(default_factory=dict)
 
     def columns(self) -> dict[str, Column]:

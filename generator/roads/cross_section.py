@@ -4,8 +4,6 @@
 gutter is at z = 0; the carriageway rises to its crown in the middle.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, fields
 from typing import Any, Literal

@@ -1,7 +1,5 @@
 """Shape of fields beside a road: parcels of crops, with tracks between them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

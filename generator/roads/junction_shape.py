@@ -1,7 +1,5 @@
 """Shape and lanes of junctions: arms from a centre, rounded corners, one path per turn."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace

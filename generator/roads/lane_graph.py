@@ -1,7 +1,5 @@
 """Lanes of roads, and the links between them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace

@@ -6,8 +6,6 @@ marks, speeds, directions and links, and connections of junctions, also direct o
 else is counted in ``Network.unused`` (``opendrive_unused``).
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterable, Iterator, Mapping

@@ -1,16 +1,13 @@
 """Lane graph of an OpenDRIVE file, relative to an origin at its centre."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gen_data.core.errors import AssetError
+from gen_data.core import errors, se3
 from gen_data.core.scene import Lane, LaneKind
-from gen_data.core.se3 import SE3
 from gen_data.roads.lane_graph import FURNITURE_M, stations, world_points
 from gen_data.roads.opendrive import Contact, LaneRecord, Network, Road, Section
 from gen_data.roads.reference_line import Array
@@ -63,7 +60,7 @@ def network_lanes(network: Network) -> tuple[Lane, ...]:
         AssetError: if linked lanes do not meet; the message names the road.
     """
     x, y = origin_m(network)
-    T_body_file = SE3((-x, -y, 0.0))
+    T_body_file = se3.SE3((-x, -y, 0.0))
     made: dict[Key, Lane] = {}
     extra: list[Lane] = []
     for road in network.roads.values():
@@ -118,7 +115,7 @@ def _trace_edges(road: Road, section: Section, number: int, step_m: float = _STE
     return _LaneEdges(s, edges[number - side], edges[number])
 
 
-def _make_lane(road: Road, index: int, section: Section, number: int, T_body_file: SE3) -> Lane:
+def _make_lane(road: Road, index: int, section: Section, number: int, T_body_file: se3.SE3) -> Lane:
     record = section.lanes[number]
     course = _trace_edges(road, section, number)
     lift = np.full(len(course.s_m), 0.5 * sum(heights_m(record)))
@@ -147,7 +144,7 @@ def _make_lane(road: Road, index: int, section: Section, number: int, T_body_fil
     )
 
 
-def _make_side_lanes(road: Road, index: int, section: Section, T_body_file: SE3) -> list[Lane]:
+def _make_side_lanes(road: Road, index: int, section: Section, T_body_file: se3.SE3) -> list[Lane]:
     """Furniture lanes on sidewalks, and frontage lanes along the outer edges of roads."""
     made: list[Lane] = []
     for side in (1, -1):
@@ -256,7 +253,7 @@ def _tapers(network: Network, key: Key, after: Key) -> bool:
 def _check_gap(network: Network, key: Key, lane: Lane, after: Lane) -> None:
     gap = _gap_m(lane, after)
     if gap > MAX_LINK_GAP_M:
-        raise AssetError(
+        raise errors.AssetError(
             f"{network.place}: road '{key[0]}': lane {key[2]} ends {gap:.2f} m from lane "
             f"'{after.name}' that it leads to; correct the link or the geometry"
         )

@@ -1,7 +1,5 @@
 """Counts the elements of an OpenDRIVE file that have no effect on lanes and surface here."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from xml.etree.ElementTree import Element

@@ -1,7 +1,5 @@
 """Shape and lanes of car parks."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -3,8 +3,6 @@
 A curve starts at its own origin along +X; poses are rows ``(x, y, heading)`` in metres and radians.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

@@ -1,14 +1,11 @@
 """Shape and lanes of roundabouts: a ring around an island, arms with rounded corners."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gen_data.core.scene import Lane
-from gen_data.core.se3 import SE3
+from gen_data.core import scene, se3
 from gen_data.roads.junction_shape import ArmsShape, corner_lanes, curve, lane_points, on_arm
 from gen_data.roads.reference_line import Array
 
@@ -131,8 +128,8 @@ class RoundaboutShape(ArmsShape):
 
 
 def roundabout_lanes(
-    shape: RoundaboutShape, name: str, T_world_junction: SE3, speed_m_s: float, crosswalks: bool
-) -> tuple[Lane, ...]:
+    shape: RoundaboutShape, name: str, T_world_junction: se3.SE3, speed_m_s: float, crosswalks: bool
+) -> tuple[scene.Lane, ...]:
     """Make a path from every arm around the ring to every other, sidewalks, and crosswalks.
 
     Paths share the ring; each is a lane of its own, as the turns of a junction are.
@@ -141,7 +138,7 @@ def roundabout_lanes(
     lanes = []
     for i, j in ((i, j) for i in range(arms) for j in range(arms) if i != j):
         center = lane_points(_ring_path(shape, i, j), shape, T_world_junction)
-        lane = Lane(f"{name}/{i}to{j}_0", "driving", center, shape.lane_width_m, road=name)
+        lane = scene.Lane(f"{name}/{i}to{j}_0", "driving", center, shape.lane_width_m, road=name)
         lanes.append(replace(lane, speed_m_s=speed_m_s, junction=True))
     return (*lanes, *corner_lanes(shape, name, T_world_junction, crosswalks))
 

@@ -156,10 +156,8 @@ def _cover(room: LitRoom, patches: _Patches) -> Array:
     shares = np.zeros((len(room.holes), len(patches.side)))
     for share, hole in zip(shares, room.holes, strict=True):
         across = [k for k in range(3) if k != hole.side // 2]
-        low, high = (
-            np.subtract(hole.low_m, middle)[across],
-            np.subtract(hole.high_m, middle)[across],
-        )
+        low = np.subtract(hole.low_m, middle)[across]
+        high = np.subtract(hole.high_m, middle)[across]
         centers, half = patches.centers_m[:, across], patches.half_m[:, across]
         common = np.minimum(centers + half, high) - np.maximum(centers - half, low)
         inside = (np.maximum(common, 0.0) / np.maximum(2.0 * half, 1e-9)).prod(axis=1)

@@ -4,8 +4,6 @@ A candidate is refused with a reason; ``Conflict`` names the most frequent one o
 could not be satisfied.
 """
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -34,7 +32,7 @@ _TOP_M = 0.003
 """Depth of the rounded border of tops."""
 _EDGE_OF_TOP_M = 0.008
 _TOPS: bounded_cache.ObjectCache[dict[str, Array]] = bounded_cache.ObjectCache(2)
-_SHAPES: bounded_cache.ObjectCache[dict[str, Shape]] = bounded_cache.ObjectCache(2)
+_SHAPES: "bounded_cache.ObjectCache[dict[str, Shape]]" = bounded_cache.ObjectCache(2)
 
 
 @dataclass(frozen=True, slots=True)

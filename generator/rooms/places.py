@@ -10,6 +10,7 @@ import numpy as np
 
 from gen_data.assets.families import declared
 from gen_data.core.keypoint_names import BACKREST
+from gen_data.core.streams import pick_by_weight
 from gen_data.rooms.floor_plan import Opening, between, direction, draw_count
 from gen_data.rooms.layout import Drawn, Layout, Neighbor, Options, Piece, Shape, cos_sin
 from gen_data.rooms.rules import Rule
@@ -80,7 +81,7 @@ def _at_wall(
             drawn = draw_asset(layout, rule, options)
             s = layout.shape(drawn[1])
             lengths = [layout.room.wall_length_m(k) for k in range(4)]
-            wall = _weighted(lengths, float(layout.rng.random()))
+            wall = pick_by_weight(lengths, float(layout.rng.random()))
             free = 0.5 * lengths[wall] - s.half_y - 0.015
             corner = free if layout.rng.random() < 0.5 else -free
             along = corner if in_corners else layout.signed(max(free, 0.0))
@@ -98,15 +99,6 @@ def _hanging_m(layout: Layout, rule: Rule, s: Shape) -> float:
     if rule.middle_m[1]:
         return between(layout.rng, rule.middle_m) - 0.5 * (s.high - s.low)
     return between(layout.rng, rule.height_m)
-
-
-def _weighted(weights: Sequence[float], draw: float) -> int:
-    left = draw * sum(weights)
-    for k, weight in enumerate(weights):
-        left -= weight
-        if left < 0.0:
-            return k
-    return len(weights) - 1
 
 
 def _free(layout: Layout, rule: Rule, options: Options, wanted: int) -> int:

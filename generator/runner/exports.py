@@ -6,8 +6,6 @@ of the data set with other exporters, so that the result has the same bytes as t
 generation with these exporters gives.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -66,11 +64,11 @@ class StoredPipeline:
         timeline = Timeline(sample.scene, open_assets(self.asset_folders), ids)
         return replace(sample, instants={name: timeline.at(t) for name, t in apart.items()})
 
-    def __call__(self) -> StoredPipeline:
+    def __call__(self) -> "StoredPipeline":
         """Make the pipeline of a process."""
         return self
 
-    def __enter__(self) -> StoredPipeline:
+    def __enter__(self) -> "StoredPipeline":
         """Start; there are no engines."""
         return self
 
@@ -169,7 +167,7 @@ def _is_same_disk(one: Path, other: Path) -> bool:
 
 def export(  # noqa: PLR0913  (keywords of one front door)
     stored: StoredSamples,
-    config: Config,
+    config: "Config",
     exporters: Mapping[str, Exporter],
     out: Path,
     *,

@@ -1,7 +1,5 @@
 """Free space on the disk: whether a data set fits, before its first shard and after each one."""
 
-from __future__ import annotations
-
 import errno
 import os
 from dataclasses import dataclass
@@ -31,7 +29,7 @@ class SpaceCheck:
         linked_bytes: Of a sample, the size of files that are hard links and take no space.
     """
 
-    store: LocalStore
+    store: "LocalStore"
     estimate_bytes: float = 0.0
     is_forced: bool = False
     linked_bytes: float = 0.0

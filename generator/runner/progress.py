@@ -1,7 +1,5 @@
 """Progress, cost and log of a run, for users; never part of a data file."""
 
-from __future__ import annotations
-
 import time
 import warnings
 from collections.abc import Callable, Mapping
@@ -72,7 +70,7 @@ class Summary:
     rss_bytes_max: int = 0
     already_complete: bool = False
     folder: str = ""
-    failed: tuple[FailedSample, ...] = ()
+    failed: "tuple[FailedSample, ...]" = ()
     shards_left: int = 0
 
     @property
@@ -127,13 +125,13 @@ class RunMonitor:
 
     def __init__(
         self,
-        store: LocalStore,
-        scan: Scan,
+        store: "LocalStore",
+        scan: "Scan",
         total: int,
         report: Callable[[RunProgress], None],
         space: free_space.SpaceCheck,
         clock: Callable[[], float] = time.monotonic,
-        proof: Proof | None = None,
+        proof: "Proof | None" = None,
     ) -> None:
         self._store = store
         self._scan = scan

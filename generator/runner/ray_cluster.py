@@ -1,7 +1,5 @@
 """Ray clusters: connection, and the resources of a worker."""
 
-from __future__ import annotations
-
 import signal
 import threading
 from collections.abc import Iterator
@@ -89,7 +87,7 @@ class RayCluster:
         fits = [int(total.get(name, 0) / each) for name, each in wanted.items() if each > 0]
         return max(1, min(fits, default=1))
 
-    def open_pool(self, job: Job) -> Pool:
+    def open_pool(self, job: "Job") -> "Pool":
         """Open a pool of workers of the connected cluster."""
         from gen_data.runner.ray_pool import RayPool
 

@@ -5,8 +5,6 @@ repeats nothing by itself (``max_restarts`` and ``max_task_retries`` are 0): the
 the shard of a lost worker again, and a shard that was committed twice has the same bytes.
 """
 
-from __future__ import annotations
-
 import pickle
 import time
 from collections.abc import Iterator
@@ -57,7 +55,7 @@ class RayPool:
         gpus: GPUs per worker.
     """
 
-    def __init__(self, job: Job, *, cpus: float, gpus: float) -> None:
+    def __init__(self, job: "Job", *, cpus: float, gpus: float) -> None:
         import ray
 
         self._ray = ray
@@ -72,7 +70,7 @@ class RayPool:
         self._actors: dict[int, _Actor] = {}
         self._ended: list[Exited] = []
 
-    def __enter__(self) -> RayPool:
+    def __enter__(self) -> "RayPool":
         """Start without workers."""
         return self
 

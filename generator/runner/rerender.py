@@ -4,8 +4,6 @@ Objects keep their ids, shapes and poses; randomizers that are not changed are n
 two data sets are pairs: they differ in nothing but what was changed (counterfactual images).
 """
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -51,7 +49,7 @@ class RerenderFactory:
     redrawn: frozenset[str]
     detached: frozenset[str] = frozenset()
 
-    def __call__(self) -> RerenderedScenes:
+    def __call__(self) -> "RerenderedScenes":
         """Make the pipeline of a process."""
         return RerenderedScenes(self, self.factory())
 
@@ -73,7 +71,7 @@ class RerenderedScenes:
         """Exporters by name."""
         return self.pipeline.exporters
 
-    def __enter__(self) -> RerenderedScenes:
+    def __enter__(self) -> "RerenderedScenes":
         """Open the renderer; physics is not needed."""
         _ = self.pipeline.renderer
         return self

@@ -4,8 +4,6 @@ Nothing is inferred from the files in a folder: a shard either matches its recor
 again.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import shlex
@@ -77,7 +75,7 @@ class Scan:
     rejections: int = 0
     failed: tuple[FailedSample, ...] = ()
 
-    def within(self, shards: range | None) -> Scan:
+    def within(self, shards: range | None) -> "Scan":
         """The same result with those missing shards only that lie in a range; None = all."""
         if shards is None:
             return self

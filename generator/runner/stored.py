@@ -1,7 +1,5 @@
 """Samples read back from a finished data set."""
 
-from __future__ import annotations
-
 import json
 import re
 import shlex
@@ -106,7 +104,7 @@ class StoredSamples:
         config: Mapping[str, Any] = self.plan.config
         return config
 
-    def labelled(self, index: int, has_points: bool = True) -> LabelledImages:
+    def labelled(self, index: int, has_points: bool = True) -> "LabelledImages":
         """The sample of that number, whose scene, images and points are read on access.
 
         Without ``has_points``, its scans are empty, as those that exporters receive.

@@ -1,7 +1,5 @@
 """Signals to stop as a flag and a file descriptor, instead of an exception at any point."""
 
-from __future__ import annotations
-
 import signal
 import threading
 from collections.abc import Iterator
@@ -29,7 +27,7 @@ class Interruption:
         self._before: dict[signal.Signals, object] = {}
         self.wake, self._writer = system_calls.wake_channel()
 
-    def __enter__(self) -> Interruption:
+    def __enter__(self) -> "Interruption":
         """Install the signal handlers."""
         if threading.current_thread() is threading.main_thread():
             for number in SIGNALS:

@@ -8,8 +8,6 @@ Sources: Preetham, Shirley and Smits, "A practical analytic model for daylight",
 luminance of clear, hazy and overcast skies).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -190,7 +188,7 @@ class _SkyAngles:
     sun_zenith_rad: float
 
     @classmethod
-    def of(cls, d: Array, sun_altitude_rad: float) -> _SkyAngles:
+    def of(cls, d: Array, sun_altitude_rad: float) -> "_SkyAngles":
         """Of unit directions [h, w, 3], each row level."""
         towards = d[..., 0] * math.cos(sun_altitude_rad) + d[..., 2] * math.sin(sun_altitude_rad)
         towards = np.clip(towards, -1.0, 1.0)

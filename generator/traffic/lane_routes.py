@@ -1,7 +1,5 @@
 """Routes over lane graphs."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -30,7 +28,7 @@ class LaneGraph:
     segments: se3.Array
 
     @classmethod
-    def of(cls, lanes: Iterable[scene.Lane], *kinds: str) -> LaneGraph:
+    def of(cls, lanes: Iterable[scene.Lane], *kinds: str) -> "LaneGraph":
         """Build the graph of all lanes of some kinds."""
         lines = {lane.name: lane_geometry.LaneLine(lane) for lane in lanes if lane.kind in kinds}
         before: dict[str, list[str]] = {}
@@ -50,7 +48,7 @@ class LaneGraph:
         """Lanes that start at the end of one."""
         return tuple(n for n in self.lines[name].lane.successors if n in self.lines)
 
-    def nearest(self, x_m: float, y_m: float) -> LanePosition | None:
+    def nearest(self, x_m: float, y_m: float) -> "LanePosition | None":
         """Nearest lane position to a point; None if there is no lane."""
         if not len(self.segments):
             return None

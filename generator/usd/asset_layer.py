@@ -3,8 +3,6 @@
 Materials are UsdPreviewSurface networks (specification version 2.6).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -160,7 +158,7 @@ def _define_layers(shader: Any, material: Material) -> None:
         shader.CreateInput("opacity", number).Set(1.0 - material.transmission)
 
 
-def _connect_images(shader: Any, images: _Images, files: TextureFiles) -> None:
+def _connect_images(shader: Any, images: "_Images", files: TextureFiles) -> None:
     """Connect images; the inputs' constant values become the images' scale factors."""
     from pxr import Gf, Sdf
 

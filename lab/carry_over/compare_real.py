@@ -1,7 +1,5 @@
 """A data set or configuration next to the labelled pictures of a user: ``--compare-real``."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections import Counter
@@ -39,7 +37,7 @@ class Ours:
 
     labels: RealSet
     units: Sequence[int]
-    config: Config | None
+    config: "Config | None"
     groups: Mapping[str, frozenset[str]]
 
 

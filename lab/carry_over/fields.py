@@ -1,7 +1,5 @@
 """Fields of configurations that change a quantity: remedies where two sets differ."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -45,7 +43,7 @@ def fields_of(quantity: str) -> list[Field]:
     return fields
 
 
-def remedies(row: Row, config: Config | None, groups: Collection[str]) -> list[str]:
+def remedies(row: Row, config: "Config | None", groups: Collection[str]) -> list[str]:
     """Changes of fields that bring our values closer to the real ones, the most direct first.
 
     Args:
@@ -69,7 +67,7 @@ def _verb(field: Field, direction: Direction) -> str:
 
 
 def _in_use(
-    fields: Sequence[Field], config: Config, groups: Collection[str], label: str
+    fields: Sequence[Field], config: "Config", groups: Collection[str], label: str
 ) -> Iterator[tuple[Field, str]]:
     """Fields of the plug-ins of a configuration, with their paths as ``--set`` takes them."""
     probe = config.probes[0]

@@ -1,7 +1,5 @@
 """Certification of a data set: the function behind ``gen-data certify``."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Callable
 from os import PathLike
@@ -23,7 +21,7 @@ def certify(
     alpha: float = 1e-3,
     date: str = "",
     on_progress: Callable[[str], None] = lambda _: None,
-) -> Certificate:
+) -> "Certificate":
     """Check all claims about a finished data set, and write its certificate next to the manifest.
 
     ``CERTIFICATE.json`` and ``CERTIFICATE.html`` are not part of the data set: its identity does

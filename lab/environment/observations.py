@@ -1,7 +1,5 @@
 """Observations: what a policy sees of an episode."""
 
-from __future__ import annotations
-
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,7 +22,7 @@ _FAR_M = 3.0
 Observation = dict[str, Any]
 
 
-def observation_space(robot: RobotModel, image: Intrinsics, settings: EnvSettings) -> spaces.Dict:
+def observation_space(robot: RobotModel, image: Intrinsics, settings: EnvSettings) -> "spaces.Dict":
     """The space of ``observe``.
 
     ``rgb`` is uint8 [h, w, 3], ``depth`` float32 [h, w, 1] along the optical axis [m].
@@ -42,7 +40,7 @@ def observation_space(robot: RobotModel, image: Intrinsics, settings: EnvSetting
     fastest = np.array([speed_max(joint) for joint in joints], np.float32)
     height, width = image.height_px, image.width_px
 
-    def box(low: float, high: float, *shape: int) -> spaces.Box:
+    def box(low: float, high: float, *shape: int) -> "spaces.Box":
         return spaces.Box(low, high, shape, np.float32)
 
     return spaces.Dict(
@@ -63,7 +61,7 @@ def observation_space(robot: RobotModel, image: Intrinsics, settings: EnvSetting
 
 
 def observe(
-    rollout: Rollout, reading: SensorReading, space: spaces.Dict, settings: EnvSettings
+    rollout: Rollout, reading: SensorReading, space: "spaces.Dict", settings: EnvSettings
 ) -> Observation:
     """The observation now, within the bounds of its space."""
     arm = rollout.simulation

@@ -1,7 +1,5 @@
 """Fit of a configuration to recordings: the function behind ``gen-data match``."""
 
-from __future__ import annotations
-
 import json
 from os import PathLike, fspath
 from pathlib import Path
@@ -26,8 +24,8 @@ def match(  # noqa: PLR0913  (keywords of one front door)
     scenes: int = 48,
     camera: str = "",
     lidar: str = "",
-    on_progress: Callable[[str], None] | None = None,
-) -> Match:
+    on_progress: "Callable[[str], None] | None" = None,
+) -> "Match":
     """Fit the sensors of a configuration to a folder of unlabelled recordings.
 
     Exposure, tone, colour, noise, blur and JPEG quality are fitted to photographs; reflectance,

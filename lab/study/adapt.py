@@ -5,8 +5,6 @@ configuration extends the one before by new weights, so that ``gen-data --config
 any round again, byte for byte.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os
@@ -114,7 +112,7 @@ def adapt(
     return replace(made, images=images)
 
 
-def _check_same(loaded: Config, data: Path) -> None:
+def _check_same(loaded: "Config", data: Path) -> None:
     """Refuse a data set of another configuration; what plans add or exports change may differ."""
     free = ("seed", "exporters", "physics", "shard_size")
     stored = load_config(str(data))
@@ -212,7 +210,7 @@ def _count(
 
 def _write_round(
     config: str,
-    loaded: Config,
+    loaded: "Config",
     judged: StoredSamples,
     out: Path,
     tallies: Mapping[int, Tally],
@@ -257,7 +255,7 @@ def _write_round(
 
 def _format_config(
     config: str,
-    loaded: Config,
+    loaded: "Config",
     file: Path,
     chosen: Sequence[Dependence],
     number: int,

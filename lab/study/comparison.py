@@ -8,8 +8,6 @@ few seeds, the degrees of freedom of Welch and Satterthwaite would make interval
 value in 92 instead of 95 of 100 cases; these hold it in 95 to 97.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -57,7 +55,7 @@ class Scores:
     resampled: NDArray[np.float64]
     pictures: float = math.inf
 
-    def __sub__(self, other: Scores) -> Scores:
+    def __sub__(self, other: "Scores") -> "Scores":
         """Differences of runs with equal seeds."""
         measured, resampled = self.measured - other.measured, self.resampled - other.resampled
         return Scores(measured, resampled, self.pictures)

@@ -5,8 +5,6 @@ AAAI 2020): a heat map of object centres per class, and at each place near a cen
 to the four sides of the box. Boxes are ``x_min, y_min, x_max, y_max`` [px], half-open.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -108,7 +106,7 @@ class Detector(nn.Module):
         torch.save(content | {"weights": self.state_dict()}, path)
 
     @staticmethod
-    def load(path: Path) -> Detector:
+    def load(path: Path) -> "Detector":
         """Read a file of ``save``, ready to detect.
 
         Raises:

@@ -3,8 +3,6 @@
 The figures are those of pycocotools, which COCO's own evaluation uses.
 """
 
-from __future__ import annotations
-
 import contextlib
 import copy
 import io
@@ -62,7 +60,7 @@ class Evaluation:
         return np.stack([precision.mean(axis=(0, 1)), precision[0].mean(axis=0)])
 
     @cached_property
-    def matches(self) -> list[Match]:
+    def matches(self) -> "list[Match]":
         """Objects that were found, missed, and false alarms; see ``match_objects``."""
         return match_objects(self)[0]
 

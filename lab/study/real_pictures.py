@@ -1,7 +1,5 @@
 """Labelled pictures of users: folders in the layout of COCO, KITTI, YOLO or Pascal VOC."""
 
-from __future__ import annotations
-
 import re
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
@@ -57,7 +55,7 @@ class RealSet:
     skipped: Mapping[str, int]
     layout: str = "coco"
 
-    def restrict(self, classes: Collection[str]) -> RealSet:
+    def restrict(self, classes: Collection[str]) -> "RealSet":
         """The same pictures with the objects of these classes; others are counted as skipped.
 
         Names agree without regard to case: KITTI's ``Car`` is the class ``car``.

@@ -1,7 +1,5 @@
 """A process that trains the small detector as a task file says, and writes its detections."""
 
-from __future__ import annotations
-
 import json
 import sys
 from pathlib import Path

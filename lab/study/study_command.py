@@ -1,7 +1,5 @@
 """``gen-data study``: the value of changes of a configuration on real pictures."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -96,7 +94,7 @@ def list_variants(
     overrides: tuple[str, ...],
     against: tuple[str, ...],
     mix: tuple[int, ...],
-) -> tuple[Variant, ...]:
+) -> "tuple[Variant, ...]":
     """The baseline and one variant per option."""
     from gen_data.assemble.config import load_config
     from gen_data.lab.study.experiment import BASELINE, Variant

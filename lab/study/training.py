@@ -1,7 +1,5 @@
 """Training of the small detector on targets in memory, and its detections in pictures."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 

@@ -5,8 +5,6 @@ Colours are the sRGB values of RAL 3020, 5017, 1023, 9017 and 9016, which EN 128
 in.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -48,7 +46,7 @@ class Face:
         shape: Outline of the plate.
     """
 
-    image: Image
+    image: "Image"
     shape: Shape
 
     def draw(self, steps: Sequence[Any]) -> None:

@@ -3,8 +3,6 @@
 Names are invented or plain words of a trade.
 """
 
-from __future__ import annotations
-
 import math
 from typing import TYPE_CHECKING
 
@@ -34,7 +32,7 @@ def shop_sign(seed: int) -> TextureData:
     return _soiled(art.resize_texture(sheet, 512, 512), 0.06, rng)
 
 
-def _board(rng: VariantRng) -> Image:
+def _board(rng: VariantRng) -> "Image":
     """One board: a name, and a frame, a line or a mark."""
     ground, ink, line = (hex_to_srgb8(code) for code in rng.choose(_WORDS["schemes"]).split())
     image = art.canvas(1024, 256, ground)
@@ -69,7 +67,7 @@ def wall_advert(seed: int) -> TextureData:
     return _soiled(art.resize_texture(sheet, 512, 512), 0.12, rng)
 
 
-def _advert(rng: VariantRng) -> Image:
+def _advert(rng: VariantRng) -> "Image":
     ground, other, ink = (hex_to_srgb8(code) for code in rng.choose(_WORDS["boards"]).split())
     image = art.canvas(512, 512, ground)
     art.gradient(image, ground, other if rng.chance(0.5) else ground)

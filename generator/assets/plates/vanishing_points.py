@@ -7,8 +7,6 @@ proposes a vanishing point; the directions with the most support are then fitted
 agree with them. There is no randomness.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -261,7 +259,7 @@ class _Frame:
     is_focal_known: bool
 
     @classmethod
-    def around(cls, start: _Proposal, focal_px: float, *, is_focal_known: bool) -> _Frame:
+    def around(cls, start: _Proposal, focal_px: float, *, is_focal_known: bool) -> "_Frame":
         zenith = start.zenith
         x = _unit(np.cross(zenith, [0.0, 0.0, 1.0])[None])[0]
         axes = np.stack([x, np.cross(zenith, x), zenith])

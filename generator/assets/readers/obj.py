@@ -5,8 +5,6 @@ keys ``Pr``, ``Pm``, ``Pc``, ``Pcr`` (roughness, metallic, clear coat and its ro
 and their images are the widespread PBR extension.
 """
 
-from __future__ import annotations
-
 import codecs
 import math
 import re
@@ -219,7 +217,7 @@ def _color_untextured(soup: TriangleSoup) -> tuple[TriangleSoup, tuple[str, ...]
     return replace(soup, colors=colors, slots=slots), remarks
 
 
-def _transform_uvs(soup: TriangleSoup, transforms: Mapping[int, UvTransform]) -> TriangleSoup:
+def _transform_uvs(soup: TriangleSoup, transforms: "Mapping[int, UvTransform]") -> TriangleSoup:
     """Apply scale and offset of each slot's image to its texture coordinates."""
     if soup.uvs is None or not transforms:
         return soup
@@ -260,7 +258,7 @@ def _look_up(table: Float64, indices: Int64, name: str, *, required: bool = Fals
 
 def _read_slots(
     folder: Folder, relative: str, s: _Statements
-) -> tuple[tuple[MaterialSlot, ...], dict[int, UvTransform], tuple[str, ...]]:
+) -> "tuple[tuple[MaterialSlot, ...], dict[int, UvTransform], tuple[str, ...]]":
     """Materials by number, how their images are placed, and remarks."""
     defined: dict[str, _Definition] = {}
     remarks: list[str] = []

@@ -1,7 +1,5 @@
 """Mixtures of distributions over numbers."""
 
-from __future__ import annotations
-
 from bisect import bisect_right
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -42,7 +40,7 @@ class Mixture(base.Numeric[base.T_co], key="mixture", kinds=("number", "whole nu
         if not self.parts or not self._cumulative[-1] > 0:
             raise base.Malformed("mixture needs at least one weight > 0")
 
-    def draw(self, rng: Rng) -> base.T_co:
+    def draw(self, rng: "Rng") -> base.T_co:
         """A value of a part that is drawn first."""
         total = self._cumulative[-1]
         index = bisect_right(self._cumulative, rng.random() * total)
@@ -66,7 +64,7 @@ class Mixture(base.Numeric[base.T_co], key="mixture", kinds=("number", "whole nu
         return [p for p, weight in zip(self.parts, self.weights, strict=True) if weight > 0]
 
     @classmethod
-    def from_yaml(cls, argument: Any, kind: base.Kind[Any]) -> Mixture[Any]:
+    def from_yaml(cls, argument: Any, kind: base.Kind[Any]) -> "Mixture[Any]":
         """Read a list of pairs: weight and distribution."""
         wanted = "mixture needs a list of pairs [weight, distribution]"
         if not isinstance(argument, (list, tuple)):

@@ -1,7 +1,5 @@
 """Distributions over intervals of numbers."""
 
-from __future__ import annotations
-
 import math
 from statistics import NormalDist
 from typing import TYPE_CHECKING, Annotated
@@ -49,7 +47,7 @@ class Uniform(Interval[float], key="uniform", kinds=("number",)):
         if math.isinf(self.high - self.low):
             raise base.Malformed(f"uniform needs a finite range, got {self.argument()}")
 
-    def draw(self, rng: Rng) -> float:
+    def draw(self, rng: "Rng") -> float:
         """One value."""
         return min(self.low + (self.high - self.low) * rng.random(), self.high)
 
@@ -75,7 +73,7 @@ class LogUniform(
             )
         super().__post_init__()
 
-    def draw(self, rng: Rng) -> float:
+    def draw(self, rng: "Rng") -> float:
         """One value."""
         u = rng.random()
         if self.low == self.high:
@@ -126,7 +124,7 @@ class Normal(base.Numeric[float], key="normal", kinds=("number",)):
                 f"falls into clip [{format_number(low)}, {format_number(high)}]"
             )
 
-    def draw(self, rng: Rng) -> float:
+    def draw(self, rng: "Rng") -> float:
         """One value."""
         # The middle of one of 2^53 equal cells: never 0, whose inverse would be -inf.
         u = rng.random() + 2.0**-54
@@ -168,7 +166,7 @@ class UniformInteger(
     low: int
     high: int
 
-    def draw(self, rng: Rng) -> int:
+    def draw(self, rng: "Rng") -> int:
         """One value."""
         return int(rng.integers(self.low, self.high, endpoint=True))
 

@@ -6,8 +6,6 @@ While it pivots, the fingers are a hinge with friction, and contacts turn it. A 
 body only if it seals on it, and as long as its force is large enough.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -35,7 +33,7 @@ _SETTLE_S = 0.6
 
 def demonstrate(
     planner: manipulation_planner.TaskPlanner, arm: arm_goals.Arm, world: World, time_step_s: float
-) -> Demonstration | errors.Rejection:
+) -> "Demonstration | errors.Rejection":
     """Plan and carry out the task of an arm goal by goal; each plan starts from what physics left.
 
     A failure that was asked for befalls the first grasp. It is no reason to stop: the arm goes on

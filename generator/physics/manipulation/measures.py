@@ -38,10 +38,8 @@ class Measures:
             return math.acos(max(-1.0, min(1.0, cosine)))
         if condition.measure == "travel":
             return joint_position(self._joints[body], self._start[body], world.pose(body))
-        (low, high), (other_low, other_high) = (
-            self._bounds(body, hand_m),
-            self._bounds(other, hand_m),
-        )
+        low, high = self._bounds(body, hand_m)
+        other_low, other_high = self._bounds(other, hand_m)
         if condition.measure == "height":
             return float(low[2] - other_high[2])
         size = 2 if condition.measure == "offset" else 3

@@ -1,7 +1,5 @@
 """Results of several kernels in one piece of device memory: the host reads and waits once."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -36,7 +34,7 @@ class Readback:
     dtypes: tuple[Any, ...]
 
     @classmethod
-    def allocate(cls, count: int, dtypes: Sequence[Any], device: wp.Device) -> Readback:
+    def allocate(cls, count: int, dtypes: Sequence[Any], device: wp.Device) -> "Readback":
         """Arrays of ``count`` elements each."""
         offsets = np.cumsum([0, *(_nbytes(count, dtype) for dtype in dtypes)]).tolist()
         memory = wp.empty(offsets[-1], dtype=wp.uint8, device=device)

@@ -1,7 +1,5 @@
 """Exposure: metering, exposure time and gain that achieve an exposure value, rolling shutter."""
 
-from __future__ import annotations
-
 import math
 from bisect import bisect_left
 from dataclasses import dataclass
@@ -43,7 +41,7 @@ class ExposureControl(Strict):
     iso: tuple[float, float] = (100.0, 3200.0)
 
     @model_validator(mode="after")
-    def _ranges_rise(self) -> ExposureControl:
+    def _ranges_rise(self) -> "ExposureControl":
         for name, (low, high) in (("time_s", self.time_s), ("iso", self.iso)):
             if not 0.0 < low <= high:
                 raise ValueError(f"{name} must rise from above 0, got [{low:g}, {high:g}]")

@@ -1,7 +1,5 @@
 """Image pipeline: all stages from radiance to the bytes of a photograph, in order."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -170,7 +168,7 @@ class ImagePipeline(base_model.Strict):
         return _lists_to_tuples(_merge_presets(below, given))
 
     @model_validator(mode="after")
-    def _keeps_grey(self) -> ImagePipeline:
+    def _keeps_grey(self) -> "ImagePipeline":
         for row in self.color_matrix or ():
             if abs(sum(row) - 1.0) > 1e-6:
                 raise ValueError(f"color_matrix: a row sums to {sum(row):g}; expected 1, so that"

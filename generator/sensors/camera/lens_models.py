@@ -1,7 +1,5 @@
 """Lens models in a camera's configuration."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Annotated, Literal
@@ -103,7 +101,7 @@ class CalibratedLens(base_model.Strict):
     rectified: bool = False
 
     @model_validator(mode="after")
-    def _has_a_source(self) -> CalibratedLens:
+    def _has_a_source(self) -> "CalibratedLens":
         if self.file:
             return self
         if self.camera not in CALIBRATIONS:

@@ -1,7 +1,5 @@
 """The camera of a photograph that is the backdrop of a scene."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Literal
 
@@ -35,7 +33,7 @@ class PlateCamera(rgb_camera.RgbCamera):
     image_pipeline: ImagePipeline = ImagePipeline(preset="photograph")
 
     @model_validator(mode="after")
-    def _follows_the_photograph(self) -> PlateCamera:
+    def _follows_the_photograph(self) -> "PlateCamera":
         for name in _GIVEN_BY_THE_PHOTOGRAPH:
             if name in self.model_fields_set:
                 raise ValueError(f"{name}: the photograph gives it; leave it out")

@@ -1,7 +1,5 @@
 """Camera with photographs and all label channels."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection
 from dataclasses import replace
@@ -88,13 +86,13 @@ class RgbCamera(Mounted):
     settings_of: str = ""
 
     @model_validator(mode="after")
-    def _has_a_partner(self) -> RgbCamera:
+    def _has_a_partner(self) -> "RgbCamera":
         if not self.stereo_with and PAIRED & set(self.media):
             raise ValueError("disparity needs a second camera: name it with stereo_with")
         return self
 
     @model_validator(mode="after")
-    def _has_a_lens(self) -> RgbCamera:
+    def _has_a_lens(self) -> "RgbCamera":
         if isinstance(self.lens, lens_models.Pinhole) and self.hfov_deg > PINHOLE_MAX_DEG:
             raise ValueError(
                 f"hfov_deg {self.hfov_deg:g} is too wide for a pinhole; expected at most "

@@ -1,7 +1,5 @@
 """Files of photographs: lossless PNG, or smaller ones with a loss that viewers hardly see."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 from pydantic import Field, model_validator
@@ -24,7 +22,7 @@ class RgbEncoding(Strict):
     quality: int = Field(DEFAULT_QUALITY, ge=1, le=100)
 
     @model_validator(mode="after")
-    def _has_a_quality(self) -> RgbEncoding:
+    def _has_a_quality(self) -> "RgbEncoding":
         if "quality" in self.model_fields_set and self.format in ("png", "webp_lossless"):
             raise ValueError(f"{self.format} has no loss: leave out quality, or use jpeg or webp")
         return self

@@ -1,7 +1,5 @@
 """Depth camera: its data sheet; measured depth and infrared images, beside the true ones."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Annotated, Any, Literal
@@ -62,7 +60,7 @@ class DepthModel(Strict):
     ] = Ideal()
 
     @model_validator(mode="after")
-    def _range_rises(self) -> DepthModel:
+    def _range_rises(self) -> "DepthModel":
         low, high = self.range_m
         if not 0.0 <= low < high:
             raise ValueError(f"range_m must rise from 0 or more, got [{low:g}, {high:g}]")
@@ -110,7 +108,7 @@ class DepthCamera(Mounted):
         return check_preset(MODELS, model) if isinstance(model, str) else model
 
     @model_validator(mode="after")
-    def _has_one_lens(self) -> DepthCamera:
+    def _has_one_lens(self) -> "DepthCamera":
         if self.intrinsics is not None:
             if self.hfov_deg is not None:
                 raise ValueError("intrinsics: excludes hfov_deg")

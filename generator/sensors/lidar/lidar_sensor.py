@@ -1,7 +1,5 @@
 """Laser scanner on a rig or beside a camera."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, fields, replace
 from typing import Annotated, Any, Literal
@@ -173,7 +171,7 @@ class Returns:
     @classmethod
     def select(
         cls, pulses: lidar_detection.Pulses, rows: NDArray[np.intp], picks: NDArray[np.intp]
-    ) -> Returns:
+    ) -> "Returns":
         """Select candidate ``picks[k]`` of pulse ``rows[k]``."""
         which = rows * pulses.light.shape[1] + picks
         return cls(

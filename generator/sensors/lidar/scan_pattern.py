@@ -5,8 +5,6 @@ from above, so that it faces ahead in the middle of its sweep. That is the scene
 KITTI's, which then triggers the cameras (Geiger et al., "Vision meets Robotics", 2013).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -148,7 +146,7 @@ class LidarModel(Strict):
     response: Response | None = None
 
     @model_validator(mode="after")
-    def _is_one_kind(self) -> LidarModel:
+    def _is_one_kind(self) -> "LidarModel":
         if (self.prisms is None) == (not self.elevations_deg):
             raise ValueError("expected either elevations_deg or prisms")
         if (self.points_per_second is None) == (self.azimuth_step_deg is None):
@@ -184,7 +182,7 @@ class LidarModel(Strict):
         light *= (near.range_m**2 + near2) / (far.range_m**2 + near2)
         return math.log(light) / (far.range_m - near.range_m)
 
-    def with_beams(self, beams: Sequence[tuple[float, float]]) -> LidarModel:
+    def with_beams(self, beams: Sequence[tuple[float, float]]) -> "LidarModel":
         """The same device with other lasers: (elevation, azimuth offset) [deg] in any order."""
         sorted_ = sorted(beams, key=lambda beam: -beam[0])
         blocks = tuple(up for up, _ in sorted_)

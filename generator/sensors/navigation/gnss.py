@@ -19,8 +19,6 @@ Random Signals and Applied Kalman Filtering"), scaled by the dilution of precisi
 satellites (Langley, "Dilution of Precision", GPS World 1999).
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Annotated, ClassVar, Literal
@@ -147,7 +145,7 @@ class Gnss(Instrument):
         model: GnssModel,
         motion: MountMotion,
         times_s: Array,
-        fixes: Fixes,
+        fixes: "Fixes",
         slow: Array,
         rng: Rng,
     ) -> dict[str, Array]:

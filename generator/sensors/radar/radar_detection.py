@@ -10,8 +10,6 @@ Radar cross sections (RCS) at 77 GHz are those of road users by category, and of
 Sources and values are in ``targets.yaml`` and ``surfaces.yaml``.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -73,11 +71,11 @@ class Echo:
     instance_id: NDArray[np.int64]
     origin: NDArray[np.int64]
 
-    def take(self, which: NDArray[np.intp] | NDArray[np.bool_]) -> Echo:
+    def take(self, which: NDArray[np.intp] | NDArray[np.bool_]) -> "Echo":
         """Select echoes by index or mask."""
         return replace(self, **{name: getattr(self, name)[which] for name in Echo.__slots__})
 
-    def append(self, others: Sequence[Echo]) -> Echo:
+    def append(self, others: "Sequence[Echo]") -> "Echo":
         """Concatenate these echoes and others."""
         every = (self, *others)
         return replace(

@@ -1,7 +1,5 @@
 """Types of quantities: what a statistic measures, and which parameter answers for it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -85,7 +83,7 @@ class LabelQuantity:
     statistic: str
     measure: Callable[[recordings.ImageLabels], float]
     slope: Callable[[float], float]
-    change: Callable[[Config, str, float], FieldChange]
+    change: "Callable[[Config, str, float], FieldChange]"
     axis: indirect_inference.Axis
     to_value: Coordinate = identity
 

@@ -5,8 +5,6 @@ a puddle; only these are traced further, after all first hits. Bodies may move d
 pulses are emitted one after another.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -150,7 +148,7 @@ class HitLabels:
     surfaces: NDArray[np.uint8]
 
     @classmethod
-    def of(cls, scene: Scene, per_body: Sequence[material_packing.BodyMaterials]) -> HitLabels:
+    def of(cls, scene: Scene, per_body: Sequence[material_packing.BodyMaterials]) -> "HitLabels":
         """Tables of a scene with the given materials of its bodies."""
         instances = [0, *(body.instance_id for body in scene.bodies)]
         nothing = np.zeros(1, np.uint8)

@@ -5,8 +5,6 @@ extends the lens model: its pixels outside the image look where a larger sensor 
 would, and nowhere beyond the lens's field.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -93,7 +91,7 @@ class _Mask:
     pixels: wp.array
 
     @classmethod
-    def allocate(cls, size: int, device: wp.Device) -> _Mask:
+    def allocate(cls, size: int, device: wp.Device) -> "_Mask":
         """At least ``size`` pixels, all 0."""
         words = wp.zeros(-(-size // 8), dtype=wp.uint64, device=device)
         pixels = wp.array(ptr=words.ptr, shape=8 * words.size, dtype=wp.uint8, device=device)

@@ -1,7 +1,5 @@
 """Rendering contexts: a camera and its world at several instants, and bands of image rows."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
@@ -47,7 +45,7 @@ class Backdrop:
 class LightTracer(Protocol):
     """Finds light along paths, in place of the realtime tier."""
 
-    def light(self, frame: CameraView) -> wp.array:
+    def light(self, frame: "CameraView") -> wp.array:
         """Radiance of all pixels through the air [cd/m^2], linear RGB, flat; scratch memory."""
         ...
 
@@ -77,11 +75,11 @@ class CameraState:
     camera: Camera
 
     @classmethod
-    def of(cls, scene: Scene, camera: Camera) -> CameraState:
+    def of(cls, scene: Scene, camera: Camera) -> "CameraState":
         """State at the scene's own instant."""
         return cls(replace(scene, cameras=(camera,), lidars=(), devices=()), camera)
 
-    def later(self, delay_s: float) -> CameraState:
+    def later(self, delay_s: float) -> "CameraState":
         """State of the same world and camera at another instant."""
         scene = scene_time.scene_at(self.scene, round(self.scene.time_s + delay_s, 9))
         return CameraState(scene, scene.cameras[0])
