@@ -204,6 +204,8 @@ def test_a_default_may_be_any_value() -> None:
     """Constants are shown as the plain value they stand for."""
 
     class Defaults(Strict):
+        """Two defaults."""
+
         a: Scalar = Constant(0.5)
         b: Position = Constant((0.0, 0.0, 1.0))
 
