@@ -22,7 +22,7 @@ from tests.tiers import sampled
 SHIPPED = ("tabletop", "street", "pedestrians", "bin_picking", "kitti_rig", "shelf")
 
 
-@pytest.mark.parametrize("name", sampled(SHIPPED, 4))
+@pytest.mark.parametrize("name", sampled(SHIPPED, 6))
 def test_init_writes_a_configuration_and_its_template(name: str, tmp_path: Path) -> None:
     """They read as the shipped ones, beside each other in an empty folder."""
     done = gen_data("init", "--template", name, cwd=tmp_path)

@@ -43,7 +43,7 @@ def demonstrated(task: str, scene_index: int = 0, failures: str = "{}") -> Scene
         return pipeline.accepted_scene(scene_index).scene
 
 
-QUICK = ("bin_picking_suction", "open_drawer")
+QUICK = ("open_drawer",)
 
 
 @pytest.mark.parametrize("task", cases(sorted(tasks()), QUICK))

@@ -302,6 +302,7 @@ def test_level_relief_is_no_relief() -> None:
         assert to_plain(one) == to_plain(Street.first(pipeline).scene)
 
 
+@pytest.mark.slow
 def test_traffic_follows_the_ground_at_every_instant() -> None:
     """Wheels of the ego vehicle and of others, at seven instants of two seconds."""
     small = (*STREET[:-1], "steps_per_scene=1")
