@@ -127,7 +127,7 @@ class ReliefOfRoads(RandomizerBase):
         rest = _NOTHING * (_BENDS_MAX - len(curves))
         return relief.RoadProfile(
             *plan,
-            round(course.length_m, 3),
+            round(float(course.length_m), 3),
             round(course.half_width_m, 2),
             left,
             right,

@@ -10,16 +10,15 @@ from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
-from gen_data.core import errors, interfaces, scene_time
+from gen_data.core import errors, interfaces
 from gen_data.core.capture import Capture, Channel, Measurements, PointCloud, SensorReading
 from gen_data.core.sample import EgoTruth, ImageTruth, Sample
 from gen_data.core.scene import LABEL_IDS_MAX, Body, Scene
 from gen_data.core.streams import Streams
 from gen_data.pipeline import checked_renderer, splits
-from gen_data.pipeline.finalize_scene import Timeline, finalize_scene
-from gen_data.pipeline.lift_scene import lift_scene
+from gen_data.pipeline.finalize_scene import Timeline
 from gen_data.pipeline.numerics import numerics_digests
-from gen_data.pipeline.separate_pieces import separate_pieces
+from gen_data.pipeline.scene_stages import finish_settled, finish_view
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -268,8 +267,7 @@ class Pipeline:
                 settled = physics.settle(scene)
             if settled.rejection is not None:
                 raise errors.LayoutRejected(settled.rejection)
-            separated = separate_pieces(settled.scene)
-            scene = finalize_scene(separated, self.assets, self._category_ids)
+            scene = finish_settled(settled.scene, self.assets, self._category_ids)
             return AcceptedScene(scene_index, scene, randomizers, sensors, attempt, timings)
 
         return self._first_accepted(scene_index, settle)
@@ -297,14 +295,12 @@ class Pipeline:
             scene = self._randomize(
                 accepted.scene, accepted.randomizers, interfaces.Stage.VIEW, streams
             )
-            if scene.relief is not None:
-                lifted = lift_scene(scene, self.assets)
-                scene = finalize_scene(lifted, self.assets, self._category_ids)
-                # Renderers keep what they packed of the same tuple; further views share it.
-                if scene.bodies == self._lifted_bodies:
-                    scene = replace(scene, bodies=self._lifted_bodies)
-                self._lifted_bodies = scene.bodies
-            return DrawnView(number, scene_time.place_sensors(scene), streams)
+            scene = finish_view(scene, self.assets, self._category_ids)
+            # Renderers keep what they packed of the same tuple; views on one relief share it.
+            if scene.relief is not None and scene.bodies == self._lifted_bodies:
+                scene = replace(scene, bodies=self._lifted_bodies)
+            self._lifted_bodies = scene.bodies
+            return DrawnView(number, scene, streams)
 
         self._view = self._first_accepted(accepted.index, draw)
         return self._view

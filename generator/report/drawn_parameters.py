@@ -23,12 +23,11 @@ from gen_data.config.distributions import Constant, Distribution, Numeric
 from gen_data.core.errors import LayoutRejected
 from gen_data.core.interfaces import PhysicsEngine, Randomizer, Stage
 from gen_data.core.scene import Scene
-from gen_data.core.scene_time import place_sensors
 from gen_data.core.serialization import canonical_json, to_plain
 from gen_data.core.streams import Rng, Streams
 from gen_data.packs.provision import open_assets
 from gen_data.physics import open_engine
-from gen_data.pipeline.finalize_scene import finalize_scene
+from gen_data.pipeline.scene_stages import finish_settled, finish_view
 from gen_data.runner import plan, provenance
 from gen_data.runner.stored import StoredSamples
 
@@ -183,7 +182,7 @@ class Replay:
             settled = physics.settle(drawn)
             if settled.rejection is not None:
                 raise LayoutRejected(settled.rejection)
-            return finalize_scene(settled.scene, self._library, self._category_ids), observed
+            return finish_settled(settled.scene, self._library, self._category_ids), observed
 
         samples = range(first, min(first + self.per_scene, self._stored.plan.n))
         attempts = self._stored.kept_scene(first).attempts
@@ -197,7 +196,8 @@ class Replay:
 
             def draw_view(attempt: int, view: int = view, index: int = index) -> Scene:
                 streams = Streams(info.seed, number, view=view, attempt=attempt, index=index)
-                return place_sensors(self._randomize(scene, observed, Stage.VIEW, streams))
+                drawn = self._randomize(scene, observed, Stage.VIEW, streams)
+                return finish_view(drawn, self._library, self._category_ids)
 
             views.append((kept, self._accept(kept.view_attempts, draw_view, log, samples)))
         self.differences += islice(filter(None, starmap(_first_difference, views)), 1)

@@ -149,6 +149,7 @@ def test_cyclists_ride_along_across_and_towards() -> None:
     parts = config.scene_config(config.shared(Streams(3, 0, index=0)))
     group = next(e for e in parts.elements if e.name == "cyclists")
     draw = next(r for r in parts.randomizers if r.name == "cyclists")
+    draw = draw.model_copy(update={"count": Constant(4)})  # type: ignore[attr-defined]
     for number, scene in enumerate(districts().values()):
         streams = Streams(2, number)
         drawn = draw(group.add(scene, library()), library(), streams.rng("cyclists"))

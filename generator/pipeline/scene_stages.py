@@ -1,0 +1,22 @@
+"""Scenes as the two stages of randomizers leave them, made ready for sensors and labels."""
+
+from collections.abc import Mapping
+
+from gen_data.core.interfaces import AssetLibrary
+from gen_data.core.scene import Scene
+from gen_data.core.scene_time import place_sensors
+from gen_data.pipeline.finalize_scene import finalize_scene
+from gen_data.pipeline.lift_scene import lift_scene
+from gen_data.pipeline.separate_pieces import separate_pieces
+
+
+def finish_settled(scene: Scene, assets: AssetLibrary, category_ids: Mapping[str, int]) -> Scene:
+    """The scene that its views share: settled by physics, then with a body for every piece."""
+    return finalize_scene(separate_pieces(scene), assets, category_ids)
+
+
+def finish_view(scene: Scene, assets: AssetLibrary, category_ids: Mapping[str, int]) -> Scene:
+    """A drawn view at time 0, on its relief, with all sensors in their places."""
+    if scene.relief is not None:
+        scene = finalize_scene(lift_scene(scene, assets), assets, category_ids)
+    return place_sensors(scene)
