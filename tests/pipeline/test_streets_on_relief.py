@@ -242,8 +242,8 @@ def test_ground_of_hills_in_depth_images_is_where_rays_meet_it(
 ) -> None:
     """Points of pixels are on it, to 6 mm: layers of paint and covers are up to 5 mm thick.
 
-    On the edge of a layer, a point may be as high as the ground 5 mm beside it. On the silhouette of
-    a crest, one ray in hundreds may meet the ground behind it.
+    On the edge of a layer, a point may be as high as the ground 5 mm beside it. On silhouettes of
+    crests, one ray in hundreds may meet the ground behind them.
     """
     pipeline, samples = hilly_samples
     for sample in samples:
