@@ -265,6 +265,11 @@ class AppliedLabelMap:
         listed = enumerate(self.label_map.classes_of.items(), 1)
         return {category: (name, k) for k, (name, own) in listed for category in own}
 
+    @cached_property
+    def _sources(self) -> frozenset[str]:
+        """All categories and subcategories that the map names."""
+        return frozenset((*self.label_map.ignore, *self.label_map.drop, *self._class_of))
+
     def map_image(self, truth: ImageTruth) -> ImageTruth:
         """The annotations of an image with mapped objects."""
         objects = tuple(self._map_objects(truth.objects))
@@ -286,7 +291,7 @@ class AppliedLabelMap:
 
     def _fate(self, thing: ObjectTruth) -> Literal["keep", "ignore", "drop"]:
         label_map, instance = self.label_map, thing.instance
-        found = _find(instance, {*label_map.ignore, *label_map.drop, *self._class_of})
+        found = _find(instance, self._sources)
         if found in label_map.drop:
             return "drop"
         if found in label_map.ignore:
@@ -318,12 +323,13 @@ class AppliedLabelMap:
 
     def map_scene(self, scene: Scene) -> Scene:
         """The scene whose instances are mapped; instances of other categories are not annotated."""
-        drop, known = self.label_map.drop, self._class_of
-        instances = tuple(
-            replace(one, annotated=False, category_id=0)
-            if (found := _find(one, {*drop, *known})) in drop
-            or (self.label_map.classes is not None and not found)
-            else self._map_instance(one)
-            for one in scene.instances
-        )
-        return replace(scene, instances=instances)
+        drop, needs_class = self.label_map.drop, self.label_map.classes is not None
+        kept_or_dropped = {*drop, *self._class_of}
+
+        def mapped(instance: Instance) -> Instance:
+            found = _find(instance, kept_or_dropped)
+            if found in drop or (needs_class and not found):
+                return replace(instance, annotated=False, category_id=0)
+            return self._map_instance(instance)
+
+        return replace(scene, instances=tuple(map(mapped, scene.instances)))
