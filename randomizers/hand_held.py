@@ -158,9 +158,8 @@ class HandHeld(asset_groups.GroupRandomizer):
         up = np.cross(ahead, side) * -1.0
         up = up if up[2] >= 0.0 else -up
         thumb = _is_left(held) * (math.cos(roll) * up + math.sin(roll) * np.cross(ahead, up))
-        turned = np.eye(4)
-        turned[:3, :3] = np.stack([ahead, thumb, np.cross(ahead, thumb)], axis=1)
-        T_world_hand = SE3.from_matrix(turned)
+        axes = np.stack([ahead, thumb, np.cross(ahead, thumb)], axis=1)
+        T_world_hand = SE3.from_rotation(axes)
         place = (shares[0] * surface.size_m[0], shares[1] * surface.size_m[1], height_m)
         to = surface.T_world_surface.apply(np.array(place))
         x, y, z = to - (T_world_hand @ held.T_hand_thing).apply(_middle_m(held.thing, assets))
@@ -207,9 +206,8 @@ def _hold(hand: str, thing: str, assets: AssetIndex, rng: Rng) -> _Held | None:
         shift = mirror * np.array(grip.shift_m) - R @ sections[0]
         bends = {"pose": "hold", "bends_deg": grip.bends_deg, "seed": seed}
         asset = str(AssetId(parse_asset_id(hand).name, bends))
-        turned = np.eye(4)
-        turned[:3, :3], turned[:3, 3] = R, shift
-        return _Held(asset, thing, SE3.from_matrix(turned), _wrist(asset, assets), upright)
+        T_hand_thing = SE3.from_rotation(R, shift)
+        return _Held(asset, thing, T_hand_thing, _wrist(asset, assets), upright)
     return None
 
 
@@ -277,7 +275,7 @@ def _carry(hand: str, thing: str, assets: AssetIndex, rng: Rng) -> _Held | None:
     other = np.eye(3)[(down // 2 + 1) % 3]
     # In the asset's axes the palm faces up; a third of the hand's length is its middle.
     R = np.stack([other, np.cross(-axis, other), -axis])
-    turned = SE3.about_z(turn) @ _turned(R)
+    turned = SE3.about_z(turn) @ SE3.from_rotation(R)
     laid = turned.apply(points)
     palm = np.array(_palm_m(asset, assets))
     laid += palm - 0.5 * (laid.min(axis=0) + laid.max(axis=0))
@@ -303,12 +301,6 @@ def _overlap_m(thing: Array, flesh: Array) -> float:
     top = (here @ (-high[:, (0, 1, 3)] / high[:, 2:3]).T).min(axis=1)
     under = bottom < top
     return float((flesh[:, 2] - bottom)[under].max()) if under.any() else 0.0
-
-
-def _turned(R: Array) -> SE3:
-    matrix = np.eye(4)
-    matrix[:3, :3] = R
-    return SE3.from_matrix(matrix)
 
 
 def _palm_m(asset: str, assets: AssetIndex) -> tuple[float, float, float]:

@@ -140,10 +140,8 @@ class Grasps(Strict):
                 return None
         angle = 2.0 * math.pi * float(turns[0]) / AROUND
         forward = math.cos(angle) * down + math.sin(angle) * side
-        matrix = np.eye(4)
-        matrix[:3, :3] = np.stack([forward, line, np.cross(forward, line)], axis=1)
-        matrix[:3, 3] = middle
-        return SE3.from_matrix(matrix)
+        columns = [forward, line, np.cross(forward, line)]
+        return SE3.from_rotation(np.stack(columns, axis=1), middle)
 
     def _are_free(self, turns: Rows, points: Array, width_m: float) -> NDArray[np.bool_]:
         """Whether open grippers, turned about the line of the contacts, contain no points.

@@ -107,14 +107,13 @@ def add_fixture(scene: Scene, light: Light, materials: Sequence[Material]) -> tu
     x = np.asarray(light.side if light.kind == "rectangle" else level_side(light.direction))
     x = x - z * float((x * z).sum())
     x = x / math.sqrt(float((x * x).sum()))
-    matrix = np.eye(4)
-    matrix[:3, :3] = np.stack([x, np.cross(z, x), z], axis=1)
-    matrix[:3, 3] = np.asarray(light.position_m) + GAP_M * z
+    rotation = np.stack([x, np.cross(z, x), z], axis=1)
+    position = np.asarray(light.position_m) + GAP_M * z
     red, green, blue = (round(c * luminance_cd_m2(light), 4) for c in light.color)
     emissive = tuple(
         replace(m, emission_cd_m2=(red, green, blue)) if m.role == LAMP else m for m in materials
     )
-    pose = SE3.from_matrix(matrix).rounded()
+    pose = SE3.from_rotation(rotation, position).rounded()
     body = Body(light.name, fixture_asset(light), pose, collides=False, materials=emissive)
     return replace(scene, bodies=(*scene.bodies, body)), replace(light, body=light.name)
 

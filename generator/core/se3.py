@@ -7,6 +7,7 @@ processor. ``T_world_body`` maps body coordinates to world coordinates.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -33,8 +34,15 @@ class SE3:
     @classmethod
     def from_matrix(cls, matrix: Array) -> SE3:
         """Pose of a homogeneous matrix, shape [4, 4] or [3, 4]."""
-        x, y, z = (float(v) for v in matrix[:3, 3])
-        return cls((x, y, z), rotation_to_quaternion(matrix[:3, :3]))
+        return cls.from_rotation(matrix[:3, :3], matrix[:3, 3])
+
+    @classmethod
+    def from_rotation(
+        cls, rotation: Array, translation_m: Sequence[float] | Array = (0.0, 0.0, 0.0)
+    ) -> SE3:
+        """Pose of a rotation matrix, shape [3, 3], and a translation [m]."""
+        x, y, z = (float(v) for v in translation_m)
+        return cls((x, y, z), rotation_to_quaternion(rotation))
 
     @classmethod
     def about_z(cls, yaw_rad: float, translation_m: Vec3 = (0.0, 0.0, 0.0)) -> SE3:
@@ -200,12 +208,8 @@ def look_at(eye_m: Vec3, target_m: Vec3, roll_rad: float = 0.0) -> SE3:
     right = right / math.sqrt(float((right * right).sum()))
     down = np.cross(forward, right)
     c, s = math.cos(roll_rad), math.sin(roll_rad)
-    matrix = np.eye(4)
-    matrix[:3, 0] = c * right + s * down
-    matrix[:3, 1] = c * down - s * right
-    matrix[:3, 2] = forward
-    matrix[:3, 3] = eye_m
-    return SE3.from_matrix(matrix)
+    columns = [c * right + s * down, c * down - s * right, forward]
+    return SE3.from_rotation(np.stack(columns, axis=1), eye_m)
 
 
 def _normalised(q: list[float]) -> Quaternion:

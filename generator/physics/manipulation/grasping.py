@@ -238,8 +238,7 @@ def _between_fingers(low_m: Array, high_m: Array, up: Vec3, palm_z_m: float) -> 
         columns = [across, np.cross(z_axis, across), z_axis]
     else:
         columns = [np.cross(across, z_axis), across, z_axis]
-    matrix = np.eye(4)
-    matrix[:3, :3] = np.stack(columns, axis=1)
-    depth = float((np.abs(matrix[2, :3]) * half).sum())
-    matrix[2, 3] = max(0.0, depth + palm_z_m + _PALM_GAP_M)
-    return SE3.from_matrix(matrix) @ SE3(tuple(-float(v) for v in center))  # type: ignore[arg-type]
+    rotation = np.stack(columns, axis=1)
+    depth = float((np.abs(rotation[2]) * half).sum())
+    ahead = (0.0, 0.0, max(0.0, depth + palm_z_m + _PALM_GAP_M))
+    return SE3.from_rotation(rotation, ahead) @ SE3(tuple(-float(v) for v in center))  # type: ignore[arg-type]
