@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from gen_data.config.base_model import Strict
-from gen_data.core import bounded_cache, errors
+from gen_data.core import errors
 from gen_data.core.asset_types import Asset
 from gen_data.core.interfaces import AssetIndex
 from gen_data.core.members import Member, add_members
@@ -25,7 +25,6 @@ MARGIN_M = 0.02
 """Gap between objects and other elements on the surface."""
 _GAPS_M = (0.24, 0.18, 0.12, 0.08, 0.05, 0.03, 0.015, 0.005)
 _STEP_M = 0.02
-_FAMILIES: bounded_cache.ObjectCache[Mapping[str, list[Asset]]] = bounded_cache.ObjectCache(1)
 """Of the latest library: a street has dozens of groups, and a library thousands of assets."""
 _TURNS_MAX = 100_000
 """Limit on the steps, rows and layers tried for one object; large surfaces need fewer."""
@@ -65,9 +64,8 @@ class AssetChoice(Strict):
         found = {a.asset_id: a for a in assets.find(self.tags)} if self.tags else {}
         for tag in self.any_of:
             found |= {a.asset_id: a for a in assets.find((tag,))}
-        families = _group_by_family(assets.find(())) if self.ids else {}
         for asset_id in self.ids:
-            members = families.get(asset_id) or [assets.get(asset_id)]
+            members = assets.variants(asset_id) or (assets.get(asset_id),)
             found |= {a.asset_id: a for a in members}
         fitting = [
             asset
@@ -190,16 +188,6 @@ class Objects(element.Element):
                 "expected fewer objects or a larger surface"
             )
         return points
-
-
-def _group_by_family(every: tuple[Asset, ...]) -> Mapping[str, list[Asset]]:
-    def group() -> Mapping[str, list[Asset]]:
-        families: dict[str, list[Asset]] = {}
-        for asset in every:
-            families.setdefault(asset.asset_id.partition("?")[0], []).append(asset)
-        return families
-
-    return _FAMILIES.get(every, group)
 
 
 def empty_group(name: str, placement: Placement) -> ObjectGroup:

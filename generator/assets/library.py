@@ -107,6 +107,19 @@ class Library:
             self._found[key] = tuple(sorted(found, key=lambda asset: asset.asset_id))
         return self._found[key]
 
+    def variants(self, family: str) -> tuple[asset_types.Asset, ...]:
+        """All objects of a family that ``find`` offers, sorted by id; empty if there is none.
+
+        Only they are described: descriptions of all objects take a second.
+        """
+        if family in self._generated:
+            found = map(self._hold, self._generated.variants(family, "object"))
+            return tuple(sorted(found, key=lambda asset: asset.asset_id))
+        if "?" in family:
+            return ()
+        files = map(self._hold, self._files.find(frozenset(), "object"))
+        return tuple(a for a in files if a.asset_id.partition("?")[0] == family)
+
     def _hold(self, asset: asset_types.Asset) -> asset_types.Asset:
         """Keep a description, so that asking for it by its id reads nothing again."""
         return self._entries.get(asset.asset_id, lambda: asset)

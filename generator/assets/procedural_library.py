@@ -50,9 +50,15 @@ class ProceduralLibrary:
     def find(self, tags: frozenset[str], kind: str) -> Iterator[Asset]:
         """Yield the assets offered for selection of a kind that have every tag."""
         for name, family in self._families.items():
-            if kind_of(family) == kind and tags.issubset(_list_tags(name, family)):
-                for k in range(family.variants):
-                    yield self.get(AssetId(name, {"seed": k}))
+            if tags.issubset(_list_tags(name, family)):
+                yield from self.variants(name, kind)
+
+    def variants(self, name: str, kind: str) -> Iterator[Asset]:
+        """Yield the assets offered for selection of a family with a known name, if of that kind."""
+        family = self._families[name]
+        if kind_of(family) == kind:
+            for k in range(family.variants):
+                yield self.get(AssetId(name, {"seed": k}))
 
     def get(self, asset_id: AssetId) -> Asset:
         """Describe the asset of an id with a known name. Raises AssetError on wrong parameters."""

@@ -67,6 +67,10 @@ class AssetIndex(Protocol):
         """All assets of a kind that have all tags, sorted by id; may be empty."""
         ...
 
+    def variants(self, family: str) -> tuple[asset_types.Asset, ...]:
+        """All objects of a family that ``find`` offers, sorted by id; empty if there is none."""
+        ...
+
     def materials(self, asset_id: str) -> tuple[asset_types.Material, ...]:
         """The asset's own materials, one per mesh slot."""
         ...

@@ -28,6 +28,16 @@ def test_seeds_are_listed_and_parametric_families_are_not(library: Library) -> N
     assert not [a for a in library.find({"procedural"}) if a.asset_id.startswith("table?")]
 
 
+def test_variants_of_every_family_are_those_offered_for_selection(library: Library) -> None:
+    """Families of textures and skies have no objects; an id with a seed is not a family."""
+    objects = library.find(())
+    families = {asset.asset_id.partition("?")[0] for asset in objects}
+    for family in families:
+        offered = tuple(a for a in objects if a.asset_id.partition("?")[0] == family)
+        assert library.variants(family) == offered, family
+    assert [library.variants(x) for x in ("mug?seed=1", "wood", "no such family")] == [()] * 3
+
+
 def test_libraries_of_a_process_share_descriptions_of_offered_assets(tmp_path: Path) -> None:
     """A command opens several, and each search by tags finds many of them."""
     one, two = (open_library(cache_dir=tmp_path / name) for name in "ab")

@@ -128,6 +128,9 @@ class FakeAssets:
         every = (self.get(i) for i in sorted([*THINGS, *TEXTURES, *ENVIRONMENTS, "two_link"]))
         return tuple(a for a in every if a.kind == kind and wanted <= set(a.tags))
 
+    def variants(self, family: str) -> tuple[Asset, ...]:
+        return tuple(a for a in self.find(()) if a.asset_id.partition("?")[0] == family)
+
     def materials(self, asset_id: str) -> tuple[Material, ...]:
         """Materials of an object; plain ones for furniture and links."""
         if asset_id in THINGS:

@@ -112,6 +112,9 @@ class FakeLibrary:
     def find(self, tags: Iterable[str], kind: str = "object") -> tuple[asset_types.Asset, ...]:
         return ()
 
+    def variants(self, family: str) -> tuple[asset_types.Asset, ...]:
+        return ()
+
     def materials(self, asset_id: str) -> tuple[asset_types.Material, ...]:
         return self.meshes[asset_id].materials
 
