@@ -81,6 +81,7 @@ class Library:
         self._files = file_library.FileLibrary(packs, user_roots, disk, store, provide)
         self._entries: CountCache[asset_types.Asset] = CountCache(_ENTRIES)
         self._found: dict[tuple[frozenset[str], str], tuple[asset_types.Asset, ...]] = {}
+        self._variants: dict[str, tuple[asset_types.Asset, ...]] = {}
         self._summaries: CountCache[_MeshSummary] = CountCache(_SUMMARIES)
         self._boxes: CountCache[tuple[Bounds, ...]] = CountCache(_SUMMARIES)
         self._mean_colors: CountCache[se3.Vec3] = CountCache(_SUMMARIES)
@@ -112,13 +113,16 @@ class Library:
 
         Only they are described: descriptions of all objects take a second.
         """
-        if family in self._generated:
-            found = map(self._hold, self._generated.variants(family, "object"))
-            return tuple(sorted(found, key=lambda asset: asset.asset_id))
         if "?" in family:
             return ()
-        files = map(self._hold, self._files.find(frozenset(), "object"))
-        return tuple(a for a in files if a.asset_id.partition("?")[0] == family)
+        if family not in self._variants:
+            if family in self._generated:
+                found = [*map(self._hold, self._generated.variants(family, "object"))]
+            else:
+                files = self._files.find(frozenset(), "object")
+                found = [a for a in files if a.asset_id.partition("?")[0] == family]
+            self._variants[family] = tuple(sorted(found, key=lambda asset: asset.asset_id))
+        return self._variants[family]
 
     def _hold(self, asset: asset_types.Asset) -> asset_types.Asset:
         """Keep a description, so that asking for it by its id reads nothing again."""
