@@ -27,7 +27,7 @@ from gen_data.core.urls import is_url, needs_folder
 
 FOLDERS_ONLY = frozenset(
     "adapt certify contact-sheet diff export match merge preview recipe repair report".split()  # noqa: SIM905
-) | {"repro", "rerender", "sample", "study"}
+) | {"ladder", "repro", "rerender", "sample", "study"}
 """Commands that read no data set at a URL."""
 
 
@@ -47,6 +47,7 @@ class LazyCommands(click.Group):
         "report": "gen_data.cli.report_command:report",
         "study": "gen_data.lab.study.study_command:study",
         "adapt": "gen_data.lab.study.adapt_command:adapt",
+        "ladder": "gen_data.lab.study.ladder_command:ladder",
         "match": "gen_data.lab.matching.match_command:match",
         "verify": "gen_data.cli.verification_commands:verify",
         "certify": "gen_data.lab.certificate.certify_command:certify",
@@ -75,6 +76,7 @@ class LazyCommands(click.Group):
         "report": "Statistics of a data set, and an HTML page with its samples.",
         "study": "Measure the value of changes of a configuration on real pictures.",
         "adapt": "Draw more of the objects that a detector missed: the next round of a curriculum.",
+        "ladder": "Generate the same scenes at several steps of one factor, and judge by them.",
         "match": "Fit exposure, colour, noise, blur and laser to real recordings.",
         "verify": "Check a data set: sizes, checksums, labels, reproducibility.",
         "certify": "Check a data set by independent means; write its certificate.",

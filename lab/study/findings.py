@@ -88,7 +88,7 @@ def tabulate(findings: Mapping[str, Any]) -> list[Table]:
         )
     seeds = findings["seeds"]
     note = (
-        f"{findings['pictures']} real pictures, {findings['objects']} objects, {seeds} "
+        f"{findings['pictures']} pictures, {findings['objects']} objects, {seeds} "
         f"{'seed: how much results vary between seeds is unknown' if seeds == 1 else 'seeds'}; "
         "95 % intervals; p adjusted by Holm"
     )
@@ -110,7 +110,8 @@ def _tabulate_groups(groups: Mapping[str, Any], seeds: int) -> list[Table]:
             "rows": [
                 [
                     group if kind == CLASS else f"{kind}: {group}",
-                    str(shares[names[0]][kind, group]["objects"] // seeds),
+                    # Steps of a ladder see different objects.
+                    str(shares[names[0]].get((kind, group), {"objects": 0})["objects"] // seeds),
                     *(_percent(shares[name].get((kind, group))) for name in names),
                 ]
                 for kind, group in every

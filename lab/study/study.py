@@ -49,7 +49,7 @@ def run_study(
     for run in runs:
         found = evaluate(prepared.real, run.results(), pictures)
         evaluations.setdefault(run.variant.name, []).append(found)
-    return _write(evaluations, prepared.real, out)
+    return write_findings(evaluations, prepared.real, out, f"Study on {prepared.real.source}")
 
 
 def compare_results(
@@ -63,14 +63,21 @@ def compare_results(
     real = read_real(folder, split)
     check_judges(real)
     runs = {name: [evaluate(real, read_results(path, real))] for name, path in files.items()}
-    return _write(runs, real, out)
+    return write_findings(runs, real, out, f"Study on {real.source}")
 
 
-def _write(runs: Mapping[str, Sequence[Evaluation]], real: RealSet, out: Path) -> dict[str, Any]:
+def write_findings(
+    runs: Mapping[str, Sequence[Evaluation]], real: RealSet, out: Path, title: str
+) -> dict[str, Any]:
+    """Compare evaluations of variants, the first of which is the baseline; write the page.
+
+    Raises:
+        StorageError: the folder cannot be written.
+    """
     findings = describe(runs)
     tables = [*tabulate(findings), _skipped(real)]
     findings |= {"source": str(real.source), "skipped": dict(real.skipped), "tables": tables}
-    page = format_page(f"Study on {real.source}", tables, runs)
+    page = format_page(title, tables, runs)
     try:
         out.mkdir(parents=True, exist_ok=True)
         (out / PAGE).write_text(page, encoding="utf-8", newline="\n")
