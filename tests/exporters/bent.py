@@ -48,14 +48,10 @@ def opencv_maps(source: Intrinsics, target: Intrinsics) -> Any:
     module = cv2.fisheye if source.lens.model == "kannala_brandt" else cv2
     return np.stack(
         module.initUndistortRectifyMap(
-            opencv_matrix(source),
-            np.array(source.lens.coefficients),
-            np.eye(3),
-            opencv_matrix(target),
-            size,
-            cv2.CV_32FC1,
+            opencv_matrix(source), np.array(source.lens.coefficients), np.eye(3),
+            opencv_matrix(target), size, cv2.CV_32FC1,
         )
-    )
+    )  # fmt: skip
 
 
 def bent_reading(scene: Scene, camera: Camera) -> SensorReading:
@@ -77,15 +73,10 @@ def bent_reading(scene: Scene, camera: Camera) -> SensorReading:
         ids[nearer], categories[nearer] = thing.instance_id, thing.category_id
     shade = np.where(np.isfinite(depth), 255.0 / (1.0 + 0.1 * depth), 0.0)
     rgb = np.stack([shade, 20.0 * ids, 60.0 * categories], axis=-1).astype(np.uint8)
-    channels = {
-        Channel.RGB: rgb,
-        Channel.Z_DEPTH: depth.astype(np.float32),
-        Channel.RANGE: (depth * np.linalg.norm(rays, axis=-1)).astype(np.float32),
-        Channel.NORMALS: conftest._normals(depth[..., None] * rays),
-        Channel.INSTANCE: ids,
-        Channel.CATEGORY: categories,
-        Channel.PART: np.zeros_like(ids),
-    }
+    channels = {Channel.RGB: rgb, Channel.Z_DEPTH: depth.astype(np.float32),
+                Channel.RANGE: (depth * np.linalg.norm(rays, axis=-1)).astype(np.float32),
+                Channel.NORMALS: conftest._normals(depth[..., None] * rays), Channel.INSTANCE: ids,
+                Channel.CATEGORY: categories, Channel.PART: np.zeros_like(ids)}  # fmt: skip
     return SensorReading(camera.name, camera, channels, silhouettes)
 
 

@@ -91,16 +91,12 @@ def instance(
     """An object on the ground at (x, y); ``shape`` is ``box`` or ``ellipsoid``."""
     length, width, height = SIZES_M[category]
     return Instance(
-        instance_id=number,
-        name=f"{category}/{number}",
-        category=category,
-        category_id=CATEGORIES.index(category) + 1,
-        asset=f"primitive/{shape}",
+        instance_id=number, name=f"{category}/{number}", category=category,
+        category_id=CATEGORIES.index(category) + 1, asset=f"primitive/{shape}",
         T_world_instance=SE3.about_z(yaw_rad, (x_m, y_m, 0.0)),
-        box_min_m=(-0.5 * length, -0.5 * width, 0.0),
-        box_max_m=(0.5 * length, 0.5 * width, height),
+        box_min_m=(-0.5 * length, -0.5 * width, 0.0), box_max_m=(0.5 * length, 0.5 * width, height),
         keypoints=KEYPOINTS.get(category, ()),
-    )
+    )  # fmt: skip
 
 
 def level_camera(name: str = "color", size_px: tuple[int, int] = (160, 120)) -> Camera:
@@ -117,7 +113,6 @@ def ray_cast(scene: Scene, camera: Camera) -> SensorReading:
     v = (np.arange(-h, 2 * h) + 0.5 - k.cy_px) / k.fy_px
     rays = np.stack([*np.meshgrid(u, v), np.ones((3 * h, 3 * w))], axis=-1)
     inside = (slice(h, 2 * h), slice(w, 2 * w))
-
     depth = _ground_depth(rays[inside], camera)
     ids = np.zeros((h, w), np.uint16)
     categories = np.zeros((h, w), np.uint16)
@@ -190,13 +185,11 @@ def street(index: int) -> tuple[Instance, ...]:
     if index % 4 == 3:
         return ()
     turn = 0.7 * index
-    return (
-        instance(1, "car", 14.0, 3.0 - 0.4 * index, turn),
-        instance(2, "pedestrian", 9.0, -2.0, 1.0 + turn),
-        instance(3, "crate", 8.0, 1.6, -turn, shape="ellipsoid"),
-        instance(4, "crate", 12.0, 2.2, 0.3),
-        instance(7, "pedestrian", 7.0, -4.6 + 0.1 * index, turn),
-    )
+    return (instance(1, "car", 14.0, 3.0 - 0.4 * index, turn),
+            instance(2, "pedestrian", 9.0, -2.0, 1.0 + turn),
+            instance(3, "crate", 8.0, 1.6, -turn, shape="ellipsoid"),
+            instance(4, "crate", 12.0, 2.2, 0.3),
+            instance(7, "pedestrian", 7.0, -4.6 + 0.1 * index, turn))  # fmt: skip
 
 
 def make_sample(
@@ -253,11 +246,8 @@ def ego_pose(time_s: float) -> SE3:
 
 def driving_scene() -> Scene:
     """A rig with two cameras and a scanner; a car ahead, a crossing pedestrian, a crate."""
-    things = (
-        instance(1, "car", 16.0, 0.5, 0.05),
-        instance(2, "pedestrian", 12.0, -4.0, 1.5),
-        instance(4, "crate", 14.0, 4.0, 0.3),
-    )
+    things = (instance(1, "car", 16.0, 0.5, 0.05), instance(2, "pedestrian", 12.0, -4.0, 1.5),
+              instance(4, "crate", 14.0, 4.0, 0.3))  # fmt: skip
     bodies = tuple(Body(t.name, t.asset, t.T_world_instance, 1.0, t.instance_id) for t in things)
     times_s = [STEP_S * k for k in range(-2, 9)]
     ways = {
@@ -271,14 +261,11 @@ def driving_scene() -> Scene:
         for name, y_m in (("left", 0.0), ("right", -0.54))
     )
     scene = Scene(
-        "street",
-        bodies=(*bodies, Body("ego", "car")),
-        instances=things,
-        cameras=cameras,
+        "street", bodies=(*bodies, Body("ego", "car")), instances=things, cameras=cameras,
         lidars=(Lidar("top", "", SE3((0.0, 0.0, 1.73)), model="VLP-16", rig="ego"),),
         rigs=(Rig("ego", "ego"),),
         tracks=tuple(Trajectory(name, STEP_S, tuple(way), -0.2) for name, way in ways.items()),
-    )
+    )  # fmt: skip
     return add_twists(place_sensors(scene))
 
 
@@ -335,15 +322,10 @@ def make_pairs() -> tuple[DatasetInfo, list[Sample]]:
         readings = {**sample.capture.readings, "left": replace(left, channels=channels)}
         samples.append(replace(sample, capture=replace(sample.capture, readings=readings)))
     media = {
-        "left": (
-            Channel.RGB,
-            Channel.DISPARITY,
-            Channel.DISPARITY_VISIBLE,
-            Channel.FLOW_FORWARD,
-            Channel.FLOW_OCCLUDED_FORWARD,
-        ),
+        "left": (Channel.RGB, Channel.DISPARITY, Channel.DISPARITY_VISIBLE, Channel.FLOW_FORWARD,
+                 Channel.FLOW_OCCLUDED_FORWARD),
         "right": (Channel.RGB,),
-    }
+    }  # fmt: skip
     names = ("left", "right")
     return make_info(8, names, ("top",), media=media, steps_per_scene=4), samples
 
@@ -430,14 +412,9 @@ def make_info(
         for name, kind in kinds.items()
     ]
     info = DatasetInfo(
-        name="street",
-        seed=7,
-        n=n,
-        views_per_scene=1,
-        categories=CATEGORIES,
-        sensors=tuple(sensors),
-        depth_scale_m=0.001,
-    )
+        name="street", seed=7, n=n, views_per_scene=1, categories=CATEGORIES,
+        sensors=tuple(sensors), depth_scale_m=0.001,
+    )  # fmt: skip
     return replace(info, **changes)
 
 
@@ -501,13 +478,10 @@ class Props:
         solid = trimesh.creation.box() if box else trimesh.creation.icosphere(4, radius=0.5)
         vertices = (solid.vertices + np.array([0.0, 0.0, 0.5])) * (length, width, height)
         return asset_types.MeshData(
-            np.asarray(vertices, np.float32),
-            np.asarray(solid.faces, np.int32),
-            np.asarray(solid.vertex_normals, np.float32),
-            np.zeros((len(vertices), 2), np.float32),
-            np.zeros(len(solid.faces), np.int32),
-            (asset_types.Material(),),
-        )
+            np.asarray(vertices, np.float32), np.asarray(solid.faces, np.int32),
+            np.asarray(solid.vertex_normals, np.float32), np.zeros((len(vertices), 2), np.float32),
+            np.zeros(len(solid.faces), np.int32), (asset_types.Material(),),
+        )  # fmt: skip
 
     def materials(self, asset_id: str) -> tuple[asset_types.Material, ...]:
         return ()

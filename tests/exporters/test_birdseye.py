@@ -32,22 +32,16 @@ def sample(world: Any) -> Sample:
     return replace(first, truth={"color": truth})
 
 
-def test_layers_are_images_of_0_and_255(world: Any, tmp_path: Path) -> None:
+def test_layers_are_images_and_frames_tell_what_is_on_them(world: Any, tmp_path: Path) -> None:
     """One per sample and layer: the right half of the map is drivable."""
     folder = world.export(Birdseye(), world.info(7), world.samples, tmp_path)
     image = cv2.imread(str(folder / "drivable/000000004.png"), cv2.IMREAD_UNCHANGED)
-
     assert len(list((folder / "drivable").iterdir())) == 7
     assert image.shape == (80, 80)
     assert (image[:, :40] == 0).all()
     assert (image[:, 40:] == 255).all()
-
-
-def test_frames_tell_where_the_map_is_and_what_is_on_it(world: Any, tmp_path: Path) -> None:
-    """In order; borders near the map only, boxes by instance."""
-    folder = world.export(Birdseye(), world.info(7), world.samples, tmp_path)
+    # In order; borders near the map only, boxes by instance.
     frames = json_lines(folder / "frames.jsonl")
-
     assert [frame["index"] for frame in frames] == list(range(7))
     first = frames[0]
     assert (first["px_m"], first["size_px"]) == (0.5, 80)
@@ -61,22 +55,15 @@ def test_frames_tell_where_the_map_is_and_what_is_on_it(world: Any, tmp_path: Pa
     assert frames[3]["boxes3d"]["ego"] == []
 
 
-def test_lanes_are_columns_at_rows_as_in_tusimple(
-    world: Any, sample: Sample, tmp_path: Path
-) -> None:
+def test_lanes_are_columns_at_tusimples_rows(world: Any, sample: Sample, tmp_path: Path) -> None:
     """Rows every ten pixels; pixel centres at whole numbers, so half a pixel less than ours."""
     folder = world.export(Birdseye(), world.info(1), [sample], tmp_path)
     (row,) = json_lines(folder / "lanes/color.jsonl")
-
     assert row["h_samples"] == list(range(0, 120, 10))
     assert row["lanes"] == [[-2] * 7 + [60.0, 70.0, 80.0, 80.0, 80.0]]
     assert row["borders"][0]["visible"] == [1, 1, 0]
     assert row["raw_file"] == "color/rgb/000000000.png"
-
-
-def test_a_line_that_misses_every_row_has_no_column() -> None:
     short = replace(BORDER, points_px=((5.0, 12.0), (6.0, 18.0)), visible=(True, True))
-
     assert columns_at(short, [0, 10, 20]) == [-2, -2, -2]
 
 
@@ -86,7 +73,6 @@ def test_coco_tells_motion_lanes_and_free_space(world: Any, sample: Sample, tmp_
     coco = json.loads((folder / "annotations/instances_train.json").read_text("utf-8"))
     image, other = coco["images"]
     motion = coco["annotations"][0]["motion"]
-
     assert image["lane_borders"][0]["points_px"] == [[80.5, 110.5], [80.5, 90.5], [60.5, 70.5]]
     assert image["free_space"]["size"] == [120, 160]
     assert {"lane_borders", "free_space"}.isdisjoint(other)

@@ -189,7 +189,7 @@ def test_models_in_the_written_poses_give_the_images(dataset: Path) -> None:
     assert sum(len(v) for p in dataset.glob("*/*/scene_gt.json") for v in read(p).values()) >= 15
 
 
-def test_coco_rows_are_the_visible_masks(dataset: Path) -> None:
+def test_coco_rows_are_the_visible_masks_and_equal_geometries_share_a_model(dataset: Path) -> None:
     """With COCO's boxes, a pixel wider than BOP's, and ids from 1."""
     for folder in sorted(dataset.glob("train/*")):
         with contextlib.redirect_stdout(io.StringIO()):
@@ -205,10 +205,7 @@ def test_coco_rows_are_the_visible_masks(dataset: Path) -> None:
                 assert row["bbox"] == coco_mask.toBbox(truth.annToRLE(row)).tolist()
                 assert row["area"] == mask.sum()
         assert min(truth.anns, default=1) == 1
-
-
-def test_equal_geometries_share_a_model(dataset: Path) -> None:
-    """Two crates of different shapes are two objects, in all frames the same ones."""
+    # Two crates of different shapes are two objects, in all frames the same ones.
     assert {k: v["asset"] for k, v in read(dataset / "objects.json").items()} == {
         "1": "primitive/box/car",
         "2": "primitive/box/crate",
@@ -221,9 +218,7 @@ def test_each_scale_is_an_object_of_its_own(world: Any, tmp_path: Path) -> None:
     first, *others = world.with_bodies(world.samples[:3])
     bodies = tuple(replace(b, scale=0.5) if "car" in b.name else b for b in first.scene.bodies)
     changed = replace(first, scene=replace(first.scene, bodies=bodies))
-
     root = world.export(Bop(), world.info(3), [changed, *others], tmp_path)
-
     sizes = {
         (v["asset"], v["scale"]): read(root / "models/models_info.json")[k]["size_x"]
         for k, v in read(root / "objects.json").items()
@@ -238,15 +233,10 @@ def test_robots_and_ignored_objects_are_left_out(world: Any, tmp_path: Path) -> 
     truth = sample.truth["color"]
     robot = Articulation("arm", "robot", 2, IDENTITY, ())
     changed = world.ignoring(replace(sample, scene=replace(sample.scene, articulations=(robot,))))
-
     root = world.export(Bop(), world.info(1), [changed], tmp_path)
-
     assets = [v["asset"] for v in read(root / "objects.json").values()]
-    assert assets == [
-        "primitive/box/crate",
-        "primitive/box/pedestrian",
-        "primitive/ellipsoid/crate",
-    ]
+    assert assets == ["primitive/box/crate", "primitive/box/pedestrian",
+                      "primitive/ellipsoid/crate"]  # fmt: skip
     assert len(read(root / "train/000000/scene_gt.json")["0"]) == len(truth.objects) - 2
 
 
@@ -258,9 +248,7 @@ def test_invisible_objects_have_no_box(world: Any, tmp_path: Path) -> None:
         [world.sample(0, (front, behind), [world.camera()],
                       thresholds=Thresholds(include_invisible=True))]
     )  # fmt: skip
-
     root = world.export(Bop(), world.info(1), [sample], tmp_path)
-
     _, hidden = read(root / "train/000000/scene_gt_info.json")["0"]
     assert hidden["bbox_visib"] == hidden["bbox_obj"] == [-1, -1, -1, -1]
     assert (hidden["px_count_visib"], hidden["visib_fract"]) == (0, 0.0)
@@ -272,10 +260,8 @@ def test_invisible_objects_have_no_box(world: Any, tmp_path: Path) -> None:
 def test_views_of_a_scene_share_a_folder(world: Any, tmp_path: Path) -> None:
     samples = [replace(s, split="train") for s in world.with_bodies(world.samples)]
     info = replace(world.info(7), views_per_scene=3)
-
     by_scene = world.export(Bop(), info, samples, tmp_path / "a")
     together = world.export(Bop(folders="thousand"), info, samples, tmp_path / "b")
-
     ids = {p.name: list(read(p / "scene_gt.json")) for p in sorted((by_scene / "train").iterdir())}
     assert ids == {"000000": ["0", "1", "2"], "000001": ["0", "1", "2"], "000002": ["0"]}
     assert list(read(together / "train/000000/scene_gt.json")) == [str(k) for k in range(7)]
@@ -301,44 +287,33 @@ def info_of(world: Any, *symmetries: Symmetry) -> Any:
     return build_model((piece,), OneCube(world, symmetries)).info  # type: ignore[arg-type]
 
 
-def test_discrete_symmetries_are_a_whole_group(world: Any) -> None:
+def test_symmetries_are_a_whole_group_in_their_place_and_end(world: Any) -> None:
     """Quarter turns about Z and half turns about X: eight poses, of which one is the identity."""
     middle = (0.0, 0.0, 0.45)
     info = info_of(
         world, Symmetry((0.0, 0.0, 1.0), 4), Symmetry((1.0, 0.0, 0.0), 2, offset_m=middle)
     )
-
     assert len(info["symmetries_discrete"]) == 7
     for row in info["symmetries_discrete"]:
         pose = np.array(row).reshape(4, 4)
         np.testing.assert_allclose(pose[:3, :3] @ pose[:3, :3].T, np.eye(3), atol=1e-8)
         # Both axes go through the centre, which is the model's origin.
         np.testing.assert_allclose(pose[:3, 3], 0.0, atol=1e-3)
-
-
-def test_axes_beside_the_centre_keep_their_place(world: Any) -> None:
-    """In millimetres from the centre of the scaled model."""
+    # In millimetres from the centre of the scaled model.
     info = info_of(world, Symmetry((0.0, 0.0, 1.0), 0, (0.1, 0.0, 0.0)))
-
     (row,) = info["symmetries_continuous"]
     assert row["axis"] == [0.0, 0.0, 1.0]
     assert row["offset"] == pytest.approx([200.0, 0.0, -900.0], abs=1e-3)
     assert "symmetries_discrete" not in info
-
-
-def test_symmetries_without_end_are_refused(world: Any) -> None:
-    """Parallel axes generate ever more poses."""
+    # Parallel axes generate ever more poses.
     with pytest.raises(AssetError, match="symmetries generate more than 120 poses"):
         info_of(world, Symmetry((0.0, 0.0, 1.0), 2), Symmetry((0.0, 0.0, 1.0), 2, (1.0, 0.0, 0.0)))
 
 
 def test_several_bodies_are_one_model(world: Any) -> None:
     """Each at its pose in the frame of the instance."""
-    pieces = (
-        Piece("primitive/box/crate", 1.0, IDENTITY),
-        Piece("primitive/box/crate", 1.0, SE3((3.0, 0.0, 0.0))),
-    )
+    pieces = (Piece("primitive/box/crate", 1.0, IDENTITY),
+              Piece("primitive/box/crate", 1.0, SE3((3.0, 0.0, 0.0))))  # fmt: skip
     model = build_model(pieces, OneCube(world, ()))  # type: ignore[arg-type]
-
     assert model.info["size_x"] == pytest.approx(4000.0)
     assert model.center_m == pytest.approx((1.5, 0.0, 0.45))

@@ -31,16 +31,6 @@ def pinhole(fx: Any, fy: Any, cx: Any, cy: Any) -> Camera:
     return np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]], float), "", ()
 
 
-def in_bop(folder: Path) -> Camera:
-    camera = json.loads((folder / "camera.json").read_text())
-    return pinhole(*(camera[name] for name in ("fx", "fy", "cx", "cy")))
-
-
-def in_cityscapes(folder: Path) -> Camera:
-    camera = json.loads(min(folder.rglob("*_camera.json")).read_text())["intrinsic"]
-    return pinhole(*(camera[name] for name in ("fx", "fy", "u0", "v0")))
-
-
 def in_coco(folder: Path) -> Camera:
     """Key ``lens`` for bent ones, with the names of coefficients."""
     (image, *_) = json.loads((folder / "annotations/instances_train.json").read_text())["images"]
@@ -65,10 +55,6 @@ def in_hdf5(folder: Path) -> Camera:
         return file["K"][()], lens["model"], lens["distortion"]
 
 
-def in_kitti(folder: Path) -> Camera:
-    return calibration(folder / "training/calib/000000.txt")["P2"].reshape(3, 4)[:, :3], "", ()
-
-
 def in_parquet(folder: Path) -> Camera:
     """A struct ``lens`` for bent ones; the card names it."""
     row = parquet(min(folder.rglob("train*.parquet"))).to_pylist()[0]
@@ -87,8 +73,10 @@ def in_records(folder: Path) -> Camera:
     return record["image/intrinsics"][1], model.decode(), distortion
 
 
-def in_scannet(folder: Path) -> Camera:
-    return np.loadtxt(min(folder.rglob("intrinsic_depth.txt")))[:3, :3], "", ()
+def document(path: Path, *names: str) -> Camera:
+    """A pinhole whose focal lengths and centre have these names in a JSON file."""
+    camera = json.loads(path.read_text())
+    return pinhole(*(camera.get("intrinsic", camera)[name] for name in names))
 
 
 def in_tum(folder: Path) -> Camera:
@@ -97,17 +85,15 @@ def in_tum(folder: Path) -> Camera:
 
 
 READERS: dict[str, Callable[[Path], Camera]] = {
-    "bop": in_bop,
-    "cityscapes": in_cityscapes,
-    "coco": in_coco,
-    "croissant": in_croissant,
-    "hdf5": in_hdf5,
-    "huggingface": in_parquet,
-    "kitti": in_kitti,
-    "scannet": in_scannet,
-    "tfrecord": in_records,
-    "tum_rgbd": in_tum,
-}
+    "bop": lambda f: document(f / "camera.json", "fx", "fy", "cx", "cy"),
+    "cityscapes": lambda f: document(min(f.rglob("*_camera.json")), "fx", "fy", "u0", "v0"),
+    "coco": in_coco, "croissant": in_croissant, "hdf5": in_hdf5, "huggingface": in_parquet,
+    "kitti": lambda f: (
+        calibration(f / "training/calib/000000.txt")["P2"].reshape(3, 4)[:, :3], "", ()
+    ),
+    "scannet": lambda f: (np.loadtxt(min(f.rglob("intrinsic_depth.txt")))[:3, :3], "", ()),
+    "tfrecord": in_records, "tum_rgbd": in_tum,
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("kind", READERS)
@@ -124,9 +110,7 @@ def test_the_ground_is_level_at_the_stated_pixels(kind: str, world: Any, tmp_pat
     rows, columns = np.nonzero(channels[Channel.INSTANCE] == 0)
     z_m = channels[Channel.Z_DEPTH][rows, columns]
     ground = np.isfinite(z_m)
-
     height_m = z_m[ground] * (rows[ground] + centre - K[1, 2]) / K[1, 1]
-
     assert ground.sum() > 1000
     np.testing.assert_allclose(height_m, EYE_M, rtol=1e-5)
     assert model in ("", "pinhole")
@@ -134,16 +118,12 @@ def test_the_ground_is_level_at_the_stated_pixels(kind: str, world: Any, tmp_pat
 
 @pytest.mark.parametrize("model", LENSES)
 @pytest.mark.parametrize("kind", ["coco", "croissant", "hdf5", "huggingface", "tfrecord"])
-def test_opencv_projects_with_the_bent_lens(
-    kind: str, model: Any, world: Any, tmp_path: Path
-) -> None:
+def test_opencv_projects_with_the_lens(kind: str, model: Any, world: Any, tmp_path: Path) -> None:
     """With K, and pixel centres where the format has them; to float32 where it holds no more."""
     exporter = TABLE.load(kind)()
     info = world.info(1, lenses={"color": model}, devices={})
     folder = world.export(exporter, info, bent_samples(world, model, 1), tmp_path)
-
     K, found, distortion = READERS[kind](folder)
-
     assert found == model
     module = cv2.fisheye if model == "kannala_brandt" else cv2
     points, still = POINTS_M.reshape(-1, 1, 3), np.zeros(3)
@@ -154,17 +134,12 @@ def test_opencv_projects_with_the_bent_lens(
     np.testing.assert_allclose(image[:, 0] + shift, true, atol=1e-4 if kind == "tfrecord" else 1e-6)
 
 
-@pytest.mark.parametrize("model", LENSES)
-def test_the_field_of_a_bent_camera_is_between_the_rays_of_its_edges(model: Any) -> None:
-    """In the row of the principal point, by OpenCV."""
-    k = LENSES[model]
-    edges = np.array([0.0, k.width_px]) - 0.5
-    left, right = opencv_rays(k, edges, np.full(2, k.cy_px - 0.5))
-    expected = abs(np.arctan2(left[0], left[2])) + abs(np.arctan2(right[0], right[2]))
-    assert fields_rad(k)[0] == pytest.approx(expected, abs=1e-6)
-
-
-def test_the_field_of_a_panorama_is_all_around() -> None:
-    """``fov_x`` of 360 degrees, ``fov_y`` of 180."""
+def test_the_field_of_a_bent_camera_is_between_the_rays_of_its_edges() -> None:
+    """In the row of the principal point, by OpenCV; 360 and 180 degrees for a panorama."""
+    for k in LENSES.values():
+        edges = np.array([0.0, k.width_px]) - 0.5
+        left, right = opencv_rays(k, edges, np.full(2, k.cy_px - 0.5))
+        expected = abs(np.arctan2(left[0], left[2])) + abs(np.arctan2(right[0], right[2]))
+        assert fields_rad(k)[0] == pytest.approx(expected, abs=1e-6)
     k = Intrinsics.from_hfov(160, 80, 2 * np.pi, Lens("equirectangular"))
     np.testing.assert_allclose(fields_rad(k), [2 * np.pi, np.pi], atol=1e-6)

@@ -20,17 +20,13 @@ from gen_data.exporters.captions import (
 STREET = Lane("lane", "driving", ((0.0, 0.0, 0.0), (9.0, 0.0, 0.0)), 3.0)
 
 
-def test_a_caption_is_one_sentence(world: Any) -> None:
+def test_a_caption_is_one_sentence_without_hidden_and_ignored_objects(world: Any) -> None:
     """Place, objects, weather, light and view of the first frame."""
     assert caption(world.samples[0], "color") == (
         "A street with two crates, two pedestrians and a car, seen at eye level."
     )
     assert caption(world.samples[3], "color") == "A street with no objects, seen at eye level."
-
-
-def test_hidden_and_ignored_objects_do_not_count(world: Any) -> None:
     car, *others = world.samples[0].truth["color"].objects
-
     assert list_objects([replace(car, box=None), others[0]]) == "a pedestrian"
     assert list_objects([replace(car, ignored=True)]) == "no objects"
 
@@ -44,21 +40,18 @@ def test_hidden_and_ignored_objects_do_not_count(world: Any) -> None:
 def test_numbers_and_plurals(world: Any, category: str, count: int, words: str) -> None:
     thing = world.samples[0].truth["color"].objects[0]
     things = [replace(thing, instance=replace(thing.instance, category=category))] * count
-
     assert list_objects(things) == words
 
 
 @pytest.mark.parametrize(
     ("weather", "words"),
     [
-        (Weather(), ""),
-        (Weather(rain_mm_h=1.0, wetness=0.5), "in light rain, on wet ground"),
+        (Weather(), ""), (Weather(rain_mm_h=1.0, wetness=0.5), "in light rain, on wet ground"),
         (Weather(rain_mm_h=30.0, puddles=0.2, wetness=1.0),
          "in heavy rain, with puddles on the ground"),
         (Weather(snow_mm_h=1.0, snow_cover=0.8), "in falling snow, on snow-covered ground"),
         (Weather(fog_extinction_per_m=0.03), "in dense fog"),
-        (Weather(fog_extinction_per_m=0.005), "in fog"),
-        (Weather(fog_extinction_per_m=0.0005), ""),
+        (Weather(fog_extinction_per_m=0.005), "in fog"), (Weather(fog_extinction_per_m=0.0005), ""),
     ],
 )  # fmt: skip
 def test_weather(weather: Weather, words: str) -> None:
@@ -107,5 +100,4 @@ def test_view(world: Any, target: Any, hfov_deg: float, words: str) -> None:
     """By the optical axis and the horizontal field of view."""
     lens = Intrinsics.from_hfov(160, 120, hfov_rad=math.radians(hfov_deg))
     pose = look_at((0.0, 0.0, 1.6), target)
-
     assert describe_view(replace(world.camera(), T_world_camera=pose, intrinsics=lens)) == words

@@ -40,12 +40,10 @@ def files_of(root: Path, index: int) -> dict[str, Path]:
     """Files of a frame of the split train by their suffix."""
     stem = f"street/street_{index:06d}_000000_"
     gt = root / "gtFine/train"
-    return {
-        **{k: gt / f"{stem}gtFine_{k}.png" for k in ("labelIds", "instanceIds", "color")},
-        "polygons": gt / f"{stem}gtFine_polygons.json",
-        "camera": root / f"camera/train/{stem}camera.json",
-        "image": root / f"leftImg8bit/train/{stem}leftImg8bit.png",
-    }
+    return {**{k: gt / f"{stem}gtFine_{k}.png" for k in ("labelIds", "instanceIds", "color")},
+            "polygons": gt / f"{stem}gtFine_polygons.json",
+            "camera": root / f"camera/train/{stem}camera.json",
+            "image": root / f"leftImg8bit/train/{stem}leftImg8bit.png"}  # fmt: skip
 
 
 def pixels(path: Path) -> Any:
@@ -97,14 +95,10 @@ def problems(root: Path, samples: Any) -> list[str]:
 def test_label_images_and_polygons_agree_with_the_samples(dataset: Path, samples: Any) -> None:
     """Counted classes have numbers; crates are dynamic and have none."""
     assert problems(dataset, samples) == []
-
-
-def test_scenery_and_sky_have_classes(dataset: Path) -> None:
-    """A tree without annotation is vegetation; what is above the horizon is sky."""
+    # A tree without annotation is vegetation; what is above the horizon is sky.
     labels = pixels(files_of(dataset, 7)["labelIds"])
     codes = pixels(files_of(dataset, 7)["instanceIds"])
     instances = pixels(dataset.parent / "shards/000002/color/instance/000000007.png")
-
     assert (labels[instances == 9] == 21).all()
     assert (codes[instances == 9] == 21).all()
     assert (instances == 9).any()
@@ -114,9 +108,7 @@ def test_scenery_and_sky_have_classes(dataset: Path) -> None:
 def test_calibration_is_that_of_the_camera(world: Any, tmp_path: Path) -> None:
     """On the rig: 0.3 m ahead, 1.6 m up, level; pixel centres at whole numbers."""
     info = world.info(8, ("left", "right"), ("top",), steps_per_scene=4)
-
     folder = world.export(Cityscapes(camera="left"), info, world.drive(), tmp_path)
-
     path = folder / "camera/train/street/street_000000_000003_camera.json"
     facts = json.loads(path.read_text())
     assert facts["extrinsic"] == pytest.approx(
@@ -135,9 +127,7 @@ def test_a_pair_has_disparities_and_a_baseline(world: Any, tmp_path: Path) -> No
     info = replace(
         info, sensors=tuple(replace(s, channels=channels.get(s.name, ())) for s in info.sensors)
     )
-
     folder = world.export(Cityscapes(camera="left", right="right"), info, pairs, tmp_path)
-
     stem = "train/street/street_000000_000001"
     facts = json.loads((folder / f"camera/{stem}_camera.json").read_text())
     assert facts["extrinsic"]["baseline"] == pytest.approx(0.54)
@@ -150,7 +140,7 @@ def test_a_pair_has_disparities_and_a_baseline(world: Any, tmp_path: Path) -> No
     assert (folder / f"rightImg8bit/{stem}_rightImg8bit.png").exists()
 
 
-def test_riders_vans_and_the_ego_vehicle(world: Any, tmp_path: Path) -> None:
+def test_riders_vans_and_egos_have_classes_and_ignored_none(world: Any, tmp_path: Path) -> None:
     """Classes come from the table; the carrier of the camera from its rig."""
     classes = city_classes()
     bicycle = replace(world.instance(1, "car", 0, 0, 0), category="bicycle")
@@ -161,7 +151,6 @@ def test_riders_vans_and_the_ego_vehicle(world: Any, tmp_path: Path) -> None:
     assert classes.of_instance(replace(bicycle, category="sofa")).name == "dynamic"
     sofa = replace(bicycle, category="sofa", annotated=False)
     assert classes.of_instance(sofa).name == "static"
-
     sample = world.drive()[0]
     scene = sample.scene
     bodies = tuple(replace(b, instance_id=1) if b.name == "ego" else b for b in scene.bodies)
@@ -171,14 +160,9 @@ def test_riders_vans_and_the_ego_vehicle(world: Any, tmp_path: Path) -> None:
     codes = pixels(files_of(folder, 0)["instanceIds"])
     ids = sample.capture.readings["left"].channels[Channel.INSTANCE]
     assert (codes[ids == 1] == 1).all()
-
-
-def test_ignored_objects_are_unlabeled(world: Any, tmp_path: Path) -> None:
     sample = world.samples[0]
     first = sample.truth["color"].objects[0]
-
-    folder = world.export(Cityscapes(), world.info(1), [world.ignoring(sample)], tmp_path)
-
+    folder = world.export(Cityscapes(), world.info(1), [world.ignoring(sample)], tmp_path / "b")
     labels = pixels(files_of(folder, 0)["labelIds"])
     ids = sample.capture.readings["color"].channels[Channel.INSTANCE]
     assert (labels[ids == first.instance.instance_id] == 0).all()
@@ -199,14 +183,12 @@ def test_the_official_scripts_read_it(dataset: Path, monkeypatch: pytest.MonkeyP
 
     ours = [(c.name, c.number, c.color, c.counted) for c in city_classes().by_name.values()]
     assert ours == [(k.name, k.id, k.color, k.hasInstances) for k in official if k.id >= 0]
-
     paths = sorted((root / "gtFine/train/street").glob("*_labelIds.png"))
     for path in paths:
         annotation = Annotation()
         annotation.fromJsonFile(str(path).replace("labelIds.png", "polygons.json"))
         drawn = np.asarray(createLabelImage(annotation, "ids"))
         np.testing.assert_array_equal(drawn, pixels(path))
-
     names = [str(path) for path in paths]
     arguments = pixel_level.args
     arguments.quiet, arguments.JSONOutput, arguments.evalInstLevelScore = True, False, True

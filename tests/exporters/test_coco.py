@@ -23,6 +23,18 @@ from tests.exporters.datasets import street_in
 from tests.exporters.label_readers import opened
 
 
+def judged(judge: Any, truth: Any, rows: Any, kind: str, sigmas: list[float] | None = None) -> Any:
+    """The first score of an evaluation of predictions."""
+    with contextlib.redirect_stdout(io.StringIO()):
+        evaluation = judge(truth, truth.loadRes(rows), kind)
+        if sigmas is not None:
+            evaluation.params.kpt_oks_sigmas = np.array(sigmas)
+        evaluation.evaluate()
+        evaluation.accumulate()
+        evaluation.summarize()
+    return float(evaluation.stats[0])
+
+
 def average_precision(truth: COCO, kind: str, path: Path | None = None) -> float:
     """AP at IoU 0.50:0.95 of the ground truth, submitted as predictions.
 
@@ -37,17 +49,13 @@ def average_precision(truth: COCO, kind: str, path: Path | None = None) -> float
         }
         for i, a in enumerate(truth.dataset["annotations"])
     ]
-    judge: Any = COCOeval
-    with contextlib.redirect_stdout(io.StringIO()):
-        if path is not None:
-            import faster_coco_eval as faster
+    if path is None:
+        return judged(COCOeval, truth, rows, kind)
+    import faster_coco_eval as faster
 
-            truth, judge = faster.COCO(str(path)), faster.COCOeval_faster
-        evaluation = judge(truth, truth.loadRes(rows), kind)
-        evaluation.evaluate()
-        evaluation.accumulate()
-        evaluation.summarize()
-    return float(evaluation.stats[0])
+    with contextlib.redirect_stdout(io.StringIO()):
+        truth = faster.COCO(str(path))
+    return judged(faster.COCOeval_faster, truth, rows, kind)
 
 
 dataset = street_in(Coco())
@@ -63,91 +71,18 @@ def train(dataset: Path) -> COCO:
 def test_ground_truth_as_predictions_scores_one(dataset: Path, split: str, kind: str) -> None:
     """Which an annotation id 0, a wrong area or a mask of the wrong size would prevent."""
     path = dataset / f"annotations/instances_{split}.json"
-
     assert average_precision(opened(path), kind) == pytest.approx(1.0, abs=1e-9)
     assert average_precision(opened(path), kind, path) == pytest.approx(1.0, abs=1e-9)
 
 
-def test_box_and_area_are_those_of_the_decoded_mask(train: COCO) -> None:
+def test_boxes_areas_and_visibility_are_those_of_the_decoded_masks(train: COCO) -> None:
     """Width is xmax - xmin + 1; area counts pixels, not width times height."""
     assert len(train.anns) > 10
     for row in train.anns.values():
         rle = train.annToRLE(row)
         assert (row["bbox"], row["area"]) == (coco_mask.toBbox(rle).tolist(), coco_mask.area(rle))
         assert row["iscrowd"] == 0
-
-
-def test_ids_are_positive_and_unique_over_all_splits(dataset: Path) -> None:
-    """Category ids are consecutive from 1 in the order of the data set's categories."""
-    paths = sorted((dataset / "annotations").glob("instances_*.json"))
-    parts = [json.loads(path.read_text()) for path in paths]
-    for section in ("images", "annotations"):
-        ids = [row["id"] for part in parts for row in part[section]]
-        assert len(ids) == len(set(ids))
-        assert min(ids) >= 1
-    for part in parts:
-        names = [(c["id"], c["name"]) for c in part["categories"]]
-        assert names == [(1, "car"), (2, "crate"), (3, "pedestrian")]
-
-
-def test_empty_images_stay_and_every_image_on_disk_is_listed(train: COCO, dataset: Path) -> None:
-    """Frame 3 shows nothing: a negative example, not a mistake."""
-    listed = {image["file_name"]: image for image in train.imgs.values()}
-
-    assert set(listed) == {p.name for p in (dataset / "train").iterdir()}
-    assert train.getAnnIds(listed["000000003_color.png"]["id"]) == []
-    for name, image in listed.items():
-        with Image.open(dataset / "train" / name) as pixels:
-            assert (pixels.mode, pixels.size) == ("RGB", (image["width"], image["height"]))
-
-
-def test_a_split_without_images_has_no_file(dataset: Path) -> None:
-    """Readers would take an empty file for an empty data set."""
-    names = {p.name for p in (dataset / "annotations").iterdir()}
-
-    stems = ("instances", "car_keypoints", "pedestrian_keypoints")
-    assert names == {f"{stem}_{split}.json" for stem in stems for split in ("train", "val")}
-
-
-def test_the_pose_and_box_project_onto_the_image_box(train: COCO) -> None:
-    """Corners, through the written K and T_camera_object, enclose whole silhouettes tightly."""
-    for row in train.anns.values():
-        k = np.array(train.imgs[row["image_id"]]["K"])
-        box = row["box3d"]
-        half = 0.5 * np.array(box["size_m"])
-        signs = np.stack(np.meshgrid([-1, 1], [-1, 1], [-1, 1]), -1).reshape(-1, 3)
-        pose = SE3(tuple(box["center_m"]), tuple(box["quaternion_wxyz"]))
-        image_points = pose.apply(signs * half) @ k.T
-        u, v = image_points[:, 0] / image_points[:, 2], image_points[:, 1] / image_points[:, 2]
-        left, top, width, _ = row["amodal_bbox"]
-
-        # A pixel belongs to the silhouette if its centre does: within one pixel of the corners.
-        slack = np.array([left - u.min(), top - v.min(), u.max() - left - width])
-        assert (slack > -1.0).all()
-        if row["attributes"]["asset"] == "primitive/box":
-            assert (slack < 1.0).all()
-        np.testing.assert_allclose(
-            np.array(row["T_camera_object"])[:3, 3],
-            pose.apply(np.array([0.0, 0.0, -half[2]])),
-            atol=1e-8,
-        )
-
-
-def test_cameras_are_written_in_full(train: COCO) -> None:
-    """K has pixel centres at i + 0.5: a centred camera has its principal point at W / 2."""
-    image = next(iter(train.imgs.values()))
-
-    assert image["K"][0][2] == image["width"] / 2
-    # Level, looking along world X: camera Z is world X, camera Y is down.
-    np.testing.assert_allclose(
-        image["T_world_camera"],
-        [[0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 1.6], [0, 0, 0, 1]],
-        atol=1e-9,
-    )
-
-
-def test_visibility_and_amodal_shapes_agree_with_the_masks(train: COCO) -> None:
-    """The visible mask lies in the amodal one; their ratio is 1 - occlusion."""
+    # The visible mask lies in the amodal one; their ratio is 1 - occlusion.
     truncated = 0
     for row in train.anns.values():
         visible = train.annToMask(row).astype(bool)
@@ -158,6 +93,73 @@ def test_visibility_and_amodal_shapes_agree_with_the_masks(train: COCO) -> None:
         assert row["visible_fraction"] == pytest.approx(remains, abs=1e-8)
         truncated += row["truncation"] > 0
     assert truncated > 0
+
+
+def test_ids_are_positive_and_unique_over_all_splits_and_boxes_are_floats(dataset: Path) -> None:
+    """Category ids are consecutive from 1 in the order of the data set's categories."""
+    paths = sorted((dataset / "annotations").glob("instances_*.json"))
+    parts = [json.loads(path.read_text()) for path in paths]
+    for section in ("images", "annotations"):
+        ids = [row["id"] for part in parts for row in part[section]]
+        assert len(ids) == len(set(ids))
+        assert min(ids) >= 1
+    for part in parts:
+        names = [(c["id"], c["name"]) for c in part["categories"]]
+        assert names == [(1, "car"), (2, "crate"), (3, "pedestrian")]
+    # Integers make integer tensors in torchvision's wrapper, whose transforms then cut boxes.
+    for path in (dataset / "annotations").glob("*.json"):
+        for row in json.loads(path.read_text())["annotations"]:
+            for key in ("bbox", "amodal_bbox"):
+                assert [type(value) for value in row[key]] == [float] * 4, (path.name, key)
+
+
+def test_empty_images_stay_and_empty_splits_have_no_file(train: COCO, dataset: Path) -> None:
+    """Frame 3 shows nothing: a negative example, not a mistake."""
+    listed = {image["file_name"]: image for image in train.imgs.values()}
+    assert set(listed) == {p.name for p in (dataset / "train").iterdir()}
+    # A view of one instant is no sequence.
+    assert "sequence_id" not in next(iter(listed.values()))
+    assert "track_id" not in next(iter(train.anns.values()))
+    assert train.getAnnIds(listed["000000003_color.png"]["id"]) == []
+    for name, image in listed.items():
+        with Image.open(dataset / "train" / name) as pixels:
+            assert (pixels.mode, pixels.size) == ("RGB", (image["width"], image["height"]))
+    # Readers would take an empty file for an empty data set.
+    names = {p.name for p in (dataset / "annotations").iterdir()}
+    stems = ("instances", "car_keypoints", "pedestrian_keypoints")
+    assert names == {f"{stem}_{split}.json" for stem in stems for split in ("train", "val")}
+
+
+def test_the_pose_and_box_project_onto_the_image_box_by_the_written_camera(train: COCO) -> None:
+    """Corners, through the written K and T_camera_object, enclose whole silhouettes tightly."""
+    for row in train.anns.values():
+        k = np.array(train.imgs[row["image_id"]]["K"])
+        box = row["box3d"]
+        half = 0.5 * np.array(box["size_m"])
+        signs = np.stack(np.meshgrid([-1, 1], [-1, 1], [-1, 1]), -1).reshape(-1, 3)
+        pose = SE3(tuple(box["center_m"]), tuple(box["quaternion_wxyz"]))
+        image_points = pose.apply(signs * half) @ k.T
+        u, v = image_points[:, 0] / image_points[:, 2], image_points[:, 1] / image_points[:, 2]
+        left, top, width, _ = row["amodal_bbox"]
+        # A pixel belongs to the silhouette if its centre does: within one pixel of the corners.
+        slack = np.array([left - u.min(), top - v.min(), u.max() - left - width])
+        assert (slack > -1.0).all()
+        if row["attributes"]["asset"] == "primitive/box":
+            assert (slack < 1.0).all()
+        np.testing.assert_allclose(
+            np.array(row["T_camera_object"])[:3, 3],
+            pose.apply(np.array([0.0, 0.0, -half[2]])),
+            atol=1e-8,
+        )
+    # K has pixel centres at i + 0.5: a centred camera has its principal point at W / 2.
+    image = next(iter(train.imgs.values()))
+    assert image["K"][0][2] == image["width"] / 2
+    # Level, looking along world X: camera Z is world X, camera Y is down.
+    np.testing.assert_allclose(
+        image["T_world_camera"],
+        [[0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 1.6], [0, 0, 0, 1]],
+        atol=1e-9,
+    )
 
 
 def test_amodal_boxes_are_those_of_the_silhouettes(world: Any, tmp_path: Path, train: COCO) -> None:
@@ -182,9 +184,7 @@ def test_amodal_boxes_are_those_of_the_silhouettes(world: Any, tmp_path: Path, t
 @pytest.mark.slow
 def test_boxes_only_and_no_amodal_keys_on_request(world: Any, tmp_path: Path) -> None:
     exporter = Coco(segmentation="none", amodal=False)
-
     folder = world.export(exporter, world.info(7), world.samples, tmp_path)
-
     truth = opened(folder / "annotations/instances_train.json")
     row = next(iter(truth.anns.values()))
     assert row["segmentation"] == []
@@ -192,12 +192,9 @@ def test_boxes_only_and_no_amodal_keys_on_request(world: Any, tmp_path: Path) ->
     assert average_precision(truth, "bbox") == pytest.approx(1.0, abs=1e-9)
 
 
-def test_runs_and_polygons_are_the_same(
-    world: Any, train: COCO, dataset: Path, tmp_path: Path
-) -> None:
+def test_runs_and_polygons_agree(world: Any, train: COCO, dataset: Path, tmp_path: Path) -> None:
     """Polygons drawn as torchvision's reference recipe does, which takes polygons only."""
     folder = world.export(Coco(segmentation="rle"), world.info(7), world.samples, tmp_path)
-
     runs = opened(folder / "annotations/instances_train.json")
     assert set(runs.anns) == set(train.anns)
     for number, row in train.anns.items():
@@ -210,23 +207,13 @@ def test_runs_and_polygons_are_the_same(
     assert average_precision(runs, "segm") == pytest.approx(1.0, abs=1e-9)
 
 
-def test_boxes_are_floats_in_json(dataset: Path) -> None:
-    """Integers make integer tensors in torchvision's wrapper, whose transforms then cut boxes."""
-    for path in (dataset / "annotations").glob("*.json"):
-        for row in json.loads(path.read_text())["annotations"]:
-            for key in ("bbox", "amodal_bbox"):
-                assert [type(value) for value in row[key]] == [float] * 4, (path.name, key)
-
-
 @pytest.mark.parametrize("segmentation", ["rle", "polygon"])
 def test_ignored_objects_are_crowds(world: Any, tmp_path: Path, segmentation: Any) -> None:
     """Which COCOeval does not count; their masks are run lengths."""
     sample = world.samples[0]
     first = sample.truth["color"].objects[0]
-
     exporter = Coco(segmentation=segmentation)
     folder = world.export(exporter, world.info(1), [world.ignoring(sample)], tmp_path)
-
     opened_truth = opened(folder / "annotations/instances_train.json")
     crowds = [row for row in opened_truth.anns.values() if row["iscrowd"]]
     assert [row["instance_id"] for row in crowds] == [first.instance.instance_id]
@@ -241,9 +228,7 @@ def test_hidden_objects_are_not_listed(world: Any, tmp_path: Path) -> None:
         0, (hidden, shown), [world.camera()], thresholds=Thresholds(include_invisible=True)
     )
     assert len(sample.truth["color"].objects) == 2
-
     folder = world.export(Coco(), world.info(1), [sample], tmp_path)
-
     truth = opened(folder / "annotations/instances_train.json")
     assert [row["instance_id"] for row in truth.anns.values()] == [2]
 
@@ -255,9 +240,7 @@ def test_two_cameras_give_two_images_per_sample(world: Any, tmp_path: Path) -> N
     sample = world.sample(0, world.samples[0].scene.instances, cameras)
     media = {"left": (Channel.RGB,), "right": (Channel.RGB,), "depth_only": (Channel.Z_DEPTH,)}
     info = world.info(1, names, media=media)
-
     folder = world.export(Coco(), info, [sample], tmp_path)
-
     truth = opened(folder / "annotations/instances_train.json")
     found = {image["file_name"]: image["id"] for image in truth.imgs.values()}
     assert found == {"000000000_left.png": 2, "000000000_right.png": 3}
@@ -270,33 +253,22 @@ def object_keypoint_similarity(truth: COCO, sigmas: list[float] | None) -> float
         for i, a in enumerate(truth.dataset["annotations"])
         if a["num_keypoints"]
     ]
-    with contextlib.redirect_stdout(io.StringIO()):
-        evaluation = COCOeval(truth, truth.loadRes(rows), "keypoints")
-        if sigmas is not None:
-            evaluation.params.kpt_oks_sigmas = np.array(sigmas)
-        evaluation.evaluate()
-        evaluation.accumulate()
-        evaluation.summarize()
-    return float(evaluation.stats[0])
+    return judged(COCOeval, truth, rows, "keypoints", sigmas)
 
 
 @pytest.mark.parametrize(
     ("name", "sigmas"), [("pedestrian", None), ("car", [0.05] * 8)], ids=["pedestrian", "car"]
 )
 @pytest.mark.parametrize("split", ["train", "val"])
-def test_keypoints_score_one(
-    dataset: Path, split: str, name: str, sigmas: list[float] | None
-) -> None:
+def test_keypoints_agree(dataset: Path, split: str, name: str, sigmas: list[float] | None) -> None:
     """COCOeval compares one skeleton at a time: each category has a file of its own."""
     truth = opened(dataset / f"annotations/{name}_keypoints_{split}.json")
-
     assert object_keypoint_similarity(truth, sigmas) == pytest.approx(1.0, abs=1e-9)
 
 
-def test_a_keypoint_file_has_its_category_whole_and_all_images(dataset: Path, train: COCO) -> None:
+def test_a_keypoint_file_has_its_category_with_projected_points(dataset: Path, train: COCO) -> None:
     """Boxes, masks and ids are those of the instances file; points come besides."""
     truth = opened(dataset / "annotations/pedestrian_keypoints_train.json")
-
     (category,) = truth.dataset["categories"]
     assert (category["id"], category["name"]) == (3, "pedestrian")
     assert len(category["keypoints"]) == 17
@@ -309,12 +281,7 @@ def test_a_keypoint_file_has_its_category_whole_and_all_images(dataset: Path, tr
         k: {name: value for name, value in row.items() if name not in added}
         for k, row in truth.anns.items()
     } == expected
-
-
-def test_keypoints_are_the_projections_of_their_positions(dataset: Path) -> None:
-    """Through the written K; v counts what is labelled, and visible ones lie on the mask."""
-    truth = opened(dataset / "annotations/pedestrian_keypoints_train.json")
-    (category,) = truth.dataset["categories"]
+    # Through the written K; v counts what is labelled, and visible ones lie on the mask.
     states = set()
     for row in truth.anns.values():
         k = np.array(truth.imgs[row["image_id"]]["K"])
@@ -337,7 +304,6 @@ def test_points_that_no_object_has_are_zero(dataset: Path) -> None:
     """The cars have four of the eight points of a vehicle: tail lights and rear wheels miss."""
     truth = opened(dataset / "annotations/car_keypoints_train.json")
     (category,) = truth.dataset["categories"]
-
     for row in truth.anns.values():
         points = np.array(row["keypoints"]).reshape(-1, 3)
         missing = [category["keypoints"].index(n) for n in ("taillight_left", "wheel_rear_right")]
@@ -355,9 +321,7 @@ def test_facts_of_objects_and_images_are_attributes(world: Any, tmp_path: Path) 
     sample = world.sample(0, (crate,), [world.camera()])
     weather = Weather(rain_mm_h=2.5, wetness=1.0, seed=77)
     scene = replace(sample.scene, shared=(("lanes", 2), ("style", "modern")), weather=weather)
-
     folder = world.export(Coco(), world.info(1), [replace(sample, scene=scene)], tmp_path)
-
     truth = opened(folder / "annotations/instances_train.json")
     (row,), (image,) = truth.anns.values(), truth.imgs.values()
     assert row["attributes"] == {
@@ -365,3 +329,24 @@ def test_facts_of_objects_and_images_are_attributes(world: Any, tmp_path: Path) 
     }  # fmt: skip
     assert image["attributes"] == {"lanes": 2, "style": "modern"}
     assert image["weather"] == {"rain_mm_h": 2.5, "wetness": 1.0}
+
+
+def test_coco_knows_sequences_frames_and_tracks(exported: Any) -> None:
+    """A track is one object in all images of one sequence, whatever the camera."""
+    folder = exported(Coco()) / "annotations"
+    tracks: dict[str, set[int]] = {}
+    for split, number in (("train", 0), ("val", 1)):
+        data = json.loads((folder / f"instances_{split}.json").read_text())
+        images = {image["id"]: image for image in data["images"]}
+        assert {image["sequence_id"] for image in images.values()} == {number}
+        assert sorted((i["frame_id"], i["sensor"]) for i in images.values()) == [
+            (k, s) for k in range(4) for s in ("left", "right")
+        ]
+        for image in images.values():
+            assert image["time_s"] == pytest.approx(0.1 * image["frame_id"])
+        by_instance: dict[int, set[int]] = {}
+        for row in data["annotations"]:
+            by_instance.setdefault(row["instance_id"], set()).add(row["track_id"])
+        assert {k: len(ids) for k, ids in by_instance.items()} == {1: 1, 2: 1, 4: 1}
+        tracks[split] = set().union(*by_instance.values())
+    assert not tracks["train"] & tracks["val"]

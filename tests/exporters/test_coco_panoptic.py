@@ -20,11 +20,9 @@ def scenery(world: Any) -> Any:
     tree = replace(world.instance(5, "crate", 12.0, 1.0, 0.2), annotated=False)
     hood = replace(world.instance(6, "car", 9.0, -3.0, 0.0), annotated=False)
     things = (
-        world.instance(1, "crate", 8.0, 1.6, 0.4),
-        world.instance(2, "pedestrian", 9.0, -2.0, 1.0),
-        replace(tree, category="tree", category_id=0),
-        replace(hood, category_id=0),
-    )
+        world.instance(1, "crate", 8.0, 1.6, 0.4), world.instance(2, "pedestrian", 9.0, -2.0, 1.0),
+        replace(tree, category="tree", category_id=0), replace(hood, category_id=0),
+    )  # fmt: skip
     return world.sample(7, things, [world.camera()])
 
 
@@ -86,21 +84,15 @@ def panoptic_quality(folder: Path, predicted: Callable[[NDArray[Any]], NDArray[A
     return float(np.mean([iou / count for iou, count in scores.values()]))
 
 
-def test_it_keeps_the_definition_and_scores_one(dataset: Path) -> None:
+def test_it_scores_one_with_scenery_as_stuff_and_unannotated_cars_as_void(dataset: Path) -> None:
     """The ground truth as prediction has PQ 1; shifted by some pixels it has not."""
     folder = dataset
-
     assert problems(folder) == []
     assert panoptic_quality(folder, lambda ids: ids) == 1.0
     assert panoptic_quality(folder, lambda ids: np.roll(ids, 4, axis=1)) < 0.9
-
-
-def test_scenery_is_stuff_and_unannotated_cars_are_void(dataset: Path) -> None:
-    """Names of stuff that occur follow the things; a hood is neither thing nor background."""
-    folder = dataset
+    # Names of stuff that occur follow the things; a hood is neither thing nor background.
     truth = read(folder)
     names = {c["id"]: (c["name"], c["isthing"]) for c in truth["categories"]}
-
     assert names == {
         1: ("car", 1), 2: ("crate", 1), 3: ("pedestrian", 1), 4: ("sky", 0), 5: ("tree", 0),
     }  # fmt: skip
@@ -114,10 +106,7 @@ def test_scenery_is_stuff_and_unannotated_cars_are_void(dataset: Path) -> None:
     assert (ids[instances == 6] == 0).all()
     (tree,) = (s for s in annotation["segments_info"] if s["category_id"] == 5)
     np.testing.assert_array_equal(ids == tree["id"], instances == 5)
-
-
-def test_the_sky_is_above_the_horizon(dataset: Path) -> None:
-    """The level camera has it in its upper half, behind everything."""
+    # The level camera has it in its upper half, behind everything.
     truth = read(dataset)
     for annotation in truth["annotations"]:
         (sky,) = (s for s in annotation["segments_info"] if s["category_id"] == 4)
@@ -129,9 +118,7 @@ def test_ignored_objects_are_void(world: Any, tmp_path: Path) -> None:
     """Evaluation leaves out what is predicted there."""
     sample = world.samples[0]
     first, *others = sample.truth["color"].objects
-
     folder = world.export(CocoPanoptic(), world.info(1), [world.ignoring(sample)], tmp_path)
-
     (annotation,) = read(folder)["annotations"]
     assert len(annotation["segments_info"]) == len(others)
     ids = segments_of(folder / "annotations/panoptic_train" / annotation["file_name"])

@@ -87,7 +87,6 @@ def test_hugging_face_reads_images_and_text(
     from datasets import load_dataset
 
     train = load_dataset(str(dataset), split="train", cache_dir=str(tmp_path))
-
     samples = [sample for sample in world.samples if sample.split == "train"]
     assert len(train) == len(samples)
     for row, listed, sample in zip(train, rows_of(dataset / "train"), samples, strict=True):
@@ -100,12 +99,13 @@ def test_hugging_face_reads_images_and_text(
 
 
 def test_a_sequence_is_one_clip(world: Any, samples: Any, tmp_path: Path) -> None:
-    """With videos of the same frames, and parameters that name them."""
+    """With videos of the same frames and bytes in every run, and parameters that name them."""
     exporter = FIXED.model_copy(update={"video": True, "camera": "left", "edges_weight": 1.0})
     info = world.info(8, ("left", "right"), steps_per_scene=4)
-
-    root = world.export(exporter, info, samples, tmp_path)
-
+    root, again = (world.export(exporter, info, samples, tmp_path / name) for name in "ab")
+    videos = sorted(p.relative_to(root) for p in root.rglob("*.mp4"))
+    assert len(videos) == 8
+    assert all((root / p).read_bytes() == (again / p).read_bytes() for p in videos)
     assert list(problems(root, samples, "left")) == []
     clip = root / "val/000001"
     facts = json.loads((clip / "clip.json").read_text())
@@ -129,38 +129,17 @@ def test_a_sequence_is_one_clip(world: Any, samples: Any, tmp_path: Path) -> Non
         assert not video.read()[0]
 
 
-def test_videos_have_the_same_bytes_in_every_run(world: Any, samples: Any, tmp_path: Path) -> None:
-    exporter = FIXED.model_copy(update={"video": True})
-    info = world.info(8, ("left", "right"), steps_per_scene=4)
-
-    one, other = (world.export(exporter, info, samples, tmp_path / name) for name in "ab")
-
-    videos = sorted(p.relative_to(one) for p in one.rglob("*.mp4"))
-    assert len(videos) == 8
-    assert all((one / p).read_bytes() == (other / p).read_bytes() for p in videos)
-
-
-def test_inverse_depth_is_linear_in_one_over_depth() -> None:
-    """White at the near end, black at the far end and where there is nothing."""
-    depth = np.array([[1.0, 2.0, 4.0, np.inf, 0.5, 9.0]], np.float32)
-
-    pixels, span = inverse_depth(depth, (1.0, 4.0))
-
-    assert span == (1.0, 4.0)
-    assert pixels.tolist() == [[255, 85, 0, 0, 255, 0]]
-
-
 @pytest.mark.parametrize(
-    ("depth", "pixels", "span"),
-    [([2.0, 4.0, np.inf], [255, 0, 0], (2.0, 4.0)), ([3.0, 3.0], [255, 255], (3.0, 3.0)),
-     ([np.inf, np.inf], [0, 0], (0.0, 0.0))],
+    ("depth", "given", "pixels", "span"),
+    [([1.0, 2.0, 4.0, np.inf, 0.5, 9.0], (1.0, 4.0), [255, 85, 0, 0, 255, 0], (1.0, 4.0)),
+     ([2.0, 4.0, np.inf], None, [255, 0, 0], (2.0, 4.0)),
+     ([3.0, 3.0], None, [255, 255], (3.0, 3.0)), ([np.inf, np.inf], None, [0, 0], (0.0, 0.0))],
+    ids=["given", "its own", "a wall parallel to the image", "an empty sky"],
 )  # fmt: skip
-def test_the_range_of_one_image(depth: Any, pixels: Any, span: Any) -> None:
-    """Its own, also for a wall parallel to the image and for an empty sky."""
-    found, used = inverse_depth(np.array([depth], np.float32), None)
-
-    assert found.tolist() == [pixels]
-    assert used == span
+def test_greys_are_linear_in_one_over_depth(depth: Any, given: Any, pixels: Any, span: Any) -> None:
+    """White at the near end, black at the far end and where there is nothing."""
+    found, used = inverse_depth(np.array([depth], np.float32), given)
+    assert (found.tolist(), used) == ([pixels], span)
 
 
 @pytest.mark.parametrize(
@@ -175,17 +154,13 @@ def test_the_suggested_range_of_a_sequence_uses_most_greys(
         ControlClips().check(world.info(8, steps_per_scene=4))
     (found,) = re.findall(rf"near_m: ([0-9.]+), far_m: ([0-9]+) \([^)]*{place}", str(caught.value))
     near_m, far_m = map(float, found)
-
     (dark, light), _ = inverse_depth(np.array([farthest_m, nearest_m], np.float32), (near_m, far_m))
-
     assert int(light) - int(dark) >= 160
 
 
 def test_categories_have_a_colour_each(world: Any, tmp_path: Path) -> None:
     exporter = ControlClips(segmentation="category")
-
     root = world.export(exporter, world.info(1), world.samples[:1], tmp_path)
-
     colors = image(root / "train/000000/segmentation/000000.png")
     ids = world.samples[0].capture.readings["color"].channels[Channel.CATEGORY]
     assert len(np.unique(colors.reshape(-1, 3), axis=0)) == len(np.unique(ids))

@@ -20,30 +20,20 @@ def dataset(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def published(world: Any, licence: str = "") -> DatasetInfo:
-    publication = Publication(
-        license=licence,
-        url="https://example.org",
-        date_published="2026-01-31",
-        cite_as="nobody",
-        creators=("A. Author",),
-    )
+    publication = Publication(license=licence, url="https://example.org", cite_as="nobody",
+                              date_published="2026-01-31", creators=("A. Author",))  # fmt: skip
     return replace(world.info(7), publication=publication)
 
 
-def test_tables_list_images_and_objects(dataset: Path, world: Any) -> None:
+def test_tables_list_images_and_objects_described_with_sums(dataset: Path, world: Any) -> None:
     """Ids are COCO's; the empty frame has an image and no object."""
     images, objects = csv_rows(dataset / "images.csv"), csv_rows(dataset / "objects.csv")
-
     assert [int(row["image_id"]) for row in images] == [s.image_id("color") for s in world.samples]
     assert {row["image_id"] for row in objects} < {row["image_id"] for row in images}
     names = [row["name"] for row in csv_rows(dataset / "categories.csv")]
     assert names == list(world.categories)
-
-
-def test_files_are_described_with_their_sums(dataset: Path) -> None:
     metadata = json.loads((dataset / "croissant.json").read_text())
     files = [f for f in metadata["distribution"] if f["@type"] == "cr:FileObject"]
-
     assert [f["contentUrl"] for f in files] == ["images.csv", "objects.csv", "categories.csv"]
     for file in files:
         data = (dataset / file["contentUrl"]).read_bytes()
@@ -58,5 +48,4 @@ def test_licences_are_those_of_assets_or_of_the_publisher(world: Any, tmp_path: 
         info = published(world, licence)
         folder = world.export(Croissant(), info, world.samples, tmp_path / str(number))
         stated.append(json.loads((folder / "croissant.json").read_text())["license"])
-
     assert stated == ["CC0-1.0", "CC-BY-4.0"]

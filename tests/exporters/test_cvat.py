@@ -15,7 +15,6 @@ def assert_states(folder: Path, samples: list[Any]) -> None:
     root = ET.parse(folder / "train/annotations.xml").getroot()
     truth = [t for s in samples if s.split == "train" for t in s.truth["color"].objects if t.box]
     states = [shape.get("occluded") for image in root.iter("image") for shape in image]
-
     assert [node.findtext("name") for node in root.iter("label")] == ["car", "crate", "pedestrian"]
     assert states == [str(int(thing.occlusion > 0.05)) for thing in truth]
     assert set(states) == {"0", "1"}
@@ -23,7 +22,6 @@ def assert_states(folder: Path, samples: list[Any]) -> None:
 
 def test_shapes_of_hidden_objects_are_occluded(world: Any, tmp_path: Path) -> None:
     folder = world.export(Cvat(shapes="box"), world.info(7), world.samples, tmp_path)
-
     assert_states(folder, world.samples)
 
 

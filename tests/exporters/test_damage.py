@@ -113,25 +113,22 @@ def aside(pose: SE3) -> SE3:
     return pose @ ASIDE
 
 
+def raised(knots: Any) -> Any:
+    """Joint positions, each by 0.01."""
+    return tuple(tuple(v + 0.01 for v in knot) for knot in knots)
+
+
+def moved(box: BoxPx) -> BoxPx:
+    return BoxPx(box.x_min + 1, box.y_min, box.x_max + 1, box.y_max)
+
+
+EXCHANGED = {"car": "crate", "crate": "car", 1: 2, 2: 1}
 CHANGES: dict[str, tuple[Callable[[Any], Any], ...]] = {
-    "arms": (
-        everywhere(
-            JointTrajectory, knots=lambda ks: tuple(tuple(v + 0.01 for v in k) for k in ks)
-        ),
-    ),
-    "boxes": (
-        everywhere(
-            ObjectTruth, box=lambda b: BoxPx(b.x_min + 1, b.y_min, b.x_max + 1, b.y_max)
-        ),
-    ),
+    "arms": (everywhere(JointTrajectory, knots=raised),),
+    "boxes": (everywhere(ObjectTruth, box=moved),),
     "cameras": (everywhere(Camera, T_world_camera=aside, T_rig_camera=aside),),
-    "categories": (
-        everywhere(
-            Instance,
-            category=lambda name: {"car": "crate", "crate": "car"}.get(name, name),
-            category_id=lambda k: {1: 2, 2: 1}.get(k, k),
-        ),
-    ),
+    "categories": (everywhere(Instance, category=lambda name: EXCHANGED.get(name, name),
+                              category_id=lambda k: EXCHANGED.get(k, k)),),
     "centres": (everywhere(Camera, intrinsics=shift_centre),),
     "corners": (everywhere(ObjectTruth, oriented_box=lambda c: (*c[1:], c[0])),),
     "depths": (pixels(Channel.Z_DEPTH, lambda a: a * np.float32(1.05)),),
@@ -139,11 +136,7 @@ CHANGES: dict[str, tuple[Callable[[Any], Any], ...]] = {
     "flow": (pixels(Channel.FLOW_FORWARD, lambda a: np.ascontiguousarray(a[..., ::-1])),),
     "grasps": (everywhere(Grasp, width_m=lambda w: w + 0.02),),
     "ids": (pixels(Channel.INSTANCE, lambda a: np.roll(a, 1, axis=1)),),
-    "maps": (
-        everywhere(
-            BirdseyeMap, layers=lambda found: {k: np.fliplr(v) for k, v in found.items()}
-        ),
-    ),
+    "maps": (everywhere(BirdseyeMap, layers=lambda ls: {k: np.fliplr(v) for k, v in ls.items()}),),
     "masks": (everywhere(ObjectTruth, mask=lambda m: replace(m, pixels=np.fliplr(m.pixels))),),
     "measurements": (records(Measurements, "rows", "force_x_m_s2", np.float32),),
     "normals": (pixels(Channel.NORMALS, np.negative),),
@@ -151,18 +144,12 @@ CHANGES: dict[str, tuple[Callable[[Any], Any], ...]] = {
     "point ids": (records(PointCloud, "points", "instance_id", lambda ids: np.roll(ids, 9)),),
     "points": (records(PointCloud, "points", "position_m", lambda p: p[:, ::-1]),),
     "poses": (everywhere(ObjectTruth, T_camera_object=aside),),
-    "shares": (
-        everywhere(ObjectTruth, visible_fraction=lambda _: 0.0, occlusion=lambda s: 1.0 - s),
-    ),
-    "solids": (
-        everywhere(Instance, box_min_m=narrow, box_max_m=narrow),
-        everywhere(OrientedBox, size_m=narrow),
-    ),
+    "shares": (everywhere(ObjectTruth, visible_fraction=lambda _: 0.0, occlusion=lambda s: 1 - s),),
+    "solids": (everywhere(Instance, box_min_m=narrow, box_max_m=narrow),
+               everywhere(OrientedBox, size_m=narrow)),
     "surroundings": (everywhere(EgoTruth, boxes3d=everywhere(OrientedBox, size_m=narrow)),),
     "texts": (everywhere(Utterance, answer=lambda _: "many"),),
-    "times": (
-        everywhere(Scene, PointCloud, SensorReading, time_s=lambda t: 1.5 * t + 0.05),
-    ),
+    "times": (everywhere(Scene, PointCloud, SensorReading, time_s=lambda t: 1.5 * t + 0.05),),
 }  # fmt: skip
 """Changed facts."""
 
@@ -267,8 +254,7 @@ def solo(made: Made) -> list[str]:
 
 ROWS = {
     "birdseye": row(street, "maps, surroundings",
-        test_birdseye.test_layers_are_images_of_0_and_255,
-        test_birdseye.test_frames_tell_where_the_map_is_and_what_is_on_it),
+        test_birdseye.test_layers_are_images_and_frames_tell_what_is_on_them),
     "bop": row(bodies, "depths, masks, poses",
         lambda m: test_bop.problems(m.folder)),
     "calibration": row(drive, "cameras",
@@ -277,10 +263,8 @@ ROWS = {
         lambda m: test_cityscapes.problems(m.folder, m.samples)),
     "coco": row(street, "boxes, cameras, categories, centres, masks, poses, shares, solids",
         labels,
-        test_coco.test_box_and_area_are_those_of_the_decoded_mask,
-        test_coco.test_the_pose_and_box_project_onto_the_image_box,
-        test_coco.test_visibility_and_amodal_shapes_agree_with_the_masks,
-        test_coco.test_cameras_are_written_in_full),
+        test_coco.test_boxes_areas_and_visibility_are_those_of_the_decoded_masks,
+        test_coco.test_the_pose_and_box_project_onto_the_image_box_by_the_written_camera),
     "coco_panoptic": row(few, "categories, ids", labels),
     "control_clips": row(few, "depths, ids, photographs",
         lambda m: [*test_control_clips.problems(m.folder, m.samples)]),
@@ -296,7 +280,7 @@ ROWS = {
     "huggingface": row(few, "boxes, categories, masks", labels),
     "kitti": row(street, "categories, solids",
         test_kitti.test_image_boxes_bound_the_projected_boxes_inside_the_image,
-        test_kitti.test_official_types_are_used_and_others_are_misc, low_px=2),
+        test_kitti.test_every_frame_has_every_file_with_official_types_and_others_misc, low_px=2),
     "kitti_raw": row(drive, "cameras, categories, photographs, points, solids",
         test_kitti_raw.test_raw_files_hold_the_samples_of_their_frames,
         test_kitti_raw.test_raw_calibration_maps_points_into_their_image,
@@ -306,8 +290,8 @@ ROWS = {
         test_kitti_stereo.test_flow_is_there_for_every_frame_that_has_a_next_one,
         test_kitti_stereo.test_points_are_in_the_right_image_at_x_minus_disparity),
     "kitti_tracking": row(drive, "categories, solids",
-        test_kitti_tracking.test_tracking_labels_have_seventeen_columns_and_lasting_ids,
-        test_kitti_tracking.test_tracking_calibration_projects_labels_onto_their_boxes, low_px=4),
+        test_kitti_tracking.test_tracking_labels_last_and_fall_into_their_boxes_by_the_calibration,
+        low_px=4),
     "label_studio": row(few, "categories, masks", labels),
     "language": row(few, "categories, masks, texts",
         labels, lambda m: test_language.assert_said(m.folder, m.samples)),
@@ -317,16 +301,13 @@ ROWS = {
         "boxes, cameras, categories, centres, photographs, point ids, points, solids, times",
         lambda m: test_mcap.faults(m.folder / "train/street-000000.mcap", m.samples[:4])),
     "motchallenge": row(drive, "boxes, categories, shares",
-        test_motchallenge.test_mot_rows_count_from_one),
+        test_motchallenge.test_mot_rows_count_from_1_and_sequences_describe_them),
     "nuscenes": row(drive, "cameras, categories, centres, point ids, points, solids",
-        test_nuscenes.test_poses_and_intrinsics_are_those_of_the_sensors,
-        test_nuscenes.test_scans_have_the_axes_of_nuscenes,
-        test_nuscenes.test_boxes_count_the_pulses_that_hit_their_object,
-        test_nuscenes.test_boxes_are_in_the_global_frame_with_width_first,
-        test_nuscenes.test_point_labels_are_those_of_the_objects, key_frame_s=0.1),
+        test_nuscenes.test_poses_intrinsics_and_scans_are_those_of_the_sensors,
+        test_nuscenes.test_boxes_count_the_pulses_that_hit_and_points_are_labelled,
+        test_nuscenes.test_boxes_are_in_the_global_frame_with_width_first, key_frame_s=0.1),
     "pointclouds": row(scans, "point ids, points, solids",
-        test_scans.test_a_ply_file_is_what_its_header_says,
-        test_scans.test_points_lie_in_the_boxes_of_the_lidar_frame),
+        test_scans.test_a_ply_file_is_what_its_header_says_and_points_in_boxes),
     "rerun": row(street, "boxes, cameras, categories, centres, solids",
         lambda m: test_rerun.problems(m.folder, m.folder.parent / "shards", m.world),
         samples_per_file=3),
@@ -334,18 +315,17 @@ ROWS = {
         lambda m: test_demonstrations.assert_written(m.folder / "train/toys_arm", m.samples)),
     "scannet": row(drive, "cameras, categories, centres, depths, ids, photographs",
         test_rgbd_sequences.test_scannet_points_lie_on_the_scene,
-        test_rgbd_sequences.test_scannet_labels_are_nyu40_of_instances,
-        test_rgbd_sequences.test_scannet_scans_are_listed_by_split),
+        test_rgbd_sequences.test_scannet_labels_are_nyu40_of_instances_in_scans_listed_by_split),
     "semantickitti": row(drive, "categories, points, times",
-        test_semantickitti.test_semantic_sequences_are_views_with_poses_of_the_drive,
         test_semantickitti.test_semantic_classes_of_things_that_move,
-        test_semantickitti.test_semantic_points_of_what_stands_stay_in_the_world),
+        test_semantickitti
+        .test_semantic_sequences_have_poses_of_the_drive_and_points_that_stay_in_the_world),
     "solo": row(street, "boxes, cameras, masks, solids", solo),
-    "tables": row(scans, "measurements", test_tables.test_csv_holds_every_digit_that_matters),
+    "tables": row(scans, "measurements",
+        test_tables.test_csv_holds_every_digit_that_counts_by_sequence),
     "tfrecord": row(few, "boxes, categories, masks", labels, masks="png"),
     "tum_rgbd": row(drive, "cameras, centres, depths, photographs, times",
-        test_rgbd_sequences.test_tum_points_lie_on_the_scene,
-        test_rgbd_sequences.test_tum_lists_every_image),
+        test_rgbd_sequences.test_tum_points_lie_on_the_scene_and_are_listed),
     "voc": row(few, "boxes, categories, masks", labels),
     "webdataset": row(scans, "boxes, categories, masks, photographs, points",
         labels, lambda m: test_webdataset.faults(m.folder / "train", m.world)),
@@ -409,9 +389,7 @@ def make(world: Any) -> Callable[..., Made]:
 
 
 @pytest.mark.parametrize("kind", sampled(ROWS, 2))
-def test_unchanged_samples_pass_their_tests(
-    kind: str, make: Callable[..., Made], tmp_path: Path
-) -> None:
+def test_unchanged_samples_pass(kind: str, make: Callable[..., Made], tmp_path: Path) -> None:
     """A failure below has no other cause than the change."""
     run_tests(make(kind, tmp_path))
 
@@ -421,7 +399,6 @@ def test_every_change_is_seen(
     kind: str, change: str, make: Callable[..., Made], tmp_path: Path
 ) -> None:
     made = make(kind, tmp_path, CHANGES[change])
-
     with pytest.raises(AssertionError):
         run_tests(made)
 

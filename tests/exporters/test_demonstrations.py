@@ -23,15 +23,10 @@ from tests.randomizers.doubles import two_link_arm
 
 INSTRUCTION = "Put the crate on the mat."
 EPISODE = Episode(
-    False,
-    "slip",
-    (Span("pick", 0.0, 0.2), Span("place", 0.2, 0.4)),
-    (Span("crate/0", 0.1, 0.3),),
-    (
-        ContactSpan("arm/finger + crate/0", 0.1, 0.3, 0.1, (1.5, 2.5), ((0.1, 0.2, 0.3),) * 2),
-        ContactSpan("crate/0 + table", 0.2, 0.3, 0.1, (9.81,), ((0.0, 0.5, 0.75),)),
-    ),
-)
+    False, "slip", (Span("pick", 0.0, 0.2), Span("place", 0.2, 0.4)), (Span("crate/0", 0.1, 0.3),),
+    (ContactSpan("arm/finger + crate/0", 0.1, 0.3, 0.1, (1.5, 2.5), ((0.1, 0.2, 0.3),) * 2),
+     ContactSpan("crate/0 + table", 0.2, 0.3, 0.1, (9.81,), ((0.0, 0.5, 0.75),))),
+)  # fmt: skip
 
 
 def demonstrated(world: Any) -> Any:
@@ -61,7 +56,6 @@ def test_lerobot_has_what_the_arm_does_each_step(world: Any, samples: Any, tmp_p
     rows = pyarrow.parquet.read_table(folder / "data/chunk-000/file-000.parquet").to_pylist()
     info = json.loads((folder / "meta/info.json").read_text())
     tasks = pyarrow.parquet.read_table(folder / "meta/tasks.parquet")
-
     assert tasks["__index_level_0__"].to_pylist() == [INSTRUCTION]
     assert [row["annotation.phase"] for row in rows] == ["pick", "pick", "place", "place"]
     assert [row["annotation.held"] for row in rows] == ["", "crate/0", "crate/0", ""]
@@ -114,7 +108,6 @@ def assert_written(folder: Path, samples: Any) -> None:
 def test_rlds_has_an_episode_per_record(world: Any, samples: Any, tmp_path: Path) -> None:
     """Of the lengths that its description states."""
     folder = world.export(Rlds(), drive_info(world), samples, tmp_path) / "train/toys_arm"
-
     assert_written(folder, samples)
 
 
@@ -127,10 +120,8 @@ def test_rlds_rewards_the_last_step_of_a_success(world: Any, samples: Any, tmp_p
     ]  # fmt: skip
     folder = world.export(Rlds(), drive_info(world), done, tmp_path) / "train/toys_arm"
     example = read_episode(folder)
-
     assert values(example, "steps/reward") == [0.0, 0.0, 0.0, 1.0]
     assert values(example, "steps/is_terminal") == [0, 0, 0, 1]
-
     # Steps are even: a sample that does not exist ends the episode, before its success.
     cut = world.export(Rlds(), drive_info(world), done[:2] + done[3:], tmp_path / "cut")
     records = tfrecord_iterator(str(next((cut / "train/toys_arm").glob("*.tfrecord"))))
@@ -139,19 +130,16 @@ def test_rlds_rewards_the_last_step_of_a_success(world: Any, samples: Any, tmp_p
     assert [values(part, "steps/reward") for part in parts] == [[0.0, 0.0], [1.0]]
 
 
-def test_the_hand_of_a_step_is_that_of_its_joints(samples: Any) -> None:
+def test_the_hand_of_a_step_is_that_of_its_joints_and_without_a_task_there_is_none(
+    samples: Any, world: Any
+) -> None:
     """Shoulder and elbow at 0: the hand stands upright over the base, 0.3 + 0.3 + 0.35 m up."""
     arm = replace(samples[0].scene.articulations[0], joint_track=None)
     arm = replace(arm, joint_positions=(0.0, 0.0, 0.02, 0.02))
-
     step = demonstration_step(arm, two_link_arm(), 5.0, 0.1)
-
     assert step is not None
     assert step.T_base_grasp == SE3((0.0, 0.0, 0.95))
     assert (step.opening, step.opening_action) == (0.5, 0.5)
     assert step.phase == "place"
-
-
-def test_an_arm_that_demonstrates_nothing_has_no_step(world: Any) -> None:
     (arm,) = world.reach()[0].scene.articulations
     assert demonstration_step(arm, two_link_arm(), 0.0, 0.1) is None

@@ -25,25 +25,17 @@ def parse_dota(path: Path) -> list[dict[str, Any]]:
     return objects
 
 
-@pytest.fixture
-def folder(world: Any, tmp_path: Path) -> Path:
-    exported: Path = world.export(Dota(), world.info(7), world.samples, tmp_path)
-    return exported
+def assert_truth(world: Any, folder: Path, below: float) -> None:
+    """Corners within a tenth of a pixel, and difficult if a share of them is hidden.
 
-
-def test_every_image_has_a_label_file_of_its_name(world: Any, folder: Path) -> None:
-    """Also one without objects; each file begins with source and resolution."""
+    Every image has a label file of its name, which begins with source and resolution.
+    """
     for sample in world.samples:
         stem = f"{sample.index:09d}_color"
         label = folder / sample.split / f"labelTxt/{stem}.txt"
         assert (folder / sample.split / f"images/{stem}.png").exists()
         assert label.read_text("utf-8").splitlines()[:2] == ["imagesource:gen-data", "gsd:null"]
-
-
-def assert_truth(world: Any, folder: Path, below: float) -> None:
-    """Corners within a tenth of a pixel, and difficult if a share of them is hidden."""
-    for sample in world.samples:
-        listed = parse_dota(folder / sample.split / f"labelTxt/{sample.index:09d}_color.txt")
+        listed = parse_dota(label)
         truth = [t for t in sample.truth["color"].objects if t.box is not None]
         assert len(listed) == len(truth)
         for row, thing in zip(listed, truth, strict=True):
@@ -57,7 +49,6 @@ def assert_truth(world: Any, folder: Path, below: float) -> None:
 def test_objects_are_those_of_the_truth(world: Any, tmp_path: Path, below: float) -> None:
     """Some objects of the world are difficult at the larger limit, some are not."""
     folder = world.export(Dota(difficult_below=below), world.info(7), world.samples, tmp_path)
-
     assert_truth(world, folder, below)
     shares = [t.visible_fraction for s in world.samples for t in s.truth["color"].objects]
     assert min(shares) < 0.95 <= max(shares)
@@ -69,6 +60,5 @@ def test_spaces_are_left_out(world: Any, tmp_path: Path) -> None:
     bus = replace(car, instance=replace(car.instance, category="school bus"))
     sample = world.with_objects(world.samples[0], lambda _: (bus,))
     folder = world.export(Dota(), world.info(1), [sample], tmp_path)
-
     (row,) = parse_dota(folder / "train/labelTxt/000000000_color.txt")
     assert row["name"] == "school-bus"

@@ -44,8 +44,18 @@ def exporter(request: pytest.FixtureRequest) -> Any:
     return TABLE.load(request.param)()
 
 
-def test_it_needs_only_annotators_that_exist(exporter: Any) -> None:
-    assert exporter.needs <= set(annotations.TABLE)
+def test_no_image_is_stored_twice_and_texts_are_utf8_with_lf(exporter: Any, written: Path) -> None:
+    """Files of the data set with the bytes of a file of the shards are links to it."""
+    assert exporter.needs <= set(annotations.TABLE), "annotators that exist"
+    places: dict[bytes, set[int]] = {}
+    for path in written.glob("shards/**/*.[pj][np]g"):
+        places.setdefault(path.read_bytes(), set()).add(path.stat().st_ino)
+    images = [p for p in (written / "dataset").rglob("*.[pj][np]g") if p.read_bytes() in places]
+    assert all(path.stat().st_ino in places[path.read_bytes()] for path in images)
+    assert bool(images) == (exporter.type not in OWN_IMAGES)
+    for name, data in files(written / "dataset").items():
+        if name.endswith((".json", ".txt")):
+            assert b"\r" not in data.decode("utf-8").encode()
 
 
 @pytest.fixture(scope="module")
@@ -56,14 +66,17 @@ def written(exporter: Any, world: Any, tmp_path_factory: pytest.TempPathFactory)
     return folder
 
 
-def test_shards_come_in_any_order(exporter: Any, world: Any, written: Path, tmp_path: Path) -> None:
+def test_shards_come_in_any_order_and_their_names_depend_on_indices_only(
+    exporter: Any, world: Any, written: Path, tmp_path: Path
+) -> None:
+    """A shard written alone equals the same shard of the whole data set."""
     info, samples = given(exporter, world)
-
     backwards = world.export(exporter, info, samples, tmp_path, backwards=True)
-
     forwards = files(written / "dataset")
     assert forwards == files(backwards)
     assert len(forwards) >= (2 if exporter.type in PACKED else len(samples))
+    world.export(exporter, info, samples[3:6], tmp_path / "alone")
+    assert files(written / "shards/000001") == files(tmp_path / "alone/shards/000000")
 
 
 @pytest.mark.parametrize("size", [1, 7])
@@ -75,75 +88,29 @@ def test_the_size_of_shards_leaves_no_trace(
     Also if the runner keeps arrays of images and points that are written already.
     """
     info, samples = given(exporter, world)
-
     other = world.export(exporter, info, samples, tmp_path, shard_size=size, keep_arrays=size == 7)
-
     assert files(other) == files(written / "dataset")
 
 
-def test_file_names_of_a_shard_depend_on_indices_only(
-    exporter: Any, world: Any, written: Path, tmp_path: Path
-) -> None:
-    """A shard written alone equals the same shard of the whole data set."""
-    info, samples = given(exporter, world)
-
-    world.export(exporter, info, samples[3:6], tmp_path)
-
-    assert files(written / "shards/000001") == files(tmp_path / "shards/000000")
-
-
-def test_only_formats_with_a_mark_have_ignored_objects(
+def test_only_formats_with_a_mark_have_ignored_objects_with_or_without_a_class(
     exporter: Any, world: Any, tmp_path: Path
 ) -> None:
     """All others write the same bytes as without the object."""
     info, samples = given(exporter, world)
     ignored = world.ignoring(samples[0])
     missing = world.with_objects(samples[0], lambda objects: objects[1:])
-
     marked, left_out = (
         files(world.export(exporter, info, [sample], tmp_path / str(number)))
         for number, sample in enumerate((ignored, missing))
     )
-
     # Texts of the data set are the same in both cases.
     marks = (EVERY_CLASS | NO_CLASS | TRACKS) - {"language"}
     assert (marked != left_out) == (exporter.type in marks)
-
-
-def test_no_image_is_stored_twice(exporter: Any, written: Path) -> None:
-    """Files of the data set with the bytes of a file of the shards are links to it."""
-    places: dict[bytes, set[int]] = {}
-    for path in written.glob("shards/**/*.[pj][np]g"):
-        places.setdefault(path.read_bytes(), set()).add(path.stat().st_ino)
-    images = [p for p in (written / "dataset").rglob("*.[pj][np]g") if p.read_bytes() in places]
-
-    assert all(path.stat().st_ino in places[path.read_bytes()] for path in images)
-    assert bool(images) == (exporter.type not in OWN_IMAGES)
-
-
-def test_text_files_are_utf8_with_unix_line_ends(written: Path) -> None:
-    for name, data in files(written / "dataset").items():
-        if name.endswith((".json", ".txt")):
-            assert b"\r" not in data.decode("utf-8").encode()
-
-
-def test_only_formats_with_a_mark_for_it_have_ignored_objects_without_a_class(
-    exporter: Any, world: Any, tmp_path: Path
-) -> None:
-    """All others leave them out: their readers would take class 0 for the first or last class."""
-    info, samples = given(exporter, world)
+    # All others leave them out: their readers would take class 0 for the first or last class.
     classes = {name: (name,) for name in info.categories[1:]}
-
+    maps = [LabelMap(classes=classes, others=others) for others in ("drop", "ignore")]
     dropped, ignored = (
-        files(
-            world.export(
-                MappedExporter(exporter, LabelMap(classes=classes, others=others)),
-                info,
-                samples[:1],
-                tmp_path / others,
-            )
-        )
-        for others in ("drop", "ignore")
+        files(world.export(MappedExporter(exporter, m), info, samples[:1], tmp_path / m.others))
+        for m in maps
     )
-
     assert (dropped != ignored) == (exporter.type in EVERY_CLASS | NO_CLASS)

@@ -40,28 +40,17 @@ def two_cameras(world: Any) -> tuple[Any, list[Any]]:
             sample.capture, readings={"color": sample.capture.readings["color"], "wide": wide}
         )
         scene = replace(sample.scene, cameras=(*sample.scene.cameras, wide.camera))
-        samples.append(
-            replace(
-                sample,
-                capture=capture,
-                scene=scene,
-                truth={**sample.truth, "wide": truth},
-                cameras=("color", "wide"),
-            )
-        )
+        changes = {"truth": {**sample.truth, "wide": truth}, "cameras": ("color", "wide")}
+        samples.append(replace(sample, capture=capture, scene=scene, **changes))
     info = world.info(len(samples), ("color", "wide"), ("top",), lenses={"wide": "kannala_brandt"})
     return info, world.with_bodies(samples)
 
 
-def test_without_fields_an_exporter_is_what_it_was() -> None:
-    """No view: shards of older configurations keep their bytes."""
-    own = TABLE.load("coco")()
-    assert view_of(own, own, Thresholds()) is own
-
-
 @pytest.mark.parametrize("kind", TABLE.names())
 def test_every_exporter_takes_cameras_sensors_and_rectify(kind: str) -> None:
-    """The fields are the base's, documented there."""
+    """The fields are the base's, documented there; without them shards keep their bytes."""
+    own = TABLE.load(kind)()
+    assert view_of(own, own, Thresholds()) is own
     view = viewed(kind, cameras=["front_*"], sensors=["top"], rectify={"hfov_deg": 90})
     assert isinstance(view, ExporterView)
     assert (view.type, view.cameras, view.sensors) == (kind, ("front_*",), ("top",))
@@ -75,7 +64,6 @@ def test_only_the_listed_cameras_are_exported(world: Any, tmp_path: Path, camera
     info, samples = two_cameras(world)
     whole = world.export(viewed("coco", sensors=["top"]), info, samples, tmp_path / "whole")
     some = world.export(viewed("coco", cameras=cameras), info, samples, tmp_path / "some")
-
     everything = json.loads((whole / "annotations/instances_train.json").read_text())
     listed = json.loads((some / "annotations/instances_train.json").read_text())
     kept = [i for i in everything["images"] if i["sensor"] == "color"]
@@ -95,16 +83,23 @@ def test_a_bent_camera_that_is_not_listed_blocks_no_format(world: Any, kind: str
     with pytest.raises(ConfigError, match="rectify: true") as error:
         refused.check(info)
     assert "cameras:" in str(error.value)
-
     viewed(kind, cameras=["color"]).check(info)
 
 
-def test_a_name_of_no_sensor_is_refused_with_the_nearest(world: Any) -> None:
+def test_names_of_no_sensor_are_refused_and_disparities_not_rectified(world: Any) -> None:
+    """They are displacements in the original image: formats that need them say so."""
     info, _ = two_cameras(world)
     with pytest.raises(ConfigError, match=r"exporter 'coco': cameras: 'colour' .*'color'\?"):
         viewed("coco", cameras=["colour"]).check(info)
     with pytest.raises(ConfigError, match=r"exporter 'coco': sensors: 'color' fits no sensor"):
         viewed("coco", sensors=["color"]).check(info)
+    channels = (Channel.RGB, Channel.DISPARITY, Channel.FLOW_FORWARD)
+    info = world.info(2, media={"color": channels}, lenses={"color": "brown_conrady"})
+    assert viewed("coco", rectify=True).info(info).media == {"color": (Channel.RGB,)}
+    # A question about the bent image may have another answer in the rectified one.
+    info = world.info(2, lenses={"color": "brown_conrady"})
+    with pytest.raises(ConfigError, match=r"exporter 'language': rectify: its texts"):
+        viewed("language", rectify=True).check(info)
 
 
 def test_scanners_can_be_left_out(world: Any, tmp_path: Path) -> None:
@@ -122,17 +117,13 @@ def test_scanners_can_be_left_out(world: Any, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("model", sorted(LENSES))
 @pytest.mark.parametrize("kind", sampled([*PINHOLES_ONLY, "coco", "hdf5", "yolo"], 4))
-def test_pinhole_formats_take_rectified_images(
-    world: Any, tmp_path: Path, kind: str, model: Any
-) -> None:
+def test_pinhole_formats_rectify_images(world: Any, tmp_path: Path, kind: str, model: Any) -> None:
     """In every format the photographs are OpenCV's, and the bent ones are nowhere."""
     samples = world.with_bodies(bent_samples(world, model))
     info = world.info(len(samples), lidars=("top",), lenses={"color": model})
     exporter = viewed(kind, rectify=True)
     exporter.check(info)
-
     folder = world.export(exporter, info, samples, tmp_path)
-
     bent, other = cv2.imread, cv2.remap
     view = exporter._camera(samples[0].scene.cameras[0])
     maps = opencv_maps(LENSES[model], view.intrinsics)
@@ -154,7 +145,6 @@ def test_the_matrix_of_bop_is_that_of_the_rectified_image(world: Any, tmp_path: 
     info = world.info(1, lenses={"color": "brown_conrady"})
     exporter = viewed("bop", rectify=True)
     folder = world.export(exporter, info, samples, tmp_path)
-
     (scene,) = {p.parent for p in folder.rglob("scene_gt.json")}
     camera = json.loads((scene / "scene_camera.json").read_text())
     ((number, shown),) = json.loads((scene / "scene_gt.json").read_text()).items()
@@ -179,7 +169,6 @@ def test_exporters_of_equal_settings_share_rectified_images(world: Any, tmp_path
     before = {p: p.stat().st_mtime_ns for p in shard.rglob("_rectified/color/**/*.png")}
     viewed("solo", rectify=True).write_shard(info, samples, shard)
     viewed("yolo", rectify={"hfov_deg": 50}).write_shard(info, samples, shard)
-
     assert before
     assert {p: p.stat().st_mtime_ns for p in before} == before
     assert sorted(p.name for p in shard.glob("_rectified*")) == ["_rectified", "_rectified_hfov_50"]
@@ -196,17 +185,3 @@ def test_a_lens_that_sees_too_much_is_refused_before_anything_is_generated() -> 
         viewed("kitti", rectify=True).check_scene(scene)
     viewed("kitti", rectify={"hfov_deg": 90}).check_scene(scene)
     viewed("kitti", rectify=True, cameras=["front"]).check_scene(scene)
-
-
-def test_disparities_and_flow_are_not_rectified(world: Any) -> None:
-    """They are displacements in the original image: formats that need them say so."""
-    channels = (Channel.RGB, Channel.DISPARITY, Channel.FLOW_FORWARD)
-    info = world.info(2, media={"color": channels}, lenses={"color": "brown_conrady"})
-    assert viewed("coco", rectify=True).info(info).media == {"color": (Channel.RGB,)}
-
-
-def test_texts_about_images_are_not_rectified(world: Any) -> None:
-    """A question about the bent image may have another answer in the rectified one."""
-    info = world.info(2, lenses={"color": "brown_conrady"})
-    with pytest.raises(ConfigError, match=r"exporter 'language': rectify: its texts"):
-        viewed("language", rectify=True).check(info)

@@ -17,11 +17,10 @@ from tests.exporters.label_readers import parquet
 dataset = street_in(HuggingFace(rows_per_file=2))
 
 
-def test_parquet_files_embed_images(dataset: Path, world: Any) -> None:
+def test_parquet_files_embed_images_and_name_and_card_count_them(dataset: Path, world: Any) -> None:
     """Read by pyarrow alone: the bytes are those of the shards' PNG files."""
     rows = [r for p in sorted((dataset / "data").glob("train-*")) for r in parquet(p).to_pylist()]
     train = [s for s in world.samples if s.split == "train"]
-
     assert [row["image_id"] for row in rows] == [s.image_id("color") for s in train]
     for row, truth in zip(rows, train, strict=True):
         assert row["image"]["path"] == f"{truth.index:09d}_color.png"
@@ -29,23 +28,13 @@ def test_parquet_files_embed_images(dataset: Path, world: Any) -> None:
         for column, channel in (("image", "rgb"), ("depth", "depth")):
             stored = (shard / channel / f"{truth.index:09d}.png").read_bytes()
             assert row[column]["bytes"] == stored
-
-
-def test_files_are_numbered_and_counted(dataset: Path) -> None:
-    """Names have the number of files of their split; no other file is there."""
+    # Names have the number of files of their split; no other file is there.
     names = sorted(p.name for p in (dataset / "data").iterdir())
-
-    assert names == [
-        *(f"train-{k:05d}-of-00003.parquet" for k in range(3)),
-        "val-00000-of-00001.parquet",
-    ]
+    assert names == [*(f"train-{k:05d}-of-00003.parquet" for k in range(3)),
+                     "val-00000-of-00001.parquet"]  # fmt: skip
     assert sorted(p.name for p in dataset.iterdir()) == ["README.md", "data"]
-
-
-def test_the_card_has_the_splits_with_sizes(dataset: Path) -> None:
-    """Without num_bytes, datasets ignores a split's numbers."""
+    # Without num_bytes, datasets ignores a split's numbers.
     facts = card(dataset)
-
     assert facts["license"] == "other"
     (files,) = (config["data_files"] for config in facts["configs"])
     assert files == [{"split": s, "path": f"data/{s}-*"} for s in ("train", "val")]
@@ -64,31 +53,24 @@ def test_groups_are_bounded(world: Any, tmp_path: Path, monkeypatch: pytest.Monk
     monkeypatch.setattr(huggingface, "GROUP_BYTES", 1)
     folder = world.export(HuggingFace(), world.info(7), world.samples, tmp_path / "b")
     by_bytes = pyarrow.parquet.ParquetFile(folder / "data/train-00000-of-00001.parquet").metadata
-
     assert [by_rows.row_group(k).num_rows for k in range(by_rows.num_row_groups)] == [3, 2]
     assert by_bytes.num_row_groups == 5
 
 
-def test_flow_is_binary_and_missing_channels_are_null(world: Any, tmp_path: Path) -> None:
+def test_flow_is_binary_what_is_missing_null_and_ignored_crowds(world: Any, tmp_path: Path) -> None:
     """Pillow would decode flow to 8 bits; the right camera writes none."""
     info, samples = world.pairs()
-    folder = world.export(HuggingFace(), info, samples, tmp_path)
+    folder = world.export(HuggingFace(), info, samples, tmp_path / "pairs")
     table = parquet(folder / "data/train-00000-of-00001.parquet")
     rows = table.to_pylist()
-
     assert table.schema.field("flow_forward").type == pyarrow.binary()
     assert [row["sensor"] for row in rows] == ["left", "right"] * 4
     for row in rows:
         assert (row["flow_forward"] is not None) == (row["sensor"] == "left")
         assert row["image"]["bytes"].startswith(b"\x89PNG")
-
-
-def test_ignored_objects_are_crowds(world: Any, tmp_path: Path) -> None:
     ignored = world.ignoring(world.samples[0])
     folder = world.export(HuggingFace(), world.info(1), [ignored], tmp_path)
-
     (row,) = parquet(folder / "data/train-00000-of-00001.parquet").to_pylist()
-
     assert row["objects"]["iscrowd"] == [True] + [False] * (len(row["objects"]["id"]) - 1)
 
 

@@ -75,7 +75,5 @@ def test_it_is_ignored_in_every_class(kind: str, world: Any, tmp_path: Path) -> 
     exporter = MappedExporter(TABLE.load(kind)(), LabelMap(classes=classes, others="ignore"))
     things = (world.instance(1, "car", 9.0, 2.5, 0.0), world.instance(2, "crate", 8.0, -1.0, 0.0))
     sample = world.sample(0, things, [world.camera()])
-
     folder = world.export(exporter, world.info(1), [sample], tmp_path)
-
     assert sorted(READERS[kind](folder)) == [("box", False), ("box", True), ("walker", True)]

@@ -36,11 +36,8 @@ from gen_data.sensors.camera.rgb_encoding import RgbEncoding
 from tests.exporters.drives import drive_info
 from tests.exporters.label_readers import json_lines, records
 
-JPEG, WEBP, LOSSLESS = (
-    ImageEncoding("jpeg", 92),
-    ImageEncoding("webp", 92),
-    ImageEncoding("webp_lossless"),
-)
+JPEG, WEBP = (ImageEncoding(kind, 92) for kind in ("jpeg", "webp"))
+LOSSLESS = ImageEncoding("webp_lossless")
 ERROR_MAX = 4.0
 """Mean difference to the rendered image, of 255; other images differ by more than 20."""
 MAGIC = {".jpg": b"\xff\xd8\xff", ".webp": b"RIFF"}
@@ -81,30 +78,21 @@ def test_photographs_come_back(tmp_path: Path, encoding: ImageEncoding) -> None:
     assert encode_channel(Channel.RGB, image, 0.001, encoding) == path.read_bytes()
 
 
-def test_quality_changes_the_size() -> None:
+def test_quality_changes_the_size_and_formats_without_loss_have_none() -> None:
     """Of both formats with a loss; the best is larger than the worst."""
     image = photograph()
     for kind in ("jpeg", "webp"):
-        sizes = [
-            len(
-                encode_channel(
-                    Channel.RGB, image, 0.001, RgbEncoding(format=kind, quality=q).described()
-                )
-            )
-            for q in (10, 95)
-        ]
+        encodings = [RgbEncoding(format=kind, quality=q).described() for q in (10, 95)]
+        sizes = [len(encode_channel(Channel.RGB, image, 0.001, e)) for e in encodings]
         assert sizes[0] < 0.7 * sizes[1]
-
-
-def test_formats_without_loss_have_no_quality() -> None:
-    """The error names the formats that have one."""
+    # The error names the formats that have one.
     assert RgbEncoding().described() == PNG
     for kind in ("png", "webp_lossless"):
         with pytest.raises(ValueError, match="leave out quality, or use jpeg or webp"):
             RgbEncoding(format=kind, quality=90)
 
 
-def test_stored_images_are_read(
+def test_stored_images_are_read_and_other_formats_refuse_them_with_a_remedy(
     tmp_path: Path, info: Any, world: Any, encoding: ImageEncoding
 ) -> None:
     """Photographs have the encoding's ending, labels stay PNG; both are read again."""
@@ -117,6 +105,10 @@ def test_stored_images_are_read(
     np.testing.assert_array_equal(stored[Channel.INSTANCE], made.channels[Channel.INSTANCE])
     error = np.abs(stored[Channel.RGB].astype(int) - made.channels[Channel.RGB])
     assert error.mean() <= (0 if encoding is LOSSLESS else 4)
+    # KITTI's images are PNG; so are those of formats that say nothing.
+    with pytest.raises(ConfigError, match=f"'color' writes {encoding.format} files.*rgb_encoding"):
+        check_image_formats(Kitti(), info)
+    check_image_formats(Coco(), info)
 
 
 def test_voc_encodes_jpeg_only_from_other_formats(
@@ -131,13 +123,6 @@ def test_voc_encodes_jpeg_only_from_other_formats(
     own = list(tmp_path.glob("shards/*/voc/*.jpg"))
     assert linked == {True}
     assert len(own) == (0 if encoding is JPEG else 7)
-
-
-def test_other_formats_refuse_them_with_a_remedy(info: Any, encoding: ImageEncoding) -> None:
-    """KITTI's images are PNG; so are those of formats that say nothing."""
-    with pytest.raises(ConfigError, match=f"'color' writes {encoding.format} files.*rgb_encoding"):
-        check_image_formats(Kitti(), info)
-    check_image_formats(Coco(), info)
 
 
 Found = tuple[bytes, str]
@@ -166,42 +151,12 @@ def in_mcap(folder: Path) -> Found:
         return bytes(message.data), message.format
 
 
-def in_cvat(folder: Path) -> Found:
-    image = ElementTree.parse(folder / "train/annotations.xml").find("image")
-    assert image is not None
-    return file_of(folder / "train/images" / image.attrib["name"])
-
-
-def in_label_studio(folder: Path) -> Found:
-    url = json.loads((folder / "train/tasks.json").read_text())[0]["data"]["image"]
-    return file_of(folder / unquote(url).partition("=label_studio/")[2])
-
-
-def in_panoptic(folder: Path) -> Found:
-    """By the entry of the image; segments stay PNG."""
-    data = json.loads((folder / "annotations/panoptic_train.json").read_text())
-    name = data["annotations"][0]["file_name"]
-    assert (folder / "annotations/panoptic_train" / name).read_bytes().startswith(b"\x89PNG")
-    return file_of(folder / "train" / data["images"][0]["file_name"])
-
-
 def in_solo(folder: Path) -> Found:
     frame = json.loads((folder / "train/sequence.0/step0.frame_data.json").read_text())
     capture = frame["captures"][0]
     path = folder / "train/sequence.0" / capture["filename"]
     assert path.suffix == ".jpg"
     return path.read_bytes(), capture["imageFormat"]
-
-
-def in_clips(folder: Path) -> Found:
-    return file_of(
-        folder / "train" / json_lines(folder / "train/metadata.jsonl")[0]["image_file_name"]
-    )
-
-
-def in_bop(folder: Path) -> Found:
-    """By number, as bop_toolkit looks for either ending."""
-    return file_of(next((folder / "train/000000/rgb").glob("000000.*")))
 
 
 def in_recording(folder: Path) -> Found:
@@ -238,57 +193,57 @@ def in_records(folder: Path) -> Found:
     return data, kind.decode()
 
 
-def in_coco(folder: Path) -> Found:
-    """By the entry of the image; depth stays PNG."""
-    (image,) = json.loads((folder / "annotations/instances_train.json").read_bytes())["images"]
-    assert (folder / image["files"]["depth"]).read_bytes().startswith(b"\x89PNG")
-    return file_of(folder / "train" / image["file_name"])
+def document(folder: Path, name: str) -> Any:
+    return json.loads((folder / name).read_text())
 
 
-def in_yolo(folder: Path) -> Found:
-    (path,) = (folder / "detect/images/train").iterdir()
-    return file_of(path)
+def named_in_xml(path: Path, name: str) -> str:
+    """A text below the root of an XML file, or the attribute ``name`` of one."""
+    node = ElementTree.parse(path).find(name)
+    assert node is not None
+    return node.get("name") or str(node.text)
 
 
-def in_voc(folder: Path) -> Found:
-    root = folder / "VOCdevkit/VOC2012"
-    (path,) = (root / "Annotations").iterdir()
-    return file_of(root / "JPEGImages" / str(ElementTree.parse(path).findtext("filename")))
-
-
-READERS: dict[str, tuple[Callable[[Path], Found], dict[str, Any]]] = {
-    "bop": (in_bop, {}),
-    "coco": (in_coco, {}),
-    "coco_panoptic": (in_panoptic, {}),
-    "control_clips": (in_clips, {}),
-    "cvat": (in_cvat, {}),
-    "huggingface": (in_parquet, {}),
-    "label_studio": (in_label_studio, {}),
-    "mcap": (in_mcap, {}),
-    "rerun": (in_recording, {}),
-    "solo": (in_solo, {}),
-    "tfrecord": (in_records, {}),
-    "voc": (in_voc, {"images": "png"}),
-    "webdataset": (in_tar, {}),
-    "yolo": (in_yolo, {"tasks": ("detect",)}),
-}
-STATED = {
-    "mcap": {"jpeg": "jpeg", "webp": "webp"},
-    "rerun": {"jpeg": "image/jpeg"},
-    "solo": {"jpeg": "Jpg"},
-    "tfrecord": {"jpeg": "jpeg"},
-}
+COCO = "annotations/{}_train.json"
+PHOTOGRAPHS: dict[str, Callable[[Path], Path]] = {
+    # By number, as bop_toolkit looks for either ending.
+    "bop": lambda f: next((f / "train/000000/rgb").glob("000000.*")),
+    "coco": lambda f: (
+        f / "train" / document(f, COCO.format("instances"))["images"][0]["file_name"]
+    ),
+    "coco_panoptic": lambda f: (
+        f / "train" / document(f, COCO.format("panoptic"))["images"][0]["file_name"]
+    ),
+    "control_clips": lambda f: (
+        f / "train" / json_lines(f / "train/metadata.jsonl")[0]["image_file_name"]
+    ),
+    "cvat": lambda f: f / "train/images" / named_in_xml(f / "train/annotations.xml", "image"),
+    "label_studio": lambda f: f / unquote(
+        document(f, "train/tasks.json")[0]["data"]["image"]
+    ).partition("=label_studio/")[2],
+    "voc": lambda f: f / "VOCdevkit/VOC2012/JPEGImages" / named_in_xml(
+        next((f / "VOCdevkit/VOC2012/Annotations").iterdir()), "filename"
+    ),
+    "yolo": lambda f: next((f / "detect/images/train").iterdir()),
+}  # fmt: skip
+"""The file that the first entry of a data set names."""
+READERS: dict[str, Callable[[Path], Found]] = {
+    "huggingface": in_parquet, "mcap": in_mcap, "rerun": in_recording, "solo": in_solo,
+    "tfrecord": in_records, "webdataset": in_tar,
+    **{kind: lambda f, path=path: file_of(path(f)) for kind, path in PHOTOGRAPHS.items()},
+}  # fmt: skip
+OPTIONS: dict[str, Any] = {"voc": {"images": "png"}, "yolo": {"tasks": ("detect",)}}
+STATED = {"mcap": {"jpeg": "jpeg", "webp": "webp"}, "rerun": {"jpeg": "image/jpeg"},
+          "solo": {"jpeg": "Jpg"}, "tfrecord": {"jpeg": "jpeg"}}  # fmt: skip
 """What a data set states, by format; others state the ending of the file."""
 
 
-@pytest.mark.parametrize("encoding", [JPEG, WEBP, LOSSLESS], ids=lambda e: e.format)
 @pytest.mark.parametrize("kind", READERS)
 def test_readers_find_photos(
     kind: str, encoding: ImageEncoding, world: Any, tmp_path: Path
 ) -> None:
-    """The first one, in the stated format; its pixels are those of the first sample."""
-    find, options = READERS[kind]
-    exporter = TABLE.load(kind)(**options)
+    """The first one, in the stated format, with the pixels of the first sample; labels are PNG."""
+    exporter = TABLE.load(kind)(**OPTIONS.get(kind, {}))
     info = encoded(world.info(1, lidars=("top",)), encoding)
     written = encoding.format.removesuffix("_lossless")
     if encoding.format not in exporter.image_formats:
@@ -296,13 +251,16 @@ def test_readers_find_photos(
             check_image_formats(exporter, info)
         return
     check_image_formats(exporter, info)
-    data, found = find(world.export(exporter, info, world.with_bodies(world.samples[:1]), tmp_path))
+    folder = world.export(exporter, info, world.with_bodies(world.samples[:1]), tmp_path)
+    data, found = READERS[kind](folder)
     assert found == STATED.get(kind, {}).get(written, encoding.suffix)
     image = Image.open(io.BytesIO(data))
     assert image.format == written.upper()
     assert is_near(image, world.samples[0].capture.readings["color"].channels[Channel.RGB])
     shard = tmp_path / f"shards/000000/color/rgb/000000000{encoding.suffix}"
     assert shard.read_bytes() == data
+    labels = [path.read_bytes()[:4] for path in folder.rglob("*.png")]
+    assert set(labels) == {b"\x89PNG"} if kind.startswith("coco") else {*labels} <= {b"\x89PNG"}
 
 
 def is_near(image: Any, expected: Any) -> bool:

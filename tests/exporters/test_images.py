@@ -6,6 +6,7 @@ import struct
 import zlib
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -51,14 +52,24 @@ def _predicted(kind: int, a: int, b: int, c: int) -> int:
     return (0, a, b, (a + b) // 2, paeth)[kind]
 
 
-def test_rgb_keeps_its_order_of_colours_and_every_value() -> None:
+RGB = np.random.default_rng(0).integers(0, 256, (H, W, 3), dtype=np.uint8)
+DEPTH_M = np.array([[1.0, 0.25, 0.75, 1.25], [np.inf, 32_767.5, 32_768.0, 0.0]], np.float32)
+HALVES = [[2, 0, 2, 2], [0, 65_535, 0, 0]]
+"""Depth in units of 0.5 m, half to even; 0 where there is nothing and 16 bits do not reach."""
+NORMALS = np.array([[[-1, 0, 1], [1, -1, 0], [0, 0, 0]]], np.float32)
+
+
+@pytest.mark.parametrize(
+    ("channel", "values", "mode", "expected"),
+    [(Channel.RGB, RGB, "RGB", RGB.tolist()), (Channel.Z_DEPTH, DEPTH_M, "I;16", HALVES),
+     (Channel.RANGE, DEPTH_M, "I;16", HALVES),
+     (Channel.NORMALS, NORMALS, "RGB", [[[0, 128, 255], [255, 0, 128], [128, 128, 128]]])],
+    ids=["colours in order", "depth", "range", "normals, and 128 for none"],
+)  # fmt: skip
+def test_readers_find_every_value(channel: Channel, values: Any, mode: str, expected: Any) -> None:
     """A red image is red for every reader; OpenCV's BGR stays inside."""
-    rgb = np.random.default_rng(0).integers(0, 256, (H, W, 3), dtype=np.uint8)
-
-    mode, pixels = read(encode_channel(Channel.RGB, rgb, 1.0))
-
-    assert mode == "RGB"
-    np.testing.assert_array_equal(pixels, rgb)
+    found, pixels = read(encode_channel(channel, values, 0.5))
+    assert (found, pixels.tolist()) == (mode, expected)
 
 
 @pytest.mark.parametrize("channel", [Channel.INSTANCE, Channel.PART, Channel.CATEGORY])
@@ -66,111 +77,62 @@ def test_ids_are_16_bit_grey_up_to_the_largest(channel: Channel) -> None:
     """Always 16 bits, also where all ids are small, so that readers need one rule."""
     ids = np.random.default_rng(1).integers(0, 65_536, (H, W), dtype=np.uint16)
     ids[0, 0], ids[0, 1] = 0, 65_535
-
     mode, pixels = read(encode_channel(channel, ids, 1.0))
     small_mode, _ = read(encode_channel(channel, ids % 3, 1.0))
-
     assert mode == small_mode == "I;16"
     np.testing.assert_array_equal(pixels, ids)
-
-
-@pytest.mark.parametrize("channel", [Channel.Z_DEPTH, Channel.RANGE])
-def test_depth_is_written_in_units_of_the_scale(channel: Channel) -> None:
-    """Half to even; 0 where there is nothing and where 16 bits do not reach."""
-    depth_m = np.array([[1.0, 0.25, 0.75, 1.25], [np.inf, 32_767.5, 32_768.0, 0.0]], np.float32)
-
-    mode, pixels = read(encode_channel(channel, depth_m, 0.5))
-
-    assert mode == "I;16"
-    assert pixels.tolist() == [[2, 0, 2, 2], [0, 65_535, 0, 0]]
 
 
 def test_depth_survives_the_file_to_half_a_unit(tmp_path: Path) -> None:
     """0.1 mm units: never more than 0.05 mm away, and equal to what the pure function says."""
     depth_m = np.random.default_rng(2).uniform(0.3, 6.5, (H, W)).astype(np.float32)
-
     _, units = read(encode_channel(Channel.Z_DEPTH, depth_m, 0.0001))
-
     assert np.abs(units * 0.0001 - depth_m).max() <= 0.00005 + 1e-9
     np.testing.assert_array_equal(units, depth_units(depth_m, 0.0001))
 
 
-@pytest.mark.parametrize("wrong", [-0.1, np.nan])
-def test_a_depth_that_is_no_distance_is_an_error(wrong: float) -> None:
+def test_wrong_depths_are_errors_and_object_coordinates_16_bit_colour() -> None:
     """16-bit integers would wrap a negative depth to a far one."""
-    with pytest.raises(SampleError, match="negative number or NaN"):
-        encode_channel(Channel.Z_DEPTH, np.array([[1.0, wrong]], np.float32), 0.001)
-
-
-def test_normals_map_minus_one_to_one_onto_a_byte() -> None:
-    """Red is the camera's x; nothing is the middle grey 128."""
-    normals = np.array([[[-1, 0, 1], [1, -1, 0], [0, 0, 0]]], np.float32)
-
-    mode, pixels = read(encode_channel(Channel.NORMALS, normals, 1.0))
-
-    assert mode == "RGB"
-    assert pixels.tolist() == [[[0, 128, 255], [255, 0, 128], [128, 128, 128]]]
-
-
-def test_object_coordinates_are_16_bit_colour() -> None:
-    """1 is 65535, also a rounding above 1; every value comes back through the PNG specification."""
+    for wrong in (-0.1, np.nan):
+        with pytest.raises(SampleError, match="negative number or NaN"):
+            encode_channel(Channel.Z_DEPTH, np.array([[1.0, wrong]], np.float32), 0.001)
+    with pytest.raises(ConfigError, match=r"'amodal'.*rgb, depth, range, instance"):
+        encode_channel(Channel.AMODAL, np.zeros((2, 2), bool), 1.0)
+    # 1 is 65535, also a rounding above 1; every value comes back through the PNG specification.
     coordinates = np.random.default_rng(3).random((H, W, 3)).astype(np.float32)
     coordinates[0, :3] = [[0.0] * 3, [1.0] * 3, [1.0001, -0.0001, 0.5]]
-
     pixels = read_rgb16(encode_channel(Channel.OBJECT_COORDINATES, coordinates, 1.0))
-
     assert pixels[0, :3].tolist() == [[0, 0, 0], [65_535] * 3, [65_535, 0, 32_768]]
     inside = np.clip(coordinates, 0, 1)
     assert np.abs(pixels / 65_535 - inside).max() <= 0.5 / 65_535 + 1e-7
 
 
-def test_silhouettes_cannot_be_written_as_an_image() -> None:
-    with pytest.raises(ConfigError, match=r"'amodal'.*rgb, depth, range, instance"):
-        encode_channel(Channel.AMODAL, np.zeros((2, 2), bool), 1.0)
-
-
 def test_every_channel_of_the_media_is_written_to_its_path(world: Any, tmp_path: Path) -> None:
     info, sample = world.info(7, devices={}), world.samples[4]
-
     write_media(info, sample, tmp_path)
-
     found = sorted(p for p in tmp_path.rglob("*") if p.is_file())
     assert found == sorted(media_path(tmp_path, "color", c, 4) for c in info.media["color"])
     _, ids = read(media_path(tmp_path, "color", Channel.INSTANCE, 4).read_bytes())
     np.testing.assert_array_equal(ids, sample.capture.readings["color"].channels[Channel.INSTANCE])
 
 
-def test_a_link_shares_the_file_where_links_are_possible(tmp_path: Path) -> None:
-    """No second copy of the images is stored."""
-    (tmp_path / "a").write_bytes(b"data")
-
-    link_or_copy(tmp_path / "a", tmp_path / "new/b")
-
-    assert (tmp_path / "new/b").samefile(tmp_path / "a")
-
-
-def test_a_copy_is_made_without_links(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Another file system, FAT, or too many links."""
-
-    def refuse(*_: Any) -> None:
-        raise OSError(18, "Invalid cross-device link")
-
-    monkeypatch.setattr(os, "link", refuse)
-    (tmp_path / "a").write_bytes(b"data")
-
-    link_or_copy(tmp_path / "a", tmp_path / "b")
-
-    assert (tmp_path / "b").read_bytes() == b"data"
-    assert not (tmp_path / "b").samefile(tmp_path / "a")
+def test_files_are_linked_where_possible(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A copy is made otherwise; nothing is replaced, nor a missing source passed over."""
+    a, link, copy = tmp_path / "a", tmp_path / "new/b", tmp_path / "c"
+    a.write_bytes(b"data")
+    link_or_copy(a, link)
+    assert link.samefile(a)
+    # Another file system, FAT, or too many links.
+    refused = OSError(18, "Invalid cross-device link")
+    monkeypatch.setattr(os, "link", Mock(side_effect=refused))
+    link_or_copy(a, copy)
+    assert (copy.read_bytes(), copy.samefile(a)) == (b"data", False)
 
 
-def test_a_link_never_replaces_a_file(tmp_path: Path) -> None:
-    """Nor is a missing source passed over."""
+@pytest.mark.parametrize(("source", "error"), [("a", FileExistsError), ("none", FileNotFoundError)])
+def test_a_link_never_replaces_a_file(tmp_path: Path, source: str, error: Any) -> None:
     (tmp_path / "a").write_bytes(b"new")
     (tmp_path / "b").write_bytes(b"old")
-
-    with pytest.raises(FileExistsError):
-        link_or_copy(tmp_path / "a", tmp_path / "b")
-    with pytest.raises(FileNotFoundError):
-        link_or_copy(tmp_path / "none", tmp_path / "c")
+    with pytest.raises(error):
+        link_or_copy(tmp_path / source, tmp_path / ("b" if source == "a" else "c"))
     assert (tmp_path / "b").read_bytes() == b"old"

@@ -18,11 +18,10 @@ from gen_data.exporters.sequences import timestamp
 from tests.exporters.drives import DRIVE, calibration, drive_info, rigid, stems
 
 
-def test_a_raw_drive_has_a_file_of_every_sensor_per_step(exported: Any) -> None:
+def test_raw_files_hold_the_samples_of_their_frames(exported: Any, samples: Any) -> None:
     """Two drives of four frames, whatever the shards; ten digits."""
     folder = exported(KittiRaw(image_03="right"))
     names = [f"{k:010d}" for k in range(4)]
-
     for number in (0, 1):
         drive = folder / DRIVE.format(number)
         for sensor in ("image_02", "image_03", "velodyne_points", "oxts"):
@@ -30,15 +29,10 @@ def test_a_raw_drive_has_a_file_of_every_sensor_per_step(exported: Any) -> None:
             assert len((drive / sensor / "timestamps.txt").read_text().splitlines()) == 4
     rows = [line.split() for line in (folder / "drives.txt").read_text().splitlines()]
     assert rows == [[DRIVE.format(0), "train", "0"], [DRIVE.format(1), "val", "4"]]
-
-
-def test_raw_files_hold_the_samples_of_their_frames(exported: Any, samples: Any) -> None:
-    """Drive 1, frame 2 is sample 6: pixels and points."""
+    # Drive 1, frame 2 is sample 6: pixels and points.
     drive = exported(KittiRaw(image_03="right")) / DRIVE.format(1)
-
     image = cv2.imread(str(drive / "image_03/data/0000000002.png"))
     points = np.fromfile(drive / "velodyne_points/data/0000000002.bin", "<f4").reshape(-1, 4)
-
     (rgb,) = (
         array
         for channel, array in samples[6].capture.readings["right"].channels.items()
@@ -49,22 +43,27 @@ def test_raw_files_hold_the_samples_of_their_frames(exported: Any, samples: Any)
     np.testing.assert_array_equal(points[:, :3], expected["position_m"])
 
 
-def test_raw_times_are_a_step_apart_and_have_nine_digits(exported: Any) -> None:
+def test_raw_times_have_nine_digits_and_grey_images_the_luma_of_colours(exported: Any) -> None:
     """Every drive begins at noon of the configured day."""
     drive = exported(KittiRaw(date="2020_02_29")) / "2020_02_29/2020_02_29_drive_0001_sync"
-
     lines = (drive / "oxts/timestamps.txt").read_text().splitlines()
-
     assert lines[0] == "2020-02-29 12:00:00.000000000"
     assert lines[3] == "2020-02-29 12:00:00.300000000"
-
-
-def test_times_carry_over_seconds_and_midnight() -> None:
-    """Nanoseconds are rounded once, before they are split; times before the start are possible."""
+    # Nanoseconds are rounded once, before they are split; times before the start are possible.
     start = datetime(2011, 9, 26, 23, 59, 59)
-
     assert timestamp(start, 0.9999999999) == "2011-09-27 00:00:00.000000000"
     assert timestamp(start, -0.05) == "2011-09-26 23:59:58.950000000"
+    # Rec. 601: red 76, green 150, blue 29 of 255, as OpenCV has it; the reference moves to 00.
+    primaries = np.eye(3, dtype=np.uint8)[None] * 255
+    assert luma(primaries).tolist() == [[76, 150, 29]]
+    folder = exported(KittiRaw(image_00="left", image_02="right"))
+    grey = cv2.imread(
+        str(folder / DRIVE.format(0) / "image_00/data/0000000000.png"), cv2.IMREAD_UNCHANGED
+    )
+    cameras = calibration(folder / "2011_09_26/calib_cam_to_cam.txt")
+    assert grey.shape == (120, 160)
+    assert cameras["P_rect_00"][3] == 0.0
+    assert cameras["P_rect_02"][3] / cameras["P_rect_02"][0] == pytest.approx(-0.54)
 
 
 def test_raw_calibration_maps_points_into_their_image(exported: Any, samples: Any) -> None:
@@ -85,15 +84,8 @@ def test_raw_calibration_maps_points_into_their_image(exported: Any, samples: An
         hits = (np.stack(around) == mine["instance_id"][inside]).any(axis=0)
         assert inside.sum() > 20
         assert hits.mean() > 0.95
-
-
-def test_raw_stereo_baseline_is_that_of_the_rig(exported: Any) -> None:
-    """0.54 m between cameras 02 and 03, as pykitti computes it."""
-    folder = exported(KittiRaw(image_03="right")) / "2011_09_26"
-    cameras = calibration(folder / "calib_cam_to_cam.txt")
-
+    # 0.54 m between cameras 02 and 03, as pykitti computes it.
     left, right = (cameras[f"P_rect_0{k}"].reshape(3, 4) for k in (2, 3))
-
     assert left[0, 3] / left[0, 0] - right[0, 3] / right[0, 0] == pytest.approx(0.54)
 
 
@@ -105,7 +97,6 @@ def test_tracklets_enclose_the_points_of_their_object(exported: Any, samples: An
     items = root.findall("item")
     assert root.findtext("count") == "3"
     assert [item.findtext("objectType") for item in items] == ["Car", "Pedestrian", "Misc"]
-
     for item, number in zip(items, (1, 2, 4), strict=True):
         height, width, length = (float(item.findtext(k) or 0) for k in "hwl")
         first = int(item.findtext("first_frame") or 0)
@@ -123,21 +114,6 @@ def test_tracklets_enclose_the_points_of_their_object(exported: Any, samples: An
             assert pose.findtext("state") == "2"
 
 
-def test_grey_images_have_the_luma_of_the_colours(exported: Any) -> None:
-    """Rec. 601: red 76, green 150, blue 29 of 255, as OpenCV has it; the reference moves to 00."""
-    primaries = np.eye(3, dtype=np.uint8)[None] * 255
-    assert luma(primaries).tolist() == [[76, 150, 29]]
-
-    folder = exported(KittiRaw(image_00="left", image_02="right"))
-    grey = cv2.imread(
-        str(folder / DRIVE.format(0) / "image_00/data/0000000000.png"), cv2.IMREAD_UNCHANGED
-    )
-    cameras = calibration(folder / "2011_09_26/calib_cam_to_cam.txt")
-    assert grey.shape == (120, 160)
-    assert cameras["P_rect_00"][3] == 0.0
-    assert cameras["P_rect_02"][3] / cameras["P_rect_02"][0] == pytest.approx(-0.54)
-
-
 def test_another_calibration_has_another_date(world: Any, samples: Any, tmp_path: Path) -> None:
     wider = SE3((0.0, 0.0, 1.93))
     moved = [
@@ -147,7 +123,6 @@ def test_another_calibration_has_another_date(world: Any, samples: Any, tmp_path
         for s in samples
     ]
     folder = world.export(KittiRaw(), drive_info(world), moved, tmp_path)
-
     assert stems(folder) == ["2011_09_26", "2011_09_27", "drives"]
     heights = [
         calibration(folder / date / "calib_velo_to_cam.txt")["T"][1]
@@ -162,7 +137,6 @@ def test_cameras_that_look_elsewhere_are_no_pair(world: Any, samples: Any, tmp_p
     left, right = sample.scene.cameras
     turned = replace(right, T_rig_camera=SE3.about_z(0.1) @ right.T_rig_camera)
     scene = replace(sample.scene, cameras=(left, turned))
-
     with pytest.raises(ConfigError, match=r"'right' is not parallel.*same yaw"):
         world.export(
             KittiRaw(image_03="right"), drive_info(world), [replace(sample, scene=scene)], tmp_path

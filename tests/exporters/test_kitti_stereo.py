@@ -83,14 +83,13 @@ def test_points_are_in_the_right_image_at_x_minus_disparity(tree: Path, world: A
     y = (rows - P2[1, 2]) / P2[1, 1] * z
     # Our own pixel coordinates have centres at i + 0.5.
     seen = right.intrinsics.project(T_right_left.apply(np.stack([x, y, z], -1))) - 0.5
-
     assert focal_baseline == pytest.approx(P2[0, 0] * BASELINE_M)
     assert len(rows) > 1000
     assert np.abs(seen[:, 0] - (columns - disparity[rows, columns])).max() < 1e-6
     assert np.abs(seen[:, 1] - rows).max() < 1e-6
 
 
-def test_every_frame_has_both_images_and_those_of_the_next_step(tree: Path) -> None:
+def test_every_frame_has_both_images_and_those_of_the_next_step_and_a_split(tree: Path) -> None:
     """RAFT and torchvision pair the k-th of ``*_10.png`` with the k-th of ``*_11.png``.
 
     The last step of a sequence has no next one; _11 of one frame is _10 of the next.
@@ -104,16 +103,10 @@ def test_every_frame_has_both_images_and_those_of_the_next_step(tree: Path) -> N
             for name in ("000000_11.png", "000001_10.png")
         )
         assert first == second
-
-
-def test_splits_list_frames_by_name(tree: Path) -> None:
-    """The first sequence is for training, the second for validation."""
+    # The first sequence is for training, the second for validation.
     listed = {k: (tree / f"ImageSets/{k}.txt").read_text().split() for k in ("train", "val")}
-
-    assert listed == {
-        "train": [f"{k:06d}" for k in range(3)],
-        "val": [f"{k:06d}" for k in range(4, 7)],
-    }
+    assert listed == {"train": [f"{k:06d}" for k in range(3)],
+                      "val": [f"{k:06d}" for k in range(4, 7)]}  # fmt: skip
 
 
 def test_without_flow_the_last_step_is_a_frame_too(world: Any, tmp_path: Path) -> None:
@@ -123,13 +116,12 @@ def test_without_flow_the_last_step_is_a_frame_too(world: Any, tmp_path: Path) -
     kept = tuple(c for c in left.channels if not c.value.startswith("flow"))
     sensors = tuple(replace(s, channels=kept) if s is left else s for s in info.sensors)
     root = world.export(KittiStereo(), replace(info, sensors=sensors), samples, tmp_path)
-
     for folder in ("image_2", "disp_occ_0"):
         assert len(list((root / "training" / folder).glob("*_10.png"))) == 8
 
 
-def test_data_sets_without_a_pair_are_refused(world: Any) -> None:
-    """No partner, two partners, a fisheye."""
+def test_data_sets_without_a_rectified_pair_are_refused(world: Any, tmp_path: Path) -> None:
+    """No partner, two partners, a fisheye. One a hand higher than the other: rows do not match."""
     info, _ = world.pairs()
     with pytest.raises(ConfigError, match=r"right: '' is not another camera .*one of: none"):
         KittiStereo().check(replace(info, sensors=(info.sensor("left"),)))
@@ -141,10 +133,6 @@ def test_data_sets_without_a_pair_are_refused(world: Any) -> None:
     bent = replace(info.sensor("right"), lens="brown_conrady")
     with pytest.raises(ConfigError, match="'right' has a lens of the model"):
         KittiStereo().check(replace(info, sensors=(info.sensor("left"), bent)))
-
-
-def test_cameras_that_are_not_beside_each_other_are_refused(world: Any, tmp_path: Path) -> None:
-    """One a hand higher than the other: rows do not match."""
     info, samples = world.pairs()
     scene = samples[0].scene
     low = scene.camera("right")
@@ -152,6 +140,5 @@ def test_cameras_that_are_not_beside_each_other_are_refused(world: Any, tmp_path
     high = replace(low, T_world_camera=low.T_world_camera @ up, T_rig_camera=low.T_rig_camera @ up)
     cameras = tuple(high if c.name == "right" else c for c in scene.cameras)
     wrong = replace(samples[0], scene=replace(scene, cameras=cameras))
-
     with pytest.raises(ConfigError, match=r"'left' and 'right' are not a rectified pair: .*below"):
         world.export(KittiStereo(), info, [wrong], tmp_path)

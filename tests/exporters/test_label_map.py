@@ -37,40 +37,45 @@ def parse(text: str) -> LabelMap:
     return LabelMap.model_validate_json(text)
 
 
-def test_two_classes_give_a_data_set_of_two_classes(world: Any) -> None:
+def test_classes_are_of_one_or_several_categories(world: Any) -> None:
     """With the ids of their order; everything else is left out."""
     first, second, *_ = sorted(categories(world))
     label_map = parse(json.dumps({"classes": {"b": second, "a": [first]}}))
     applied = AppliedLabelMap(label_map, world.info(7))
     things = truths(world, label_map)
-
     assert applied.info.categories == ("b", "a")
     assert {(t.instance.category, t.instance.category_id) for t in things} == {("b", 1), ("a", 2)}
     assert len(things) == categories(world)[first] + categories(world)[second]
-
-
-def test_several_categories_become_one_class(world: Any) -> None:
-    """And a class without categories takes the category of its own name."""
-    first, second, *_ = sorted(categories(world))
+    # And a class without categories takes the category of its own name.
     merged = parse(json.dumps({"classes": {"all": [first, second]}}))
     own = parse(json.dumps({"classes": {first: None}}))
-
     counts = categories(world)
     assert len(truths(world, merged)) == counts[first] + counts[second]
     assert len(truths(world, own)) == counts[first]
 
 
-def test_other_and_ignored_categories_can_stay_as_ignored_regions(world: Any) -> None:
+def test_other_and_ignored_categories_and_those_below_limits_can_stay_ignored(world: Any) -> None:
+    """An object that misses one of them is dropped, or ignored."""
     first, second, *_ = sorted(categories(world))
     others = parse(json.dumps({"classes": {first: None}, "others": "ignore"}))
     ignored = parse(json.dumps({"ignore": [second]}))
-
     for label_map in (others, ignored):
         things = truths(world, label_map)
         assert len(things) == categories(world).total()
         is_ignored = {t.instance.category for t in things if t.ignored}
         assert second in is_ignored
         assert first not in is_ignored
+    every = truths(world, LabelMap())
+    for limits, missed in (
+        ({"min_box_px": 12}, [min(t.box.width_px, t.box.height_px) < 12 for t in every if t.box]),
+        ({"min_visible_fraction": 0.6}, [t.visible_fraction < 0.6 for t in every if t.box]),
+        ({"max_truncation": 0.05}, [t.truncation > 0.05 for t in every if t.box]),
+    ):
+        assert any(missed), limits
+        dropped = [t for t in truths(world, LabelMap(**limits)) if t.box]
+        ignored = [t for t in truths(world, LabelMap(**limits, below="ignore")) if t.box]
+        assert len(dropped) == missed.count(False)
+        assert [t.ignored for t in ignored] == missed
 
 
 def test_subcategories_go_before_their_category(world: Any) -> None:
@@ -103,28 +108,26 @@ def test_subcategories_go_before_their_category(world: Any) -> None:
     assert [i.annotated for i in kept] == [False, True, False, True]
 
 
-def test_a_subcategory_of_two_fates_is_refused() -> None:
-    with pytest.raises(ValidationError, match="'apple/half' is dropped and belongs to the class"):
-        parse('{"classes": {"cut": ["apple/half"]}, "drop": ["apple/half"]}')
+TWICE = "'mug' belongs to the classes 'a' and 'b'"
+PRINTABLE = "expected a name of 1 to 60 printable characters"
 
 
-def test_limits_apply_to_the_visible_part(world: Any) -> None:
-    """An object that misses one of them is dropped, or ignored."""
-    every = truths(world, LabelMap())
-    for limits, missed in (
-        ({"min_box_px": 12}, [min(t.box.width_px, t.box.height_px) < 12 for t in every if t.box]),
-        ({"min_visible_fraction": 0.6}, [t.visible_fraction < 0.6 for t in every if t.box]),
-        ({"max_truncation": 0.05}, [t.truncation > 0.05 for t in every if t.box]),
-    ):
-        assert any(missed), limits
-        dropped = [t for t in truths(world, LabelMap(**limits)) if t.box]
-        ignored = [t for t in truths(world, LabelMap(**limits, below="ignore")) if t.box]
-        assert len(dropped) == missed.count(False)
-        assert [t.ignored for t in ignored] == missed
+@pytest.mark.parametrize(
+    ("fields", "message"),
+    [({"classes": {"cut": ["apple/half"]}, "drop": ["apple/half"]},
+      "'apple/half' is dropped and belongs to the class"),
+     ({"classes": {"a": "mug", "b": ["mug"]}}, TWICE),
+     ({"classes": {"a": "mug"}, "ignore": ["mug"]}, "'mug' is ignored and belongs to the class"),
+     *(({"classes": {name: ["mug"]}}, PRINTABLE) for name in ["", " ", "a\nb", "\0", "x" * 61])],
+)  # fmt: skip
+def test_two_fates_and_names_that_do_not_print_are_refused(fields: Any, message: str) -> None:
+    """Formats write names of classes into lines of text."""
+    with pytest.raises(ValidationError, match=message):
+        parse(json.dumps(fields))
 
 
-def test_formats_with_classes_of_their_own_keep_their_names(world: Any, tmp_path: Path) -> None:
-    """KITTI: types follow the categories, objects of other categories have no row."""
+def test_kitti_keeps_names_and_ignored_ones_are_dont_cares(world: Any, tmp_path: Path) -> None:
+    """Types follow the categories, objects of other categories have no row."""
     first, *_ = sorted(categories(world))
     label_map = parse(json.dumps({"classes": {"thing": [first]}}))
     info = world.info(7, lidars=("top",))
@@ -138,15 +141,10 @@ def test_formats_with_classes_of_their_own_keep_their_names(world: Any, tmp_path
     del rows(plain)["DontCare"]
     assert set(rows(folder)) - {"DontCare"} < set(rows(plain))
     assert "thing" not in rows(folder)
-
-
-def test_ignored_objects_are_dont_care_regions_in_kitti(world: Any, tmp_path: Path) -> None:
     ignore_all = LabelMap(ignore=tuple(categories(world)))
-    info = world.info(7, lidars=("top",))
     folder = world.export(
         MappedExporter(Kitti(), ignore_all), info, world.samples, tmp_path / "mapped"
     )
-
     lines = "".join(p.read_text() for p in folder.glob("training/label_2/*.txt")).splitlines()
     assert lines
     assert all(line.startswith("DontCare -1 -1 -10 ") for line in lines)
@@ -158,14 +156,13 @@ def test_images_of_category_ids_are_left_out_if_classes_differ(world: Any, tmp_p
     label_map = parse(json.dumps({"classes": {first: None}}))
     exporter = MappedExporter(Coco(), label_map)
     folder = world.export(exporter, world.info(7), world.samples, tmp_path)
-
     data = json.loads((folder / "annotations/instances_train.json").read_text())
     assert [c["name"] for c in data["categories"]] == [first]
     assert all("category" not in image["files"] for image in data["images"])
     assert not (folder / "category").exists()
 
 
-def test_public_lists_have_the_published_classes() -> None:
+def test_public_lists_have_the_published_classes_and_others_may_be_empty() -> None:
     """COCO's number and ends; Cityscapes' order; nuScenes' ten."""
     coco = list(public_classes("coco80"))
     assert (len(coco), coco[0], coco[-1]) == (80, "person", "toothbrush")
@@ -177,6 +174,16 @@ def test_public_lists_have_the_published_classes() -> None:
     nyu, ade = list(public_classes("nyu40")), list(public_classes("ade20k"))
     assert (len(nyu), nyu[0], nyu[21], nyu[-1]) == (40, "wall", "ceiling", "otherprop")
     assert (len(ade), ade[0], ade[5], ade[-1]) == (150, "wall", "ceiling", "flag")
+    # A map may serve several data sets.
+    with pytest.raises(ConfigError) as caught:
+        parse('{"classes": {"bottel": null, "mugg": null, "mug": null}}').check(["bottle", "mug"])
+    assert [line.split(":")[0] for line in str(caught.value).splitlines()] == [
+        "labels.map.classes.bottel",
+        "labels.map.classes.mugg",
+    ]
+    label_map = parse('{"classes": {"bottle": [], "mug": null}}')
+    label_map.check(["mug"])
+    assert list(label_map.classes_of) == ["bottle", "mug"]
 
 
 @pytest.mark.parametrize("name", ["nyu40", "ade20k"])
@@ -186,23 +193,8 @@ def test_every_category_of_rooms_has_a_class_or_is_listed_without_one(name: Any)
     without = yaml.safe_load(text)["without_class"][name]
     mapped = {c for own in LabelMap(classes=name).classes_of.values() for c in own}
     rooms = PipelineFactory(load_config("indoor_rgbd.yaml"), n=1).categories
-
     assert set(rooms) - mapped == set(without)
     assert {"wall", "floor", "ceiling", "window", "door"} <= mapped & set(rooms)
-
-
-@pytest.mark.parametrize("name", ["", " ", "a\nb", "\0", "x" * 61])
-def test_class_names_are_printable(name: str) -> None:
-    """Formats write them into lines of text."""
-    with pytest.raises(ValidationError, match="expected a name of 1 to 60 printable characters"):
-        LabelMap(classes={name: ("mug",)})
-
-
-def test_a_category_in_two_places_is_refused() -> None:
-    with pytest.raises(ValidationError, match="'mug' belongs to the classes 'a' and 'b'"):
-        parse('{"classes": {"a": "mug", "b": ["mug"]}}')
-    with pytest.raises(ValidationError, match="'mug' is ignored and belongs to the class 'a'"):
-        parse('{"classes": {"a": "mug"}, "ignore": ["mug"]}')
 
 
 def test_categories_that_the_data_set_lacks_are_named(world: Any) -> None:
@@ -217,30 +209,12 @@ def test_categories_that_the_data_set_lacks_are_named(world: Any) -> None:
 
 @pytest.mark.parametrize(
     ("classes", "fault"),
-    [
-        ({"bottel": None, "mug": None}, "bottel: no object .* 'bottel' .did you mean 'bottle'"),
-        ({"Mug": None, "bottle": None}, "Mug: no object .* 'Mug' .did you mean 'mug'"),
-        ({"cup": ["MUG", "Botle"]}, "cup: no object .* 'MUG', 'Botle' .did you mean 'mug'"),
-        ({"qqq": None, "mug": None}, r"qqq: .* 'qqq'; expected some of bottle, mug; or \[\] for"),
-    ],
-)
+    [({"bottel": None, "mug": None}, "bottel: no object .* 'bottel' .did you mean 'bottle'"),
+     ({"Mug": None, "bottle": None}, "Mug: no object .* 'Mug' .did you mean 'mug'"),
+     ({"cup": ["MUG", "Botle"]}, "cup: no object .* 'MUG', 'Botle' .did you mean 'mug'"),
+     ({"qqq": None, "mug": None}, r"qqq: .* 'qqq'; expected some of bottle, mug; or \[\] for")],
+)  # fmt: skip
 def test_a_class_that_no_object_can_have_is_refused(classes: Any, fault: str) -> None:
     """Misspelt, in other letters, or unknown; also if other classes have objects."""
     with pytest.raises(ConfigError, match=f"labels.map.classes.{fault}"):
         parse(json.dumps({"classes": classes})).check(["bottle", "mug"])
-
-
-def test_all_classes_without_objects_are_named_at_once() -> None:
-    with pytest.raises(ConfigError) as caught:
-        parse('{"classes": {"bottel": null, "mugg": null, "mug": null}}').check(["bottle", "mug"])
-    assert [line.split(":")[0] for line in str(caught.value).splitlines()] == [
-        "labels.map.classes.bottel",
-        "labels.map.classes.mugg",
-    ]
-
-
-def test_an_empty_list_keeps_the_id_of_a_class_without_objects() -> None:
-    """A map may serve several data sets."""
-    label_map = parse('{"classes": {"bottle": [], "mug": null}}')
-    label_map.check(["mug"])
-    assert list(label_map.classes_of) == ["bottle", "mug"]

@@ -60,16 +60,13 @@ def test_keypoints_are_regions_of_their_object(world: Any, dataset: Path) -> Non
 def test_masks_come_back(crop: np.ndarray, above: int, left: int, below: int, right: int) -> None:
     """Also at the image's edges, where runs of different rows meet."""
     expected = np.pad(crop, [(above, below), (left, right)])
-
     values = unpack(brush_rle(MaskPx(left, above, crop), *expected.shape))
-
     assert np.array_equal(values.reshape(*expected.shape, 4) == 255, np.stack([expected] * 4, -1))
 
 
 def test_long_runs_are_divided() -> None:
     """A run has 16 bits for its length; a pixel counts four times."""
     values = unpack(brush_rle(MaskPx(0, 0, np.ones((300, 100), bool)), 300, 100))
-
     assert len(values) == 120_000
     assert (values == 255).all()
 
@@ -79,7 +76,6 @@ def test_predictions_and_other_addresses(world: Any, tmp_path: Path) -> None:
     exporter = LabelStudio(kind="predictions", url_prefix="https://example.org/")
     root = world.export(exporter, world.info(7), world.samples, tmp_path)
     task = json.loads((root / "train/tasks.json").read_text())[0]
-
     assert task["data"]["image"].startswith("https://example.org/label_studio/train/images/0")
     assert task["predictions"][0]["model_version"] == "gen-data"
     assert "annotations" not in task
@@ -98,7 +94,6 @@ def test_the_sdk_accepts_interface_and_tasks(dataset: Path, shapes: str) -> None
     tasks = json.loads((root / "train/tasks.json").read_text())
     annotations = [task["annotations"][0] for task in tasks]
     regions = [region for annotation in annotations for region in annotation["result"]]
-
     assert len(tasks) == 5
     assert all(interface.validate_task({"data": task["data"]}) for task in tasks)
     assert all(map(interface.validate_annotation, annotations))

@@ -18,12 +18,10 @@ def divided(world: Any) -> Any:
     """A car in two parts behind a pedestrian, seen by a tilted camera."""
     level = world.camera()
     pose = level.T_world_camera @ SE3.about_z(0.4)
-    things = (
-        world.instance(1, "car", 14.0, 0.0, 1.57),
-        world.instance(2, "pedestrian", 8.0, 0.0, 0.0),
-        world.instance(3, "crate", 9.0, 2.0, 0.0),
-        world.instance(4, "crate", 10.0, -3.0, 0.5),
-    )
+    things = (world.instance(1, "car", 14.0, 0.0, 1.57),
+              world.instance(2, "pedestrian", 8.0, 0.0, 0.0),
+              world.instance(3, "crate", 9.0, 2.0, 0.0),
+              world.instance(4, "crate", 10.0, -3.0, 0.5))  # fmt: skip
     return world.sample(7, things, [replace(level, T_world_camera=pose)])
 
 
@@ -61,30 +59,18 @@ def assert_objects(kind: str, folder: Path, samples: list[Any]) -> None:
 @pytest.mark.parametrize(
     ("kind", "options"),
     sampled(
-        [
-            *((kind, {}) for kind in READERS if kind not in ("tfrecord", "yolo")),
-            ("coco", {"segmentation": "rle"}),
-            *(
-                (kind, {"shapes": s})
-                for kind in ("cvat", "label_studio")
-                for s in ("box", "polygon")
-            ),
-            ("label_studio", {"shapes": "mask"}),
-            ("huggingface", {"rows_per_file": 2}),
-            ("tfrecord", {"rows_per_file": 2, "masks": "png"}),
-            ("webdataset", {"samples_per_tar": 2}),
-            ("yolo", {"tasks": ("detect",)}),
-        ],
+        [*((kind, {}) for kind in READERS if kind not in ("tfrecord", "yolo")),
+         ("coco", {"segmentation": "rle"}),
+         *((kind, {"shapes": s}) for kind in ("cvat", "label_studio") for s in ("box", "polygon")),
+         ("label_studio", {"shapes": "mask"}), ("huggingface", {"rows_per_file": 2}),
+         ("tfrecord", {"rows_per_file": 2, "masks": "png"}), ("webdataset", {"samples_per_tar": 2}),
+         ("yolo", {"tasks": ("detect",)})],
         3,
     ),
-)
-def test_objects_are_the_samples(
-    kind: str, options: dict[str, Any], world: Any, tmp_path: Path
-) -> None:
+)  # fmt: skip
+def test_objects_are_found(kind: str, options: dict[str, Any], world: Any, tmp_path: Path) -> None:
     """In seven frames, of which one is empty, and one with an object in two parts."""
     exporter = TABLE.load(kind)(type=kind, **options)
     samples = [*world.samples, divided(world)]
-
     folder = world.export(exporter, world.info(8, lidars=("top",)), samples, tmp_path)
-
     assert_objects(kind, folder, samples)

@@ -23,12 +23,13 @@ def samples(world: Any) -> list[Sample]:
     return [replace(first, truth=truth), *others]
 
 
-def test_lines_refer_to_their_objects(world: Any, samples: list[Sample], tmp_path: Path) -> None:
-    """Ids are unique, and every file is there."""
+def test_lines_refer_to_their_objects_and_are_every_utterance_in_order(
+    world: Any, samples: list[Sample], tmp_path: Path
+) -> None:
+    """Ids are unique, and every file is there. After a caption of the whole scene."""
     folder = world.export(LanguageJsonl(), world.info(7), samples, tmp_path)
     rows = json_lines(folder / "train.jsonl")
     images = {image["image_id"]: image for image in json_lines(folder / "train_images.jsonl")}
-
     assert len({row["id"] for row in rows}) == len(rows)
     assert {row["kind"] for row in rows} >= {"scene_caption", "caption", "counting", "existence"}
     for row in rows:
@@ -40,6 +41,7 @@ def test_lines_refer_to_their_objects(world: Any, samples: list[Sample], tmp_pat
         assert set(row["object_ids"]) <= known
         assert row["file_name"] == image["file_name"]
         assert (folder / row["file_name"]).exists()
+    assert_said(folder, samples)
 
 
 def assert_said(folder: Path, samples: list[Sample]) -> None:
@@ -47,37 +49,21 @@ def assert_said(folder: Path, samples: list[Sample]) -> None:
     train = [s for s in samples if s.split == "train"]
     said = [u for s in train for u in s.truth["color"].utterances or ()]
     rows = [row for row in json_lines(folder / "train.jsonl") if row["kind"] != "scene_caption"]
-
     assert [(r["kind"], r["text"], r["answer"], tuple(r["object_ids"])) for r in rows] == [
         (u.kind, u.text, u.answer, u.instances) for u in said
     ]
     assert said
 
 
-def test_every_utterance_of_the_annotation_is_written_in_order(
-    world: Any, samples: list[Sample], tmp_path: Path
-) -> None:
-    """After a caption of the whole scene."""
-    assert_said(world.export(LanguageJsonl(), world.info(7), samples, tmp_path), samples)
-
-
-def test_relations_have_both_directions_here_and_in_coco(
-    world: Any, samples: list[Sample], tmp_path: Path
-) -> None:
+def test_relations_have_both_directions(world: Any, samples: list[Sample], tmp_path: Path) -> None:
     """Left has right as its inverse, and near itself."""
     folder = world.export(LanguageJsonl(), world.info(7), samples, tmp_path / "language")
     coco = world.export(Coco(), world.info(7), samples, tmp_path / "coco")
     first = json_lines(folder / "train_images.jsonl")[0]
-    image = next(
-        i
-        for i in json.loads((coco / "annotations/instances_train.json").read_text("utf-8"))[
-            "images"
-        ]
-        if i["sample"] == 0
-    )
+    truth = json.loads((coco / "annotations/instances_train.json").read_text("utf-8"))
+    image = next(i for i in truth["images"] if i["sample"] == 0)
     a, b, *_ = (t.instance.instance_id for t in samples[0].truth["color"].objects)
     expected = {(a, "left_of", b), (b, "right_of", a), (a, "near", b), (b, "near", a)}
-
     assert {(r["subject_id"], r["predicate"], r["object_id"]) for r in first["relationships"]} == (
         expected
     )
@@ -93,7 +79,6 @@ def test_label_maps_drop_relations_and_text_too(world: Any, samples: list[Sample
     mapping = LabelMap(classes={name: (name,) for name in kept}, others="drop")
     mapped = AppliedLabelMap(mapping, world.info(7)).map_image(first)
     gone = {t.instance.instance_id for t in first.objects if t.instance.category == dropped}
-
     assert gone
     assert mapped.relations == ()
     assert mapped.utterances == tuple(

@@ -21,6 +21,7 @@ from gen_data.exporters import lerobot_files
 from gen_data.exporters.lerobot import LeRobot, task_sentence
 from gen_data.exporters.lerobot_statistics import image_sums
 from tests.exporters.drives import drive_info
+from tests.exporters.label_readers import json_lines
 
 
 @pytest.fixture(scope="module")
@@ -41,10 +42,6 @@ def shared_files(world: Any, tmp_path: Path) -> Path:
     return world.export(LeRobot(), drive_info(world), samples, tmp_path) / "train/toys_arm"
 
 
-def lines(path: Path) -> list[Any]:
-    return [json.loads(line) for line in path.read_text().splitlines()]
-
-
 def tasks_of(folder: Path) -> dict[int, str]:
     """Sentences by number; they are the index of the table that pandas reads."""
     path = folder / "meta/tasks.parquet"
@@ -52,14 +49,14 @@ def tasks_of(folder: Path) -> dict[int, str]:
         table = pyarrow.parquet.read_table(path)
         (index,) = json.loads(table.schema.metadata[b"pandas"])["index_columns"]
         return dict(zip(table["task_index"].to_pylist(), table[index].to_pylist(), strict=True))
-    return {row["task_index"]: row["task"] for row in lines(folder / "meta/tasks.jsonl")}
+    return {row["task_index"]: row["task"] for row in json_lines(folder / "meta/tasks.jsonl")}
 
 
 def episodes_of(folder: Path) -> list[dict[str, Any]]:
     path = folder / "meta/episodes/chunk-000/file-000.parquet"
     if not path.exists():
-        stats = lines(folder / "meta/episodes_stats.jsonl")
-        pairs = zip(lines(folder / "meta/episodes.jsonl"), stats, strict=True)
+        stats = json_lines(folder / "meta/episodes_stats.jsonl")
+        pairs = zip(json_lines(folder / "meta/episodes.jsonl"), stats, strict=True)
         return [episode | line for episode, line in pairs]
     rows = pyarrow.parquet.read_table(path).to_pylist()
     for row in rows:
@@ -103,9 +100,8 @@ def faults(folder: Path, samples: Any) -> list[str]:
             if not np.allclose(row[name], arm.joint_track.positions(at_s), atol=1e-6):
                 found.append(name)
         for camera in sample.truth:
-            pixels = np.asarray(
-                Image.open(io.BytesIO(row[f"observation.images.{camera}"]["bytes"]))
-            )
+            data = row[f"observation.images.{camera}"]["bytes"]
+            pixels = np.asarray(Image.open(io.BytesIO(data)))
             shape = info["features"][f"observation.images.{camera}"]["shape"]
             if list(pixels.shape) != shape:
                 found.append(f"{camera} shape")
@@ -144,22 +140,18 @@ def differences(stats: dict[str, Any], rows: list[dict[str, Any]]) -> list[str]:
     return found
 
 
-def test_episodes_have_states_actions_and_images(dataset: Path, reach: Any) -> None:
+def test_episodes_have_states_actions_images_and_named_features(dataset: Path, reach: Any) -> None:
     """Actions are the positions one step later; the arm rests after the last step."""
     assert faults(dataset / "train/toys_arm", reach[:4]) == []
     assert faults(dataset / "val/toys_arm", reach[4:]) == []
     last = rows_of(dataset / "train/toys_arm")[-1]
     assert last["action"] == pytest.approx([0.3, 0.2])
-
-
-def test_joints_and_features_are_named(dataset: Path) -> None:
-    """Features of the files, in the forms of LeRobot and of datasets."""
+    # Features of the files, in the forms of LeRobot and of datasets.
     folder = dataset / "train/toys_arm"
     info = json.loads((folder / "meta/info.json").read_text())
     (path,) = (folder / "data").rglob("*.parquet")
     described = json.loads(pyarrow.parquet.read_schema(path).metadata[b"huggingface"])
     action = {"dtype": "float32", "shape": [2], "names": ["shoulder", "elbow"]}
-
     assert action.items() <= info["features"]["action"].items()
     assert (info["fps"], info["robot_type"]) == (10, "toys/arm")
     assert set(described["info"]["features"]) == set(info["features"])
@@ -188,7 +180,6 @@ def test_quantiles_are_those_of_the_stored_values(shared_files: Path) -> None:
     """Those of all episodes are means of the episodes', as LeRobot merges them."""
     rows, whole = rows_of(shared_files), json.loads((shared_files / "meta/stats.json").read_text())
     states = np.array([row["observation.state"] for row in rows], np.float64).reshape(2, 4, -1)
-
     for key, share in {"q01": 0.01, "q50": 0.5, "q99": 0.99}.items():
         expected = np.quantile(states, share, axis=1)
         found = [one["stats"]["observation.state"][key] for one in episodes_of(shared_files)]
@@ -225,19 +216,14 @@ print(json.dumps({
 @pytest.mark.slow
 def test_lerobot_reads_what_was_written(shared_files: Path) -> None:
     """Release 0.4.4: rows, images, tasks, statistics, and windows over time within episodes."""
-    done = subprocess.run(
-        [sys.executable, "-c", READ, shared_files],
-        env=os.environ | {"HF_HUB_OFFLINE": "1"},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    env = os.environ | {"HF_HUB_OFFLINE": "1"}
+    command = [sys.executable, "-c", READ, shared_files]
+    done = subprocess.run(command, env=env, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     read, rows = json.loads(done.stdout), rows_of(shared_files)
     actions = np.array([row["action"] for row in rows])
     key = "observation.images.left"
     images = [np.asarray(Image.open(io.BytesIO(row[key]["bytes"]))) for row in rows]
-
     assert read["episodes"] == [0] * 4 + [1] * 4
     assert read["tasks"] == ["Pick up the crate, then put it down."]
     # The window of an episode's last frame repeats its last action.
@@ -254,9 +240,7 @@ def test_images_of_statistics_are_thinned_as_lerobot_does(tmp_path: Path) -> Non
     pixels[::4, ::4] = (10, 20, 30)
     path = tmp_path / "image.png"
     Image.fromarray(pixels).save(path)
-
     sums = image_sums(path)
-
     n = 160 * 120
     assert sums["count"] == n
     assert sums["min"] == sums["max"] == [10, 20, 30]
@@ -268,14 +252,15 @@ def test_tasks_are_sentences(reach: Any) -> None:
     scene = reach[0].scene
     (arm,) = scene.articulations
     reaching = replace(arm, task=(ArmGoal("reach"), ArmGoal("reach"), ArmGoal("joints")))
-
     assert task_sentence(scene, arm) == "Pick up the crate, then put it down."
     assert task_sentence(replace(scene, tracks=()), arm) == "Pick up an object, then put it down."
     assert task_sentence(scene, reaching) == "Reach a pose, then move to a posture."
     assert task_sentence(scene, replace(arm, task=())) == "Stay in place."
 
 
-def test_data_sets_without_arms_are_refused(world: Any, samples: Any, tmp_path: Path) -> None:
+def test_data_sets_without_arms_and_cameras_that_skip_steps_are_refused(
+    world: Any, samples: Any, tmp_path: Path
+) -> None:
     """By the nominal scene, before anything is rendered; with the field to set."""
     with pytest.raises(ConfigError, match="exporter 'lerobot': the scene has no arm; add an elem"):
         LeRobot().check_scene(samples[0].scene)
@@ -283,14 +268,10 @@ def test_data_sets_without_arms_are_refused(world: Any, samples: Any, tmp_path: 
         world.export(LeRobot(), drive_info(world), samples, tmp_path / "a")
     with pytest.raises(ConfigError, match="has no arm 'leg'; expected one of: arm"):
         world.export(LeRobot(arm="leg"), drive_info(world), world.reach(), tmp_path / "b")
-
-
-def test_cameras_that_skip_steps_are_refused(world: Any) -> None:
-    """Every frame has an image of every camera."""
+    # Every frame has an image of every camera.
     info = drive_info(world)
     slow = tuple(replace(s, rate_hz=5.0) if s.name == "right" else s for s in info.sensors)
     info = replace(info, sensors=slow)
-
     with pytest.raises(ConfigError, match="camera 'right' reads 5 times per second"):
         LeRobot().check(info)
     LeRobot(cameras=("left",)).check(info)
@@ -301,9 +282,7 @@ def test_a_missing_sample_ends_the_episode(world: Any, tmp_path: Path, version: 
     """Frames are 1 / fps apart by definition: what follows a gap is another episode."""
     samples = [replace(sample, split="train") for sample in world.reach()]
     kept = [sample for sample in samples if sample.index != 1]
-
     folder = world.export(LeRobot(version=version), drive_info(world), kept, tmp_path)
-
     rows = rows_of(folder / "train/toys_arm")
     fps = json.loads((folder / "train/toys_arm/meta/info.json").read_text())["fps"]
     assert [(row["episode_index"], row["frame_index"]) for row in rows] == [

@@ -34,29 +34,19 @@ def decoded(png: bytes) -> np.ndarray:
 def test_masks_come_back(crop: np.ndarray, above: int, left: int, below: int, right: int) -> None:
     """Also at the image's edges, where runs of different rows meet."""
     expected = np.pad(crop, [(above, below), (left, right)]).astype(np.uint8) * 255
-
     png = encode_mask(MaskPx(left, above, crop), *expected.shape)
-
     np.testing.assert_array_equal(decoded(png), expected)
 
 
-def test_runs_of_every_length() -> None:
+def test_runs_of_every_length_come_back_and_a_full_image_is_small() -> None:
     """A row of set pixels: the longest copy, two of them, and each possible rest."""
     for width in range(1, 600):
         png = encode_mask(MaskPx(0, 0, np.ones((1, width), bool)), 2, width)
-
         np.testing.assert_array_equal(decoded(png), [[255] * width, [0] * width])
-
-
-def test_nothing_is_an_empty_image() -> None:
     for mask in (None, MaskPx(0, 0, np.zeros((0, 0), bool))):
         assert not decoded(encode_mask(mask, 48, 64)).any()
-
-
-def test_a_full_image_is_small() -> None:
-    """Its bytes are those of the runs."""
+    # Its bytes are those of the runs.
     png = encode_mask(MaskPx(0, 0, np.ones((480, 640), bool)), 480, 640)
-
     assert decoded(png).min() == 255
     assert len(png) < 8_000
 
@@ -73,5 +63,4 @@ def test_checksum_of_runs_is_that_of_their_bytes(borders: list[int], after: int)
     for border in borders:
         data[border:] ^= 255
     ends = [*borders, size] if len(borders) % 2 else borders
-
     assert adler32_of_runs(np.array(ends, np.int64), size) == zlib.adler32(data.tobytes())

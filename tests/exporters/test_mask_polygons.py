@@ -41,7 +41,6 @@ def test_polygons_cover_exactly_the_pixels(pixels: NDArray[np.bool_]) -> None:
     inside the edges, also at borders of the image.
     """
     polygons = mask_polygons(MaskPx(3, 5, pixels))
-
     picture = np.zeros((5 + pixels.shape[0] + 2, 3 + pixels.shape[1] + 4), bool)
     picture[5 : 5 + pixels.shape[0], 3 : 3 + pixels.shape[1]] = pixels
     np.testing.assert_array_equal(drawn(polygons, *picture.shape), picture)
@@ -82,62 +81,42 @@ def test_other_rasterisers_draw_exactly_the_mask(
         pixels[2 * row : 2 * row + 2, first : first + width] = True
     (solid, *_) = cv2.connectedComponents(pixels.astype(np.uint8), connectivity=4)
     polygons = drawable_polygons(MaskPx(0, 0, pixels))
-
     assert len(polygons) == solid - 1
     np.testing.assert_array_equal(draw(polygons, *pixels.shape), pixels)
 
 
-def test_vertices_of_a_drawable_square_lie_inside_its_edges() -> None:
+def test_vertices_of_drawable_polygons_lie_inside_edges_also_when_joined() -> None:
     """By 0.02 px: pycocotools, OpenCV and PIL draw 100 pixels; edge to edge, the last two 121."""
     pixels = MaskPx(0, 0, np.ones((10, 10), bool))
     (polygon,), (exact,) = drawable_polygons(pixels), mask_polygons(pixels)
-
     assert polygon.tolist() == [[0.02, 0.02], [9.98, 0.02], [9.98, 9.98], [0.02, 9.98]]
     for draw in (drawn, drawn_by_opencv, drawn_by_pillow):
         assert draw([polygon], 12, 12).sum() == 100
     assert [d([exact], 12, 12).sum() for d in (drawn_by_opencv, drawn_by_pillow)] == [121, 121]
-
-
-def test_a_joined_drawable_polygon_covers_the_pixels() -> None:
-    """Parts and holes; OpenCV also draws the pixels of the lines that join parts."""
+    # Parts and holes; OpenCV also draws the pixels of the lines that join parts.
     pixels = np.ones((9, 9), bool)
     pixels[3:6, 3:6] = pixels[:, 7] = False
     joined = join_polygons(drawable_polygons(MaskPx(0, 0, pixels)))
-
     np.testing.assert_array_equal(drawn([joined], 9, 9), pixels)
-
-
-def test_parts_are_joined_at_the_first_of_equally_near_vertices() -> None:
-    """Four vertices are 4 px from the part's first one; a search tree finds another of them."""
+    # Four vertices are 4 px from the part's first one; a search tree finds another of them.
     far = [[x, 20] for x in range(-20, 21, 2)]
     near = [[0, 4], [-4, 0], [0, -4], [4, 0]]
     part = np.array([[0, 0], [1, 0], [1, 1]])
-
     joined = join_polygons([np.array(far + near), part])
-
     assert joined.tolist() == [*far, [0, 4], [1, 1], [0, 0], [1, 0], [1, 1], [0, 4], *near[1:]]
 
 
-def test_a_rectangle_has_its_four_corners() -> None:
+def test_a_rectangle_has_four_corners_a_hole_one_line_to_it_and_nothing_no_polygon() -> None:
     """From the upper left corner, clockwise; COCO's box is 20 wide and 10 high."""
     (polygon,) = mask_polygons(MaskPx(10, 5, np.ones((10, 20), bool)))
-
     assert polygon.tolist() == [[10, 5], [30, 5], [30, 15], [10, 15]]
-
-
-def test_a_hole_is_reached_along_one_line() -> None:
-    """A ring of one pixel's width: eight corners, and the line from the outer to the inner."""
+    # A ring of one pixel's width: eight corners, and the line from the outer to the inner.
     pixels = np.ones((3, 3), bool)
     pixels[1, 1] = False
-
     (polygon,) = mask_polygons(MaskPx(0, 0, pixels))
-
     assert polygon.tolist() == [
         [0, 0], [2, 0], [2, 1], [1, 1], [1, 2], [2, 2], [2, 1], [2, 0], [3, 0], [3, 3], [0, 3],
     ]  # fmt: skip
-
-
-def test_nothing_has_no_polygon() -> None:
     assert mask_polygons(MaskPx(0, 0, np.zeros((0, 0), bool))) == []
     with pytest.raises(ValueError, match="no polygon"):
         join_polygons([])

@@ -77,12 +77,9 @@ def instant_faults(topics: dict[str, list[Any]], sample: Any) -> list[str]:
         found += projection_faults(topics, name, world_pose(image.frame_id), sample)
     (cloud,) = topics["/lidar/top/points"]
     fields = {f.name: (NUMPY_TYPES[f.type], f.offset) for f in cloud.fields}
-    kinds = {"names": [], "formats": [], "offsets": [], "itemsize": cloud.point_stride}
-    for name, (kind, offset) in fields.items():
-        kinds["names"].append(name)
-        kinds["formats"].append(kind)
-        kinds["offsets"].append(offset)
-    points = np.frombuffer(cloud.data, np.dtype(kinds))
+    formats, offsets = zip(*fields.values(), strict=True)
+    kinds = {"names": [*fields], "formats": formats, "offsets": offsets}
+    points = np.frombuffer(cloud.data, np.dtype(kinds | {"itemsize": cloud.point_stride}))
     expected = sample.capture.clouds["top"].points
     place = np.stack([points["x"], points["y"], points["z"]], axis=1)
     if not np.array_equal(place, expected["position_m"]):
@@ -144,11 +141,22 @@ def box_faults(topics: dict[str, list[Any]], points: Any, ids: Any) -> list[str]
     return found
 
 
-def test_messages_agree_with_the_samples(dataset: Path, samples: Any) -> None:
+def test_messages_agree_with_the_samples_in_foxgloves_schemas(dataset: Path, samples: Any) -> None:
     """Images, transforms, calibrations, clouds and cubes, in order of time."""
     assert faults(dataset / "train/street-000000.mcap", samples[:4]) == []
     assert faults(dataset / "val/street-000001.mcap", samples[4:]) == []
     assert len([p for p in dataset.rglob("*") if p.is_file()]) == 2
+    # And the summary counts all messages.
+    path = dataset / "train/street-000000.mcap"
+    found = messages(path)
+    names = ("FrameTransform", "CompressedImage", "CameraCalibration", "ImageAnnotations",
+             "PointCloud", "SceneUpdate")  # fmt: skip
+    assert {name for _, name, _, _ in found} == {f"foxglove.{name}" for name in names}
+    with path.open("rb") as file:
+        summary = make_reader(file).get_summary()
+    assert summary is not None
+    assert summary.statistics is not None
+    assert summary.statistics.message_count == len(found)
 
 
 def test_compressed_files_hold_the_same(dataset: Path, exported: Any) -> None:
@@ -163,54 +171,23 @@ def test_compressed_files_hold_the_same(dataset: Path, exported: Any) -> None:
     assert str(messages(compressed)) == str(messages(plain))
 
 
-def test_schemas_are_foxgloves(dataset: Path) -> None:
-    """And the summary counts all messages."""
-    path = dataset / "train/street-000000.mcap"
-    found = messages(path)
-
-    assert {name for _, name, _, _ in found} == {
-        f"foxglove.{name}"
-        for name in (
-            "FrameTransform",
-            "CompressedImage",
-            "CameraCalibration",
-            "ImageAnnotations",
-            "PointCloud",
-            "SceneUpdate",
-        )
-    }
-    with path.open("rb") as file:
-        summary = make_reader(file).get_summary()
-    assert summary is not None
-    assert summary.statistics is not None
-    assert summary.statistics.message_count == len(found)
-
-
 def test_sensors_have_their_own_instants(world: Any, slow: Any, tmp_path: Path) -> None:
     """The right camera and the scanner read at every second step."""
     path = world.export(Mcap(), drive_info(world), slow, tmp_path) / "train/street-000000.mcap"
-
     times = [(topic, time_ns) for topic, _, time_ns, _ in messages(path)]
-
-    assert [t for topic, t in times if topic == "/camera/left/rgb"] == [
-        START_NS + k * STEP_NS for k in range(4)
-    ]
-    assert [t for topic, t in times if topic == "/camera/right/rgb"] == [
-        START_NS,
-        START_NS + 2 * STEP_NS,
-    ]
-    assert [t for topic, t in times if topic == "/lidar/top/points"] == [
-        START_NS,
-        START_NS + 2 * STEP_NS,
-    ]
+    every = [START_NS + k * STEP_NS for k in range(4)]
+    for name, read in (
+        ("/camera/left/rgb", every),
+        ("/camera/right/rgb", every[::2]),
+        ("/lidar/top/points", every[::2]),
+    ):
+        assert [t for topic, t in times if topic == name] == read
 
 
 def test_fields_of_points_cover_the_record() -> None:
     """Without gaps, in the record's own types."""
     fields = list(point_fields())
     sizes = {1: 1, 3: 2, 7: 4}
-
     ends = [f["offset"] + sizes[f["type"]] for f in fields]
-
     assert [f["offset"] for f in fields] == [0, *ends[:-1]]
     assert ends[-1] == POINT.itemsize

@@ -11,11 +11,10 @@ from gen_data.exporters.motchallenge import MotChallenge, mot_class
 from tests.exporters.drives import stems
 
 
-def test_mot_rows_count_from_one(exported: Any, samples: Any) -> None:
+def test_mot_rows_count_from_1_and_sequences_describe_them(exported: Any, samples: Any) -> None:
     """Frames, ids and pixels; boxes are those of the visible pixels."""
     folder = exported(MotChallenge()) / "street-val/street-0001"
     rows = [line.split(",") for line in (folder / "gt/gt.txt").read_text().splitlines()]
-
     assert stems(folder / "img1") == [f"{k:06d}" for k in range(1, 5)]
     assert [row[0] for row in rows if row[1] == "2"] == ["1", "2", "3", "4"]
     for row in rows:
@@ -27,42 +26,25 @@ def test_mot_rows_count_from_one(exported: Any, samples: Any) -> None:
         ]  # fmt: skip
         assert float(row[8]) == pytest.approx(thing.visible_fraction, abs=1e-6)
     assert {(row[1], row[6], row[7]) for row in rows} == {("1", "0", "3"), ("2", "1", "1")}
-
-
-def test_mot_sequences_describe_themselves(exported: Any) -> None:
-    """seqinfo.ini by an ini reader; the list of sequences has TrackEval's header."""
+    # seqinfo.ini by an ini reader; the list of sequences has TrackEval's header.
     folder = exported(MotChallenge())
     ini = configparser.ConfigParser()
     ini.read(folder / "street-train/street-0000/seqinfo.ini")
-
-    assert dict(ini["Sequence"]) == {
-        "name": "street-0000",
-        "imdir": "img1",
-        "framerate": "10",
-        "seqlength": "4",
-        "imwidth": "160",
-        "imheight": "120",
-        "imext": ".png",
-    }
+    assert dict(ini["Sequence"]) == {"name": "street-0000", "imdir": "img1", "framerate": "10",
+                                     "seqlength": "4", "imwidth": "160", "imheight": "120",
+                                     "imext": ".png"}  # fmt: skip
     assert (folder / "seqmaps/street-val.txt").read_text() == "name\nstreet-0001\n"
 
 
 @pytest.mark.parametrize(
     ("category", "facts", "number"),
-    [
-        ("person", (), 1),
-        ("pedestrian", (("pose", "sitting"),), 7),
-        ("motorcycle", (("rider", "yes"),), 2),
-        ("motorcycle", (("rider", "no"),), 5),
-        ("bicycle", (), 4),
-        ("bus", (), 3),
-        ("crate", (), 0),
-    ],
-)
+    [("person", (), 1), ("pedestrian", (("pose", "sitting"),), 7),
+     ("motorcycle", (("rider", "yes"),), 2), ("motorcycle", (("rider", "no"),), 5),
+     ("bicycle", (), 4), ("bus", (), 3), ("crate", (), 0)],
+)  # fmt: skip
 def test_mot_classes(category: str, facts: Any, number: int, world: Any) -> None:
     """Numbers of MOT16's table 5; 0 has no rows."""
     thing = replace(world.instance(1, "car", 0.0, 0.0, 0.0), category=category, attributes=facts)
-
     assert mot_class(thing) == number
 
 
@@ -71,25 +53,17 @@ def trackeval_scores(dataset: Any, sequence: str, name: str) -> dict[str, float]
     import trackeval
 
     quiet = {"PRINT_CONFIG": False}
-    evaluator = trackeval.Evaluator(
-        {
-            **dict.fromkeys(("PRINT_RESULTS", "PRINT_CONFIG", "TIME_PROGRESS"), False),
-            **dict.fromkeys(("OUTPUT_SUMMARY", "OUTPUT_DETAILED", "PLOT_CURVES"), False),
-            "USE_PARALLEL": False,
-            "BREAK_ON_ERROR": True,
-            "LOG_ON_ERROR": None,
-        }
-    )
+    off = ("PRINT_RESULTS", "PRINT_CONFIG", "TIME_PROGRESS", "OUTPUT_SUMMARY", "OUTPUT_DETAILED",
+           "PLOT_CURVES", "USE_PARALLEL")  # fmt: skip
+    options = {**dict.fromkeys(off, False), "BREAK_ON_ERROR": True, "LOG_ON_ERROR": None}
+    evaluator = trackeval.Evaluator(options)
     metrics = trackeval.metrics
     judges = [metrics.HOTA(quiet), metrics.CLEAR(quiet), metrics.Identity(quiet)]
     results, _ = evaluator.evaluate([dataset], judges)
     (tracked,) = results.values()
     row = tracked["truth"][sequence][name]
-    return {
-        "HOTA": float(row["HOTA"]["HOTA"].mean()),
-        "MOTA": float(row["CLEAR"]["MOTA"]),
-        "IDF1": float(row["Identity"]["IDF1"]),
-    }
+    return {"HOTA": float(row["HOTA"]["HOTA"].mean()), "MOTA": float(row["CLEAR"]["MOTA"]),
+            "IDF1": float(row["Identity"]["IDF1"])}  # fmt: skip
 
 
 @pytest.mark.slow
@@ -112,16 +86,10 @@ def test_trackeval_scores_the_truth_as_perfect(exported: Any, tmp_path: Path, sp
         data = tmp_path / "trackers/truth/data"
         data.mkdir(parents=True, exist_ok=True)
         (data / f"{sequence}.txt").write_text("\n".join(lines))
-        dataset = trackeval.datasets.MotChallenge2DBox(
-            {
-                "GT_FOLDER": str(folder),
-                "TRACKERS_FOLDER": str(tmp_path / "trackers"),
-                "OUTPUT_FOLDER": str(tmp_path / "results"),
-                "SKIP_SPLIT_FOL": True,
-                "SEQ_INFO": {sequence: 4},
-                "PRINT_CONFIG": False,
-            }
-        )
+        options = {**{"GT_FOLDER": str(folder), "TRACKERS_FOLDER": str(tmp_path / "trackers")},
+                   **{"OUTPUT_FOLDER": str(tmp_path / "results"), "SKIP_SPLIT_FOL": True},
+                   **{"SEQ_INFO": {sequence: 4}, "PRINT_CONFIG": False}}  # fmt: skip
+        dataset = trackeval.datasets.MotChallenge2DBox(options)
         return trackeval_scores(dataset, sequence, "pedestrian")
 
     assert scores({}) == pytest.approx({"HOTA": 1.0, "MOTA": 1.0, "IDF1": 1.0}, abs=1e-9)

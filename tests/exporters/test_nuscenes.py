@@ -64,10 +64,8 @@ def every(exported: Any) -> Path:
 def test_steps_between_key_frames_are_sweeps(exported: Any) -> None:
     """A sweep belongs to the key frame that follows, the last ones to the last."""
     folder = exported(NuScenes(key_frame_s=0.2))
-
     samples = by_token(folder, "sample")
     rows = readings(folder, "CAM_LEFT")
-
     assert [row["is_key_frame"] for row in rows] == [True, False, True, False] * 2
     assert [row["filename"].split("/")[0] for row in rows[:2]] == ["samples", "sweeps"]
     assert all((folder / row["filename"]).exists() for row in rows)
@@ -91,7 +89,7 @@ def test_times_are_microseconds_and_chains_follow_them(every: Path) -> None:
     assert rows[4]["timestamp"] - rows[3]["timestamp"] > 1_000_000
 
 
-def test_poses_and_intrinsics_are_those_of_the_sensors(every: Path, samples: Any) -> None:
+def test_poses_intrinsics_and_scans_are_those_of_the_sensors(every: Path, samples: Any) -> None:
     """Ego and mount together are the sensor in the world; pixel centres are whole numbers."""
     T_global_world = SE3(ORIGIN_M)
     for sample, row in zip(samples, readings(every, "CAM_RIGHT"), strict=True):
@@ -104,10 +102,7 @@ def test_poses_and_intrinsics_are_those_of_the_sensors(every: Path, samples: Any
         assert (row["width"], row["height"]) == (160, 120)
     (origin,) = {tuple(log["world_origin"]) for log in table(every, "log")}
     assert origin == ORIGIN_M
-
-
-def test_scans_have_the_axes_of_nuscenes(every: Path, samples: Any) -> None:
-    """X right, y forward, intensity to 255; the mount turns them back to the world."""
+    # X right, y forward, intensity to 255; the mount turns them back to the world.
     for sample, row in zip(samples, readings(every, "LIDAR_TOP"), strict=True):
         points = np.fromfile(every / row["filename"], "<f4").reshape(-1, 5)
         cloud = sample.capture.clouds["top"].points
@@ -129,21 +124,33 @@ def test_files_of_a_scanner_look_ahead_however_it_is_mounted(yaw_deg: int, turns
     points = np.zeros(2, POINT)
     ego_m = np.array([[10.0, 0.0, 1.0], [0.0, 10.0, 1.0]])
     points["position_m"] = mount.inverse().apply(ego_m)
-
     xyz = np.frombuffer(nuscenes_files.lidar_bytes(points, turns), "<f4").reshape(-1, 5)[:, :3]
-
     np.testing.assert_allclose(xyz, [[0, 10, 1], [-10, 0, 1]], atol=1.0)
     assert np.isclose(np.linalg.norm(xyz[0]), np.sqrt(101.0))
 
 
-def test_the_lowest_laser_is_ring_0() -> None:
+def test_the_lowest_laser_is_ring_0_and_radar_files_have_the_fields_of_the_device() -> None:
+    """Position and radial velocity of a detection 30 degrees to the left that approaches."""
     points = np.zeros(3, POINT)
     points["ring"] = [0, 30, 31]
     rings = np.frombuffer(nuscenes_files.lidar_bytes(points, 0), "<f4").reshape(-1, 5)[:, 4]
     assert rings.tolist() == [31, 1, 0]
+    rows = table_rows(Radar.columns, 2, range_m=[10.0, 20.0], azimuth_rad=[np.pi / 6, 0.0],
+                      velocity_m_s=[-8.0, -5.0], velocity_compensated_m_s=[-3.0, 0.1],
+                      rcs_dbsm=[12.5, 3.0])  # fmt: skip
+    head, body = nuscenes_files.radar_bytes(rows).split(b"DATA binary\n")
+    points = np.frombuffer(body[:-1], nuscenes_files.RADAR_POINT)
+    assert nuscenes_files.RADAR_POINT.itemsize == 43
+    assert b"WIDTH 2\n" in head
+    np.testing.assert_allclose(points["x"], [10 * np.cos(np.pi / 6), 20], rtol=1e-6)
+    np.testing.assert_allclose(points["y"], [5, 0], atol=1e-5)
+    np.testing.assert_allclose(points["vy"], [-4, 0], atol=1e-5)
+    np.testing.assert_allclose(points["vy_comp"], [-1.5, 0], atol=1e-5)
+    assert points["dyn_prop"].tolist() == [2, 1]
+    assert points["id"].tolist() == [0, 1]
 
 
-def test_boxes_count_the_pulses_that_hit_their_object(every: Path, samples: Any) -> None:
+def test_boxes_count_the_pulses_that_hit_and_points_are_labelled(every: Path, samples: Any) -> None:
     """Of a noise-free scan, whose points lie on the faces: each hit counts."""
     annotations = by_token(every, "sample_annotation")
     instances = by_token(every, "instance")
@@ -158,6 +165,20 @@ def test_boxes_count_the_pulses_that_hit_their_object(every: Path, samples: Any)
         for number, name in ((1, "vehicle.car"), (2, "human.pedestrian.adult")):
             assert found[k, name] == int((ids == number).sum())
     assert sum(found.values()) > 100
+    # Class by point; instance numbers count per category and stay the same.
+    index = {row["name"]: row["index"] for row in table(every, "category")}
+    labels = {row["sample_data_token"]: row["filename"] for row in table(every, "lidarseg")}
+    panoptic = {row["sample_data_token"]: row["filename"] for row in table(every, "panoptic")}
+    names = ("flat.driveable_surface", "vehicle.car", "human.pedestrian.adult", "static.other")
+    expected = dict(zip((0, 1, 2, 4), map(index.__getitem__, names), strict=True))
+    for sample, row in zip(samples, readings(every, "LIDAR_TOP"), strict=True):
+        points = sample.capture.clouds["top"].points
+        made = np.fromfile(every / labels[row["token"]], np.uint8)
+        assert made.tolist() == [expected[k] for k in points["instance_id"].tolist()]
+        whole = np.load(every / panoptic[row["token"]])["data"]
+        assert whole.dtype == np.uint16
+        assert (whole // 1000 == made).all()
+        assert (whole % 1000 == (points["instance_id"] > 0)).all()
 
 
 def test_boxes_are_in_the_global_frame_with_width_first(every: Path, samples: Any) -> None:
@@ -182,27 +203,6 @@ def test_boxes_are_in_the_global_frame_with_width_first(every: Path, samples: An
     assert car["nbr_annotations"] == 4
 
 
-def test_point_labels_are_those_of_the_objects(every: Path, samples: Any) -> None:
-    """Class by point; instance numbers count per category and stay the same."""
-    index = {row["name"]: row["index"] for row in table(every, "category")}
-    labels = {row["sample_data_token"]: row["filename"] for row in table(every, "lidarseg")}
-    panoptic = {row["sample_data_token"]: row["filename"] for row in table(every, "panoptic")}
-    expected = {
-        0: index["flat.driveable_surface"],
-        1: index["vehicle.car"],
-        2: index["human.pedestrian.adult"],
-        4: index["static.other"],
-    }
-    for sample, row in zip(samples, readings(every, "LIDAR_TOP"), strict=True):
-        points = sample.capture.clouds["top"].points
-        made = np.fromfile(every / labels[row["token"]], np.uint8)
-        assert made.tolist() == [expected[k] for k in points["instance_id"].tolist()]
-        whole = np.load(every / panoptic[row["token"]])["data"]
-        assert whole.dtype == np.uint16
-        assert (whole // 1000 == made).all()
-        assert (whole % 1000 == (points["instance_id"] > 0)).all()
-
-
 def swept(sample: Any) -> Any:
     """The sample with a sweep of 100 ms whose pulses hit everything at its end."""
     cloud = sample.capture.clouds["top"]
@@ -221,22 +221,19 @@ def test_boxes_are_where_pulses_hit_the_object(
     sample = swept(samples[1])
     exporter = NuScenes(boxes_at=boxes_at, box_margin_m=0.0)
     folder = world.export(exporter, drive_info(world), [sample], tmp_path)
-
     moved = {}
     for row in table(folder, "sample_annotation"):
-        thing = min(
-            sample.scene.instances,
-            key=lambda i: np.linalg.norm(
-                np.subtract(row["translation"], ORIGIN_M)[:2] - i.T_world_instance.translation_m[:2]
-            ),
-        )
         centre = np.subtract(row["translation"], ORIGIN_M)
+        places = [i.T_world_instance.translation_m[:2] for i in sample.scene.instances]
+        nearest = np.argmin(np.linalg.norm(centre[:2] - places, axis=1))
+        thing = sample.scene.instances[nearest]
         offset = thing.T_world_instance.inverse().apply(centre)
         moved[thing.instance_id] = round(float(offset[0]), 4)
     assert moved == {1: ahead_m, 2: round(ahead_m * 1.5 / 8.0, 4), 4: 0.0}
 
 
-def test_objects_that_labels_ignore_have_no_box(world: Any, samples: Any) -> None:
+def test_ignored_objects_have_no_box_and_visibility_adds_up(world: Any, samples: Any) -> None:
+    """Two cameras that show a half each show all; half of it hidden is level 2."""
     sample = samples[0]
     image = sample.truth["left"]
     flagged = tuple(replace(t, ignored=t.instance.instance_id == 2) for t in image.objects)
@@ -248,9 +245,15 @@ def test_objects_that_labels_ignore_have_no_box(world: Any, samples: Any) -> Non
         truth={**sample.truth, "left": replace(image, objects=flagged)},
         scene=replace(sample.scene, instances=instances),
     )
-
     assert set(annotated_things(sample)) == {1, 2, 4}
     assert set(annotated_things(changed)) == {1}
+    views = views_by_instance(samples[0])[1]
+    half = [replace(view, visible_px=100, occlusion=0.0, truncation=0.5) for view in views[:2]]
+    assert len(views) == 2
+    assert (visibility_level(half), visibility_level(half[:1])) == ("4", "2")
+    assert visibility_level([replace(view, occlusion=0.5) for view in half]) == "2"
+    assert visibility_level([replace(view, occlusion=0.3) for view in half]) == "3"
+    assert visibility_level([]) == "1"
 
 
 def test_a_hidden_object_keeps_its_track(world: Any, samples: Any, tmp_path: Path) -> None:
@@ -260,7 +263,6 @@ def test_a_hidden_object_keeps_its_track(world: Any, samples: Any, tmp_path: Pat
         unseen = (1, 2) if k == 1 else (2,) if k == 3 else ()
         hidden.append(without(sample, unseen))
     folder = world.export(NuScenes(key_frame_s=0.1), drive_info(world), hidden, tmp_path)
-
     counts = {row["category_token"]: row["nbr_annotations"] for row in table(folder, "instance")}
     names = {row["token"]: row["name"] for row in table(folder, "category")}
     assert {names[k]: n for k, n in counts.items()} == {
@@ -286,49 +288,10 @@ def without(sample: Any, numbers: tuple[int, ...]) -> Any:
     return replace(sample, truth=truth, capture=replace(sample.capture, clouds=clouds))
 
 
-def test_visibility_adds_up_over_the_cameras(samples: Any) -> None:
-    """Two cameras that show a half each show all; half of it hidden is level 2."""
-    views = views_by_instance(samples[0])[1]
-    half = [replace(view, visible_px=100, occlusion=0.0, truncation=0.5) for view in views[:2]]
-
-    assert len(views) == 2
-    assert (visibility_level(half), visibility_level(half[:1])) == ("4", "2")
-    assert visibility_level([replace(view, occlusion=0.5) for view in half]) == "2"
-    assert visibility_level([replace(view, occlusion=0.3) for view in half]) == "3"
-    assert visibility_level([]) == "1"
-
-
-def test_radar_files_have_the_fields_of_the_device() -> None:
-    """Position and radial velocity of a detection 30 degrees to the left that approaches."""
-    rows = table_rows(
-        Radar.columns,
-        2,
-        range_m=[10.0, 20.0],
-        azimuth_rad=[np.pi / 6, 0.0],
-        velocity_m_s=[-8.0, -5.0],
-        velocity_compensated_m_s=[-3.0, 0.1],
-        rcs_dbsm=[12.5, 3.0],
-    )
-    head, body = nuscenes_files.radar_bytes(rows).split(b"DATA binary\n")
-
-    points = np.frombuffer(body[:-1], nuscenes_files.RADAR_POINT)
-
-    assert nuscenes_files.RADAR_POINT.itemsize == 43
-    assert b"WIDTH 2\n" in head
-    np.testing.assert_allclose(points["x"], [10 * np.cos(np.pi / 6), 20], rtol=1e-6)
-    np.testing.assert_allclose(points["y"], [5, 0], atol=1e-5)
-    np.testing.assert_allclose(points["vy"], [-4, 0], atol=1e-5)
-    np.testing.assert_allclose(points["vy_comp"], [-1.5, 0], atol=1e-5)
-    assert points["dyn_prop"].tolist() == [2, 1]
-    assert points["id"].tolist() == [0, 1]
-
-
 def test_maps_show_where_one_may_drive() -> None:
     """Ten pixels per metre, the last row at y = 0; the origin is below and left of all lanes."""
-    lanes = (
-        Lane("a", "driving", ((-20.0, 5.0, 0.0), (20.0, 5.0, 0.0)), 4.0),
-        Lane("b", "sidewalk", ((-20.0, 12.0, 0.0), (20.0, 12.0, 0.0)), 2.0),
-    )
+    lanes = (Lane("a", "driving", ((-20.0, 5.0, 0.0), (20.0, 5.0, 0.0)), 4.0),
+             Lane("b", "sidewalk", ((-20.0, 12.0, 0.0), (20.0, 12.0, 0.0)), 2.0))  # fmt: skip
     area = nuscenes_files.map_area(lanes)
     mask = cv2.imdecode(
         np.frombuffer(nuscenes_files.map_bytes(lanes, area), np.uint8), cv2.IMREAD_UNCHANGED
@@ -347,16 +310,13 @@ def test_maps_show_where_one_may_drive() -> None:
     assert [is_driveable(x, 5) for x in (-20.3, -19.7, 19.7, 20.3)] == [False, True, True, False]
 
 
-def test_every_class_has_a_name_of_nuscenes() -> None:
+def test_classes_have_names_of_nuscenes_and_attributes_tell_how_objects_stand(world: Any) -> None:
     """Tables refer to known categories and surfaces."""
     names = [name for name, _ in classes().categories]
     assert len(names) == len(set(names)) == 32
     assert set(classes().things.values()) | set(classes().surfaces.values()) <= set(names)
     assert set(classes().surfaces) <= set(SURFACES)
-
-
-def test_attributes_tell_how_objects_stand(world: Any) -> None:
-    """Parked beside the lanes, stopped in traffic, moving by speed, people by their pose."""
+    # Parked beside the lanes, stopped in traffic, moving by speed, people by their pose.
     groups = tuple(
         ObjectGroup(name, (), (), 1, "along", lanes=(kind,))
         for name, kind in (("parked", "parking"), ("traffic", "driving"))
@@ -393,7 +353,6 @@ def test_a_scan_without_returns_is_a_key_frame(world: Any, samples: Any, tmp_pat
     clouds = {"top": replace(cloud, points=cloud.points[:0])}
     empty = replace(sample, capture=replace(sample.capture, clouds=clouds))
     folder = world.export(NuScenes(), drive_info(world), [empty], tmp_path)
-
     (row,) = readings(folder, "LIDAR_TOP")
     assert (folder / row["filename"]).stat().st_size == 0
     assert {row["num_lidar_pts"] for row in table(folder, "sample_annotation")} == {0}

@@ -29,14 +29,8 @@ def with_radar(sample: Any) -> Any:
     T_radar_world = scene.device("front").T_world_device.inverse()
     car = scene.instance(1)
     x, y, _ = T_radar_world.apply(np.array(car.T_world_instance.translation_m))
-    rows = table_rows(
-        Radar.columns,
-        sample.index % 4 and 1,
-        time_s=scene.time_s,
-        range_m=np.hypot(x, y),
-        azimuth_rad=np.arctan2(y, x),
-        instance_id=1,
-    )
+    values = {"range_m": np.hypot(x, y), "azimuth_rad": np.arctan2(y, x), "instance_id": 1}
+    rows = table_rows(Radar.columns, sample.index % 4 and 1, time_s=scene.time_s, **values)
     tables = {"front": Measurements("front", scene.device("front"), rows, scene.time_s)}
     capture = Capture(sample.capture.readings, sample.capture.clouds, tables)
     return replace(sample, scene=scene, capture=capture)
@@ -55,7 +49,8 @@ def folder(world: Any, driven: Any, tmp_path_factory: pytest.TempPathFactory) ->
     return made
 
 
-def open_devkit(folder: Path) -> Any:
+@pytest.fixture(scope="module")
+def devkit(folder: Path) -> Any:
     from nuscenes.nuscenes import NuScenes
 
     return NuScenes(V, str(folder), verbose=False)
@@ -68,14 +63,8 @@ def detection_faults(devkit: Any, predicted: Callable[[Any], Any], folder: Path)
 
     result = folder.parent / "predictions.json"
     result.write_text(json.dumps({"meta": META, "results": predicted(devkit)}))
-    evaluation = DetectionEval(
-        devkit,
-        config_factory("detection_cvpr_2019"),
-        str(result),
-        "all",
-        str(folder.parent / "evaluation"),
-        verbose=False,
-    )
+    config, target = config_factory("detection_cvpr_2019"), str(folder.parent / "evaluation")
+    evaluation = DetectionEval(devkit, config, str(result), "all", target, verbose=False)
     metrics, _ = evaluation.evaluate()
     boxes = [b for k in evaluation.gt_boxes.sample_tokens for b in evaluation.gt_boxes[k]]
     present = {box.detection_name for box in boxes}
@@ -89,13 +78,8 @@ def detection_faults(devkit: Any, predicted: Callable[[Any], Any], folder: Path)
                 yield f"{name}: {error} {metrics.get_label_tp(name, error):.3f}"
 
 
-META = {
-    "use_camera": True,
-    "use_lidar": True,
-    "use_radar": True,
-    "use_map": False,
-    "use_external": False,
-}
+META = {f"use_{name}": name in ("camera", "lidar", "radar")
+        for name in ("camera", "lidar", "radar", "map", "external")}  # fmt: skip
 
 
 def predictions(devkit: Any) -> dict[str, list[dict[str, Any]]]:
@@ -106,24 +90,19 @@ def predictions(devkit: Any) -> dict[str, list[dict[str, Any]]]:
     for row in devkit.sample_annotation:
         name = category_to_detection_name(row["category_name"])
         if name is not None and row["num_lidar_pts"] + row["num_radar_pts"] > 0:
+            attribute = devkit.get("attribute", row["attribute_tokens"][0])["name"]
             results[row["sample_token"]].append(
-                {
-                    "sample_token": row["sample_token"],
-                    "translation": row["translation"],
-                    "size": row["size"],
-                    "rotation": row["rotation"],
-                    "velocity": devkit.box_velocity(row["token"])[:2].tolist(),
-                    "detection_name": name,
-                    "detection_score": 0.9,
-                    "attribute_name": devkit.get("attribute", row["attribute_tokens"][0])["name"],
-                }
+                {key: row[key] for key in ("sample_token", "translation", "size", "rotation")}
+                | {"velocity": devkit.box_velocity(row["token"])[:2].tolist()}
+                | {"detection_name": name, "detection_score": 0.9, "attribute_name": attribute}
             )
     return results
 
 
-def test_velocities_of_neighbouring_boxes_are_the_objects(folder: Path, driven: Any) -> None:
+def test_boxes_contain_the_points_that_they_count_and_move_as_the_objects_on_maps(
+    folder: Path, devkit: Any, driven: Any
+) -> None:
     """Away from the ends of tracks."""
-    devkit = open_devkit(folder)
     steps = {int(row["timestamp"]): k for k, row in enumerate(devkit.sample)}
     for row in devkit.sample_annotation:
         if row["prev"] and row["next"]:
@@ -133,14 +112,10 @@ def test_velocities_of_neighbouring_boxes_are_the_objects(folder: Path, driven: 
                 np.linalg.norm(t.twist.velocity_m_s - velocity) for t in sample.scene.instances
             ]
             assert min(speeds) < 0.05, row["category_name"]
-
-
-def test_boxes_contain_the_points_that_they_count(folder: Path) -> None:
-    """Their margin contains the points on the faces, by the devkit's geometry."""
+    # Their margin contains the points on the faces, by the devkit's geometry.
     from nuscenes.utils.data_classes import LidarPointCloud
     from nuscenes.utils.geometry_utils import points_in_box
 
-    devkit = open_devkit(folder)
     counted = 0
     for sample in devkit.sample:
         path, boxes, _ = devkit.get_sample_data(sample["data"]["LIDAR_TOP"])
@@ -150,10 +125,6 @@ def test_boxes_contain_the_points_that_they_count(folder: Path) -> None:
             assert points_in_box(box, xyz).sum() == count, box.name
             counted += count
     assert counted > 100
-
-
-def test_maps_contain_the_poses_of_the_ego(folder: Path) -> None:
-    devkit = open_devkit(folder)
     for scene in devkit.scene:
         log = devkit.get("log", scene["log_token"])
         mask = devkit.get("map", log["map_token"])["mask"].mask()
@@ -163,16 +134,29 @@ def test_maps_contain_the_poses_of_the_ego(folder: Path) -> None:
             assert 0 <= 10 * x < mask.shape[1] and 0 <= 10 * y < mask.shape[0]
 
 
-def test_the_evaluation_scores_the_boxes_as_perfect(folder: Path) -> None:
+def test_the_evaluation_scores_the_boxes_as_perfect_and_predictions_elsewhere_worse(
+    folder: Path, devkit: Any
+) -> None:
     """AP 1 and no error of every class that is there."""
-    assert list(detection_faults(open_devkit(folder), predictions, folder)) == []
+    assert list(detection_faults(devkit, predictions, folder)) == []
+
+    # Predictions 0.3 m to the side have that error, and still an AP.
+    def moved(devkit: Any) -> Any:
+        found = predictions(devkit)
+        for boxes in found.values():
+            for box in boxes:
+                box["translation"] = [box["translation"][0] + 0.3, *box["translation"][1:]]
+        return found
+
+    faults = list(detection_faults(devkit, moved, folder))
+    assert "car: trans_err 0.300" in faults
+    assert not any("AP" in fault for fault in faults)
 
 
-def test_radar_detections_are_counted_and_read(folder: Path, driven: Any) -> None:
+def test_radar_detections_are_counted_and_read(folder: Path, devkit: Any, driven: Any) -> None:
     """In the frame of the radar the car's detection is where the car is."""
     from nuscenes.utils.data_classes import RadarPointCloud
 
-    devkit = open_devkit(folder)
     counts = [row["num_radar_pts"] for row in devkit.sample_annotation]
     assert sorted(counts)[-6:] == [1] * 6 and sum(counts) == 6
     for k, sample in enumerate(devkit.sample):
@@ -184,12 +168,11 @@ def test_radar_detections_are_counted_and_read(folder: Path, driven: Any) -> Non
         assert np.abs(points[:2].T - car.center[:2]).max(initial=0.0) < 1e-3
 
 
-def test_the_tracking_evaluation_scores_the_boxes_as_perfect(folder: Path, tmp_path: Path) -> None:
+def test_the_tracking_evaluation_is_perfect(folder: Path, devkit: Any, tmp_path: Path) -> None:
     """AMOTA 1 for each class; AMOTA falls if a track changes its id at every key frame."""
     from nuscenes.eval.common.config import config_factory
     from nuscenes.eval.tracking.evaluate import TrackingEval
 
-    devkit = open_devkit(folder)
     owner = {row["token"]: row["instance_token"] for row in devkit.sample_annotation}
 
     def amota(name_track: Callable[[str, str], str], name: str) -> dict[str, float]:
@@ -222,13 +205,12 @@ def test_the_tracking_evaluation_scores_the_boxes_as_perfect(folder: Path, tmp_p
 
 
 def test_the_lidarseg_evaluation_scores_the_labels_as_perfect(
-    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    folder: Path, devkit: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """IoU 1 for each class that is there, and less where a third of the points has another one."""
     from nuscenes.eval.lidarseg import utils
     from nuscenes.eval.lidarseg.evaluate import LidarSegEval
 
-    devkit = open_devkit(folder)
     names = [row["name"] for row in devkit.scene]
     monkeypatch.setattr(utils, "create_splits_scenes", lambda verbose: {"val": names})
 
@@ -248,19 +230,3 @@ def test_the_lidarseg_evaluation_scores_the_labels_as_perfect(
     assert perfect == [1.0] * len(perfect) and len(perfect) > 1
     other = score(lambda labels: np.where(np.arange(len(labels)) % 3, labels, 1), "other")
     assert min(other) < 0.7
-
-
-def test_the_evaluator_finds_predictions_elsewhere(folder: Path) -> None:
-    """Predictions 0.3 m to the side have that error, and still an AP."""
-
-    def moved(devkit: Any) -> Any:
-        found = predictions(devkit)
-        for boxes in found.values():
-            for box in boxes:
-                box["translation"] = [box["translation"][0] + 0.3, *box["translation"][1:]]
-        return found
-
-    faults = list(detection_faults(open_devkit(folder), moved, folder))
-
-    assert "car: trans_err 0.300" in faults
-    assert not any("AP" in fault for fault in faults)

@@ -44,7 +44,6 @@ def test_navigation_follows_the_rig(exported: Any, world: Any) -> None:
     ]
     scale = math.cos(math.radians(rows[0][0]))
     start = mercator(rows[0][0], rows[0][1], scale)
-
     for k, row in enumerate(rows):
         pose = world.ego_pose(0.1 * k)
         east, north = mercator(row[0], row[1], scale)
@@ -60,16 +59,28 @@ def test_navigation_follows_the_rig(exported: Any, world: Any) -> None:
         assert math.hypot(row[6], row[7]) == pytest.approx(10.0, abs=2e-3)
 
 
-def test_navigation_of_a_leaning_unit_at_rest_feels_gravity_along_its_own_axes() -> None:
+def test_navigation_has_the_axes_of_a_leaning_unit_and_of_the_compass() -> None:
     """Nose up by 30 degrees: half of gravity forward along its axis, none along the level one."""
     up = SE3((0.0, 0.0, 7.0), (math.cos(math.radians(15)), 0.0, -math.sin(math.radians(15)), 0.0))
     row = np.array(oxts_row(RigMotion(up, STILL), (49.0, 8.0)).split(), float)
-
     assert row[:3] == pytest.approx([49.0, 8.0, 7.0])
     assert row[3:6] == pytest.approx([0.0, -math.radians(30), 0.0])
     assert row[11:17] == pytest.approx(
         [0.5 * GRAVITY_M_S2, 0.0, math.sqrt(0.75) * GRAVITY_M_S2, 0.0, 0.0, GRAVITY_M_S2]
     )
+    # World Y is north, X is east; heading north makes both forward and leftward differ.
+    north = SE3.about_z(math.radians(90))
+    motion = RigMotion(north, Twist((1.0, 5.0, 0.0)))
+    row = np.array(oxts_row(motion, (0.0, 0.0)).split(), float)
+    assert row[6:11] == pytest.approx([5.0, 1.0, 5.0, -1.0, 0.0])
+    # Rz(yaw) Ry(pitch) Rx(roll), as the devkit builds it.
+    roll, pitch, yaw = 0.1, -0.2, 2.8
+
+    def about(axis: int, angle: float) -> Any:
+        return cv2.Rodrigues(np.eye(3)[axis] * angle)[0]
+
+    rotation = about(2, yaw) @ about(1, pitch) @ about(0, roll)
+    assert roll_pitch_yaw(rotation) == pytest.approx((roll, pitch, yaw))
 
 
 def test_navigation_of_a_device_is_that_of_its_place_on_the_rig(samples: Any) -> None:
@@ -78,32 +89,10 @@ def test_navigation_of_a_device_is_that_of_its_place_on_the_rig(samples: Any) ->
     scene = replace(samples[1].scene, devices=(device,))
     mount = navigation_mount(scene, "gnss", "ego", "kitti_raw")
     row = np.array(oxts_row(rig_motion(scene, mount), (0.0, 0.0)).split(), float)
-
     assert row[8:11] == pytest.approx([9.8, 0.0, 0.0], abs=2e-3)
     assert (row[12], row[2]) == (pytest.approx(9.8 * 0.2, abs=0.01), pytest.approx(0.5))
     with pytest.raises(ConfigError, match=r"no device 'imu'.*gnss"):
         navigation_mount(scene, "imu", "ego", "kitti_raw")
-
-
-def test_navigation_north_and_east() -> None:
-    """World Y is north, X is east; heading north makes both forward and leftward differ."""
-    north = SE3.about_z(math.radians(90))
-    motion = RigMotion(north, Twist((1.0, 5.0, 0.0)))
-    row = np.array(oxts_row(motion, (0.0, 0.0)).split(), float)
-
-    assert row[6:11] == pytest.approx([5.0, 1.0, 5.0, -1.0, 0.0])
-
-
-def test_roll_pitch_and_yaw_multiply_to_the_rotation() -> None:
-    """Rz(yaw) Ry(pitch) Rx(roll), as the devkit builds it."""
-    roll, pitch, yaw = 0.1, -0.2, 2.8
-
-    def about(axis: int, angle: float) -> Any:
-        return cv2.Rodrigues(np.eye(3)[axis] * angle)[0]
-
-    rotation = about(2, yaw) @ about(1, pitch) @ about(0, roll)
-
-    assert roll_pitch_yaw(rotation) == pytest.approx((roll, pitch, yaw))
 
 
 def test_a_pose_without_motion_is_where_the_rig_stands(world: Any, tmp_path: Path) -> None:
@@ -111,7 +100,6 @@ def test_a_pose_without_motion_is_where_the_rig_stands(world: Any, tmp_path: Pat
     info = world.info(7, lidars=("top",))
     folder = world.export(KittiRaw(), info, world.samples, tmp_path)
     row = (folder / DRIVE.format(2) / "oxts/data/0000000000.txt").read_text().split()
-
     assert float(row[2]) == pytest.approx(1.6)
     assert float(row[8]) == 0.0
 

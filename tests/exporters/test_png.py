@@ -90,14 +90,9 @@ def shapes(height: int, width: int) -> NDArray[np.uint16]:
 @pytest.mark.parametrize("size", [(1, 1), (1, 700), (700, 1), (3, 2), (48, 64), (300, 400)])
 @pytest.mark.parametrize(
     "values",
-    [
-        noise((301,), np.uint8),
-        noise((301,), np.uint16),
-        noise((301, 3), np.uint8),
-        np.zeros(301, np.uint8),
-        np.full((301, 3), 200, np.uint8),
-    ],
-)
+    [noise((301,), np.uint8), noise((301,), np.uint16), noise((301, 3), np.uint8),
+     np.zeros(301, np.uint8), np.full((301, 3), 200, np.uint8)],
+)  # fmt: skip
 def test_label_images_have_their_values(size: tuple[int, int], values: NDArray[Any]) -> None:
     """OpenCV and zlib, which checks the sum, read every pixel; also of labels of equal values."""
     labels = shapes(*size)
@@ -111,7 +106,7 @@ def test_label_images_have_their_values(size: tuple[int, int], values: NDArray[A
     Image.open(io.BytesIO(data)).verify()
 
 
-def test_long_codes_are_avoided() -> None:
+def test_label_images_avoid_long_codes_are_small_and_have_a_palette() -> None:
     """Counts that grow like Fibonacci's numbers give Huffman codes of more than 15 bits."""
     counts = [1, 1]
     while len(counts) < 24:
@@ -123,23 +118,16 @@ def test_long_codes_are_avoided() -> None:
     np.testing.assert_array_equal(
         cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED), labels
     )
-
-
-def test_label_images_are_small() -> None:
-    """Not larger than those of a general compressor by more than a fifth."""
+    # Not larger than those of a general compressor by more than a fifth.
     labels = np.zeros((480, 640), np.uint8)
     for k in range(1, 12):
         cv2.circle(labels, (50 * k, 30 * k), 40 + 5 * k, k, -1)
     general = encode_png(labels, RowFilter.UP, 2)
     assert len(encode_label_png(labels, np.arange(256, dtype=np.uint8))) < 1.2 * len(general)
-
-
-def test_an_image_of_indices_has_its_palette() -> None:
-    """Pillow reads both, and the colours through them."""
+    # Pillow reads both, and the colours through them.
     colors = noise((256, 3), np.uint8)
     pixels = noise((9, 31), np.uint8)
     data = encode_label_png(pixels, np.arange(256, dtype=np.uint8), colors)
-
     with Image.open(io.BytesIO(data)) as image:
         assert image.mode == "P"
         np.testing.assert_array_equal(np.asarray(image), pixels)

@@ -57,14 +57,12 @@ def test_static_points_of_ply_files_lie_in_boxes(sample: Any, world: Any, tmp_pa
     folder = world.export(PointClouds(), drive_info(world), [sample], tmp_path)
     row = json.loads((folder / "top/poses.jsonl").read_text())
     points = read_ply(folder / "top/000000000.ply")
-
     mine = points[points["instance"] == CRATE]
     where = placed(np.stack([mine[a] for a in "xyz"], -1), row["time_s"] + mine["time"])
     box = next(box for box in row["boxes"] if box["instance"] == CRATE)
     T_world_box = SE3.from_matrix(np.array(row["T_world_lidar"])) @ SE3(
         tuple(box["center_m"]), tuple(box["quaternion_wxyz"])
     )
-
     assert len(mine) > 50
     assert share_inside(where, T_world_box, box["size_m"]) >= 0.99
     assert (row["point_time"], row["sweep_s"]) == ("sweep_middle", SWEEP_S)
@@ -92,9 +90,7 @@ def test_static_points_of_mcap_files_lie_in_cubes(sample: Any, world: Any, tmp_p
     (entity,) = [e for e in found["/objects"].entities if e.id == str(CRATE)]
     (cube,) = entity.cubes
     p, q = cube.pose.position, cube.pose.orientation
-
     where = placed(points["position_m"][mine], stamp_s + time_s[mine])
-
     T_world_box = SE3((p.x, p.y, p.z), (q.w, q.x, q.y, q.z))
     size_m = (cube.size.x, cube.size.y, cube.size.z)
     assert share_inside(where, T_world_box, size_m) >= 0.99
@@ -105,10 +101,8 @@ def test_times_may_count_from_the_sweeps_start(sample: Any, world: Any, tmp_path
     """Poses and boxes stay at its middle, ``time_s`` of the row."""
     chosen = PointClouds(point_time="sweep_start")
     folder = world.export(chosen, drive_info(world), [sample], tmp_path)
-
     row = json.loads((folder / "top/poses.jsonl").read_text())
     times = read_ply(folder / "top/000000000.ply")["time"]
-
     assert (row["time_s"], row["point_time"]) == (STAMP_S, "sweep_start")
     assert times.min() == 0.0
     assert times.max() == np.float32(SWEEP_S)

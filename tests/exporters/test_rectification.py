@@ -25,67 +25,45 @@ def bent(request: pytest.FixtureRequest) -> Rectification:
     return Rectification(source, rectified_intrinsics(source, Rectify()))
 
 
-def test_the_map_is_that_of_opencv_half_a_pixel_apart(bent: Rectification) -> None:
+def test_maps_and_pictures_are_opencvs_and_show_what_the_original_has(bent: Rectification) -> None:
     """OpenCV's maps are float32 and count from the centre of the first pixel."""
     own = np.moveaxis(bent._inside, -1, 0) - 0.5
-
     np.testing.assert_allclose(own, opencv_maps(bent.source, bent.target), atol=2e-5)
-
-
-def test_the_default_pinhole_is_opencvs_without_empty_pixels() -> None:
-    """``alpha=0`` with a centred principal point, whose rectangle is a little too narrow."""
-    source = LENSES["brown_conrady"]
-    target = rectified_intrinsics(source, Rectify())
-
-    K, _ = cv2.getOptimalNewCameraMatrix(
-        opencv_matrix(source),
-        np.array(source.lens.coefficients),
-        (160, 120),
-        0.0,
-        centerPrincipalPoint=True,
-    )
-    np.testing.assert_allclose(opencv_matrix(target), K, rtol=2e-3)
-    assert target.fx_px / target.fy_px == pytest.approx(118.0 / 117.0)
-
-
-def test_the_default_pinhole_shows_no_pixel_that_the_original_lacks(bent: Rectification) -> None:
     u, v = opencv_maps(bent.source, bent.target)
     assert (u.min() > -1e-3, v.min() > -1e-3) == (True, True)
     assert (u.max() < 159 + 1e-3, v.max() < 119 + 1e-3) == (True, True)
-
     k = bent.target
     wider = replace(k, fx_px=0.99 * k.fx_px, fy_px=0.99 * k.fy_px)
     u, v = opencv_maps(bent.source, wider)
     assert u.min() < 0 or v.min() < 0 or u.max() > 159 or v.max() > 119
-
-
-def test_photographs_are_those_of_opencv(bent: Rectification) -> None:
-    """OpenCV's weights are multiples of 1/32: on a photograph of small contrast, one grey level."""
+    # OpenCV's weights are multiples of 1/32: on a photograph of small contrast, one grey level.
     rng = np.random.default_rng(0)
     image = cv2.GaussianBlur(rng.integers(0, 256, (120, 160, 3), np.uint8), (0, 0), 3.0)
     maps = opencv_maps(bent.source, bent.target)
-
     theirs = cv2.remap(image, *maps, cv2.INTER_LINEAR)
-
     ours = bent.image(Channel.RGB, image)
     assert ours.dtype == np.uint8
     assert np.abs(ours.astype(int) - theirs).max() <= 1
 
 
-def test_points_go_where_opencv_moves_them() -> None:
-    """Keypoints: ``cv2.undistortPoints`` with the new matrix."""
+def test_the_default_pinhole_and_its_points_are_opencvs_without_empty_pixels() -> None:
+    """``alpha=0`` with a centred principal point, whose rectangle is a little too narrow."""
     source = LENSES["brown_conrady"]
+    target = rectified_intrinsics(source, Rectify())
+    K, _ = cv2.getOptimalNewCameraMatrix(
+        opencv_matrix(source), np.array(source.lens.coefficients), (160, 120), 0.0,
+        centerPrincipalPoint=True,
+    )  # fmt: skip
+    np.testing.assert_allclose(opencv_matrix(target), K, rtol=2e-3)
+    assert target.fx_px / target.fy_px == pytest.approx(118.0 / 117.0)
+    # Keypoints: ``cv2.undistortPoints`` with the new matrix.
     bent = Rectification(source, rectified_intrinsics(source, Rectify()))
     points = np.array([[20.3, 30.8], [80.0, 60.0], [150.1, 100.9]])
-
     theirs = cv2.undistortPoints(
-        (points - 0.5).reshape(-1, 1, 2),
-        opencv_matrix(source),
-        np.array(source.lens.coefficients),
-        R=np.eye(3),
-        P=opencv_matrix(bent.target),
+        (points - 0.5).reshape(-1, 1, 2), opencv_matrix(source), np.array(source.lens.coefficients),
+        R=np.eye(3), P=opencv_matrix(bent.target),
         criteria=(cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_COUNT, 100, 1e-12),
-    )
+    )  # fmt: skip
     np.testing.assert_allclose(bent.points(points) - 0.5, theirs[:, 0], atol=1e-6)
 
 
@@ -97,13 +75,11 @@ def test_label_images_are_those_of_a_pinhole_except_at_silhouettes(world: Any, m
     source = reading.camera.intrinsics
     bent = Rectification(source, rectified_intrinsics(source, Rectify()))
     pinhole = conftest.ray_cast(sample.scene, replace(reading.camera, intrinsics=bent.target))
-
     cast = pinhole.channels[Channel.INSTANCE]
     ids = bent.image(Channel.INSTANCE, reading.channels[Channel.INSTANCE])
     inner = minimum_filter(cast, 3) == maximum_filter(cast, 3)
     np.testing.assert_array_equal(ids[inner], cast[inner])
     assert set(np.unique(ids)) == set(np.unique(cast))
-
     depth = bent.image(Channel.Z_DEPTH, reading.channels[Channel.Z_DEPTH])
     true = pinhole.channels[Channel.Z_DEPTH]
     # A surface's slope over at most half a pixel.
@@ -127,7 +103,6 @@ def test_annotations_are_those_of_the_rectified_masks(world: Any, model: str) ->
     camera = replace(reading.camera, intrinsics=bent.target)
     cast = conftest.ray_cast(sample.scene, camera)
     other = conftest.annotated(sample.scene, {"color": cast}, Thresholds())["color"]
-
     ids = bent.image(Channel.INSTANCE, reading.channels[Channel.INSTANCE])
     assert again.camera == camera
     assert [t.instance for t in again.objects] == [t.instance for t in other.objects]
@@ -167,7 +142,6 @@ def test_shares_of_objects_that_only_the_rectified_image_cuts(world: Any, amodal
     camera = replace(truth.camera, intrinsics=bent.target)
     cast = {"color": conftest.ray_cast(sample.scene, camera)}
     other = conftest.annotated(sample.scene, cast, Thresholds())["color"]
-
     assert [t.instance for t in again.objects] == [t.instance for t in other.objects]
     cut = 0
     for mine, theirs in zip(again.objects, other.objects, strict=True):
@@ -190,7 +164,6 @@ def test_a_panorama_needs_a_stated_field() -> None:
         source = Intrinsics.from_hfov(160, 120, np.radians(200.0), lens)
         with pytest.raises(ConfigError, match="wider than 150 degrees; expected rectify: "):
             rectified_intrinsics(source, Rectify())
-
         target = rectified_intrinsics(source, Rectify(hfov_deg=90.0))
         assert target == Intrinsics(160, 120, 80.0, 80.0, 80.0, 60.0)
 
@@ -200,7 +173,6 @@ def test_the_focal_length_can_be_kept() -> None:
     source = replace(LENSES["brown_conrady"], lens=Lens("brown_conrady", (0.5, *[0.0] * 7)))
     target = rectified_intrinsics(source, Rectify(keep_focal=True))
     assert target == Intrinsics(160, 120, 118.0, 117.0, 81.5, 58.7)
-
     bent = Rectification(source, target)
     u, v = opencv_maps(source, target)
     outside = (u < -0.5) | (u >= 159.5) | (v < -0.5) | (v >= 119.5)

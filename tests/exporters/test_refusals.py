@@ -9,6 +9,7 @@ from gen_data.core.capture import Channel
 from gen_data.core.errors import ConfigError
 from gen_data.exporters import TABLE
 
+BENT = {"color": "kannala_brandt"}
 RGB_ONLY = {"media": {"color": (Channel.RGB,)}}
 DEPTH_ONLY = {"media": {"color": (Channel.Z_DEPTH,)}}
 NO_IDS = {"media": {"color": (Channel.RGB, Channel.Z_DEPTH)}}
@@ -19,10 +20,8 @@ DRIVE = {"n": 8, "cameras": ("left", "right"), "lidars": ("top",), "steps_per_sc
 LONG = DRIVE | {"n": 40_001}
 TRAFFIC = DRIVE | {"categories": ("bench", "mug")}
 
-PINHOLES = [
-    *("bop", "cityscapes", "kitti", "kitti_raw", "kitti_tracking", "nuscenes", "scannet"),
-    *("semantickitti", "solo", "tum_rgbd"),
-]
+PINHOLES = [*("bop", "cityscapes", "kitti", "kitti_raw", "kitti_tracking", "nuscenes", "scannet"),
+            *("semantickitti", "solo", "tum_rgbd")]  # fmt: skip
 NO_PHOTOGRAPH = r"no sensor of color writes the rgb channel"
 TOO_LONG = "there are 10001; expected at most 40000 samples"
 NO_RANGE = "expected both, with near_m < far_m, or neither"
@@ -63,12 +62,7 @@ ROWS: list[tuple[str, dict[str, Any], dict[str, Any], str]] = [
     ("motchallenge", {"camera": "middle"}, DRIVE, "camera 'middle'.*left, right"),
     ("nuscenes", {}, DRIVE | {"lidars": ()}, r"there is no lidar; add .*LIDAR_TOP"),
     ("nuscenes", {}, TRAFFIC, r"no category of the data set has a class .* car, van"),
-    (
-        "nuscenes",
-        {},
-        DRIVE | {"cameras": ("CAM_LEFT", "left")},
-        "'CAM_LEFT' and 'left' both become CAM_LEFT",
-    ),
+    ("nuscenes", {}, DRIVE | {"cameras": ("CAM_LEFT", "left")}, "'CAM_LEFT' and 'left' both"),
     ("pointclouds", {}, {}, "add a sensor of that type"),
     ("scannet", {}, RGB_ONLY, "camera 'color' does not write the channel depth"),
     ("semantickitti", {}, {}, "there is no lidar; add a sensor"),
@@ -83,10 +77,7 @@ ROWS: list[tuple[str, dict[str, Any], dict[str, Any], str]] = [
     ("voc", {}, {"categories": ("c",) * 255}, "room for 254 categories, but there are 255"),
     ("webdataset", {}, {"cameras": ("color", "Color")}, r"'color' and 'Color' differ in case"),
     ("yolo", {"pose_category": "cars"}, {}, r"pose_category: there is no category 'cars'.*car"),
-    *(
-        (name, {}, SCANNER | {"lenses": {"color": "kannala_brandt"}}, "'color' has a lens of the")
-        for name in PINHOLES
-    ),
+    *((k, {}, SCANNER | {"lenses": BENT}, "'color' has a lens of the") for k in PINHOLES),
 ]
 
 
@@ -96,7 +87,6 @@ def test_the_text_names_what_is_missing(
 ) -> None:
     """And the field to change, the known names or the nearest one."""
     exporter = TABLE.load(kind).model_validate({"type": kind, **options})
-
     with pytest.raises(ConfigError, match=f"exporter '{kind}'.*{message}"):
         exporter.check(world.info(**{"n": 7, **facts}))
 
@@ -104,7 +94,7 @@ def test_the_text_names_what_is_missing(
 @pytest.mark.parametrize("kind", ["coco", "motchallenge"])
 def test_formats_of_image_boxes_take_any_lens(world: Any, kind: str) -> None:
     """Boxes and masks are where the lens puts them."""
-    assert TABLE.load(kind)().check(world.info(4, lenses={"color": "kannala_brandt"})) is None
+    assert TABLE.load(kind)().check(world.info(4, lenses=BENT)) is None
 
 
 @pytest.mark.parametrize(
@@ -116,7 +106,6 @@ def test_a_missing_package_is_named(
 ) -> None:
     """With the command that installs it; NumPy's archives need none."""
     monkeypatch.setattr(optional_packages, "find_spec", lambda name: None)
-
     with pytest.raises(ConfigError, match=rf"{package}.*: pip install .*\[formats\]'"):
         TABLE.load(kind)().check(world.info(7))
     TABLE.load("hdf5")(container="npz").check(world.info(7))

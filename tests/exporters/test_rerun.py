@@ -55,23 +55,16 @@ def problems(root: Path, shards: Path, world: Any) -> list[str]:
         intrinsics = truth.camera.intrinsics
         stored = media_path(shards / f"{k // 3:06d}", "color", Channel.RGB, k).read_bytes()
         halves = [np.divide(t.box3d_world.size_m, 2) for t in seen]
+        classes = [t.instance.category_id for t in seen]
+        boxes = [t.box for t in truth.objects if t.box is not None and not t.ignored]
+        centres = [((b.x_min + b.x_max) / 2, (b.y_min + b.y_max) / 2) for b in boxes]
         position_m = truth.camera.T_world_camera.translation_m
         expected = {
             "position": (read["/world/cameras/color"]["Transform3D:translation"], [position_m]),
             "pinhole": (read[image]["Pinhole:image_from_camera"], [intrinsics.matrix().T.ravel()]),
             "half sizes": (read["/world/boxes"]["Boxes3D:half_sizes"], halves),
-            "classes": (
-                read["/world/boxes"]["Boxes3D:class_ids"],
-                [t.instance.category_id for t in seen],
-            ),
-            "boxes": (
-                read[f"{image}/boxes"]["Boxes2D:centers"],
-                [
-                    ((t.box.x_min + t.box.x_max) / 2, (t.box.y_min + t.box.y_max) / 2)
-                    for t in truth.objects
-                    if t.box is not None and not t.ignored
-                ],
-            ),
+            "classes": (read["/world/boxes"]["Boxes3D:class_ids"], classes),
+            "boxes": (read[f"{image}/boxes"]["Boxes2D:centers"], centres),
         }
         for name, (values, wanted) in expected.items():
             got = np.array(values.get(k, []), np.float64)
@@ -83,14 +76,22 @@ def problems(root: Path, shards: Path, world: Any) -> list[str]:
     return found
 
 
-def test_recordings_hold_the_samples(dataset: Path, world: Any) -> None:
+def test_recordings_hold_the_samples_and_the_tool_verifies_them(dataset: Path, world: Any) -> None:
     """Poses, pinholes, boxes, classes, and the bytes of the photographs."""
     assert problems(dataset, dataset.parent / "shards", world) == []
     assert [p.relative_to(dataset).as_posix() for p in sorted(dataset.glob("*/*"))] == [
-        "train/000000.rrd",
-        "train/000001.rrd",
-        "val/000000.rrd",
+        "train/000000.rrd", "train/000001.rrd", "val/000000.rrd",
+    ]  # fmt: skip
+    # The footer, which is written again, fits the chunks; a cut file does not pass.
+    path = dataset / "train/000000.rrd"
+    cut = dataset.parent / "cut.rrd"
+    cut.write_bytes(path.read_bytes()[:-40])
+    codes = [
+        subprocess.run([*CLI, "rrd", "verify", file], capture_output=True, check=False).returncode
+        for file in (path, cut)
     ]
+    assert codes[0] == 0
+    assert codes[1] != 0
 
 
 def test_scans_and_instants_of_a_drive(exported: Any, samples: Any) -> None:
@@ -122,20 +123,6 @@ def read_times(path: Path) -> dict[int, Any]:
     return found
 
 
-def test_the_command_line_tool_verifies_the_file(dataset: Path) -> None:
-    """The footer, which is written again, fits the chunks; a cut file does not pass."""
-    path = dataset / "train/000000.rrd"
-    cut = dataset.parent / "cut.rrd"
-    cut.write_bytes(path.read_bytes()[:-40])
-    codes = [
-        subprocess.run([*CLI, "rrd", "verify", file], capture_output=True, check=False).returncode
-        for file in (path, cut)
-    ]
-
-    assert codes[0] == 0
-    assert codes[1] != 0
-
-
 def a_chunk() -> Any:
     """Two rows of points with several components."""
     columns = rr.Points3D.columns(positions=[[0, 0, 1], [0, 1, 0]], class_ids=[1, 2])
@@ -153,7 +140,6 @@ def test_files_do_not_depend_on_clock_or_hashing(tmp_path: Path) -> None:
         store = rerun.chunk.ChunkStore.from_chunks([a_chunk()])
         store.write_rrd(str(path), application_id="test", recording_id="name")
         theirs.add(path.read_bytes())
-
     assert (len(ours), len(theirs)) == (1, 4)
 
 
@@ -175,18 +161,14 @@ def test_processes_write_the_same_bytes(dataset: Path, tmp_path: Path) -> None:
     files = [tmp_path / f"{k}.rrd" for k in range(2)]
     for file in files:
         subprocess.run([sys.executable, "-c", _SCRIPT, file], check=True)
-
     assert len({file.read_bytes() for file in files}) == 1
 
 
 @pytest.mark.parametrize(
     ("data", "seed", "digest"),
-    [
-        (b"", 0, 0x02CC5D05),
-        (b"a", 0, 0x550D7456),
-        (b"Nobody inspects the spammish repetition", 0, 0xE2293B2F),
-    ],
-)
+    [(b"", 0, 0x02CC5D05), (b"a", 0, 0x550D7456),
+     (b"Nobody inspects the spammish repetition", 0, 0xE2293B2F)],
+)  # fmt: skip
 def test_digests_are_those_of_xxhash(data: bytes, seed: int, digest: int) -> None:
     """Published values of XXH32."""
     assert xxh32(data, seed) == digest

@@ -69,7 +69,7 @@ def sequence(samples: Sequence[Sample], number: int) -> Sequence[Sample]:
     return samples[4 * number : 4 * number + 4]
 
 
-def test_tum_points_lie_on_the_scene(tum: Path, samples: Sequence[Sample]) -> None:
+def test_tum_points_lie_on_the_scene_and_are_listed(tum: Path, samples: Sequence[Sample]) -> None:
     """Depth at 5000 units per metre, quaternions with the scalar last, and associated times."""
     for number, split in enumerate(("train", "val")):
         folder = tum / split / f"{number:06d}"
@@ -85,10 +85,7 @@ def test_tum_points_lie_on_the_scene(tum: Path, samples: Sequence[Sample]) -> No
             exact = sample.capture.readings["left"].channels[Channel.Z_DEPTH]
             assert (depth_m[np.isfinite(exact) & (exact < 13.0)] > 0.0).all()
             assert_on_scene(heights_m(depth_m, pinhole, pose), depth_m, sample, 0.0006)
-
-
-def test_tum_lists_every_image(tum: Path, samples: Sequence[Sample]) -> None:
-    """In the order of their times; the photographs are those of the data set."""
+    # In the order of their times; the photographs are those of the data set.
     for number, split in enumerate(("train", "val")):
         folder = tum / split / f"{number:06d}"
         for kind in ("rgb", "depth"):
@@ -135,7 +132,9 @@ def test_scannet_points_lie_on_the_scene(scannet: Path, samples: Sequence[Sample
             assert np.abs(forward_m).max() < 1e-8
 
 
-def test_scannet_labels_are_nyu40_of_instances(scannet: Path, samples: Sequence[Sample]) -> None:
+def test_scannet_labels_are_nyu40_of_instances_in_scans_listed_by_split(
+    scannet: Path, samples: Sequence[Sample]
+) -> None:
     """And instances have the ids of the data set wherever there is a class."""
     with (scannet / "scannetv2-labels.combined.tsv").open(encoding="utf-8") as file:
         classes = {int(row["id"]): row for row in csv.DictReader(file, delimiter="\t")}
@@ -153,10 +152,7 @@ def test_scannet_labels_are_nyu40_of_instances(scannet: Path, samples: Sequence[
                 expected[ids == thing.instance_id] = NYU40[thing.category]
             assert np.array_equal(labels, expected)
             assert np.array_equal(instances, np.where(expected > 0, ids, 0))
-
-
-def test_scannet_scans_are_listed_by_split(scannet: Path, samples: Sequence[Sample]) -> None:
-    """Every frame has a photograph like that of the data set, in JPEG."""
+    # Every frame has a photograph like that of the data set, in JPEG.
     assert (scannet / "scannetv2_train.txt").read_text() == "scene0000_00\n"
     assert (scannet / "scannetv2_val.txt").read_text() == "scene0001_00\n"
     for number in range(2):

@@ -33,9 +33,7 @@ def test_rle_of_a_crop_is_what_pycocotools_makes_of_the_whole_mask(
     image = np.random.default_rng(seed).random((height, width)) < density
     if not image.any():
         image[-1, -1] = True
-
     ours = encode_rle(tight(image), height, width)
-
     theirs = coco_mask.encode(np.asfortranarray(image.astype(np.uint8)))
     assert ours == {"size": list(theirs["size"]), "counts": theirs["counts"].decode()}
 
@@ -46,6 +44,5 @@ def test_runs_begin_with_zeros_and_go_down_columns() -> None:
     assert run_lengths(one, 3, 4) == [7, 1, 4]  # two columns and a row before it
     assert run_lengths(MaskPx(0, 0, np.ones((3, 4), dtype=bool)), 3, 4) == [0, 12]
     mask = MaskPx(0, 0, np.zeros((0, 0), dtype=bool))
-
     assert not coco_mask.decode(dict(encode_rle(mask, 5, 6))).any()
     assert run_lengths(mask, 5, 6) == [30]

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from gen_data.core.asset_types import SURFACES
 from gen_data.core.capture import POINT
 from gen_data.core.errors import StorageError
-from gen_data.core.motion import Twist
 from gen_data.exporters.kitti import (
     Kitti,
     label_rows,
@@ -25,14 +25,11 @@ from gen_data.exporters.kitti import (
 from gen_data.exporters.point_cloud_io import read_points
 from gen_data.exporters.pointclouds import PointClouds
 from gen_data.exporters.semantickitti import SemanticKitti
-from gen_data.exporters.semantickitti import point_labels as semantic_labels
 from tests.exporters.drives import calibration, read_ply
 from tests.wheels import needs_open3d
 
-POINT_FIELDS = [
-    *("x", "y", "z", "intensity", "time", "ring", "instance", "category", "surface"),
-    *("return_number", "return_count"),
-]
+POINT_FIELDS = [*("x", "y", "z", "intensity", "time", "ring", "instance", "category", "surface"),
+                *("return_number", "return_count")]  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -60,19 +57,31 @@ def test_the_native_file_holds_every_field_and_nothing_else(world: Any, tmp_path
     """What was captured is what is read; a missing file is told."""
     world.export(Kitti(), world.info(7, lidars=("top",)), world.samples, tmp_path)
     kept = read_points(tmp_path / "shards/000000", "top", 1)
-
     assert kept.tobytes() == world.samples[1].capture.clouds["top"].points.tobytes()
     with pytest.raises(StorageError, match="generate the data set again"):
         read_points(tmp_path / "shards/000000", "top", 99)
 
 
-def test_kitti_points_are_the_scanner_s(kitti: Path, world: Any) -> None:
-    """All points, x y z and reflectance in [0, 1]."""
+def test_kitti_points_are_the_scanners_with_labels_naming_the_row(kitti: Path, world: Any) -> None:
+    """All points: x y z and reflectance in [0, 1].
+
+    The upper half of a label is the row of its instance from 1, the lower half the category.
+    """
+    checked = 0
     for sample in world.samples:
         points = sample.capture.clouds["top"].points
         written = bins(kitti / f"training/velodyne/{sample.index:06d}.bin")
         np.testing.assert_array_equal(written[:, :3], points["position_m"])
         np.testing.assert_array_equal(written[:, 3], points["intensity"])
+        category, row = labels(kitti / f"training/velodyne_labels/{sample.index:06d}.label")
+        np.testing.assert_array_equal(category, points["category_id"])
+        text = (kitti / f"training/label_2/{sample.index:06d}.txt").read_text().splitlines()
+        for number in np.unique(row[row > 0]):
+            (instance_id,) = np.unique(points["instance_id"][row == number])
+            expected = official_type(sample.scene.instance(int(instance_id)))
+            assert text[number - 1].split(" ")[0] in (expected, "DontCare")
+            checked += 1
+    assert checked > 10
 
 
 def test_the_calibration_takes_points_onto_the_objects_pixels(kitti: Path, world: Any) -> None:
@@ -96,25 +105,11 @@ def test_the_calibration_takes_points_onto_the_objects_pixels(kitti: Path, world
     assert checked > 20
 
 
-def test_kitti_point_labels_name_the_row_of_the_label_file(kitti: Path, world: Any) -> None:
-    """Upper half 1-based row of the type that the instance has; lower half the category."""
-    checked = 0
-    for sample in world.samples:
-        points = sample.capture.clouds["top"].points
-        category, row = labels(kitti / f"training/velodyne_labels/{sample.index:06d}.label")
-        np.testing.assert_array_equal(category, points["category_id"])
-        text = (kitti / f"training/label_2/{sample.index:06d}.txt").read_text().splitlines()
-        for number in np.unique(row[row > 0]):
-            (instance_id,) = np.unique(points["instance_id"][row == number])
-            kind = text[number - 1].split(" ")[0]
-            expected = official_type(sample.scene.instance(int(instance_id)))
-            assert kind in (expected, "DontCare")
-            checked += 1
-    assert checked > 10
+def test_kitti_objects_are_what_lies_in_their_boxes(world: Any) -> None:
+    """Noise of 3 cm is forgiven, more is not; road that reaches into the box is in it.
 
-
-def kitti_rows(world: Any) -> np.ndarray:
-    """Rows of four points of the first car: on it, 2 cm and 4 cm before it, road 4 cm inside."""
+    Four points of the first car: on it, 2 cm and 4 cm before it, and road 4 cm inside.
+    """
     truth = world.samples[0].truth["color"]
     alone = replace(truth, objects=truth.objects[:1])
     box = upright_box(truth.objects[0].box3d_camera)
@@ -123,40 +118,25 @@ def kitti_rows(world: Any) -> np.ndarray:
     middle = np.asarray(box.bottom_m) - (0.0, 0.04, 0.0)
     points = np.zeros(4, POINT)
     points["position_m"] = [face, face + 0.02 * ahead, face + 0.04 * ahead, middle]
-    points["instance_id"] = [1, 1, 1, 0]
-    points["category_id"] = [1, 1, 1, 0]
+    points["instance_id"] = points["category_id"] = [1, 1, 1, 0]
     rows = label_rows(alone, Kitti(far_m=100.0))
     members, unseen = point_members(points, alone, rows, np.eye(3, 4))
     assert unseen == frozenset()
     both = point_labels(points, members, rows)
     np.testing.assert_array_equal(both & 0xFFFF, points["category_id"])
-    return both >> 16
-
-
-def test_kitti_objects_are_what_lies_in_their_boxes(world: Any) -> None:
-    """Noise of 3 cm is forgiven, more is not; road that reaches into the box is in it."""
-    np.testing.assert_array_equal(kitti_rows(world), [1, 1, 0, 1])
-
-
-def test_what_the_scanner_did_not_see_is_dont_care(world: Any) -> None:
-    """All its points out of the box; with one point in it, it is a Car."""
-    sample = world.samples[0]
-    truth = sample.truth["color"]
-    alone = replace(truth, objects=truth.objects[:1])
-    rows = label_rows(alone, Kitti(far_m=100.0))
-    points = sample.capture.clouds["top"].points
-    mine = points[points["instance_id"] == 1].copy()
+    np.testing.assert_array_equal(both >> 16, [1, 1, 0, 1])
+    # With none of its points in the box, it is DontCare; with one, a Car.
     T_camera_velo = np.array([[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0]], float)
-
-    _, unseen = point_members(mine[:0], alone, rows, T_camera_velo)
-
+    _, unseen = point_members(points[:0], alone, rows, T_camera_velo)
     assert unseen == {1}
     ((changed, _),) = without_returns(rows, unseen, alone)
     assert changed.startswith("DontCare -1 -1 -10 ")
     assert rows[0][0].startswith("Car ")
 
 
-def test_semantic_scans_are_numbered_without_gaps_in_official_splits(semantic: Path) -> None:
+def test_semantic_scans_are_in_official_splits_with_classes_and_ids_of_all_scenes(
+    semantic: Path, world: Any
+) -> None:
     """Train is sequence 00, val is 08; points, labels, poses and times agree in number."""
     counts = {"00": 5, "08": 2}
     assert sorted(p.name for p in (semantic / "sequences").iterdir()) == sorted(counts)
@@ -169,26 +149,19 @@ def test_semantic_scans_are_numbered_without_gaps_in_official_splits(semantic: P
             assert len((folder / text).read_text().splitlines()) == count
         first = np.array((folder / "poses.txt").read_text().splitlines()[0].split(), float)
         np.testing.assert_allclose(first.reshape(3, 4), np.eye(3, 4), atol=1e-9)
-
-
-def test_semantic_classes_follow_category_and_surface(semantic: Path, world: Any) -> None:
-    """Cars 10, people 30 with an instance; crates 99 and the road 40 without."""
+    # Cars 10, people 30 with an instance; crates 99 and the road 40 without.
     folder = semantic / "sequences/00"
     sample = world.samples[0]
     points = sample.capture.clouds["top"].points
     classes, things = labels(folder / "labels/000000.label")
     ids = points["instance_id"]
-
     for number, expected in {1: 10, 2: 30, 3: 99, 7: 30}.items():
         assert set(classes[ids == number]) <= {expected}
     assert set(classes[ids == 0]) == {40}
     assert (things[np.isin(classes, [10, 30])] > 0).all()
     assert (things[np.isin(classes, [99, 40])] == 0).all()
     assert {10, 30, 99, 40} <= set(classes)
-
-
-def test_instances_of_different_scenes_have_different_ids(semantic: Path) -> None:
-    """Instance ids never come back with another scene."""
+    # Instance ids never come back with another scene.
     seen: set[int] = set()
     for path in sorted((semantic / "sequences/00/labels").iterdir()):
         _, things = labels(path)
@@ -198,21 +171,6 @@ def test_instances_of_different_scenes_have_different_ids(semantic: Path) -> Non
     assert len(seen) > 5
 
 
-def test_things_under_way_have_moving_classes(world: Any) -> None:
-    """A car that moves is a moving-car, 252; one at rest a car, 10."""
-    sample = world.samples[0]
-    points = sample.capture.clouds["top"].points
-    moving = Twist((0.0, 3.0, 0.0))
-    things = tuple(
-        replace(i, twist=moving if i.instance_id == 1 else i.twist) for i in sample.scene.instances
-    )
-
-    classes = semantic_labels(points, replace(sample.scene, instances=things)) & 0xFFFF
-
-    assert set(classes[points["instance_id"] == 1]) == {252}
-    assert set(classes[points["instance_id"] == 2]) == {30}
-
-
 @needs_open3d
 @pytest.mark.parametrize("kind", ["ply", "pcd"])
 def test_open3d_reads_point_clouds(kind: str, world: Any, open3d: Any, tmp_path: Path) -> None:
@@ -220,25 +178,36 @@ def test_open3d_reads_point_clouds(kind: str, world: Any, open3d: Any, tmp_path:
     info = world.info(7, lidars=("top",))
     folder = world.export(PointClouds(format=kind), info, world.samples, tmp_path)
     points = world.samples[2].capture.clouds["top"].points
-
     read = open3d.t.io.read_point_cloud(str(folder / f"top/000000002.{kind}"))
-
     np.testing.assert_array_equal(read.point["positions"].numpy(), points["position_m"])
     for name, field in (("intensity", "intensity"), ("instance", "instance_id")):
         np.testing.assert_array_equal(read.point[name].numpy()[:, 0], points[field])
 
 
-def test_a_ply_file_is_what_its_header_says(world: Any, tmp_path: Path) -> None:
+def test_a_ply_file_is_what_its_header_says_and_points_in_boxes(world: Any, tmp_path: Path) -> None:
     """Parsed by hand: one record per point, in the order of the properties."""
     info = world.info(7, lidars=("top",))
     folder = world.export(PointClouds(), info, world.samples, tmp_path)
     records = read_ply(folder / "top/000000000.ply")
     points = world.samples[0].capture.clouds["top"].points
-
     assert list(records.dtype.names) == POINT_FIELDS
     np.testing.assert_array_equal(records["category"], points["category_id"])
     np.testing.assert_array_equal(records["instance"], points["instance_id"])
     np.testing.assert_array_equal(records["z"], points["position_m"][:, 2])
+    # ``poses.jsonl`` lists boxes; every labelled point is in its own, to a millimetre.
+    rows = [json.loads(line) for line in (folder / "top/poses.jsonl").read_text().splitlines()]
+    assert [row["index"] for row in rows] == list(range(7))
+    checked = 0
+    for row, sample in zip(rows, world.samples, strict=True):
+        points = sample.capture.clouds["top"].points
+        for box in row["boxes"]:
+            w, *xyz = box["quaternion_wxyz"]
+            rotation = Rotation.from_quat([*xyz, w]).as_matrix()
+            mine = points[points["instance_id"] == box["instance"]]["position_m"]
+            local = (mine - np.array(box["center_m"])) @ rotation
+            assert (np.abs(local) <= 0.5 * np.array(box["size_m"]) + 1e-3).all()
+            checked += len(mine)
+    assert checked > 100
 
 
 def test_a_pcd_file_is_what_its_header_says(world: Any, tmp_path: Path) -> None:
@@ -249,39 +218,12 @@ def test_a_pcd_file_is_what_its_header_says(world: Any, tmp_path: Path) -> None:
     lines = dict(line.split(" ", 1) for line in header.decode("ascii").splitlines())
     kinds = zip(lines["TYPE"].lower().split(), lines["SIZE"].split(), strict=True)
     points = world.samples[0].capture.clouds["top"].points
-
     assert lines["FIELDS"].split() == POINT_FIELDS
     dtype = np.dtype(list(zip(POINT_FIELDS, (f"<{t}{n}" for t, n in kinds), strict=True)))
     records = np.frombuffer(body, dtype)
     assert len(records) == int(lines["POINTS"]) == len(points)
     np.testing.assert_array_equal(records["category"], points["category_id"])
     np.testing.assert_array_equal(records["z"], points["position_m"][:, 2])
-
-
-def test_points_lie_in_the_boxes_of_the_lidar_frame(world: Any, tmp_path: Path) -> None:
-    """``poses.jsonl`` lists boxes; every labelled point is in its own, to a millimetre."""
-    info = world.info(7, lidars=("top",))
-    folder = world.export(PointClouds(), info, world.samples, tmp_path)
-    rows = [json.loads(line) for line in (folder / "top/poses.jsonl").read_text().splitlines()]
-
-    assert [row["index"] for row in rows] == list(range(7))
-    checked = 0
-    for row, sample in zip(rows, world.samples, strict=True):
-        points = sample.capture.clouds["top"].points
-        for box in row["boxes"]:
-            w, x, y, z = box["quaternion_wxyz"]
-            rotation = np.array(
-                [
-                    [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-                    [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-                    [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-                ]
-            )
-            mine = points[points["instance_id"] == box["instance"]]["position_m"]
-            local = (mine - np.array(box["center_m"])) @ rotation
-            assert (np.abs(local) <= 0.5 * np.array(box["size_m"]) + 1e-3).all()
-            checked += len(mine)
-    assert checked > 100
 
 
 def test_air_and_ground_have_surfaces_with_names() -> None:

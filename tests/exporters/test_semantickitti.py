@@ -16,34 +16,23 @@ def poses(folder: Path) -> list[Any]:
     return [np.vstack([np.array(r, float).reshape(3, 4), [0, 0, 0, 1]]) for r in rows]
 
 
-def test_semantic_sequences_are_views_with_poses_of_the_drive(exported: Any, world: Any) -> None:
+def test_semantic_sequences_have_poses_of_the_drive_and_points_that_stay_in_the_world(
+    exported: Any, world: Any, samples: Any
+) -> None:
     """Tr^-1 pose Tr moves the scanner along the circle; times are a step apart."""
     folder = exported(SemanticKitti())
     assert stems(folder / "sequences") == ["00", "01"]
     assert (folder / "split.yaml").read_text() == "split:\n  train: [0]\n  valid: [1]\n  test: []\n"
     sequence = folder / "sequences/01"
     Tr = np.vstack([calibration(sequence / "calib.txt")["Tr"].reshape(3, 4), [0, 0, 0, 1]])
-
     for k, pose in enumerate(poses(sequence)):
         moved = np.linalg.inv(Tr) @ pose @ Tr
         np.testing.assert_allclose(moved, world.ego_pose(0.1 * k).matrix(), atol=3e-6)
     times = [float(t) for t in (sequence / "times.txt").read_text().split()]
     assert times == pytest.approx([0.0, 0.1, 0.2, 0.3])
     assert (sequence / "scans.txt").read_text().split() == ["4", "5", "6", "7"]
-
-
-def test_semantic_classes_of_things_that_move(exported: Any) -> None:
-    """Moving car 252, moving person 254, with the instance ids of the scene in every scan."""
-    for path in sorted((exported(SemanticKitti()) / "sequences/00/labels").iterdir()):
-        labels = np.fromfile(path, "<u4")
-        assert {(int(v) & 0xFFFF, int(v) >> 16) for v in labels} == {
-            (252, 1), (254, 2), (99, 0), (40, 0)
-        }  # fmt: skip
-
-
-def test_semantic_points_of_what_stands_stay_in_the_world(exported: Any, samples: Any) -> None:
-    """The crate's points, moved by the poses, stay within its box in all scans."""
-    sequence = exported(SemanticKitti()) / "sequences/00"
+    # The crate's points, moved by the poses, stay within its box in all scans.
+    sequence = folder / "sequences/00"
     Tr = np.vstack([calibration(sequence / "calib.txt")["Tr"].reshape(3, 4), [0, 0, 0, 1]])
     seen = 0
     for k, pose in enumerate(poses(sequence)):
@@ -56,3 +45,12 @@ def test_semantic_points_of_what_stands_stay_in_the_world(exported: Any, samples
         assert np.linalg.norm(local[:3].T - centre, axis=1).max(initial=0.0) < 1.0
         seen += len(mine)
     assert seen > 10
+
+
+def test_semantic_classes_of_things_that_move(exported: Any) -> None:
+    """Moving car 252, moving person 254, with the instance ids of the scene in every scan."""
+    for path in sorted((exported(SemanticKitti()) / "sequences/00/labels").iterdir()):
+        labels = np.fromfile(path, "<u4")
+        assert {(int(v) & 0xFFFF, int(v) >> 16) for v in labels} == {
+            (252, 1), (254, 2), (99, 0), (40, 0)
+        }  # fmt: skip

@@ -103,10 +103,8 @@ def wrong_colors(folder: Path, flat: Any, instances: Any, labels: Any) -> Iterat
     pixels = [
         np.asarray(Image.open(folder / a.filename).convert("RGBA")) for a in (instances, labels)
     ]
-    listed = [
-        {tuple(row.color): row.labelName for row in instances.instances},
-        {tuple(row.pixelValue): row.labelName for row in labels.instances},
-    ]
+    listed = [{tuple(row.color): row.labelName for row in instances.instances},
+              {tuple(row.pixelValue): row.labelName for row in labels.instances}]  # fmt: skip
     for image, colors in zip(pixels, listed, strict=True):
         if {*map(tuple, np.unique(image.reshape(-1, 4), axis=0).tolist())} - {(0, 0, 0, 255)} != {
             *colors
@@ -146,7 +144,6 @@ def test_the_official_converter_makes_coco_of_it(dataset: Path, world: Any, tmp_
     SOLO2COCOConverter(Reader(data_path=str(dataset / "train"))).convert(
         output_path=str(tmp_path), dataset_name="coco"
     )
-
     (path,) = tmp_path.rglob("instances.json")
     rows = json.loads(path.read_text())["annotations"]
     boxes = [
@@ -162,9 +159,7 @@ def test_the_official_converter_makes_coco_of_it(dataset: Path, world: Any, tmp_
 def test_sequences_have_steps(world: Any, samples: Any, tmp_path: Path) -> None:
     """Two cameras on a moving rig; each split numbers its sequences from 0."""
     info = world.info(8, ("left", "right"), steps_per_scene=4)
-
     root = world.export(Solo(), info, samples, tmp_path)
-
     for split, members in (("train", samples[:4]), ("val", samples[4:])):
         frames = read_json(root / split)
         assert [(f.sequence, f.step, len(f.captures)) for f in frames] == [
@@ -184,9 +179,7 @@ def test_centres_behind_the_sensor_have_no_3d_box(world: Any, tmp_path: Path) ->
     far = world.instance(2, "crate", 9.0, 0.0, 0.0)
     sample = world.sample(0, (near, far), [world.camera()])
     assert [t.instance.instance_id for t in sample.truth["color"].objects] == [1, 2]
-
     root = world.export(Solo(), world.info(1), [sample], tmp_path)
-
     (frame,) = read_json(root / "train")
     flat, solid, *_ = frame.captures[0].annotations
     assert [row.instanceId for row in flat.values] == [1, 2]
@@ -196,7 +189,6 @@ def test_centres_behind_the_sensor_have_no_3d_box(world: Any, tmp_path: Path) ->
 def test_colors_differ() -> None:
     """Of all ids that an instance may have; only 0 is black."""
     colors = [id_color(number) for number in range(65_536)]
-
     assert len(set(colors)) == 65_536
     assert colors[0] == (0, 0, 0)
     ids = np.arange(65_536, dtype=np.uint16).reshape(256, 256)

@@ -75,7 +75,6 @@ def test_a_turn_that_nobody_sees_is_no_error(library: Library, asset: str, turn_
     """Without the symmetry the error is most of the diameter; tessellation may move a vertex."""
     model = model_of(library, asset)
     turn = about((0, 0, 1), (0, 0, 0), math.radians(turn_deg))
-
     assert symmetric_error(model, turn) < 0.05
     bare = replace(model, info={"diameter": model.info["diameter"]})
     assert symmetric_error(bare, turn) > 0.1
@@ -85,7 +84,6 @@ def test_a_turn_that_nobody_sees_is_no_error(library: Library, asset: str, turn_
 def test_objects_that_look_different_after_any_turn_have_none(library: Library, asset: str) -> None:
     """A handle, a bend and a claw."""
     info = model_of(library, asset).info
-
     assert not {"symmetries_discrete", "symmetries_continuous"} & set(info)
 
 
@@ -112,23 +110,15 @@ def test_what_assets_state_is_found_without_them(library: Library) -> None:
 def test_boxes_have_the_turns_of_their_sides(size: Any, expected: set[int]) -> None:
     """A cube quarter turns about every axis, a column about one, a brick none."""
     found = folds(CUBE * size)
-
     assert {found[axis] for axis in ((1, 0, 0), (0, 1, 0), (0, 0, 1))} == expected
 
 
-def test_a_painted_side_leaves_the_turns_about_its_axis() -> None:
+def test_symmetries_depend_on_colours_and_not_on_the_frame_and_nothing_has_none() -> None:
     """Colours count: only the quarter turns about the painted side's axis look the same."""
     assert folds(CUBE, painted=1) == {(1.0, 0.0, 0.0): 4}
-
-
-def test_a_symmetric_thing_may_stand_in_any_frame() -> None:
-    """Its axes are found where the frame's own are none of them."""
+    # Its axes are found where the frame's own are none of them.
     pose = SE3((0.3, -0.2, 0.5), (0.8, 0.36, 0.48, 0.0))
     found = folds(CUBE * (1, 1, 3) @ pose.rotation().T + np.array(pose.translation_m))
-
     (axis,) = (np.array(a) for a, fold in found.items() if fold == 4)
     assert abs(axis @ pose.rotation()[:, 2]) == pytest.approx(1.0, abs=0.02)
-
-
-def test_nothing_has_no_symmetries() -> None:
     assert folds(CUBE * 0.0) == {}

@@ -29,7 +29,7 @@ def sums_are_right(path: Path) -> bool:
     return position == len(data)
 
 
-def test_records_have_the_keys_and_kinds_of_the_api(dataset: Path, world: Any) -> None:
+def test_records_have_the_apis_keys_and_kinds_and_other_channels(dataset: Path, world: Any) -> None:
     """Every sum is right, values have the kinds of the API, and ids are COCO's."""
     paths = sorted(dataset.glob("*.tfrecord"))
     assert all(map(sums_are_right, paths))
@@ -48,31 +48,22 @@ def test_records_have_the_keys_and_kinds_of_the_api(dataset: Path, world: Any) -
         *(f"train-{k:05d}-of-00003.tfrecord" for k in range(3)),
         "val-00000-of-00001.tfrecord",
     ]
-
-
-def test_other_channels_are_additional_keys(dataset: Path) -> None:
-    """PNG files, as in the shard."""
+    # PNG files, as in the shard.
     record, _ = records(dataset / "val-00000-of-00001.tfrecord")
-
     (depth,) = record["image/depth/encoded"][1]
     shard = dataset.parent / "shards/000000"
     assert depth == (shard / "color/depth/000000002.png").read_bytes()
     assert len(record["image/T_world_camera"][1]) == 16
 
 
-def test_the_label_map_counts_from_one() -> None:
-    text = label_map(("car", 'a "b"'))
-
-    assert text == 'item {\n  id: 1\n  name: "car"\n}\nitem {\n  id: 2\n  name: "a \\"b\\""\n}\n'
-
-
-def test_sums_of_the_specification() -> None:
+def test_sums_are_of_the_specification_and_the_label_map_counts_from_one() -> None:
     """RFC 3720, B.4: CRC32C of 32 zero bytes is AA 36 91 8A; numbers up to 2**63."""
     record = frame_record(bytes(32))
-
     crc = 0x8A9136AA
     masked = (((crc >> 15) | (crc << 17)) + 0xA282EAD8) & 0xFFFFFFFF
     assert record[-4:] == struct.pack("<I", masked)
     size = 2**63 - 1
     data = tfrecord.encode_example(encode_features({"image/sample": [size]}))
     assert features(data) == {"image/sample": ("int64_list", [size])}
+    text = label_map(("car", 'a "b"'))
+    assert text == 'item {\n  id: 1\n  name: "car"\n}\nitem {\n  id: 2\n  name: "a \\"b\\""\n}\n'

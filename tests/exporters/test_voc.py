@@ -14,16 +14,30 @@ from tests.exporters.label_readers import voc_objects
 dataset = street_in(Voc())
 
 
-def test_the_palette_is_that_of_the_development_kit(dataset: Path) -> None:
+def test_palette_and_label_map_are_the_kits_and_images_the_photographs(dataset: Path) -> None:
     """Aeroplane, bicycle, bird, ..., and the cream colour of void."""
     colors = voc_palette()
-
     assert colors[[0, 1, 2, 3, 4, 8, 20, 255]].tolist() == [
         [0, 0, 0], [128, 0, 0], [0, 128, 0], [128, 128, 0], [0, 0, 128], [64, 0, 0], [0, 64, 128],
         [224, 224, 192],
     ]  # fmt: skip
     with Image.open(dataset / f"{YEAR}/SegmentationClass/000000000_color.png") as image:
         assert image.getpalette()[: 3 * 256] == colors.ravel().tolist()
+    # Rows ``name:r,g,b:parts:actions``, as CVAT and Datumaro read them; void is "ignored".
+    root = dataset / YEAR
+    rows = [line.split(":") for line in (root / "labelmap.txt").read_text().splitlines()[1:]]
+    color_of = {name: tuple(map(int, color.split(","))) for name, color, *_ in rows}
+    with Image.open(next((root / "SegmentationClass").iterdir())) as image:
+        palette = np.array(image.getpalette()).reshape(-1, 3).tolist()
+    assert list(color_of) == ["background", "car", "crate", "pedestrian", "ignored"]
+    assert [list(c) for c in color_of.values()] == [palette[k] for k in (0, 1, 2, 3, 255)]
+    # JPEG of high quality, in the right order of colours.
+    with Image.open(dataset / f"{YEAR}/JPEGImages/000000000_color.jpg") as picture:
+        assert (picture.format, picture.mode) == ("JPEG", "RGB")
+        copy = np.asarray(picture).astype(int)
+    with Image.open(dataset.parent / "shards/000000/color/rgb/000000000.png") as picture:
+        photograph = np.asarray(picture).astype(int)
+    assert np.abs(copy - photograph).mean() < 6
 
 
 def test_lists_of_classes_name_the_images_that_show_them(dataset: Path) -> None:
@@ -52,24 +66,11 @@ def test_truncated_and_occluded_follow_the_guidelines(world: Any, dataset: Path)
     assert {"0", "1"} == {a for a, _ in states} == {b for _, b in states}
 
 
-def test_images_are_the_photographs(dataset: Path) -> None:
-    """JPEG of high quality, in the right order of colours."""
-    with Image.open(dataset / f"{YEAR}/JPEGImages/000000000_color.jpg") as picture:
-        assert (picture.format, picture.mode) == ("JPEG", "RGB")
-        copy = np.asarray(picture).astype(int)
-    with Image.open(dataset.parent / "shards/000000/color/rgb/000000000.png") as picture:
-        photograph = np.asarray(picture).astype(int)
-
-    assert np.abs(copy - photograph).mean() < 6
-
-
 def test_ignored_objects_are_difficult_and_void(world: Any, tmp_path: Path) -> None:
     """They come last, so that the others are numbered without gaps."""
     sample = world.samples[0]
     first, *others = sample.truth["color"].objects
-
     folder = world.export(Voc(images="png"), world.info(1), [world.ignoring(sample)], tmp_path)
-
     root = folder / YEAR
     rows = voc_objects(root / "Annotations/000000000_color.xml")
     assert [row["difficult"] for row in rows] == ["0"] * len(others) + ["1"]
@@ -81,15 +82,3 @@ def test_ignored_objects_are_difficult_and_void(world: Any, tmp_path: Path) -> N
     assert (root / "JPEGImages/000000000_color.png").samefile(
         folder.parent / "shards/000000/color/rgb/000000000.png"
     )
-
-
-def test_the_label_map_file_names_classes_by_their_colours(dataset: Path) -> None:
-    """Rows ``name:r,g,b:parts:actions``, as CVAT and Datumaro read them; void is "ignored"."""
-    root = dataset / YEAR
-    rows = [line.split(":") for line in (root / "labelmap.txt").read_text().splitlines()[1:]]
-    color_of = {name: tuple(map(int, color.split(","))) for name, color, *_ in rows}
-    with Image.open(next((root / "SegmentationClass").iterdir())) as image:
-        palette = np.array(image.getpalette()).reshape(-1, 3).tolist()
-
-    assert list(color_of) == ["background", "car", "crate", "pedestrian", "ignored"]
-    assert [list(c) for c in color_of.values()] == [palette[k] for k in (0, 1, 2, 3, 255)]

@@ -51,16 +51,26 @@ def faults(folder: Path, world: Any) -> list[str]:
 
 
 @pytest.mark.slow
-def test_samples_are_read_back_with_all_fields(dataset: Path, world: Any) -> None:
+def test_samples_are_read_back_with_all_fields_by_hugging_face_too(
+    dataset: Path, world: Any
+) -> None:
     """Images, scans, rows and labels under one key; splits have folders of their own."""
     assert faults(dataset / "train", world) == []
     assert faults(dataset / "val", world) == []
     assert sorted(p.name for p in (dataset / "train").iterdir()) == [
         f"street-{k:06d}.tar" for k in range(3)
     ]
+    # Its reader refuses arrays of records.
+    datasets = pytest.importorskip("datasets")
+    files = sorted(map(str, (dataset / "train").glob("*.tar")))
+    loaded = datasets.load_dataset("webdataset", data_files=files, split="train", streaming=True)
+    expected = [s for s in world.samples if s.split == "train"]
+    for row, sample in zip(loaded, expected, strict=True):
+        columns = row["json"]["columns"]["top.points.npy"]
+        assert same_columns(np.array(row["top.points.npy"], np.float32), columns, sample)
 
 
-def test_tar_files_show_nothing_of_the_machine(dataset: Path) -> None:
+def test_tar_files_show_nothing_of_the_machine_and_hold_bytes_of_the_shards(dataset: Path) -> None:
     """Time, owner and mode are constant; members are regular files, sorted."""
     for path in dataset.rglob("*.tar"):
         with tarfile.open(path) as tar:
@@ -70,10 +80,7 @@ def test_tar_files_show_nothing_of_the_machine(dataset: Path) -> None:
         }
         assert all(m.isfile() for m in members)
         assert [m.name for m in members] == sorted(m.name for m in members)
-
-
-def test_images_are_the_bytes_of_the_shards(dataset: Path) -> None:
-    """They are not encoded a second time."""
+    # They are not encoded a second time.
     shard = dataset.parent / "shards/000001"
     with tarfile.open(dataset / "train/street-000001.tar") as tar:
         member = tar.extractfile("000000003.color.depth.png")
@@ -86,24 +93,8 @@ def test_sensors_that_do_not_read_have_no_field(world: Any, slow: Any, tmp_path:
     """The right camera and the scanner read at every second step."""
     info = world.info(8, ("left", "right"), ("top",), devices={}, steps_per_scene=4)
     folder = world.export(WebDataset(), info, slow, tmp_path)
-
     fields = [
         {n for n in s if n.endswith((".rgb.png", ".npy"))} for s in tar_samples(folder / "train")
     ]
-
     whole, less = {"left.rgb.png", "right.rgb.png", "top.points.npy"}, {"left.rgb.png"}
     assert fields == [whole, less, whole, less]
-
-
-@pytest.mark.slow
-def test_hugging_face_reads_scans_and_rows(dataset: Path, world: Any) -> None:
-    """Its reader refuses arrays of records."""
-    datasets = pytest.importorskip("datasets")
-    files = sorted(map(str, (dataset / "train").glob("*.tar")))
-
-    loaded = datasets.load_dataset("webdataset", data_files=files, split="train", streaming=True)
-
-    expected = [s for s in world.samples if s.split == "train"]
-    for row, sample in zip(loaded, expected, strict=True):
-        columns = row["json"]["columns"]["top.points.npy"]
-        assert same_columns(np.array(row["top.points.npy"], np.float32), columns, sample)

@@ -39,9 +39,7 @@ def objects_of(samples: list[Any], folder: Path) -> Iterator[tuple[list[float], 
         yield from zip(rows, truth_of(sample), strict=True)
 
 
-def test_segments_are_the_outline_of_the_mask(
-    dataset: Path, samples: list[Any], world: Any
-) -> None:
+def test_segments_are_outlines_of_the_mask(dataset: Path, samples: list[Any], world: Any) -> None:
     """Drawn by pycocotools and OpenCV, every polygon gives the mask back, also of two parts."""
     parts = 0
     for (number, *outline), thing in objects_of(samples, dataset / "segment"):
@@ -81,23 +79,16 @@ def test_rotated_boxes_enclose_their_masks(dataset: Path, samples: list[Any]) ->
     assert smaller > 3
 
 
-def test_the_smallest_rectangle_is_opencvs() -> None:
+def test_the_smallest_rectangle_is_opencvs_or_upright_if_it_leaves_the_image() -> None:
     """Far from the borders of the image nothing else is allowed."""
     points = np.array([[40, 40], [80, 60], [70, 80], [30, 60], [55, 60]])
-
     corners = inner_rectangle(points, 200, 200)
-
     _, size, _ = cv2.minAreaRect(points.astype(np.float32))
     sides = sorted(np.hypot(*(np.roll(corners, -1, axis=0) - corners).T)[:2])
     assert sides == pytest.approx(sorted(size), abs=1e-3)
-
-
-def test_a_rectangle_that_leaves_the_image_is_replaced() -> None:
-    """A triangle in the corner of the image: upright, as the diagonal one reaches outside."""
+    # A triangle in the corner of the image: upright, as the diagonal one reaches outside.
     points = np.array([[0, 0], [30, 0], [0, 30]])
-
     corners = inner_rectangle(points, 100, 100)
-
     assert sorted(map(tuple, corners.tolist())) == [(0, 0), (0, 30), (30, 0), (30, 30)]
 
 
@@ -105,7 +96,6 @@ def test_pose_has_the_people_with_their_keypoints(dataset: Path, samples: list[A
     """One class; points that are not in the image are 0."""
     folder = dataset / "pose"
     data = yaml.safe_load((folder / "data.yaml").read_text())
-
     assert (data["names"], data["kpt_shape"]) == ({0: "pedestrian"}, [17, 3])
     assert data["flip_idx"] == [0, 2, 1, 4, 3, 6, 5, 8, 7, 10, 9, 12, 11, 14, 13, 16, 15]
     count = 0
@@ -135,7 +125,6 @@ def test_pose_of_another_category(world: Any, tmp_path: Path) -> None:
 
 def test_a_missing_split_is_said_in_the_file(world: Any, tmp_path: Path) -> None:
     folder = world.export(Yolo(tasks=("detect",)), world.info(2), world.samples[:2], tmp_path)
-
     text = (folder / "detect/data.yaml").read_text()
     assert "val: images/train  # the data set has no split val\n" in text
     assert "test:" not in text
