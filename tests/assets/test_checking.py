@@ -68,7 +68,6 @@ def test_a_robot_is_measured_at_home(folder: Path, tmp_path: Path) -> None:
 def test_a_folder_without_assets_is_refused(tmp_path: Path) -> None:
     (tmp_path / "thesis.txt").write_text("irreplaceable")
     result = CliRunner().invoke(assets, ["check", str(tmp_path)])
-
     assert isinstance(result.exception, AssetError)
     assert "has no assets; expected OBJ" in str(result.exception)
 
@@ -93,9 +92,7 @@ def test_what_a_check_prints_fits_a_terminal(folder: Path, monkeypatch: pytest.M
     text = (folder / "assets.yaml").read_text()
     (folder / "assets.yaml").write_text(text.replace("crate.glb", f"{name}.glb"))
     monkeypatch.chdir(folder)
-
     lines = CliRunner().invoke(assets, ["check", "."]).output.splitlines()
-
     assert max(map(len, lines)) <= 80
     words = [line.split() for line in lines]
     assert [f"user/{name}", "ok", "object", "props"] in words
@@ -126,14 +123,11 @@ def test_a_folder_is_listed(folder: Path) -> None:
     }  # fmt: skip
 
 
-def test_the_schema_describes_the_index() -> None:
+def test_the_schema_describes_the_index_and_the_page_on_assets_shows_a_valid_one() -> None:
     printed = CliRunner().invoke(assets, ["schema"], catch_exceptions=False)
     described = json.loads(printed.output)
     assert {"assets", "robots", "textures", "environments"} <= set(described["properties"])
     assert "SymmetryEntry" in described["$defs"]
-
-
-def test_the_page_on_assets_shows_a_valid_index() -> None:
     page = Path(__file__).parents[2] / "docs/assets.md"
     examples = page.read_text(encoding="utf-8").split("```yaml\n")[1:]
     text = max((example.partition("```")[0] for example in examples), key=len)

@@ -38,7 +38,7 @@ def test_pictures_are_upright_as_exif_says(orientation: int) -> None:
     assert decode_image(data, "a.png").tolist() == upright.tolist()
 
 
-def test_sixteen_bits_become_eight() -> None:
+def test_sixteen_bits_become_eight_and_floating_point_counts_to_1() -> None:
     """Grey 0, 257 and 65535 are 0, 1 and 255: PNG and TIFF, grey and colour."""
     grey = np.array([[0, 257, 65535]], np.uint16)
     for kind in ("PNG", "TIFF"):
@@ -50,10 +50,7 @@ def test_sixteen_bits_become_eight() -> None:
     assert done
     # OpenCV counts blue, green, red.
     assert decode_image(data.tobytes(), "a")[0, 1].tolist() == [255, 1, 0]
-
-
-def test_floating_point_values_count_to_1() -> None:
-    """0, 0.5 and 1, and beyond."""
+    # 0, 0.5 and 1, and beyond.
     values = np.array([[0.0, 0.5, 1.0, 7.0]], np.float32)
     levels = decode_image(encoded(Image.fromarray(values), "TIFF"), "a")[0, :, 0]
     assert levels.tolist() == [0, 128, 255, 255]
@@ -93,14 +90,11 @@ def test_radiance_in_xyz_is_refused_in_words() -> None:
 
 @pytest.mark.parametrize(
     ("names", "expected"),
-    [
-        (("R", "G", "B"), (0.1, 0.2, 0.3)),
-        (("ViewLayer.Combined.R", "ViewLayer.Combined.G", "ViewLayer.Combined.B"), (0.1, 0.2, 0.3)),
-        (("r", "g", "b"), (0.1, 0.2, 0.3)),
-        (("Y",), (0.1, 0.1, 0.1)),
-    ],
+    [(("R", "G", "B"), (0.1, 0.2, 0.3)),
+     (("ViewLayer.Combined.R", "ViewLayer.Combined.G", "ViewLayer.Combined.B"), (0.1, 0.2, 0.3)),
+     (("r", "g", "b"), (0.1, 0.2, 0.3)), (("Y",), (0.1, 0.1, 0.1))],
     ids=["plain", "Blender's layer", "lower case", "grey"],
-)
+)  # fmt: skip
 def test_openexr_by_names(
     tmp_path: Path, names: tuple[str, ...], expected: tuple[float, ...]
 ) -> None:

@@ -112,10 +112,8 @@ def test_records_of_files_that_are_gone_are_dropped_when_there_are_many(
     shutil.rmtree(tmp_path / "gone")
     cache = DiskCache(tmp_path / "cache")
     gone, kept = (str(tmp_path / name / "a.obj") for name in ("gone", "props"))
-
     digest_of(folder, tmp_path / "cache")
     assert set(cache.load_json("digests.json")) == {gone, kept}
-
     monkeypatch.setattr(content_hashes, "_ASSETS_KEPT", 1)
     rewrite(folder.root / "a.obj", NEW)
     assert digest_of(folder, tmp_path / "cache") == sha256(NEW).hexdigest()

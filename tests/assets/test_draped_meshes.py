@@ -14,12 +14,8 @@ from gen_data.core.relief import Relief, RoadProfile
 from gen_data.core.se3 import SE3
 from tests.embree import RayCaster
 
-HILL = Relief((
-    RoadProfile(
-        -60.0, 3.0, 0.3, 0.004, 120.0, 12.0, 0.2, -0.2, 0.0, 0.09,
-        (20.0, 30.0, -0.15, 70.0, 40.0, 0.1, 0.0, 1.0, 0.0),
-    ),
-))  # fmt: skip
+HILL = Relief((RoadProfile(-60.0, 3.0, 0.3, 0.004, 120.0, 12.0, 0.2, -0.2, 0.0, 0.09,
+                           (20.0, 30.0, -0.15, 70.0, 40.0, 0.1, 0.0, 1.0, 0.0)),))  # fmt: skip
 PLACE = SE3.about_z(0.3, (-60.0, 3.0, 0.2))
 
 
@@ -44,7 +40,7 @@ def test_land_has_no_crack(library: Library) -> None:
     assert at_rim.all()
 
 
-def test_land_is_near_the_ground(library: Library) -> None:
+def test_land_is_near_the_ground_with_its_slots_textures_area_and_normals(library: Library) -> None:
     """Near the road, by rays from above; its hollows are those of the level mesh."""
     rng = np.random.default_rng(1)
     places = np.column_stack([rng.uniform(0.0, 120.0, 4000), rng.uniform(-40.0, 40.0, 4000)])
@@ -56,18 +52,33 @@ def test_land_is_near_the_ground(library: Library) -> None:
     raised = HILL.height(PLACE.apply(np.column_stack([places, np.zeros(4000)])))
     # Halves of an edge may bend once more between the points that were asked.
     assert np.abs(heights[1] - heights[0] - raised).max() < 2.0 * LAND_M
+    # Cutting and raising changes neither the plan of any slot nor the range of its texture.
+    asset = "road?length_m=120&edge_lines=solid"
+    level, mesh = library.mesh(asset), _on_hill(library, asset)
+    assert mesh.materials == level.materials
+    for slot in np.unique(level.face_slots):
+        areas = []
+        for one in (level, mesh):
+            across = np.cross(*_sides(one, np.flatnonzero(one.face_slots == slot)))
+            areas.append(0.5 * np.abs(across[:, 2]).sum())
+        assert areas[1] == pytest.approx(areas[0], rel=1e-4, abs=1e-3)
+    np.testing.assert_allclose(mesh.uvs.max(axis=0), level.uvs.max(axis=0), atol=1e-4)
+    # On a slope of constant grade, the level land's normal turns by atan(0.09).
+    ramp = Relief((RoadProfile(-60.0, 0.0, 0.0, 0.0, 120.0, 40.0, 0.0, 0.0, 0.0, 0.09,
+                               (0.0, 1.0, 0.0) * 3),))  # fmt: skip
+    asset = draped_id(parse_asset_id("paved_area"), SE3.about_z(1.0), 1.0, ramp)
+    mesh = library.mesh(asset)
+    top = mesh.normals[mesh.normals[:, 2] > 0.98]
+    # The body is turned by 1 rad: uphill is at -1 rad in its frame.
+    normal = np.array([-0.09 * np.cos(1.0), 0.09 * np.sin(1.0), 1.0]) / np.hypot(0.09, 1.0)
+    np.testing.assert_allclose(np.median(top, axis=0), normal, atol=1e-3)
 
 
 @pytest.mark.parametrize(
-    "asset",
-    [
-        "road?length_m=120&curvature_per_m=0.004&wear=0.9&edge_lines=solid",
-        "crosswalk?length_m=40",
-    ],
-)
-def test_all_points_of_layers_are_raised_by_the_ground_below_them(
-    library: Library, asset: str
-) -> None:
+    "asset", ["road?length_m=120&curvature_per_m=0.004&wear=0.9&edge_lines=solid",
+              "crosswalk?length_m=40"],
+)  # fmt: skip
+def test_points_of_layers_are_raised_by_the_ground_below_them(library: Library, asset: str) -> None:
     """Rays through random triangles of the level mesh meet the same layer, to 0.1 mm."""
     level, mesh = library.mesh(asset), _on_hill(library, asset)
     rng = np.random.default_rng(2)
@@ -90,43 +101,12 @@ def _sides(mesh: MeshData, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return b - a, c - a
 
 
-def test_slots_textures_and_area_in_plan_stay(library: Library) -> None:
-    """Cutting and raising changes neither the plan of any slot nor the range of its texture."""
-    asset = "road?length_m=120&edge_lines=solid"
-    level, mesh = library.mesh(asset), _on_hill(library, asset)
-    assert mesh.materials == level.materials
-    for slot in np.unique(level.face_slots):
-        areas = []
-        for one in (level, mesh):
-            across = np.cross(*_sides(one, np.flatnonzero(one.face_slots == slot)))
-            areas.append(0.5 * np.abs(across[:, 2]).sum())
-        assert areas[1] == pytest.approx(areas[0], rel=1e-4, abs=1e-3)
-    np.testing.assert_allclose(mesh.uvs.max(axis=0), level.uvs.max(axis=0), atol=1e-4)
-
-
-def test_normals_are_those_of_the_raised_surface(library: Library) -> None:
-    """On a slope of constant grade, the level land's normal turns by atan(0.09)."""
-    ramp = Relief((
-        RoadProfile(
-            -60.0, 0.0, 0.0, 0.0, 120.0, 40.0, 0.0, 0.0, 0.0, 0.09, (0.0, 1.0, 0.0) * 3
-        ),
-    ))  # fmt: skip
-    asset = draped_id(parse_asset_id("paved_area"), SE3.about_z(1.0), 1.0, ramp)
-    mesh = library.mesh(asset)
-    top = mesh.normals[mesh.normals[:, 2] > 0.98]
-    # The body is turned by 1 rad: uphill is at -1 rad in its frame.
-    normal = np.array([-0.09 * np.cos(1.0), 0.09 * np.sin(1.0), 1.0]) / np.hypot(0.09, 1.0)
-    np.testing.assert_allclose(np.median(top, axis=0), normal, atol=1e-3)
-
-
 @pytest.mark.parametrize(
     ("text", "message"),
-    [
-        ("paved_area?relief=1,2,3", "expected at=x,y,yaw,scale"),
-        ("paved_area?at=0,0,0,1&relief=1,2,3", "3 numbers are no relief; expected 19 per road"),
-        ("car?at=0,0,0,1&relief=1,2,3", "has no parameter"),
-    ],
-)
+    [("paved_area?relief=1,2,3", "expected at=x,y,yaw,scale"),
+     ("paved_area?at=0,0,0,1&relief=1,2,3", "3 numbers are no relief; expected 19 per road"),
+     ("car?at=0,0,0,1&relief=1,2,3", "has no parameter")],
+)  # fmt: skip
 def test_wrong_ids_are_refused(library: Library, text: str, message: str) -> None:
     """With the id, and with what is expected."""
     with pytest.raises(AssetError, match=message):

@@ -61,14 +61,12 @@ def test_check_lists_remarks_and_still_succeeds(folder: Path) -> None:
 
 @pytest.mark.parametrize(
     ("files", "reason"),
-    [
-        ({"a.mtl": "newmtl m\nmap_Kd gone.png\n"}, "gone.png: no such image"),
-        ({"a.mtl": "newmtl m\nmap_Kd t.png\n", "t.png": "text"}, "t.png: unreadable image"),
-        ({"a.mtl": "newmtl other\nKd 1 0 0\n"}, "material 'm' is not defined in a.mtl"),
-        ({"a.mtl": "newmtl M\nKd 1 0 0\n"}, "is not defined in a.mtl (did you mean 'M'"),
-    ],
+    [({"a.mtl": "newmtl m\nmap_Kd gone.png\n"}, "gone.png: no such image"),
+     ({"a.mtl": "newmtl m\nmap_Kd t.png\n", "t.png": "text"}, "t.png: unreadable image"),
+     ({"a.mtl": "newmtl other\nKd 1 0 0\n"}, "material 'm' is not defined in a.mtl"),
+     ({"a.mtl": "newmtl M\nKd 1 0 0\n"}, "is not defined in a.mtl (did you mean 'M'")],
     ids=["missing image", "no image", "unknown material", "another case"],
-)
+)  # fmt: skip
 def test_check_refuses_wrong_looks(folder: Path, files: dict[str, str], reason: str) -> None:
     """Each is found without rendering anything, and ends with exit code 3."""
     for name, text in files.items():
@@ -78,18 +76,15 @@ def test_check_refuses_wrong_looks(folder: Path, files: dict[str, str], reason: 
     assert reason in findings(folder)["user/a"].error
 
 
-def test_warnings_are_given_once_per_file(folder: Path) -> None:
+def test_warnings_are_given_once_a_file_and_large_folders_not_read_for_them(folder: Path) -> None:
+    """Unless the file was read before."""
+    assert collect_remarks(opened(folder), ["user/a"], read_max=0) == ()
     library = opened(folder)
     with pytest.warns(AssetWarning, match="map_Bump") as told:
         known = warn_of_remarks(library, ["user/a", "mug?seed=3"])
     assert len(told) == 1
     assert known == {str(folder / "a.obj")}
     assert warn_of_remarks(library, ["user/a"], told=known) == known
-
-
-def test_large_folders_are_not_read_for_their_remarks(folder: Path) -> None:
-    assert collect_remarks(opened(folder), ["user/a"], read_max=0) == ()
-    opened(folder).mesh("user/a")
     assert len(collect_remarks(opened(folder), ["user/a"], read_max=0)) == 1
 
 
@@ -112,15 +107,12 @@ def test_files_of_one_stem_are_told_apart(folder: Path) -> None:
 
 @pytest.mark.parametrize(
     ("file", "category"),
-    [
-        ("Ecoforms_Pot/meshes/model.obj", "Ecoforms_Pot"),
-        ("ycbv/models/obj_000004.ply", "obj_000004"),
-        ("02876657/1071fa4cddb2da2fc8724d5673a063a6/models/model_normalized.obj", "02876657"),
-        ("tools/hammer.stl", "tools"),
-        ("meshes/hammer.stl", "meshes"),
-    ],
+    [("Ecoforms_Pot/meshes/model.obj", "Ecoforms_Pot"),
+     ("ycbv/models/obj_000004.ply", "obj_000004"),
+     ("02876657/1071fa4cddb2da2fc8724d5673a063a6/models/model_normalized.obj", "02876657"),
+     ("tools/hammer.stl", "tools"), ("meshes/hammer.stl", "meshes")],
     ids=["Google Scanned Objects", "BOP", "ShapeNet", "own", "only a sorting folder"],
-)
+)  # fmt: skip
 def test_categories_of_published_layouts(tmp_path: Path, file: str, category: str) -> None:
     """The nearest folder whose name says something."""
     path = tmp_path / "props" / file

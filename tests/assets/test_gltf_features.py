@@ -3,76 +3,19 @@
 Files are built here; expected values follow from the specification of glTF 2.0 and its extensions.
 """
 
-import json
-import struct
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from PIL import Image
 
 from gen_data.assets.asset_folder import Folder
 from gen_data.assets.folder_index import MeshEntry
 from gen_data.assets.importer import import_object
-from gen_data.assets.readers import MeshSource, read_mesh
+from gen_data.assets.readers import read_mesh
 from gen_data.core.errors import AssetError
-
-POINTS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], "<f4")
-UVS = np.array([[0.0, 0.0], [0.25, 0.0], [0.0, 0.5]], "<f4")
-_TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
-_COMPONENTS = {"f4": 5126, "u1": 5121, "u2": 5123}
-
-
-class Builder:
-    """A glTF document of one triangle, with its buffer beside it."""
-
-    def __init__(self) -> None:
-        self.data = b""
-        self.tree: dict[str, Any] = {
-            "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}],
-            "nodes": [{"mesh": 0}], "bufferViews": [], "accessors": [],
-        }  # fmt: skip
-        self.attributes = {"POSITION": self.accessor(POINTS)}
-        self.primitive: dict[str, Any] = {"attributes": self.attributes}
-        self.tree["meshes"] = [{"primitives": [self.primitive]}]
-
-    def view(self, values: NDArray[Any]) -> int:
-        self.data += b"\0" * (-len(self.data) % 4)
-        view = {"buffer": 0, "byteOffset": len(self.data), "byteLength": values.nbytes}
-        self.data += values.tobytes()
-        self.tree["bufferViews"].append(view)
-        return len(self.tree["bufferViews"]) - 1
-
-    def accessor(self, values: NDArray[Any], **more: Any) -> int:
-        width = values.shape[1] if values.ndim == 2 else 1
-        self.tree["accessors"].append(
-            {"bufferView": self.view(values), "componentType": _COMPONENTS[values.dtype.str[1:]],
-             "count": len(values), "type": _TYPES[width], **more}
-        )  # fmt: skip
-        return len(self.tree["accessors"]) - 1
-
-    def textured(self, folder: Path, **reference: Any) -> dict[str, Any]:
-        """A material with an image of its own; returns it."""
-        Image.new("RGB", (2, 2), (200, 0, 0)).save(folder / "i.png")
-        self.tree |= {"images": [{"uri": "i.png"}], "textures": [{"source": 0}]}
-        pbr = {"baseColorTexture": {"index": 0, **reference}, "metallicFactor": 0}
-        return self.material(pbrMetallicRoughness=pbr)
-
-    def material(self, **content: Any) -> dict[str, Any]:
-        self.tree["materials"] = [{"name": "m", **content}]
-        self.primitive["material"] = 0
-        return self.tree["materials"][0]
-
-    def read(self, folder: Path) -> MeshSource:
-        self.write(folder)
-        return read_mesh(Folder(folder), "a.gltf")
-
-    def write(self, folder: Path) -> None:
-        self.tree["buffers"] = [{"byteLength": len(self.data), "uri": "a.bin"}]
-        (folder / "a.bin").write_bytes(self.data)
-        (folder / "a.gltf").write_text(json.dumps(self.tree))
+from tests.assets.gltf_builder import POINTS, UVS, Builder
 
 
 @pytest.fixture
@@ -139,10 +82,8 @@ def test_a_skin_takes_the_place_of_its_nodes_transform(builder: Builder, tmp_pat
     joints = np.array([[0, 1, 0, 0]] * 3, "<u1")
     weights = np.array([[0.25, 0.75, 0, 0]] * 3, "<f4")
     bind = np.stack([np.eye(4), np.diag([0.5, 0.5, 0.5, 1.0])]).astype("<f4")
-    builder.attributes |= {
-        "JOINTS_0": builder.accessor(joints),
-        "WEIGHTS_0": builder.accessor(weights),
-    }
+    builder.attributes |= {"JOINTS_0": builder.accessor(joints),
+                           "WEIGHTS_0": builder.accessor(weights)}  # fmt: skip
     matrices = builder.accessor(bind.reshape(-1, 16))
     builder.tree["nodes"] = [{"mesh": 0, "skin": 0, "scale": [5, 5, 5]}, {"name": "a"},
                              {"name": "b", "translation": [0, 1, 0]}]  # fmt: skip
@@ -162,11 +103,9 @@ def test_morph_targets_apply_by_their_weights_at_rest(builder: Builder, tmp_path
 
 def test_sparse_accessors_replace_single_values(builder: Builder, tmp_path: Path) -> None:
     """Point 1 is replaced; without a buffer view, the others are zero."""
-    sparse = {
-        "count": 1,
-        "indices": {"bufferView": builder.view(np.array([1], "<u2")), "componentType": 5123},
-        "values": {"bufferView": builder.view(np.array([7, 8, 9], "<f4"))},
-    }
+    sparse = {"count": 1,
+              "indices": {"bufferView": builder.view(np.array([1], "<u2")), "componentType": 5123},
+              "values": {"bufferView": builder.view(np.array([7, 8, 9], "<f4"))}}  # fmt: skip
     builder.tree["accessors"][0]["sparse"] = sparse
     assert builder.read(tmp_path).soup.corners[0].tolist() == [[0, 0, 0], [7, 8, 9], [0, 1, 0]]
     del builder.tree["accessors"][0]["bufferView"]
@@ -214,9 +153,7 @@ def test_specular_glossiness(
     "name",
     ["KHR_materials_", "KHR_materials_sheen", "KHR_texture_transform2", "KHR_texture_basisu"],
 )
-def test_extensions_are_compared_by_whole_names(
-    builder: Builder, tmp_path: Path, name: str
-) -> None:
+def test_extensions_are_compared_as_whole(builder: Builder, tmp_path: Path, name: str) -> None:
     """What is not applied is refused if it is required, and named if it is used."""
     builder.tree["extensionsUsed"] = [name]
     assert builder.read(tmp_path).remarks == (f"the extension {name} is not used",)
@@ -227,12 +164,7 @@ def test_extensions_are_compared_by_whole_names(
 
 def test_bytes_after_a_binary_file(builder: Builder, tmp_path: Path) -> None:
     """Padding behind the stated length is named; a file that is too short is refused."""
-    builder.tree["buffers"] = [{"byteLength": len(builder.data)}]
-    text = json.dumps(builder.tree).encode()
-    text += b" " * (-len(text) % 4)
-    chunks = struct.pack("<II", len(text), 0x4E4F534A) + text
-    chunks += struct.pack("<II", len(builder.data), 0x004E4942) + builder.data
-    whole = struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
+    whole = builder.glb()
     (tmp_path / "a.glb").write_bytes(whole + b"\0\0\0")
     assert read_mesh(Folder(tmp_path), "a.glb").remarks == ("3 bytes after its end are not read",)
     (tmp_path / "a.glb").write_bytes(whole[:-1])
@@ -242,15 +174,11 @@ def test_bytes_after_a_binary_file(builder: Builder, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     "material",
-    [
-        {"alphaMode": "BLEND", "pbrMetallicRoughness": {"baseColorFactor": [1, 0, 0, 0]}},
-        {"alphaMode": "MASK", "pbrMetallicRoughness": {"baseColorFactor": [1, 0, 0, 0.2]}},
-    ],
+    [{"alphaMode": "BLEND", "pbrMetallicRoughness": {"baseColorFactor": [1, 0, 0, 0]}},
+     {"alphaMode": "MASK", "pbrMetallicRoughness": {"baseColorFactor": [1, 0, 0, 0.2]}}],
     ids=["BLEND", "MASK"],
-)
-def test_the_invisible_is_no_asset(
-    builder: Builder, tmp_path: Path, material: dict[str, Any]
-) -> None:
+)  # fmt: skip
+def test_the_unseen_is_no_asset(builder: Builder, tmp_path: Path, material: dict[str, Any]) -> None:
     """Alpha 0, or below the threshold of a mask."""
     builder.material(**material)
     builder.write(tmp_path)
@@ -258,8 +186,8 @@ def test_the_invisible_is_no_asset(
         import_object(Folder(tmp_path), MeshEntry(file="a.gltf"), "user/a")
 
 
-def test_animations_lines_and_further_scenes_are_named(builder: Builder, tmp_path: Path) -> None:
-    """None of them changes the triangles at rest."""
+def test_unread_content_is_named_and_unknown_ones_refused(builder: Builder, tmp_path: Path) -> None:
+    """Animations, lines and further scenes do not change the triangles at rest."""
     builder.tree["animations"] = [{"channels": [], "samplers": []}]
     builder.tree["scenes"].append({"nodes": []})
     builder.tree["meshes"][0]["primitives"].append({"attributes": builder.attributes, "mode": 1})
@@ -268,22 +196,17 @@ def test_animations_lines_and_further_scenes_are_named(builder: Builder, tmp_pat
         "1 further scenes are not read",
         "lines and points are not read",
     )
+    builder.tree["accessors"][0]["componentType"] = 9999
+    with pytest.raises(AssetError, match="accessor 0 has the unknown componentType 9999"):
+        builder.read(tmp_path)
 
 
 @pytest.mark.parametrize(
     ("data", "reason"),
-    [
-        (b"\xcd\x00\x00\x00binary", "neither like JSON nor like a binary glTF"),
-        (b'{"asset": 3', "malformed glTF"),
-    ],
-)
+    [(b"\xcd\x00\x00\x00binary", "neither like JSON nor like a binary glTF"),
+     (b'{"asset": 3', "malformed glTF")],
+)  # fmt: skip
 def test_other_files_are_refused_in_words(tmp_path: Path, data: bytes, reason: str) -> None:
     (tmp_path / "a.glb").write_bytes(data)
     with pytest.raises(AssetError, match=reason):
         read_mesh(Folder(tmp_path), "a.glb")
-
-
-def test_an_unknown_component_type_is_named(builder: Builder, tmp_path: Path) -> None:
-    builder.tree["accessors"][0]["componentType"] = 9999
-    with pytest.raises(AssetError, match="accessor 0 has the unknown componentType 9999"):
-        builder.read(tmp_path)

@@ -30,7 +30,6 @@ def test_there_are_enough_hostile_files_of_every_kind() -> None:
     """Meshes, robots, images, panoramas, archives, roads and stages."""
     counts = count_marked()
     print(dict(counts), counts.total())
-
     assert {name: n for name, n in counts.items() if n < 4} == {}
     assert len(counts) >= 5
     assert counts.total() >= HOSTILE_MIN

@@ -29,19 +29,13 @@ def test_every_category_has_forty_shapes(families: list[str]) -> None:
 
 
 @pytest.mark.parametrize("group", GROUPS)
-def test_the_first_seeds_are_of_different_kinds(group: str) -> None:
+def test_kinds_take_turns_and_contents_are_known_and_vary(group: str) -> None:
+    """Every name is a row of a table; some variants are empty, some are not."""
     kinds = [name for name in STYLES if name.startswith(f"{group}/")]
-
     assert len(kinds) >= 7
     assert [choose(group, seed).kind for seed in range(len(kinds))] == kinds
     assert FAMILIES[group].variants >= 4 * len(kinds)
-
-
-@pytest.mark.parametrize("group", GROUPS)
-def test_contents_are_known_and_vary(group: str) -> None:
-    """Every name is a row of a table; some variants are empty, some are not."""
     drawn = [choose(group, seed).content for seed in range(FAMILIES[group].variants)]
-
     assert {name for name in drawn if name} <= DRINKS.keys() | FOODS.keys()
     assert drawn.count("") >= 5
     assert len(set(drawn)) >= 2
@@ -63,36 +57,26 @@ def test_a_drink_stays_inside_its_vessel(group: str) -> None:
     wall = mesh.vertices_m[np.unique(mesh.faces[mesh.face_slots == 0])]
     rim = wall[wall[:, 2] > wall[:, 2].max() - 1e-3]
     axis = 0.5 * (rim.min(axis=0) + rim.max(axis=0))[:2]
-
     assert len(poured)
     assert poured[:, 2].max() < wall[:, 2].max()
     wide = np.hypot(*(wall[:, :2] - axis).T).max()
     assert np.hypot(*(poured[:, :2] - axis).T).max() < wide
 
 
-def test_labels_name_the_kind_and_the_contents() -> None:
-    """The facts of a variant are those that its mesh was made with."""
+def test_labels_name_the_kind_and_contents_and_bananas_count_as_stated() -> None:
+    """The facts of a variant are those that its mesh was made with. By the role of the slots."""
     seed = first("bowl", set(FOODS))
     facts = FAMILIES["bowl"].facts
     assert facts is not None
     said, choice = facts(seed=seed), choose("bowl", seed)
-
     assert f"bowl/{said.subcategory}" == choice.kind
     assert said.attributes == {"contents": choice.content}
-
-
-def test_clear_bottles_show_a_drink_and_others_none() -> None:
-    """By the role of the slots."""
     for seed in (0, 8, 13):
         roles = [m.role for m in FAMILIES["bottle"].build(seed=seed).mesh.materials]
         assert roles.count(CONTENTS) == bool(choose_bottle(seed).drink)
-
-
-def test_hands_of_bananas_have_as_many_as_stated() -> None:
-    """Peels of two slots; every banana has the same number of triangles."""
+    # Peels of two slots; every banana has the same number of triangles.
     one, hand = (FAMILIES["banana"].build(seed=k).mesh for k in (0, 4))
     peels = int((hand.face_slots < 2).sum())
-
     assert fruit.banana_count(4) > 1
     assert peels == pytest.approx(fruit.banana_count(4) * len(one.faces), rel=0.02)
 

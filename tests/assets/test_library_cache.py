@@ -40,14 +40,10 @@ def test_stored_bounds_are_those_of_the_mesh_which_is_not_read(
     first.bounds_m(asset)
     vertices_m = first.mesh(asset).vertices_m
     of_body = first.body_bounds_m(asset)
-
     later = open_library(cache_dir=tmp_path)
     monkeypatch.delattr(type(later), "_imported")
-
-    assert later.bounds_m(asset) == (
-        tuple(vertices_m.min(axis=0).tolist()),
-        tuple(vertices_m.max(axis=0).tolist()),
-    )
+    assert later.bounds_m(asset) == (tuple(vertices_m.min(axis=0).tolist()),
+                                     tuple(vertices_m.max(axis=0).tolist()))  # fmt: skip
     assert later.body_bounds_m(asset) == of_body
     assert (of_body is not None) == asset.startswith("car")
 
@@ -68,7 +64,7 @@ def test_cold_warm_and_another_cache_give_the_same_bytes(tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize("damage", ["truncated", "bit flip", "empty", "foreign"])
-def test_a_damaged_entry_is_made_anew(tmp_path: Path, damage: str) -> None:
+def test_a_damaged_entry_is_made_again_without_temporary_files(tmp_path: Path, damage: str) -> None:
     good = open_library(cache_dir=tmp_path).mesh(ASSET)
     (path,) = entries(tmp_path)
     data = bytearray(path.read_bytes())
@@ -82,6 +78,7 @@ def test_a_damaged_entry_is_made_anew(tmp_path: Path, damage: str) -> None:
     else:
         np.savez(path, vertices_m=np.zeros((3, 3)))
     assert_same(open_library(cache_dir=tmp_path).mesh(ASSET), good)
+    assert not list(tmp_path.rglob("*.part"))
 
 
 def large_arrays() -> dict[str, np.ndarray]:
@@ -108,9 +105,7 @@ def test_a_damaged_large_entry_is_made_anew(tmp_path: Path, damage: str) -> None
     data[150_000] ^= 0x10
     path.unlink()
     path.write_bytes(data[:180_000] if damage == "truncated" else data)
-
     arrays = disk.arrays(key, large_arrays)
-
     np.testing.assert_array_equal(arrays["x"], large_arrays()["x"])
     assert path.read_bytes() != data
 
@@ -142,16 +137,16 @@ def test_people_in_a_given_pose_are_stored_but_not_every_step_of_a_stride(tmp_pa
     assert len(entries(tmp_path)) == 1
 
 
-def test_a_cache_that_cannot_be_written_only_costs_time(tmp_path: Path) -> None:
-    """A file stands where the cache folder should be."""
-    blocked = tmp_path / "cache"
+def test_opening_reads_nothing_and_a_cache_not_writable_only_costs_time(tmp_path: Path) -> None:
+    """A library opens with a missing folder; the first query reports the fault."""
+    library = open_library([tmp_path / "missing"], cache_dir=tmp_path / "cache")
+    assert not (tmp_path / "cache").exists()
+    with pytest.raises(Exception, match="no such folder"):
+        library.get(ASSET)
+    # A file stands where the cache folder should be.
+    blocked = tmp_path / "blocked"
     blocked.write_text("in the way")
     assert len(open_library(cache_dir=blocked).mesh(ASSET).faces) > 100
-
-
-def test_no_temporary_file_stays_behind(tmp_path: Path) -> None:
-    open_library(cache_dir=tmp_path).mesh(ASSET)
-    assert not list(tmp_path.rglob("*.part"))
 
 
 @pytest.mark.slow
@@ -188,11 +183,3 @@ def test_memory_is_bounded_and_forgets_the_oldest(tmp_path: Path) -> None:
     get("c")
     assert computed == ["a", "b", "c"]
     assert len(store) == 2
-
-
-def test_opening_reads_nothing(tmp_path: Path) -> None:
-    """A library opens with a missing folder; the first query reports the fault."""
-    library = open_library([tmp_path / "missing"], cache_dir=tmp_path / "cache")
-    assert not (tmp_path / "cache").exists()
-    with pytest.raises(Exception, match="no such folder"):
-        library.get(ASSET)

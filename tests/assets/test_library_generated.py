@@ -8,21 +8,15 @@ from gen_data.assets.library import Library, open_library
 from gen_data.core.errors import AssetError
 
 
-def test_defaults_count_as_parameters(library: Library) -> None:
+def test_parameters_make_the_asset_defaults_too_and_only_seeds_are_listed(library: Library) -> None:
     """Leaving a default out and writing it gives the same content."""
     assert library.get("mug").sha256 == library.get("mug?seed=0").sha256
     assert library.get("mug?seed=1").sha256 != library.get("mug?seed=0").sha256
-
-
-def test_size_parameters_are_obeyed(library: Library) -> None:
-    """A table of 0.9 x 0.6 x 0.5 m, standing on the floor."""
+    # A table of 0.9 x 0.6 x 0.5 m, standing on the floor.
     low, high = library.bounds_m("table?size_m=0.9,0.6,0.5")
     assert low == pytest.approx((-0.45, -0.3, 0.0), abs=1e-3)
     assert high == pytest.approx((0.45, 0.3, 0.5), abs=1e-3)
-
-
-def test_seeds_are_listed_and_parametric_families_are_not(library: Library) -> None:
-    """Furniture is asked for by its size, not drawn."""
+    # Furniture is asked for by its size, not drawn.
     mugs = library.find({"mug", "procedural"})
     assert [a.asset_id for a in mugs] == sorted(f"mug?seed={k}" for k in range(len(mugs)))
     assert not [a for a in library.find({"procedural"}) if a.asset_id.startswith("table?")]
@@ -42,7 +36,6 @@ def test_libraries_of_a_process_share_descriptions_of_offered_assets(tmp_path: P
     """A command opens several, and each search by tags finds many of them."""
     one, two = (open_library(cache_dir=tmp_path / name) for name in "ab")
     mug = one.get("mug?seed=1")
-
     assert two.get("mug?seed=1") is mug
     assert any(found is mug for found in two.find({"mug"}))
     assert one.get("mug?seed=123456") is not two.get("mug?seed=123456")
@@ -50,29 +43,21 @@ def test_libraries_of_a_process_share_descriptions_of_offered_assets(tmp_path: P
 
 @pytest.mark.parametrize(
     ("asset_id", "reason"),
-    [
-        ("mug?sede=1", "did you mean 'seed'"),
-        ("mug?seed=-1", "integer from 0"),
-        ("mug?seed=1.5", "integer from 0"),
-        ("mug?seed=red", "integer from 0"),
-        ("table?size_m=1,2", "expects 3 comma-separated numbers"),
-        ("table?size_m=wide", "expects 3 comma-separated numbers"),
-        ("table?style=3", "expects a word"),
-        ("table?size_m=0,0,0", "table"),
-        ("mgu?seed=3", "did you mean 'mug"),
-    ],
-)
-def test_wrong_parameters_are_refused_with_right(
-    library: Library, asset_id: str, reason: str
-) -> None:
+    [("mug?sede=1", "did you mean 'seed'"), ("mug?seed=-1", "integer from 0"),
+     ("mug?seed=1.5", "integer from 0"), ("mug?seed=red", "integer from 0"),
+     ("table?size_m=1,2", "expects 3 comma-separated numbers"),
+     ("table?size_m=wide", "expects 3 comma-separated numbers"),
+     ("table?style=3", "expects a word"), ("table?size_m=0,0,0", "table"),
+     ("mgu?seed=3", "did you mean 'mug")],
+)  # fmt: skip
+def test_wrong_parameters_are_refused_so(library: Library, asset_id: str, reason: str) -> None:
     with pytest.raises(AssetError, match=reason):
         library.mesh(asset_id)
 
 
-def test_kinds_are_not_confused(library: Library) -> None:
-    with pytest.raises(AssetError, match="not a texture"):
-        library.texture("mug?seed=0")
-    with pytest.raises(AssetError, match="not an environment"):
-        library.environment("mug?seed=0")
-    with pytest.raises(AssetError, match="not a robot"):
-        library.robot("mug?seed=0")
+@pytest.mark.parametrize(
+    ("kind", "article"), [("texture", "a"), ("environment", "an"), ("robot", "a")]
+)
+def test_kinds_are_not_confused(library: Library, kind: str, article: str) -> None:
+    with pytest.raises(AssetError, match=f"not {article} {kind}"):
+        getattr(library, kind)("mug?seed=0")

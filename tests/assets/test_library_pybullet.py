@@ -36,15 +36,29 @@ def test_objects_have_the_size_of_the_real_thing(
     assert size_m(library, f"pybullet/{name}") == pytest.approx(expected_m, abs=tolerance_m)
 
 
-def test_the_teddy_stands_and_fits_a_hand(library: Library) -> None:
+def test_teddies_and_random_shapes_have_their_files_sizes_and_textures(library: Library) -> None:
     """0.16 m from feet to ears, along Z."""
     size = size_m(library, "pybullet/teddy")
     assert size[2] == pytest.approx(0.16, abs=1e-4)
     assert int(size.argmax()) == 2
+    # At scale 0.015 they are hand-sized, and they have the colour of their URDF.
+    lines = Path(pybullet_data.getDataPath(), "random_urdfs/000/000.obj").read_text().splitlines()
+    points = np.array([line.split()[1:4] for line in lines if line.startswith("v ")], dtype=float)
+    expected = 0.015 * (points.max(axis=0) - points.min(axis=0))
+    assert size_m(library, "random_urdfs/000") == pytest.approx(expected, abs=1e-5)
+    red, green, blue = library.materials("random_urdfs/000")[0].base_color
+    assert blue > 10 * max(red, green)
+    # A material's texture id leads to the image that lies beside the mesh.
+    (material,) = library.materials("pybullet/domino")
+    assert library.texture(material.texture).albedo.shape == (1024, 2048, 3)
+    assert material.printed
+    assert material.base_color == (1.0, 1.0, 1.0)
 
 
 @pytest.mark.parametrize("name", OBJECTS)
-def test_the_origin_is_where_conventions_put_it(library: Library, name: str) -> None:
+def test_objects_are_in_the_normal_form_with_their_origin_where_conventions_put_it(
+    library: Library, name: str
+) -> None:
     """Centre of the bounding box; furniture at the centre of its footprint on the floor."""
     asset = library.get(f"pybullet/{name}")
     low, high = np.array(library.bounds_m(asset.asset_id))
@@ -52,11 +66,7 @@ def test_the_origin_is_where_conventions_put_it(library: Library, name: str) -> 
     if "furniture" in asset.tags:
         centre[2] = low[2]
     assert centre == pytest.approx(np.zeros(3), abs=1e-6)
-
-
-@pytest.mark.parametrize("name", OBJECTS)
-def test_collision_parts_cover_what_is_seen(library: Library, name: str) -> None:
-    """Mesh and parts share one frame: their boxes agree (the table's legs do not collide)."""
+    # Mesh and parts share one frame: their boxes agree (the table's legs do not collide).
     asset_id = f"pybullet/{name}"
     points = np.concatenate(library.convex_parts(asset_id).parts_m)
     low, high = np.array(library.bounds_m(asset_id))
@@ -67,10 +77,6 @@ def test_collision_parts_cover_what_is_seen(library: Library, name: str) -> None
     assert (points.max(axis=0) - points.min(axis=0))[:2] == pytest.approx(
         (high - low)[:2], abs=slack
     )
-
-
-@pytest.mark.parametrize("name", OBJECTS)
-def test_meshes_are_in_the_normal_form(library: Library, name: str) -> None:
     mesh = library.mesh(f"pybullet/{name}")
     assert mesh.vertices_m.dtype == mesh.normals.dtype == mesh.uvs.dtype == np.float32
     assert mesh.faces.dtype == mesh.face_slots.dtype == np.int32
@@ -83,7 +89,9 @@ def test_meshes_are_in_the_normal_form(library: Library, name: str) -> None:
 
 
 @pytest.mark.slow
-def test_a_thousand_random_shapes_are_found_by_tag(library: Library) -> None:
+def test_a_thousand_random_shapes_are_found_and_all_assets_name_their_licence(
+    library: Library,
+) -> None:
     """Every folder of random_urdfs is listed, sorted by id, but the one whose mesh has NaNs."""
     found = library.find({"random_shape"})
     folders = sorted(p.name for p in (Path(pybullet_data.getDataPath()) / "random_urdfs").iterdir())
@@ -91,34 +99,6 @@ def test_a_thousand_random_shapes_are_found_by_tag(library: Library) -> None:
     assert [a.asset_id for a in found] == [f"random_urdfs/{name}" for name in fit]
     assert {a.category for a in found} == {"random_object"}
     assert len({a.sha256 for a in found}) == len(found)
-
-
-def test_random_shapes_come_at_the_size_of_their_urdf(library: Library) -> None:
-    """At scale 0.015 they are hand-sized, and they have the colour of their URDF."""
-    lines = Path(pybullet_data.getDataPath(), "random_urdfs/000/000.obj").read_text().splitlines()
-    points = np.array([line.split()[1:4] for line in lines if line.startswith("v ")], dtype=float)
-    expected = 0.015 * (points.max(axis=0) - points.min(axis=0))
-    assert size_m(library, "random_urdfs/000") == pytest.approx(expected, abs=1e-5)
-    red, green, blue = library.materials("random_urdfs/000")[0].base_color
-    assert blue > 10 * max(red, green)
-
-
-def test_textures_of_objects_are_served(library: Library) -> None:
-    """A material's texture id leads to the image that lies beside the mesh."""
-    (material,) = library.materials("pybullet/domino")
-    assert library.texture(material.texture).albedo.shape == (1024, 2048, 3)
-    assert material.printed
-    assert material.base_color == (1.0, 1.0, 1.0)
-
-
-def test_neither_duck_nor_bicycle_are_offered(library: Library) -> None:
-    for name in ("pybullet/duck", "pybullet/bicycle"):
-        with pytest.raises(AssetError):
-            library.get(name)
-
-
-@pytest.mark.slow
-def test_every_asset_names_licence_author_and_source(library: Library) -> None:
     for kind in ("object", "robot", "texture", "environment"):
         for asset in library.find((), kind):
             assert asset.licence
@@ -128,17 +108,20 @@ def test_every_asset_names_licence_author_and_source(library: Library) -> None:
             assert asset.tags == tuple(sorted(set(asset.tags)))
 
 
-def test_an_unknown_id_is_answered_with_the_nearest(library: Library) -> None:
+def test_other_ids_are_answered_with_the_nearest_and_collision_parts_are_small(
+    library: Library,
+) -> None:
+    """Neither duck nor bicycle are offered."""
+    for name in ("pybullet/duck", "pybullet/bicycle"):
+        with pytest.raises(AssetError):
+            library.get(name)
     with pytest.raises(AssetError, match=r"pybullet/tedy.*did you mean 'pybullet/teddy'"):
         library.mesh("pybullet/tedy")
     with pytest.raises(AssetError, match="pybullet/teddy"):
         library.robot("pybullet/teddy")
     with pytest.raises(AssetError, match="is a robot"):
         library.mesh("franka_panda")
-
-
-def test_collision_parts_are_small_and_bounded(library: Library) -> None:
-    """At most 24 parts of at most 64 vertices, each with volume."""
+    # At most 24 parts of at most 64 vertices, each with volume.
     from scipy.spatial import ConvexHull
 
     for asset_id in ("pybullet/teddy", "pybullet/mug", "pybullet/soccerball", "random_urdfs/003"):
@@ -147,11 +130,6 @@ def test_collision_parts_are_small_and_bounded(library: Library) -> None:
         for part in parts:
             assert 4 <= len(part) <= 64
             assert ConvexHull(part).volume > 0.0
-
-
-def test_a_ball_is_approximated_by_its_hull_within_five_percent(library: Library) -> None:
-    """64 vertices on a sphere of radius r hold most of 4/3 pi r^3."""
-    from scipy.spatial import ConvexHull
-
+    # 64 vertices on a sphere of radius r hold most of 4/3 pi r^3.
     (part,) = library.convex_parts("pybullet/soccerball").parts_m
     assert ConvexHull(part).volume > 0.85 * 4 / 3 * math.pi * 0.11**3

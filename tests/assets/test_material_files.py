@@ -1,7 +1,6 @@
 """What files say of coats, glass, opacity, holes and light: it arrives, or is refused by name."""
 
 import io
-import json
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +14,7 @@ from gen_data.assets.readers import read_mesh
 from gen_data.assets.texture_maps import TextureMaps, compose_texture, find_maps
 from gen_data.core.asset_types import Material, TextureData
 from gen_data.core.errors import AssetError, ConfigError
+from tests.assets.gltf_builder import Builder
 
 TRIANGLE_OBJ = (
     "mtllib m.mtl\nusemtl m\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n"
@@ -29,31 +29,19 @@ def png(pixels: np.ndarray) -> bytes:
 
 def gltf(folder: Path, material: dict[str, Any], **images: np.ndarray) -> None:
     """A triangle with a material, beside its images, which have the numbers of their order."""
-    positions = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], "<f4").tobytes()
-    uvs = np.array([[0, 0], [1, 0], [0, 1]], "<f4").tobytes()
-    (folder / "t.bin").write_bytes(positions + uvs)
     for name, pixels in images.items():
         (folder / f"{name}.png").write_bytes(png(pixels))
-    tree = {
-        "asset": {"version": "2.0"},
-        "nodes": [{"mesh": 0}],
-        "meshes": [
-            {"primitives": [{"attributes": {"POSITION": 0, "TEXCOORD_0": 1}, "material": 0}]}
-        ],
-        "materials": [{"name": "skin of it", **material}],
-        "textures": [{"source": k} for k in range(len(images))],
-        "images": [{"uri": f"{name}.png"} for name in images],
-        "accessors": [
-            {"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"},
-            {"bufferView": 1, "componentType": 5126, "count": 3, "type": "VEC2"},
-        ],
-        "bufferViews": [
-            {"buffer": 0, "byteLength": 36},
-            {"buffer": 0, "byteOffset": 36, "byteLength": 24},
-        ],
-        "buffers": [{"byteLength": 60, "uri": "t.bin"}],
-    }
-    (folder / "t.gltf").write_text(json.dumps(tree))
+    made = Builder()
+    made.attributes["TEXCOORD_0"] = made.accessor(np.array([[0, 0], [1, 0], [0, 1]], "<f4"))
+    made.material(**{"name": "skin of it", **material})
+    made.tree |= {"textures": [{"source": k} for k in range(len(images))],
+                  "images": [{"uri": f"{name}.png"} for name in images]}  # fmt: skip
+    made.write(folder, "t")
+
+
+def triangle(folder: Path, mtl: str, obj: str = TRIANGLE_OBJ) -> None:
+    (folder / "t.obj").write_text(obj)
+    (folder / "m.mtl").write_text(mtl)
 
 
 def loaded(folder: Path) -> tuple[Material, TextureData | None]:
@@ -89,9 +77,7 @@ def test_gltf_extensions_become_coat_glass_and_light(folder: Path) -> None:
             "KHR_materials_emissive_strength": {"emissiveStrength": 400.0},
         },
     })  # fmt: skip
-
     material, texture = loaded(folder)
-
     assert texture is None
     assert (material.coat, material.coat_roughness) == (0.8, 0.2)
     assert (material.transmission, material.ior, material.thin) == (0.9, 1.33, False)
@@ -102,17 +88,13 @@ def test_gltf_extensions_become_coat_glass_and_light(folder: Path) -> None:
 
 def test_gltf_leaves_reflect_what_they_do_not_transmit(folder: Path) -> None:
     """KHR_materials_diffuse_transmission: reflection (1 - f) base, transmission f colour."""
-    extension = {
-        "diffuseTransmissionFactor": 0.4,
-        "diffuseTransmissionColorFactor": [0.5, 1.0, 0.25],
-    }
+    extension = {"diffuseTransmissionFactor": 0.4,
+                 "diffuseTransmissionColorFactor": [0.5, 1.0, 0.25]}  # fmt: skip
     gltf(folder, {
         "pbrMetallicRoughness": {"baseColorFactor": [0.2, 0.5, 0.1, 1], "metallicFactor": 0},
         "extensions": {"KHR_materials_diffuse_transmission": extension},
     })  # fmt: skip
-
     material, _ = loaded(folder)
-
     assert material.base_color == pytest.approx((0.12, 0.3, 0.06))
     assert material.diffuse_transmission == pytest.approx((0.2, 0.4, 0.1))
 
@@ -126,9 +108,7 @@ def test_the_mean_of_a_gltf_image_of_transmitted_light_is_kept(folder: Path) -> 
         "extensions": {"KHR_materials_diffuse_transmission": {
             "diffuseTransmissionFactor": 0.2, "diffuseTransmissionColorTexture": {"index": 1}}},
     }, base=base, passed=passed)  # fmt: skip
-
     material, texture = loaded(folder)
-
     # sRGB 188 is 0.5029 in linear light (IEC 61966-2-1).
     half = ((188 / 255 + 0.055) / 1.055) ** 2.4
     assert texture is not None
@@ -143,27 +123,13 @@ def test_gltf_images_become_maps(folder: Path) -> None:
     orm = np.dstack([checker(100, 200), checker(0, 255), checker(255, 0)])
     leaf = np.dstack([np.full((4, 4, 3), 90, np.uint8), checker(0, 200)])
     glow = np.dstack([checker(0, 255)] * 3)
-    gltf(
-        folder,
-        {
-            "alphaMode": "MASK",
-            "alphaCutoff": 0.25,
-            "pbrMetallicRoughness": {
-                "baseColorTexture": {"index": 0},
-                "metallicRoughnessTexture": {"index": 1},
-            },
-            "occlusionTexture": {"index": 1},
-            "emissiveFactor": [3, 3, 3],
-            "emissiveTexture": {"index": 2},
-            "normalTexture": {"index": 2},
-        },
-        leaf=leaf,
-        orm=orm,
-        glow=glow,
-    )
-
+    gltf(folder, {
+        "alphaMode": "MASK", "alphaCutoff": 0.25, "occlusionTexture": {"index": 1},
+        "pbrMetallicRoughness": {"baseColorTexture": {"index": 0},
+                                 "metallicRoughnessTexture": {"index": 1}},
+        "emissiveFactor": [3, 3, 3], "emissiveTexture": {"index": 2}, "normalTexture": {"index": 2},
+    }, leaf=leaf, orm=orm, glow=glow)  # fmt: skip
     material, texture = loaded(folder)
-
     assert texture is not None
     assert (material.roughness, material.metallic, material.opacity) == (1.0, 1.0, 1.0)
     np.testing.assert_array_equal(texture.albedo, leaf[..., :3])
@@ -182,9 +148,7 @@ def test_even_images_become_numbers(folder: Path) -> None:
     even[..., 1], even[..., 2] = 128, 255
     gltf(folder, {"pbrMetallicRoughness": {
         "metallicRoughnessTexture": {"index": 0}, "roughnessFactor": 0.5}}, even=even)  # fmt: skip
-
     material, texture = loaded(folder)
-
     assert texture is None
     assert material.roughness == pytest.approx(0.5 * 128 / 255, abs=1e-4)
     assert material.metallic == 1.0
@@ -195,9 +159,7 @@ def test_a_blended_image_is_opacity_and_holes(folder: Path) -> None:
     veil = np.dstack([np.full((4, 4, 3), 255, np.uint8), checker(0, 102)])
     gltf(folder, {"alphaMode": "BLEND", "pbrMetallicRoughness": {
         "baseColorTexture": {"index": 0}}}, veil=veil)  # fmt: skip
-
     material, texture = loaded(folder)
-
     assert material.opacity == pytest.approx(0.4, abs=1e-4)
     assert texture is not None and texture.alpha is not None
     np.testing.assert_array_equal(texture.alpha >= 128, veil[..., 3] > 0)
@@ -205,17 +167,15 @@ def test_a_blended_image_is_opacity_and_holes(folder: Path) -> None:
 
 def test_mtl_says_opacity_light_coat_and_holes(folder: Path) -> None:
     """``d`` goes before ``Tr``; a coverage image of its own is grey."""
-    (folder / "t.obj").write_text(TRIANGLE_OBJ)
-    (folder / "m.mtl").write_text(
+    triangle(
+        folder,
         "newmtl m\nKd 1 1 1\nTr 0.9\nd 0.6\nKe 10 20 30\nPc 0.7\nPcr 0.1\nNi 1.4\n"
-        "map_d hole.png\nmap_Kd wood.png\nmap_Ke lamp.png\n"
+        "map_d hole.png\nmap_Kd wood.png\nmap_Ke lamp.png\n",
     )
     hole, wood = checker(0, 255), np.dstack([checker(10, 240)] * 3)
     for name, pixels in (("hole", hole), ("wood", wood), ("lamp", wood)):
         (folder / f"{name}.png").write_bytes(png(pixels))
-
     material, texture = loaded(folder)
-
     assert (material.opacity, material.emission_cd_m2) == (0.6, (10.0, 20.0, 30.0))
     assert (material.coat, material.coat_roughness, material.ior) == (0.7, 0.1, 1.4)
     assert texture is not None
@@ -225,8 +185,7 @@ def test_mtl_says_opacity_light_coat_and_holes(folder: Path) -> None:
 
 def test_a_changed_map_is_another_asset(folder: Path) -> None:
     """Content hashes cover every image that an MTL file names."""
-    (folder / "t.obj").write_text(TRIANGLE_OBJ)
-    (folder / "m.mtl").write_text("newmtl m\nmap_Kd wood.png\nmap_Ke lamp.png\n")
+    triangle(folder, "newmtl m\nmap_Kd wood.png\nmap_Ke lamp.png\n")
     (folder / "wood.png").write_bytes(png(np.dstack([checker(10, 240)] * 3)))
     digests = []
     for value in (50, 60):
@@ -261,25 +220,18 @@ def test_gltf_values_out_of_range_are_one_clear_error(folder: Path, field: str) 
 
 @pytest.mark.parametrize("line", ["d 1.5", "Tr -0.5", "Pr nan", "Pm 2", "Pc -1", "Ke -1 0 0"])
 def test_mtl_values_out_of_range_are_one_clear_error(folder: Path, line: str) -> None:
-    (folder / "t.obj").write_text(TRIANGLE_OBJ)
-    (folder / "m.mtl").write_text(f"newmtl m\n{line}\n")
+    triangle(folder, f"newmtl m\n{line}\n")
     with pytest.raises(AssetError, match=rf"m\.mtl: material 'm': .*{line.partition(' ')[0]} is"):
         read_mesh(Folder(folder), "t.obj")
 
 
 @pytest.mark.parametrize(
     ("field", "value"),
-    [
-        ("coat", "1.5"),
-        ("transmission", "-0.1"),
-        ("opacity", ".nan"),
-        ("ior", "0.5"),
-        ("emission_cd_m2", "[-1, 0, 0]"),
-    ],
-)
+    [("coat", "1.5"), ("transmission", "-0.1"), ("opacity", ".nan"), ("ior", "0.5"),
+     ("emission_cd_m2", "[-1, 0, 0]")],
+)  # fmt: skip
 def test_index_values_out_of_range_are_one_error(folder: Path, field: str, value: str) -> None:
-    (folder / "t.obj").write_text(TRIANGLE_OBJ)
-    (folder / "m.mtl").write_text("newmtl m\n")
+    triangle(folder, "newmtl m\n")
     (folder / "assets.yaml").write_text(
         "assets:\n  - id: thing\n    file: t.obj\n    category: thing\n    licence: CC0-1.0\n"
         f"    materials: {{m: {{{field}: {value}}}}}\n"
@@ -288,7 +240,7 @@ def test_index_values_out_of_range_are_one_error(folder: Path, field: str, value
         open_library([folder], cache_dir=folder.parent / "cache").get("user/thing")
 
 
-def test_names_of_maps_survive_any_file_name() -> None:
+def test_names_of_maps_survive_any_file_name_and_several_sizes_take_the_largest() -> None:
     """Spaces, semicolons and equal signs in names of images come back."""
     maps = TextureMaps(
         albedo="a b;c=d.png", metallic="x%20/y.png!2", alpha="a b;c=d.png!3", cutoff=0.2
@@ -296,10 +248,7 @@ def test_names_of_maps_survive_any_file_name() -> None:
     assert find_maps(maps.name()) == maps
     assert find_maps("plain.png") is None
     assert TextureMaps(albedo="plain.png").name() == "plain.png"
-
-
-def test_maps_of_several_sizes_take_the_largest() -> None:
-    """A grey of 2 x 2 beside a colour of 8 x 4."""
+    # A grey of 2 x 2 beside a colour of 8 x 4.
     small, large = np.full((2, 2, 3), 70, np.uint8), np.full((4, 8, 3), 9, np.uint8)
     texture = compose_texture(
         TextureMaps(albedo="s", emission="l"), {"s": small, "l": large}.__getitem__
@@ -316,8 +265,6 @@ def test_coverage_that_no_face_reaches_is_left_out(folder: Path) -> None:
         (folder / f"{name}.obj").write_text(TRIANGLE_OBJ.replace("vt 1 0", f"vt {wide} 0"))
     (folder / "m.mtl").write_text("newmtl m\nmap_Kd wood.png\nmap_d wood.png\n")
     library = open_library([folder], cache_dir=folder.parent / "cache")
-
     names = [library.mesh(f"user/{name}").materials[0].texture for name in ("t", "u")]
-
     assert library.texture(names[0]).alpha is None
     assert library.texture(names[1]).alpha is not None

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -24,24 +25,18 @@ def face_normals(mesh: MeshData) -> np.ndarray:
     return normals / np.linalg.norm(normals, axis=1, keepdims=True)
 
 
-def test_a_box_keeps_its_edges() -> None:
+def test_a_box_keeps_its_edges_a_ball_is_smooth_and_a_cylinder_has_sharp_rims() -> None:
     """Six flat sides share no vertex: 24 vertices, each normal along an axis."""
     mesh = normal_form(TriangleSoup.of(box((0.2, 0.3, 0.4))), "box")
     assert (len(mesh.vertices_m), len(mesh.faces)) == (24, 12)
     assert np.abs(mesh.normals).max(axis=1) == pytest.approx(1.0)
     assert volume_m3(mesh) == pytest.approx(0.2 * 0.3 * 0.4, rel=1e-5)
-
-
-def test_a_ball_is_smooth() -> None:
-    """No vertex is split, and normals point along the radius."""
+    # No vertex is split, and normals point along the radius.
     mesh = normal_form(TriangleSoup.of(sphere(0.1)), "ball")
     directions = mesh.vertices_m / np.linalg.norm(mesh.vertices_m, axis=1, keepdims=True)
     assert (mesh.normals * directions).sum(axis=1).min() > 0.999
     assert len(mesh.vertices_m) == len(np.unique(mesh.vertices_m.round(6), axis=0))
-
-
-def test_a_cylinder_is_smooth_around_and_sharp_at_its_rims() -> None:
-    """Each rim vertex occurs twice: once for the side, once for the cap."""
+    # Each rim vertex occurs twice: once for the side, once for the cap.
     mesh = normal_form(TriangleSoup.of(cylinder(0.05, 0.2)), "can")
     rim = np.abs(np.hypot(mesh.vertices_m[:, 0], mesh.vertices_m[:, 1]) - 0.05) < 1e-6
     assert rim.sum() == 2 * 2 * 32
@@ -59,16 +54,13 @@ def test_the_crease_angle_decides_what_is_smooth(crease_deg: float) -> None:
     assert deviation == pytest.approx(expected, abs=1e-4)
 
 
-def test_an_inside_out_mesh_is_turned() -> None:
+def test_closed_surfaces_are_turned_outward_and_open_ones_keep_their_winding() -> None:
     """A closed surface encloses a positive volume."""
     mesh = normal_form(TriangleSoup.of(box((0.2, 0.2, 0.2))).flipped(), "box")
     assert volume_m3(mesh) == pytest.approx(0.008, rel=1e-5)
     outward = (face_normals(mesh) * mesh.vertices_m[mesh.faces].mean(axis=1)).sum(axis=1)
     assert (outward > 0).all()
-
-
-def test_mixed_windings_are_made_consistent() -> None:
-    """Every third triangle of a ball is wound the wrong way."""
+    # Every third triangle of a ball is wound the wrong way.
     corners = sphere(0.1)
     corners[::3] = corners[::3, ::-1]
     mesh = normal_form(TriangleSoup.of(corners), "ball")
@@ -76,51 +68,54 @@ def test_mixed_windings_are_made_consistent() -> None:
         volume_m3(normal_form(TriangleSoup.of(sphere(0.1)), "ball"))
     )
     assert (face_normals(mesh) * mesh.vertices_m[mesh.faces].mean(axis=1)).sum(axis=1).min() > 0
-
-
-def test_an_open_surface_keeps_the_winding_of_its_file() -> None:
-    """A single triangle has no inside."""
+    # A single triangle has no inside.
     triangle = np.array([[[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]])
     assert normal_form(TriangleSoup.of(triangle), "t").normals[0, 2] == 1.0
     assert normal_form(TriangleSoup.of(triangle).flipped(), "t").normals[0, 2] == -1.0
+    # A scale of -1 along one axis, as some URDFs have, does not turn a mesh inside out.
+    matrix = np.hstack([np.diag([-1.0, 1.0, 1.0]), np.zeros((3, 1))])
+    soup = TriangleSoup.of(box((0.1, 0.2, 0.3))).transformed(matrix)
+    assert (np.einsum("ni,ni->n", soup.corners.mean(axis=1),
+            np.cross(soup.corners[:, 1] - soup.corners[:, 0],
+                     soup.corners[:, 2] - soup.corners[:, 0])) > 0).all()  # fmt: skip
 
 
-def test_degenerate_and_duplicate_triangles_are_dropped() -> None:
+def test_degenerate_and_duplicate_triangles_and_equal_and_unused_materials_go() -> None:
     """A point, a line, and the same triangle twice leave one triangle."""
     triangle = [[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]
     turned = [triangle[1], triangle[2], triangle[0]]
     line = [[0.0, 0, 0], [0.5, 0, 0], [1, 0, 0]]
     mesh = normal_form(TriangleSoup.of(np.array([triangle, [triangle[0]] * 3, line, turned])), "t")
     assert mesh.faces.tolist() == [[0, 1, 2]]
+    # Renderers get one draw per look, not one per name.
+    plain = Material()
+    names = {"a": plain, "b": plain, "c": Material(roughness=0.1)}
+    slots = tuple(MaterialSlot(name, material) for name, material in names.items())
+    soup = replace(TriangleSoup.of(box((1, 1, 1))), face_slots=np.array([0, 1] * 6), slots=slots)
+    mesh = normal_form(soup, "box")
+    assert mesh.materials == (plain,)
+    assert set(mesh.face_slots.tolist()) == {0}
 
 
-def test_good_normals_of_a_file_are_kept() -> None:
-    """An artist's normals, up to 45 degrees off the face, survive."""
+@pytest.mark.parametrize(
+    ("normals", "kept"),
+    [([[0.6, 0, 0.8], [0, 0.6, 0.8], [0.0, 0, 1]], True), (np.zeros((3, 3)), False),
+     (np.full((3, 3), np.nan), False), ([[0.0, 0.0, -1.0]] * 3, False)],
+    ids=["an artist's, up to 45 degrees off the face", "zero", "undefined", "backward"],
+)  # fmt: skip
+def test_good_normals_of_a_file_are_kept_and_bad_ones_replaced(normals: Any, kept: bool) -> None:
     soup = TriangleSoup.of(np.array([[[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]]))
-    tilted = np.array([[[0.6, 0, 0.8], [0, 0.6, 0.8], [0.0, 0, 1]]])
-    assert normal_form(replace(soup, normals=tilted), "t").normals == pytest.approx(tilted[0])
-
-
-@pytest.mark.parametrize("bad", [np.zeros((1, 3, 3)), np.full((1, 3, 3), np.nan)])
-def test_bad_normals_of_a_file_are_replaced(bad: np.ndarray) -> None:
-    """Zero, undefined or backward normals say nothing."""
-    soup = TriangleSoup.of(np.array([[[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]]))
-    backward = np.broadcast_to(np.array([0.0, 0.0, -1.0]), (1, 3, 3))
-    for normals in (bad, backward):
-        mesh = normal_form(replace(soup, normals=normals), "t")
-        assert mesh.normals[:, 2].tolist() == [1.0, 1.0, 1.0]
+    found = normal_form(replace(soup, normals=np.array([normals])), "t").normals
+    assert found == pytest.approx(np.array(normals if kept else [[0.0, 0.0, 1.0]] * 3))
 
 
 def test_a_dense_mesh_is_thinned_out_to_its_budget_and_keeps_its_shape() -> None:
     """A ball of 4,096 triangles in two colours comes down to about 1,000."""
-    corners = np.array([t for s in _subdivided(sphere(0.1), 1) for t in [s]])
+    corners = _subdivided(sphere(0.1), 1)
     upper = (corners.mean(axis=1)[:, 2] > 0).astype(np.int64)
     red, blue = Material(base_color=(1, 0, 0)), Material(base_color=(0, 0, 1))
-    soup = replace(
-        TriangleSoup.of(corners),
-        face_slots=upper,
-        slots=(MaterialSlot("a", red, True), MaterialSlot("b", blue, True)),
-    )
+    slots = (MaterialSlot("a", red, True), MaterialSlot("b", blue, True))
+    soup = replace(TriangleSoup.of(corners), face_slots=upper, slots=slots)
     mesh = normal_form(soup, "ball", max_faces=1000)
     assert len(corners) > 3500
     assert 800 < len(mesh.faces) < 1200
@@ -139,41 +134,14 @@ def _subdivided(corners: np.ndarray, times: int) -> np.ndarray:
     return corners
 
 
-def test_equal_materials_become_one_slot_and_unused_ones_none() -> None:
-    """Renderers get one draw per look, not one per name."""
-    plain = Material()
-    slots = (
-        MaterialSlot("a", plain),
-        MaterialSlot("b", plain),
-        MaterialSlot("c", Material(roughness=0.1)),
-    )
-    soup = replace(TriangleSoup.of(box((1, 1, 1))), face_slots=np.array([0, 1] * 6), slots=slots)
-    mesh = normal_form(soup, "box")
-    assert mesh.materials == (plain,)
-    assert set(mesh.face_slots.tolist()) == {0}
-
-
 @pytest.mark.parametrize(
     ("corners", "reason"),
-    [
-        (np.zeros((0, 3, 3)), "no triangles"),
-        (np.full((1, 3, 3), np.nan), "not finite"),
-        (box((1e-5, 1e-5, 1e-5)), "set scale or size_m"),
-        (box((2e3, 1, 1)), "set scale or size_m"),
-        (box((1, 1, 1)) + 1e5, "from its origin"),
-        (np.array([[[0.0, 0, 0], [1, 0, 0], [2, 0, 0]]]), "degenerate"),
-    ],
-)
+    [(np.zeros((0, 3, 3)), "no triangles"), (np.full((1, 3, 3), np.nan), "not finite"),
+     (box((1e-5, 1e-5, 1e-5)), "set scale or size_m"), (box((2e3, 1, 1)), "set scale or size_m"),
+     (box((1, 1, 1)) + 1e5, "from its origin"),
+     (np.array([[[0.0, 0, 0], [1, 0, 0], [2, 0, 0]]]), "degenerate")],
+)  # fmt: skip
 def test_unusable_soups_are_refused(corners: np.ndarray, reason: str) -> None:
     """The message names the place, the fact and what to do."""
     with pytest.raises(AssetError, match=rf"^place: .*{reason}"):
         normal_form(TriangleSoup.of(corners), "place")
-
-
-def test_mirroring_keeps_the_outside_outside() -> None:
-    """A scale of -1 along one axis, as some URDFs have, does not turn a mesh inside out."""
-    matrix = np.hstack([np.diag([-1.0, 1.0, 1.0]), np.zeros((3, 1))])
-    soup = TriangleSoup.of(box((0.1, 0.2, 0.3))).transformed(matrix)
-    assert (np.einsum("ni,ni->n", soup.corners.mean(axis=1),
-            np.cross(soup.corners[:, 1] - soup.corners[:, 0],
-                     soup.corners[:, 2] - soup.corners[:, 0])) > 0).all()  # fmt: skip

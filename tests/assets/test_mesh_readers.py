@@ -2,9 +2,7 @@
 
 import base64
 import json
-import struct
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -15,6 +13,7 @@ from gen_data.assets.asset_folder import Folder
 from gen_data.assets.library import open_library
 from gen_data.assets.readers import read_mesh
 from gen_data.assets.triangle_soup import box, sphere
+from tests.assets.gltf_builder import Builder
 
 CUBE_OBJ = """mtllib cube.mtl
 v 0 0 0
@@ -53,15 +52,12 @@ def test_obj_polygons_negative_indices_and_materials(tmp_path: Path) -> None:
     assert (used["shiny"].roughness, used["shiny"].metallic) == (0.1, 1.0)
 
 
-def test_obj_groups_follow_its_objects(tmp_path: Path) -> None:
+def test_obj_groups_follow_its_objects_and_texture_options_odd_line_ends(tmp_path: Path) -> None:
     """Two ``o`` statements are two groups."""
     text = "v 0 0 0\nv 1 0 0\nv 0 1 0\no a\nf 1 2 3\no b\nf 1 3 2\n"
     (tmp_path / "two.obj").write_text(text)
     assert len(set(read_mesh(Folder(tmp_path), "two.obj").soup.face_groups.tolist())) == 2
-
-
-def test_obj_texture_options_and_odd_line_ends(tmp_path: Path) -> None:
-    """``-s 2 2 1`` before the file name, which repeats it twice, spaces in it, and CR LF."""
+    # ``-s 2 2 1`` before the file name, which repeats it twice, spaces in it, and CR LF.
     (tmp_path / "a.mtl").write_bytes(b"newmtl m\r\nmap_Kd -s 2 2 1 -clamp on maps/my wood.png\r\n")
     (tmp_path / "a.obj").write_bytes(
         b"mtllib a.mtl\r\nusemtl m\r\nv 0 0 0\r\nv 1 0 0\r\nv 0 1 0\r\n"
@@ -87,64 +83,30 @@ def test_files_written_by_another_tool_read_back(tmp_path: Path, suffix: str) ->
     assert read.corners == pytest.approx(corners, abs=1e-6)
 
 
-def glb(tree: dict[str, Any], binary: bytes) -> bytes:
-    """A binary glTF file of a document and one buffer."""
-    text = json.dumps(tree).encode()
-    text += b" " * (-len(text) % 4)
-    binary += b"\0" * (-len(binary) % 4)
-    length = 12 + 8 + len(text) + 8 + len(binary)
-    return (
-        struct.pack("<4sII", b"glTF", 2, length)
-        + struct.pack("<II", len(text), 0x4E4F534A) + text
-        + struct.pack("<II", len(binary), 0x004E4942) + binary
-    )  # fmt: skip
-
-
-def textured_triangle(tmp_path: Path) -> tuple[dict[str, Any], bytes]:
+def textured_triangle(tmp_path: Path) -> Builder:
     """A triangle in the plane Y = 0 of glTF, 2 m wide, with an embedded 4 x 2 image."""
     image = np.zeros((2, 4, 3), np.uint8)
     image[0, 0] = (255, 0, 0)
     Image.fromarray(image).save(tmp_path / "i.png")
-    png = (tmp_path / "i.png").read_bytes()
-    positions = np.array([[0, 0, 0], [2, 0, 0], [0, 0, -2]], "<f4").tobytes()
-    uvs = np.array([[0, 0], [1, 0], [0, 1]], "<f4").tobytes()
-    indices = np.array([0, 1, 2], "<u2").tobytes() + b"\0\0"
-    binary = positions + uvs + indices + png
-    tree = {
-        "asset": {"version": "2.0"},
-        "scene": 0,
-        "scenes": [{"nodes": [0]}],
-        "nodes": [{"children": [1], "scale": [0.5, 0.5, 0.5]},
-                  {"mesh": 0, "translation": [2, 0, 0]}],
-        "meshes": [{"primitives": [{"attributes": {"POSITION": 0, "TEXCOORD_0": 1},
-                                    "indices": 2, "material": 0}]}],
-        "materials": [{"name": "paint", "pbrMetallicRoughness": {
-            "baseColorTexture": {"index": 0}, "baseColorFactor": [0.5, 0.5, 0.5, 1],
-            "metallicFactor": 0, "roughnessFactor": 0.3}}],
-        "textures": [{"source": 0}],
-        "images": [{"bufferView": 3, "mimeType": "image/png"}],
-        "accessors": [
-            {"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"},
-            {"bufferView": 1, "componentType": 5126, "count": 3, "type": "VEC2"},
-            {"bufferView": 2, "componentType": 5123, "count": 3, "type": "SCALAR"},
-        ],
-        "bufferViews": [
-            {"buffer": 0, "byteOffset": 0, "byteLength": 36},
-            {"buffer": 0, "byteOffset": 36, "byteLength": 24},
-            {"buffer": 0, "byteOffset": 60, "byteLength": 6},
-            {"buffer": 0, "byteOffset": 68, "byteLength": len(png)},
-        ],
-        "buffers": [{"byteLength": len(binary)}],
+    made = Builder(np.array([[0, 0, 0], [2, 0, 0], [0, 0, -2]], "<f4"))
+    made.attributes["TEXCOORD_0"] = made.accessor(np.array([[0, 0], [1, 0], [0, 1]], "<f4"))
+    made.primitive["indices"] = made.accessor(np.array([0, 1, 2], "<u2"))
+    png = made.view(np.fromfile(tmp_path / "i.png", np.uint8))
+    made.tree |= {
+        "nodes": [{"children": [1], "scale": [0.5] * 3}, {"mesh": 0, "translation": [2, 0, 0]}],
+        "images": [{"bufferView": png, "mimeType": "image/png"}], "textures": [{"source": 0}],
     }  # fmt: skip
-    return tree, binary
+    made.material(name="paint", pbrMetallicRoughness={
+        "baseColorTexture": {"index": 0}, "baseColorFactor": [0.5, 0.5, 0.5, 1],
+        "metallicFactor": 0, "roughnessFactor": 0.3})  # fmt: skip
+    return made
 
 
 def test_glb_comes_upright_with_its_embedded_image(tmp_path: Path) -> None:
     """Node transforms apply, Y becomes Z, UVs count from the bottom, images are served."""
-    tree, binary = textured_triangle(tmp_path)
     folder = tmp_path / "assets"
     folder.mkdir()
-    (folder / "flag.glb").write_bytes(glb(tree, binary))
+    (folder / "flag.glb").write_bytes(textured_triangle(tmp_path).glb())
     library = open_library([folder], cache_dir=tmp_path / "cache")
     mesh = library.mesh("user/flag")
     low, high = np.array(mesh.bounds_m())
@@ -163,16 +125,13 @@ def test_glb_comes_upright_with_its_embedded_image(tmp_path: Path) -> None:
 
 def test_images_inside_the_meshes_of_a_robot_are_those_of_its_links(tmp_path: Path) -> None:
     """Of a robot's link and of a rigid object; two mesh files keep their images apart."""
-    tree, binary = textured_triangle(tmp_path)
     folder = tmp_path / "assets"
     folder.mkdir()
-    (folder / "flag.glb").write_bytes(glb(tree, binary))
-    (folder / "other.glb").write_bytes(glb(tree, binary))
-    visuals = "".join(
-        f'<visual><origin xyz="0 0 {z}"/><geometry><mesh filename="{name}.glb"/></geometry>'
-        "</visual>"
-        for z, name in enumerate(("flag", "other"))
-    )
+    visuals = ""
+    for z, name in enumerate(("flag.glb", "other.glb")):
+        (folder / name).write_bytes(textured_triangle(tmp_path).glb())
+        visuals += f'<visual><origin xyz="0 0 {z}"/><geometry><mesh filename="{name}"/></geometry>'
+        visuals += "</visual>"
     text = f'<robot name="r"><link name="a">{visuals}</link></robot>'
     (folder / "r.urdf").write_text(text)
     (folder / "assets.yaml").write_text(
@@ -187,24 +146,19 @@ def test_images_inside_the_meshes_of_a_robot_are_those_of_its_links(tmp_path: Pa
             assert library.texture(texture).albedo[0, 0].tolist() == [255, 0, 0]
 
 
-def test_gltf_with_separate_and_inline_buffers_agree(tmp_path: Path) -> None:
+def test_gltf_with_separate_and_inline_buffers_agree_and_other_tools(tmp_path: Path) -> None:
     """A .bin beside the file, a data URI and a GLB hold the same triangles."""
-    tree, binary = textured_triangle(tmp_path)
-    (tmp_path / "a.glb").write_bytes(glb(tree, binary))
-    (tmp_path / "my data.bin").write_bytes(binary)
-    tree["buffers"][0]["uri"] = "my%20data.bin"
-    (tmp_path / "b.gltf").write_text(json.dumps(tree))
-    tree["buffers"][0]["uri"] = (
-        "data:application/octet-stream;base64," + base64.b64encode(binary).decode()
-    )
-    (tmp_path / "c.gltf").write_text(json.dumps(tree))
+    made = textured_triangle(tmp_path)
+    (tmp_path / "a.glb").write_bytes(made.glb())
+    (tmp_path / "my data.bin").write_bytes(made.data)
+    inline = "data:application/octet-stream;base64," + base64.b64encode(made.data).decode()
+    for name, uri in (("b", "my%20data.bin"), ("c", inline)):
+        made.tree["buffers"][0]["uri"] = uri
+        (tmp_path / f"{name}.gltf").write_text(json.dumps(made.tree))
     soups = [read_mesh(Folder(tmp_path), name).soup for name in ("a.glb", "b.gltf", "c.gltf")]
     for soup in soups[1:]:
         assert soup.corners.tobytes() == soups[0].corners.tobytes()
-
-
-def test_glb_written_by_another_tool_reads_back(tmp_path: Path) -> None:
-    """Trimesh writes a box with a transform; it comes at its place and size."""
+    # Trimesh writes a box with a transform; it comes at its place and size.
     scene = trimesh.Scene()
     matrix = np.eye(4)
     matrix[:3, 3] = (1, 2, 3)

@@ -95,7 +95,7 @@ def test_geoms_are_where_mujoco_has(tmp_path: Path, positions: tuple[float, floa
     assert poses["tip"].translation_m == pytest.approx(data.site("tip").xpos, abs=1e-7)
 
 
-def test_meshes_have_the_vertices_that_mujoco_has(tmp_path: Path) -> None:
+def test_meshes_joints_and_groups_are_those_of_mujoco(tmp_path: Path) -> None:
     """Scale, reference position and reference turn of a mesh; the file's own origin is kept."""
     described = read_mjcf(write(tmp_path), "arm.xml")
     model = mujoco.MjModel.from_xml_path(str(tmp_path / "arm.xml"))
@@ -109,29 +109,19 @@ def test_meshes_have_the_vertices_that_mujoco_has(tmp_path: Path) -> None:
     assert np.sort(pose.apply(corners), axis=0) == pytest.approx(
         np.sort(expected, axis=0), abs=1e-6
     )
-
-
-def test_joints_have_kinds_and_ranges_in_radians_and_metres(tmp_path: Path) -> None:
-    """-90 to 45 degrees; -0.1 to 0.3 m; without end."""
-    described = read_mjcf(write(tmp_path), "arm.xml")
+    # -90 to 45 degrees; -0.1 to 0.3 m; without end.
     found = {j.name: (j.kind, j.lower, j.upper) for j in described.joints if j.movable}
     assert found == {
         "swing": ("revolute", pytest.approx(-np.pi / 2), pytest.approx(np.pi / 4)),
         "lift": ("prismatic", -0.1, 0.3),
         "spin": ("continuous", -np.pi, np.pi),
     }
-
-
-def test_groups_and_contacts_tell_what_is_seen_and_what_collides(tmp_path: Path) -> None:
-    """A body with geoms for the eye shows these only; any other shows what collides."""
-    links = read_mjcf(write(tmp_path), "arm.xml").links
+    # A body with geoms for the eye shows these only; any other shows what collides.
+    links = described.links
     kinds = {n: ([s.kind for s in k.visuals], [s.kind for s in k.collisions])
              for n, k in links.items() if k.visuals or k.collisions}  # fmt: skip
-    assert kinds == {
-        "base": (["mesh"], ["box"]),
-        "upper": (["capsule"], ["cylinder"]),
-        "hand": (["ellipsoid"], ["ellipsoid"]),
-    }
+    assert kinds == {"base": (["mesh"], ["box"]), "upper": (["capsule"], ["cylinder"]),
+                     "hand": (["ellipsoid"], ["ellipsoid"])}  # fmt: skip
     assert links["base"].collisions[0].size == pytest.approx((0.2, 0.4, 0.6))
     assert links["upper"].collisions[0].size == pytest.approx((0.05, 0.4, 0.0))
 
@@ -177,23 +167,18 @@ def test_a_joint_constraint_is_a_mimic_joint(tmp_path: Path) -> None:
     assert described.home == {"swing": 0.5, "lift": 0.2, "spin": 1.0}
 
 
-def test_what_is_not_used_is_named(tmp_path: Path) -> None:
+def test_what_is_not_used_is_named_and_a_height_fields_file_not_opened(tmp_path: Path) -> None:
     """In the result and by ``assets check``."""
     ball = """<body name="eye"><joint type="ball" name="look"/><geom size="0.1"/></body>
     </worldbody>"""
     described = read_mjcf(write(tmp_path, ARM.replace("</worldbody>", ball)), "arm.xml")
-    assert described.remarks == (
-        "not used: 1 ball joint (it stays at its origin)",
-        "not used: 1 plane geom",
-    )
+    assert described.remarks == ("not used: 1 ball joint (it stays at its origin)",
+                                 "not used: 1 plane geom")  # fmt: skip
     (tmp_path / "assets.yaml").write_text("robots: [{id: arm, file: arm.xml, licence: MIT}]\n")
     library = open_library([tmp_path], tmp_path / "cache", tmp_path)
     (finding,) = check_folder(tmp_path, library)
     place = tmp_path / "arm.xml"
     assert finding.warnings == tuple(f"{place}: {text}" for text in described.remarks)
-
-
-def test_a_height_field_is_named_and_its_file_not_opened(tmp_path: Path) -> None:
     terrain = '<asset><hfield name="h" file="/etc/passwd" size="1 1 1 1"/>'
     ground = '<worldbody><geom type="hfield" hfield="h"/>'
     text = ARM.replace("<asset>", terrain).replace("<worldbody>", ground)
@@ -217,34 +202,31 @@ def test_included_files_are_part_of_the_asset(tmp_path: Path) -> None:
     assert digests[0] != digests[1]
 
 
-def test_without_an_index_it_is_one_object(tmp_path: Path) -> None:
-    write(tmp_path)
+def test_without_an_index_it_is_one_object_and_without_mujoco_the_extra_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = write(tmp_path)
     (tmp_path / "package.xml").write_text("<package><name>arm</name></package>")
     library = open_library([tmp_path], tmp_path / "cache", tmp_path)
     assert [a.asset_id for a in library.find({"user"})] == ["user/arm"]
     low, high = library.bounds_m("user/arm")
     assert high[2] - low[2] > 0.5
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    with pytest.raises(AssetError, match=r"run: pip install .*\[mjcf\]"):
+        read_mjcf(folder, "arm.xml")
 
 
 @pytest.mark.parametrize(
     ("old", "new", "reason"),
-    [
-        ("<worldbody>", "<worldbdy>", "malformed XML"),
-        ("<mujoco", "<!DOCTYPE a [<!ENTITY b 'c'>]><mujoco", "declares a document type"),
-        ('axis="0 0 2"', 'axis="0 0 0"', "MuJoCo refuses it .*lift"),
-        ('mesh="wedge"', 'mesh="edge"', "MuJoCo refuses it .*edge"),
-        ('file="wedge.obj"', 'file="../../wedge.obj"', "outside"),
-        ('type="ellipsoid"', 'type="elipsoid"', "MuJoCo refuses it .*elipsoid"),
-        ("<asset>", '<include file="arm.xml"/><asset>', "includes arm.xml twice"),
-    ],
-)
+    [("<worldbody>", "<worldbdy>", "malformed XML"),
+     ("<mujoco", "<!DOCTYPE a [<!ENTITY b 'c'>]><mujoco", "declares a document type"),
+     ('axis="0 0 2"', 'axis="0 0 0"', "MuJoCo refuses it .*lift"),
+     ('mesh="wedge"', 'mesh="edge"', "MuJoCo refuses it .*edge"),
+     ('file="wedge.obj"', 'file="../../wedge.obj"', "outside"),
+     ('type="ellipsoid"', 'type="elipsoid"', "MuJoCo refuses it .*elipsoid"),
+     ("<asset>", '<include file="arm.xml"/><asset>', "includes arm.xml twice")],
+)  # fmt: skip
 def test_faults_have_one_clear_error(tmp_path: Path, old: str, new: str, reason: str) -> None:
     folder = write(tmp_path, ARM.replace(old, new, 1))
     with pytest.raises(AssetError, match=rf"arm\.xml.*{reason}"):
         read_mjcf(folder, "arm.xml")
-
-
-def test_without_mujoco_the_extra_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "mujoco", None)
-    with pytest.raises(AssetError, match=r"run: pip install .*\[mjcf\]"):
-        read_mjcf(write(tmp_path), "arm.xml")

@@ -56,15 +56,12 @@ def test_a_hand_of_its_own_file_is_on_the_flange(tmp_path: Path, hand: str) -> N
     assert (model.gripper.link, model.gripper.finger_joints) == ("palm", ("open",))
 
 
-def test_a_changed_hand_changes_the_digest(tmp_path: Path) -> None:
+def test_a_changed_hand_changes_the_digest_and_one_that_misfits_is_refused(tmp_path: Path) -> None:
     robot(tmp_path)
     one = open_library([tmp_path], tmp_path / "cache", tmp_path).get("user/arm").sha256
     (tmp_path / "hand.urdf").write_text(HAND.replace("0.04", "0.05"))
     two = open_library([tmp_path], tmp_path / "cache", tmp_path).get("user/arm").sha256
     assert one != two
-
-
-def test_hands_that_do_not_fit_are_refused(tmp_path: Path) -> None:
     with pytest.raises(AssetError, match=r"arm\.urdf: it has a link or joint 'base', as its tool"):
         robot(tmp_path, "arm.urdf")
     with pytest.raises(AssetError, match=r"no movable joint 'opn' \(did you mean 'open'\?\)"):

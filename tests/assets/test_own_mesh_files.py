@@ -56,9 +56,7 @@ def test_obj_spelling_keeps_faces_and_materials(tmp_path: Path, obj: str, mtl: s
     (tmp_path / "a.mtl").write_bytes(mtl.encode())
     if "other.mtl" in obj:
         (tmp_path / "other.mtl").write_text("newmtl blue\nKd 0 0 1\n")
-
     source = read_mesh(Folder(tmp_path), "a.obj")
-
     assert source.soup.corners.tolist() == [[[0, 0, 0], [1, 0, 0], [0, 1, 0]]]
     assert material_of(tmp_path).base_color == (1.0, 0.0, 0.0)
 
@@ -85,7 +83,7 @@ def test_names_for_no_material_are_grey_without_a_remark(tmp_path: Path, name: s
     assert read.remarks == ()
 
 
-def test_an_mtl_may_name_the_image_of_another_model(tmp_path: Path) -> None:
+def test_an_mtl_may_name_the_image_of_another_model_and_scale_and_move_it(tmp_path: Path) -> None:
     """As Gazebo's ``ambulance`` takes the wheels of ``suv``."""
     (tmp_path / "suv/images").mkdir(parents=True)
     (tmp_path / "suv/images/wheel.png").write_bytes(b"")
@@ -95,10 +93,7 @@ def test_an_mtl_may_name_the_image_of_another_model(tmp_path: Path) -> None:
     (tmp_path / "van/a.obj").write_text(text)
     soup = read_mesh(Folder(tmp_path), "van/a.obj").soup
     assert soup.slots[soup.face_slots[0]].material.texture == "suv/images/wheel.png"
-
-
-def test_the_image_of_an_mtl_is_scaled_and_moved(tmp_path: Path) -> None:
-    """``-s 2 3 1 -o 0.5 0``: u * 2 + 0.5 and v * 3, as in Blender and three.js."""
+    # ``-s 2 3 1 -o 0.5 0``: u * 2 + 0.5 and v * 3, as in Blender and three.js.
     (tmp_path / "a.obj").write_text(
         f"mtllib a.mtl\n{TRIANGLE}vt 0 0\nvt 1 0\nvt 0 1\nusemtl m\nf 1/1 2/2 3/3\n"
     )
@@ -132,14 +127,10 @@ def obj_text(scale: float) -> bytes:
 
 @pytest.mark.parametrize(
     ("name", "data"),
-    [
-        ("a.ply", ply_text()),
-        ("a.ply", ply_text("float", 1.0 / 255.0)),
-        ("a.obj", obj_text(1.0 / 255.0)),
-        ("a.obj", obj_text(1.0)),
-    ],
+    [("a.ply", ply_text()), ("a.ply", ply_text("float", 1.0 / 255.0)),
+     ("a.obj", obj_text(1.0 / 255.0)), ("a.obj", obj_text(1.0))],
     ids=["PLY of bytes", "PLY of floats", "OBJ to 1", "OBJ to 255"],
-)
+)  # fmt: skip
 def test_vertex_colours_are_read_as_srgb(tmp_path: Path, name: str, data: bytes) -> None:
     """The square's fan 0 1 2, 0 2 3 has the colours of its corners."""
     (tmp_path / name).write_bytes(data)
@@ -171,18 +162,13 @@ def color_at(read: ImportedMesh, point: tuple[float, float]) -> np.ndarray:
     raise AssertionError(point)
 
 
-def test_gradients_become_an_image_that_returns_the_corners_colours(tmp_path: Path) -> None:
+def test_gradients_become_an_image_of_corner_colours_and_few_ones_materials(tmp_path: Path) -> None:
     """At the corners of the square, which is centred: the file's own bytes."""
     (tmp_path / "a.ply").write_bytes(ply_text())
     read = imported(tmp_path, "a.ply")
     for (x, y, _), rgb in zip(SQUARE, SRGB, strict=True):
         assert color_at(read, (x - 0.5, y - 0.5)) == pytest.approx(rgb, abs=1.0)
-
-
-def test_few_colours_of_faces_become_materials_and_one_a_base_colour(
-    tmp_path: Path,
-) -> None:
-    """A PLY with a red and a blue face has two materials and no image."""
+    # A PLY with a red and a blue face has two materials and no image.
     (tmp_path / "a.ply").write_text(
         "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n"
         "property float z\nelement face 2\nproperty list uchar int vertex_indices\n"
@@ -215,9 +201,7 @@ def test_colours_of_a_dense_scan_survive_its_decimation(tmp_path: Path) -> None:
     head += "".join(f"property uchar {c}\n" for c in ("red", "green", "blue"))
     head += f"element face {len(face)}\nproperty list uchar int vertex_indices\nend_header\n"
     (tmp_path / "a.ply").write_bytes(head.encode() + vertex.tobytes() + face.tobytes())
-
     read = imported(tmp_path, "a.ply")
-
     assert read.mesh is not None
     assert len(read.mesh.faces) <= 25_000
     for at in (-0.4, 0.0, 0.3):
@@ -239,7 +223,7 @@ def test_a_colour_beside_an_image_of_ply_is_named(tmp_path: Path, color: str, to
     assert remarks.count("vertex and face colours are not used beside an image") == told
 
 
-def test_ply_image_with_texture_coordinates_of_corners(tmp_path: Path) -> None:
+def test_ply_images_with_texture_coordinates_of_corners_and_triangle_strips(tmp_path: Path) -> None:
     """MeshLab: ``TextureFile`` and a list ``texcoord`` per face; the file's words are longer."""
     (tmp_path / "a.ply").write_text(
         "ply\nformat ascii 1.0\ncomment TextureFile my image.png\nelement vertex 3\n"
@@ -251,6 +235,15 @@ def test_ply_image_with_texture_coordinates_of_corners(tmp_path: Path) -> None:
     assert soup.slots[0].material.texture == "my image.png"
     assert soup.uvs is not None
     assert soup.uvs[0] == pytest.approx(np.array([[0.1, 0.2], [0.3, 0.4], [0.5, 0.6]]))
+    # Strip 0 1 3 2 and, after -1, 0 1 2: every second triangle of a strip is turned.
+    (tmp_path / "a.ply").write_text(
+        "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n"
+        "property float z\nelement tristrips 1\nproperty list int int vertex_indices\nend_header\n"
+        "0 0 0\n1 0 0\n1 1 0\n0 1 0\n8 0 1 3 2 -1 0 1 2\n"
+    )
+    corners = read_mesh(Folder(tmp_path), "a.ply").soup.corners
+    expected = [[SQUARE[k] for k in t] for t in ((0, 1, 3), (3, 1, 2), (0, 1, 2))]
+    assert corners.tolist() == np.array(expected, float).tolist()
 
 
 @pytest.mark.parametrize("order", ["<", ">"])
@@ -266,18 +259,6 @@ def test_binary_ply_of_triangles_and_quads(tmp_path: Path, order: str) -> None:
     body += struct.pack(f"{order}B3I", 3, 0, 1, 2) + struct.pack(f"{order}B4I", 4, 0, 1, 2, 3)
     (tmp_path / "a.ply").write_bytes(head.encode() + body)
     assert len(read_mesh(Folder(tmp_path), "a.ply").soup) == 3
-
-
-def test_triangle_strips_of_ply(tmp_path: Path) -> None:
-    """Strip 0 1 3 2 and, after -1, 0 1 2: every second triangle of a strip is turned."""
-    (tmp_path / "a.ply").write_text(
-        "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n"
-        "property float z\nelement tristrips 1\nproperty list int int vertex_indices\nend_header\n"
-        "0 0 0\n1 0 0\n1 1 0\n0 1 0\n8 0 1 3 2 -1 0 1 2\n"
-    )
-    corners = read_mesh(Folder(tmp_path), "a.ply").soup.corners
-    expected = [[SQUARE[k] for k in t] for t in ((0, 1, 3), (3, 1, 2), (0, 1, 2))]
-    assert corners.tolist() == np.array(expected, float).tolist()
 
 
 def binary_stl(attributes: tuple[int, ...], header: bytes = b"") -> bytes:
@@ -316,14 +297,11 @@ ASCII_STL = (
 
 @pytest.mark.parametrize(
     ("text", "reason"),
-    [
-        (ASCII_STL[:105], "cut off"),
-        (ASCII_STL[:-12], "cut off"),
-        (ASCII_STL.replace("vertex 1 0 0\n", ""), r"a\.stl:6: .*without three vertices"),
-        (ASCII_STL.replace("vertex 1 0 0\n", "vertex 1 0\n"), r"a\.stl:5: .*three numbers"),
-    ],
+    [(ASCII_STL[:105], "cut off"), (ASCII_STL[:-12], "cut off"),
+     (ASCII_STL.replace("vertex 1 0 0\n", ""), r"a\.stl:6: .*without three vertices"),
+     (ASCII_STL.replace("vertex 1 0 0\n", "vertex 1 0\n"), r"a\.stl:5: .*three numbers")],
     ids=["first facet only", "last line missing", "two vertices", "two numbers"],
-)
+)  # fmt: skip
 def test_a_cut_ascii_stl_is_refused(tmp_path: Path, text: str, reason: str) -> None:
     """Whole, it has two facets; cut, none of them is trusted."""
     (tmp_path / "a.stl").write_text(ASCII_STL)
@@ -352,9 +330,7 @@ def test_3mf_builds_components_in_their_unit_with_their_colours(tmp_path: Path) 
     soup = read_mesh(Folder(tmp_path), "a.3mf").soup
     assert soup.corners.reshape(-1, 3).max(axis=0) == pytest.approx((30 * 0.0254, 0.254, 0.254))
     assert soup.colors is not None
-    assert soup.colors[:, 0].tolist() == [[1, 0, 0]] * 3 + [[0, 0, 1]] + [[1, 0, 0]] * 3 + [
-        [0, 0, 1]
-    ]
+    assert soup.colors[:, 0].tolist() == ([[1, 0, 0]] * 3 + [[0, 0, 1]]) * 2
 
 
 @pytest.mark.slow
@@ -429,14 +405,12 @@ MODEL_3MF = (
 @pytest.mark.hostile
 @pytest.mark.parametrize(
     ("model", "reason"),
-    [
-        (MODEL_3MF.format('<components><component objectid="1"/></components>'), "16 levels"),
-        (MODEL_3MF.format('<components><component objectid="9"/></components>'), "missing '9'"),
-        ('<!DOCTYPE a [<!ENTITY b "c">]><model/>', "declares a document type"),
-        (" " * 100_000_000, "malformed XML"),
-    ],
+    [(MODEL_3MF.format('<components><component objectid="1"/></components>'), "16 levels"),
+     (MODEL_3MF.format('<components><component objectid="9"/></components>'), "missing '9'"),
+     ('<!DOCTYPE a [<!ENTITY b "c">]><model/>', "declares a document type"),
+     (" " * 100_000_000, "malformed XML")],
     ids=["cycle", "missing object", "entities", "a bomb of blanks"],
-)
+)  # fmt: skip
 def test_hostile_3mf_is_one_clear_error(tmp_path: Path, model: str, reason: str) -> None:
     root = tmp_path / "props"
     root.mkdir()

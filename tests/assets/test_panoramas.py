@@ -34,79 +34,57 @@ def with_texel(value: float) -> np.ndarray:
     return rgb
 
 
-def test_openexr_and_radiance_hold_the_same_light() -> None:
+def test_openexr_and_radiance_hold_the_same_light_and_ringing_below_zero_is_dark() -> None:
     """The same panorama of mean luminance 1 from both, to the precision of Radiance (1 %)."""
-    exr, hdr = (
-        decode_radiance(exr_file(pixels()), "a"),
-        decode_radiance(encode_radiance(pixels()), "b"),
-    )
-
+    exr, hdr = (decode_radiance(made(pixels()), "a") for made in (exr_file, encode_radiance))
     np.testing.assert_allclose(exr, hdr, rtol=0.01)
     np.testing.assert_allclose(exr[0, 0] / exr[0, 0, 0], (1.0, 0.5, 0.25), rtol=1e-6)
     rows = np.cos(np.pi * np.arange(9) / 8)
     mean = ((exr @ (0.2126, 0.7152, 0.0722)).mean(axis=1) * 0.5 * (rows[:-1] - rows[1:])).sum()
     assert mean == pytest.approx(1.0, rel=1e-6)
-
-
-def test_a_little_ringing_below_zero_is_dark() -> None:
-    """Filters leave values a little below zero beside a sun; they are taken for none."""
+    # Filters leave values a little below zero beside a sun; they are taken for none.
     rgb = with_texel(-1e-5)
-
     assert decode_radiance(exr_file(rgb), "sky")[5, 3, 1] == 0.0
 
 
+UNREADABLE = [b"", b"\x89PNG\r\n\x1a\n" + bytes(64), b"no image at all",
+              b"\xff\xd8\xff" + bytes(90)]  # fmt: skip
+
+
 @pytest.mark.hostile
 @pytest.mark.parametrize(
-    ("make", "said"),
+    ("make", "said", "kind"),
     [
-        (lambda: exr_file(with_texel(float("nan"))), "row 5, column 3 is nan"),
-        (lambda: exr_file(with_texel(float("inf"))), "row 5, column 3 is inf"),
-        (lambda: exr_file(with_texel(-2.0)), "row 5, column 3 is -2"),
-        (lambda: exr_file(0.0 * pixels()), "black"),
-        (lambda: exr_file(pixels()[:, :8]), "8 x 8 px; a panorama is twice as wide as high"),
-        (lambda: exr_file(pixels()[..., :2], "RG"), "has no channels R, G, B"),
-        (lambda: exr_file(pixels(64))[:600], "unreadable OpenEXR image"),
-        (lambda: exr_file(pixels())[:4] + bytes(200), "unreadable OpenEXR image"),
-        (lambda: exr_file(np.ones((1, 17000, 3), np.float32)), "at most 16384 a side"),
-        (lambda: encode_radiance(pixels())[:-100], "unreadable panorama"),
-        (lambda: encode_radiance(0.0 * pixels()), "black"),
-        (lambda: b"#?RADIANCE\n\nnonsense", "neither Radiance nor OpenEXR"),
-        (lambda: b"", "neither Radiance nor OpenEXR"),
-        (lambda: b"\x89PNG\r\n\x1a\n" + bytes(64), "neither Radiance nor OpenEXR"),
+        *((make, said, "environment") for make, said in (
+            (lambda: exr_file(with_texel(float("nan"))), "row 5, column 3 is nan"),
+            (lambda: exr_file(with_texel(float("inf"))), "row 5, column 3 is inf"),
+            (lambda: exr_file(with_texel(-2.0)), "row 5, column 3 is -2"),
+            (lambda: exr_file(0.0 * pixels()), "black"),
+            (lambda: exr_file(pixels()[:, :8]), "8 x 8 px; a panorama is twice as wide as high"),
+            (lambda: exr_file(pixels()[..., :2], "RG"), "has no channels R, G, B"),
+            (lambda: exr_file(pixels(64))[:600], "unreadable OpenEXR image"),
+            (lambda: exr_file(pixels())[:4] + bytes(200), "unreadable OpenEXR image"),
+            (lambda: exr_file(np.ones((1, 17000, 3), np.float32)), "at most 16384 a side"),
+            (lambda: encode_radiance(pixels())[:-100], "unreadable panorama"),
+            (lambda: encode_radiance(0.0 * pixels()), "black"),
+            (lambda: b"#?RADIANCE\n\nnonsense", "neither Radiance nor OpenEXR"),
+            *((lambda data=data: data, "neither Radiance nor OpenEXR") for data in UNREADABLE[:2]),
+        )),
+        *((lambda data=data: data, "unreadable image", "texture") for data in UNREADABLE),
     ],
-)
-def test_what_is_no_panorama_is_refused_and_nothing_is_kept(
-    tmp_path: Path, make: Callable[[], bytes], said: str
+)  # fmt: skip
+def test_what_is_no_image_is_refused_and_nothing_is_kept(
+    tmp_path: Path, make: Callable[[], bytes], said: str, kind: str
 ) -> None:
     folder, cache = tmp_path / "mine", tmp_path / "cache"
     folder.mkdir()
-    (folder / "sky.exr").write_bytes(make())
-    (folder / "assets.yaml").write_text("environments:\n  - {id: sky, file: sky.exr}\n")
+    file = {"environment": "it.exr", "texture": "it.png"}[kind]
+    (folder / file).write_bytes(make())
+    (folder / "assets.yaml").write_text(f"{kind}s:\n  - {{id: it, file: {file}}}\n")
     library = open_library((folder,), cache, tmp_path / "no packs")
-
-    with pytest.raises(AssetError, match=r"sky\.exr: ") as refused:
-        library.environment("user/sky")
-
+    with pytest.raises(AssetError, match=rf"{file}: ") as refused:
+        getattr(library, kind)("user/it")
     assert said in str(refused.value)
-    assert "\n" not in str(refused.value)
-    assert not [path for path in cache.rglob("*") if path.is_file()]
-
-
-@pytest.mark.hostile
-@pytest.mark.parametrize(
-    "data",
-    [b"", b"\x89PNG\r\n\x1a\n" + bytes(64), b"not an image at all", b"\xff\xd8\xff" + bytes(90)],
-)
-def test_a_corrupt_texture_is_refused_and_nothing_is_kept(tmp_path: Path, data: bytes) -> None:
-    folder, cache = tmp_path / "mine", tmp_path / "cache"
-    folder.mkdir()
-    (folder / "wood.png").write_bytes(data)
-    (folder / "assets.yaml").write_text("textures:\n  - {id: wood, file: wood.png}\n")
-    library = open_library((folder,), cache, tmp_path / "no packs")
-
-    with pytest.raises(AssetError, match=r"wood\.png: unreadable image") as refused:
-        library.texture("user/wood")
-
     assert "\n" not in str(refused.value)
     assert not [path for path in cache.rglob("*") if path.is_file()]
 
@@ -118,6 +96,5 @@ def test_a_panorama_of_the_user_lights_as_one_of_the_packs(tmp_path: Path) -> No
         "environments:\n  - {id: sky, file: sky.exr, tags: [outdoor]}\n"
     )
     library = open_library((tmp_path,), tmp_path / "cache", tmp_path / "no packs")
-
     assert [a.asset_id for a in library.find(("outdoor",), "environment")].count("user/sky") == 1
     assert library.environment("user/sky").shape == (16, 32, 3)

@@ -150,38 +150,31 @@ def test_exif_gives_the_field_of_view(tmp_path: Path) -> None:
     [
         (f"ground: {GROUND}, hfov_deg: 60", r"photo.png: horizon: no horizon .* give horizon"),
         (f"ground: {GROUND}, horizon: {{height_px: 300}}", r"photo.png: hfov_deg: is unknown"),
-        (
-            "ground: [[0, 600], [900, 600], [400, 200]], hfov_deg: 60, horizon: {height_px: 300}",
-            r"ground: corner \(400, 200\) is above the horizon",
-        ),
-        (
-            "ground: [[0, 600], [990, 600], [400, 500]], hfov_deg: 60, horizon: {height_px: 300}",
-            r"corner \(990, 600\) is outside the photograph of 960 x 640",
-        ),
-        (
-            f"ground: {GROUND}, hfov_deg: 60, horizon: {{height_px: 300}}, "
-            "lanes: [{center_px: [[400, 600], [400, 100]]}]",
-            r"lanes\[0\].center_px: a point is above the horizon",
-        ),
+        ("ground: [[0, 600], [900, 600], [400, 200]], hfov_deg: 60, horizon: {height_px: 300}",
+         r"ground: corner \(400, 200\) is above the horizon"),
+        ("ground: [[0, 600], [990, 600], [400, 500]], hfov_deg: 60, horizon: {height_px: 300}",
+         r"corner \(990, 600\) is outside the photograph of 960 x 640"),
+        (f"ground: {GROUND}, hfov_deg: 60, horizon: {{height_px: 300}}, "
+         "lanes: [{center_px: [[400, 600], [400, 100]]}]",
+         r"lanes\[0\].center_px: a point is above the horizon"),
     ],
-)
+)  # fmt: skip
 def test_unusable_photographs_are_refused(tmp_path: Path, entry: str, fault: str) -> None:
     with pytest.raises(AssetError, match=fault):
         plate_of(tmp_path, entry)
 
 
-def test_a_mask_of_another_size_is_refused(tmp_path: Path) -> None:
+def test_a_mask_of_another_size_is_refused_and_wrong_fields_have_a_place(tmp_path: Path) -> None:
     Image.fromarray(np.zeros((8, 8), np.uint8)).save(tmp_path / "mask.png")
     entry = f"ground: {GROUND}, hfov_deg: 60, horizon: {{height_px: 300}}, mask: mask.png"
     with pytest.raises(AssetError, match="8 x 8 px; expected the size of its photograph"):
         plate_of(tmp_path, entry)
-
-
-def test_wrong_fields_have_a_place(tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match=r"assets.yaml:3:\d+: .*ground"):
-        plate_of(tmp_path, "hfov_deg: 60")
-    with pytest.raises(ConfigError, match=r"assets.yaml:3:\d+: .*no such file"):
-        plate_of(tmp_path, f"ground: {GROUND}, mask: gone.png")
+    for entry, fault in (
+        ("hfov_deg: 60", "ground"),
+        (f"ground: {GROUND}, mask: gone.png", "no such file"),
+    ):
+        with pytest.raises(ConfigError, match=rf"assets.yaml:3:\d+: .*{fault}"):
+            plate_of(tmp_path, entry)
 
 
 def test_surroundings_light_the_ground_as_the_photograph_shows_it(tmp_path: Path) -> None:

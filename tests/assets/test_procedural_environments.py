@@ -17,7 +17,6 @@ def test_mean_luminance_is_one_by_solid_angle(name: str, seed: int) -> None:
     rows, columns, channels = image.shape
     weight = np.sin(np.pi * (np.arange(rows) + 0.5) / rows)
     luminance = (image.astype(np.float64) * LUMINANCE).sum(axis=2).mean(axis=1)
-
     assert image.dtype == np.float32
     assert (columns, channels) == (2 * rows, 3)
     assert np.isfinite(image).all()
@@ -28,30 +27,21 @@ def test_mean_luminance_is_one_by_solid_angle(name: str, seed: int) -> None:
 @pytest.mark.parametrize("name", sorted(ENVIRONMENTS))
 def test_equal_seeds_make_equal_environments_and_others_differ(name: str) -> None:
     build = ENVIRONMENTS[name].build
-
     assert build(1).tobytes() == build(1).tobytes()
     assert len({build(k).tobytes() for k in range(4)}) == 4
 
 
-def test_columns_grow_clockwise_from_minus_x() -> None:
+def test_columns_grow_clockwise_from_minus_x_and_studios_have_few_lights() -> None:
     """Row 0 is the zenith, column 0 is -X, the centre +X, three quarters -Y."""
     d = pixel_directions(64)
-
     assert d[0, 0, 2] > 0.999
     assert np.allclose(d[32, 0], (-1.0, 0.0, 0.0), atol=0.05)
     assert np.allclose(d[32, 64], (1.0, 0.0, 0.0), atol=0.05)
     assert np.allclose(d[32, 96], (0.0, -1.0, 0.0), atol=0.05)
     assert np.allclose((d**2).sum(axis=2), 1.0)
-
-
-def test_studio_light_comes_from_a_few_small_places() -> None:
-    """Soft boxes: a tenth of the directions gives most of the light."""
+    assert np.allclose(normalize_luminance(np.full((16, 32, 3), 7.0)), 1.0, atol=1e-6)
+    # Soft boxes: a tenth of the directions gives most of the light.
     image = ENVIRONMENTS["studio"].build(0) @ LUMINANCE.astype(np.float32)
     weight = np.sin(np.pi * (np.arange(len(image)) + 0.5) / len(image))[:, None]
     power = np.sort((image * weight).ravel())[::-1]
-
     assert power[: power.size // 10].sum() > 0.4 * power.sum()
-
-
-def test_normalising_a_uniform_image_gives_ones() -> None:
-    assert np.allclose(normalize_luminance(np.full((16, 32, 3), 7.0)), 1.0, atol=1e-6)

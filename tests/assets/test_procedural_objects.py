@@ -53,76 +53,48 @@ def test_every_object_family_has_a_stated_real_size() -> None:
 
 @pytest.mark.slow
 @for_every_variant
-def test_objects_have_the_size_of_real_ones(built: tuple[str, Solid]) -> None:
+def test_objects_are_closed_of_real_size_centred_and_near_hulls(built: tuple[str, Solid]) -> None:
     """The longest side lies in the range that is measured on real things."""
     name, solid = built
     low, high = solid.mesh.bounds_m()
     longest = max(b - a for a, b in zip(low, high, strict=True))
-
     assert LONGEST_SIDE_M[name][0] <= longest <= LONGEST_SIDE_M[name][1]
-
-
-@pytest.mark.slow
-@for_every_variant
-def test_the_origin_is_the_centre_of_the_bounding_box(built: tuple[str, Solid]) -> None:
-    """Objects are placed by the centre of their box."""
+    # Objects are placed by the centre of their box.
     low, high = built[1].mesh.bounds_m()
-
     assert np.allclose(np.add(low, high), 0.0, atol=3e-6)
+    # Labels are never cut off by wrapping around.
+    uvs = built[1].mesh.uvs
+    assert uvs.min() >= 0.0
+    assert uvs.max() <= 1.0
+    # Every edge is walked as often in one direction as in the other.
+    assert _unmatched_edges(solid.mesh) <= OPEN_EDGES.get(name, 0.0)
+    # Half of the vertices within 2.5 mm of a part, nine in ten within 3.5 mm.
+    mesh = built[1].mesh
+    solid = [slot for slot, material in enumerate(mesh.materials) if material.role != CONTENTS]
+    seen = np.unique(mesh.faces[np.isin(mesh.face_slots, solid)])
+    vertices = mesh.vertices_m[seen].astype(np.float64)
+    outside = np.min([_outside_m(part, vertices) for part in built[1].collision.parts_m], axis=0)
+    assert np.quantile(outside, 0.5) < 0.0025
+    assert np.quantile(outside, 0.9) < 0.0035
 
 
 @for_every_variant
-def test_meshes_are_well_formed_and_within_the_budget(built: tuple[str, Solid]) -> None:
+def test_meshes_are_well_formed_and_have_a_small_convex_collision(built: tuple[str, Solid]) -> None:
     """At most 12 000 triangles."""
     assert_well_formed(built[1].mesh)
     assert 60 <= len(built[1].mesh.faces) <= 12_000
-
-
-@pytest.mark.slow
-@for_every_variant
-def test_texture_coordinates_stay_in_the_image(built: tuple[str, Solid]) -> None:
-    """Labels are never cut off by wrapping around."""
-    uvs = built[1].mesh.uvs
-
-    assert uvs.min() >= 0.0
-    assert uvs.max() <= 1.0
-
-
-@pytest.mark.slow
-@for_every_variant
-def test_surfaces_are_closed(built: tuple[str, Solid]) -> None:
-    """Every edge is walked as often in one direction as in the other."""
-    name, solid = built
-
-    assert _unmatched_edges(solid.mesh) <= OPEN_EDGES.get(name, 0.0)
-
-
-@for_every_variant
-def test_faces_are_wound_outward(built: tuple[str, Solid]) -> None:
-    """The divergence theorem gives a positive volume, smaller than the box; so for contents."""
+    # The divergence theorem gives a positive volume, smaller than the box; so for contents.
     mesh = built[1].mesh
     low, high = mesh.bounds_m()
     inside = np.array([material.role == CONTENTS for material in mesh.materials])[mesh.face_slots]
-
     for faces in (mesh.faces[~inside], mesh.faces[inside]):
         volume = volume_m3(mesh.vertices_m[faces].astype(np.float64))
         assert (volume > 0.0 or not len(faces)) and volume < np.prod(np.subtract(high, low))
-
-
-@for_every_variant
-def test_normals_are_on_the_side_of_their_faces(built: tuple[str, Solid]) -> None:
-    """Smoothing never turns a normal away from a face it belongs to."""
-    mesh = built[1].mesh
+    # Smoothing never turns a normal away from a face it belongs to.
     face = crosses(mesh) / np.linalg.norm(crosses(mesh), axis=1, keepdims=True)
-
     assert (face[:, None, :] * mesh.normals[mesh.faces]).sum(axis=2).min() > 0.5
-
-
-@for_every_variant
-def test_collision_is_few_small_convex_parts(built: tuple[str, Solid]) -> None:
-    """At most 24 parts of at most 48 vertices; all of them are vertices of their hull."""
+    # At most 24 parts of at most 48 vertices; all of them are vertices of their hull.
     parts = built[1].collision.parts_m
-
     assert 1 <= len(parts) <= 24
     for part in parts:
         assert part.dtype == np.float64
@@ -130,30 +102,9 @@ def test_collision_is_few_small_convex_parts(built: tuple[str, Solid]) -> None:
         hull = ConvexHull(part)
         depth = (part @ hull.equations[:, :3].T + hull.equations[:, 3]).max(axis=1)
         assert depth.min() > -2e-4
-
-
-@for_every_variant
-def test_collision_has_the_bounds_of_what_is_seen(built: tuple[str, Solid]) -> None:
-    mesh = built[1].mesh
     points = np.concatenate(built[1].collision.parts_m)
-    low, high = mesh.bounds_m()
-
     assert np.abs(points.min(axis=0) - low).max() < 0.003
     assert np.abs(points.max(axis=0) - high).max() < 0.003
-
-
-@pytest.mark.slow
-@for_every_variant
-def test_most_of_what_is_seen_lies_near_the_collision(built: tuple[str, Solid]) -> None:
-    """Half of the vertices within 2.5 mm of a part, nine in ten within 3.5 mm."""
-    mesh = built[1].mesh
-    solid = [slot for slot, material in enumerate(mesh.materials) if material.role != CONTENTS]
-    seen = np.unique(mesh.faces[np.isin(mesh.face_slots, solid)])
-    vertices = mesh.vertices_m[seen].astype(np.float64)
-    outside = np.min([_outside_m(part, vertices) for part in built[1].collision.parts_m], axis=0)
-
-    assert np.quantile(outside, 0.5) < 0.0025
-    assert np.quantile(outside, 0.9) < 0.0035
 
 
 def open_variants(name: str) -> list[int]:
@@ -175,7 +126,6 @@ def test_vessels_are_hollow_in_physics(name: str, seed: int) -> None:
     rim = solid.mesh.vertices_m[solid.mesh.vertices_m[:, 2] > high[2] - 0.001]
     axis = 0.5 * (rim.min(axis=0) + rim.max(axis=0)).astype(np.float64)
     marble = np.array([(axis[0] + 0.008 * dx, axis[1], z) for z in heights for dx in (-1, 0, 1)])
-
     for part in solid.collision.parts_m:
         assert (_outside_m(part, marble) > 0.001).all()
 
@@ -184,7 +134,6 @@ def test_vessels_are_hollow_in_physics(name: str, seed: int) -> None:
 @for_every(OBJECTS)
 def test_equal_seeds_make_equal_bytes_and_others_differ(name: str) -> None:
     digests = [digest(build(name, seed)) for seed in range(4)]
-
     assert digests[:2] == [digest(variant(name, seed)) for seed in (0, 1)]
     assert len(set(digests)) == 4
 
@@ -214,7 +163,6 @@ def test_printed_things_carry_a_label(name: str) -> None:
     assert "printed" in FAMILIES[name].tags
     mesh = FAMILIES[name].build(seed=2).mesh
     printed = [slot for slot, material in enumerate(mesh.materials) if material.printed]
-
     assert printed
     assert np.isin(mesh.face_slots, printed).any()
 

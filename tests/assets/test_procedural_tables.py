@@ -14,29 +14,21 @@ VEHICLES = "gen_data.content.vehicles"
 TABLES = sorted(Path(assets.__path__[0]).rglob("*.yaml"))
 
 
-def test_rows_have_the_type_of_the_table() -> None:
+def test_rows_have_the_type_of_the_table_in_the_order_of_the_file() -> None:
     """Lists become tuples, whole numbers fractions where the field is one."""
     wine = BOTTLES["wine"]
-
     assert isinstance(wine, BottleStyle)
     assert wine.height_m == (0.29, 0.32)
     assert isinstance(wine.depth, float)
     assert not wine.clear
-
-
-def test_rows_keep_the_order_of_the_file_and_take_fields_from_another() -> None:
-    """Seeds take the styles in turn; an estate is a sedan with other measures."""
+    # Seeds take the styles in turn; an estate is a sedan with other measures.
     assert " ".join(BOTTLES) == (
         "wine beer water soda ketchup detergent burgundy champagne white_wine longneck stubby "
         "ribbed family juice milk oil spirit sauce shampoo soap spray flask sport medicine squeeze"
     )
     sedan, estate = DESIGNS["sedan"], DESIGNS["estate"]
-
     assert (sedan.rails, estate.rails) == (False, True)
     assert estate.width_m == sedan.width_m
-
-
-def test_a_table_of_another_type_is_refused() -> None:
     with pytest.raises(KeyError):
         load_table(VEHICLES, "bicycles", Design)
 

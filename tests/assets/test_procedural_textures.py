@@ -23,23 +23,10 @@ SKIN = {"hand_skin"}
 DEVICES = {"phone_screen", "key_legends"}
 TABLEWARE = {"ceramic_decor", "drink_surface"}
 RELIEF = (
-    "brick",
-    "brushed_metal",
-    "cardboard",
-    "carpet",
-    "citrus_peel",
-    "concrete",
-    "fabric",
-    "floor_tiles",
-    "leather",
-    "paint",
-    "painted_metal",
-    "plaster",
-    "screed",
-    "tiles",
-    "wood_grain",
+    "brick", "brushed_metal", "cardboard", "carpet", "citrus_peel", "concrete", "fabric",
+    "floor_tiles", "leather", "paint", "painted_metal", "plaster", "screed", "tiles", "wood_grain",
     "wood_planks",
-)
+)  # fmt: skip
 TILING = sorted(set(TEXTURES) - PRINTED - FOOD - FRUIT - SKIN - TABLEWARE - DEVICES)
 
 
@@ -54,21 +41,16 @@ def made(request: pytest.FixtureRequest) -> tuple[str, TextureData]:
     return request.param, texture(request.param, 0)
 
 
-def test_images_are_8_bit_and_of_one_size(made: tuple[str, TextureData]) -> None:
+def test_images_are_8_bit_of_one_size_and_show_something(made: tuple[str, TextureData]) -> None:
     """Albedo, roughness and normals have the shapes of the contract."""
     texture = made[1]
     height, width, _ = texture.albedo.shape
-
     assert texture.albedo.dtype == np.uint8
     assert (height, width) in ((512, 512), (256, 512))
     assert texture.roughness is None or texture.roughness.shape == (height, width)
     assert texture.normal is None or texture.normal.shape == (height, width, 3)
-
-
-def test_images_show_something(made: tuple[str, TextureData]) -> None:
-    """No image is a single colour, nor white or black all over."""
+    # No image is a single colour, nor white or black all over.
     albedo = made[1].albedo.astype(np.float64)
-
     assert albedo.std(axis=(0, 1)).max() > 0.8
     assert 8 < albedo.mean() < 250
 
@@ -79,7 +61,6 @@ def test_normals_point_out_of_the_surface(name: str) -> None:
     image = texture(name, 0).normal
     assert image is not None
     normal = image.astype(np.float64) / 127.5 - 1.0
-
     assert np.allclose((normal**2).sum(axis=2), 1.0, atol=0.03)
     assert normal[..., 2].min() > 0.05
     assert np.abs(normal[..., :2].mean(axis=(0, 1))).max() < 0.03
@@ -103,7 +84,6 @@ def test_equal_seeds_make_equal_images_and_others_differ(name: str) -> None:
     """A texture is a pure function of its seed."""
     again = TEXTURES[name].build(0)
     images = [made.albedo.tobytes() for made in (again, *(texture(name, s) for s in range(3)))]
-
     assert images[0] == images[1]
     assert len(set(images)) == 3
 
@@ -119,9 +99,7 @@ def median_wavelength_mm(slope: np.ndarray, repeat_m: float) -> float:
     ("name", "repeat_m", "most_mm"),
     [("leather", 0.2, 3.0), ("fabric", 0.15, 1.5), ("carpet", 0.5, 7.5)],
 )
-def test_relief_is_as_fine_as_that_of_the_real_surface(
-    name: str, repeat_m: float, most_mm: float
-) -> None:
+def test_relief_is_as_fine_as_on_real_surfaces(name: str, repeat_m: float, most_mm: float) -> None:
     """Slopes change with pebbles and yarns of 1 to 2 mm, tufts of 3 to 5 mm."""
     for seed in range(4):
         normal = texture(name, seed).normal
@@ -133,13 +111,10 @@ def test_relief_is_as_fine_as_that_of_the_real_surface(
 @pytest.mark.parametrize(
     ("name", "repeat_m", "most_mm"), [("wood_grain", 0.5, 20.0), ("terrazzo", 0.6, 40.0)]
 )
-def test_figure_is_as_fine_as_that_of_the_real_surface(
-    name: str, repeat_m: float, most_mm: float
-) -> None:
+def test_figure_is_as_fine_as_on_real_surfaces(name: str, repeat_m: float, most_mm: float) -> None:
     """Rings are 2 to 5 mm apart, 5 to 25 mm in cathedrals; chips are 3 to 16 mm wide."""
     greys = [texture(name, seed).albedo.astype(np.float64).mean(axis=2) for seed in range(16)]
     found = [median_wavelength_mm(grey, repeat_m) for grey in greys]
-
     assert np.median(found) < most_mm
 
 
@@ -150,7 +125,6 @@ def test_concrete_is_grey_and_even(name: str, seed: int) -> None:
     albedo = texture(name, seed).albedo.astype(np.float64)
     grey = albedo.mean(axis=2)
     channels = albedo.mean(axis=(0, 1))
-
     assert np.ptp(channels) < 0.04 * channels.mean()
     assert grey.std() < 0.06 * grey.mean()
     assert (grey < 0.8 * grey.mean()).mean() < 0.02
@@ -166,26 +140,19 @@ def test_brand_of_a_can_is_on_its_upper_front() -> None:
         assert can_size(seed).radius_m < 0.05
 
 
-def test_perlin_noise_is_zero_at_lattice_points_and_bounded() -> None:
+def test_noise_is_zero_at_lattice_points_repeats_and_has_true_distances() -> None:
     """Gradient noise vanishes where gradients sit; its range is about [-1, 1]."""
     noise = perlin((4, 8), Streams(seed=1, scene=0).rng("test"), 512)
     near_lattice = noise[::128, ::64]
-
     assert np.abs(near_lattice).max() < 0.05
     assert 0.4 < np.abs(noise).max() < 1.3
-
-
-def test_noise_repeats_at_the_border() -> None:
-    """One more row would be the first row: the step across the seam is an ordinary step."""
+    # One more row would be the first row: the step across the seam is an ordinary step.
     rng = Streams(seed=2, scene=0).rng("test")
     for noise in (fbm((3, 5), 4, rng), worley((7, 4), rng).nearest):
         for axis in (0, 1):
             steps = np.abs(noise - np.roll(noise, 1, axis=axis)).mean(axis=1 - axis)
             assert steps[0] < 1.5 * steps[1:].max()
-
-
-def test_worley_distances_agree_with_brute_force() -> None:
-    """Nearest and second nearest over all points and their periodic copies."""
+    # Nearest and second nearest over all points and their periodic copies.
     seed = Streams(seed=3, scene=0)
     points = worley((5, 6), seed.rng("w"), size_px=64)
     place = 0.5 + (seed.rng("w").random((2, 5, 6)) - 0.5)
@@ -195,7 +162,6 @@ def test_worley_distances_agree_with_brute_force() -> None:
     all_y, all_x = (np.concatenate([c[k] for c in copies]) for k in (0, 1))
     row, column = (np.arange(64) + 0.5) * 5 / 64, (np.arange(64) + 0.5) * 6 / 64
     away = np.sqrt((row[:, None, None] - all_y) ** 2 + (column[None, :, None] - all_x) ** 2)
-
     assert np.allclose(points.nearest, np.sort(away, axis=2)[..., 0], atol=1e-4)
 
 
@@ -215,6 +181,5 @@ def test_every_printed_character_has_a_glyph() -> None:
     font = ImageFont.load_default(size=20)
     glyphs = {c: bytes(font.getmask(c)) for c in {*"".join(words), "\uffff"}}
     box = glyphs.pop("\uffff")
-
     assert foreign == set()
     assert {c for c, glyph in glyphs.items() if glyph == box} == set()

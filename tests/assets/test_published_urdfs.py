@@ -53,18 +53,15 @@ def test_alpha_of_a_colour_is_opacity(tmp_path: Path) -> None:
     own = '<material name="m"><color rgba="0.5 0 0 0.3"/></material>'
     shared = '<material name="glass"><color rgba="0 0.5 0 0.4"/></material>'
     library = seen(
-        tmp_path,
-        shared,
-        link("a", visual(own)),
-        link("b", visual('<material name="glass"/>')),
+        tmp_path, shared, link("a", visual(own)), link("b", visual('<material name="glass"/>')),
         joint("j", "a", "b", '<origin xyz="0 0 1"/>'),
-    )
+    )  # fmt: skip
     red, green = library.materials("user/a")
     assert (red.opacity, red.base_color) == (0.3, (0.214041, 0.0, 0.0))
     assert (green.opacity, green.base_color) == (0.4, (0.0, 0.214041, 0.0))
 
 
-def test_a_material_of_the_robot_wins_over_one_inside_a_link(tmp_path: Path) -> None:
+def test_materials_of_the_robot_win_over_links_and_clear_ones_are_omitted(tmp_path: Path) -> None:
     """As in urdfdom, wherever it stands; TALOS has two materials named DarkGrey."""
     described = describe(
         tmp_path,
@@ -74,6 +71,10 @@ def test_a_material_of_the_robot_wins_over_one_inside_a_link(tmp_path: Path) -> 
         joint("j", "a", "b"),
     )
     assert described.links["b"].visuals[0].look.color == (0.2, 0.2, 0.2)
+    clear = '<material name="m"><color rgba="1 0 0 0"/></material>'
+    described = describe(tmp_path, link("a", visual(clear)))
+    assert described.links["a"].visuals == ()
+    assert "invisible (alpha 0)" in described.remarks[0]
 
 
 def test_a_texture_is_whole_and_upright_on_every_face_of_a_box(tmp_path: Path) -> None:
@@ -109,7 +110,7 @@ def test_capsules_have_caps(tmp_path: Path) -> None:
     assert volume == pytest.approx(exact, rel=0.02)
 
 
-def test_a_joint_that_mimics_another_may_leave_out_its_limits(tmp_path: Path) -> None:
+def test_a_joint_without_limits_is_refused_with_remedy_unless_it_mimics_one(tmp_path: Path) -> None:
     """Leader from -1 to 2, multiplier -0.5, offset 0.1: from -0.9 to 0.6."""
     leader = joint("j", "a", "b", '<limit lower="-1" upper="2" effort="1" velocity="1"/>',
                    "revolute")  # fmt: skip
@@ -117,9 +118,6 @@ def test_a_joint_that_mimics_another_may_leave_out_its_limits(tmp_path: Path) ->
     described = describe(tmp_path, link("a"), link("b"), link("c"), leader, follower)
     limits = {j.name: (j.lower, j.upper) for j in described.joints}
     assert limits["k"] == pytest.approx((-0.9, 0.6))
-
-
-def test_a_joint_without_limits_is_refused_with_the_remedy(tmp_path: Path) -> None:
     with pytest.raises(AssetError, match=r"a\.urdf:4:1: .*'j' has no limits; give it a <limit>"):
         describe(tmp_path, link("a"), link("b"), joint("j", "a", "b", kind="revolute"))
 
@@ -138,14 +136,10 @@ def test_floating_and_planar_joints_stay_at_their_origin(tmp_path: Path, kind: s
 
 @pytest.mark.parametrize(
     ("shape", "what"),
-    [
-        ('<sphere radius="0"/>', "a sphere of size 0"),
-        ('<box size="0 1 1"/>', "a box of size 0"),
-        ('<cylinder radius="0.1" length="0"/>', "a cylinder of size 0"),
-        ('<capsule radius="0" length="1"/>', "a capsule of size 0"),
-        ("", "without geometry"),
-    ],
-)
+    [('<sphere radius="0"/>', "a sphere of size 0"), ('<box size="0 1 1"/>', "a box of size 0"),
+     ('<cylinder radius="0.1" length="0"/>', "a cylinder of size 0"),
+     ('<capsule radius="0" length="1"/>', "a capsule of size 0"), ("", "without geometry")],
+)  # fmt: skip
 def test_markers_without_volume_are_left_out_by_name(tmp_path: Path, shape: str, what: str) -> None:
     """Contact points of legs are spheres of radius 0; the robot around them is used."""
     marker = link("contact", collision=f"<geometry>{shape}</geometry>")
@@ -166,22 +160,12 @@ def test_negative_sizes_are_refused_with_link_and_line(tmp_path: Path, shape: st
         describe(tmp_path, link("a"), link("b", collision=f"<geometry>{shape}</geometry>"))
 
 
-def test_an_invisible_visual_is_left_out(tmp_path: Path) -> None:
-    clear = '<material name="m"><color rgba="1 0 0 0"/></material>'
-    described = describe(tmp_path, link("a", visual(clear)))
-    assert described.links["a"].visuals == ()
-    assert "invisible (alpha 0)" in described.remarks[0]
-
-
 @pytest.mark.parametrize(
     "part",
-    [
-        '<xacro:include filename="$(find r)/gripper.xacro"/>',
-        '<xacro:gripper parent="a"/>',
-        link("b", visual(geometry='<geometry><box size="${w} 1 1"/></geometry>')),
-        '<link name="$(arg prefix)b"/>',
-    ],
-)
+    ['<xacro:include filename="$(find r)/gripper.xacro"/>', '<xacro:gripper parent="a"/>',
+     link("b", visual(geometry='<geometry><box size="${w} 1 1"/></geometry>')),
+     '<link name="$(arg prefix)b"/>'],
+)  # fmt: skip
 def test_a_xacro_file_is_refused_with_the_command_for_it(tmp_path: Path, part: str) -> None:
     """At the line of the first macro or expression."""
     (tmp_path / "a.urdf").write_text(
@@ -197,14 +181,11 @@ PACKAGED = link("a", visual(geometry='<geometry><mesh filename="package://arm_de
 
 @pytest.mark.parametrize(
     ("urdf", "mesh", "xml"),
-    [
-        ("urdf/a.urdf", "meshes/a.obj", "package.xml"),
-        ("src/arm/urdf/a.urdf", "src/arm/meshes/a.obj", "src/arm/package.xml"),
-        ("a.urdf", "arm_description/meshes/a.obj", ""),
-        ("one/urdf/a.urdf", "arm_description/meshes/a.obj", ""),
-        ("urdf/a.urdf", "meshes/a.obj", ""),
-    ],
-)
+    [("urdf/a.urdf", "meshes/a.obj", "package.xml"),
+     ("src/arm/urdf/a.urdf", "src/arm/meshes/a.obj", "src/arm/package.xml"),
+     ("a.urdf", "arm_description/meshes/a.obj", ""),
+     ("one/urdf/a.urdf", "arm_description/meshes/a.obj", ""), ("urdf/a.urdf", "meshes/a.obj", "")],
+)  # fmt: skip
 def test_a_ros_package_is_an_asset_folder(tmp_path: Path, urdf: str, mesh: str, xml: str) -> None:
     """Whatever its folder is called: ``package.xml`` names it."""
     (tmp_path / mesh).parent.mkdir(parents=True)
@@ -216,18 +197,16 @@ def test_a_ros_package_is_an_asset_folder(tmp_path: Path, urdf: str, mesh: str, 
     assert describe(tmp_path, PACKAGED, file=urdf).files() == (mesh,)
 
 
-def test_a_third_slash_of_a_package_uri_is_no_part_of_the_path(tmp_path: Path) -> None:
+def test_a_third_slash_of_a_package_uri_counts_nothing_but_a_name_does(tmp_path: Path) -> None:
+    """``package.xml`` has another name: the path that is looked for is the one in that package."""
     (tmp_path / "arm_description/meshes").mkdir(parents=True)
     (tmp_path / "arm_description/meshes/a.obj").write_text(TETRAHEDRON)
     described = describe(tmp_path, PACKAGED.replace("package://", "package:///"))
     assert described.files() == ("arm_description/meshes/a.obj",)
-
-
-def test_another_packages_mesh_is_not_taken_from_this_one(tmp_path: Path) -> None:
-    """``package.xml`` has another name: the path that is looked for is the one in that package."""
     (tmp_path / "meshes").mkdir()
     (tmp_path / "meshes/a.obj").write_text(TETRAHEDRON)
     (tmp_path / "package.xml").write_text("<package><name>other</name></package>")
+    (tmp_path / "arm_description").rename(tmp_path / "elsewhere")
     described = describe(tmp_path, PACKAGED, file="urdf/a.urdf")
     assert described.files() == ("urdf/arm_description/meshes/a.obj",)
 

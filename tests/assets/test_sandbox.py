@@ -32,7 +32,7 @@ def shared() -> Iterator[Sandbox]:
     child.close()
 
 
-def test_results_are_the_arrays_of_the_function(shared: Sandbox) -> None:
+def test_results_and_errors_arrive_as_they_are(shared: Sandbox, tmp_path: Path) -> None:
     """All dtypes and shapes arrive as they were, in one process for several calls."""
     wanted = {"a": np.arange(6.0).reshape(2, 3), "b": np.array([1, 255], np.uint8)}
     for _ in range(2):
@@ -42,12 +42,12 @@ def test_results_are_the_arrays_of_the_function(shared: Sandbox) -> None:
             "b": [1, 255],
         }
         assert arrays["b"].dtype == np.uint8
-
-
-def test_errors_of_readers_arrive_as_they_are(shared: Sandbox, tmp_path: Path) -> None:
     (tmp_path / "a.png").write_bytes(b"noise")
     with pytest.raises(AssetError, match=r"a\.png: unreadable.*; [^\n]*$"):
         shared.run(parse_image, tmp_path, {}, "a.png", "rgb", place="x", input_bytes=0)
+    # Everything but an AssetError is a fault of the program and keeps its traceback.
+    with pytest.raises(RuntimeError, match="TypeError"):
+        shared.run(read_stl, place="x", input_bytes=0)
 
 
 def test_relative_paths_follow_the_folder_of_the_caller(
@@ -64,44 +64,29 @@ def test_relative_paths_follow_the_folder_of_the_caller(
         assert next(iter(arrays.values())).max() == shade
 
 
-def test_mistakes_of_ours_are_not_called_errors_of_the_file(shared: Sandbox) -> None:
-    """Everything but an AssetError is a fault of the program and keeps its traceback."""
-    with pytest.raises(RuntimeError, match="TypeError"):
-        shared.run(read_stl, place="x", input_bytes=0)
-
-
-def test_memory_is_limited(shared: Sandbox) -> None:
+def test_memory_and_time_are_limited(shared: Sandbox, monkeypatch: pytest.MonkeyPatch) -> None:
     """An allocation beyond the limit is one error, and the process goes on."""
     with pytest.raises(AssetError, match=r"^a\.obj: needs more than 1\.1 GB"):
         shared.run(bytes, 3 << 30, place="a.obj", input_bytes=0)
-
-
-def test_processor_time_is_limited(shared: Sandbox, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A loop inside native code ends, too."""
+    # A loop inside native code ends, too.
     monkeypatch.setattr(sandbox, "CPU_S", 1.0)
     with pytest.raises(AssetError, match=r"a\.obj: not read within 1 s of processor time"):
         shared.run(pow, 3, 10**9, place="a.obj", input_bytes=0)
-
-
-def test_waiting_is_limited(shared: Sandbox, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A reader that waits takes no processor time, but no longer than the limit."""
+    # A reader that waits takes no processor time, but no longer than the limit.
     monkeypatch.setattr(sandbox, "CPU_S", 0.5)
     monkeypatch.setattr(sandbox, "_WALL_PER_CPU", 2.0)
     with pytest.raises(AssetError, match="not read within"):
         shared.run(time.sleep, 60.0, place="a.obj", input_bytes=0)
 
 
-def test_a_crash_is_an_error_of_the_file(shared: Sandbox) -> None:
+def test_a_crash_is_an_error_of_the_file_and_no_connection_leaves(shared: Sandbox) -> None:
     """Segmentation faults and aborts name the file; the next file is read as usual."""
     with pytest.raises(AssetError, match=r"a\.ply: its reader crashed \(SIGSEGV\)"):
         shared.run(ctypes.string_at, 0, place="a.ply", input_bytes=0)
     with pytest.raises(AssetError, match=r"a\.ply: its reader crashed \(SIGABRT\)"):
         shared.run(os.abort, place="a.ply", input_bytes=0)
     assert shared.run(dict, place="x", input_bytes=0) == {}
-
-
-def test_no_connection_leaves_the_process(shared: Sandbox) -> None:
-    """Even the loopback interface is out of reach (network_namespaces(7))."""
+    # Even the loopback interface is out of reach (network_namespaces(7)).
     if subprocess.run(["unshare", "-n", "true"], check=False).returncode != 0:
         pytest.skip("root may write everywhere: own network namespaces are not permitted here")
     with (

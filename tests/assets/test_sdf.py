@@ -74,13 +74,11 @@ def test_a_door_turns_about_its_hinge(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("axis", "expected"),
-    [
-        ("<xyz>0 1 0</xyz>", [0.9, 0.0, 0.5]),
-        ('<xyz expressed_in="__model__">0 1 0</xyz>', [1.0, 0.1, 0.5]),
-        ('<xyz expressed_in="frame">1 0 0</xyz>', [1.1, 0.0, 0.5]),
-        ("<xyz>0 1 0</xyz><use_parent_model_frame>true</use_parent_model_frame>", [1.0, 0.1, 0.5]),
-    ],
-)
+    [("<xyz>0 1 0</xyz>", [0.9, 0.0, 0.5]),
+     ('<xyz expressed_in="__model__">0 1 0</xyz>', [1.0, 0.1, 0.5]),
+     ('<xyz expressed_in="frame">1 0 0</xyz>', [1.1, 0.0, 0.5]),
+     ("<xyz>0 1 0</xyz><use_parent_model_frame>true</use_parent_model_frame>", [1.0, 0.1, 0.5])],
+)  # fmt: skip
 def test_axes_are_in_the_named_frame(tmp_path: Path, axis: str, expected: list[float]) -> None:
     """By default in the joint's own, which here has Y along the model's -X."""
     slide = HINGED[2].replace("revolute", "prismatic").replace("<xyz>0 0 1</xyz>", axis)
@@ -133,7 +131,7 @@ INCLUDED = (
 )
 
 
-def test_a_merged_model_is_part_of_the_outer_one(tmp_path: Path) -> None:
+def test_models_are_merged_placed_by_a_frame_and_found_by_their_bare_names(tmp_path: Path) -> None:
     """Names have no prefix; poses stay in its own frame, which is 2 m along X and half turned."""
     (tmp_path / "hand.sdf").write_text(INCLUDED)
     described = read(
@@ -147,10 +145,7 @@ def test_a_merged_model_is_part_of_the_outer_one(tmp_path: Path) -> None:
     assert list(described.links) == ["__model__", "arm", "palm", "ring"]
     assert middle(described, "palm") == [2.0, 0.0, 1.0]
     assert middle(described, "ring") == [1.5, 0.0, 1.0]
-
-
-def test_an_included_model_is_placed_by_a_frame_of_it(tmp_path: Path) -> None:
-    """``tip`` at (0, 0, 3) puts the palm half a metre before it."""
+    # ``tip`` at (0, 0, 3) puts the palm half a metre before it.
     (tmp_path / "hand.sdf").write_text(INCLUDED)
     include = (
         "<include><uri>hand.sdf</uri><name>h</name><pose>0 0 3 0 0 0</pose>"
@@ -162,10 +157,7 @@ def test_an_included_model_is_placed_by_a_frame_of_it(tmp_path: Path) -> None:
     (tmp_path / "hand.sdf").write_text(placed)
     unnamed = include.replace("<placement_frame>tip</placement_frame>", "")
     assert middle(read(tmp_path, link("arm"), unnamed), "h::palm") == [-0.5, 0.0, 3.0]
-
-
-def test_models_are_found_by_their_bare_names(tmp_path: Path) -> None:
-    """As Gazebo does with the folders of its resource path; the file may hold an include only."""
+    # As Gazebo does with the folders of its resource path; the file may hold an include only.
     (tmp_path / "hand").mkdir()
     (tmp_path / "hand/model.sdf").write_text(INCLUDED)
     (tmp_path / "robot").mkdir()
@@ -215,16 +207,10 @@ def test_meshes_materials_and_textures_of_gazebo(tmp_path: Path) -> None:
 
 def test_a_mimic_follows_its_leader_from_a_reference(tmp_path: Path) -> None:
     """2 (x - 0.1) + 0.3 = 2 x + 0.1 (SDF 1.11)."""
-    second = (
-        HINGED[2]
-        .replace("hinge", "other")
-        .replace("<child>door", "<child>leaf")
-        .replace(
-            "</limit>",
-            "</limit><mimic joint='hinge'><multiplier>2</multiplier><offset>0.3</offset>"
-            "<reference>0.1</reference></mimic>",
-        )
-    )
+    mimic = ("</limit><mimic joint='hinge'><multiplier>2</multiplier><offset>0.3</offset>"
+             "<reference>0.1</reference></mimic>")  # fmt: skip
+    second = HINGED[2].replace("hinge", "other").replace("<child>door", "<child>leaf")
+    second = second.replace("</limit>", mimic)
     described = read(tmp_path, *HINGED, link("leaf"), second)
     (other,) = (j for j in described.joints if j.name == "other")
     assert (other.mimic, other.mimic_multiplier, other.mimic_offset) == ("hinge", 2.0, 0.1)
@@ -250,22 +236,16 @@ def test_one_object_of_a_mesh_file_is_used_and_centered(tmp_path: Path) -> None:
         read_shape(Folder(tmp_path), shape, SE3())
 
 
-def test_of_a_loop_the_first_joint_is_kept(tmp_path: Path) -> None:
+def test_what_is_not_used_is_named_and_a_loop_cut_after_its_first_joint(tmp_path: Path) -> None:
     """As of a closed loop of MJCF; the other one is named."""
     brace = '<joint name="brace" type="fixed"><parent>frame</parent><child>door</child></joint>'
     described = read(tmp_path, *HINGED, brace)
     assert [j.name for j in described.joints if j.movable] == ["hinge"]
     assert described.remarks == ("not used: 1 joint 'brace' (it closes a loop)",)
-
-
-def test_a_static_model_does_not_move(tmp_path: Path) -> None:
     described = read(tmp_path, "<static>true</static>", *HINGED)
     assert not any(joint.movable for joint in described.joints)
     assert middle(described, "door") == [1.0, 0.0, 0.5]
-
-
-def test_what_is_not_used_is_named(tmp_path: Path) -> None:
-    """Sensors, plugins, joints of several positions, and geometry without a surface."""
+    # Sensors, plugins, joints of several positions, and geometry without a surface.
     described = read(
         tmp_path,
         *HINGED[:2],
@@ -274,12 +254,9 @@ def test_what_is_not_used_is_named(tmp_path: Path) -> None:
         '<link name="eye"><sensor name="s" type="camera"/><visual name="v"><geometry><plane>'
         "<normal>0 0 1</normal></plane></geometry></visual></link>",
     )
-    assert described.remarks == (
-        "not used: 1 ball joint (it stays at its origin)",
-        "not used: 1 plane geometry",
-        "not used: 1 plugin",
-        "not used: 1 sensor",
-    )
+    assert described.remarks == ("not used: 1 ball joint (it stays at its origin)",
+                                 "not used: 1 plane geometry", "not used: 1 plugin",
+                                 "not used: 1 sensor")  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -303,14 +280,11 @@ def test_faults_have_one_clear_error(tmp_path: Path, part: str, reason: str) -> 
         read(tmp_path, part, *HINGED[:2])
 
 
-def test_entities_are_never_expanded(tmp_path: Path) -> None:
+def test_entities_and_files_with_two_models_are_refused(tmp_path: Path) -> None:
+    """Nobody knows which one is meant."""
     (tmp_path / "a.sdf").write_text("<!DOCTYPE a [<!ENTITY b 'c'>]><sdf><model name='&b;'/></sdf>")
     with pytest.raises(AssetError, match=r"a\.sdf: .*declares a document type"):
         read_sdf(Folder(tmp_path), "a.sdf")
-
-
-def test_a_file_with_two_models_is_refused(tmp_path: Path) -> None:
-    """Nobody knows which one is meant."""
     (tmp_path / "a.sdf").write_text(
         '<sdf version="1.9"><world name="w"><model name="a"/><model name="b"/></world></sdf>'
     )

@@ -1,6 +1,7 @@
 """Sun and sky, against tables and formulas of photometry and meteorology."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -8,16 +9,8 @@ import pytest
 from gen_data.assets.library import open_library
 from gen_data.core.errors import AssetError
 from gen_data.sky import daylight
-from gen_data.sky.sky import (
-    SkyModel,
-    clear_sky,
-    luminance_cd_m2,
-    mean_luminance_cd_m2,
-    overcast_sky,
-    preetham_sky,
-    sky,
-    sun_lux,
-)
+from gen_data.sky import sky as skies
+from gen_data.sky.sky import SkyModel, clear_sky, luminance_cd_m2, preetham_sky
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
@@ -38,28 +31,23 @@ def level_illuminance_lux(image: np.ndarray) -> float:
 def test_clear_sun_has_the_illuminance_of_the_ies_formula(altitude_deg: float, lux: float) -> None:
     """127.5 klx exp(-0.21 m), with m = 1, 1.155, 2.0, 3.84, 5.6 from Kasten and Young's table."""
     got = daylight.sun_illuminance_lux(math.radians(altitude_deg))
-
     assert got == pytest.approx(lux, rel=0.02)
 
 
 @pytest.mark.parametrize(
     ("altitude_deg", "lux", "factor"), [(-0.8, 453.0, 1.2), (-6.0, 3.4, 1.2), (-12.0, 0.0083, 1.3)]
 )
-def test_twilight_fades_as_observatories_tell(
-    altitude_deg: float, lux: float, factor: float
-) -> None:
+def test_twilight_fades_as_measured(altitude_deg: float, lux: float, factor: float) -> None:
     """Sunset, the end of civil and of nautical twilight; a city's own glow is taken off."""
     altitude = math.radians(altitude_deg)
     got = daylight.sky_illuminance_lux(altitude) - daylight.night_illuminance_lux()
-
     assert lux / factor < got < lux * factor
 
 
-def test_light_levels_are_those_of_the_street() -> None:
+def test_light_levels_are_those_of_the_street_and_low_sun_is_redder() -> None:
     """Clear noon about 100 klx, overcast noon 10 to 20 klx; the sun sets without a jump."""
     noon = math.radians(55.0)
     clear_sun = daylight.sun_illuminance_lux(noon) * math.sin(noon)
-
     assert 90e3 < clear_sun + daylight.sky_illuminance_lux(noon) < 110e3
     assert daylight.sun_illuminance_lux(noon, cloudiness=1.0) == 0.0
     assert 10e3 < daylight.sky_illuminance_lux(noon, 1.0) < 20e3
@@ -67,13 +55,9 @@ def test_light_levels_are_those_of_the_street() -> None:
     assert around == sorted(around, reverse=True)
     assert around[2] < 1.0
     assert around[3] == 0.0
-
-
-def test_low_sun_is_redder() -> None:
-    """Rayleigh and aerosol extinction take blue first."""
+    # Rayleigh and aerosol extinction take blue first.
     colors = [daylight.sun_color(math.radians(a)) for a in (60.0, 20.0, 5.0)]
     ratios = [red / blue for red, _, blue in colors]
-
     assert ratios == sorted(ratios)
     assert all(np.dot(color, LUMINANCE) == pytest.approx(1.0, abs=1e-4) for color in colors)
 
@@ -128,9 +112,7 @@ def test_measured_skies_are_the_standard_clear_sky_and_in_haze_the_polluted_one(
     altitude_deg: float, turbidity: float, polluted: bool
 ) -> None:
     d, sun = directions(89.0), math.radians(altitude_deg)
-
     got = clear_sky(d, sun, turbidity) @ LUMINANCE
-
     np.testing.assert_allclose(got, cie_clear_sky(d, sun, polluted=polluted), rtol=1e-9)
 
 
@@ -142,9 +124,7 @@ def test_preethams_sky_is_shaped_as_the_standard_clear_sky(altitude_deg: float) 
     """
     d = directions(80.0)
     sun = math.radians(altitude_deg)
-
     ratio = (preetham_sky(d, sun, 2.5) @ LUMINANCE) / cie_clear_sky(d, sun)
-
     weights = np.hypot(d[..., 0], d[..., 1]).ravel()
     order = np.argsort(ratio.ravel())
     grown = np.cumsum(weights[order]) / weights.sum()
@@ -161,17 +141,15 @@ def test_preethams_light_is_that_of_a_clear_day(altitude_deg: float, turbidity: 
     """
     altitude = math.radians(altitude_deg)
     model = SkyModel(0, altitude_deg, turbidity, model="preetham")
-
     sky_lux = level_illuminance_lux(luminance_cd_m2(model, 128))
-    total = sun_lux(model) * math.sin(altitude) + sky_lux
-
+    total = skies.sun_lux(model) * math.sin(altitude) + sky_lux
     mass = daylight.air_mass(altitude)
     sun = 127_500.0 * math.exp(-0.21 * mass) * math.sin(altitude)
     expected = sun + 800.0 + 15_500.0 * math.sqrt(math.sin(altitude))
     assert total == pytest.approx(expected, rel=0.15)
 
 
-def test_preethams_zenith_is_as_bright_as_published() -> None:
+def test_preethams_and_overcast_zeniths_are_as_bright_as_published() -> None:
     """A.2: (4.0453 T - 4.9710) tan((4/9 - T/120) (pi - 2 theta)) - 0.2155 T + 2.4192, kcd/m^2.
 
     By hand for T = 3 and the sun at 40 degrees: 7.1649 tan(0.5856) + 1.7727 = 6.521.
@@ -182,33 +160,28 @@ def test_preethams_zenith_is_as_bright_as_published() -> None:
     model = SkyModel(0, 40.0, 3.0, model="preetham")
     top = luminance_cd_m2(model, 256)[0] @ LUMINANCE
     assert top.mean() == pytest.approx(6521.0, rel=0.02)
+    # CIE standard overcast sky; 45 degrees: (1 + 2 / sqrt 2) / 3.
+    d = np.array([[[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [math.sqrt(0.5), 0.0, math.sqrt(0.5)]]])
+    zenith, horizon, half = skies.overcast_sky(d)[0] @ LUMINANCE
+    assert zenith / horizon == pytest.approx(3.0)
+    assert half / zenith == pytest.approx((1 + math.sqrt(2)) / 3)
+    # The sun is in the direction of +X: the centre column.
+    luminance = luminance_cd_m2(SkyModel(0, 40.0), 128) @ LUMINANCE
+    row, column = np.unravel_index(np.argmax(luminance[:60]), (60, 256))
+    assert 90.0 - (row + 0.5) / 128 * 180.0 == pytest.approx(40.0, abs=3.0)
+    assert column in (127, 128)
 
 
 @pytest.mark.parametrize(
     ("given", "said"),
-    [
-        ({"cloudiness": 0.3}, "no clouds"),
-        ({"sun_altitude_deg": -5.0}, "no night"),
-        ({"turbidity": 9.0}, "turbidity"),
-    ],
-)
-def test_preethams_sky_is_clear_and_by_day(given: dict[str, float], said: str) -> None:
+    [({"cloudiness": 0.3}, "no clouds"), ({"sun_altitude_deg": -5.0}, "no night"),
+     ({"turbidity": 9.0}, "turbidity"),
+     ({"model": "hosek"}, "expected one of measured, preetham")],
+)  # fmt: skip
+def test_preethams_sky_is_clear_and_by_day(given: dict[str, Any], said: str) -> None:
+    """An unknown model is refused, too."""
     with pytest.raises(ValueError, match=said):
-        luminance_cd_m2(SkyModel(model="preetham", **given), 64)
-
-
-def test_an_unknown_model_of_the_sky_is_refused() -> None:
-    with pytest.raises(ValueError, match="expected one of measured, preetham"):
-        luminance_cd_m2(SkyModel(model="hosek"), 64)
-
-
-def test_overcast_zenith_is_three_times_the_horizon() -> None:
-    """CIE standard overcast sky; 45 degrees: (1 + 2 / sqrt 2) / 3."""
-    d = np.array([[[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [math.sqrt(0.5), 0.0, math.sqrt(0.5)]]])
-    zenith, horizon, half = overcast_sky(d)[0] @ LUMINANCE
-
-    assert zenith / horizon == pytest.approx(3.0)
-    assert half / zenith == pytest.approx((1 + math.sqrt(2)) / 3)
+        luminance_cd_m2(SkyModel(**{"model": "preetham", **given}), 64)
 
 
 @pytest.mark.parametrize("cloudiness", [0.0, 0.4, 1.0])
@@ -218,44 +191,25 @@ def test_image_gives_the_illuminance_of_the_formula(altitude_deg: float, cloudin
     model = SkyModel(3, altitude_deg, 2.5, cloudiness)
     image = luminance_cd_m2(model, 128)
     expected = daylight.sky_illuminance_lux(math.radians(altitude_deg), cloudiness)
-
     assert image.min() >= 0.0
     assert level_illuminance_lux(image) == pytest.approx(expected, rel=0.01)
 
 
-def test_mean_luminance_is_that_of_the_full_image() -> None:
+def test_mean_luminance_is_the_images_and_clouds_cover_more_when_cloudier() -> None:
     """A coarse image is enough to know how bright the sphere is."""
     model = SkyModel(5, 35.0, 3.0, 0.45)
     image = luminance_cd_m2(model, 512)
     weights = np.sin((np.arange(512) + 0.5) * math.pi / 512)
     mean = float(((image @ LUMINANCE).mean(axis=1) * weights).sum() / weights.sum())
-
-    assert mean_luminance_cd_m2(model) == pytest.approx(mean, rel=0.03)
-
-
-def test_brightest_part_of_a_clear_sky_is_around_the_sun() -> None:
-    """The sun is in the direction of +X: the centre column."""
-    luminance = luminance_cd_m2(SkyModel(0, 40.0), 128) @ LUMINANCE
-    row, column = np.unravel_index(np.argmax(luminance[:60]), (60, 256))
-
-    assert 90.0 - (row + 0.5) / 128 * 180.0 == pytest.approx(40.0, abs=3.0)
-    assert column in (127, 128)
-
-
-def test_clouds_cover_more_the_cloudier_it_is() -> None:
-    """Where there is no cloud the sky is blue: twice as much blue as red."""
+    assert skies.mean_luminance_cd_m2(model) == pytest.approx(mean, rel=0.03)
+    # Where there is no cloud the sky is blue: twice as much blue as red.
     blue = []
     for cloudiness in (0.0, 0.3, 0.6):
         upper = luminance_cd_m2(SkyModel(2, 50.0, 2.0, cloudiness), 128)[:45]
         blue.append(float((upper[..., 2] > 1.6 * upper[..., 0]).mean()))
-
     assert blue[0] > 0.8
     assert blue[0] > blue[1] + 0.1 > blue[2] + 0.2
-
-
-def test_same_arguments_make_the_same_bytes() -> None:
-    first, again, other = (sky(seed, 30.0, 2.5, 0.4, 0.18) for seed in (1, 1, 2))
-
+    first, again, other = (skies.sky(seed, 30.0, 2.5, 0.4, 0.18) for seed in (1, 1, 2))
     assert first.tobytes() == again.tobytes()
     assert first.tobytes() != other.tobytes()
     assert (first.shape, first.dtype) == ((512, 1024, 3), np.float32)
@@ -263,6 +217,5 @@ def test_same_arguments_make_the_same_bytes() -> None:
 
 def test_library_refuses_a_sky_that_cannot_be(tmp_path) -> None:  # noqa: ANN001
     library = open_library(cache_dir=tmp_path)
-
     with pytest.raises(AssetError, match=r"cloudiness is 2; expected a number in \[0, 1\]"):
         library.environment("environment/sky?cloudiness=2")

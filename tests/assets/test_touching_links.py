@@ -14,12 +14,10 @@ def test_a_shell_fixed_to_a_link_may_touch_the_next_link_wherever_it_is_listed()
         return Joint(name, kind, parent, child, SE3(), (0.0, 0.0, 1.0), -1.0, 1.0)  # type: ignore[arg-type]
 
     links = {name: Link(name, (), ()) for name in ("base", "upper", "fore", "hand", "shell")}
-    joints = (
-        joint("shoulder", "revolute", "base", "upper"),
-        joint("elbow", "revolute", "upper", "fore"),
-        joint("wrist", "revolute", "fore", "hand"),
-        joint("screws", "fixed", "upper", "shell"),
-    )
+    joints = (joint("shoulder", "revolute", "base", "upper"),
+              joint("elbow", "revolute", "upper", "fore"),
+              joint("wrist", "revolute", "fore", "hand"),
+              joint("screws", "fixed", "upper", "shell"))  # fmt: skip
     entry = RobotEntry(id="arm", file="arm.urdf")
 
     allowed = robot_model("arm", RobotDescription(links, joints), entry, "arm.urdf").no_collide

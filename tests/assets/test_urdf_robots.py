@@ -30,12 +30,29 @@ def link_poses(robot: RobotModel, positions: tuple[float, ...]) -> dict[str, SE3
     return poses
 
 
-def test_the_panda_reaches_where_its_maker_says(library: Library) -> None:
+def test_the_panda_has_the_joints_reach_and_colour_of_its_maker(library: Library) -> None:
     """At zero the flange is at (0.088, 0, 0.926) m and looks down (Franka, DH table)."""
     robot = library.robot("franka_panda")
     flange = link_poses(robot, (0.0,) * 9)["panda_link8"]
     assert flange.translation_m == pytest.approx((0.088, 0.0, 0.926), abs=1e-6)
     assert flange.rotate(np.array([0.0, 0.0, 1.0])) == pytest.approx([0.0, 0.0, -1.0], abs=1e-9)
+    # Order of the movable joints: arm from base to hand, then fingers.
+    names = [joint.name for joint in robot.movable]
+    assert names == [*(f"panda_joint{k}" for k in range(1, 8)),
+                     "panda_finger_joint1", "panda_finger_joint2"]  # fmt: skip
+    assert robot.movable[8].mimic == "panda_finger_joint1"
+    assert robot.home == pytest.approx(
+        (0, -math.pi / 4, 0, -3 * math.pi / 4, 0, math.pi / 2, math.pi / 4, 0.04, 0.04), abs=1e-6
+    )
+    assert robot.gripper is not None
+    assert robot.gripper.stroke_m == 0.08
+    # link0 and link7 are shown by untextured collision meshes; nothing is whiter than snow.
+    for link in ("panda_link0", "panda_link1", "panda_link7"):
+        (material,) = library.materials(f"franka_panda/{link}")
+        assert material.base_color == (0.85, 0.85, 0.85)
+        assert not material.texture
+    forearm = [m.base_color for m in library.materials("franka_panda/panda_link5")]
+    assert min(max(color) for color in forearm) < 0.1
 
 
 @pytest.mark.slow
@@ -69,20 +86,6 @@ def test_tools_point_out_of_the_flange_and_close_at_the_grasp(library: Library, 
         assert np.abs(points[:, 1]).min() == pytest.approx(0.0, abs=1e-6)
 
 
-def test_the_panda_has_seven_joints_and_two_fingers(library: Library) -> None:
-    """Order of the movable joints: arm from base to hand, then fingers."""
-    robot = library.robot("franka_panda")
-    names = [joint.name for joint in robot.movable]
-    assert names == [*(f"panda_joint{k}" for k in range(1, 8)),
-                     "panda_finger_joint1", "panda_finger_joint2"]  # fmt: skip
-    assert robot.movable[8].mimic == "panda_finger_joint1"
-    assert robot.home == pytest.approx(
-        (0, -math.pi / 4, 0, -3 * math.pi / 4, 0, math.pi / 2, math.pi / 4, 0.04, 0.04), abs=1e-6
-    )
-    assert robot.gripper is not None
-    assert robot.gripper.stroke_m == 0.08
-
-
 @pytest.mark.slow
 def test_the_grasp_frame_lies_between_the_finger_tips(library: Library) -> None:
     """Fully open, the tips are 0.08 m apart along the grasp frame's Y, at its height."""
@@ -102,7 +105,7 @@ def test_the_grasp_frame_lies_between_the_finger_tips(library: Library) -> None:
 
 
 @pytest.mark.parametrize("name", ROBOTS)
-def test_links_come_root_first_and_home_is_within_limits(library: Library, name: str) -> None:
+def test_links_come_root_first_collide_and_may_touch_others(library: Library, name: str) -> None:
     """Each link after its parent; one home position per movable joint."""
     robot = library.robot(name)
     assert [j.child for j in robot.joints] == list(robot.links[1:])
@@ -112,22 +115,12 @@ def test_links_come_root_first_and_home_is_within_limits(library: Library, name:
         seen.add(joint.child)
     for joint, position in zip(robot.movable, robot.home, strict=True):
         assert joint.lower <= position <= joint.upper
-
-
-@pytest.mark.parametrize("name", ROBOTS)
-def test_neighbours_may_touch_and_distant_links_may_not(library: Library, name: str) -> None:
-    """Pairs that a joint connects are allowed, base and last link are not."""
-    robot = library.robot(name)
+    # Pairs that a joint connects are allowed, base and last link are not.
     for joint in robot.joints:
         assert (joint.parent, joint.child) in robot.no_collide
     solid = list(robot.collisions)
     assert (solid[0], solid[-1]) not in robot.no_collide
-
-
-@pytest.mark.parametrize("name", ROBOTS)
-def test_every_link_is_small_enough_and_collides(library: Library, name: str) -> None:
-    """At most 35,000 triangles for a robot, and hulls close to what is seen."""
-    robot = library.robot(name)
+    # At most 35,000 triangles for a robot, and hulls close to what is seen.
     total = 0
     for link, asset_id in robot.visuals.items():
         mesh = library.mesh(asset_id)
@@ -137,16 +130,6 @@ def test_every_link_is_small_enough_and_collides(library: Library, name: str) ->
         assert hull.min(axis=0) == pytest.approx(low, abs=0.02)
         assert hull.max(axis=0) == pytest.approx(high, abs=0.02)
     assert 5_000 < total < 35_000
-
-
-def test_the_pandas_base_is_white_plastic_like_its_arm(library: Library) -> None:
-    """link0 and link7 are shown by untextured collision meshes; nothing is whiter than snow."""
-    for link in ("panda_link0", "panda_link1", "panda_link7"):
-        (material,) = library.materials(f"franka_panda/{link}")
-        assert material.base_color == (0.85, 0.85, 0.85)
-        assert not material.texture
-    forearm = [m.base_color for m in library.materials("franka_panda/panda_link5")]
-    assert min(max(color) for color in forearm) < 0.1
 
 
 def test_links_can_be_asked_for_by_id(library: Library) -> None:

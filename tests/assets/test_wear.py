@@ -97,30 +97,16 @@ def test_ink_is_rubbed_off_at_convex_edges_of_the_mesh(variant: tuple[str, int])
     away = distances_m(points, convex_edges_m(mesh))
     changed = sample(change(PRINTS[family], seed), uvs)
     below = normals[:, 2] < 0.5
-
     assert changed[below & (away < 0.0015)].mean() > 1.6 * changed[below & (away > 0.012)].mean()
 
 
 @pytest.mark.slow
-def test_new_prints_are_as_they_were_printed() -> None:
+def test_new_prints_are_as_printed_and_dust_of_boxes_lies_on_upper_faces() -> None:
     """Those of the least wear, off the face that dust falls on."""
     for name in ("label", "front_label", "can_label"):
         newest = min(range(48), key=lambda seed: draw_wear(name, seed))
-
         assert change(name, newest).mean() < 1.5, name
-
-
-@pytest.mark.slow
-def test_dust_follows_the_cosine_of_the_slope() -> None:
-    """All of it on level ground, half at 60 degrees, none on walls and from below."""
-    upward = np.cos(np.radians([0.0, 60.0, 90.0, 180.0])).astype(np.float32)
-
-    assert dust_share(upward, 0.4) == pytest.approx([0.4, 0.2, 0.0, 0.0], abs=1e-6)
-
-
-@pytest.mark.slow
-def test_dust_of_new_boxes_lies_on_their_upper_faces() -> None:
-    """By the mesh's normals: what is not used yet changes there only."""
+    # By the mesh's normals: what is not used yet changes there only.
     above, beside = [], []
     for seed in (s for s in range(48) if draw_wear("carton", s) < 0.05):
         mesh = FAMILIES["carton"].build(seed=seed).mesh
@@ -128,19 +114,38 @@ def test_dust_of_new_boxes_lies_on_their_upper_faces() -> None:
         changed = sample(change("carton", seed), uvs)
         above.append(changed[normals[:, 2] > 0.99].mean())
         beside.append(changed[normals[:, 2] < 0.99].mean())
-
     assert max(beside) < 1.5
     assert max(above) > 10.0 * max(beside)
     assert np.mean(above) > 3.0 * np.mean(beside)
 
 
 @pytest.mark.slow
+def test_dust_follows_the_cosine_of_the_slope_films_cover_and_tide_lines_are_level() -> None:
+    """All of it on level ground, half at 60 degrees, none on walls and from below."""
+    upward = np.cos(np.radians([0.0, 60.0, 90.0, 180.0])).astype(np.float32)
+    assert dust_share(upward, 0.4) == pytest.approx([0.4, 0.2, 0.0, 0.0], abs=1e-6)
+    # A full film hides all below it; half a film is the mean of both.
+    grey = np.full((2, 2, 3), 100, np.uint8)
+    full, half = np.full((2, 2), 255, np.uint8), np.full((2, 2), 128, np.uint8)
+    films = [Film(full, (1.0, 0.0, 0.0)), Film(half, (0.0, 0.0, 1.0))]
+    assert lay_films(grey, films)[0, 0].tolist() == pytest.approx([127, 0, 128], abs=1)
+    assert (lay_films(grey, [Film(0 * full, (1.0, 1.0, 1.0))]) == 100).all()
+    # The image varies more from row to row than along rows.
+    rows = TEXTURES["use_marks"].build(11, kind="vessel").albedo[:200, :, 2].astype(np.float64)
+    assert rows.mean(axis=1).std() > 2.0 * rows.std(axis=1).mean()
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LABELS)
-def test_most_labels_stay_legible(name: str) -> None:
+def test_most_labels_stay_legible_and_worn_places_are_duller(name: str) -> None:
     """On nine of ten variants at most a tenth of all pixels changes by more than a quarter."""
     hidden = [(change(name, seed) > 64).mean() for seed in range(0, TEXTURES[name].variants, 4)]
-
     assert np.quantile(hidden, 0.9) < 0.1
+    # The roughness factor is 1 where it is dullest, less elsewhere on used things.
+    used = max(range(TEXTURES[name].variants), key=lambda seed: draw_wear(name, seed))
+    rough = worn(name, used).roughness
+    assert rough is not None
+    assert rough.max() > 250 and rough.min() < 180
 
 
 @pytest.mark.slow
@@ -158,22 +163,10 @@ def test_pieces_of_some_labels_are_torn_off(name: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", LABELS)
-def test_worn_places_are_duller_and_the_others_as_new(name: str) -> None:
-    """The roughness factor is 1 where it is dullest, less elsewhere on used things."""
-    used = max(range(TEXTURES[name].variants), key=lambda seed: draw_wear(name, seed))
-    rough = worn(name, used).roughness
-
-    assert rough is not None
-    assert rough.max() > 250 and rough.min() < 180
-
-
-@pytest.mark.slow
 @for_every(VARIANTS)
 def test_marks_change_the_look_of_plain_slots_alone(variant: tuple[str, int]) -> None:
     """Shape, prints, glass, contents and lamps are as new; nothing gets smoother."""
     new, used = new_and_worn(*variant)
-
     assert np.array_equal(new.uvs, used.uvs)
     for before, after in zip(new.materials, used.materials, strict=True):
         assert after.base_color == before.base_color
@@ -200,25 +193,5 @@ def test_every_family_of_things_to_handle_has_new_and_marked_variants() -> None:
 def test_marks_grow_with_use(kind: str) -> None:
     light, heavy = (TEXTURES["use_marks"].build(step, kind=kind) for step in (2, 11))
     assert light.roughness is not None and heavy.roughness is not None
-
     assert heavy.albedo.mean() < light.albedo.mean()
     assert np.ptp(heavy.roughness) > np.ptp(light.roughness)
-
-
-@pytest.mark.slow
-def test_tide_lines_run_around_a_cup_at_one_height() -> None:
-    """The image varies more from row to row than along rows."""
-    rows = TEXTURES["use_marks"].build(11, kind="vessel").albedo[:200, :, 2].astype(np.float64)
-
-    assert rows.mean(axis=1).std() > 2.0 * rows.std(axis=1).mean()
-
-
-@pytest.mark.slow
-def test_films_cover_in_order() -> None:
-    """A full film hides all below it; half a film is the mean of both."""
-    grey = np.full((2, 2, 3), 100, np.uint8)
-    full, half = np.full((2, 2), 255, np.uint8), np.full((2, 2), 128, np.uint8)
-    films = [Film(full, (1.0, 0.0, 0.0)), Film(half, (0.0, 0.0, 1.0))]
-
-    assert lay_films(grey, films)[0, 0].tolist() == pytest.approx([127, 0, 128], abs=1)
-    assert (lay_films(grey, [Film(0 * full, (1.0, 1.0, 1.0))]) == 100).all()
