@@ -20,15 +20,9 @@ from gen_data.runner.run import Settings
 from gen_data.runner.shard_record import SplitCount
 from tests.runner.doubles import FakePipeline, Trouble, fake_plan, make
 
-PUBLICATION = Publication(
-    title="Mugs",
-    description="Mugs and bowls.",
-    license="CC-BY-4.0",
-    creators=("A. Author",),
-    date_published="2026-01-31",
-    cite_as="@misc{mugs}",
-    version="2.1.0",
-)
+PUBLICATION = Publication(title="Mugs", description="Mugs and bowls.", license="CC-BY-4.0",
+                          creators=("A. Author",), date_published="2026-01-31",
+                          cite_as="@misc{mugs}", version="2.1.0")  # fmt: skip
 LICENCES = "# Assets\n\n| source | licence | author | assets |\n|---|---|---|---|\n"
 LICENCES += "| here | MIT | me | mug |\n| there | CC0-1.0 | you | bowl |\n"
 
@@ -40,10 +34,9 @@ def facts(publication: Publication = PUBLICATION) -> DatasetFacts:
     return DatasetFacts(fake_plan(), info, counts, 5, ("coco",), LICENCES)
 
 
-def test_the_card_counts_and_states_the_publication() -> None:
+def test_the_card_counts_and_states_the_publication_or_licences_of_assets() -> None:
     """Splits, categories, sensors, licences and citation."""
     card = data_card(facts())
-
     assert card.startswith("# Mugs\n\nMugs and bowls.\n")
     for line in (
         "10 samples of 5 scenes: 2 views per scene, one instant per view.",
@@ -57,6 +50,14 @@ def test_the_card_counts_and_states_the_publication() -> None:
         "@misc{mugs}",
     ):
         assert line in card
+    bare = facts(Publication())
+    assert "The publisher has stated no licence of its own." in data_card(bare)
+    assert "## Publication" not in data_card(bare)
+    metadata = json.loads(croissant_json(bare))
+    assert (metadata["license"], metadata["name"]) == (["CC0-1.0", "MIT"], "fake")
+    few = facts()
+    many = replace(few, plan=replace(few.plan, n=90), info=replace(few.info, n=90))
+    assert len(croissant_json(many)) == len(croissant_json(few))
 
 
 def test_texts_of_users_are_no_html_in_the_card_and_the_table_of_licences() -> None:
@@ -68,13 +69,14 @@ def test_texts_of_users_are_no_html_in_the_card_and_the_table_of_licences() -> N
         PUBLICATION, title=tag, description=tag, license=tag, creators=(tag,), cite_as="```" + tag
     )
     card = data_card(replace(facts(named), asset_licences=table))
-
     assert licences_in(table) == [f"{tag}|A"]
     assert len(table.splitlines()) == 5
     assert tag not in table
     before, quoted, after = card.partition("```\n" + tag + "\n```")
     assert quoted
     assert tag not in before + after
+    assert licences_in("# Assets\n\nnone\n") == []
+    assert licences_in(LICENCES.rpartition("|---")[0]) == []
 
 
 @pytest.mark.parametrize(
@@ -94,32 +96,9 @@ def test_a_card_states_what_has_no_labels(labels: dict[str, Any] | None, words: 
     """The configuration's limits, or the default ones."""
     given = {} if labels is None else {"labels": labels}
     plan = replace(fake_plan(), config={**fake_plan().config, **given})
-
     card = data_card(replace(facts(), plan=plan))
-
     for sentence in words:
         assert sentence in card
-
-
-def test_without_a_publication_only_licences_of_assets_are_stated() -> None:
-    bare = facts(Publication())
-
-    assert "The publisher has stated no licence of its own." in data_card(bare)
-    assert "## Publication" not in data_card(bare)
-    metadata = json.loads(croissant_json(bare))
-    assert (metadata["license"], metadata["name"]) == (["CC0-1.0", "MIT"], "fake")
-
-
-def test_texts_without_a_table_have_no_licences() -> None:
-    assert licences_in("# Assets\n\nnone\n") == []
-    assert licences_in(LICENCES.rpartition("|---")[0]) == []
-
-
-def test_size_does_not_depend_on_the_number_of_samples() -> None:
-    few = facts()
-    many = replace(few, plan=replace(few.plan, n=90), info=replace(few.info, n=90))
-
-    assert len(croissant_json(many)) == len(croissant_json(few))
 
 
 @pytest.fixture(scope="module")
@@ -186,17 +165,14 @@ def edit(path: Path, old: str, new: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "damage",
-    [
-        lambda d: edit(d / "croissant.json", '"column": "split"', '"column": "half"'),
-        lambda d: edit(d / "croissant.json", "shards/*/color/rgb", "shards/*/colour/rgb"),
-        lambda d: edit(d / "croissant.json", '"jsonPath": "category"', '"jsonPath": "name"'),
-        lambda d: (d / "shards/000001/color/rgb/000000005.png").unlink(),
-    ],
+    [lambda d: edit(d / "croissant.json", '"column": "split"', '"column": "half"'),
+     lambda d: edit(d / "croissant.json", "shards/*/color/rgb", "shards/*/colour/rgb"),
+     lambda d: edit(d / "croissant.json", '"jsonPath": "category"', '"jsonPath": "name"'),
+     lambda d: (d / "shards/000001/color/rgb/000000005.png").unlink()],
     ids=["no such column", "no such folder", "another key", "image missing"],
-)
+)  # fmt: skip
 def test_damage_is_found(damage: Callable[[Path], Any], dataset: Path, tmp_path: Path) -> None:
     copy = tmp_path / "copy"
     shutil.copytree(dataset, copy)
     damage(copy)
-
     assert faults(copy)

@@ -32,14 +32,10 @@ def png(shape: tuple[int, ...], dtype: type[np.generic], value: int = 1) -> byte
 @pytest.mark.parametrize("channel", [Channel.RGB, Channel.Z_DEPTH, Channel.INSTANCE])
 @pytest.mark.parametrize(
     ("shape", "dtype"),
-    [
-        ((HEIGHT_PX * 2, WIDTH_PX * 2), np.uint16),
-        ((HEIGHT_PX * 2, WIDTH_PX * 2, 3), np.uint8),
-        ((WIDTH_PX, HEIGHT_PX, 3), np.uint8),
-        ((HEIGHT_PX, WIDTH_PX), np.uint8),
-        ((HEIGHT_PX, WIDTH_PX, 3), np.uint16),
-    ],
-)
+    [((HEIGHT_PX * 2, WIDTH_PX * 2), np.uint16), ((HEIGHT_PX * 2, WIDTH_PX * 2, 3), np.uint8),
+     ((WIDTH_PX, HEIGHT_PX, 3), np.uint8), ((HEIGHT_PX, WIDTH_PX), np.uint8),
+     ((HEIGHT_PX, WIDTH_PX, 3), np.uint16)],
+)  # fmt: skip
 def test_images_of_another_kind_or_size_are_refused(
     folder: Path, channel: Channel, shape: tuple[int, ...], dtype: type[np.generic]
 ) -> None:
@@ -57,12 +53,10 @@ def test_images_of_another_kind_or_size_are_refused(
 
 @pytest.mark.parametrize(
     ("points", "fact"),
-    [
-        (np.zeros(3, np.float32), "expected a list of"),
-        (np.zeros((2, 2), POINT), "records \\[2, 2\\]"),
-        (np.full(2, np.nan, np.float32).astype([("position_m", "<f4")]), "expected a list of"),
-    ],
-)
+    [(np.zeros(3, np.float32), "expected a list of"),
+     (np.zeros((2, 2), POINT), "records \\[2, 2\\]"),
+     (np.full(2, np.nan, np.float32).astype([("position_m", "<f4")]), "expected a list of")],
+)  # fmt: skip
 def test_points_of_another_kind_are_refused(
     folder: Path, points: np.ndarray[tuple[int, ...], np.dtype[np.generic]], fact: str
 ) -> None:

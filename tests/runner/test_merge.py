@@ -26,7 +26,7 @@ def gather(parts: list[Path], out: Path, allow_mixed_numerics: bool = False) -> 
     gather_shards(common_plan(parts), parts, LocalStore(out), allow_mixed_numerics)
 
 
-def test_a_part_holds_its_shards_and_is_no_data_set(tmp_path: Path) -> None:
+def test_a_part_holds_its_shards_and_is_no_data_set_and_ranges_are_checked(tmp_path: Path) -> None:
     """Its summary says what is left; the same command later changes nothing."""
     settings = Settings(shards=range(4, 6), write_media=write_raw_images)
     for made in (3, 0):
@@ -39,6 +39,11 @@ def test_a_part_holds_its_shards_and_is_no_data_set(tmp_path: Path) -> None:
     assert {p.name for p in (tmp_path / "out/shards").iterdir()} == {
         "000004", "000004.json", "000005", "000005.json",
     }  # fmt: skip
+    # The end may lie beyond the last shard, as in the last task of an array job.
+    assert check_shards((4, 50), 6) == range(4, 6)
+    for shards in ((6, 8), (3, 3), (4, 2), (-1, 2)):
+        with pytest.raises(ConfigError, match=r"none of the 6 shards; expected FIRST:END"):
+            check_shards(shards, 6)
 
 
 def test_the_last_missing_part_finishes_the_data_set(tmp_path: Path) -> None:
@@ -55,14 +60,10 @@ def test_the_last_missing_part_finishes_the_data_set(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     "ranges",
-    [
-        [range(3), range(3, 6)],
-        [range(4, 6), range(2), range(2, 4)],
-        [range(4), range(2, 6)],
-        [range(1, 3)],
-    ],
+    [[range(3), range(3, 6)], [range(4, 6), range(2), range(2, 4)], [range(4), range(2, 6)],
+     [range(1, 3)]],
     ids=["two", "in any order", "overlapping", "with a gap"],
-)
+)  # fmt: skip
 def test_merged_parts_equal_one_run(tmp_path: Path, ranges: list[range]) -> None:
     """Byte for byte; what no part has is generated, and the parts stay."""
     parts = [make_part(tmp_path / f"part-{k}", shards) for k, shards in enumerate(ranges)]
@@ -70,7 +71,6 @@ def test_merged_parts_equal_one_run(tmp_path: Path, ranges: list[range]) -> None
     gather(parts, tmp_path / "out")
     made = make(tmp_path / "out", N, SHARD_SIZE).made
     make(tmp_path / "whole", N, SHARD_SIZE)
-
     assert tree_digest(tmp_path / "out") == tree_digest(tmp_path / "whole")
     assert find_deviations(tmp_path / "out", full=True) == []
     assert [tree_digest(part) for part in parts] == before
@@ -78,12 +78,20 @@ def test_merged_parts_equal_one_run(tmp_path: Path, ranges: list[range]) -> None
     assert made == sum(1 for i in range(N) if i // SHARD_SIZE not in present)
 
 
-def test_merging_again_after_a_crash_goes_on(tmp_path: Path) -> None:
+def test_merging_again_goes_on_and_a_shard_with_a_missing_file_is_missing(tmp_path: Path) -> None:
     """Shards that are there already are compared and kept."""
     parts = [make_part(tmp_path / "a", range(3)), make_part(tmp_path / "b", range(3, 6))]
     gather(parts[:1], tmp_path / "out")
     gather(parts, tmp_path / "out")
     assert make(tmp_path / "out", N, SHARD_SIZE).made == 0
+    # It is generated, and the parts stay as they are.
+    part = make_part(tmp_path / "part", range(2))
+    lost = next((part / "shards/000001").rglob("*.png"))
+    lost.unlink()
+    gather([part], tmp_path / "lacking")
+    assert LocalStore(tmp_path / "lacking").record(0) is not None
+    assert LocalStore(tmp_path / "lacking").record(1) is None
+    assert (part / "shards/000001.json").exists()
 
 
 def test_damage_in_a_part_is_not_sealed(tmp_path: Path) -> None:
@@ -129,24 +137,3 @@ def test_machines_that_compute_differently_do_not_mix(tmp_path: Path) -> None:
     gather(parts, tmp_path / "out", allow_mixed_numerics=True)
     lines = (tmp_path / "out/run" / NUMERICS_NAME).read_text().splitlines()
     assert len(lines) == 2
-
-
-def test_ranges_are_checked() -> None:
-    """The end may lie beyond the last shard, as in the last task of an array job."""
-    assert check_shards((4, 50), 6) == range(4, 6)
-    for shards in ((6, 8), (3, 3), (4, 2), (-1, 2)):
-        with pytest.raises(ConfigError, match=r"none of the 6 shards; expected FIRST:END"):
-            check_shards(shards, 6)
-
-
-def test_a_shard_with_a_missing_file_counts_as_missing(tmp_path: Path) -> None:
-    """It is generated, and the parts stay as they are."""
-    part = make_part(tmp_path / "part", range(2))
-    lost = next((part / "shards/000001").rglob("*.png"))
-    lost.unlink()
-
-    gather([part], tmp_path / "out")
-
-    assert LocalStore(tmp_path / "out").record(0) is not None
-    assert LocalStore(tmp_path / "out").record(1) is None
-    assert (part / "shards/000001.json").exists()

@@ -32,22 +32,16 @@ def make_job(out: Path, allow: bool = False) -> Job:
     return Job(fake_plan(), store, FakeFactory(10), allow_mixed_numerics=allow)
 
 
-def test_a_machine_that_computes_differently_is_refused_by_name(tmp_path: Path) -> None:
+def test_a_machine_that_computes_differently_is_refused_by_name_or_recorded(tmp_path: Path) -> None:
     """The message names what differs and the way out; equal machines are admitted."""
     job = make_job(tmp_path / "out")
     admit_numerics(job, Machine("cpu"))
     admit_numerics(job, Machine("cpu"))
-
     with pytest.raises(NumericsError, match=r"(?s)\(render\): processor was .*--allow-mixed"):
         admit_numerics(job, Machine("gpu"))
-
-
-def test_an_accepted_mixture_is_recorded(tmp_path: Path) -> None:
-    """Once accepted, the second kind of machine is known."""
-    admit_numerics(make_job(tmp_path / "out"), Machine("cpu"))
+    # Once accepted, the second kind of machine is known.
     admit_numerics(make_job(tmp_path / "out", allow=True), Machine("gpu"))
     admit_numerics(make_job(tmp_path / "out"), Machine("gpu"))
-
     lines = (tmp_path / "out/run/numerics.json").read_text().splitlines()
     assert [json.loads(line)["digests"]["render"] for line in lines] == ["cpu", "gpu"]
 
@@ -57,10 +51,8 @@ def test_the_run_goes_on_without_a_worker_that_computes_differently() -> None:
     supervisor = Supervisor(range(4), lambda s: range(s, s + 1), 2, str)
     supervisor.start(0.0)
     error = NumericsError("this machine computes differently")
-
     supervisor.handle(Ready(0), 0.0)
     actions = supervisor.handle(Failed(1, error), 0.0)
-
     assert [type(action) for action in actions] == [Note]
     assert "takes no work" in actions[0].text  # type: ignore[union-attr]
     assert supervisor.error is None

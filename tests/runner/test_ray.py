@@ -37,13 +37,10 @@ def make(out: Path, trouble: doubles.Trouble, workers: int = 0) -> Summary:
     """A data set, made in this process or by workers on the cluster."""
     cluster = RayCluster(cpus=1.0)
     return run(
-        replace(doubles.fake_plan(N, SHARD_SIZE), versions={}),
-        doubles.FakeFactory(N, trouble),
-        out,
-        workers=workers,
-        resume_command="",
+        replace(doubles.fake_plan(N, SHARD_SIZE), versions={}), doubles.FakeFactory(N, trouble),
+        out, workers=workers, resume_command="",
         settings=Settings(write_media=doubles.write_raw_images, open_pool=cluster.open_pool),
-    )
+    )  # fmt: skip
 
 
 def after_shards(out: Path, count: int, act: Callable[[], None]) -> threading.Thread:
@@ -70,12 +67,10 @@ def test_lost_machines_and_workers_change_no_byte(tmp_path: Path, cluster: Any) 
     make(tmp_path / "here", doubles.Trouble())
     out = tmp_path / "ray"
     trouble = doubles.Trouble(delay_s=0.15, killed_once_at=31, marker=str(tmp_path / "marker"))
-
     interrupting = after_shards(out, 3, lambda: os.kill(os.getpid(), signal.SIGINT))
     with pytest.raises(Interrupted):
         make(out, trouble, workers=3)
     interrupting.join()
-
     losing = after_shards(out, 8, lambda: cluster.remove_node(lost, allow_graceful=False))
     summary = make(out, trouble, workers=3)
     losing.join()

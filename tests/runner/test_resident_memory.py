@@ -27,9 +27,7 @@ def test_pages_of_files_are_returned_and_come_back(tmp_path: Path) -> None:
         seen = np.frombuffer(mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ), np.uint32)
     np.testing.assert_array_equal(seen, pattern())
     before = resident_file_bytes()
-
     release_memory(file_bytes_kept=0)
-
     assert resident_file_bytes() < before - SIZE // 2
     np.testing.assert_array_equal(seen, pattern())
 
@@ -42,9 +40,7 @@ def test_fewer_pages_than_are_kept_stay(tmp_path: Path) -> None:
         mapped = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
     assert sum(mapped[::4096]) == 0
     before = resident_file_bytes()
-
     release_memory(file_bytes_kept=before + SIZE)
-
     assert resident_file_bytes() > before - SIZE // 2
 
 
@@ -61,9 +57,7 @@ def test_modified_pages_that_became_read_only_are_kept(tmp_path: Path) -> None:
         ctypes.c_void_p(values.ctypes.data), ctypes.c_size_t(SIZE), mmap.PROT_READ
     )
     assert protected == 0, ctypes.get_errno()
-
     release_memory(file_bytes_kept=0)
-
     np.testing.assert_array_equal(values, pattern())
 
 
@@ -109,7 +103,6 @@ def test_the_heap_is_trimmed_once_it_has_grown_by_the_threshold() -> None:
         [sys.executable, "-c", FILL_AND_TRIM], capture_output=True, text=True, check=True
     )
     kept, grown, trimmed = map(float, done.stdout.split())
-
     assert kept == pytest.approx(0.5, abs=0.1)
     assert grown > 1.9
     assert trimmed < 0.1

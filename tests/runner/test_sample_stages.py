@@ -77,22 +77,18 @@ def occluded_object(sample: Sample) -> Sample:
 
 @pytest.mark.parametrize(
     ("change", "stage", "text"),
-    [
-        (brighter_sun, "scene", r"scene\.lights\[0\]\.illuminance_lux: was [\d.]+, now 1\.0"),
-        (nearer_pixel, "geometry", r"color/depth/000000003\.png: 1 of 48 pixels differ, by 1000"),
-        (redder_pixel, "render", r"color/rgb/000000003\.png: 1 of 48 pixels differ, by 1 at most"),
-        (occluded_object, "labels", r"truth\.color\.objects\[0\]\.occlusion"),
-    ],
-)
+    [(brighter_sun, "scene", r"scene\.lights\[0\]\.illuminance_lux: was [\d.]+, now 1\.0"),
+     (nearer_pixel, "geometry", r"color/depth/000000003\.png: 1 of 48 pixels differ, by 1000"),
+     (redder_pixel, "render", r"color/rgb/000000003\.png: 1 of 48 pixels differ, by 1 at most"),
+     (occluded_object, "labels", r"truth\.color\.objects\[0\]\.occlusion")],
+)  # fmt: skip
 def test_the_first_differing_stage_is_named(
     tmp_path: Path, change: Callable[[Sample], Sample], stage: str, text: str
 ) -> None:
     """With the field or file, in both the comparison and the digests."""
     one = write(make_sample(), tmp_path / "one")
     other = write(change(make_sample()), tmp_path / "other")
-
     found = compare_samples(one, other)
-
     assert found is not None
     assert (found.index, found.stage) == (INDEX, stage)
     assert re.search(text, found.text), found.text
@@ -105,10 +101,8 @@ def test_other_bytes_for_the_same_pixels_are_a_matter_of_the_encoder(tmp_path: P
     one = write(make_sample(), tmp_path / "one")
     other = write(make_sample(), tmp_path / "other")
     assert compare_samples(one, other) is None
-
     path = tmp_path / "other/color/rgb/000000003.png"
     cv2.imwrite(str(path), cv2.imread(str(path)), [cv2.IMWRITE_PNG_COMPRESSION, 9])
-
     found = compare_samples(one, other)
     assert found is not None
     assert found.stage == "encode"
@@ -123,7 +117,6 @@ def test_data_sets_are_compared_by_plan_sample_and_export(tmp_path: Path) -> Non
     result = compare(tmp_path / "one", tmp_path / "two", semantic=True)
     assert result.equal
     assert result.plan == ("shard_size: was 4, now 3",)
-
     path = tmp_path / "two/shards/000002/labels.jsonl"
     lines = [json.loads(line) for line in path.read_text().splitlines()]
     lines[1]["truth"]["color"]["objects"][0]["visible_px"] += 1

@@ -15,7 +15,6 @@ SEEDS = range(300)
 def test_every_run_ends_with_all_its_shards_or_an_error() -> None:
     """300 of the seeds of ``python -m tests.runner.simulation``; all kinds of ends occur."""
     ends = {type(Run(seed).execute()) for seed in SEEDS}
-
     assert ends == {type(None), WorkerLost, StorageError, Interrupted}
 
 
@@ -53,13 +52,10 @@ class TriesForEver(Supervisor):
 
 @pytest.mark.parametrize(
     ("mutant", "fault"),
-    [
-        (WaitsForStarts, "never ends"),
-        (ForgetsShards, "missing silently"),
-        (StartsForEver, "endless starting|never ends"),
-        (TriesForEver, "more attempts|endless starting"),
-    ],
-)
+    [(WaitsForStarts, "never ends"), (ForgetsShards, "missing silently"),
+     (StartsForEver, "endless starting|never ends"),
+     (TriesForEver, "more attempts|endless starting")],
+)  # fmt: skip
 def test_a_planted_fault_is_found(mutant: type[Supervisor], fault: str) -> None:
     """Each within 300 seeds; otherwise the simulation would prove nothing."""
 

@@ -68,13 +68,9 @@ CLEANS_UP_FOR_LONG = """
 
 def start(body: str, folder: Path) -> subprocess.Popen[str]:
     marker = folder / "begun"
-    process = subprocess.Popen(
-        [sys.executable, "-c", START.format(body=body), str(marker)],
-        cwd=ROOT,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+    command = [sys.executable, "-c", START.format(body=body), str(marker)]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    process = subprocess.Popen(command, cwd=ROOT, text=True, **pipes)
     wait_for(marker.exists)
     return process
 
@@ -83,31 +79,23 @@ def start(body: str, folder: Path) -> subprocess.Popen[str]:
 def test_a_signal_lets_a_command_clean_up(tmp_path: Path, number: signal.Signals) -> None:
     """Exit code 130, one line, and what the command does at its end is done."""
     process = start(SLEEPS, tmp_path)
-
     process.send_signal(number)
-
     printed, message = process.communicate(timeout=HANG_S)
     assert (process.returncode, printed) == (130, "cleaned up\n")
     assert message.strip() == "gen-data: interrupted"
 
 
-@pytest.mark.parametrize("body", [SWALLOWS, COMPUTES], ids=["swallowed", "native code"])
-def test_a_signal_without_effect_ends_the_process_all_the_same(tmp_path: Path, body: str) -> None:
+@pytest.mark.parametrize(
+    ("body", "number"),
+    [(SWALLOWS, signal.SIGTERM), (COMPUTES, signal.SIGTERM), (TRANSLATES, signal.SIGINT)],
+    ids=["swallowed", "native code", "an interrupted import, which is an ImportError"],
+)
+def test_a_signal_without_effect_ends_the_process_all_the_same(
+    tmp_path: Path, body: str, number: signal.Signals
+) -> None:
     """Code that drops KeyboardInterrupt, or computes for hours, is ended after the patience."""
     process = start(body, tmp_path)
-
-    process.terminate()
-
-    message = process.communicate(timeout=HANG_S)[1]
-    assert (process.returncode, message.strip()) == (130, "gen-data: interrupted")
-
-
-def test_an_error_that_an_interruption_caused_is_no_traceback(tmp_path: Path) -> None:
-    """Libraries report an interrupted import as ImportError."""
-    process = start(TRANSLATES, tmp_path)
-
-    process.send_signal(signal.SIGINT)
-
+    process.send_signal(number)
     message = process.communicate(timeout=HANG_S)[1]
     assert (process.returncode, message.strip()) == (130, "gen-data: interrupted")
 
@@ -118,9 +106,7 @@ def test_an_error_that_an_interruption_caused_is_no_traceback(tmp_path: Path) ->
 def test_lack_of_memory_is_one_line(tmp_path: Path, error: str) -> None:
     """Under ``ulimit -v``, libraries cannot even be loaded; a traceback tells nothing."""
     process = start(f"\n    begun()\n    raise {error}\n", tmp_path)
-
     message = process.communicate(timeout=HANG_S)[1]
-
     assert process.returncode == 6
     assert message.startswith("gen-data: out of memory: the system refused more memory")
     assert len(message.splitlines()) == 1
@@ -132,9 +118,7 @@ def test_the_second_ctrl_c_is_immediate(tmp_path: Path) -> None:
     process.send_signal(signal.SIGINT)
     wait_for((tmp_path / "begun-cleaning").exists)
     time.sleep(0.2)
-
     process.send_signal(signal.SIGINT)
-
     message = process.communicate(timeout=HANG_S)[1]
     assert process.returncode == 130
     assert message.strip() == "gen-data: interrupted twice, stopped at once"

@@ -58,63 +58,48 @@ def finish(process: subprocess.Popen[str]) -> str:
 
 
 @pytest.mark.slow
-def test_a_worker_killed_at_birth_is_replaced_however_large_the_job_is(tmp_path: Path) -> None:
-    """A job three times as large as a pipe, and nobody there to read it: the run goes on."""
-    environment = with_action_at_birth(tmp_path, "os.kill(os.getpid(), signal.SIGKILL)")
-
-    process = start_fake_run(tmp_path / "out", 1, 0.0, 3 * PIPE_BYTES, environment=environment)
+@pytest.mark.parametrize(
+    ("action", "ballast_bytes", "note", "log"),
+    [("os.kill(os.getpid(), signal.SIGKILL)", 3 * PIPE_BYTES,
+      "killed by signal 9 (SIGKILL); out of memory? while starting", ""),
+     ("sys.modules['gen_data.runner'] = None", 0, "exited with status 1 while starting",
+      "ModuleNotFoundError")],
+    ids=["killed while nobody reads a job three times as large as a pipe", "cannot be imported"],
+)  # fmt: skip
+def test_a_worker_that_ends_at_birth_is_replaced_and_reported_in_the_run_folder(
+    tmp_path: Path, action: str, ballast_bytes: int, note: str, log: str
+) -> None:
+    """The terminal shows no traceback of a process that the user never started."""
+    environment = with_action_at_birth(tmp_path, action)
+    process = start_fake_run(tmp_path / "out", 1, 0.0, ballast_bytes, environment=environment)
     message = finish(process)
-
-    assert process.returncode == 0, message
-    assert (
-        "killed by signal 9 (SIGKILL); out of memory? while starting"
-        in notes_of(tmp_path / "out")[0]
-    )
-    assert message == ""
+    assert (process.returncode, message) == (0, "")
+    assert note in notes_of(tmp_path / "out")[0]
+    assert log in (tmp_path / "out/run/worker-0.log").read_text()
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("action", "ballast_bytes"),
-    [
-        (SIGNALS_AT_BIRTH["ctrl-c"], 0),
-        *(pytest.param(action, 3 * PIPE_BYTES, id=k) for k, action in SIGNALS_AT_BIRTH.items()),
-    ],
-)
+    [(SIGNALS_AT_BIRTH["ctrl-c"], 0),
+     *(pytest.param(action, 3 * PIPE_BYTES, id=k) for k, action in SIGNALS_AT_BIRTH.items())],
+)  # fmt: skip
 def test_a_signal_at_a_start_ends_the_run(tmp_path: Path, action: str, ballast_bytes: int) -> None:
     """Exit code 130, the command to go on with and no traceback; no process is left."""
     environment = with_action_at_birth(tmp_path, action)
-
     process = start_fake_run(tmp_path / "out", 2, 0.1, ballast_bytes, environment=environment)
     message = finish(process)
-
     assert process.returncode == 130, message
     assert RESUME in message
     assert "Traceback" not in message
     wait_for(lambda: processes_of_session(process.pid) == [])
 
 
-@pytest.mark.slow
-def test_a_worker_that_cannot_be_imported_is_reported_in_the_run_folder(tmp_path: Path) -> None:
-    """The terminal shows no traceback of a process that the user never started."""
-    environment = with_action_at_birth(tmp_path, "sys.modules['gen_data.runner'] = None")
-
-    process = start_fake_run(tmp_path / "out", 1, 0.0, environment=environment)
-    message = finish(process)
-
-    assert process.returncode == 0, message
-    assert message == ""
-    assert "exited with status 1 while starting" in notes_of(tmp_path / "out")[0]
-    assert "ModuleNotFoundError" in (tmp_path / "out/run/worker-0.log").read_text()
-
-
 def test_a_supervisor_killed_while_a_worker_starts_leaves_nobody(tmp_path: Path) -> None:
     """The new worker finds itself without a parent and ends, silently."""
     environment = with_action_at_birth(tmp_path, "os.kill(os.getppid(), signal.SIGKILL)")
-
     process = start_fake_run(tmp_path / "out", 1, 0.0, environment=environment)
     message = finish(process)
-
     assert message == ""
     wait_for(lambda: processes_of_session(process.pid) == [])
 
@@ -130,17 +115,11 @@ def test_a_worker_that_cannot_be_killed_does_not_keep_the_run(tmp_path: Path) ->
         "sys.exit(fake_run.main())\n"
     )
     action = "signal.signal(2, 1); os.killpg(os.getpgrp(), signal.SIGINT); signal.pause()"
-    process = subprocess.Popen(
-        [sys.executable, "-c", program, str(tmp_path / "out"), "1", "0"],
-        cwd=ROOT,
-        env=with_action_at_birth(tmp_path, action),
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-    )
-
+    command = [sys.executable, "-c", program, str(tmp_path / "out"), "1", "0"]
+    environment = with_action_at_birth(tmp_path, action)
+    options = {"stderr": subprocess.PIPE, "text": True, "start_new_session": True}
+    process = subprocess.Popen(command, cwd=ROOT, env=environment, **options)
     message = finish(process)
-
     # Nobody else ends the worker: it sleeps before it could tie itself to its parent.
     (worker,) = processes_of_session(process.pid)
     os.kill(worker, signal.SIGKILL)
