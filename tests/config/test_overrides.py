@@ -27,24 +27,18 @@ def document() -> Node:
 @pytest.mark.parametrize(
     ("path", "value", "reached", "expected"),
     [
-        ("seed", "0", ("seed",), 0),
-        ("camera.fov_deg", "1e1", ("camera", "fov_deg"), 10.0),
+        ("seed", "0", ("seed",), 0), ("camera.fov_deg", "1e1", ("camera", "fov_deg"), 10.0),
         ("camera.name", "front", ("camera", "name"), "front"),
         ("randomizers[0].count", "5", ("randomizers", 0, "count"), 5),
         ("randomizers.1.name", "x", ("randomizers", 1, "name"), "x"),
         ("randomizers.clutter.count", "5", ("randomizers", 0, "count"), 5),
-        (
-            "randomizers.finish.roughness",
-            "{normal: {mean: 0, stddev: 1}}",
-            ("randomizers", 1, "roughness"),
-            {"normal": {"mean": 0, "stddev": 1}},
-        ),
+        ("randomizers.finish.roughness", "{normal: {mean: 0, stddev: 1}}",
+         ("randomizers", 1, "roughness"), {"normal": {"mean": 0, "stddev": 1}}),
         ("randomizers.finish.roughness.uniform[1]", "2", ("randomizers", 1, "roughness"),
          {"uniform": [0, 2]}),
         ("physics.settle_s", "4", ("physics",), {"settle_s": 4}),
         ("render.samples", "16", ("render",), {"samples": 16}),
-        ("randomizers", "[]", ("randomizers",), []),
-        ("camera", "", ("camera",), None),
+        ("randomizers", "[]", ("randomizers",), []), ("camera", "", ("camera",), None),
         ("name", "a=b", ("name",), "a=b"),
     ],
 )  # fmt: skip
@@ -54,7 +48,6 @@ def test_an_override_exchanges_one_value(
     """By keys, by index, by name; anything else stays."""
     changed = with_override(document, path, value)
     node = changed.get(*reached)
-
     assert node is not None
     assert node.plain() == expected
     assert document.plain() == parse_yaml(TEXT, "t.yaml").plain()
@@ -66,7 +59,6 @@ def test_an_overridden_value_knows_that_it_came_from_the_command_line(document: 
     """The column counts in ``path=value``."""
     changed = with_override(document, "camera.fov_deg", "400")
     camera = changed.get("camera")
-
     assert camera is not None
     assert camera.content["fov_deg"].position.source == "camera.fov_deg=400"  # type: ignore[index,call-overload]
     assert str(camera.content["fov_deg"].position) == "--set:1:16"  # type: ignore[index,call-overload]
@@ -95,21 +87,18 @@ def test_overrides_to_nowhere_say_so(
 ) -> None:
     with pytest.raises(ConfigError) as caught:
         with_override(document, path, value)
-
     assert str(caught.value) == told("--set", f"{path}={value}", (1, column, fact))
 
 
-def test_a_list_without_names_is_addressed_by_index() -> None:
-    document = parse_yaml("a: [1, 2]", "t.yaml")
-
-    with pytest.raises(ConfigError, match=r"no item is named 'x'; expected an index such as \[0\]"):
-        with_override(document, "a.x", "1")
-
-
-def test_a_path_cannot_be_used_to_nest_without_end(document: Node) -> None:
-    """A thousand dots are refused before any tree is built."""
-    with pytest.raises(ConfigError, match="a path of more than 32 parts"):
-        with_override(document, "a." * 1000 + "a", "1")
+@pytest.mark.parametrize(
+    ("path", "fact"),
+    [("a.x", r"no item is named 'x'; expected an index such as \[0\]"),
+     ("a." * 1000 + "a", "a path of more than 32 parts")],
+    ids=["a list without names", "nesting without end, refused before any tree is built"],
+)  # fmt: skip
+def test_paths_that_cannot_be_followed_are_refused(path: str, fact: str) -> None:
+    with pytest.raises(ConfigError, match=fact):
+        with_override(parse_yaml("a: [1, 2]", "t.yaml"), path, "1")
 
 
 @settings(max_examples=400, deadline=None, derandomize=True)
@@ -120,5 +109,4 @@ def test_any_override_gives_a_tree_or_an_error(path: str, value: str) -> None:
         outcome = type(with_override(parse_yaml(TEXT, "t.yaml"), path, value).plain()).__name__
     except ConfigError as error:
         outcome = str(error)
-
     assert outcome.startswith(("dict", "--set:"))

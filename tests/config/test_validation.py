@@ -92,9 +92,7 @@ def test_a_valid_document_becomes_a_frozen_model() -> None:
     text = (
         "{camera: {fov_deg: 60, size_px: [1, 2], mode: good}, names: [a, b], share: 1, wet: true}"
     )
-
     config = validate(parse_yaml(text, "x.yaml"), Config, problems)
-
     problems.raise_if_any()
     assert config is not None
     assert config.camera == Camera(fov_deg=60.0, size_px=(1, 2), mode=Mode.GOOD)
@@ -127,8 +125,7 @@ MESSAGES = [
     ("camera: 3", "1:9: camera: expected a mapping (fov_deg, size_px, mode), got 3"),
     ("style: mate",
      "1:8: style: unknown value 'mate'; expected one of matte, glossy (did you mean 'matte'?)"),
-    ("n: 0", "1:4: n: 0 is not >= 1"),
-    ("n: 13", "1:1: 13 is an unlucky number; expected another"),
+    ("n: 0", "1:4: n: 0 is not >= 1"), ("n: 13", "1:1: 13 is an unlucky number; expected another"),
     ("n:", "1:3: n: expected a whole number >= 1, got nothing"),
     ("share: 1.5", "1:8: share: 1.5 is not in [0, 1]"),
     ("name: ''", "1:7: name: must not be empty"),
@@ -164,8 +161,7 @@ MESSAGES = [
     ("roughness: {uniform: [1.2, 0.4]}",
      "1:22: roughness: uniform needs low <= high, got [1.2, 0.4]"),
     ("roughness: {uniform: [0, x]}", "1:26: roughness: expected a number, got 'x'"),
-    ("roughness: {uniform: 1}",
-     "1:22: roughness: uniform needs two numbers [low, high], got 1"),
+    ("roughness: {uniform: 1}", "1:22: roughness: uniform needs two numbers [low, high], got 1"),
     ("roughness: {uniform: [0, 1], normal: 1}",
      f"1:12: roughness: a distribution is a mapping with one key, got 2 keys; "
      f"expected one of {NUMERIC}"),
@@ -199,10 +195,8 @@ MESSAGES = [
      "(did you mean {uniform: [0, 1]}?)"),
     ("roughness: abc", "1:12: roughness: expected a number or a distribution, got 'abc'"),
     ("roughness: uniform", "1:12: roughness: 'uniform' needs an argument; write {uniform: ...}"),
-    ("angle: 170", "1:8: angle: 170 is not in (1, 170)"),
-    ("lux: 0", "1:6: lux: 0 is not > 0"),
-    ("lux: {log_uniform: [0, 1]}",
-     "1:20: lux: log_uniform needs low > 0 and high > 0, got [0, 1]"),
+    ("angle: 170", "1:8: angle: 170 is not in (1, 170)"), ("lux: 0", "1:6: lux: 0 is not > 0"),
+    ("lux: {log_uniform: [0, 1]}", "1:20: lux: log_uniform needs low > 0 and high > 0, got [0, 1]"),
     ("lux: {log_uniform: [2, 1]}", "1:20: lux: log_uniform needs low <= high, got [2, 1]"),
     ("count: -1", "1:8: count: -1 is not >= 0"),
     ("count: 1.5", "1:8: count: expected a whole number or a distribution, got 1.5"),
@@ -228,54 +222,19 @@ MESSAGES = [
 def test_every_mistake_is_told_in_plain_words(text: str, message: str) -> None:
     """Place, field, fact, expectation; then the line with a caret under the column."""
     column = int(message.split(":")[1])
-
     assert told(text) == f"x.yaml:{message}\n      1 | {text}\n        | {' ' * (column - 1)}^"
 
 
-def test_all_mistakes_are_told_at_once() -> None:
-    """In the order of the file."""
+def test_all_mistakes_are_told_at_once_and_those_of_the_command_line_there() -> None:
+    """In the order of the file. The rest of the tree still points into its file."""
     text = "n: 0\ncamera: {fov_deg: 400, x: 1}\nwet: 1\nroughness: {uniform: [1, 0]}\n"
-
     places = [line.split(": ")[:2] for line in told(text).split("\n") if line.startswith("x.yaml")]
-
-    assert places == [
-        ["x.yaml:1:4", "n"],
-        ["x.yaml:2:19", "camera.fov_deg"],
-        ["x.yaml:2:24", "camera.x"],
-        ["x.yaml:3:6", "wet"],
-        ["x.yaml:4:22", "roughness"],
-    ]
-
-
-def test_fields_are_named_from_the_root_of_the_document() -> None:
-    document = parse_yaml("randomizers:\n  - {fov_deg: 0}\n", "x.yaml")
-    node, problems = document.get("randomizers", 0), Problems()
-
-    assert node is not None
-    assert validate(node, Camera, problems, "randomizers[0]") is None
-    assert str(problems.sorted()[0]).startswith(
-        "x.yaml:2:15: randomizers[0].fov_deg: 0 is not in (1, 170)"
-    )
-
-
-def test_a_node_that_is_no_mapping_is_told() -> None:
-    document, problems = parse_yaml("a: [1]", "x.yaml"), Problems()
-    node = document.get("a", 0)
-
-    assert node is not None
-    assert validate(node, Camera, problems, "a[0]") is None
-    assert str(problems.sorted()[0]).startswith(
-        "x.yaml:1:5: a[0]: expected a mapping (fov_deg, size_px, mode), got 1"
-    )
-
-
-def test_a_mistake_on_the_command_line_is_placed_there() -> None:
-    """The rest of the tree still points into its file."""
+    assert places == [["x.yaml:1:4", "n"], ["x.yaml:2:19", "camera.fov_deg"],
+                      ["x.yaml:2:24", "camera.x"], ["x.yaml:3:6", "wet"],
+                      ["x.yaml:4:22", "roughness"]]  # fmt: skip
     document = with_override(parse_yaml("camera: {fov_deg: 60}", "x.yaml"), "camera.fov_deg", "400")
     problems = Problems()
-
     validate(document, Config, problems)
-
     assert [str(problem) for problem in problems.sorted()] == [
         "--set:1:16: camera.fov_deg: 400 is not in (1, 170)\n"
         "      1 | camera.fov_deg=400\n"
@@ -283,18 +242,31 @@ def test_a_mistake_on_the_command_line_is_placed_there() -> None:
     ]
 
 
+def test_fields_are_named_from_the_root_of_the_document_also_if_they_are_no_mapping() -> None:
+    document = parse_yaml("randomizers:\n  - {fov_deg: 0}\n", "x.yaml")
+    node, problems = document.get("randomizers", 0), Problems()
+    assert node is not None
+    assert validate(node, Camera, problems, "randomizers[0]") is None
+    assert str(problems.sorted()[0]).startswith(
+        "x.yaml:2:15: randomizers[0].fov_deg: 0 is not in (1, 170)"
+    )
+    document, problems = parse_yaml("a: [1]", "x.yaml"), Problems()
+    node = document.get("a", 0)
+    assert node is not None
+    assert validate(node, Camera, problems, "a[0]") is None
+    assert str(problems.sorted()[0]).startswith(
+        "x.yaml:1:5: a[0]: expected a mapping (fov_deg, size_px, mode), got 1"
+    )
+
+
 @pytest.mark.parametrize(
     ("path", "message"),
-    [
-        ("camerra.fov_deg", "--set:1:1: camerra: unknown key 'camerra'; "),
-        ("camera.fov", "--set:1:8: camera.fov: unknown key 'fov'; "),
-    ],
-)
+    [("camerra.fov_deg", "--set:1:1: camerra: unknown key 'camerra'; "),
+     ("camera.fov", "--set:1:8: camera.fov: unknown key 'fov'; ")],
+)  # fmt: skip
 def test_a_misspelt_override_is_an_unknown_key(path: str, message: str) -> None:
     document, problems = parse_yaml("camera: {fov_deg: 60}", "x.yaml"), Problems()
-
     validate(with_override(document, path, "3"), Config, problems)
-
     assert str(problems.sorted()[0]).startswith(message)
     assert "did you mean" in str(problems.sorted()[0])
 
@@ -321,7 +293,6 @@ def test_any_document_gives_a_model_or_problems(plain: dict[str, Any]) -> None:
 
     text, problems = to_flow_yaml(plain), Problems()
     made = validate(parse_yaml(text, "x.yaml"), Config, problems)
-
     assert (made is None) == bool(len(problems))
     for problem in problems.sorted():
         assert problem.position.file == "x.yaml"
