@@ -10,16 +10,12 @@ from typing import Any
 from gen_data.runner.shard_record import FileRecord, parse_unchecked_record
 
 SMALL: dict[str, Any] = {
-    "overrides": (
-        "sensors[0].size_px=[96, 72]",
-        "shard_size=16",
-        "views_per_scene=2",
-        "randomizers.clutter.count={uniform_integer: [1, 3]}",
-        "splits={train: 0.5, val: 0.25, test: 0.25, assign: round_robin}",
-        "exporters=[{type: coco}]",
-    ),
+    "overrides": ("sensors[0].size_px=[96, 72]", "shard_size=16", "views_per_scene=2",
+                  "randomizers.clutter.count={uniform_integer: [1, 3]}",
+                  "splits={train: 0.5, val: 0.25, test: 0.25, assign: round_robin}",
+                  "exporters=[{type: coco}]"),
     "without": ("distractors", "tabletop", "cover", "finish"),
-}
+}  # fmt: skip
 """Changes that make a data set quick to generate."""
 
 

@@ -47,28 +47,16 @@ ALPHA = 1e-4
 DRAWS = 5_000
 
 DISTRIBUTIONS: list[tuple[Distribution[Any], int]] = [
-    (Uniform(-2, 5), 1),
-    (LogUniform(0.01, 100), 1),
-    (Normal(3, 2), 1),
-    (Normal(0.5, 0.2, clip=(0, 1)), 1),
-    (Normal(0, 1, clip=(2, 9)), 1),
-    (UniformInteger(3, 12), 1),
-    (Choice(("a", "b", "c")), 1),
-    (Choice({"matte": 3, "glossy": 1, "never": 0}), 1),
-    (Probability(0.3), 1),
-    (Mixture((Uniform(0, 2), Uniform(1, 5), Constant(1.5)), (1, 2, 1)), 1),
+    (Uniform(-2, 5), 1), (LogUniform(0.01, 100), 1), (Normal(3, 2), 1),
+    (Normal(0.5, 0.2, clip=(0, 1)), 1), (Normal(0, 1, clip=(2, 9)), 1), (UniformInteger(3, 12), 1),
+    (Choice(("a", "b", "c")), 1), (Choice({"matte": 3, "glossy": 1, "never": 0}), 1),
+    (Probability(0.3), 1), (Mixture((Uniform(0, 2), Uniform(1, 5), Constant(1.5)), (1, 2, 1)), 1),
     (Mixture((UniformInteger(0, 3), Constant(9.0)), (3, 1)), 1),
-    (Mixture((LogUniform(1, 9), Normal(4, 1, clip=(2, 8))), (1, 1)), 1),
-    (So3(), 3),
-    (AboutZ(), 1),
-    (AboutZ((-30.0, 100.0)), 1),
-    (Sphere(), 2),
-    (Cap((1.0, 2.0, -0.5), 40.0), 2),
-    (Cap((0.0, 0.0, 1.0), 180.0), 2),
-    (Box((0.0, -1.0, 2.0), (1.0, 1.0, 2.0)), 2),
-    (Shell((1.0, 2.0, 3.0), (0.5, 2.0), (-10.0, 60.0)), 3),
-    (Shell((1.0, 2.0, 3.0), (2.0, 2.0)), 2),
-]
+    (Mixture((LogUniform(1, 9), Normal(4, 1, clip=(2, 8))), (1, 1)), 1), (So3(), 3), (AboutZ(), 1),
+    (AboutZ((-30.0, 100.0)), 1), (Sphere(), 2), (Cap((1.0, 2.0, -0.5), 40.0), 2),
+    (Cap((0.0, 0.0, 1.0), 180.0), 2), (Box((0.0, -1.0, 2.0), (1.0, 1.0, 2.0)), 2),
+    (Shell((1.0, 2.0, 3.0), (0.5, 2.0), (-10.0, 60.0)), 3), (Shell((1.0, 2.0, 3.0), (2.0, 2.0)), 2),
+]  # fmt: skip
 """With their degrees of freedom."""
 
 
@@ -91,7 +79,6 @@ def test_scores_of_drawn_values_are_uniform_and_independent(
 ) -> None:
     """Kolmogorov-Smirnov per degree of freedom; no rank correlation between two of them."""
     scores = scores_of(distribution)
-
     assert scores.shape == (DRAWS, freedom)
     for column in scores.T:
         assert stats.kstest(column, "uniform").pvalue > ALPHA
@@ -100,74 +87,47 @@ def test_scores_of_drawn_values_are_uniform_and_independent(
             assert stats.spearmanr(scores[:, k], scores[:, j]).pvalue > ALPHA
 
 
-@pytest.mark.parametrize(
-    ("distribution", "value"),
-    [
-        (Uniform(0, 1), 1.001),
-        (Uniform(2, 2), 2.1),
-        (LogUniform(1, 2), 0.9),
-        (Normal(0, 1, clip=(-1, 1)), 1.5),
-        (UniformInteger(1, 3), 4),
-        (UniformInteger(1, 3), 1.5),
-        (Choice({"a": 1, "b": 0}), "b"),
-        (Choice(("a", "b")), "c"),
-        (Probability(0.0), True),
-        (AboutZ((0.0, 90.0)), (0.0, 0.0, 0.0, 1.0)),
-        (AboutZ(), (0.6, 0.8, 0.0, 0.0)),
-        (Cap((0.0, 0.0, 1.0), 30.0), (1.0, 0.0, 0.0)),
-        (Box((0.0, 0.0, 0.0), (1.0, 1.0, 1.0)), (0.5, 0.5, 1.5)),
-        (Shell((0.0, 0.0, 0.0), (1.0, 2.0)), (0.0, 0.0, 0.5)),
-    ],
-    ids=lambda v: repr(v)[:50],
-)
-def test_values_that_cannot_be_drawn_have_no_scores(
-    distribution: Distribution[Any], value: Any
-) -> None:
-    """None, which fails the claim, whatever the number of values."""
-    assert uniform_scores(distribution, value, stream("impossible")) is None
+IMPOSSIBLE: list[tuple[Distribution[Any], Any]] = [
+    *((Uniform(0, 1), 1.001), (Uniform(2, 2), 2.1), (LogUniform(1, 2), 0.9)),
+    *((Normal(0, 1, clip=(-1, 1)), 1.5), (UniformInteger(1, 3), 4), (UniformInteger(1, 3), 1.5)),
+    *((Choice({"a": 1, "b": 0}), "b"), (Choice(("a", "b")), "c"), (Probability(0.0), True)),
+    *((AboutZ((0.0, 90.0)), (0.0, 0.0, 0.0, 1.0)), (AboutZ(), (0.6, 0.8, 0.0, 0.0))),
+    (Cap((0.0, 0.0, 1.0), 30.0), (1.0, 0.0, 0.0)),
+    (Box((0.0, 0.0, 0.0), (1.0, 1.0, 1.0)), (0.5, 0.5, 1.5)),
+    (Shell((0.0, 0.0, 0.0), (1.0, 2.0)), (0.0, 0.0, 0.5)),
+]
+FIXED: list[tuple[Distribution[Any], Any]] = [
+    *((Constant(3.0), 3.0), (Sequence((1, 2)), 2), (Uniform(2, 2), 2.0), (Probability(1.0), True)),
+    *((UniformInteger(4, 4), 4), (Choice(("only",)), "only"), (Normal(1.0, 0.0), 1.0)),
+]
 
 
 @pytest.mark.parametrize(
-    ("distribution", "value"),
-    [
-        (Constant(3.0), 3.0),
-        (Sequence((1, 2)), 2),
-        (Uniform(2, 2), 2.0),
-        (UniformInteger(4, 4), 4),
-        (Choice(("only",)), "only"),
-        (Probability(1.0), True),
-        (Normal(1.0, 0.0), 1.0),
-    ],
+    ("distribution", "value", "scores"),
+    [*((*row, None) for row in IMPOSSIBLE), *((*row, ()) for row in FIXED)],
     ids=lambda v: repr(v)[:50],
 )
-def test_values_without_randomness_have_nothing_to_test(
-    distribution: Distribution[Any], value: Any
+def test_values_that_cannot_be_drawn_and_fixed_ones_have_no_scores(
+    distribution: Distribution[Any], value: Any, scores: tuple[float, ...] | None
 ) -> None:
-    assert uniform_scores(distribution, value, stream("fixed")) == ()
+    """None fails the claim, whatever the number of values; of no randomness, nothing is tested."""
+    assert uniform_scores(distribution, value, stream("impossible")) == scores
 
 
 @pytest.mark.slow
-def test_p_values_of_true_parameters_are_uniform() -> None:
+def test_p_values_of_true_parameters_are_uniform_and_families_fail_at_the_rate() -> None:
     """Of 2,000 tests of 40 values each: their rate of refusals is the level, for any level."""
     rng = np.random.default_rng(5)
     p_values = [compare_with_uniform("x", rng.random(40)).p_value for _ in range(2_000)]
-
     assert stats.kstest(p_values, "uniform").pvalue > ALPHA
-
-
-@pytest.mark.slow
-def test_families_of_true_parameters_fail_at_the_stated_rate() -> None:
-    """30 independent uniform p-values each: Holm refuses 1 - (1 - alpha / 30)^30 of the families.
-
-    The expected rate at alpha = 0.05 is 0.0488; the number in 20,000 families is binomial.
-    """
+    # 30 independent uniform p-values each: Holm refuses 1 - (1 - alpha / 30)^30 of the families.
+    # The expected rate at alpha = 0.05 is 0.0488; the number in 20,000 families is binomial.
     alpha, tests, families = 0.05, 30, 20_000
     p_values = np.random.default_rng(6).random((families, tests))
     alarms = sum(
         any(refused([Comparison(str(k), 40, 0.1, p) for k, p in enumerate(row)], alpha))
         for row in p_values
     )
-
     expected = 1.0 - (1.0 - alpha / tests) ** tests
     assert stats.binomtest(alarms, families, expected).pvalue > ALPHA
     assert expected <= alpha
@@ -177,13 +137,12 @@ def test_holm_names_what_bonferroni_would_not() -> None:
     """The smallest p-value is compared with alpha / 4, the next one with alpha / 3, and so on."""
     p_values = {"d": 0.5, "a": 0.01, "c": 0.04, "b": 0.03}
     family = [Comparison(name, 9, 0.5, p) for name, p in p_values.items()]
-
     # 0.01 <= 0.1 / 4, 0.03 <= 0.1 / 3, 0.04 <= 0.1 / 2, 0.5 > 0.1; Bonferroni refuses a only.
     assert [test.name for test in refused(family, 0.1)] == ["a", "b", "c"]
     assert list(refused([], 0.1)) == []
 
 
-def test_a_stated_deviation_is_found_as_often_as_stated() -> None:
+def test_a_stated_deviation_is_found_as_often_as_stated_and_a_constant_of_30() -> None:
     """Values of which a share is 0: at least 99 % of 400 samples of 200 values are refused."""
     n, level = 200, 1e-3 / 40
     share = found_deviation(n, level)
@@ -192,16 +151,10 @@ def test_a_stated_deviation_is_found_as_often_as_stated() -> None:
     for _ in range(400):
         values = np.where(rng.random(n) < share, 0.0, rng.random(n))
         found += compare_with_uniform("x", values).p_value <= level
-
     assert 0.2 < share < 0.4
     # A rate of 0.99 gives fewer than 388 with probability 1e-4.
     assert found >= 388
-
-
-def test_a_constant_needs_about_thirty_values_to_be_refused() -> None:
-    """The largest deviation of a constant is at least 1/2; 2 exp(-2 n / 4) bounds its p-value."""
-    level = 1e-3 / 40
-
+    # The largest deviation of a constant is at least 1/2; 2 exp(-2 n / 4) bounds its p-value.
     assert not can_refuse_constant(10, level)
     assert can_refuse_constant(30, level)
     assert compare_with_uniform("x", [0.5] * 30).p_value <= level
@@ -225,41 +178,28 @@ def check(*parameters: Parameter) -> Finding:
     return finding
 
 
-def test_a_parameter_that_never_varies_is_named() -> None:
+def test_a_parameter_that_never_varies_is_named_and_values_judged_by_their_own() -> None:
     """Among others that are drawn as declared."""
     rng = stream("good")
     good = [drawn(f"good{k}", Uniform(0, 1), rng.random(60)) for k in range(20)]
-
     finding = check(*good, drawn("orbit.distance_m", Uniform(0.9, 1.5), [1.3] * 60))
-
     assert finding.status is Status.FAILED
     assert finding.evidence[0].startswith("orbit.distance_m: 60 values deviate by 0.667")
     assert len(finding.evidence) == 1
     assert check(*good).status is Status.PASSED
-
-
-def test_a_value_outside_its_distribution_is_named_at_once() -> None:
-    """One value suffices."""
-    finding = check(drawn("count", UniformInteger(1, 3), [1, 4]))
-
-    assert finding.status is Status.FAILED
-    assert "count: 4 cannot be drawn" in finding.evidence[0]
-
-
-def test_values_of_several_distributions_are_judged_together() -> None:
-    """As of a parameter that depends on a shared value: each value by its own distribution."""
+    # As of a parameter that depends on a shared value: each value by its own distribution.
     rng = stream("switch")
     wide, narrow = Uniform(0, 10), Uniform(4, 5)
     mixed = [(d, d.draw(rng)) for d in (wide, narrow) * 30]
     wrong = [(wide, narrow.draw(rng)) for _ in range(60)]
-
     assert check(Parameter("gap_m", firsts=mixed)).status is Status.PASSED
     assert check(Parameter("gap_m", firsts=wrong)).status is Status.FAILED
 
 
-def test_too_few_values_are_no_success() -> None:
+def test_one_value_outside_its_distribution_suffices_and_few_others_are_no_success() -> None:
     """The finding says what would help."""
-    finding = check(drawn("orbit.distance_m", Uniform(0.9, 1.5), [1.0, 1.4]))
-
-    assert finding.status is Status.NOT_CHECKED
-    assert "more samples" in finding.reason
+    outside = check(drawn("count", UniformInteger(1, 3), [1, 4]))
+    few = check(drawn("orbit.distance_m", Uniform(0.9, 1.5), [1.0, 1.4]))
+    assert (outside.status, few.status) == (Status.FAILED, Status.NOT_CHECKED)
+    assert "count: 4 cannot be drawn" in outside.evidence[0]
+    assert "more samples" in few.reason

@@ -23,10 +23,8 @@ BOXED = MASKED | {"croissant", "hdf5", "tfrecord", "voc", "yolo"}
 """Formats whose readers compare masks, and boxes."""
 
 
-DATA = {
-    *(".json", ".tar", ".tfrecord", ".parquet", ".csv", ".hdf5"),
-    *(".mcap", ".ply", ".usdc", ".txt", ".xml"),
-}
+DATA = {*(".json", ".tar", ".tfrecord", ".parquet", ".csv", ".hdf5"),
+        *(".mcap", ".ply", ".usdc", ".txt", ".xml")}  # fmt: skip
 """Endings of files that readers need; of YOLO's tasks, only ``detect`` is read."""
 
 
@@ -60,7 +58,6 @@ def read(folder: Path, name: str) -> Finding:
 def test_readers_find_what_labels_say(exported: Path, name: str) -> None:
     """Two images whose boxes, and masks where the format has them, score 1."""
     finding = read(exported, name)
-
     assert finding.status is Status.PASSED, finding.evidence
     assert READERS[name].package in str(finding.figures["reader"])
     assert (finding.figures.get("images") == 2) == (name in BOXED)
@@ -70,14 +67,11 @@ def test_readers_find_what_labels_say(exported: Path, name: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
-def test_an_export_without_its_largest_file_fails(
-    exported: Path, tmp_path: Path, name: str
-) -> None:
+def test_an_export_without_its_main_file_fails(exported: Path, tmp_path: Path, name: str) -> None:
     """Whether the reader refuses it, or misses something."""
     copy = Path(shutil.copytree(exported, tmp_path / "copy"))
     files = [p for p in (copy / name).rglob("*") if is_read(p)]
     max(files, key=lambda p: (p.parent == copy / name, p.stat().st_size)).unlink()
-
     assert read(copy, name).status is Status.FAILED
 
 
@@ -98,24 +92,18 @@ CUP, BOWL = thing("cup", 1, 2, 11, 22), thing("bowl", 30, 5, 40, 9)
         ([image(0, CUP, BOWL)], []),
         ([image(0, BOWL, CUP)], []),
         ([image(0, thing("cup", 1, 2, 11, 22.4), BOWL)], []),
-        (
-            [image(0, thing("cup", 1, 2, 11, 23), BOWL)],
-            ["sample 0, color: cup: box (1, 2, 11, 23), expected (1, 2, 11, 22)"],
-        ),
+        ([image(0, thing("cup", 1, 2, 11, 23), BOWL)],
+         ["sample 0, color: cup: box (1, 2, 11, 23), expected (1, 2, 11, 22)"]),
         ([image(0, CUP)], ["sample 0, color: bowl at (30, 5, 40, 9): is missing"]),
-        (
-            [image(0, CUP, BOWL, BOWL)],
-            ["sample 0, color: bowl at (30, 5, 40, 9): is not in the labels"],
-        ),
-        (
-            [image(0, CUP, BOWL, split="val")],
-            ["sample 0, color: is in the split val, expected train"],
-        ),
+        ([image(0, CUP, BOWL, BOWL)],
+         ["sample 0, color: bowl at (30, 5, 40, 9): is not in the labels"]),
+        ([image(0, CUP, BOWL, split="val")],
+         ["sample 0, color: is in the split val, expected train"]),
         ([], ["sample 0, color: is missing"]),
         ([image(0, CUP, BOWL), image(7)], ["sample 7, color: is no image of the data set"]),
         ([image(0, CUP, BOWL), image(0, CUP, BOWL)], ["sample 0, color: is there twice"]),
     ],
-)
+)  # fmt: skip
 def test_contradictions_are_named(found: list[LabelledImage], facts: list[str]) -> None:
     """In either direction; half a pixel is tolerated here, whatever the order."""
     assert list(compare_images([image(0, CUP, BOWL)], found, 0.5)) == facts
@@ -124,7 +112,6 @@ def test_contradictions_are_named(found: list[LabelledImage], facts: list[str]) 
 def test_a_missing_object_lowers_the_score() -> None:
     """One class of two is not found at all: its AP is 0, so that the mean is 1/2."""
     truth = [image(0, CUP, BOWL)]
-
     assert average_precision(truth, truth, "bbox") == pytest.approx(1.0, abs=1e-12)
     assert average_precision(truth, [image(0, CUP)], "bbox") == pytest.approx(0.5)
     assert average_precision([image(0)], [image(0)], "bbox") == 1.0
