@@ -26,9 +26,7 @@ def test_the_distance_is_scipys_over_the_real_deviation() -> None:
     rng = np.random.default_rng(0)
     real = {"bottom m": rng.normal(1.5, 0.3, 200), "distance m": rng.lognormal(3, 0.5, 200)}
     ours = {"bottom m": rng.normal(1.6, 0.1, 150), "distance m": rng.lognormal(3.5, 0.6, 150)}
-
     rows = compared(real, ours)
-
     expected = wasserstein_distance(real["bottom m"], ours["bottom m"]) / real["bottom m"].std()
     assert rows["bottom m"].apart == pytest.approx(expected)
     a, b = np.log2(real["distance m"]), np.log2(ours["distance m"])
@@ -41,25 +39,16 @@ def test_the_distance_is_scipys_over_the_real_deviation() -> None:
     assert [*rows] == ["distance m", "bottom m"]
 
 
-def test_values_that_are_all_equal_are_measured_by_the_grain() -> None:
+def test_equal_sets_differ_in_nothing_and_what_is_not_compared_is_named() -> None:
     """Unoccluded objects on both sides: no difference, and no division by 0."""
     rows = compared({"occlusion": np.zeros(100)}, {"occlusion": np.zeros(100)})
-
     assert (rows["occlusion"].apart, rows["occlusion"].differs) == (0.0, False)
-
-
-def test_a_set_differs_from_itself_in_nothing() -> None:
     rng = np.random.default_rng(1)
     side = {"grey": rng.normal(90, 20, 100), "count": rng.poisson(3, 100).astype(float)}
-
     assert not any(row.differs for row in compared(side, side).values())
-
-
-def test_what_is_not_compared_is_named() -> None:
-    """Classes with fewer than ten values on a side, and quantities that one side never states."""
+    # Classes with fewer than ten values on a side, and quantities that one side never states.
     few, many = values(np.ones(9)), values(np.ones(100))
     real = {("car", "grey"): few, ("bus", "grey"): many, ("bus", "occlusion"): many}
-
     assert compare(real, {("car", "grey"): many}, 20, 20) == ((), ("car", "bus"), ("occlusion",))
 
 

@@ -44,14 +44,11 @@ def has_field(definition: str, path: str) -> bool:
 
 
 def test_every_quantity_has_fields_and_every_field_is_in_the_schema() -> None:
+    """The check above is one."""
     for field in {field for quantity in QUANTITIES for field in fields_of(quantity)}:
         definition = f"{field.kind}.{field.type}" if field.type else "LabelSettings"
         for path in (field.path, field.needs, field.without):
             assert not path or has_field(definition, path), field.name
-
-
-def test_a_field_that_does_not_exist_is_found() -> None:
-    """The check above is one."""
     assert has_field("sensor.rgb_camera", "image_pipeline.contrast")
     assert not has_field("sensor.rgb_camera", "image_pipeline.contrasts")
 
@@ -80,23 +77,18 @@ def test_fields_of_the_configuration_are_named_with_a_direction(
 ) -> None:
     """Of two that exclude each other, the one that is set."""
     found = named(quantity, direction, camera)
-
     assert found[0] == expected
     assert not any("fills" in text for text in found[1:])
 
 
-def test_groups_that_have_no_object_of_the_class_are_left_out() -> None:
+def test_groups_without_the_class_are_left_out_and_without_a_field_plug_ins_named() -> None:
+    """Also without a configuration."""
     assert "raise randomizers.clutter.count" in named(
         "count", "smaller", "distance_m: 1", {"clutter"}
     )
     assert not any(
         "clutter" in text for text in named("count", "smaller", "distance_m: 1", {"arm"})
     )
-
-
-def test_without_a_field_in_use_plug_ins_are_named() -> None:
-    """Also without a configuration."""
     row = Row("car", "bottom m", (0, 0, 0), (1, 1, 1), 99, 99, 1.0, 0.1, "larger")
-
     assert remedies(row, None, ())[0] == "set randomizer relief: grade"
     assert Field("labels", "min_box_px").name == "labels: min_box_px"

@@ -25,9 +25,7 @@ def test_boxes_and_brightness_agree_with_pycocotools_and_pillow(tmp_path: Path) 
     with contextlib.redirect_stdout(io.StringIO()):
         coco = COCO(tmp_path / "annotations/instances_all.json")
     pictures = read_real(tmp_path).pictures
-
     found = measure(pictures, range(6), NAMES)
-
     rows = [row for k in range(6) for row in coco.loadAnns(coco.getAnnIds(k, catIds=[1]))]
     x, y, w, h = np.array([row["bbox"] for row in rows]).T
     expected = {
@@ -63,9 +61,7 @@ def test_boxes_and_brightness_agree_with_pycocotools_and_pillow(tmp_path: Path) 
 
 def test_all_classes_together_have_the_values_of_each(tmp_path: Path) -> None:
     write_coco(tmp_path, 2, pictures=4)
-
     found = measure(read_real(tmp_path).pictures, range(4), NAMES)
-
     both = np.concatenate([found[name, "height px"].values for name in NAMES])
     every = found["all classes", "height px"].values
     np.testing.assert_array_equal(np.sort(every), np.sort(both))
@@ -122,21 +118,12 @@ def points_in(car: tuple[float, ...], points: np.ndarray) -> int:
 def test_boxes_in_space_and_points_in_them_follow_kittis_devkit(tmp_path: Path) -> None:
     """Columns h, w, l, x, y, z and the rotation about the camera's y axis."""
     points = write_kitti(tmp_path)
-
     found = measure(read_real(tmp_path).pictures, [0], {"Car": "car"})
-
-    expected = {
-        "height m": [1.5, 1.4],
-        "width m": [1.6, 1.8],
-        "length m": [4.0, 4.2],
-        "bottom m": [1.7, 3.1],
-        "distance m": [math.hypot(2, 12), math.hypot(5, 22)],
-        "occlusion": [0, 1],
-        "truncation": [0.25, 0.25],
-        "long side": [40 / 128] * 2,
-        "points 5-15 m": [points_in(CARS[0], points)],
-        "points 15-30 m": [points_in(CARS[1], points)],
-    }
+    expected = {"height m": [1.5, 1.4], "width m": [1.6, 1.8], "length m": [4.0, 4.2],
+                "bottom m": [1.7, 3.1], "distance m": [math.hypot(2, 12), math.hypot(5, 22)],
+                "occlusion": [0, 1], "truncation": [0.25, 0.25], "long side": [40 / 128] * 2,
+                "points 5-15 m": [points_in(CARS[0], points)],
+                "points 15-30 m": [points_in(CARS[1], points)]}  # fmt: skip
     for name, values in expected.items():
         np.testing.assert_allclose(found["car", name].values, values, rtol=1e-6, err_msg=name)
     assert min(expected["points 5-15 m"] + expected["points 15-30 m"]) > 10
@@ -145,17 +132,12 @@ def test_boxes_in_space_and_points_in_them_follow_kittis_devkit(tmp_path: Path) 
 
 @pytest.mark.parametrize(
     ("text", "fact"),
-    [
-        ("P2: 700 0 64 0 0 700 48 0 0 0 1 0\n", "has no Tr_velo_to_cam"),
-        (None, "with its calibration"),
-    ],
-)
-def test_a_scan_without_a_calibration_is_refused(
-    text: str | None, fact: str, tmp_path: Path
-) -> None:
+    [("P2: 700 0 64 0 0 700 48 0 0 0 1 0\n", "has no Tr_velo_to_cam"),
+     (None, "with its calibration")],
+)  # fmt: skip
+def test_a_scan_without_calibration_is_refused(text: str | None, fact: str, tmp_path: Path) -> None:
     write_kitti(tmp_path)
     calib = tmp_path / "calib/000000.txt"
     calib.unlink() if text is None else calib.write_text(text)
-
     with pytest.raises(StorageError, match=fact):
         measure(read_real(tmp_path).pictures, [0], {"Car": "car"})

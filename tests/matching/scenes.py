@@ -23,27 +23,12 @@ from gen_data.sensors.lidar.lidar_sensor import LidarSensor
 
 WIDTH_PX, HEIGHT_PX, FINER = 320, 240, 4
 CAMERA = Camera("color", SE3(), Intrinsics.from_hfov(WIDTH_PX, HEIGHT_PX, math.radians(60.0)))
-SHEET = {
-    "elevations_deg": ({"first": 10.0, "last": -10.0, "count": 8},),
-    "rotation_hz": 10.0,
-    "points_per_second": 32_000,
-    "range_m": (0.5, 100.0),
-    "range_noise_m": 0.01,
-    "range_step_m": 0.0,
-    "divergence_mrad": 3.0,
-    "pulse_m": 0.5,
-    "wavelength_nm": 905.0,
-    "seen": {"reflectance": 0.1, "range_m": 20.0},
-    "white_intensity": 0.4,
-}
-RESPONSE = {
-    "half": 0.2,
-    "dark": 0.05,
-    "range_exponent": 0.0,
-    "noise": 0.02,
-    "laser_spread": 0.05,
-    "step": 0.01,
-}
+SHEET = {"elevations_deg": ({"first": 10.0, "last": -10.0, "count": 8},), "rotation_hz": 10.0,
+         "points_per_second": 32_000, "range_m": (0.5, 100.0), "range_noise_m": 0.01,
+         "range_step_m": 0.0, "divergence_mrad": 3.0, "pulse_m": 0.5, "wavelength_nm": 905.0,
+         "seen": {"reflectance": 0.1, "range_m": 20.0}, "white_intensity": 0.4}  # fmt: skip
+RESPONSE = {"half": 0.2, "dark": 0.05, "range_exponent": 0.0, "noise": 0.02, "laser_spread": 0.05,
+            "step": 0.01}  # fmt: skip
 """Of a scanner that reports 0 for dark surfaces."""
 
 

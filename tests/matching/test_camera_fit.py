@@ -29,14 +29,18 @@ TRUTH = ImagePipeline.model_validate({
 })  # fmt: skip
 
 
+def fit_to(truth: ImagePipeline, count: int, base: ImagePipeline, scenes: int) -> Part:
+    """A fit of some scenes to photographs of other ones."""
+    photos = [
+        measure_photo(Photo(f"{k}.png", photograph(one, truth).rgb, (320, 240), None))
+        for k, one in enumerate(exposures(range(1000, 1000 + count), truth))
+    ]
+    return fit_camera(exposures(range(scenes), base), photos, 0)
+
+
 @pytest.fixture(scope="module")
 def fitted() -> Part:
-    """A fit of 24 scenes to 30 photographs of other scenes."""
-    photos = [
-        measure_photo(Photo(f"{k}.png", photograph(one, TRUTH).rgb, (320, 240), None))
-        for k, one in enumerate(exposures(range(1000, 1030), TRUTH))
-    ]
-    return fit_camera(exposures(range(24), BASE), photos, 0)
+    return fit_to(TRUTH, 30, BASE, 24)
 
 
 def row(part: Part, name: str) -> FittedQuantity:
@@ -45,26 +49,17 @@ def row(part: Part, name: str) -> FittedQuantity:
 
 @pytest.mark.parametrize(
     ("name", "truth", "tolerance"),
-    [
-        ("exposure", -0.7, 0.2),
-        ("tone", 1.375, 0.15),
-        ("white balance", 0.3, 0.06),
-        ("saturation", 0.75, 0.1),
-        ("blur", 1.0, 0.06),
-        ("noise", 3000.0, 1000.0),
-    ],
-)
+    [("exposure", -0.7, 0.2), ("tone", 1.375, 0.15), ("white balance", 0.3, 0.06),
+     ("saturation", 0.75, 0.1), ("blur", 1.0, 0.06), ("noise", 3000.0, 1000.0)],
+)  # fmt: skip
 @pytest.mark.slow
-def test_known_parameters_are_recovered(
-    fitted: Part, name: str, truth: float, tolerance: float
-) -> None:
+def test_known_parameters_return(fitted: Part, name: str, truth: float, tolerance: float) -> None:
     """Within a tolerance, and within the stated interval.
 
     Six intervals of 95 % hold all six truths in 74 of 100 fits; Bonferroni's are 1.35 times
     as wide.
     """
     found = row(fitted, name)
-
     assert found.mean == pytest.approx(truth, abs=tolerance)
     assert found.low is not None
     assert found.high is not None
@@ -82,12 +77,7 @@ def test_read_noise_is_recovered() -> None:
     real = ImagePipeline.model_validate(
         {"preset": "industrial", "focus": None, "image_sensor": truth}
     )
-    photos = [
-        measure_photo(Photo(f"{k}.png", photograph(one, real).rgb, (320, 240), None))
-        for k, one in enumerate(exposures(range(1000, 1060), real))
-    ]
-    part = fit_camera(exposures(range(32), BASE), photos, 0)
-
+    part = fit_to(real, 60, BASE, 32)
     for name, value in (("read noise", 12.0), ("noise", 3000.0)):
         found = row(part, name)
         assert found.is_fitted
@@ -100,51 +90,40 @@ def test_read_noise_is_recovered() -> None:
 
 
 @pytest.mark.slow
-def test_a_spread_of_exposures_becomes_a_distribution(fitted: Part) -> None:
+def test_spread_of_exposures_and_jpeg_quality_are_found_and_pictures_nearer(fitted: Part) -> None:
     """Its deviation of 0.4 stops is told from that of scenes; blur, which has none, is a number."""
     found = row(fitted, "exposure")
-
     assert found.spread == pytest.approx(0.4, abs=0.12)
     assert found.value["normal"]["stddev"] == pytest.approx(found.spread, rel=1e-3)
     assert row(fitted, "blur").value == pytest.approx(1.0, abs=0.06)
-
-
-@pytest.mark.slow
-def test_qualities_of_jpeg_are_found_in_decoded_pixels(fitted: Part) -> None:
-    """Each of the two qualities, as often as it occurred."""
+    # Each of the two qualities, as often as it occurred.
     found = row(fitted, "JPEG quality").value["choice"]
-
     assert set(found) == {"92", "95"}
     assert sum(found.values()) == 30
-
-
-@pytest.mark.slow
-def test_simulated_pictures_come_nearer_to_the_real_ones(fitted: Part) -> None:
-    """Means of every fitted statistic, in units of the distance before; means have errors."""
+    # Means of every fitted statistic, in units of the distance before; means have errors.
     for one in fitted.statistics[:6]:
         before, after = (abs(group.mean() - one.real.mean()) for group in (one.before, one.after))
         error = math.hypot(*(g.std() / math.sqrt(len(g)) for g in (one.real, one.after)))
         assert after < 0.5 * before + error, one.name
 
 
-def test_without_photographs_nothing_is_fitted() -> None:
+def test_nothing_is_fitted_without_photographs_and_flat_ones_have_no_more() -> None:
     """The reason is in every row."""
     part = fit_camera(exposures([1], BASE), [], 0)
-
     assert not part.fields
     assert {one.note for one in part.quantities} == {"no photographs"}
+    # A grey card has a level and neither edges nor colours; black and white have no noise.
+    grey, black, white = (Picture(np.full((96, 128, 3), v, np.uint8)) for v in (118, 0, 255))
+    assert exposure.measure(grey) == pytest.approx(np.log2(0.1812 + 1.0 / 512.0), abs=0.01)
+    assert np.isnan(blur.measure(grey))
+    assert np.isnan(noise.measure(black))
+    assert np.isnan(noise.measure(white))
 
 
 @pytest.mark.slow
 def test_a_camera_without_sensor_gets_none_for_pictures_without_noise() -> None:
     """Nor a demosaicing, which would blur."""
-    ideal = ImagePipeline()
-    photos = [
-        measure_photo(Photo(f"{k}.png", photograph(one, ideal).rgb, (320, 240), None))
-        for k, one in enumerate(exposures(range(1000, 1008), ideal))
-    ]
-    part = fit_camera(exposures(range(8), ideal), photos, 0)
-
+    part = fit_to(ImagePipeline(), 8, ImagePipeline(), 8)
     assert not row(part, "noise").is_fitted
     assert "no noise" in row(part, "noise").note
     assert not any("image_sensor" in one.change.field for one in part.fields)
@@ -155,7 +134,6 @@ def test_quality_is_read_from_pixels_exactly(quality: int) -> None:
     """Quantised coefficients lie at multiples of the steps of one quality only."""
     (one,) = exposures([5], BASE)
     picture = photograph(one, BASE.model_copy(update={"jpeg_quality": Constant(float(quality))}))
-
     assert jpeg_quality.pixel_quality(picture) == quality
 
 
@@ -179,18 +157,7 @@ def test_quality_is_read_from_the_tables_of_a_file(quality: int) -> None:
     Image.fromarray(np.zeros((16, 16, 3), np.uint8)).save(stream, "JPEG", quality=quality)
     with Image.open(io.BytesIO(stream.getvalue())) as image:
         steps = np.array(image.quantization[0])  # type: ignore[attr-defined]
-
     assert jpeg_quality.table_quality(steps) == quality
-
-
-def test_statistics_of_flat_pictures_are_defined_or_missing() -> None:
-    """A grey card has a level and neither edges nor colours; black and white have no noise."""
-    grey, black, white = (Picture(np.full((96, 128, 3), v, np.uint8)) for v in (118, 0, 255))
-
-    assert exposure.measure(grey) == pytest.approx(np.log2(0.1812 + 1.0 / 512.0), abs=0.01)
-    assert np.isnan(blur.measure(grey))
-    assert np.isnan(noise.measure(black))
-    assert np.isnan(noise.measure(white))
 
 
 @pytest.mark.parametrize("stddev_px", [0.7, 1.0, 1.5, 2.5])
@@ -204,5 +171,4 @@ def test_blur_of_a_step_is_its_variance(stddev_px: float) -> None:
         cv2.GaussianBlur(wide, (0, 0), 10.0 * stddev_px), (128, 128), interpolation=cv2.INTER_AREA
     )
     picture = Picture(np.repeat(np.rint(step)[..., None], 3, axis=-1).astype(np.uint8))
-
     assert blur.measure(picture) == pytest.approx(stddev_px**2 + 1.0 / 12.0 + 1.0 / 3.0, rel=0.1)

@@ -8,15 +8,8 @@ import pytest
 from scipy.stats import norm
 
 from gen_data.core.se3 import Array
-from gen_data.lab.matching.indirect_inference import (
-    Axis,
-    direct_estimate,
-    estimate,
-    estimate_with_spread,
-    fit,
-    solve,
-    trimmed_mean,
-)
+from gen_data.lab.matching import indirect_inference as inference
+from gen_data.lab.matching.indirect_inference import Axis, estimate, solve, trimmed_mean
 
 AXIS = Axis(-10.0, 10.0, step=0.5, plausible=3.0, enough=0.1)
 AXES = (AXIS, AXIS)
@@ -47,21 +40,16 @@ def test_parameters_of_a_linear_model_are_found_within_their_intervals() -> None
         real = recordings(seed, 40, truth, np.zeros(2))
         found = estimate(real, solve(real, model(1000 + seed), AXES, np.zeros(2)), AXES)
         inside += [abs(one.mean - t) <= one.half_width for one, t in zip(found, truth, strict=True)]
-
     assert 0.90 <= np.mean(inside) <= 0.99
 
 
-def test_a_curved_statistic_is_solved_by_repeated_derivatives() -> None:
+def test_curved_statistics_are_solved_also_with_parameters_of_large_numbers() -> None:
     """The fourth power of the parameter, from a start where its slope is a tenth of the last."""
     scenes = np.random.default_rng(3).standard_normal((40, 1))
     real = 2.0**4 + np.random.default_rng(4).standard_normal((40, 1))
     solution = solve(real, lambda p, n: (p**4 + scenes)[:n], (AXIS,), np.array([1.0]))
-
     assert solution.parameters[0] == pytest.approx(2.0, abs=0.02)
-
-
-def test_a_parameter_of_large_numbers_does_not_end_the_search() -> None:
-    """Two parameters of a curved model, the second about 1000: both are found."""
+    # Two parameters of a curved model, the second about 1000: both are found.
     scenes = np.random.default_rng(20).standard_normal((40, 2))
     real = np.array([2.0**4, 1000.0]) + np.random.default_rng(21).standard_normal((40, 2))
 
@@ -69,7 +57,6 @@ def test_a_parameter_of_large_numbers_does_not_end_the_search() -> None:
         return np.asarray(np.array([parameters[0] ** 4, parameters[1]]) + scenes)[:count]
 
     solution = solve(real, simulate, AXES_OF_TWO_SIZES, np.array([1.0, 990.0]))
-
     assert solution.parameters[0] == pytest.approx(2.0, abs=0.02)
     assert solution.parameters[1] == pytest.approx(1000.0, abs=1.0)
 
@@ -81,11 +68,9 @@ def test_late_parameters_do_not_lead_the_search_into_a_valley() -> None:
     with every change. Without an order, the search ends far from the contrast of the recordings.
     """
     truth, start = np.array([0.0, 11.55, 3.58]), np.array([0.0, 15.0, 2.8])
-    axes = [
-        Axis(-2.0, 2.0, step=0.2, plausible=0.6, enough=0.1),
-        Axis(5.0, 20.0, step=1.0, plausible=4.0, enough=0.1, late=True),
-        Axis(-2.0, 8.0, step=0.5, plausible=2.0, enough=0.1, late=True),
-    ]
+    axes = [Axis(-2.0, 2.0, step=0.2, plausible=0.6, enough=0.1),
+            Axis(5.0, 20.0, step=1.0, plausible=4.0, enough=0.1, late=True),
+            Axis(-2.0, 8.0, step=0.5, plausible=2.0, enough=0.1, late=True)]  # fmt: skip
 
     def simulate(parameters: Array, count: int, seed: int = 0) -> Array:
         contrast, well, read = parameters
@@ -105,13 +90,35 @@ def test_late_parameters_do_not_lead_the_search_into_a_valley() -> None:
     assert abs(at_once[0] - contrast) > 0.02
 
 
-def test_spread_between_recordings_is_told_from_that_of_scenes() -> None:
+def test_spread_of_recordings_makes_the_interval_which_few_widen() -> None:
     """The first parameter has deviation 0.5, the second none."""
     real = recordings(5, 200, np.array([1.0, 1.0]), np.array([0.5, 0.0]))
     first, second = estimate(real, solve(real, model(6, 200), AXES, np.zeros(2)), AXES)
-
     assert first.spread == pytest.approx(0.5, abs=0.08)
     assert second.spread == 0.0
+    # Student's quantile for a single degree of freedom is 6.5 times the normal one.
+    truth = np.array([1.0, 1.0])
+    widths = []
+    for n in (2, 5, 20, 80):
+        real = recordings(9, n, truth, np.full(2, 0.5))
+        widths.append(estimate(real, solve(real, model(10), AXES, np.zeros(2)), AXES)[0].half_width)
+    alone = recordings(9, 1, truth, np.zeros(2))
+    (single, _) = estimate(alone, solve(alone, model(10), AXES, np.zeros(2)), AXES)
+    assert widths == sorted(widths, reverse=True)
+    assert single.half_width == np.inf
+    assert single.n_enough is None
+    # A set of the number that a small one asks for has about the half width of its axis.
+    axis = replace(AXIS, enough=0.05)
+    few = np.random.default_rng(11).standard_normal(30)
+    asked = inference.direct_estimate(few, axis).n_enough
+    assert asked is not None
+    many = inference.direct_estimate(np.random.default_rng(12).standard_normal(asked), axis)
+    assert many.half_width == pytest.approx(axis.enough, rel=0.35)
+    # One of ten is left out at either end.
+    values = np.array(
+        [[1.0], [2.0], [3.0], [np.nan], [2.0], [2.0], [1e9], [-1e9], [3.0], [1.0], [2.0]]
+    )
+    assert trimmed_mean(values)[0] == pytest.approx(2.0)
 
 
 def test_spread_shifts_the_mean_of_a_curved_statistic_but_not_the_fit() -> None:
@@ -125,7 +132,7 @@ def test_spread_shifts_the_mean_of_a_curved_statistic_but_not_the_fit() -> None:
         return np.asarray(np.exp(parameters) + scenes[:count])
 
     constant = solve(real, simulate, (AXIS,), start).parameters[0]
-    (found,) = estimate_with_spread(real, simulate, (AXIS,), start)
+    (found,) = inference.estimate_with_spread(real, simulate, (AXIS,), start)
 
     assert constant > 1.06
     assert found.mean == pytest.approx(1.0, abs=0.03)
@@ -141,43 +148,8 @@ def test_a_parameter_without_effect_is_not_determined_and_keeps_its_value() -> N
         full[list(positions)] = parameters  # type: ignore[call-overload]
         return (noise + full * (1.0, 0.0))[:count][:, list(positions)]  # type: ignore[call-overload]
 
-    found = fit(real, simulate, AXES, np.zeros(2), [0, 1])
+    found = inference.fit(real, simulate, AXES, np.zeros(2), [0, 1])
 
     assert found[0].determined
     assert found[0].mean == pytest.approx(3.0, abs=0.3)
     assert not found[1].determined
-
-
-def test_fewer_recordings_have_wider_intervals_and_one_has_none() -> None:
-    """Student's quantile for a single degree of freedom is 6.5 times the normal one."""
-    truth = np.array([1.0, 1.0])
-    widths = []
-    for n in (2, 5, 20, 80):
-        real = recordings(9, n, truth, np.full(2, 0.5))
-        widths.append(estimate(real, solve(real, model(10), AXES, np.zeros(2)), AXES)[0].half_width)
-    alone = recordings(9, 1, truth, np.zeros(2))
-    (single, _) = estimate(alone, solve(alone, model(10), AXES, np.zeros(2)), AXES)
-
-    assert widths == sorted(widths, reverse=True)
-    assert single.half_width == np.inf
-    assert single.n_enough is None
-
-
-def test_enough_recordings_give_the_interval_that_is_enough() -> None:
-    """A set of the number that a small one asks for has about the half width of its axis."""
-    axis = replace(AXIS, enough=0.05)
-    few = np.random.default_rng(11).standard_normal(30)
-    asked = direct_estimate(few, axis).n_enough
-    assert asked is not None
-    many = direct_estimate(np.random.default_rng(12).standard_normal(asked), axis)
-
-    assert many.half_width == pytest.approx(axis.enough, rel=0.35)
-
-
-def test_extremes_and_missing_values_do_not_move_a_mean() -> None:
-    """One of ten is left out at either end."""
-    values = np.array(
-        [[1.0], [2.0], [3.0], [np.nan], [2.0], [2.0], [1e9], [-1e9], [3.0], [1.0], [2.0]]
-    )
-
-    assert trimmed_mean(values)[0] == pytest.approx(2.0)

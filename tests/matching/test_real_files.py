@@ -21,9 +21,7 @@ def save(path: Path, width: int = 96, height: int = 80, mode: str = "RGB", **opt
 
 
 @pytest.mark.slow
-def test_photographs_are_read_and_all_else_is_counted_with_reasons(
-    tmp_path: Path,
-) -> None:
+def test_photographs_are_read_and_all_else_is_counted_with_reasons(tmp_path: Path) -> None:
     """Damaged, tiny, grey and label images; depth folders and second links are no photographs."""
     save(tmp_path / "a.png")
     save(tmp_path / "deep" / "b.JPG", width=200, quality=80)
@@ -34,21 +32,15 @@ def test_photographs_are_read_and_all_else_is_counted_with_reasons(
     (tmp_path / "broken.jpg").write_bytes(b"\xff\xd8 no image")
     (tmp_path / "linked.png").hardlink_to(tmp_path / "a.png")
     inventory = real_files.Inventory()
-
     photos = list(real_files.read_photos(real_files.find_files(tmp_path), 100, inventory))
-
     assert [photo.name for photo in photos] == ["a.png", "deep/b.JPG"]
     assert photos[0].quantisation is None
     assert photos[1].quantisation is not None
     assert photos[1].size_px == (200, 80)
     assert inventory.used["photographs"] == 2
     reasons = {why.split(" (")[0]: n for (_, why), n in inventory.skipped.items()}
-    assert reasons == {
-        "unreadable image": 1,
-        "smaller than 64 px": 1,
-        "without colours": 1,
-        "a label or depth image": 1,
-    }
+    assert reasons == {"unreadable image": 1, "smaller than 64 px": 1, "without colours": 1,
+                       "a label or depth image": 1}  # fmt: skip
     table = inventory_rows(inventory)
     assert table[0] == ("photographs", "6", "2", "4", "1 of 96 x 80 px, 1 of 200 x 80 px")
 
@@ -57,22 +49,16 @@ def test_large_photographs_are_cropped_to_their_middle_on_the_grid_of_jpeg(tmp_p
     """Four megapixels remain; the size of the whole is kept."""
     save(tmp_path / "large.png", width=4000, height=3000)
     (photo,) = real_files.read_photos(real_files.find_files(tmp_path), 1, real_files.Inventory())
-
     assert photo.size_px == (4000, 3000)
     assert 3.9e6 < photo.rgb.shape[0] * photo.rgb.shape[1] <= 4.0e6
     assert photo.rgb.shape[0] % 8 == photo.rgb.shape[1] % 8 == 0
 
 
-def test_a_limit_chooses_files_evenly() -> None:
-    """From the first on, at equal distances."""
+def test_a_limit_chooses_files_evenly_and_folders_without_any_are_refused(tmp_path: Path) -> None:
+    """From the first on, at equal distances. The message names what was expected."""
     files = [Path(str(k)) for k in range(10)]
-
     assert real_files.choose_evenly(files, 4) == [files[0], files[2], files[5], files[7]]
     assert real_files.choose_evenly(files, 100) == files
-
-
-def test_folders_without_recordings_are_refused(tmp_path: Path) -> None:
-    """The message names what was expected."""
     with pytest.raises(StorageError, match="is no folder"):
         real_files.find_files(tmp_path / "absent")
     (tmp_path / "notes.txt").write_text("nothing")
@@ -105,9 +91,7 @@ def test_scans_of_every_format_have_the_same_points(tmp_path: Path, name: str) -
         ring = np.zeros((len(flat), 1), "<f4")
         five = np.hstack([flat, ring]) if name == "scan.pcd.bin" else flat
         (tmp_path / name).write_bytes(five.astype("<f4").tobytes())
-
     (scan,) = real_files.read_scans(real_files.find_files(tmp_path), 10, real_files.Inventory())
-
     np.testing.assert_allclose(scan.range_m, np.linalg.norm(flat[:, :3], axis=1), rtol=1e-5)
     np.testing.assert_allclose(scan.intensity, flat[:, 3], rtol=1e-5)
 
@@ -138,7 +122,6 @@ def test_bytes_of_intensity_become_shares(tmp_path: Path) -> None:
     flat.tofile(tmp_path / "a.bin")
     inventory = real_files.Inventory()
     (scan,) = real_files.read_scans(real_files.find_files(tmp_path), 10, inventory)
-
     np.testing.assert_allclose(scan.intensity, 0.2)
     assert inventory.notes["scans"] == "intensities of 1 divided by 255"
 
@@ -159,11 +142,9 @@ def test_boxes_of_coco_and_kitti_are_the_same(tmp_path: Path) -> None:
     line = "Car 0 0 0 10 20 40 60 1 1 1 0 0 9 0\nDontCare -1 -1 -10 0 0 9 9 -1 -1 -1 -1 -1 -1 -1\n"
     (kitti / "label_2" / "a.txt").write_text(line)
     save(kitti / "a.png")
-
     (one,) = real_files.read_labels(real_files.find_files(coco), {}, real_files.Inventory())
     (two,) = real_files.read_labels(
         real_files.find_files(kitti), {"a.png": (96, 80)}, real_files.Inventory()
     )
-
     assert one == two
     assert one.boxes == (("Car", 10.0, 20.0, 31.0, 41.0),)

@@ -73,7 +73,7 @@ def made(config: Path, data: Path, results: Path) -> Round:
 
 
 @pytest.mark.slow
-def test_the_next_round_draws_more_of_what_was_missed(made: Round) -> None:
+def test_the_next_round_draws_more_of_what_was_missed(made: Round, results: Path) -> None:
     """Only the distance changes; the file loads, and most of its weight is beyond 1.2 m."""
     assert made.changed == ("orbit.distance_m",)
     document = yaml.safe_load(made.config.read_text())
@@ -84,16 +84,17 @@ def test_the_next_round_draws_more_of_what_was_missed(made: Round) -> None:
     loaded = load_config(str(made.config))
     (distance,) = [r for r in loaded.probes[0].randomizers if r.name == "orbit"]
     assert distance.distance_m.support() == (0.9, 1.5)
+    # So that results of a part of the data set, or of another one, show.
+    images = {row["image_id"] for row in json.loads(results.read_text())}
+    assert made.images == (len(images), 40)
+    assert tabulate(made, 1.0)["note"].endswith(f"{len(images)} of 40 images have detections")
 
 
 @pytest.mark.slow
-def test_the_same_input_writes_the_same_bytes(
-    config: Path, data: Path, results: Path, made: Round
-) -> None:
+def test_equal_input_equal_bytes(config: Path, data: Path, results: Path, made: Round) -> None:
     """Of the configuration and of the curriculum, which names what was judged."""
     first, second = made.config.parent, made.config.parent.with_name("again")
     adapt(str(config), data, second, results=results)
-
     for name in ("round_1.yaml", "curriculum.yaml"):
         assert (first / name).read_bytes() == (second / name).read_bytes()
     (entry,) = yaml.safe_load((first / "curriculum.yaml").read_text())["rounds"]
@@ -112,9 +113,7 @@ def test_a_second_round_extends_the_first(made: Round, tmp_path: Path) -> None:
     gen_data.generate(str(first), 20, out=judged, workers=0)
     path = tmp_path / "second.json"
     path.write_text(json.dumps(weak_results(judged)))
-
     second = adapt(str(first), judged, rounds_folder, results=path)
-
     assert second.config.name == "round_2.yaml"
     assert yaml.safe_load(second.config.read_text())["extends"] == "round_1.yaml"
     rounds = yaml.safe_load((rounds_folder / "curriculum.yaml").read_text())["rounds"]
@@ -122,45 +121,31 @@ def test_a_second_round_extends_the_first(made: Round, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_results_of_another_data_set_are_refused_by_its_id(
-    config: Path, data: Path, tmp_path: Path
-) -> None:
-    """Where the file names its data set."""
-    path = tmp_path / "other.json"
-    path.write_text(json.dumps({"dataset": "0123456789abcdef", "results": []}))
-
-    with pytest.raises(ConfigError) as caught:
-        adapt(str(config), data, tmp_path / "out", results=path)
-
-    assert str(caught.value) == (
-        f"{path}: has results of the data set 0123456789abcdef; expected those of "
-        f"{StoredSamples(data).dataset_id} in {data}"
-    )
-    assert not (tmp_path / "out").exists()
-
-
-@pytest.mark.slow
-def test_results_in_images_that_the_data_set_lacks_are_refused(
+def test_what_a_detector_cannot_be_judged_by_is_refused(
     config: Path, data: Path, results: Path, tmp_path: Path
 ) -> None:
-    """A plain list names no data set; forty samples have the images 1 to 40."""
+    """Results of other data and of other images than 1 to 40, and the truth, without a miss."""
     rows = json.loads(results.read_text())
-    path = tmp_path / "other.json"
-    path.write_text(json.dumps([*rows, rows[0] | {"image_id": 41}]))
+    truth = json.loads((data / "coco/annotations/instances_train.json").read_text())["annotations"]
+    path, none = tmp_path / "other.json", tmp_path / "none"
+    name = StoredSamples(data).dataset_id
+    another = f"^{path}: has results of the data set 0123456789abcdef; expected those of {name} in "
+    for content, fact in (
+        ({"dataset": "0123456789abcdef", "results": []}, rf"{another}{data}$"),
+        ([*rows, rows[0] | {"image_id": 41}], "of another data set: the image_id 41 is not in"),
+        ([r | {"score": 1.0} for r in truth], r"found all \d+ objects; expected misses to learn"),
+    ):
+        path.write_text(json.dumps(content))
+        with pytest.raises(ConfigError, match=fact):
+            adapt(str(config), data, tmp_path / "out", results=path)
+        assert not (tmp_path / "out").exists()
+    # A folder that is no data set is not looked for among configurations.
+    with pytest.raises(StorageError, match="there is no folder"):
+        adapt(str(config), none, tmp_path, results=none)
+    with pytest.raises(ConfigError, match=r"not generated from tabletop: the sections .*sensors"):
+        adapt("tabletop.yaml", data, tmp_path, results=none)
 
-    with pytest.raises(ConfigError, match="of another data set: the image_id 41 is not in"):
-        adapt(str(config), data, tmp_path / "out", results=path)
 
-
-@pytest.mark.slow
-def test_a_round_says_in_how_many_images_something_was_detected(made: Round, results: Path) -> None:
-    """So that results of a part of the data set, or of another one, show."""
-    images = {row["image_id"] for row in json.loads(results.read_text())}
-    assert made.images == (len(images), 40)
-    assert tabulate(made, 1.0)["note"].endswith(f"{len(images)} of 40 images have detections")
-
-
-@pytest.mark.slow
 @pytest.mark.slow
 @pytest.mark.parametrize("content", [b"[]", b"", b"PK"])
 def test_a_file_that_is_no_detector_is_refused(
@@ -169,38 +154,8 @@ def test_a_file_that_is_no_detector_is_refused(
     """With what was expected, and not with torch's own words alone."""
     path = tmp_path / "detector.pt"
     path.write_bytes(content)
-
     with pytest.raises(ConfigError, match=r"cannot be read as a detector .* expected a file"):
         adapt(str(config), data, tmp_path / "out", detector=path)
-
-
-def test_a_folder_that_is_no_data_set_is_refused(config: Path, tmp_path: Path) -> None:
-    """It is not looked for among configurations."""
-    with pytest.raises(StorageError, match="there is no folder"):
-        adapt(str(config), tmp_path / "none", tmp_path, results=tmp_path / "none.json")
-
-
-@pytest.mark.slow
-def test_a_data_set_of_another_configuration_is_refused(data: Path, tmp_path: Path) -> None:
-    """With the sections that differ."""
-    with pytest.raises(
-        ConfigError, match=r"was not generated from tabletop: the sections .*sensors"
-    ):
-        adapt("tabletop.yaml", data, tmp_path, results=tmp_path / "none.json")
-
-
-@pytest.mark.slow
-def test_a_detector_that_misses_nothing_teaches_nothing(
-    config: Path, data: Path, tmp_path: Path
-) -> None:
-    """The truth as results."""
-    truth = json.loads((data / "coco/annotations/instances_train.json").read_text())
-    rows = [row | {"score": 1.0} for row in truth["annotations"]]
-    path = tmp_path / "perfect.json"
-    path.write_text(json.dumps(rows))
-
-    with pytest.raises(ConfigError, match=r"found all \d+ objects; expected misses to learn from"):
-        adapt(str(config), data, tmp_path / "out", results=path)
 
 
 @pytest.fixture(scope="module")
@@ -227,9 +182,7 @@ def test_results_of_every_colour_camera_count(pair: tuple[Path, Path], tmp_path:
     found = [row for row in rows if sensors[row["image_id"]] == "behind"]
     path = tmp_path / "results.json"
     path.write_text(json.dumps(found))
-
     made = adapt(str(config), data, tmp_path / "out", results=path)
-
     assert made.images == (len({row["image_id"] for row in found}), 24)
     assert made.recall == pytest.approx(len(found) / len(rows))
 
@@ -241,7 +194,5 @@ def test_the_size_of_shards_is_no_part_of_what_was_drawn(
     """A set of the same scenes in other shards is of the same configuration."""
     other = tmp_path / "other.yaml"
     other.write_text(f"extends: {config}\nshard_size: 7\n")
-
     made = adapt(str(other), data, tmp_path / "out", results=results)
-
     assert made.changed == ("orbit.distance_m",)

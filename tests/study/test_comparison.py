@@ -30,7 +30,6 @@ def test_95_of_100_intervals_hold_the_true_difference(
     for _ in range(3000):
         found = interval(simulate(rng, 0.1, by_pictures, by_seeds, seeds))
         held += found.low <= 0.1 <= found.high
-
     assert 2850 - 4.0 * np.sqrt(3000 * 0.95 * 0.05) < held < 2940
 
 
@@ -48,7 +47,6 @@ def test_few_pictures_have_intervals_that_hold_the_truth_all_the_same(pictures: 
         scores = Scores(np.array([values.mean()]), resampled[None], pictures)
         found = interval(scores)
         held += found.low <= 0.3 <= found.high
-
     assert abs(held - 1500 * 0.95) < 4.0 * np.sqrt(1500 * 0.95 * 0.05)
 
 
@@ -57,26 +55,20 @@ def test_false_alarms_are_at_most_as_frequent_as_p_says(alpha: float) -> None:
     """2,000 experiments in which nothing differs, at four standard deviations."""
     rng = np.random.default_rng(2)
     alarms = sum(interval(simulate(rng, 0.0, 0.02, 0.02, 3)).p < alpha for _ in range(2000))
-
     assert alarms < 2000 * alpha + 4.0 * np.sqrt(2000 * alpha * (1.0 - alpha))
     assert alarms > 2000 * alpha / 8.0
 
 
-def test_the_interval_of_a_difference_ignores_what_is_hard_for_both() -> None:
+def test_intervals_of_differences_are_paired_and_p_adjusted_as_holm_does() -> None:
     """Pictures that are hard for both variants move both scores together."""
     rng = np.random.default_rng(3)
     common = rng.normal(0.0, 0.1, 200)
     first = Scores(np.array([0.5]), (0.5 + common)[None])
     second = Scores(np.array([0.52]), (0.52 + common + rng.normal(0.0, 0.001, 200))[None])
-
     alone, paired = interval(second), interval(second - first)
-
     assert alone.high - alone.low > 0.3
     assert paired.high - paired.low < 0.005
     assert paired.mean == pytest.approx(0.02)
-
-
-def test_values_of_p_are_adjusted_as_holm_does() -> None:
-    """The example of the article "Holm-Bonferroni method" of Wikipedia."""
+    # The example of the article "Holm-Bonferroni method" of Wikipedia.
     assert adjust([0.01, 0.04, 0.03, 0.005]) == pytest.approx([0.03, 0.06, 0.06, 0.02])
     assert adjust([]) == []

@@ -21,7 +21,6 @@ def test_the_focal_loss_has_the_slope_of_its_formula() -> None:
     truths = [replace(t, heat=t.heat.double(), counts=t.counts.double()) for t in truths]
     logits = torch.randn((2, 3, 24, 24), dtype=torch.float64, generator=torch.manual_seed(0))
     first, second = logits.clone().requires_grad_(), logits.clone().requires_grad_()
-
     heat = torch.stack([truth.heat for truth in truths])
     counts = torch.stack([truth.counts for truth in truths])[:, None]
     p, is_centre = torch.sigmoid(first), heat == 1.0
@@ -31,6 +30,5 @@ def test_the_focal_loss_has_the_slope_of_its_formula() -> None:
     (3.0 * expected).backward()
     found = CentreLoss.apply(second, truths)
     (3.0 * found).backward()
-
     assert found.item() == pytest.approx(expected.item(), rel=1e-12)
     torch.testing.assert_close(second.grad, first.grad, rtol=1e-9, atol=1e-12)

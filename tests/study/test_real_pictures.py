@@ -24,14 +24,10 @@ def test_cocos_boxes_crowds_and_occlusion_are_read(tmp_path: Path) -> None:
         tmp_path,
         [[{"bbox": [1, 2, 10, 20], "occlusion": 0.7}, {"bbox": [5, 5, 4, 4], "iscrowd": 1}], []],
     )
-
     real = read_real(tmp_path)
-
     assert real.category_ids == {"cup": 7, "plate": 3}
-    assert [(p.image_id, p.size_px, len(p.objects)) for p in real.pictures] == [
-        (10, (64, 48), 2),
-        (11, (64, 48), 0),
-    ]
+    sizes = [(p.image_id, p.size_px, len(p.objects)) for p in real.pictures]
+    assert sizes == [(10, (64, 48), 2), (11, (64, 48), 0)]
     assert real.pictures[0].objects == (
         RealObject("cup", (1, 2, 11, 22), False, "largely occluded"),
         RealObject("cup", (5, 5, 9, 9), True, ""),
@@ -43,19 +39,11 @@ def test_kittis_inclusive_sides_and_regions_are_read(tmp_path: Path) -> None:
     write_picture(tmp_path / "training/image_2/000007.png")
     (tmp_path / "training/label_2").mkdir()
     (tmp_path / "training/label_2/000007.txt").write_text(LABELS)
-
     real = read_real(tmp_path).restrict(["car", "cyclist"])
-
     (picture,) = real.pictures
+    solid = UprightBox((1.5, 1.6, 3.9), (1.0, 1.7, 20.0), -1.5)
     assert picture.objects == (
-        RealObject(
-            "car",
-            (10, 12, 30, 32),
-            False,
-            "partly occluded",
-            0.0,
-            UprightBox((1.5, 1.6, 3.9), (1.0, 1.7, 20.0), -1.5),
-        ),
+        RealObject("car", (10, 12, 30, 32), False, "partly occluded", 0.0, solid),
         RealObject("", (0, 0, 10, 10), True, ""),
     )
     assert real.skipped == {"object of class 'Pedestrian', which the configuration lacks": 1}
@@ -70,9 +58,7 @@ def test_kittis_scans_belong_to_their_frames_and_missing_ones_are_counted(tmp_pa
         write_picture(tmp_path / f"image_2/{name}.png")
         (tmp_path / f"label_2/{name}.txt").write_text(LABELS)
     (tmp_path / "velodyne/000001.bin").write_bytes(b"")
-
     real = read_real(tmp_path)
-
     assert [p.scan for p in real.pictures] == [None, tmp_path / "velodyne/000001.bin"]
     assert real.skipped == {"scan that is missing": 1}
 
@@ -82,7 +68,6 @@ def test_of_cocos_own_folder_the_instances_are_read(tmp_path: Path) -> None:
     source = write_coco(tmp_path / "coco", [[{"bbox": [1, 2, 10, 20]}]])
     (source.parent / "captions_val.json").write_text('{"images": [], "annotations": []}')
     (tmp_path / "plan.json").write_text('{"randomizers": [{"images": ["indoor"]}]}')
-
     assert read_real(tmp_path).source == source
 
 
@@ -95,19 +80,13 @@ def test_yolos_boxes_and_polygons_are_read_in_pixels(tmp_path: Path) -> None:
     (tmp_path / "labels/train/0.txt").write_text("1 0.5 0.5 0.25 0.5\n")
     (tmp_path / "labels/train/1.txt").write_text("0 0.25 0 0.5 0.5 0.125 0.75\n")
     (tmp_path / "labels/train/9.txt").write_text("0 0.5 0.5 0.1 0.1\n")
-
     real = read_real(tmp_path)
-
     assert [p.objects for p in real.pictures] == [
-        (RealObject("plate", (24, 12, 40, 36)),),
-        (RealObject("cup", (8, 0, 32, 36)),),
-        (),
-    ]
+        (RealObject("plate", (24, 12, 40, 36)),), (RealObject("cup", (8, 0, 32, 36)),), (),
+    ]  # fmt: skip
     assert (real.layout, real.category_ids) == ("yolo", {"cup": 1, "plate": 2})
-    assert real.skipped == {
-        "image without a label file, read as one without objects": 1,
-        "image that is missing": 1,
-    }
+    assert real.skipped == {"image without a label file, read as one without objects": 1,
+                            "image that is missing": 1}  # fmt: skip
 
 
 def test_yolos_rows_with_keypoints_begin_with_the_box(tmp_path: Path) -> None:
@@ -116,22 +95,37 @@ def test_yolos_rows_with_keypoints_begin_with_the_box(tmp_path: Path) -> None:
     (tmp_path / "labels").mkdir()
     (tmp_path / "data.yaml").write_text("kpt_shape: [1, 2]\nnames: [cup]\n")
     (tmp_path / "labels/0.txt").write_text("0 0.5 0.5 0.25 0.5 0.5 0.5\n")
-
     (picture,) = read_real(tmp_path).pictures
-
     assert picture.objects == (RealObject("cup", (24, 12, 40, 36)),)
 
 
-@pytest.mark.parametrize(
-    ("row", "fact"),
-    [("2 0.5 0.5 0.1 0.1", "class 2, expected 0 to 1"), ("0 0.5 0.5 0.1", "4 columns")],
-)
-def test_a_wrong_row_of_yolo_is_named(row: str, fact: str, tmp_path: Path) -> None:
-    write_picture(tmp_path / "a.png")
-    (tmp_path / "classes.txt").write_text("cup\nplate\n")
-    (tmp_path / "a.txt").write_text(f"0 0.5 0.5 0.1 0.1\n{row}\n")
+CUPS = {"classes.txt": "cup\nplate\n", "a.png": ""}
 
-    with pytest.raises(StorageError, match=rf"a\.txt:2: not a label in YOLO's format: {fact}"):
+
+@pytest.mark.parametrize(
+    ("files", "fact"),
+    [
+        ({**CUPS, "a.txt": "0 0.5 0.5 0.1 0.1\n2 0.5 0.5 0.1 0.1\n"},
+         r"a\.txt:2: not a label in YOLO's format: class 2, expected 0 to 1"),
+        ({**CUPS, "a.txt": "0 0.5 0.5 0.1 0.1\n0 0.5 0.5 0.1\n"},
+         r"a\.txt:2: not a label in YOLO's format: 4 columns"),
+        ({"image_2/1.png": "", "label_2/1.txt": "Car 0 0 0 1 2 3 4\nCar 0 0 0 1 2\n"},
+         r"1\.txt:2: not a label in KITTI's format"),
+        *(({"Annotations/7.xml": text}, r"7\.xml: not annotations in VOC's format")
+          for text in ("<annotation>", "<annotation><object/></annotation>")),
+        *(({"annotations/x.json": text}, r"x\.json: not annotations in COCO's format")
+          for text in ("[]", "{", '{"images": [], "categories": []}')),
+    ],
+)  # fmt: skip
+def test_a_wrong_label_is_named_by_line(files: dict[str, str], fact: str, tmp_path: Path) -> None:
+    """Not a traceback."""
+    for name, text in files.items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        if name.endswith(".png"):
+            write_picture(tmp_path / name)
+        else:
+            (tmp_path / name).write_text(text)
+    with pytest.raises(StorageError, match=fact):
         read_real(tmp_path)
 
 
@@ -150,72 +144,34 @@ def test_vocs_boxes_and_flags_are_read(tmp_path: Path) -> None:
     write_picture(folder / "JPEGImages/7.png")
     (folder / "Annotations").mkdir()
     (folder / "Annotations/7.xml").write_text(VOC)
-
     real = read_real(tmp_path)
-
-    assert (real.layout, [p.objects for p in real.pictures]) == (
-        "voc",
-        [
-            (
-                RealObject("cup", (0, 2, 20, 30), truncation=1.0),
-                RealObject("cup", (4, 4, 5, 5), True, "partly occluded"),
-            )
-        ],
-    )
+    assert real.layout == "voc"
+    assert [p.objects for p in real.pictures] == [
+        (RealObject("cup", (0, 2, 20, 30), truncation=1.0),
+         RealObject("cup", (4, 4, 5, 5), True, "partly occluded"))
+    ]  # fmt: skip
 
 
-@pytest.mark.parametrize("text", ["<annotation>", "<annotation><object/></annotation>"])
-def test_a_file_that_is_not_vocs_is_named(text: str, tmp_path: Path) -> None:
-    (tmp_path / "Annotations").mkdir()
-    (tmp_path / "Annotations/7.xml").write_text(text)
-
-    with pytest.raises(StorageError, match=r"7\.xml: not annotations in VOC's format"):
-        read_real(tmp_path)
-
-
-def test_a_largest_number_of_pictures_is_chosen_evenly(tmp_path: Path) -> None:
-    """And all files of COCO are read, if asked."""
-    write_coco(tmp_path, [[{"bbox": [1, 2, 10, 20]}] for _ in range(4)])
-
-    real = read_real(tmp_path, None, most=2)
-
-    assert [p.image_id for p in real.pictures] == [10, 12]
-    assert real.skipped == {"picture beyond the largest number": 2}
-
-
-def test_labels_without_any_image_are_refused(tmp_path: Path) -> None:
-    write_coco(tmp_path, [[{"bbox": [1, 2, 10, 20]}]])
-    (tmp_path / "images/0.png").unlink()
-
-    with pytest.raises(StorageError, match=r"no picture can be used \(1 x image that is missing\)"):
-        read_real(tmp_path)
-
-
-def test_what_cannot_be_used_is_counted(tmp_path: Path) -> None:
-    """A missing image, a damaged one, an empty box."""
-    write_coco(tmp_path, [[{"bbox": [1, 2, 10, 20]}, {"bbox": [1, 2, 0, 20]}], [], []])
+def test_what_cannot_be_used_is_counted_and_the_rest_chosen_evenly(tmp_path: Path) -> None:
+    """A missing image, a damaged one, one of another size than COCO's file states, an empty box."""
+    box = {"bbox": [1, 2, 10, 20]}
+    write_coco(tmp_path, [[box, {"bbox": [1, 2, 0, 20]}], [], [], [box], [box], [], [box]])
     (tmp_path / "images/1.png").unlink()
     (tmp_path / "images/2.png").write_bytes(b"no image")
-
-    real = read_real(tmp_path)
-
-    assert [p.image_id for p in real.pictures] == [10]
-    assert real.skipped == {
-        "image that is missing": 1,
-        "image that cannot be read": 1,
-        "object with an empty box": 1,
-    }
-
-
-def test_an_image_that_was_resized_since_it_was_labelled_is_left_out(tmp_path: Path) -> None:
-    """Its boxes are those of the size that COCO's file states."""
-    write_coco(tmp_path, [[{"bbox": [1, 2, 10, 20]}], [{"bbox": [1, 2, 10, 20]}]])
-    write_picture(tmp_path / "images/1.png", (32, 24))
-
-    real = read_real(tmp_path)
-
-    assert [p.image_id for p in real.pictures] == [10]
-    assert real.skipped == {"image of another size than its labels state": 1}
+    write_picture(tmp_path / "images/5.png", (32, 24))
+    whole, some = read_real(tmp_path), read_real(tmp_path, None, most=2)
+    assert [p.image_id for p in whole.pictures] == [10, 13, 14, 16]
+    assert whole.skipped == {"image that is missing": 1, "image that cannot be read": 1,
+                             "object with an empty box": 1,
+                             "image of another size than its labels state": 1}  # fmt: skip
+    assert [p.image_id for p in some.pictures] == [10, 13]
+    assert some.skipped == {"picture beyond the largest number": 5, "object with an empty box": 1}
+    for k in range(7):
+        (tmp_path / f"images/{k}.png").unlink(missing_ok=True)
+    with pytest.raises(
+        StorageError, match=r"no picture can be used .*, 7 x image that is missing\)"
+    ):
+        read_real(tmp_path)
 
 
 def test_one_picture_and_pictures_without_objects_cannot_judge(tmp_path: Path) -> None:
@@ -224,7 +180,6 @@ def test_one_picture_and_pictures_without_objects_cannot_judge(tmp_path: Path) -
     (tmp_path / "images/1.png").unlink()
     with pytest.raises(ConfigError, match=r"1 picture can be .* \(skipped: 1 x image that is miss"):
         check_judges(read_real(tmp_path))
-
     write_coco(tmp_path, [[], [{"bbox": [5, 5, 4, 4], "iscrowd": 1}]])
     with pytest.raises(ConfigError, match="has no labelled object"):
         check_judges(read_real(tmp_path))
@@ -234,7 +189,6 @@ def test_a_folder_without_labels_is_refused(tmp_path: Path) -> None:
     """With both layouts that are looked for."""
     with pytest.raises(ConfigError) as caught:
         read_real(tmp_path)
-
     assert str(caught.value) == (
         f"{tmp_path}: there are no labels; expected annotations/*.json in COCO's format, label_2 "
         "and image_2 in KITTI's, labels and data.yaml in YOLO's, or Annotations and JPEGImages "
@@ -242,46 +196,19 @@ def test_a_folder_without_labels_is_refused(tmp_path: Path) -> None:
     )
 
 
-def test_other_class_names_are_refused_with_both_lists(tmp_path: Path) -> None:
-    """And a remedy."""
+def test_other_class_names_and_a_split_without_a_file_are_refused(tmp_path: Path) -> None:
+    """And a remedy. The validation set is the default."""
     path = write_coco(tmp_path, [[{"bbox": [1, 2, 10, 20]}]])
-
     with pytest.raises(ConfigError) as caught:
         read_real(tmp_path).restrict(["car", "tram"])
-
     assert str(caught.value) == (
         f"{path}: has no object of the classes car, tram; it has cup: give the configuration a "
         "label map with these names"
     )
-
-
-def test_several_annotation_files_need_a_split(tmp_path: Path) -> None:
-    """The validation set is the default."""
     write_coco(tmp_path, [[{"bbox": [1, 2, 10, 20]}]])
     source = tmp_path / "annotations/instances_val.json"
     (tmp_path / "annotations/instances_train.json").write_text(source.read_text())
-
     assert read_real(tmp_path).source == source
     assert read_real(tmp_path, "train").source.name == "instances_train.json"
     with pytest.raises(ConfigError, match="expected one annotation file, or a split that names"):
         read_real(tmp_path, "test")
-
-
-@pytest.mark.parametrize("text", ["[]", "{", '{"images": [], "categories": []}'])
-def test_a_file_that_is_no_annotation_file_is_named(text: str, tmp_path: Path) -> None:
-    """Not a traceback."""
-    (tmp_path / "annotations").mkdir()
-    (tmp_path / "annotations/x.json").write_text(text)
-
-    with pytest.raises(StorageError, match=r"x\.json: not annotations in COCO's format"):
-        read_real(tmp_path)
-
-
-def test_a_wrong_label_line_is_named(tmp_path: Path) -> None:
-    """With file and line."""
-    write_picture(tmp_path / "image_2/1.png")
-    (tmp_path / "label_2").mkdir()
-    (tmp_path / "label_2/1.txt").write_text("Car 0 0 0 1 2 3 4\nCar 0 0 0 1 2\n")
-
-    with pytest.raises(StorageError, match=r"1\.txt:2: not a label in KITTI's format"):
-        read_real(tmp_path)

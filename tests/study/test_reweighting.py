@@ -22,15 +22,10 @@ from gen_data.lab.study.reweighting import Dependence, Tally, divide, find_depen
 from gen_data.report.drawn_parameters import Drawn
 
 DECLARED: list[Distribution[Any]] = [
-    Uniform(-2.0, 10.0),
-    LogUniform(0.5, 800.0),
-    Normal(3.0, 2.0, clip=(0.0, 9.0)),
-    UniformInteger(3, 22),
-    UniformInteger(0, 2),
-    Choice({"day": 9.0, "night": 1.0}),
-    Probability(0.2),
-    Mixture((Uniform(0.0, 1.0), Uniform(1.0, 5.0)), (3.0, 1.0)),
-]
+    Uniform(-2.0, 10.0), LogUniform(0.5, 800.0), Normal(3.0, 2.0, clip=(0.0, 9.0)),
+    UniformInteger(3, 22), UniformInteger(0, 2), Choice({"day": 9.0, "night": 1.0}),
+    Probability(0.2), Mixture((Uniform(0.0, 1.0), Uniform(1.0, 5.0)), (3.0, 1.0)),
+]  # fmt: skip
 
 
 def draw(distribution: Distribution[Any], count: int, seed: int = 0) -> list[Any]:
@@ -39,14 +34,11 @@ def draw(distribution: Distribution[Any], count: int, seed: int = 0) -> list[Any
 
 
 @pytest.mark.parametrize("declared", DECLARED, ids=str)
-def test_parts_with_their_probabilities_are_the_declared_distribution(
-    declared: Distribution[Any],
-) -> None:
+def test_parts_and_probabilities_are_the_declared_distribution(declared: Distribution[Any]) -> None:
     """Two-sample tests, at one false alarm in 100,000 each."""
     parts = divide(declared)
     unchanged = Dependence("x", declared, parts, (100,) * len(parts), (30,) * len(parts), 1.0)
     first, second = draw(declared, 20_000), draw(unchanged.reweighted(1.0), 20_000, 1)
-
     if isinstance(first[0], (str, bool, int)):
         values = sorted(set(first) | set(second))
         table = [[list(drawn).count(v) for v in values] for drawn in (first, second)]
@@ -56,9 +48,7 @@ def test_parts_with_their_probabilities_are_the_declared_distribution(
 
 
 @pytest.mark.parametrize("declared", DECLARED, ids=str)
-def test_the_support_stays_and_what_is_missed_is_drawn_more_often(
-    declared: Distribution[Any],
-) -> None:
+def test_the_support_stays_and_what_is_missed_is_drawn_oftener(declared: Distribution[Any]) -> None:
     """Nine of ten objects of the last part are missed, one of ten of the others."""
     parts = divide(declared)
     missed = (100,) * (len(parts) - 1) + (900,)
@@ -107,9 +97,7 @@ def simulate(seed: int, miss_by_value: float) -> tuple[list[Drawn], dict[int, Ta
 def test_the_parameter_that_misses_depend_on_is_found() -> None:
     """Its weights rise with its value; the other one is not significant."""
     draws, tallies = simulate(0, 0.5)
-
     first, second = find_dependences(draws, tallies)
-
     assert (first.name, second.name) == ("light.exposure", "paint.hue")
     assert first.p < 0.001
     assert second.p > 0.05
@@ -124,5 +112,4 @@ def test_false_alarms_are_as_rare_as_stated() -> None:
     alarms = sum(
         any(d.p < 0.05 for d in find_dependences(*simulate(seed, 0.0))) for seed in range(60)
     )
-
     assert alarms <= 3 + 4.0 * np.sqrt(60 * 0.05 * 0.95)
