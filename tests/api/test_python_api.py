@@ -52,7 +52,6 @@ def test_a_sample_has_images_boxes_objects_and_the_scene(data: gen_data.Dataset)
     """Each visible box is the extent of its object's pixels, computed here from the id image."""
     sample = data[4]
     camera = sample.cameras["color"]
-
     assert camera.rgb.shape == (72, 96, 3)
     assert camera.depth_m.dtype == np.float32
     assert len(camera.objects) >= len(camera.boxes2d) > 0
@@ -64,50 +63,33 @@ def test_a_sample_has_images_boxes_objects_and_the_scene(data: gen_data.Dataset)
     assert {body.name for body in sample.scene.bodies} >= {"table"}
 
 
-def test_order_of_reading_does_not_matter(data: gen_data.Dataset) -> None:
+def test_samples_are_the_same_in_any_order_and_of_a_pickled_set(data: gen_data.Dataset) -> None:
     """A sample made first in a fresh data set equals the same one made after others."""
     _ = data[0], data[2]
     fresh = gen_data.Dataset("tabletop.yaml", seed=1, overrides=SMALL)
-
     np.testing.assert_array_equal(fresh[5].cameras["color"].rgb, data[5].cameras["color"].rgb)
-
-
-def test_a_pickled_data_set_makes_the_same_samples(data: gen_data.Dataset) -> None:
-    """Loaders of other libraries send the data set to their worker processes."""
+    # Loaders of other libraries send the data set to their worker processes.
     other = pickle.loads(pickle.dumps(data))
-
     np.testing.assert_array_equal(other[1].cameras["color"].rgb, data[1].cameras["color"].rgb)
 
 
-def test_slices_are_lazy_and_have_a_length(data: gen_data.Dataset) -> None:
+def test_slices_have_a_length_and_what_is_not_there_is_said(data: gen_data.Dataset) -> None:
     """A slice of an endless data set is bounded; indices count from its first sample."""
     part = data[10:1000:5]
-
     assert len(part) == 198
     assert part[1].index == 15
     assert [sample.index for sample in data[3:5]] == [3, 4]
-
-
-def test_a_data_set_without_a_size_has_no_length_and_no_end(data: gen_data.Dataset) -> None:
-    """Both refusals say how to bound it."""
+    # Both refusals say how to bound it.
     with pytest.raises(TypeError, match="n="):
         len(data)
     with pytest.raises(gen_data.SampleIndexError, match="n="):
         _ = data[-1]
-
-
-def test_an_index_beyond_the_data_set_is_an_index_error() -> None:
     data = gen_data.Dataset("tabletop.yaml", n=5, overrides=SMALL)
-
     with pytest.raises(gen_data.SampleIndexError, match="index 5 is out of range for 5 samples"):
         _ = data[5]
     assert issubclass(gen_data.SampleIndexError, IndexError)
-
-
-def test_an_unknown_name_tells_which_exist(data: gen_data.Dataset) -> None:
-    """Sensors and channels alike; the error is also a KeyError, so that ``get`` works."""
+    # Sensors and channels alike; the error is also a KeyError, so that ``get`` works.
     sample = data[0]
-
     with pytest.raises(gen_data.UnknownNameError, match=r"no camera 'colour'.*'color'"):
         _ = sample.cameras["colour"]
     with pytest.raises(gen_data.UnknownNameError, match="there is no channel 'normals'"):
@@ -118,7 +100,6 @@ def test_an_unknown_name_tells_which_exist(data: gen_data.Dataset) -> None:
 def test_channels_can_be_rendered_in_addition() -> None:
     data = gen_data.Dataset(MINIMAL, channels=["normals"])
     camera = data[0].cameras["color"]
-
     lengths = np.linalg.norm(camera.channels["normals"], axis=-1)
     np.testing.assert_allclose(lengths[np.isfinite(camera.depth_m)], 1.0, atol=1e-5)
     with pytest.raises(gen_data.ConfigError, match="unknown channel 'normal'"):
@@ -129,47 +110,30 @@ def test_a_dictionary_equals_the_file_with_its_content(tmp_path: Path) -> None:
     """The resolved configurations are the same."""
     file = tmp_path / "mine.yaml"
     file.write_text(yaml.safe_dump(MINIMAL))
-
     assert gen_data.Dataset(MINIMAL).config == gen_data.Dataset(file).config
-
-
-def test_a_dictionary_extends_a_file_as_a_file_does(tmp_path: Path) -> None:
-    """Also a shipped one, and leaves out what it inherits."""
-    own = {
-        "extends": "tabletop.yaml",
-        "without": {"exporters": "all"},
-        "sensors": [{"name": "color", "size_px": [64, 48]}],
-    }
+    # Also a shipped one, and leaves out what it inherits.
+    own = {"extends": "tabletop.yaml", "without": {"exporters": "all"},
+           "sensors": [{"name": "color", "size_px": [64, 48]}]}  # fmt: skip
     file = tmp_path / "mine.yaml"
     file.write_text(yaml.safe_dump(own))
-
     assert gen_data.Dataset(own).config == gen_data.Dataset(file).config
     assert gen_data.Dataset(own).config["sensors"][0]["size_px"] == [64, 48]
     with pytest.raises(gen_data.ConfigError, match=r"<config>:1:\d+: extends: .*tabeltop"):
         gen_data.Dataset({"extends": "tabeltop.yaml"})
-
-
-def test_typed_plug_ins_can_stand_in_a_dictionary() -> None:
-    """An object of a plug-in's class means what its YAML means."""
+    # An object of a plug-in's class means what its YAML means.
     sensor = {"type": "rgb_camera", "name": "color", "size_px": [64, 48], "hfov_deg": 70.0}
     typed = gen_data.Dataset({**MINIMAL, "sensors": [sensor]})
     from gen_data.sensors.camera.rgb_camera import RgbCamera
 
     camera = RgbCamera(name="color", size_px=(64, 48), hfov_deg=70.0)
     assert gen_data.Dataset({**MINIMAL, "sensors": [camera]}).config == typed.config
-
-
-def test_faults_in_a_dictionary_name_the_field() -> None:
-    """The message is that of a file, with a place in the dictionary's own YAML."""
+    # The message is that of a file, with a place in the dictionary's own YAML.
     wrong = {**MINIMAL, "views_per_scene": "many"}
-
     with pytest.raises(gen_data.ConfigError, match=r"<config>:\d+:\d+: views_per_scene: "):
         gen_data.Dataset(wrong)
 
 
-def test_what_is_read_is_what_was_made(
-    data: gen_data.Dataset, stored: gen_data.StoredDataset
-) -> None:
+def test_all_that_was_made_is_read(data: gen_data.Dataset, stored: gen_data.StoredDataset) -> None:
     """Colour, ids, labels and scene are equal; depth up to half a unit of its file."""
     assert len(stored) == 7
     for generated, read in zip(data[:7], stored, strict=True):
@@ -182,16 +146,10 @@ def test_what_is_read_is_what_was_made(
         assert to_plain(read.ego) == to_plain(generated.ego)
         assert read.scene == generated.scene
         assert (read.split, read.index) == (generated.split, generated.index)
-
-
-def test_masks_survive_the_disk(data: gen_data.Dataset, stored: gen_data.StoredDataset) -> None:
     for ours, theirs in zip(data[6].objects["color"], stored[6].objects["color"], strict=True):
         assert ours.mask is not None and theirs.mask is not None
         assert (ours.mask.x_px, ours.mask.y_px) == (theirs.mask.x_px, theirs.mask.y_px)
         np.testing.assert_array_equal(ours.mask.pixels, theirs.mask.pixels)
-
-
-def test_a_stored_data_set_can_be_pickled(stored: gen_data.StoredDataset) -> None:
     assert pickle.loads(pickle.dumps(stored))[2].boxes2d["color"] == stored[2].boxes2d["color"]
 
 
@@ -208,7 +166,6 @@ def test_workers_have_one_thread_whatever_the_host_programs_environment(tmp_path
         env={**environment(), "OMP_NUM_THREADS": "8"},
         capture_output=True, text=True, check=True, cwd=tmp_path,
     )  # fmt: skip
-
     assert done.stdout.strip() == "1"
 
 
@@ -220,7 +177,6 @@ def test_progress_is_reported_and_empty_splits_are_warned_of(tmp_path: Path) -> 
         summary = gen_data.generate(
             one_scene, 2, out=tmp_path / "out", workers=0, on_progress=lambda p: seen.append(p.done)
         )
-
     assert max(seen) == 2
     assert summary.folder == str(tmp_path / "out")
 
@@ -232,7 +188,6 @@ def readme_block(language: str) -> str:
 
 def test_the_yaml_of_the_readme_is_valid() -> None:
     config = parse_config(readme_block("yaml"), "README.md", "README")
-
     assert [sensor.name for sensor in config.sensors] == ["color"]
     with PipelineFactory(config, n=1)() as pipeline:
         assert set(pipeline.exporters) == {"coco", "kitti"}
@@ -250,29 +205,23 @@ def test_the_python_of_the_readme_runs(tmp_path: Path, monkeypatch: pytest.Monke
     ):
         assert written in program
         program = program.replace(written, small)
-
     names: dict[str, Any] = {}
     exec(compile(program, str(README), "exec"), names)
-
     assert names["sample"].index == 1
     assert (tmp_path / "out" / "tabletop" / "manifest.json").is_file()
 
 
-def test_public_names_are_the_listed_ones() -> None:
+def test_public_names_are_the_listed_ones_and_importing_loads_no_engine() -> None:
     """Every name of the list exists, and ``dir`` shows just these."""
     for name in gen_data.__all__:
         assert getattr(gen_data, name) is not None
     assert dir(gen_data) == sorted(gen_data.__all__)
-
-
-def test_importing_loads_no_engine() -> None:
-    """``import gen_data`` is quick: numpy and all that is heavier wait until they are needed."""
+    # ``import gen_data`` is quick: numpy and all that is heavier wait until they are needed.
     program = "import sys, gen_data; print(sorted({'numpy', 'warp', 'pydantic'} & {*sys.modules}))"
     done = subprocess.run(
         [sys.executable, "-c", program],
         env=environment(), capture_output=True, text=True, check=True,
     )  # fmt: skip
-
     assert done.stdout.strip() == "[]"
 
 
@@ -292,22 +241,27 @@ def test_packages_of_the_same_names_do_no_harm(tmp_path: Path) -> None:
         "print(len(data.categories))\n"
         f"gen_data.generate('tabletop.yaml', 1, out='out', workers=1, overrides={SMALL!r})\n"
     )
-
     done = subprocess.run(
         [sys.executable, str(script)],
         cwd=tmp_path, env=environment(), capture_output=True, text=True, check=False,
     )  # fmt: skip
-
     assert done.returncode == 0, done.stderr
     assert int(done.stdout) > 0
     assert (tmp_path / "out" / "manifest.json").is_file()
 
 
-@pytest.mark.parametrize("channel", [c for c in Channel if c.value.startswith(("flow_", "scene"))])
-def test_images_of_motion_are_read_as_written(channel: Channel, tmp_path: Path) -> None:
-    """Values on the grid of the file return exactly; NaN stays NaN."""
+IMAGES = [c for c in Channel if c.value.startswith(("flow_", "scene", "normals"))]
+
+
+@pytest.mark.parametrize("channel", IMAGES)
+def test_images_of_motion_and_normals_are_read_as_written(channel: Channel, tmp_path: Path) -> None:
+    """Values on the grid of the file return exactly; NaN stays NaN; normals within their 8 bits."""
     rng = np.random.Generator(np.random.Philox(key=1))
-    if channel.value.startswith("flow_occluded"):
+    if channel is Channel.NORMALS:
+        image = rng.normal(size=(6, 8, 3)).astype(np.float32)
+        image /= np.linalg.norm(image, axis=-1, keepdims=True)
+        image[0, 0] = 0.0
+    elif channel.value.startswith("flow_occluded"):
         image = rng.integers(0, 2, (5, 7)).astype(np.uint8)
     else:
         unit, depth = (1 / 64, 2) if channel.value.startswith("flow") else (0.001, 3)
@@ -316,24 +270,13 @@ def test_images_of_motion_are_read_as_written(channel: Channel, tmp_path: Path) 
         image[2, 3] = np.nan
     path = tmp_path / "image.png"
     path.write_bytes(encode_channel(channel, image, 0.001))
-
-    np.testing.assert_allclose(read_image(path, channel, 0.001), image, atol=1e-6)
-
-
-def test_normals_are_read_as_unit_vectors(tmp_path: Path) -> None:
-    """Within the 8 bits of the file, and zero where there is no surface."""
-    rng = np.random.Generator(np.random.Philox(key=2))
-    normals = rng.normal(size=(6, 8, 3))
-    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
-    normals[0, 0] = 0.0
-    path = tmp_path / "image.png"
-    path.write_bytes(encode_channel(Channel.NORMALS, normals.astype(np.float32), 0.001))
-
-    read = read_image(path, Channel.NORMALS, 0.001)
-
-    assert (read[0, 0] == 0.0).all()
-    angles = np.arccos(np.clip((read * normals).sum(axis=-1), -1.0, 1.0))[1:]
-    assert np.degrees(angles).max() < 0.7
+    read = read_image(path, channel, 0.001)
+    if channel is Channel.NORMALS:
+        angles = np.arccos(np.clip((read * image).sum(axis=-1), -1.0, 1.0))[1:]
+        assert np.degrees(angles).max() < 0.7
+        assert (read[0, 0] == 0.0).all()
+    else:
+        np.testing.assert_allclose(read, image, atol=1e-6)
 
 
 def test_relabelled_samples_have_the_classes_of_the_map(stored: gen_data.StoredDataset) -> None:
@@ -341,7 +284,6 @@ def test_relabelled_samples_have_the_classes_of_the_map(stored: gen_data.StoredD
     names = sorted({b.category for s in stored for b in s.boxes2d["color"]})
     chosen = {"second": names[1], "first": [names[0]]}
     mapped = stored.relabelled({"classes": chosen})
-
     assert mapped.categories == ("second", "first")
     for plain, one in zip(stored, pickle.loads(pickle.dumps(mapped)), strict=True):
         expected = [b for b in plain.boxes2d["color"] if b.category in names[:2]]
@@ -350,20 +292,13 @@ def test_relabelled_samples_have_the_classes_of_the_map(stored: gen_data.StoredD
         assert [b.category_id for b in boxes] == [2 - names.index(b.category) for b in expected]
         assert np.array_equal(one.cameras["color"].rgb, plain.cameras["color"].rgb)
         assert {i.category for i in one.scene.instances if i.annotated} <= {"first", "second"}
-
-
-def test_a_label_map_must_be_given_or_configured(stored: gen_data.StoredDataset) -> None:
     with pytest.raises(gen_data.ConfigError, match=r"labels\.map: the configuration has none"):
         stored.relabelled()
     with pytest.raises(gen_data.ConfigError, match=r"<label map>:1:\d+: classess: unknown key"):
         stored.relabelled({"classess": {}})
-
-
-def test_targets_mark_objects_that_a_label_map_ignores(stored: gen_data.StoredDataset) -> None:
-    """``iscrowd`` is 1, as for COCO's regions that training leaves out."""
+    # ``iscrowd`` is 1, as for COCO's regions that training leaves out.
     name = stored[0].boxes2d["color"][0].category
     _, target = gen_data.targets.detection_target(stored.relabelled({"ignore": [name]})[0])
     ignored = [box.category == name for box in stored[0].boxes2d["color"]]
-
     assert 0 < sum(ignored) < len(ignored)
     assert target["iscrowd"].tolist() == [int(flag) for flag in ignored]

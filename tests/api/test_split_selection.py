@@ -13,15 +13,10 @@ import gen_data
 from gen_data.core.errors import ConfigError
 
 N, VIEWS = 40, 2
-CONFIG = {
-    "seed": 5,
-    "template": "tabletop",
-    "views_per_scene": VIEWS,
-    "splits": {"train": 0.6, "val": 0.4},
-    "sensors": [{"type": "rgb_camera", "name": "color", "size_px": [32, 24], "hfov_deg": 60}],
-    "annotations": ["boxes2d"],
-    "labels": {"map": {"classes": {"mug": None}}},
-}
+CONFIG = {"seed": 5, "template": "tabletop", "views_per_scene": VIEWS,
+          "splits": {"train": 0.6, "val": 0.4},
+          "sensors": [{"type": "rgb_camera", "name": "color", "size_px": [32, 24], "hfov_deg": 60}],
+          "annotations": ["boxes2d"], "labels": {"map": {"classes": {"mug": None}}}}  # fmt: skip
 
 
 def number(sample: gen_data.Sample) -> int:
@@ -62,12 +57,20 @@ def numbers(samples: gen_data.SampleSequence) -> list[int]:
     return [sample.index for sample in samples]
 
 
-def test_a_split_has_exactly_its_samples_in_their_order(data: gen_data.SampleSequence) -> None:
+def test_a_split_has_exactly_its_samples_in_order_and_scenes(data: gen_data.SampleSequence) -> None:
     """As the pipeline assigns them; nothing is in two splits, or in none."""
     assert (numbers(data.split("train")), numbers(data.split("val"))) == (TRAIN, VAL)
     assert len(data.split("train")) == len(TRAIN)
     assert data.split("val")[-1].index == VAL[-1]
     assert numbers(data.split("all")) == list(range(N))
+    again = pickle.loads(pickle.dumps(data.split("val")))
+    assert numbers(again) == VAL
+    # Loaders keep views of a scene together by them.
+    scenes = data.split("val").scene_indices(np.arange(len(VAL)))
+    assert scenes.tolist() == [k // VIEWS for k in VAL]
+    # ``n`` counts the samples of all splits, as in ``generate``.
+    assert len(gen_data.Dataset(CONFIG, n=N, split="val")) == len(VAL)
+    assert not gen_data.Dataset(CONFIG, split="train").is_bounded
 
 
 def test_splits_and_slices_compose_in_any_order(data: gen_data.SampleSequence) -> None:
@@ -83,7 +86,6 @@ def test_a_data_set_without_end_has_splits_without_end() -> None:
     """Position ``p`` is the same sample as in a data set with a size."""
     endless = gen_data.SampleSequence(Numbered(), gen_data.Dataset(CONFIG)._indices)
     val = endless.split("val")
-
     assert not val.is_bounded
     assert numbers(val[: len(VAL)]) == VAL
     assert val[len(VAL) - 1].index == VAL[-1]
@@ -91,20 +93,7 @@ def test_a_data_set_without_end_has_splits_without_end() -> None:
         len(val)
 
 
-def test_a_pickled_split_is_the_same(data: gen_data.SampleSequence) -> None:
-    again = pickle.loads(pickle.dumps(data.split("val")))
-    assert numbers(again) == VAL
-
-
-def test_a_lazy_data_set_takes_the_split_as_an_argument() -> None:
-    """``n`` counts the samples of all splits, as in ``generate``."""
-    assert len(gen_data.Dataset(CONFIG, n=N, split="val")) == len(VAL)
-    assert not gen_data.Dataset(CONFIG, split="train").is_bounded
-
-
-def test_loaders_yield_the_split_and_resume_in_it(
-    data: gen_data.SampleSequence,
-) -> None:
+def test_loaders_yield_the_split_and_resume_in_it(data: gen_data.SampleSequence) -> None:
     """Every sample once per epoch, whole scenes together; the rest after an interruption."""
 
     def loader() -> gen_data.Loader[int]:
@@ -119,12 +108,6 @@ def test_loaders_yield_the_split_and_resume_in_it(
     _ = next(reading), next(reading)
     resumed.load_state_dict(begun.state_dict())
     assert list(resumed) == batches[2:]
-
-
-def test_scenes_of_a_split_are_those_of_its_samples(data: gen_data.SampleSequence) -> None:
-    """Loaders keep views of a scene together by them."""
-    scenes = data.split("val").scene_indices(np.arange(len(VAL)))
-    assert scenes.tolist() == [k // VIEWS for k in VAL]
 
 
 MIXED = "samples of the splits train and val"
@@ -143,13 +126,8 @@ def test_loaders_warn_of_mixed_splits_unless_they_are_wanted(data: gen_data.Samp
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         scene = VAL[0] // VIEWS * VIEWS
-        for chosen in (
-            data.split("train"),
-            data.split("all"),
-            data.split("all")[3:9],
-            data.split("train").relabelled(),
-            data[scene : scene + VIEWS],
-        ):
+        train, every = data.split("train"), data.split("all")
+        for chosen in (train, every, every[3:9], train.relabelled(), data[scene : scene + VIEWS]):
             gen_data.Loader(chosen, number)
 
 
@@ -162,23 +140,14 @@ def test_the_data_set_of_torch_warns_of_mixed_splits(data: gen_data.SampleSequen
     assert len(gen_data.torch.SampleDataset(data.split("val"), number)) == len(VAL)
 
 
-@pytest.mark.parametrize(
-    ("name", "fact"),
-    [
+def test_unknown_splits_name_others_and_a_name_is_no_index(data: gen_data.SampleSequence) -> None:
+    """Splits without a share have no samples; a mapping's syntax gets the method's name."""
+    for name, fact in (
         ("test", "there is no split 'test': its share is 0; expected one of train, val, all"),
         ("trian", "there is no split 'trian'; expected one of train, val, all .*mean 'train'"),
-    ],
-)
-def test_an_unknown_split_names_the_others(
-    data: gen_data.SampleSequence, name: str, fact: str
-) -> None:
-    """Splits without a share have no samples."""
-    with pytest.raises(gen_data.UnknownNameError, match=fact):
-        data.split(name)
-
-
-def test_a_name_is_no_index(data: gen_data.SampleSequence) -> None:
-    """A mapping's syntax gets the method's name as an answer."""
+    ):
+        with pytest.raises(gen_data.UnknownNameError, match=fact):
+            data.split(name)
     with pytest.raises(TypeError, match=r"'val'; expected a whole .*\.split\('val'\)"):
         data["val"]  # type: ignore[call-overload]
     with pytest.raises(TypeError, match=r"1\.0; expected a whole number or a slice"):
@@ -204,7 +173,6 @@ def test_a_stored_data_set_is_opened_with_a_split(tmp_path: Path) -> None:
     every = gen_data.open(tmp_path / "set")
     stated = [sample.index for sample in every if sample.split == "val"]
     val = gen_data.open(tmp_path / "set", split="val")
-
     assert numbers(val) == stated
     assert 0 < len(stated) < 8
     assert repr(val) == f"<StoredDataset '{tmp_path / 'set'}', val: {len(stated)} samples>"

@@ -23,7 +23,7 @@ def stored(tmp_path_factory: pytest.TempPathFactory) -> gen_data.StoredDataset:
     return gen_data.open(folder)
 
 
-def test_detection_targets_are_those_of_torchvisions_reference(stored: Any) -> None:
+def test_detection_targets_are_those_of_torchvisions_reference_in_a_loader_too(stored: Any) -> None:
     """Types, shapes and ranges; boxes and labels of the data set."""
     import torch
 
@@ -31,7 +31,6 @@ def test_detection_targets_are_those_of_torchvisions_reference(stored: Any) -> N
 
     image, target = gt.SampleDataset(stored)[4]
     camera = stored[4].cameras["color"]
-
     assert (image.dtype, tuple(image.shape)) == (torch.uint8, (3, 72, 96))
     assert np.array_equal(image.permute(1, 2, 0).numpy(), camera.rgb)
     assert target["boxes"].dtype == torch.float32
@@ -40,6 +39,12 @@ def test_detection_targets_are_those_of_torchvisions_reference(stored: Any) -> N
     assert target["labels"].tolist() == [b.category_id for b in camera.boxes2d]
     assert bool((target["boxes"][:, 2:] > target["boxes"][:, :2]).all())
     assert int(target["image_id"]) == 4
+    from torch.utils.data import DataLoader
+
+    source = gt.SampleDataset(stored)
+    batches = DataLoader(source, 4, shuffle=True, num_workers=1, collate_fn=gt.collate)
+    numbers = [int(t["image_id"]) for _, targets in batches for t in targets]
+    assert sorted(numbers) == list(range(10))
 
 
 def test_masks_lie_in_their_boxes_and_have_their_areas(stored: Any) -> None:
@@ -55,22 +60,6 @@ def test_masks_lie_in_their_boxes_and_have_their_areas(stored: Any) -> None:
             assert int(mask.sum()) == int(area)
             checked += 1
     assert checked > 20
-
-
-def test_the_data_loader_of_torch_reads_a_finished_set(stored: Any) -> None:
-    from torch.utils.data import DataLoader
-
-    import gen_data.torch as gt
-
-    batches = list(
-        DataLoader(
-            gt.SampleDataset(stored), batch_size=4, shuffle=True, num_workers=1,
-            collate_fn=gt.collate,
-        )
-    )  # fmt: skip
-    numbers = [int(t["image_id"]) for _, targets in batches for t in targets]
-
-    assert sorted(numbers) == list(range(10))
 
 
 def test_rendering_in_training_gives_the_finished_samples(stored: Any, tmp_path: Path) -> None:
@@ -89,7 +78,6 @@ def test_rendering_in_training_gives_the_finished_samples(stored: Any, tmp_path:
     second = gt.loader(live, depth_target, workers=1, **options)
     second.load_state_dict(first.state_dict())
     got += list(second)
-
     assert len(got) == len(expected) == 4
     for (images, depths), (stored_images, stored_depths) in zip(got, expected, strict=True):
         assert all(map(torch.equal, images, stored_images))
@@ -106,7 +94,6 @@ def test_laser_boxes_hold_their_points() -> None:
 
     data = gen_data.Dataset("tabletop.yaml", seed=3, n=1)
     points, target = gt.to_tensors(lidar_target(data[0]))
-
     assert points.shape[1] == 4
     assert len(target["boxes"]) > 3
     for box, count in zip(target["boxes"], target["points"], strict=True):
@@ -162,9 +149,7 @@ def test_targets_are_wrapped_for_torchvision(stored: Any, monkeypatch: pytest.Mo
     monkeypatch.setitem(sys.modules, "torchvision.tv_tensors", module)
     image, target = gt.to_tensors(segmentation_target(stored[4]))
     target["keypoints"] = torch.tensor([[[3.5, 7.0, 2.0], [1.0, 0.5, 0.0]]])
-
     picture, wrapped = gt.to_tv_tensors((image, target))
-
     assert type(picture) is module.Image and torch.equal(picture, image)
     assert type(wrapped["boxes"]) is module.BoundingBoxes
     assert wrapped["boxes"].format == "XYXY"

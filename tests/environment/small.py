@@ -16,22 +16,12 @@ CONFIG: dict[str, Any] = {
     "shared": {"robot": "franka_panda", "task": "reach"},
     "randomizers": [{"type": "arm_task", "name": "things", "task": "$shared.task"}],
     "sensors": [
-        {
-            "type": "rgb_camera",
-            "name": "color",
-            "size_px": [32, 24],
-            "hfov_deg": 60,
-            "channels": ["rgb"],
-        }
+        {"type": "rgb_camera", "name": "color", "size_px": [32, 24], "hfov_deg": 60,
+         "channels": ["rgb"]},
     ],
-}
-NOMINAL = {
-    "mass_factor": 1,
-    "friction_factor": 1,
-    "joint_damping_per_s": 40,
-    "motor_gain_per_s2": 400,
-    "latency_steps": 0,
-}
+}  # fmt: skip
+NOMINAL = {"mass_factor": 1, "friction_factor": 1, "joint_damping_per_s": 40,
+           "motor_gain_per_s2": 400, "latency_steps": 0}  # fmt: skip
 """Dynamics without variation: critically damped motors."""
 
 

@@ -16,6 +16,7 @@ from tests.environment.small import NOMINAL, nominal, simulation_of, small
 from tests.physics.panda import urdf_path
 from tests.wheels import INSTALLED
 
+Array = NDArray[np.float64]
 HAND_LINK, ARM_JOINTS = b"panda_hand", 7
 GRASP_M = 0.1034
 """From the hand's frame to the grasp frame (Franka Emika, "Franka Hand product manual")."""
@@ -33,9 +34,7 @@ def bullet_arm() -> Iterator[tuple[int, int, int]]:
     pybullet.disconnect(client)
 
 
-def hand_poses(
-    *positions: NDArray[np.float64],
-) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+def hand_poses(*positions: Array) -> list[tuple[Array, Array]]:
     """Positions [m] and rotation matrices of the grasp frame, by pybullet's forward kinematics."""
     found = []
     pybullet = pytest.importorskip("pybullet")
@@ -51,7 +50,7 @@ def hand_poses(
     return found
 
 
-def settled(env: Env, action: NDArray[np.float32], steps: int = 20) -> NDArray[np.float64]:
+def settled(env: Env, action: NDArray[np.float32], steps: int = 20) -> Array:
     """Joint positions once an action has taken effect, and nothing else is asked for."""
     env.step(action)
     nothing = np.zeros_like(action)
@@ -156,13 +155,10 @@ def test_latency_delays_by_exactly_its_steps(latency: int) -> None:
 @pytest.mark.parametrize("engine", INSTALLED)
 def test_drawn_dynamics_reach_the_engine(engine: str) -> None:
     """Masses and friction read from the engine are the nominal ones times factors in the range."""
-    dynamics = {
-        "mass_factor": {"uniform": [1.5, 1.6]},
-        "friction_factor": {"uniform": [0.5, 0.6]},
-        "motor_gain_per_s2": {"uniform": [300, 310]},
-        "joint_damping_per_s": {"uniform": [30, 31]},
-        "latency_steps": {"uniform_integer": [2, 3]},
-    }
+    dynamics = {"mass_factor": {"uniform": [1.5, 1.6]}, "friction_factor": {"uniform": [0.5, 0.6]},
+                "motor_gain_per_s2": {"uniform": [300, 310]},
+                "joint_damping_per_s": {"uniform": [30, 31]},
+                "latency_steps": {"uniform_integer": [2, 3]}}  # fmt: skip
     plain, varied = nominal(engine, "joint"), small(engine, settings={"dynamics": dynamics})
     drawn = []
     for seed in (1, 4):

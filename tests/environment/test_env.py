@@ -47,16 +47,7 @@ def test_gymnasium_s_checker_finds_nothing_in_the_defaults() -> None:
 
 
 @pytest.mark.slow
-def test_a_seed_is_a_scene_of_the_data_set() -> None:
-    """The first photograph is that of the data set's sample, byte for byte."""
-    observation, info = small(settings={"steps_max": 3}).reset(seed=2)
-    sample = gen_data.Dataset(CONFIG)[2]
-    assert info["scene_index"] == 2
-    assert observation["rgb"].tobytes() == sample.cameras["color"].rgb.tobytes()
-
-
-@pytest.mark.slow
-def test_equal_seeds_give_equal_bytes_whatever_happened_before() -> None:
+def test_equal_seeds_give_equal_bytes_and_resets_without_one_continue() -> None:
     """Two environments, one of which has had another episode; different seeds differ."""
     one, other = small(), small()
     other.reset(seed=5)
@@ -70,17 +61,18 @@ def test_equal_seeds_give_equal_bytes_whatever_happened_before() -> None:
         assert same(mine[0], yours[0])
         assert mine[1:] == yours[1:]
     assert not same(one.reset(seed=4)[0], first[0])
-
-
-@pytest.mark.slow
-def test_resets_without_a_seed_continue_from_the_latest_one() -> None:
-    """The same sequence of scenes after the same seed, all of them different."""
+    # The same sequence of scenes after the same seed, all of them different.
     env = nominal(INSTALLED[0], "joint")
     env.reset(seed=1)
     following = [env.reset()[1]["scene_index"] for _ in range(2)]
     env.reset(seed=1)
     assert [env.reset()[1]["scene_index"] for _ in range(2)] == following
     assert following[0] != following[1]
+    # The first photograph is that of the data set's sample, byte for byte.
+    observation, info = small(settings={"steps_max": 3}).reset(seed=2)
+    sample = gen_data.Dataset(CONFIG)[2]
+    assert info["scene_index"] == 2
+    assert observation["rgb"].tobytes() == sample.cameras["color"].rgb.tobytes()
 
 
 @pytest.mark.slow
@@ -163,49 +155,37 @@ def test_proximity_is_the_height_of_the_fingers_over_the_table(engine: str) -> N
     assert float(observation["proximity"][0]) == pytest.approx(above_m, abs=1e-3)
 
 
-def test_episodes_are_truncated_after_their_steps() -> None:
-    """Not terminated, as nothing was lifted."""
-    env = small(settings={"steps_max": 2})
-    env.reset(seed=1)
-    ends = [env.step(np.zeros(7, np.float32))[2:4] for _ in range(2)]
-    assert ends == [(False, False), (False, True)]
-
-
-def test_rendering_shows_the_latest_photograph() -> None:
-    """It is a copy; without a mode there is none."""
-    env = small(render_mode="rgb_array")
+def test_episodes_are_truncated_after_their_steps_and_rendering_shows_the_latest() -> None:
+    """Not terminated, as nothing was lifted; the photograph is a copy."""
+    env = small(settings={"steps_max": 2}, render_mode="rgb_array")
     observation, _ = env.reset(seed=1)
     picture = env.render()
     assert picture is not None
     assert picture.tobytes() == observation["rgb"].tobytes()
     assert env.metadata["render_fps"] == 20
+    ends = [env.step(np.zeros(7, np.float32))[2:4] for _ in range(2)]
+    assert ends == [(False, False), (False, True)]
 
 
 @pytest.mark.slow
-def test_vectors_equal_single_environments() -> None:
-    """Environment ``k`` of a vector has the seed ``s + k``."""
+def test_vectors_and_processes_equal_single_environments() -> None:
+    """Environment ``k`` of a vector has the seed ``s + k``, and the same bytes."""
     vector = gymnasium.vector.SyncVectorEnv([partial(small)] * 2)
     together, _ = vector.reset(seed=1)
     actions = np.full((2, 7), 0.4, np.float32)
     together_later = vector.step(actions)[0]
+    processes = make_vec(CONFIG, 2, settings={"steps_max": 50})
+    try:
+        apart, _ = processes.reset(seed=1)
+    finally:
+        processes.close()
     single = small()
     for k in range(2):
-        assert same({n: v[k] for n, v in together.items()}, single.reset(seed=1 + k)[0])
+        first = single.reset(seed=1 + k)[0]
+        assert same({n: v[k] for n, v in together.items()}, first)
+        assert same({n: v[k] for n, v in apart.items()}, first)
         later = single.step(actions[k])[0]
         assert same({n: v[k] for n, v in together_later.items()}, later)
-
-
-@pytest.mark.slow
-def test_processes_equal_single_environments() -> None:
-    """As many processes as environments, with the same bytes."""
-    vector = make_vec(CONFIG, 2, settings={"steps_max": 50})
-    try:
-        together, _ = vector.reset(seed=1)
-    finally:
-        vector.close()
-    single = small()
-    for k in range(2):
-        assert same({n: v[k] for n, v in together.items()}, single.reset(seed=1 + k)[0])
 
 
 WRONG: list[tuple[dict[str, Any], str]] = [
@@ -213,10 +193,8 @@ WRONG: list[tuple[dict[str, Any], str]] = [
     ({"settings": {"camera": "colour"}}, r"<settings>:1:9: camera: there is no camera 'colour'"),
     ({"settings": {"arm": "left"}}, r"<settings>:1:6: arm: there is no arm 'left'; expected arm"),
     ({"settings": {"dynamics": {"mass_factor": -1}}}, r"2:16: dynamics.mass_factor: -1 is not > 0"),
-    (
-        {"settings": {"control": "ik", "workspace_m": [[3, 3, 0], [4, 4, 1]]}},
-        r"workspace_m: its nearest point is 4.24 m from the base",
-    ),
+    ({"settings": {"control": "ik", "workspace_m": [[3, 3, 0], [4, 4, 1]]}},
+     r"workspace_m: its nearest point is 4.24 m from the base"),
     ({"settings": {"workspace_m": [[0, 1, 0], [1, 0, 1]]}}, r"workspace_m: expected the low"),
     ({"settings": "missing.yaml"}, r"missing.yaml"),
     ({"render_mode": "human"}, r"render_mode: 'human' is unknown; expected 'rgb_array'"),
@@ -231,21 +209,24 @@ def test_wrong_settings_are_refused_with_their_place(options: dict[str, Any], me
 
 
 @pytest.mark.slow
-def test_configurations_without_one_robot_with_a_gripper_are_refused() -> None:
-    """None, several kinds, and one without a gripper."""
-    with pytest.raises(ConfigError, match=r"elements: there is no robot; expected one with"):
-        Env("closeup.yaml")
-    with pytest.raises(ConfigError, match=r"elements: the robot differs from scene to scene \(fr"):
-        Env("tabletop.yaml")
-    with pytest.raises(ConfigError, match=r"elements: robot 'kuka_iiwa' has no gripper"):
-        Env("tabletop.yaml", overrides=["shared.robot=kuka_iiwa"])
-
-
-@pytest.mark.parametrize("name", ["nope", "frank_panda"])
-def test_a_robot_that_does_not_exist_is_refused_whatever_may_replace_it(name: str) -> None:
-    """Only robots of packs that are not installed have a replacement."""
-    with pytest.raises(AssetError, match=rf"shared\.robot: asset '{name}': unknown"):
-        Env("arm_tasks.yaml", overrides=[f"shared.robot={name}"])
+@pytest.mark.parametrize(
+    ("config", "overrides", "error", "fact"),
+    [
+        ("closeup.yaml", [], ConfigError, "elements: there is no robot; expected one with"),
+        ("tabletop.yaml", [], ConfigError,
+         r"elements: the robot differs from scene to scene \(fr"),
+        ("tabletop.yaml", ["shared.robot=kuka_iiwa"], ConfigError,
+         "elements: robot 'kuka_iiwa' has no gripper"),
+        # Only robots of packs that are not installed have a replacement.
+        *(("arm_tasks.yaml", [f"shared.robot={name}"], AssetError,
+           rf"shared\.robot: asset '{name}': unknown") for name in ("nope", "frank_panda")),
+    ],
+)  # fmt: skip
+def test_configurations_without_one_robot_with_a_gripper_are_refused(
+    config: str, overrides: list[str], error: type[Exception], fact: str
+) -> None:
+    with pytest.raises(error, match=fact):
+        Env(config, overrides=overrides)
 
 
 def test_a_task_without_solution_is_refused_with_reasons() -> None:

@@ -49,14 +49,9 @@ def run(*arguments: str, path: str, cwd: Path) -> subprocess.CompletedProcess[st
     """Run ``gen-data`` with a folder of installed packages on its path."""
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), path])}
     return subprocess.run(
-        command(*arguments),
-        cwd=cwd,
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=False,
+        command(*arguments), cwd=cwd, env=environment, capture_output=True, text=True, check=False,
         timeout=600,
-    )
+    )  # fmt: skip
 
 
 @pytest.fixture(scope="session")
@@ -100,7 +95,6 @@ def test_each_kind_of_plug_in_takes_one_file_and_one_line(installed: str) -> Non
     """Files and entry points of the package correspond one to one; no file imports another."""
     (package,) = distributions(path=[installed])
     files = {path.stem: path.read_text() for path in PACKAGE.glob("src/stranger/[!_]*.py")}
-
     assert sorted(entry.module for entry in package.entry_points) == sorted(
         f"stranger.{name}" for name in files
     )
@@ -129,7 +123,6 @@ def test_the_contact_sheet_shows_the_drawing_of_the_device(dataset: Path, instal
     """The last tile is white up to the share of 50 cd/m^2 that the device measured."""
     arguments = ("contact-sheet", "strange.yaml", "-n", "1", "--channels", "written")
     done = run(*arguments, "--tile-px", "96", "--columns", "1", path=installed, cwd=dataset.parent)
-
     assert done.returncode == 0, done.stderr
     row = (dataset / "tables/meter/000000.csv").read_text().splitlines()[1]
     sheet = np.array(Image.open(dataset.parent / "contact-sheet.png"))
@@ -141,13 +134,10 @@ def test_the_contact_sheet_shows_the_drawing_of_the_device(dataset: Path, instal
 
 def test_the_data_set_verifies(dataset: Path, installed: str) -> None:
     done = run("verify", str(dataset), "--full", path=installed, cwd=dataset)
-
     assert done.returncode == 0, done.stderr
 
 
-def test_the_element_is_in_every_scene_with_a_drawn_asset(
-    dataset: Path,
-) -> None:
+def test_the_element_and_the_texture_are_in_every_scene_and_the_plan(dataset: Path) -> None:
     """A mug 1 m above the floor; the plan names every mug that might have been drawn."""
     for scene in scenes(dataset):
         (cup,) = (body for body in scene["bodies"] if body["name"] == "cup")  # type: ignore[attr-defined]
@@ -155,10 +145,7 @@ def test_the_element_is_in_every_scene_with_a_drawn_asset(
         assert cup["T_world_body"]["translation_m"] == [0.0, 0.0, 1.0]
     planned = json.loads((dataset / "plan.json").read_text())["assets"]
     assert len([name for name in planned if name.startswith("mug?")]) > 1
-
-
-def test_the_texture_covers_the_table_and_keeps_its_licence(dataset: Path) -> None:
-    """It is selected by its tag."""
+    # It is selected by its tag.
     for scene in scenes(dataset):
         (table,) = (body for body in scene["bodies"] if body["name"] == "table")  # type: ignore[attr-defined]
         textures = {material["texture"] for material in table["materials"]}
@@ -166,9 +153,11 @@ def test_the_texture_covers_the_table_and_keeps_its_licence(dataset: Path) -> No
     licences = (dataset / "LICENSES-ASSETS.md").read_text()
     names = "stranger_block, texture/stranger_stripes"
     assert f"| stranger | CC0-1.0 | A stranger | {names} |" in licences
+    # Another release may change every byte and is not resumed.
+    assert json.loads((dataset / "plan.json").read_text())["versions"]["stranger"] == "1.0"
 
 
-def test_the_sensor_measures_the_images_of_the_renderer(dataset: Path) -> None:
+def test_the_sensor_measures_the_images_and_the_exporter_writes_the_labels(dataset: Path) -> None:
     """A box is 250 cd/m^2, the background black: the light meter reads their mean.
 
     The camera meters the boxes to middle grey: 18 %, which is 118 in sRGB.
@@ -183,10 +172,7 @@ def test_the_sensor_measures_the_images_of_the_renderer(dataset: Path) -> None:
         assert float(row.split(",")[2]) == pytest.approx(250.0 * share, rel=1e-6)
     columns = json.loads((dataset / "tables/columns.json").read_text())["meter"]["columns"]
     assert [column["name"] for column in columns] == ["sample", "time_s", "luminance_cd_m2"]
-
-
-def test_the_exporter_writes_the_annotations(dataset: Path) -> None:
-    """Each distance is the one from the camera to the mug."""
+    # Each distance is the one from the camera to the mug.
     cups = [line for line in lines(dataset) if line["category"] == "mug"]
     for line, scene in zip(cups, scenes(dataset), strict=True):
         (camera,) = scene["cameras"]  # type: ignore[misc]
@@ -194,18 +180,10 @@ def test_the_exporter_writes_the_annotations(dataset: Path) -> None:
         assert line["distance_m"] == pytest.approx(np.linalg.norm(eye_m - [0, 0, 1]), abs=1e-5)
 
 
-def test_the_plan_names_the_package(
-    dataset: Path,
-) -> None:
-    """Another release may change every byte and is not resumed."""
-    assert json.loads((dataset / "plan.json").read_text())["versions"]["stranger"] == "1.0"
-
-
 @pytest.mark.slow
 def test_describe_and_schema_include_the_plug_ins(installed: str, tmp_path: Path) -> None:
     """Fields and docstrings of third parties appear like those of the project."""
     done = run("describe", "stranger_boxes", path=installed, cwd=tmp_path)
-
     assert done.returncode == 0, done.stderr
     assert "renderer stranger_boxes" in done.stdout
     assert "Luminance of every box; the background is black." in done.stdout
@@ -220,7 +198,6 @@ def test_an_unknown_field_is_refused_at_its_place(installed: str, tmp_path: Path
     """With file, line, column, and the field that was probably meant."""
     (tmp_path / "strange.yaml").write_text(CONFIG.replace("luminance_cd_m2", "luminance"))
     done = run("--config", "strange.yaml", "--n", "1", path=installed, cwd=tmp_path)
-
     assert done.returncode != 0
     assert "strange.yaml:20:36: render.luminance: unknown key" in done.stderr
     assert "luminance_cd_m2" in done.stderr
@@ -230,7 +207,6 @@ def test_the_examples_of_the_contributors_guide_are_those_of_the_package() -> No
     """Each code block that names a file in its first line is part of that file."""
     guide = (ROOT / "CONTRIBUTING.md").read_text()
     blocks = re.findall(r"^```\w+\n# (tests/\S+)\n(.*?)^```$", guide, re.MULTILINE | re.DOTALL)
-
     assert len(blocks) == 10
     for path, text in blocks:
         assert text.rstrip() in (ROOT / path).read_text(), path
