@@ -26,10 +26,11 @@ def color_of_flow(u: float, v: float) -> tuple[int, int, int]:
     return red, green, blue
 
 
-def test_what_stands_still_is_white_and_none_is_black() -> None:
+def test_what_stands_still_is_white_and_the_saturation_is_the_length() -> None:
     """The middle of the wheel; and what is not on it."""
     assert color_of_flow(0.0, 0.0) == (255, 255, 255)
     assert color_of_flow(math.nan, math.nan) == (0, 0, 0)
+    assert (color_of_flow(5.0, 0.0), color_of_flow(20.0, 0.0)) == ((255, 127, 127), (191, 0, 0))
 
 
 @pytest.mark.parametrize(
@@ -42,14 +43,9 @@ def test_the_hue_is_the_direction(direction: tuple[float, float], hue_deg: float
     """Red to the right, yellow downwards, blue to the left, violet upwards."""
     red, green, blue = color_of_flow(*direction)
     hue, saturation, value = colorsys.rgb_to_hsv(red / 255, green / 255, blue / 255)
-
     assert 360.0 * hue == pytest.approx(hue_deg, abs=1.0)
     assert saturation > 0.99
     assert value > 0.99
-
-
-def test_the_saturation_is_the_length() -> None:
-    assert (color_of_flow(5.0, 0.0), color_of_flow(20.0, 0.0)) == ((255, 127, 127), (191, 0, 0))
 
 
 @pytest.mark.parametrize(
@@ -60,9 +56,7 @@ def test_every_channel_of_flow_can_be_looked_at(channel: Channel, depth: int) ->
     shape = (4, 6, depth) if depth else (4, 6)
     data = np.ones(shape, np.float32 if depth else np.uint8)
     camera = Camera("c", IDENTITY, Intrinsics(6, 4, 5.0, 5.0, 3.0, 2.0))
-
     image = channel_image(SensorReading("c", camera, {channel: data}), channel)
-
     assert (image.shape, image.dtype) == ((4, 6, 3), np.uint8)
     assert image.max() == 255
 
@@ -85,21 +79,13 @@ def test_a_recording_has_flow_beside_the_image_of_its_camera() -> None:
     """As a picture in a tab of its own; a camera without flow has no tabs."""
     camera = Camera("c", IDENTITY, Intrinsics(6, 4, 5.0, 5.0, 3.0, 2.0))
     reading = SensorReading("c", camera, {Channel.FLOW_FORWARD: np.ones((4, 6, 2), np.float32)})
-    info = DatasetInfo(
-        "t",
-        1,
-        1,
-        1,
-        (),
-        (SensorInfo("c", Modality.CAMERA, channels=(Channel.RGB, Channel.FLOW_FORWARD)),),
-    )
+    sensor = SensorInfo("c", Modality.CAMERA, channels=(Channel.RGB, Channel.FLOW_FORWARD))
+    info = DatasetInfo("t", 1, 1, 1, (), (sensor,))
     stream = _Stream()
     recorder = Recorder(stream, None, info)  # type: ignore[arg-type]
     truth = {"c": ImageTruth(camera, ())}
-
     recorder.start()
     recorder.record(Sample(0, 0, 0, "train", Scene("t"), Capture({"c": reading}), truth))
-
     assert "channels/c/flow_forward" in stream.logged
     (root,) = [stream.blueprint.root_container]
     (tabs,) = root.contents[1].contents

@@ -44,10 +44,14 @@ def test_what_surrounds_the_scene_is_outlined_and_not_tinted(category: str) -> N
     assert (image[199, 10:310] != GREY).any(axis=-1).all()
 
 
-def test_things_are_tinted() -> None:
+def test_things_are_tinted_and_names_of_neighbours_do_not_cover_one_another() -> None:
     """A box, a tint and a name."""
     image = drawn(("mug", BoxPx(100, 100, 160, 160)))
     assert (image[140:155, 105:155] != GREY).any(axis=-1).all()
+    box = BoxPx(100, 100, 140, 140)
+    one, both = drawn(("mug", box)), drawn(("mug", box), ("mug", BoxPx(102, 101, 142, 141)))
+    name = (slice(86, 99), slice(100, 130))
+    np.testing.assert_array_equal(one[name], both[name])
 
 
 def test_lines_and_names_grow_with_the_image_that_is_scaled_down() -> None:
@@ -63,10 +67,3 @@ def test_lines_and_names_grow_with_the_image_that_is_scaled_down() -> None:
         label = image[rows.min() : 99, 101:125]
         assert label.max() > 200, name
         assert label.min() < 80, name
-
-
-def test_names_of_neighbours_do_not_cover_one_another() -> None:
-    box = BoxPx(100, 100, 140, 140)
-    one, both = drawn(("mug", box)), drawn(("mug", box), ("mug", BoxPx(102, 101, 142, 141)))
-    name = (slice(86, 99), slice(100, 130))
-    np.testing.assert_array_equal(one[name], both[name])

@@ -26,25 +26,24 @@ from gen_data.preview.rerun_recording import Recorder
 from gen_data.preview.sensor_views import ROW_PX, point_colors, range_view, top_view
 
 
-def test_box_edges_join_corners_that_differ_in_one_axis() -> None:
+def test_boxes_are_drawn_at_their_projection_and_not_behind_the_camera() -> None:
     """Twelve edges of a cuboid, none twice."""
     corners = OrientedBox(SE3(), (2.0, 2.0, 2.0)).corners()
     differing = [int((corners[a] != corners[b]).sum()) for a, b in BOX_EDGES]
-
     assert differing == [1] * 12
     assert len({frozenset(edge) for edge in BOX_EDGES}) == 12
-
-
-def test_box_is_drawn_at_its_projection() -> None:
-    """The front face of a 2 m cube centred 4 m ahead spans f * 1 / 3 pixels to each side."""
+    # The front face of a 2 m cube centred 4 m ahead spans f * 1 / 3 pixels to each side.
     intrinsics = Intrinsics(120, 120, 60.0, 60.0, 60.0, 60.0)
     image = np.zeros((120, 120, 3), np.uint8)
-
     draw_box3d(image, OrientedBox(SE3((0.0, 0.0, 4.0)), (2.0, 2.0, 2.0)), intrinsics, (255, 0, 0))
-
     rows, columns = np.nonzero(image[..., 0] > 128)
     assert (rows.min(), rows.max()) == (40, 80)
     assert (columns.min(), columns.max()) == (40, 80)
+    # What is behind is not mirrored into the image.
+    intrinsics = Intrinsics(64, 64, 60.0, 60.0, 32.0, 32.0)
+    image = np.zeros((64, 64, 3), np.uint8)
+    draw_box3d(image, OrientedBox(SE3((0.0, 0.0, -3.0)), (1.0, 1.0, 1.0)), intrinsics, (9, 9, 9))
+    assert not image.any()
 
 
 def test_a_skeleton_is_drawn_at_its_points_and_hidden_ones_are_rings() -> None:
@@ -57,9 +56,7 @@ def test_a_skeleton_is_drawn_at_its_points_and_hidden_ones_are_rings() -> None:
         KeypointTruth("right_hip", far, (30.5, 20.5), 1),
         KeypointTruth("nose", far),
     )
-
     draw_keypoints(image, points, (255, 0, 0))
-
     red = image[..., 0]
     assert (red[15:31, 10] > 200).all()
     assert red[20, 30] < 100
@@ -106,22 +103,18 @@ def test_a_recording_joins_the_keypoints_of_each_object_by_itself() -> None:
                 Instance(k, f"person/{k}", "person", 1, "person", keypoints=points),
                 visible_px=9,
                 box=BoxPx(0, 0, 9, 9),
-                keypoints=(
-                    KeypointTruth("left_ankle", (0.0, 0.0, 2.0), (20.0, 20.0), 2),
-                    KeypointTruth("nose", (0.0, -9.0, 2.0)),
-                ),
+                keypoints=(KeypointTruth("left_ankle", (0.0, 0.0, 2.0), (20.0, 20.0), 2),
+                           KeypointTruth("nose", (0.0, -9.0, 2.0))),
             )
             for k in (4, 7)
         ),
-    )
+    )  # fmt: skip
     scene = Scene("street", instances=tuple(item.instance for item in truth.objects))
     capture = Capture({"color": SensorReading("color", camera, {})})
     stream = _Stream()
     recorder = Recorder(stream, None, _info(categories=("person",)))  # type: ignore[arg-type]
-
     recorder.start()
     recorder.record(Sample(0, 0, 0, "train", scene, capture, {"color": truth}))
-
     prefix = "world/cameras/color/image/keypoints"
     logged = [(path, what) for path, what in stream.logged if path.startswith(prefix)]
     assert [path for path, _ in logged] == [prefix, f"{prefix}/4", f"{prefix}/7"]
@@ -135,25 +128,13 @@ def test_a_recording_joins_the_keypoints_of_each_object_by_itself() -> None:
     assert [(b["keypoint0"], b["keypoint1"]) for b in bones] == list(PERSON.bones)
 
 
-def test_box_behind_the_camera_leaves_no_trace() -> None:
-    """What is behind is not mirrored into the image."""
-    intrinsics = Intrinsics(64, 64, 60.0, 60.0, 32.0, 32.0)
-    image = np.zeros((64, 64, 3), np.uint8)
-
-    draw_box3d(image, OrientedBox(SE3((0.0, 0.0, -3.0)), (1.0, 1.0, 1.0)), intrinsics, (9, 9, 9))
-
-    assert not image.any()
-
-
 def test_edges_of_boxes_bow_with_the_lens() -> None:
     """The middle of a long edge is drawn where the lens puts it, and not on the chord."""
     lens = Lens("kannala_brandt", (0.0,) * 4)
     intrinsics = Intrinsics(200, 200, 60.0, 60.0, 100.0, 100.0, lens)
     image = np.zeros((200, 200, 3), np.uint8)
     bar = OrientedBox(SE3((0.0, 1.2, 1.0)), (6.0, 0.001, 0.001))
-
     draw_box3d(image, bar, intrinsics, (200, 200, 200))
-
     ends = intrinsics.project(np.array([[-3.0, 1.2, 1.0], [3.0, 1.2, 1.0]]))
     row = int(intrinsics.project(np.array([0.0, 1.2, 1.0]))[1])
     assert row - ends[:, 1].max() > 15
@@ -171,10 +152,8 @@ def test_images_that_rerun_cannot_place_in_space_are_shown_by_themselves() -> No
         recorder = Recorder(stream, None, _info())  # type: ignore[arg-type]
         truth = {"color": ImageTruth(camera, ())}
         sample = Sample(0, 0, 0, "train", Scene("s"), Capture({"color": reading}), truth)
-
         recorder.start()
         recorder.record(sample)
-
         logged = [what for path, what in stream.logged if path == "world/cameras/color/image"]
         assert len(logged) == pinholes
 
@@ -190,7 +169,6 @@ def test_the_scene_opens_where_the_first_camera_is() -> None:
     for index in (0, 1):
         truth = {"color": ImageTruth(camera, ())}
         recorder.record(Sample(index, 0, 0, "train", Scene("s"), capture, truth))
-
     (blueprint,) = stream.blueprints
     world = blueprint.root_container.contents[0]
     eye = world.properties["EyeControls3D"]
@@ -221,9 +199,7 @@ def test_every_channel_of_a_camera_is_in_the_recording() -> None:
     recorder = Recorder(stream, None, _info())  # type: ignore[arg-type]
     capture = Capture({"color": SensorReading("color", camera, channels)})
     truth = {"color": ImageTruth(camera, ())}
-
     recorder.record(Sample(0, 0, 0, "train", Scene("s"), capture, truth))
-
     logged = {path for path, _ in stream.logged}
     for name in ("rgb", "depth", "measured_depth"):
         assert f"world/cameras/color/image/{name}" in logged
@@ -231,52 +207,60 @@ def test_every_channel_of_a_camera_is_in_the_recording() -> None:
         assert f"channels/color/{name}" in logged
 
 
-def test_neighbouring_ids_look_different_and_nothing_is_black() -> None:
+def test_ids_depths_and_shares_have_different_colours_and_nothing_is_black() -> None:
     """At least 60 grey levels in some channel between consecutive ids."""
     colors = np.array([id_color(i) for i in range(1, 200)], int)
-
     assert id_color(0) == (0, 0, 0)
     assert (np.abs(np.diff(colors, axis=0)).max(axis=1) >= 60).all()
     ids = np.array([[0, 3], [7, 3]], np.uint16)
     assert tuple(color_ids(ids)[0, 1]) == id_color(3)
-
-
-def test_depth_is_bright_when_near_and_black_when_nothing() -> None:
-    """Infinite depth is black; the nearest pixel is the brightest."""
+    # Infinite depth is black; the nearest pixel is the brightest.
     shown = color_depth(np.array([[1.0, 2.0], [3.0, np.inf]]))[..., 0]
-
     assert shown[1, 1] == 0
     assert shown[0, 0] > shown[0, 1] > shown[1, 0] > 0
+    # Shares outside [0, 1] are clipped.
+    shown = color_shares(np.array([-1.0, 0.0, 0.5, 1.0, 2.0])).tolist()
+    blue, green, red = [0, 0, 255], [0, 255, 0], [255, 0, 0]
+    assert shown == [blue, blue, green, red, red]
 
 
-def test_sheet_places_tiles_row_by_row() -> None:
+def test_sheets_place_tiles_row_by_row_and_of_nothing_are_refused() -> None:
     """Five tiles in columns of three: the fifth is second in the second row."""
     images = [np.full((10, 20, 3), 50 * k, np.uint8) for k in range(1, 6)]
-
     sheet = arrange_tiles(images, columns=3)
-
     assert sheet.shape == (2 * (10 + GAP_PX) + GAP_PX, 3 * (20 + GAP_PX) + GAP_PX, 3)
     assert (sheet[GAP_PX * 2 + 10 + 5, GAP_PX * 2 + 20 + 5] == 250).all()
-
-
-def test_sheet_of_nothing_is_refused() -> None:
     with pytest.raises(ConfigError):
         arrange_tiles([], columns=3)
 
 
-def test_a_scan_from_above_has_its_points_where_they_are() -> None:
+def test_scans_from_above_and_range_images_have_their_points_where_they_are() -> None:
     """X to the right, Y up: a point 25 m ahead and 10 m to the left, coloured by its category."""
     points = np.zeros(2, POINT)
     points["position_m"] = [(25.0, 10.0, 0.0), (25.0, 10.0, -1.0)]
     points["category_id"] = [3, 0]
     cloud = PointCloud("top", Lidar("top", "color"), points)
-
     view = top_view(cloud, Scene("t"), aspect=2.0)
-
     assert view.shape == (480, 960, 3)
     (row,), (column,) = np.nonzero(view.any(axis=-1))
     assert (row, column) == (240 - 96, 480 + 240)
     assert tuple(view[row, column]) == id_color(3)
+    # Strong returns are red, weak ones blue, whatever they are.
+    points = np.zeros(2, POINT)
+    points["intensity"] = [0.0, 1.0]
+    points["category_id"] = 3
+    cloud = PointCloud("top", Lidar("top", "color"), points)
+    assert point_colors(cloud, "intensity").tolist() == [[0, 0, 255], [255, 0, 0]]
+    assert tuple(point_colors(cloud)[0]) == id_color(3)
+    # Three panels of two rings; the nearer of two points in one pixel is shown.
+    points = np.zeros(3, POINT)
+    points["position_m"] = [(2.0, -0.001, 0.0), (50.0, -0.025, 0.0), (0.0, 100.0, 0.0)]
+    points["ring"] = [0, 0, 1]
+    view = range_view(PointCloud("top", Lidar("top", "color"), points))
+    assert view.shape == (3 * 2 * ROW_PX, 960, 3)
+    assert view[0, 480].tolist() == [0, 0, 255]
+    assert view[ROW_PX, 240].tolist() == [255, 0, 0]
+    assert int(view[: 2 * ROW_PX].any(axis=-1).sum()) == 2 * ROW_PX
 
 
 class _Triangles:
@@ -285,13 +269,10 @@ class _Triangles:
     def mesh(self, asset_id: str) -> MeshData:
         corners = np.eye(3, dtype=np.float32)
         return MeshData(
-            vertices_m=corners,
-            faces=np.array([[0, 1, 2]], np.int32),
-            normals=corners,
-            uvs=np.zeros((3, 2), np.float32),
-            face_slots=np.zeros(1, np.int32),
+            vertices_m=corners, faces=np.array([[0, 1, 2]], np.int32), normals=corners,
+            uvs=np.zeros((3, 2), np.float32), face_slots=np.zeros(1, np.int32),
             materials=(Material(),),
-        )
+        )  # fmt: skip
 
 
 def _moving(step_index: int, *, first: int = 0) -> Sample:
@@ -316,7 +297,7 @@ def _recorded(samples: list[Sample]) -> _Stream:
     return stream
 
 
-def test_a_sequence_sends_meshes_once_and_transforms_of_what_moves() -> None:
+def test_sequences_follow_each_other_and_send_meshes_once_and_ways() -> None:
     """The house is sent once, the car's mesh once and its place at each of three steps."""
     logged = _recorded([_moving(k) for k in range(3)]).logged
 
@@ -326,53 +307,13 @@ def test_a_sequence_sends_meshes_once_and_transforms_of_what_moves() -> None:
     assert [count("world/bodies/house", k) for k in ("Mesh3D", "Transform3D")] == [1, 1]
     assert [count("world/bodies/ego", k) for k in ("Mesh3D", "Transform3D")] == [1, 3]
     assert count("world/rigs/ego", "Transform3D") == 3
-
-
-def test_sequences_follow_each_other_in_seconds() -> None:
-    """Four steps of 0.1 s make a sequence of 0.4 s; the second begins where the first ended."""
-    stream = _recorded([_moving(2), _moving(0, first=4)])
-
-    seconds = dict.fromkeys(s for path, s in stream.seconds if path == "world/rigs/ego")
-    assert list(seconds) == pytest.approx([0.2, 0.4])
-
-
-def test_a_way_is_where_a_body_goes_until_the_end_of_its_sequence() -> None:
-    """3 m ahead from the first step, logged once; it is lifted off the ground."""
+    # 3 m ahead from the first step, logged once; it is lifted off the ground.
     logged = _recorded([_moving(k) for k in range(3)]).logged
-
     (way,) = [what for path, what in logged if path == "world/ways"]
     (strip,) = way.strips.as_arrow_array().to_pylist()
     assert strip[0] == pytest.approx([0.0, 0.0, 0.05])
     assert strip[-1] == pytest.approx([3.0, 0.0, 0.05])
-
-
-def test_colors_of_shares_run_from_blue_over_green_to_red() -> None:
-    """Shares outside [0, 1] are clipped."""
-    shown = color_shares(np.array([-1.0, 0.0, 0.5, 1.0, 2.0])).tolist()
-
-    blue, green, red = [0, 0, 255], [0, 255, 0], [255, 0, 0]
-    assert shown == [blue, blue, green, red, red]
-
-
-def test_points_are_colored_by_intensity_if_asked() -> None:
-    """Strong returns are red, weak ones blue, whatever they are."""
-    points = np.zeros(2, POINT)
-    points["intensity"] = [0.0, 1.0]
-    points["category_id"] = 3
-    cloud = PointCloud("top", Lidar("top", "color"), points)
-
-    assert point_colors(cloud, "intensity").tolist() == [[0, 0, 255], [255, 0, 0]]
-    assert tuple(point_colors(cloud)[0]) == id_color(3)
-
-
-def test_a_range_image_has_ahead_in_the_middle_and_left_on_the_left() -> None:
-    """Three panels of two rings; the nearer of two points in one pixel is shown."""
-    points = np.zeros(3, POINT)
-    points["position_m"] = [(2.0, -0.001, 0.0), (50.0, -0.025, 0.0), (0.0, 100.0, 0.0)]
-    points["ring"] = [0, 0, 1]
-    view = range_view(PointCloud("top", Lidar("top", "color"), points))
-
-    assert view.shape == (3 * 2 * ROW_PX, 960, 3)
-    assert view[0, 480].tolist() == [0, 0, 255]
-    assert view[ROW_PX, 240].tolist() == [255, 0, 0]
-    assert int(view[: 2 * ROW_PX].any(axis=-1).sum()) == 2 * ROW_PX
+    # Four steps of 0.1 s make a sequence of 0.4 s; the second begins where the first ended.
+    stream = _recorded([_moving(2), _moving(0, first=4)])
+    seconds = dict.fromkeys(s for path, s in stream.seconds if path == "world/rigs/ego")
+    assert list(seconds) == pytest.approx([0.2, 0.4])

@@ -41,10 +41,8 @@ def event_table() -> Measurements:
 def sample() -> Sample:
     lens = Intrinsics(32, 24, 30.0, 30.0, 16.0, 12.0)
     color, depth = Camera("color", SE3(), lens), Camera("depth", SE3(), lens)
-    images = {
-        Channel.RGB: np.full((24, 32, 3), 90, np.uint8),
-        Channel.Z_DEPTH: np.full((24, 32), 2.0, np.float32),
-    }
+    images = {Channel.RGB: np.full((24, 32, 3), 90, np.uint8),
+              Channel.Z_DEPTH: np.full((24, 32), 2.0, np.float32)}  # fmt: skip
     readings = {c.name: SensorReading(c.name, c, images) for c in (color, depth)}
     tables = {"radar": radar_table(range_m=10.0), "events": event_table()}
     truth = {c.name: ImageTruth(c, ()) for c in (color, depth)}
@@ -52,37 +50,34 @@ def sample() -> Sample:
     return Sample(0, 0, 0, "train", scene, Capture(readings, tables=tables), truth)
 
 
-def test_every_sensor_shows_what_it_writes() -> None:
+def test_every_sensor_shows_what_it_writes_and_captions_stand_below() -> None:
     """Captions name the sensor, and the channel where it has several."""
     channels = {"color": (Channel.RGB,), "depth": (Channel.RGB, Channel.Z_DEPTH)}
-
     shown = list(make_tiles([sample()], channels, labels=False, views=VIEWS))
-
     assert [t.caption for t in shown] == ["color", "depth rgb", "depth depth", "events", "radar"]
     without = make_tiles([sample()], channels, labels=True)
     assert [t.caption for t in without] == ["color", "depth rgb", "depth depth"]
-
-
-def test_captions_stand_below_their_tiles() -> None:
-    """The picture is not covered; without captions it is all there is."""
+    # The picture is not covered; without captions it is all there is.
     tile = Tile("camera", np.full((30, 40, 3), 200, np.uint8))
-
     (plain,) = render_tiles([tile], 80, captions=False)
     (named,) = render_tiles([tile], 80, captions=True)
-
     assert plain.shape == (60, 80, 3)
     assert named.shape == (60 + CAPTION_PX, 80, 3)
     assert np.array_equal(named[:60], plain)
     assert named[60:].max() > 150
 
 
-def test_the_last_event_of_a_pixel_decides_its_colour() -> None:
+def test_the_last_event_of_a_pixel_decides_its_colour_and_radars_outline_objects() -> None:
     """Red where it became darker at last, blue where brighter, grey where nothing came."""
     view = event_view(event_table(), Scene("t"), 1.0)
-
     assert view.shape == (8, 10, 3)
     assert (tuple(view[7, 9]), tuple(view[2, 3])) == (DARKER, BRIGHTER)
     assert (view[0] == GREY).all()
+    # A car of 4 m by 2 m at the origin: 38 by 19 pixels.
+    view = radar_view(radar_table(range_m=49.0), Scene("t", instances=(CAR,)), 1.0)
+    rows, columns = np.nonzero(view[:, :600].any(axis=2))
+    assert columns.max() - columns.min() == pytest.approx(4.0 * 9.6, abs=3)
+    assert rows.max() - rows.min() == pytest.approx(2.0 * 9.6, abs=3)
 
 
 @pytest.mark.parametrize(("velocity", "channel"), [(-20.0, 2), (0.0, 1), (20.0, 0)])
@@ -93,20 +88,10 @@ def test_detections_are_seen_from_above_by_their_speed(velocity: float, channel:
         snr_db=30.0,
     )  # fmt: skip
     view = radar_view(table, Scene("t", instances=(replace(CAR, annotated=False),)), 1.0)
-
     assert view.shape == (960, 960, 3)
     assert view[480 - 96, 480 + 96].argmax() == channel
     assert view[480 - 96, 480 + 96].max() == 255
     assert not view[480:].any()
-
-
-def test_things_are_outlined_around_a_radar() -> None:
-    """A car of 4 m by 2 m at the origin: 38 by 19 pixels."""
-    view = radar_view(radar_table(range_m=49.0), Scene("t", instances=(CAR,)), 1.0)
-    rows, columns = np.nonzero(view[:, :600].any(axis=2))
-
-    assert columns.max() - columns.min() == pytest.approx(4.0 * 9.6, abs=3)
-    assert rows.max() - rows.min() == pytest.approx(2.0 * 9.6, abs=3)
 
 
 @pytest.mark.parametrize("path", SHEETS, ids=lambda path: path.stem)

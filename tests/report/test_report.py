@@ -18,17 +18,11 @@ from gen_data.report.label_statistics import Survey, collect_statistics
 def annotation(number: int, image_id: int, category_id: int, **keys: Any) -> dict[str, Any]:
     """A car, or a person, 5 m ahead and 12 m to the right: 13 m away."""
     return {
-        "id": number,
-        "image_id": image_id,
-        "category_id": category_id,
-        "bbox": [3, 4, 30, 20],
-        "attributes": {"name": "it", "asset": "it"},
-        "occlusion": 0.0,
-        "truncation": 0.0,
+        "id": number, "image_id": image_id, "category_id": category_id, "bbox": [3, 4, 30, 20],
+        "attributes": {"name": "it", "asset": "it"}, "occlusion": 0.0, "truncation": 0.0,
         "visible_fraction": 1.0,
-        "box3d": {"center_m": [12.0, 1.0, 5.0], "size_m": [4.0, 1.6, 1.5]},
-        **keys,
-    }
+        "box3d": {"center_m": [12.0, 1.0, 5.0], "size_m": [4.0, 1.6, 1.5]}, **keys,
+    }  # fmt: skip
 
 
 def write_coco(folder: Path, split: str, stem: str, n: int, rows: list[dict[str, Any]]) -> None:
@@ -44,12 +38,10 @@ def write_coco(folder: Path, split: str, stem: str, n: int, rows: list[dict[str,
 @pytest.fixture
 def street(tmp_path: Path) -> Path:
     """Three cars and a sitting person in two of three images; one car half hidden, one cut off."""
-    rows = [
-        annotation(1, 1, 1),
-        annotation(2, 1, 1, occlusion=0.4, visible_fraction=0.6, bbox=[0, 0, 60, 45]),
-        annotation(3, 2, 1, truncation=0.2, bbox=[0, 0, 60, 45]),
-        annotation(4, 2, 2, attributes={"pose": "sit"}, occlusion=0.9),
-    ]
+    rows = [annotation(1, 1, 1),
+            annotation(2, 1, 1, occlusion=0.4, visible_fraction=0.6, bbox=[0, 0, 60, 45]),
+            annotation(3, 2, 1, truncation=0.2, bbox=[0, 0, 60, 45]),
+            annotation(4, 2, 2, attributes={"pose": "sit"}, occlusion=0.9)]  # fmt: skip
     write_coco(tmp_path, "train", "instances", 3, rows)
     points = [0, 0, 0, 5.0, 5.0, 1, 6.0, 6.0, 2, 7.0, 7.0, 2]
     write_coco(tmp_path, "train", "person_keypoints", 3, [rows[3] | {"keypoints": points}])
@@ -63,10 +55,9 @@ def row_of(made: tuple[report_tables.Table, ...], title: str, name: str) -> dict
     return {f"{h} {k}" if h == "KITTI" else h: c for k, (h, c) in enumerate(zip(table.header, row))}  # noqa: B905
 
 
-def test_cocos_files_are_read_an_object_at_a_time(street: Path) -> None:
+def test_cocos_files_are_read_an_object_at_a_time_and_histograms_lose_nothing(street: Path) -> None:
     """Distance is over the ground; the pose makes the type; points are counted by state."""
     found = list(read_records(street))
-
     assert [r for r in found if isinstance(r, Picture)] == [
         Picture("train", str(k)) for k in (1, 2, 3)
     ]
@@ -76,25 +67,38 @@ def test_cocos_files_are_read_an_object_at_a_time(street: Path) -> None:
     )
     assert (labels[3].kind, labels[3].occlusion_level) == ("Person_sitting", 2)
     assert [r for r in found if isinstance(r, Points)] == [Points("person", (1, 1, 2))]
+    # What is beyond the last edge is in the last bin.
+    found = collect_statistics(read_records(street))
+    found.numbers[("car", "Car")].extend([5000.0, 4000.0, 0, 0, 1, 999.0, 4, 2, 1])
+    made = report_tables.make_histograms(found)
+    for histogram in made[1:]:
+        assert histogram.counts["car"].sum() == 4
+        assert len(histogram.counts["car"]) == len(histogram.edges) - 1
+    assert made[0].counts["images"].tolist()[:3] == [1, 0, 2]
 
 
-def test_diversity_counts_variants_by_category_and_family() -> None:
+def test_diversity_counts_variants_and_what_was_not_annotated_is_blank() -> None:
     """Four cars of one family, one half of them alike: 2/4, 1/4, 1/4 have 1.5 bits."""
     ids = ["car?seed=1", "car?seed=1", "car?seed=2", "car?seed=3", "user/van", "user/van"]
     labels = [Label(("train", "1"), "car", "Car", 9, 9, asset=asset) for asset in ids]
     survey = collect_statistics([*labels, Label(("train", "1"), "dog", "Misc", 9, 9)])
-
     (table,) = (one for one in report_tables.make_tables(survey) if one.title == "Diversity")
-
     assert table.header == ("category", "family", "objects", "variants", "entropy bits")
     # All: 2/6, 1/6, 1/6, 2/6, so 2/3 log2 3 + 1/3 log2 6 = 1.9183 bits.
     assert table.rows == (("car", "all", "6", "4", "1.92"), ("car", "car", "4", "3", "1.50"))
-
-
-def test_labels_without_assets_have_no_table_of_diversity() -> None:
     survey = collect_statistics([Label(("train", "1"), "Car", "Car", 9, 9)])
-
     assert "Diversity" not in {one.title for one in report_tables.make_tables(survey)}
+    # A data set of boxes only has sizes still; without its types KITTI is no match.
+    made = report_tables.make_tables(
+        collect_statistics([Picture("train", "1"), Label(("train", "1"), "mug", "Misc", 10, 20)])
+    )
+    hidden = row_of(made, "Occlusion and truncation", "mug")
+    assert set(hidden.values()) == {"mug", "-"}
+    assert row_of(made, "Distance and size", "mug")["height m"] == "-"
+    assert [t.title for t in made][-1] == "Distance and size"
+    found = collect_statistics([Picture("train", "1")])
+    assert row_of(report_tables.make_tables(found), "Images", "train")["empty"] == "100.0 %"
+    assert report_tables.make_histograms(found)[0].counts["images"].sum() == 1
 
 
 def test_kittis_files_are_read_where_there_is_no_coco(tmp_path: Path) -> None:
@@ -107,44 +111,37 @@ def test_kittis_files_are_read_where_there_is_no_coco(tmp_path: Path) -> None:
         "Car 0.10 2 0.50 10.00 20.00 39.00 39.00 1.5 1.6 4.0 12.0 1.0 5.0 1.0\n"
         "DontCare -1 -1 -10 1.00 1.00 2.00 2.00 -1 -1 -1 -1000 -1000 -1000 -10\n"
     )
-
     picture, label = read_records(tmp_path)
-
     assert picture == Picture("val", "000007")
     assert label == Label(
         ("val", "000007"), "Car", "Car", 30, 20, 2, 0.1, None, 13.0, (4.0, 1.6, 1.5)
     )
 
 
-def test_a_folder_without_labels_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(StorageError, match=r"there are no labels.*exported as coco or kitti"):
-        list(read_records(tmp_path))
+KITTI, COCO = "kitti/training/label_2/000007.txt", "coco/annotations/instances_val.json"
 
 
-@pytest.mark.parametrize("text", ["Car 0 0 0\n", "Car a 0 0 1 1 2 2 1 1 1 1 1 1 1\n"])
-def test_a_damaged_label_is_named_with_its_line(tmp_path: Path, text: str) -> None:
-    test_kittis_files_are_read_where_there_is_no_coco(tmp_path)
-    path = tmp_path / "kitti/training/label_2/000007.txt"
-    path.write_text(text)
-
-    with pytest.raises(StorageError, match=r"000007.txt:1: not the 15 columns"):
-        list(read_records(tmp_path))
-
-
-def test_a_coco_file_of_another_layout_is_refused(tmp_path: Path) -> None:
-    """It would have to be read whole."""
-    folder = tmp_path / "coco/annotations"
-    folder.mkdir(parents=True)
-    (folder / "instances_val.json").write_text('{\n "images": [],\n "annotations": []\n}')
-
-    with pytest.raises(StorageError, match="not written by gen-data"):
+@pytest.mark.parametrize(
+    ("path", "text", "message"),
+    [("notes.txt", "", r"there are no labels.*exported as coco or kitti"),
+     (KITTI, "Car 0 0 0\n", r"000007.txt:1: not the 15 columns"),
+     (KITTI, "Car a 0 0 1 1 2 2 1 1 1 1 1 1 1\n", r"000007.txt:1: not the 15 columns"),
+     (COCO, '{\n "images": [],\n "annotations": []\n}', "not written by gen-data")],
+    ids=["no labels", "few columns", "a letter", "another layout, to be read whole"],
+)  # fmt: skip
+def test_a_bad_label_is_named_by_line(tmp_path: Path, path: str, text: str, message: str) -> None:
+    (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
+    (tmp_path / path).write_text(text)
+    if path == KITTI:
+        (tmp_path / "kitti/ImageSets").mkdir()
+        (tmp_path / "kitti/ImageSets/val.txt").write_text("000007\n")
+    with pytest.raises(StorageError, match=message):
         list(read_records(tmp_path))
 
 
 def test_tables_count_what_was_written(street: Path) -> None:
     """Two of four objects in each of two images, one image empty."""
     made = report_tables.make_tables(collect_statistics(read_records(street)))
-
     images = row_of(made, "Images", "all")
     assert (images["images"], images["objects"], images["empty"]) == ("3", "4", "33.3 %")
     assert images["objects/image"] == "1.3"
@@ -163,79 +160,29 @@ def test_tables_count_what_was_written(street: Path) -> None:
     assert row_of(made, "Beside KITTI", "Person_sitting")["objects"] == "1"
 
 
-def test_labels_that_were_not_annotated_are_left_blank() -> None:
-    """A data set of boxes only has sizes still; without its types KITTI is no match."""
-    made = report_tables.make_tables(
-        collect_statistics([Picture("train", "1"), Label(("train", "1"), "mug", "Misc", 10, 20)])
-    )
-
-    hidden = row_of(made, "Occlusion and truncation", "mug")
-    assert set(hidden.values()) == {"mug", "-"}
-    assert row_of(made, "Distance and size", "mug")["height m"] == "-"
-    assert [t.title for t in made][-1] == "Distance and size"
-
-
-def test_a_data_set_without_objects_has_a_report() -> None:
-    found = collect_statistics([Picture("train", "1")])
-
-    assert row_of(report_tables.make_tables(found), "Images", "train")["empty"] == "100.0 %"
-    assert report_tables.make_histograms(found)[0].counts["images"].sum() == 1
-
-
-def test_the_difficulties_are_those_of_the_devkit() -> None:
+def test_the_difficulties_are_those_of_the_devkit_and_counts_need_little_memory() -> None:
     """40, 25 and 25 px; levels 0, 1, 2; 15, 30 and 50 % outside: limits belong to the level."""
-    columns = {
-        "height_px": np.array([40.0, 39.9, 25.0, 24.9, 90.0]),
-        "occlusion_level": np.array([0.0, 0.0, 1.0, 0.0, 2.0]),
-        "truncation": np.array([0.15, 0.0, 0.3, 0.0, 0.5]),
-    }
-
-    counted = [
-        report_tables.counts_at(columns, level).tolist() for level in report_tables.DIFFICULTIES
-    ]
-
-    assert counted == [
-        [True, False, False, False, False],
-        [True, True, True, False, False],
-        [True, True, True, False, True],
-    ]
-
-
-def test_kittis_counts_add_up() -> None:
-    """51,865 labelled objects in all, 11,295 of which are DontCare regions."""
+    columns = {"height_px": np.array([40.0, 39.9, 25.0, 24.9, 90.0]),
+               "occlusion_level": np.array([0.0, 0.0, 1.0, 0.0, 2.0]),
+               "truncation": np.array([0.15, 0.0, 0.3, 0.0, 0.5])}  # fmt: skip
+    levels = report_tables.DIFFICULTIES
+    counted = [report_tables.counts_at(columns, level).tolist() for level in levels]
+    assert counted == [[True, False, False, False, False], [True, True, True, False, False],
+                       [True, True, True, False, True]]  # fmt: skip
+    # 51,865 labelled objects in all, 11,295 of which are DontCare regions.
     assert sum(kind.objects for kind in report_tables.TYPES.values()) == 51_865 - 11_295
-
-
-def test_histograms_lose_nothing(street: Path) -> None:
-    """What is beyond the last edge is in the last bin."""
-    found = collect_statistics(read_records(street))
-    found.numbers[("car", "Car")].extend([5000.0, 4000.0, 0, 0, 1, 999.0, 4, 2, 1])
-
-    made = report_tables.make_histograms(found)
-
-    for histogram in made[1:]:
-        assert histogram.counts["car"].sum() == 4
-        assert len(histogram.counts["car"]) == len(histogram.edges) - 1
-    assert made[0].counts["images"].tolist()[:3] == [1, 0, 2]
+    # A million objects are 72 MB.
+    label = Label(("train", "1"), "mug", "Misc", 10, 20)
+    found: Survey = collect_statistics(label for _ in range(1000))
+    assert found.numbers[("mug", "Misc")].buffer_info()[1] == 9000
 
 
 def test_the_command_prints_tables_and_writes_a_page(street: Path, tmp_path: Path) -> None:
     html = tmp_path / "out/report.html"
-
     done = CliRunner().invoke(report, [str(street), "--html", str(html)])
-
     assert done.exit_code == 0, done.output
     assert "Occlusion and truncation" in done.output
     assert "Beside KITTI" in html.read_text(encoding="utf-8")
-
-
-def test_memory_grows_by_nine_numbers_per_object() -> None:
-    """A million objects are 72 MB."""
-    label = Label(("train", "1"), "mug", "Misc", 10, 20)
-
-    found: Survey = collect_statistics(label for _ in range(1000))
-
-    assert found.numbers[("mug", "Misc")].buffer_info()[1] == 9000
 
 
 def write_scan(folder: Path, name: str, rows: list[int], labels: str) -> None:
@@ -262,10 +209,8 @@ Car 0.00 0 0.00 1.00 1.00 9.00 9.00 1.50 1.60 4.00 12.00 1.70 16.00 0.00
 def test_points_on_cars_are_counted_by_distance(tmp_path: Path) -> None:
     """Two cars in view, 5 m and 20 m away, with three points and none."""
     write_scan(tmp_path / "kitti", "000000", [1, 1, 1, 2, 3, 0], CAR_ROWS)
-
     (scan,) = read_scans(tmp_path)
     whole, cars = report_tables.make_scan_tables([scan])
-
     assert (scan.points, scan.dark) == (6, 3)
     assert scan.cars == ((5.0, 3), (20.0, 0))
     assert (whole.rows[0][1:4], whole.rows[0][-1]) == (("6", "120000", "104450"), "50.00 %")
@@ -278,15 +223,12 @@ def test_of_many_scans_some_are_read(tmp_path: Path) -> None:
     assert list(read_scans(tmp_path)) == [] and report_tables.make_scan_tables([]) == ()
     for k in range(SCANS_MAX + 1):
         write_scan(tmp_path, f"{k:06d}", [0] * (k + 1), "")
-
     read = [scan.points for scan in read_scans(tmp_path)]
-
     assert read == list(range(1, SCANS_MAX + 2, 2))
 
 
 def test_a_scan_whose_labels_do_not_fit_is_refused(tmp_path: Path) -> None:
     write_scan(tmp_path, "000007", [0, 0], "")
     (tmp_path / "training/velodyne/000007.bin").write_bytes(b"1234")
-
     with pytest.raises(StorageError, match=r"000007.label: not a scan"):
         list(read_scans(tmp_path))

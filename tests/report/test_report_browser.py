@@ -125,10 +125,8 @@ def test_the_policy_blocks_other_scripts_and_requests(opened: Opened, tmp_path: 
     page.on("requestfinished", lambda request: answered.append(request.url))
     page.on("requestfailed", lambda request: failed.update({request.url: request.failure}))
     page.on("dialog", lambda dialog: (dialogs.append(dialog.message), dialog.dismiss()))
-
     page.goto(path.as_uri())
     page.wait_for_selector(".stage canvas[data-layers]")
-
     assert page.evaluate("window.added") is None
     assert [url for url in answered if url[:5] != "data:"] == [path.as_uri()]
     assert failed == {"http://127.0.0.1:9/x.png": "csp"}  # refused before any connection

@@ -34,13 +34,10 @@ Json = dict[str, Any]
 def hand(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Five samples: the fourth is empty, the last has the image of the first, a little darker."""
     rng = np.random.default_rng(1)
-    samples = [
-        [make_object(1, "car"), make_object(2, HOSTILE_NAME, 40, 4)],
-        [make_object(1, "car", side_px=16)],
-        [make_object(1, "car"), make_object(2, "car", 40)],
-        [],
-        [make_object(1, HOSTILE_NAME)],
-    ]
+    samples = [[make_object(1, "car"), make_object(2, HOSTILE_NAME, 40, 4)],
+               [make_object(1, "car", side_px=16)],
+               [make_object(1, "car"), make_object(2, "car", 40)], [],
+               [make_object(1, HOSTILE_NAME)]]  # fmt: skip
     images = [make_image(rng) for _ in samples]
     images[4] = (images[0] * 0.8).astype(np.uint8)
     folder = tmp_path_factory.mktemp("hand") / HOSTILE_NAME
@@ -52,7 +49,7 @@ def described(hand: Path) -> Json:
     return describe_dataset(hand, scenes_max=0)
 
 
-def test_figures_are_those_of_the_labels(described: Json, hand: Path) -> None:
+def test_figures_viewpoints_and_duplicates_are_those_of_data(described: Json, hand: Path) -> None:
     """Counted on paper; brightness by OpenCV from the files."""
     assert described["counts"] == {"images": 5, "objects": 6}
     assert described["splits"] == {"val": 2, "train": 3}
@@ -69,20 +66,12 @@ def test_figures_are_those_of_the_labels(described: Json, hand: Path) -> None:
     assert bright["counts"]["color"] == np.histogram(means, bright["edges"])[0].tolist()
     assert described["rejected_layouts"] == 2
     assert described["licences"][0]["assets"] == "cube, a | b"
-
-
-def test_viewpoints_are_in_the_frame_of_the_object(described: Json) -> None:
-    """The cubes turn their +Z to the camera: elevations are near 90 degrees, the last row."""
+    # The cubes turn their +Z to the camera: elevations are near 90 degrees, the last row.
     cells = np.array(described["viewpoints"]["counts"]["car"])
-
     assert cells.sum() == 4
     assert cells[:, -1].sum() == 4
-
-
-def test_near_duplicates_of_other_scenes_are_grouped(described: Json) -> None:
-    """A darker copy is found, in its split."""
+    # A darker copy is found, in its split.
     found = described["duplicates"]
-
     assert (found["groups"], found["grouped"]) == (1, 2)
     (group,) = found["shown"]
     assert [m["index"] for m in group["members"]] == [0, 4]
@@ -133,23 +122,17 @@ class Page(HTMLParser):
             self.raw[self._inside][-1] += data
 
 
-def test_hostile_names_stay_text(described: Json) -> None:
+def test_hostile_names_stay_text_and_the_policy_permits_one_script_only(described: Json) -> None:
     """A browser's parser finds our two scripts and no other tag; the data is unchanged."""
     text = format_page([described])
     page = Page(text)
-
     assert [tag for tag, _ in page.tags].count("script") == 2
     assert not [tag for tag, _ in page.tags if tag == "img"]
     assert not [name for _, attributes in page.tags for name in attributes if name[:2] == "on"]
     assert json.loads(page.raw["script"][0]) == [json.loads(json.dumps(described))]
     assert HOSTILE not in text
     assert HOSTILE_NAME not in text
-
-
-def test_the_policy_permits_nothing_but_the_own_script_and_style(described: Json) -> None:
-    """Digests of both, images in ``data:`` URLs, and no address of any other place."""
-    text = format_page([described])
-    page = Page(text)
+    # Digests of both, images in ``data:`` URLs, and no address of any other place.
     (policy,) = (a["content"] for t, a in page.tags if a.get("http-equiv"))
     rules = dict(rule.strip().split(" ", 1) for rule in str(policy).split(";"))
 
@@ -201,10 +184,8 @@ def test_each_check_finds_its_contradiction_and_no_other(tmp_path: Path, title: 
     image = np.zeros((48, 64, 3), np.uint8)
     folder = write_dataset(tmp_path / "set", [[damaged, good]], ("car",), [image])
     checks = LabelChecks()
-
     for labels in read_images(StoredSamples(folder)):
         checks.add(labels)
-
     assert {r.title: r.found for r in checks.results if r.found} == {title: 1}
     (finding,) = next(r.examples for r in checks.results if r.found)
     assert (finding.index, finding.instance_id) == (0, 1)
@@ -237,16 +218,14 @@ def test_mirrors_may_exceed_the_3d_box(tmp_path: Path) -> None:
     assert findings == [set(), {"2D box exceeds the projected 3D box"}]
 
 
-def test_all_pairs_of_near_hashes_are_found() -> None:
+def test_all_pairs_of_near_hashes_are_found_but_of_one_scene_or_another_content() -> None:
     """As by comparing all pairs: components of the graph of pairs at most 4 bits apart."""
     rng = np.random.default_rng(7)
     centers = rng.integers(0, 2**63, 40, dtype=np.uint64)
     flips = [1 << int(b) for b in rng.integers(0, 64, 400)]
     hashes = [int(centers[k % 40]) ^ flips[k] ^ flips[-k] for k in range(200)]
     files = [ImageFile(k, "color", k, "train", Path(str(k))) for k in range(200)]
-
     groups = group_duplicates(files, hashes)
-
     apart = np.array([[(a ^ b).bit_count() for b in hashes] for a in hashes])
     reach = apart <= DISTANCE_MAX
     for _ in range(8):
@@ -254,21 +233,13 @@ def test_all_pairs_of_near_hashes_are_found() -> None:
     expected = {tuple(np.flatnonzero(row).tolist()) for row in reach if row.sum() > 1}
     assert {group.members for group in groups} == expected
     assert len(expected) == 40
-
-
-def test_images_of_one_scene_are_no_duplicates() -> None:
-    """Views and instants look alike by design."""
+    # Views and instants look alike by design.
     files = [ImageFile(k, "color", 5, "train", Path(str(k))) for k in range(3)]
-
     assert group_duplicates(files, [9, 9, 9]) == []
-
-
-def test_hashes_ignore_brightness_and_size_but_not_content() -> None:
-    """Half the bits of unrelated images differ."""
+    # Half the bits of unrelated images differ.
     rng = np.random.default_rng(3)
     one, other = (cv2.cvtColor(make_image(rng), cv2.COLOR_BGR2GRAY) for _ in range(2))
     small = cv2.resize((one * 0.7).astype(np.uint8), (48, 36), interpolation=cv2.INTER_AREA)
-
     assert (measure_look(one).hash ^ measure_look(small).hash).bit_count() <= DISTANCE_MAX
     assert (measure_look(one).hash ^ measure_look(other).hash).bit_count() > 16
 
@@ -277,7 +248,6 @@ def test_hashes_ignore_brightness_and_size_but_not_content() -> None:
 def test_images_are_spread_evenly(count: int) -> None:
     """All numbers occur once; the first 16 leave gaps of at most two sixteenths."""
     order = list(evenly_spread(count))
-
     assert sorted(order) == list(range(count))
     if count >= 64:
         chosen = np.sort([*order[:16], count])
@@ -287,7 +257,6 @@ def test_images_are_spread_evenly(count: int) -> None:
 def test_the_page_of_a_data_set_is_in_its_run_folder(hand: Path) -> None:
     """The figures are beside it; a second data set is shown in the same page."""
     done = CliRunner().invoke(report, [str(hand), "--compare", str(hand), "--scenes", "0"])
-
     assert done.exit_code == 0, done.output
     folder = hand / "run/report"
     page = Page((folder / "index.html").read_text(encoding="utf-8"))
@@ -320,9 +289,7 @@ def test_the_page_of_a_large_data_set_is_bounded(tmp_path: Path) -> None:
     small = write_dataset(tmp_path / "small", [objects] * 110, ("car",), [make_image(rng)])
     noise = [rng.integers(0, 256, (480, 640, 3), dtype=np.uint8)]  # compresses worst
     large = write_dataset(tmp_path / "large", [objects] * 40, ("car",), noise)
-
     many, heavy = (describe_dataset(folder, scenes_max=0) for folder in (small, large))
-
     assert len(many["browser"]) == 96 and many["counts"]["images"] == 110
     assert many["duplicates"]["grouped"] == 110
     assert len(heavy["browser"]) < 40

@@ -41,14 +41,11 @@ def saved(stage: Usd.Stage, folder: Path) -> MeshSource:
 
 @pytest.mark.parametrize(
     ("interpolation", "values", "indices", "expected"),
-    [
-        ("constant", [RED], None, [RED] * 4),
-        ("uniform", [RED, BLUE], None, [RED, RED, BLUE, BLUE]),
-        ("uniform", [RED, BLUE], [1, 0], [BLUE, BLUE, RED, RED]),
-        ("vertex", [RED, RED, BLUE, RED, RED, BLUE], None, [RED, RED, RED, RED]),
-        ("faceVarying", [BLUE] * 4 + [RED] * 4, None, [BLUE, BLUE, RED, RED]),
-    ],
-)
+    [("constant", [RED], None, [RED] * 4), ("uniform", [RED, BLUE], None, [RED, RED, BLUE, BLUE]),
+     ("uniform", [RED, BLUE], [1, 0], [BLUE, BLUE, RED, RED]),
+     ("vertex", [RED, RED, BLUE, RED, RED, BLUE], None, [RED, RED, RED, RED]),
+     ("faceVarying", [BLUE] * 4 + [RED] * 4, None, [BLUE, BLUE, RED, RED])],
+)  # fmt: skip
 def test_display_colours_by_interpolation(
     tmp_path: Path, interpolation: str, values: list[Gf.Vec3f], indices: list[int] | None,
     expected: list[Gf.Vec3f],
@@ -64,8 +61,8 @@ def test_display_colours_by_interpolation(
     assert colors[:, 0].tolist() == [list(color) for color in expected]
 
 
-def test_display_colours_are_inherited_and_hidden_by_materials(tmp_path: Path) -> None:
-    """/W is red; the second mesh has a green material."""
+def test_display_colours_are_inherited_hidden_by_materials_or_used_by_them(tmp_path: Path) -> None:
+    """/W is red; the second mesh has a green material. UsdPrimvarReader_float3 of displayColor."""
     stage = new_stage(tmp_path)
     add_quads(stage, "/W/A")
     bound = add_quads(stage, "/W/B")
@@ -80,19 +77,8 @@ def test_display_colours_are_inherited_and_hidden_by_materials(tmp_path: Path) -
     assert mesh is not None
     shown = {m.base_color for m in mesh.materials}
     assert shown == {(0.85, 0.0, 0.0), (0.0, 0.5, 0.0)}
-
-
-def surface(stage: Usd.Stage) -> tuple[UsdShade.Material, UsdShade.Shader]:
-    material = UsdShade.Material.Define(stage, "/W/Look")
-    shader = UsdShade.Shader.Define(stage, "/W/Look/S")
-    shader.CreateIdAttr("UsdPreviewSurface")
-    material.CreateSurfaceOutput().ConnectToSource(shader.ConnectableAPI(), "surface")
-    return material, shader
-
-
-def test_a_material_may_take_its_colour_from_a_primvar(tmp_path: Path) -> None:
-    """UsdPrimvarReader_float3 of displayColor."""
-    stage = new_stage(tmp_path)
+    (tmp_path / "b").mkdir()
+    stage = new_stage(tmp_path / "b")
     mesh = add_quads(stage)
     mesh.CreateDisplayColorPrimvar("uniform").Set([RED, BLUE])
     material, shader = surface(stage)
@@ -102,9 +88,17 @@ def test_a_material_may_take_its_colour_from_a_primvar(tmp_path: Path) -> None:
     source = shader.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f)
     source.ConnectToSource(reader.ConnectableAPI(), "result")
     UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(material)
-    colors = saved(stage, tmp_path).soup.colors
+    colors = saved(stage, tmp_path / "b").soup.colors
     assert colors is not None
     assert colors[:, 0].tolist() == [[1, 0, 0], [1, 0, 0], [0, 0, 1], [0, 0, 1]]
+
+
+def surface(stage: Usd.Stage) -> tuple[UsdShade.Material, UsdShade.Shader]:
+    material = UsdShade.Material.Define(stage, "/W/Look")
+    shader = UsdShade.Shader.Define(stage, "/W/Look/S")
+    shader.CreateIdAttr("UsdPreviewSurface")
+    material.CreateSurfaceOutput().ConnectToSource(shader.ConnectableAPI(), "surface")
+    return material, shader
 
 
 @pytest.mark.parametrize("hides", ["opacity", "presence", "displayOpacity"])
@@ -138,22 +132,18 @@ def area_and_size(source: MeshSource) -> tuple[float, list[float]]:
     crosses = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     volume = float((corners[:, 0] * np.cross(corners[:, 1], corners[:, 2])).sum()) / 6.0
     assert volume >= 0.0, "triangles wind outwards"
-    return float(np.linalg.norm(crosses, axis=1).sum()) / 2.0, np.ptp(
-        corners.reshape(-1, 3), axis=0
-    ).tolist()
+    area = float(np.linalg.norm(crosses, axis=1).sum()) / 2.0
+    return area, np.ptp(corners.reshape(-1, 3), axis=0).tolist()
 
 
 @pytest.mark.parametrize(
     ("kind", "attributes", "area", "size"),
-    [
-        ("Cube", {"size": 2.0}, 24.0, [2, 2, 2]),
-        ("Sphere", {"radius": 0.5}, np.pi, [1, 1, 1]),
-        ("Cylinder", {"radius": 0.5, "height": 2.0, "axis": "X"}, 2.5 * np.pi, [2, 1, 1]),
-        ("Cone", {"radius": 3.0, "height": 4.0, "axis": "Z"}, 24.0 * np.pi, [6, 6, 4]),
-        ("Capsule", {"radius": 0.5, "height": 1.0, "axis": "Y"}, 2.0 * np.pi, [1, 2, 1]),
-        ("Plane", {"width": 2.0, "length": 3.0, "axis": "Z"}, 6.0, [2, 3, 0]),
-    ],
-)
+    [("Cube", {"size": 2.0}, 24.0, [2, 2, 2]), ("Sphere", {"radius": 0.5}, np.pi, [1, 1, 1]),
+     ("Cylinder", {"radius": 0.5, "height": 2.0, "axis": "X"}, 2.5 * np.pi, [2, 1, 1]),
+     ("Cone", {"radius": 3.0, "height": 4.0, "axis": "Z"}, 24.0 * np.pi, [6, 6, 4]),
+     ("Capsule", {"radius": 0.5, "height": 1.0, "axis": "Y"}, 2.0 * np.pi, [1, 2, 1]),
+     ("Plane", {"width": 2.0, "length": 3.0, "axis": "Z"}, 6.0, [2, 3, 0])],
+)  # fmt: skip
 def test_primitive_shapes_have_their_area_and_size(
     tmp_path: Path, kind: str, attributes: dict[str, object], area: float, size: list[float]
 ) -> None:
@@ -216,8 +206,6 @@ def test_what_a_stage_holds_and_is_not_used_is_named(tmp_path: Path) -> None:
     points.Set([p + Gf.Vec3f(0, 0, 1) for p in points.Get(1.0)], 2.0)
     UsdGeom.BasisCurves.Define(stage, "/W/C")
     remarks = saved(stage, tmp_path).remarks
-    assert remarks == (
-        "BasisCurves is not read, such as /W/C",
-        "subdivision surfaces (catmullClark) are read as their cages",
-        "points that move over time are read at the earliest time",
-    )
+    assert remarks == ("BasisCurves is not read, such as /W/C",
+                       "subdivision surfaces (catmullClark) are read as their cages",
+                       "points that move over time are read at the earliest time")  # fmt: skip

@@ -72,9 +72,7 @@ def test_the_stages_camera_has_the_label_boxes(sequence: Any, library: Library, 
     scene = scene_at(table_world(library), step * STEP_S)
     reading = WarpRenderer(library, "cpu").render(scene, camera, frozenset({Channel.AMODAL}))
     k = camera.intrinsics
-
     boxes = labelled_boxes(sequence, "/World/Cameras/color", step, k.width_px, k.height_px)
-
     assert sorted(boxes) == [1, 2, 3, 4]
     for number, silhouette in reading.silhouettes.items():
         height, width = silhouette.mask.shape
@@ -95,38 +93,30 @@ def test_every_validator_of_openusd_accepts_it(sequence: Any) -> None:
     assert sequence.GetTimeCodesPerSecond() == 10.0
 
 
-def _other_up_axis(stage: Any) -> None:
-    UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
+DAMAGES: dict[str, Callable[[Any], Any]] = {
+    "another up axis": lambda stage: UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y),
+    "centimetres": lambda stage: UsdGeom.SetStageMetersPerUnit(stage, 0.01),
+    "an asset is missing": lambda stage: (
+        stage.GetPrimAtPath("/World/clutter_0").GetReferences().AddReference("./nowhere.usdc")
+    ),
+    "slower": lambda stage: stage.SetTimeCodesPerSecond(24.0),
+}
 
 
-def _centimetres(stage: Any) -> None:
-    UsdGeom.SetStageMetersPerUnit(stage, 0.01)
-
-
-def _asset_missing(stage: Any) -> None:
-    stage.GetPrimAtPath("/World/clutter_0").GetReferences().AddReference("./assets/nowhere.usdc")
-
-
-def _slower(stage: Any) -> None:
-    stage.SetTimeCodesPerSecond(24.0)
-
-
-@pytest.mark.parametrize("damage", [_other_up_axis, _centimetres, _asset_missing, _slower])
-def test_damage_is_found(sequence: Any, tmp_path: Path, damage: Callable[[Any], None]) -> None:
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_damage_is_found(sequence: Any, tmp_path: Path, damage: str) -> None:
     """The check above is able to fail."""
     path = Path(sequence.GetRootLayer().realPath)
     shutil.copytree(path.parent, tmp_path / "copy")
     stage = Usd.Stage.Open(str(tmp_path / "copy" / path.name))
     test_every_validator_of_openusd_accepts_it(stage)
-
-    damage(stage)
+    DAMAGES[damage](stage)
     stage.Save()
-
     with pytest.raises(AssertionError):
         test_every_validator_of_openusd_accepts_it(stage)
 
 
-def test_lights_are_photometric(sequence: Any) -> None:
+def test_lights_are_photometric_and_a_bodys_materials_replace_its_meshs(sequence: Any) -> None:
     """900 cd of a ball of 8 cm are 900 / (pi 0.08^2) nits; 4000 lx of a sun stay 4000 lx."""
     lamp = UsdLux.SphereLight(sequence.GetPrimAtPath("/World/Lights/lamp"))
     sun = UsdLux.DistantLight(sequence.GetPrimAtPath("/World/Lights/sun"))
@@ -142,10 +132,7 @@ def test_lights_are_photometric(sequence: Any) -> None:
     # The image's centre: +Z of USD's sky, +X of ours, turned by 0.4 rad.
     centre = sky.ComputeLocalToWorldTransform(0).TransformDir((0, 0, 1))
     assert list(centre) == pytest.approx([np.cos(0.4), np.sin(0.4), 0.0])
-
-
-def test_materials_of_a_body_replace_those_of_its_mesh(sequence: Any) -> None:
-    """The red thing is red in every part, and no image is left of what it was."""
+    # The red thing is red in every part, and no image is left of what it was.
     reds = 0
     for prim in Usd.PrimRange(
         sequence.GetPrimAtPath("/World/clutter_0"), Usd.TraverseInstanceProxies()
@@ -204,9 +191,7 @@ def test_a_scene_without_motion_has_no_time_codes(library: Library, tmp_path: Pa
 
 
 @pytest.mark.parametrize("steps", [1, STEPS])
-def test_a_camera_with_an_offset_has_its_poses(
-    library: Library, tmp_path: Path, steps: int
-) -> None:
+def test_an_offset_camera_has_its_poses(library: Library, tmp_path: Path, steps: int) -> None:
     """It rides on the thing that moves by 0.2 m/s along X; so do the poses of all other things."""
     world = table_world(library)
     camera = replace(off_centre_camera(), rig="mover")
@@ -229,11 +214,9 @@ def test_a_camera_with_an_offset_has_its_poses(
             assert x_m(thing, step + offset) - x_m(thing, 0.0) == pytest.approx(moved_m, abs=2e-6)
 
 
-LENSES = {
-    "kannala_brandt": Lens("kannala_brandt", (0.01, -0.002, 0.0, 0.0003), 1.5),
-    "brown_conrady": Lens("brown_conrady", (0.1, 0.0, 0.001, 0.0, 0.0, 0.0, 0.0, 0.0)),
-    "equirectangular": Lens("equirectangular"),
-}
+LENSES = {"kannala_brandt": Lens("kannala_brandt", (0.01, -0.002, 0.0, 0.0003), 1.5),
+          "brown_conrady": Lens("brown_conrady", (0.1, 0.0, 0.001, 0.0, 0.0, 0.0, 0.0, 0.0)),
+          "equirectangular": Lens("equirectangular")}  # fmt: skip
 
 
 @pytest.mark.parametrize("model", LENSES)
@@ -244,7 +227,6 @@ def test_every_lens_is_beside_the_pinhole(library: Library, tmp_path: Path, mode
     scene = replace(table_world(library), cameras=(bent,))
     stage = Usd.Stage.Open(str(exported(scene, library, tmp_path)))
     prim = stage.GetPrimAtPath("/World/Cameras/color")
-
     assert prim.GetAttribute("genData:lens:model").Get() == model
     stated = prim.GetAttribute("genData:lens:coefficients").Get()
     assert tuple(stated or ()) == LENSES[model].coefficients
@@ -270,17 +252,9 @@ def test_a_sequence_is_written_where_it_begins(library: Library, tmp_path: Path)
     """Shards may end within a sequence: the one with its first step holds the whole stage."""
     scene = table_world(library)
     info = DatasetInfo("t", 7, 6, 1, (), (), steps_per_scene=3, step_s=STEP_S)
+    steps = [scene_at(scene, k * STEP_S) for k in range(3)]
     samples = [
-        Sample(
-            k,
-            k // 3,
-            0,
-            "train",
-            scene_at(scene, k % 3 * STEP_S),
-            Capture({}),
-            {},
-            step_index=k % 3,
-        )
+        Sample(k, k // 3, 0, "train", steps[k % 3], Capture({}), {}, step_index=k % 3)
         for k in range(6)
     ]
     exporter = UsdExporter().with_assets(library)
@@ -288,7 +262,6 @@ def test_a_sequence_is_written_where_it_begins(library: Library, tmp_path: Path)
         exporter.write_shard(info, part, tmp_path / str(number))
     shards = [tmp_path / str(number) for number in range(3)]
     exporter.finalize(info, shards, tmp_path / "usd")
-
     assert [p.name for p in sorted((tmp_path / "usd").glob("*.usdc"))] == [
         "000000000.usdc",
         "000000003.usdc",

@@ -14,9 +14,7 @@ def test_the_spot_of_a_dipped_headlight_lies_below_its_cutoff() -> None:
     """Its upper edge is 1 % below the horizon, as far as the spot's own direction says."""
     stage = Usd.Stage.CreateInMemory()
     beam = dipped_beam("beam", SE3.about_z(0.5, (1.0, 2.0, 0.7)), 10_000.0)
-
     define_light(stage, "/beam", [beam])
-
     prim = stage.GetPrimAtPath("/beam")
     half_rad = math.radians(UsdLux.ShapingAPI(prim).GetShapingConeAngleAttr().Get())
     placed = UsdGeom.Xformable(prim).ComputeLocalToWorldTransform(0)

@@ -66,16 +66,14 @@ def textured(stage: Usd.Stage, path: str, image: str) -> UsdShade.Material:
 
 
 @pytest.mark.slow
-def test_an_exported_world_comes_back(tmp_path: Path) -> None:
+def test_an_exported_world_comes_back_with_its_lights_and_cameras(tmp_path: Path) -> None:
     """The same camera sees the same things: label images agree to more than 99 %."""
     library = opened_library(tmp_path)
     world = table_world(library)
     root = exported(world, library, tmp_path / "out").parent
     again = opened_library(tmp_path / "again", root)
     element = UsdStage(name="copy", asset="user/000000000", annotate=True)
-
     scene = element.add(Scene("empty", cameras=world.cameras), again)
-
     (camera,) = world.cameras
     wanted = frozenset({Channel.INSTANCE, Channel.Z_DEPTH})
     first = WarpRenderer(library, "cpu").render(world, camera, wanted).channels
@@ -85,28 +83,16 @@ def test_an_exported_world_comes_back(tmp_path: Path) -> None:
     for instance in scene.instances:
         name = instance.name.removeprefix("copy/World_").replace("clutter_", "clutter/")
         number = next(k for k, v in names.items() if v == name)
-        one, other = (
-            first[Channel.INSTANCE] == number,
-            second[Channel.INSTANCE] == instance.instance_id,
-        )
+        one, other = (first[Channel.INSTANCE] == number,
+                      second[Channel.INSTANCE] == instance.instance_id)  # fmt: skip
         assert one.sum() > 100
         assert (one & other).sum() / (one | other).sum() > 0.99
     both = np.isfinite(first[Channel.Z_DEPTH]) & np.isfinite(second[Channel.Z_DEPTH])
     depth = abs(first[Channel.Z_DEPTH][both] - second[Channel.Z_DEPTH][both])
     assert both.mean() > 0.5 and np.quantile(depth, 0.99) < 1e-4
-
-
-@pytest.mark.slow
-def test_lights_and_cameras_come_back(tmp_path: Path) -> None:
-    """Intensities, colours, cones and poses, turned with the element; cameras become rigs."""
-    library = opened_library(tmp_path)
-    world = table_world(library)
-    root = exported(world, library, tmp_path / "out").parent
-    again = opened_library(tmp_path / "again", root)
+    # Intensities, colours, cones and poses, turned with the element; cameras become rigs.
     element = UsdStage(name="copy", asset="user/000000000", cameras=True)
-
     scene = element.add(Scene("empty"), again)
-
     by_kind = {light.kind: light for light in scene.lights}
     for light in world.lights:
         copy = by_kind[light.kind]
@@ -153,9 +139,7 @@ def test_units_axes_subsets_and_materials_are_read(tmp_path: Path) -> None:
         UsdShade.MaterialBindingAPI.Apply(part.GetPrim()).Bind(material)
     stage.Save()
     library = opened_library(tmp_path, tmp_path / "props")
-
     read = library.mesh("user/wall")
-
     low, high = read.bounds_m()
     assert np.subtract(high, low) == pytest.approx([1.0, 0.0, 0.5], abs=1e-6)
     slots = {m.metallic: (k, m) for k, m in enumerate(read.materials)}
@@ -184,9 +168,7 @@ def test_instances_transforms_and_references_are_followed(tmp_path: Path) -> Non
     UsdGeom.Imageable(stage.GetPrimAtPath("/World/hidden")).MakeInvisible()
     stage.Save()
     library = opened_library(tmp_path, tmp_path / "props")
-
     model = library.stage("user/pair")
-
     assert [p.name for p in model.pieces] == ["World_a_Mesh", "World_b_Mesh"]
     # Centres: (50, 25) and (100, 125) cm; Y becomes Z.
     assert model.pieces[0].T_stage_piece.translation_m == pytest.approx((0.5, 0.0, 0.25))
@@ -212,15 +194,6 @@ def test_an_archive_brings_its_images(tmp_path: Path) -> None:
         assert library.texture(material.texture).albedo[0, 0].tolist() == [10, 200, 10]
 
 
-def shiny(stage: Usd.Stage, path: str, roughness: float) -> UsdShade.Material:
-    material = UsdShade.Material.Define(stage, path)
-    surface = UsdShade.Shader.Define(stage, f"{path}/Surface")
-    surface.CreateIdAttr("UsdPreviewSurface")
-    surface.CreateInput("roughness", Sdf.ValueTypeNames.Float).Set(roughness)
-    material.CreateSurfaceOutput().ConnectToSource(surface.ConnectableAPI(), "surface")
-    return material
-
-
 def broken(folder: Path, kind: str) -> None:
     stage = new_stage(folder / "bad.usda")
     if kind == "no mesh":
@@ -236,7 +209,9 @@ def broken(folder: Path, kind: str) -> None:
             material = UsdShade.Material.Define(stage, "/M")
             UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(material)
         elif kind.startswith("roughness"):
-            material = shiny(stage, "/M", float(kind.rstrip(",").split()[-1]))
+            material, shader = surface(stage, "/M")
+            roughness = float(kind.rstrip(",").split()[-1])
+            shader.CreateInput("roughness", Sdf.ValueTypeNames.Float).Set(roughness)
             UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(material)
         elif kind == "inconsistent":
             mesh.CreateFaceVertexIndicesAttr([0, 1, 2, 9])
@@ -258,33 +233,18 @@ def broken(folder: Path, kind: str) -> None:
 @pytest.mark.hostile
 @pytest.mark.parametrize(
     "fault",
-    [
-        "no mesh",
-        "radius is -1",
-        "is missing",
-        "UsdPreviewSurface",
-        "roughness is 1.5,",
-        "roughness is -0.5,",
-        "inconsistent",
-        "No such file",
-        "outside",
-        "in an archive outside",
-        "unreadable USD",
-        "compressed",
-    ],
-)
-def test_bad_stages_are_one_error(
-    fault: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+    ["no mesh", "radius is -1", "is missing", "UsdPreviewSurface", "roughness is 1.5,",
+     "roughness is -0.5,", "inconsistent", "No such file", "outside", "in an archive outside",
+     "unreadable USD", "compressed"],
+)  # fmt: skip
+def test_bad_stages_are_told(fault: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     """The file is named, the fault and the remedy; the library behind prints nothing."""
     (tmp_path / "outside.usda").write_text("#usda 1.0\n")
     broken(tmp_path / "props", fault)
     capfd.readouterr()
     library = opened_library(tmp_path, tmp_path / "props")
-
     with pytest.raises(AssetError, match=fault.removeprefix("in an archive ")) as raised:
         library.mesh("user/bad")
-
     assert "props/" in str(raised.value) and ";" in str(raised.value)
     out, err = capfd.readouterr()
     assert (out, err) == ("", "")
@@ -329,16 +289,13 @@ def test_what_a_stage_refers_to_belongs_to_its_content(tmp_path: Path) -> None:
 @pytest.mark.hostile
 @pytest.mark.parametrize(
     ("attribute", "value", "said"),
-    [
-        ("inputs:intensity", float("nan"), "has intensity nan"),
-        ("inputs:intensity", -3.0, "has intensity -"),
-        ("inputs:color", (-0.5, 1.0, 1.0), "has color -"),
-        ("inputs:color", (float("inf"), 1.0, 1.0), "light 'Panel'"),
-        ("inputs:width", -1.0, "light 'Panel' has"),
-        ("inputs:width", 0.0, "has no area"),
-        ("inputs:height", float("nan"), "light 'Panel' has"),
-    ],
-)
+    [("inputs:intensity", float("nan"), "has intensity nan"),
+     ("inputs:intensity", -3.0, "has intensity -"),
+     ("inputs:color", (-0.5, 1.0, 1.0), "has color -"),
+     ("inputs:color", (float("inf"), 1.0, 1.0), "light 'Panel'"),
+     ("inputs:width", -1.0, "light 'Panel' has"), ("inputs:width", 0.0, "has no area"),
+     ("inputs:height", float("nan"), "light 'Panel' has")],
+)  # fmt: skip
 def test_an_impossible_light_of_a_stage_is_refused(
     tmp_path: Path, attribute: str, value: object, said: str
 ) -> None:
@@ -348,13 +305,12 @@ def test_an_impossible_light_of_a_stage_is_refused(
     panel = UsdLux.RectLight.Define(stage, "/Panel")
     panel.GetPrim().GetAttribute(attribute).Set(value)
     stage.GetRootLayer().Save()
-
     with pytest.raises(AssetError, match=r"s\.usda: .*") as refused:
         opened_library(tmp_path, tmp_path / "props").stage("user/s")
     assert said in str(refused.value)
 
 
-def test_a_normalised_panel_sends_out_the_same_whatever_its_size(tmp_path: Path) -> None:
+def test_normalised_panels_of_any_size_and_scaled_stages_keep_their_light(tmp_path: Path) -> None:
     """UsdLux: intensity 500, normalised, is 500 cd from 0.1 m^2 or 4 m^2 alike."""
     (tmp_path / "props").mkdir()
     stage = new_stage(tmp_path / "props/s.usda")
@@ -365,14 +321,10 @@ def test_a_normalised_panel_sends_out_the_same_whatever_its_size(tmp_path: Path)
         panel.CreateNormalizeAttr(True)
         panel.CreateIntensityAttr(500.0)
     stage.GetRootLayer().Save()
-
     lights = opened_library(tmp_path, tmp_path / "props").stage("user/s").lights
     assert [light.intensity_cd for light in lights] == pytest.approx([500.0, 500.0])
-
-
-def test_a_scaled_stage_keeps_its_light(tmp_path: Path) -> None:
-    """Twice as large: lamps twice as far away light as brightly as before."""
-    stage = new_stage(tmp_path / "props/s.usda", "Z", 1.0)
+    # Twice as large: lamps twice as far away light as brightly as before.
+    stage = new_stage(tmp_path / "scaled/s.usda", "Z", 1.0)
     add_quad(stage, "/Quad")
     lamp = UsdLux.SphereLight.Define(stage, "/Lamp")
     lamp.CreateRadiusAttr(0.1)
@@ -380,8 +332,8 @@ def test_a_scaled_stage_keeps_its_light(tmp_path: Path) -> None:
     lamp.AddTranslateOp().Set((0.0, 0.0, 3.0))
     stage.Save()
     index = "assets:\n  - {id: s, file: s.usda, category: room, scale: 0.02}\n"
-    (tmp_path / "props/assets.yaml").write_text(index)
-    (light,) = opened_library(tmp_path, tmp_path / "props").stage("user/s").lights
+    (tmp_path / "scaled/assets.yaml").write_text(index)
+    (light,) = opened_library(tmp_path, tmp_path / "scaled").stage("user/s").lights
     assert (light.kind, light.position_m) == ("sphere", pytest.approx((0.0, 0.0, 0.06)))
     # 1000 nits of a disc of 0.1 m, at 1 / 50 of the distance.
     assert light.intensity_cd == pytest.approx(1000.0 * np.pi * 0.01 / 2500.0)

@@ -27,20 +27,15 @@ def returned(folder: Path, material: Material, texture: TextureData | None = Non
 
 @pytest.mark.parametrize(
     "changes",
-    [
-        {"coat": 0.75, "coat_roughness": 0.125},
-        {"transmission": 0.5, "ior": 1.25, "specular": 0.1543},
-        {"opacity": 0.25},
-        {"emission_cd_m2": (100.0, 50.0, 25.0)},
-    ],
+    [{"coat": 0.75, "coat_roughness": 0.125},
+     {"transmission": 0.5, "ior": 1.25, "specular": 0.1543}, {"opacity": 0.25},
+     {"emission_cd_m2": (100.0, 50.0, 25.0)}],
     ids=lambda changes: next(iter(changes)),
-)
+)  # fmt: skip
 def test_numbers_come_back(tmp_path: Path, changes: dict[str, object]) -> None:
     """Each kind of layer by itself; what was not given is what it was."""
     material = replace(Material(base_color=(0.5, 0.25, 0.125)), **changes)
-
     (read,) = returned(tmp_path, material).materials
-
     names = ("coat", "coat_roughness", "transmission", "opacity", "emission_cd_m2", "base_color")
     for name in names:
         if name != "coat_roughness" or material.coat:
@@ -61,9 +56,7 @@ def test_maps_come_back(tmp_path: Path) -> None:
         alpha=alpha.astype(np.uint8),
     )
     material = Material((1.0, 1.0, 1.0), 1.0, 1.0, texture="map", emission_cd_m2=(9.0, 9.0, 9.0))
-
     mesh = returned(tmp_path, material, texture)
-
     (read,) = mesh.materials
     library = open_library([tmp_path / "out"], cache_dir=tmp_path / "cache")
     again = library.texture(read.texture)

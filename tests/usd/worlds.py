@@ -40,28 +40,16 @@ def table_world(library: Library) -> Scene:
     lights = (
         Light("lamp", "sphere", (0.4, -0.9, 2.2), intensity_cd=900.0, radius_m=0.08),
         Light("spot", "spot", (0.0, 0.5, 1.5), (0.0, -0.6, -0.8), (1.2, 0.97, 0.7), 250.0),
-        Light(
-            "panel",
-            "rectangle",
-            (0.3, 0.4, 1.6),
-            (0.0, -0.6, -0.8),
-            (1.1, 0.98, 0.9),
-            120.0,
-            size_m=(0.8, 0.4),
-            side=(0.8, 0.48, -0.36),
-        ),
+        Light("panel", "rectangle", (0.3, 0.4, 1.6), (0.0, -0.6, -0.8), (1.1, 0.98, 0.9), 120.0,
+              size_m=(0.8, 0.4), side=(0.8, 0.48, -0.36)),
         Light("disk", "disk", (-0.5, 0.4, 1.2), (0.6, 0.0, -0.8), intensity_cd=60.0, radius_m=0.2),
         Light("sun", "sun", direction=(0.6, 0.0, -0.8), illuminance_lux=4000.0),
-    )
+    )  # fmt: skip
     return Scene(
-        "table",
-        tuple(bodies),
-        tuple(instances),
-        lights=lights,
-        cameras=(off_centre_camera(),),
+        "table", tuple(bodies), tuple(instances), lights=lights, cameras=(off_centre_camera(),),
         environment=Environment(luminance_cd_m2=80.0, yaw_rad=0.4),
         tracks=(Trajectory("clutter/0", STEP_S, way),),
-    )
+    )  # fmt: skip
 
 
 def exported(
@@ -74,16 +62,9 @@ def exported(
     **options: str,
 ) -> Path:
     """The stage of a scene, as the exporter leaves it."""
-    info = DatasetInfo(
-        "t",
-        7,
-        steps,
-        1,
-        ("thing",),
-        (SensorInfo("color", Modality.CAMERA, time_offset_s=time_offset_s),),
-        steps_per_scene=steps,
-        step_s=STEP_S,
-    )
+    sensors = (SensorInfo("color", Modality.CAMERA, time_offset_s=time_offset_s),)
+    timing = {"steps_per_scene": steps, "step_s": STEP_S}
+    info = DatasetInfo("t", 7, steps, 1, ("thing",), sensors, **timing)
     sample = Sample(0, 0, 0, "train", scene, Capture({}), {})
     exporter = Usd.model_validate(options).with_assets(library)
     exporter.write_shard(info, [sample], folder / "shard")
