@@ -9,7 +9,7 @@ from gen_data.core.boxes import BoxPx, OrientedBox, tight_box
 from gen_data.core.se3 import SE3
 
 
-def test_a_single_pixel_has_a_box_of_one_by_one() -> None:
+def test_a_single_pixel_has_a_box_of_one_by_one_and_no_pixel_none() -> None:
     """Half-open, so width is a plain difference."""
     mask = np.zeros((7, 9), bool)
     mask[5, 3] = True
@@ -19,9 +19,6 @@ def test_a_single_pixel_has_a_box_of_one_by_one() -> None:
     assert box == BoxPx(3, 5, 4, 6)
     assert (box.width_px, box.height_px) == (1, 1)
 
-
-def test_an_empty_mask_has_no_box() -> None:
-    """None, not a box of no size."""
     assert tight_box(np.zeros((4, 4), bool)) is None
     assert tight_box(np.zeros((0, 0), bool)) is None
 

@@ -51,14 +51,12 @@ def test_projection_is_that_of_the_calibration_matrix() -> None:
     np.testing.assert_allclose(VGA.project(p_camera), homogeneous[:, :2] / homogeneous[:, 2:])
 
 
-def test_what_lies_behind_has_no_image() -> None:
+def test_what_lies_behind_has_no_image_and_what_saw_nothing_no_point() -> None:
     pixels = VGA.project(np.array([[0.0, 0, 1], [0, 0, 0], [0, 0, -1]]))
 
     assert np.isfinite(pixels[0]).all()
     assert np.isnan(pixels[1:]).all()
 
-
-def test_pixels_that_saw_nothing_have_no_point() -> None:
     depth = np.array([[1.0, np.inf]])
 
     points = Intrinsics(2, 1, 1.0, 1.0, 1.0, 0.5).unproject(depth)

@@ -135,15 +135,13 @@ def test_even_acceleration_is_exact_from_the_first_to_the_last_instant() -> None
         assert twist.acceleration_m_s2[0] == pytest.approx(-3.0, abs=1e-8)
 
 
-def test_outside_its_knots_a_body_stands_still() -> None:
+def test_outside_its_knots_a_body_stands_still_and_one_knot_is_no_track() -> None:
     """Before the first and after the last knot."""
     track = track_of([(0, 0, 0), (1, 0, 0)])
     assert track.pose(0.0) == track.knots[0]
     assert track.pose(9.0) == track.knots[-1]
     assert track.twist(9.0) == STILL
 
-
-def test_a_track_of_one_knot_is_refused() -> None:
     with pytest.raises(ValueError, match="two knots"):
         Trajectory("car", 0.1, (SE3(),))
 
@@ -219,14 +217,11 @@ def test_changes_hold_until_the_next_one() -> None:
         assert then.body("car").asset == then.instance(1).asset == asset
 
 
-def test_the_way_to_an_instant_does_not_matter() -> None:
-    """By another instant or straight: the same bodies."""
+def test_the_way_to_an_instant_does_not_matter_and_instances_have_its_velocities() -> None:
+    """By another instant or straight: the same bodies. One metre in one second; the tree stands."""
     detour = scene_at(scene_at(scene(), 0.3), 0.7)
     assert detour.bodies == scene_at(scene(), 0.7).bodies
 
-
-def test_what_moves_is_known_to_its_instance() -> None:
-    """One metre in one second; the tree stands."""
     then = scene_at(scene(), 0.5)
     assert then.instance(1).twist.velocity_m_s == pytest.approx((1.0, 0.0, 0.0))
     assert then.instance(2).twist == STILL

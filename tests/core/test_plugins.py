@@ -11,20 +11,16 @@ from gen_data.core.plugins import PluginTable
 TABLE = PluginTable("noun", {"fraction": "fractions:Fraction", "decimal": "decimal:Decimal"})
 
 
-def test_a_plug_in_is_loaded_by_its_name() -> None:
+def test_a_plug_in_is_loaded_by_its_name_and_an_unknown_name_told_with_all() -> None:
     from fractions import Fraction
 
     assert TABLE.load("fraction") is Fraction
 
-
-def test_names_are_sorted() -> None:
     assert TABLE.names() == ("decimal", "fraction")
     assert list(TABLE) == ["decimal", "fraction"]
     assert "decimal" in TABLE
     assert "float" not in TABLE
 
-
-def test_an_unknown_name_is_told_with_all_known_ones() -> None:
     with pytest.raises(ConfigError) as caught:
         TABLE.load("fractoin")
 

@@ -161,7 +161,8 @@ def test_pixels_rest_after_an_event() -> None:
     assert apply_refractory_period(events, 0.0).time_s.tolist() == times_s.tolist()
 
 
-def test_a_reading_sees_its_first_and_last_instant_but_the_first_has_none() -> None:
+def test_pictures_are_rendered_once_and_none_while_nothing_moves() -> None:
+    """Four for three parts of a step; before a parked car one is enough, unless rain falls."""
     film = Film(lambda t: 0.5)
 
     assert len(seen(EventCamera(rig="ego"), film, 0).rows) == 0
@@ -170,9 +171,6 @@ def test_a_reading_sees_its_first_and_last_instant_but_the_first_has_none() -> N
 
     assert film.frames == 4
 
-
-def test_nothing_is_rendered_again_while_nothing_moves() -> None:
-    """Before a parked car one image is enough, unless rain falls; noise goes on."""
     parked = world(ego=straight((0.0, 0.0), (0.0, 0.0)))
     sensor = EventCamera(rig="ego", size_px=SIZE_PX, shot_noise_hz=20.0)
     dry, wet = Film(lambda t: 0.5), Film(lambda t: 0.5)

@@ -19,14 +19,11 @@ def camera(**given: Any) -> Camera:
     return RgbCamera.model_validate({"name": "eye", **given}).mount(Scene("t")).camera("eye")
 
 
-def test_a_camera_is_a_pinhole_unless_it_says_otherwise() -> None:
-    """As it was before there were lenses."""
+def test_a_camera_is_a_pinhole_unless_a_lens_with_its_coefficients_is_given() -> None:
+    """By OpenCV's names, in OpenCV's order; those not given are 0."""
     assert camera().intrinsics == camera(lens={"model": "pinhole"}).intrinsics
     assert camera().intrinsics.straight
 
-
-def test_coefficients_go_to_their_places() -> None:
-    """By OpenCV's names, in OpenCV's order; those not given are 0."""
     lens = camera(lens={"model": "brown_conrady", "k1": -0.2, "p2": 0.001, "k6": 0.01}).intrinsics
 
     assert COEFFICIENTS["brown_conrady"] == ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")

@@ -78,7 +78,7 @@ def test_light_falls_with_the_square_of_range() -> None:
     assert light[2] == pytest.approx(1.0, rel=1e-5)
 
 
-def test_an_ideal_scan_reports_every_hit_where_it_is() -> None:
+def test_an_ideal_scan_reports_every_hit_where_it_is_through_a_clean_window() -> None:
     """All pulses, exact ranges, labels, one return each, intensity of the manual's scale."""
     points = scan(LidarSensor(model="VLP-16", ideal=True), Wall(30.0))
     ranges_m = np.linalg.norm(points["position_m"].astype(float), axis=1)
@@ -88,6 +88,23 @@ def test_an_ideal_scan_reports_every_hit_where_it_is() -> None:
     np.testing.assert_allclose(points["intensity"], 0.5 * 0.392, rtol=1e-5)
     assert (points["instance_id"] == 7).all() and (points["category_id"] == 2).all()
     assert (points["return_number"] == 1).all() and (points["return_count"] == 1).all()
+
+    sensor = LidarSensor(model="VLP-16", ideal=True)
+
+    assert (len(scan(sensor, Wall(0.4))), len(scan(sensor, Wall(100.5)))) == (0, 0)
+    assert len(scan(sensor, Wall(99.5))) == 1808 * 16
+
+    ideal = LidarSensor(model="VLP-16", ideal=True)
+    soiled = ideal.model_copy(update={"window": 0.2})
+
+    np.testing.assert_array_equal(scan(soiled, Wall(90.0)), scan(ideal, Wall(90.0)))
+
+    points = scan(LidarSensor(model="HDL-64E", ideal=True), Wall(30.0))
+    white = lidar_model("HDL-64E").white_intensity
+
+    np.testing.assert_allclose(points["intensity"], 0.5 * white, rtol=1e-5)
+    noisy = scan(LidarSensor(model="HDL-64E"), Wall(30.0))
+    assert noisy["intensity"].std() > 0.03
 
 
 class Mirrors(Wall):
@@ -138,13 +155,6 @@ def test_range_noise_is_that_of_the_data_sheet_on_steps_of_the_device() -> None:
     assert np.abs(steps - np.rint(steps)).max() < 2e-3
 
 
-def test_nothing_nearer_or_farther_than_the_device_reports() -> None:
-    sensor = LidarSensor(model="VLP-16", ideal=True)
-
-    assert (len(scan(sensor, Wall(0.4))), len(scan(sensor, Wall(100.5)))) == (0, 0)
-    assert len(scan(sensor, Wall(99.5))) == 1808 * 16
-
-
 def test_equal_streams_make_equal_bytes() -> None:
     """Weather and all; another stream makes others."""
     sensor = LidarSensor(model="VLP-16", returns="dual", divergence=True)
@@ -189,7 +199,7 @@ def test_fog_that_thins_with_height_is_integrated_along_the_beam(up: float) -> N
     assert depth[0, 0] == pytest.approx(expected, rel=1e-4)
 
 
-def test_dense_fog_answers_itself_a_few_metres_away() -> None:
+def test_dense_fog_answers_itself_a_few_metres_away_and_thicker_fog_more() -> None:
     """Points of air, no instance, near the scanner; none in clear air (Hahner et al. 2021)."""
     peak_m, _ = fog_peak(0.06)
     points = scan(LidarSensor(model="HDL-64E"), Wall(90.0), Weather(fog_extinction_per_m=0.06))
@@ -201,6 +211,10 @@ def test_dense_fog_answers_itself_a_few_metres_away() -> None:
     assert (air["instance_id"] == 0).all()
     assert np.median(ranges_m) == pytest.approx(peak_m, rel=0.1)
     assert not (scan(LidarSensor(), Wall(90.0))["surface"] == SURFACES.index("air")).any()
+
+    strengths = [fog_peak(a)[1] for a in (0.005, 0.01, 0.02, 0.06)]
+
+    assert strengths == sorted(strengths)
 
 
 def test_the_air_has_a_sensitivity_of_its_own() -> None:
@@ -224,12 +238,6 @@ def test_the_air_has_a_sensitivity_of_its_own() -> None:
     assert (one.light[:, 1:] > 0.0).any(axis=0).all()
     np.testing.assert_array_equal(one.light[:, 1:], two.light[:, 1:])
     np.testing.assert_array_equal(one.range_m, two.range_m)
-
-
-def test_thicker_fog_answers_more() -> None:
-    strengths = [fog_peak(a)[1] for a in (0.005, 0.01, 0.02, 0.06)]
-
-    assert strengths == sorted(strengths)
 
 
 def test_snow_sends_back_more_than_rain() -> None:
@@ -286,17 +294,6 @@ def test_a_soiled_window_takes_light_both_ways() -> None:
         assert len(points) / pulses == pytest.approx(expected, abs=4.0 * spread)
     assert soiled["intensity"].mean() == pytest.approx(0.64 * clean["intensity"].mean(), rel=1e-4)
 
-
-def test_an_ideal_scanner_has_a_clean_window() -> None:
-    """Every hit, with the intensity of its reflectance."""
-    ideal = LidarSensor(model="VLP-16", ideal=True)
-    soiled = ideal.model_copy(update={"window": 0.2})
-
-    np.testing.assert_array_equal(scan(soiled, Wall(90.0)), scan(ideal, Wall(90.0)))
-
-
-def test_a_window_passes_some_light_and_at_most_all() -> None:
-    """Outside of (0, 1] it is refused."""
     for share in (0.0, 1.1, -0.5):
         with pytest.raises(ValueError, match="window"):
             LidarSensor(window=share)
@@ -332,7 +329,7 @@ def test_a_receiver_focused_at_a_distance_collects_less_nearby() -> None:
     np.testing.assert_allclose(light, expected, rtol=1e-5)
 
 
-def test_the_range_of_an_hdl64_follows_the_reflectance() -> None:
+def test_the_range_of_an_hdl64_follows_the_reflectance_by_an_exponential_loss() -> None:
     """As its manual says: 10 % at 50 m, 80 % at 120 m. Without a loss it would be 151 m."""
     model = lidar_model("HDL-64E")
     light = lidar_detection.received_light(np.float32([0.1, 0.8]), np.float32([50.0, 120.0]), model)
@@ -345,11 +342,6 @@ def test_the_range_of_an_hdl64_follows_the_reflectance() -> None:
         0
     ] == pytest.approx(1.0)
 
-
-def test_a_far_sensitivity_adds_an_exponential_loss() -> None:
-    """Equal steps of range divide light by equal factors, beside the lidar equation's."""
-    model = lidar_model("HDL-64E")
-    plain = model.model_copy(update={"seen_far": None})
     r = np.array([0.0, 50.0, 60.0, 70.0, np.inf], np.float32)
     seen = np.full(5, 0.3, np.float32)
 
@@ -403,23 +395,7 @@ def test_noise_spread_and_steps_of_intensities() -> None:
     assert (lidar_detection.laser_gains(16, 0.0) == 1.0).all()
 
 
-def test_an_ideal_scanner_reports_intensity_in_proportion() -> None:
-    """Neither response nor noise: reflectance times the value of white."""
-    points = scan(LidarSensor(model="HDL-64E", ideal=True), Wall(30.0))
-    white = lidar_model("HDL-64E").white_intensity
-
-    np.testing.assert_allclose(points["intensity"], 0.5 * white, rtol=1e-5)
-    noisy = scan(LidarSensor(model="HDL-64E"), Wall(30.0))
-    assert noisy["intensity"].std() > 0.03
-
-
-def test_a_scanner_needs_a_camera_listed_before_it() -> None:
-    """The message names what there is."""
-    with pytest.raises(ConfigError, match=r"camera 'color'.*none"):
-        LidarSensor().mount(Scene("t"))
-
-
-def test_the_mount_turns_left_and_upwards() -> None:
+def test_the_mount_turns_left_and_upwards_and_needs_a_camera_listed_before_it() -> None:
     """Yaw 90 looks along the rig's Y, pitch 90 along its Z."""
     ahead = np.array([[1.0, 0.0, 0.0]])
     left = scene_with(LidarSensor(yaw_deg=90.0)).lidars[0].T_rig_lidar
@@ -429,6 +405,9 @@ def test_the_mount_turns_left_and_upwards() -> None:
     np.testing.assert_allclose(up.rotate(ahead), [[0.0, 0.0, 1.0]], atol=1e-5)
     assert up.translation_m == (0.1, 0.2, 0.3)
     assert isinstance(up, SE3)
+
+    with pytest.raises(ConfigError, match=r"camera 'color'.*none"):
+        LidarSensor().mount(Scene("t"))
 
 
 def test_the_strongest_return_is_the_strongest_of_all_that_detours_add() -> None:

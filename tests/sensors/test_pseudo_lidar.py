@@ -85,7 +85,7 @@ def test_points_lie_on_the_surfaces_of_the_world(lens: Intrinsics) -> None:
     assert np.abs(local.max(axis=1)).max() < 1e-3
 
 
-def test_the_frame_is_above_the_camera_and_looks_along_its_axis() -> None:
+def test_the_frame_looks_along_the_axis_above_the_camera_and_far_points_are_left_out() -> None:
     """X forward, Y left, Z up, 0.3 m over its centre: what KITTI's readers expect."""
     world = scene(Intrinsics.from_hfov(64, 48, 1.2))
     lidar = cloud_of(PseudoLidar(), world).lidar
@@ -94,9 +94,6 @@ def test_the_frame_is_above_the_camera_and_looks_along_its_axis() -> None:
     expected = [[0, -1, 0, 0], [0, 0, -1, -0.3], [1, 0, 0, 0], [0, 0, 0, 1]]
     assert np.allclose(T_camera_lidar, expected, atol=1e-6)
 
-
-def test_what_is_too_far_away_has_no_point() -> None:
-    world = scene(Intrinsics.from_hfov(64, 48, 1.2))
     near = cloud_of(PseudoLidar(stride_px=2, range_max_m=7.0), world)
     every = cloud_of(PseudoLidar(stride_px=2), world)
     p_world = near.lidar.T_world_lidar.apply(near.points["position_m"])

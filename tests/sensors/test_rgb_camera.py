@@ -26,15 +26,13 @@ def rng() -> Rng:
     return Streams(seed=0, scene=0).rng("sensor")
 
 
-def test_mounting_leaves_a_camera_of_that_name_alone() -> None:
+def test_a_mounted_camera_stays_and_renders_its_channels_and_those_asked_for() -> None:
     """A pose that is already in the scene is kept."""
     sensor = RgbCamera(name="eye")
     scene = sensor.mount(Scene("t"))
 
     assert sensor.mount(scene) is scene
 
-
-def test_a_capture_renders_its_own_channels_and_those_asked_for() -> None:
     sensor = RgbCamera(name="eye", channels=("rgb", "depth"))
     scene = RgbCamera(name="other").mount(sensor.mount(Scene("t")))
     renderer = Asked()

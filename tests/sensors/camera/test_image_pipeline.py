@@ -93,7 +93,7 @@ def test_every_stage_of_a_camera_with_all_errors_changes_its_picture() -> None:
         assert (whole != picture(less, wet)).any(), key
 
 
-def test_ideal_is_a_preset_and_the_default() -> None:
+def test_ideal_is_the_default_and_reaches_every_exposure() -> None:
     """It exposes, and applies Uchimura's curve: nothing else happens to the radiance."""
     assert "ideal" in preset_names(PRESETS)
     assert ImagePipeline() == ImagePipeline(preset="ideal")
@@ -104,9 +104,6 @@ def test_ideal_is_a_preset_and_the_default() -> None:
     assert np.abs(photo.rgb.astype(int) - expected).max() <= 1
     assert photo.ev100 == 8.0
 
-
-def test_an_ideal_camera_reaches_every_exposure() -> None:
-    """Limits of time and gain are those of an image sensor."""
     night = np.full((48, 64, 3), 0.25 * 1.2 * 2.0**-9, np.float32)
     camera = Camera("eye", SE3(), LENS, ev100=-9.0)
 
@@ -173,7 +170,9 @@ def written(tmp_path: Path, text: str) -> str:
     return str(path)
 
 
-def test_deprecated_keys_are_read_with_a_warning_that_names_the_new_ones(tmp_path: Path) -> None:
+def test_deprecated_keys_are_read_with_a_warning_and_refused_beside_their_new_names(
+    tmp_path: Path,
+) -> None:
     """``formation`` with ``bloom``, ``shutter`` and ``photosites``, each told at its place."""
     own = written(
         tmp_path,
@@ -197,9 +196,6 @@ def test_deprecated_keys_are_read_with_a_warning_that_names_the_new_ones(tmp_pat
     for name in ("glare", "exposure_control", "image_sensor"):
         assert any(f"called '{name}' now" in text for text in told), name
 
-
-def test_a_deprecated_key_beside_its_new_name_is_refused(tmp_path: Path) -> None:
-    """No value is dropped without a word."""
     own = written(tmp_path, "sensors:\n  - {type: rgb_camera, formation: {}, image_pipeline: {}}\n")
     with pytest.raises(ConfigError, match=r"own\.yaml:3:24: .*called 'image_pipeline' now"):
         load_config(own)

@@ -118,11 +118,15 @@ def test_dark_current_adds_noise_and_no_light() -> None:
     assert float(raw.var()) == pytest.approx((2000 + 900 + 400) / 1e8, rel=0.03)
 
 
-def test_a_full_well_reads_white() -> None:
-    """Light beyond saturation stays at 1."""
+def test_a_full_well_reads_white_and_numbers_are_whole_steps() -> None:
+    """Light beyond saturation stays at 1; eight bits are multiples of 1 / 255."""
     sites = ImageSensor(prnu=0.0, dsnu_e=0.0)
     raw = expose(np.full((20, 20), 3.0, np.float32), 1.0, 0.01, sites, rng())
     assert (raw == 1.0).all()
+
+    sites = ImageSensor(bits=8)
+    raw = expose(np.full((30, 30), 0.4, np.float32), 1.0, 0.01, sites, rng())
+    np.testing.assert_allclose(raw * 255.0, np.rint(raw * 255.0), atol=1e-4)
 
 
 def test_several_exposures_read_light_far_beyond_white() -> None:
@@ -134,13 +138,6 @@ def test_several_exposures_read_light_far_beyond_white() -> None:
         raw = expose(np.full((50, 50), light, np.float32), 1.0, 0.01, sites, rng())
         assert float(raw.mean()) == pytest.approx(light, rel=0.01)
         assert float(raw.std()) < 0.05 * light
-
-
-def test_numbers_are_whole_steps_of_the_converter() -> None:
-    """Eight bits: multiples of 1 / 255."""
-    sites = ImageSensor(bits=8)
-    raw = expose(np.full((30, 30), 0.4, np.float32), 1.0, 0.01, sites, rng())
-    np.testing.assert_allclose(raw * 255.0, np.rint(raw * 255.0), atol=1e-4)
 
 
 def test_hot_pixels_stay_where_they_are() -> None:
@@ -285,8 +282,8 @@ def test_the_circle_of_confusion_is_that_of_a_thin_lens() -> None:
     assert radius[0, 3] < 0.0
 
 
-def test_what_is_in_focus_stays_and_what_is_not_spreads() -> None:
-    """A line at the focus keeps its pixels; a line behind it is spread over its circle."""
+def test_what_is_in_focus_stays_and_what_is_not_spreads_without_bleeding() -> None:
+    """A line behind the focus is spread over its circle; black beyond a sharp white half stays."""
     image = np.zeros((60, 60, 3), np.float32)
     image[:, 30] = 1.0
     sharp = optics.defocus(image, np.zeros((60, 60), np.float32))
@@ -296,9 +293,6 @@ def test_what_is_in_focus_stays_and_what_is_not_spreads() -> None:
     assert soft[30, 20, 0] == pytest.approx(0.0, abs=1e-6)
     assert float(soft[30].sum()) == pytest.approx(3.0, rel=1e-3)
 
-
-def test_a_sharp_foreground_does_not_bleed_into_a_blurred_background() -> None:
-    """A white sharp half before a black blurred one: the black stays black."""
     image = np.zeros((40, 40, 3), np.float32)
     image[:, :20] = 1.0
     radius = np.zeros((40, 40), np.float32)
