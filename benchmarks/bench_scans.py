@@ -50,25 +50,14 @@ HIGHEST = 0.995
 """Quantile of elevations that stands for the highest beam."""
 
 REAL = {
-    "points a sweep": 118_900.0,
-    "cells hit": 0.761,
-    "ground residual [mm]": 21.6,
-    "ground reflectance": 0.244,
-    "  its deviation": 0.097,
-    "reflectance of all points": 0.262,
-    "  95th percentile": 0.49,
-    "  zeros": 0.118,
-    "reflectance of cars": 0.161,
-    "reflectance of pedestrians": 0.343,
-    "reflectance of cyclists": 0.277,
-    "points on a car at 10 m": 1345.0,
-    "points on a car at 20 m": 210.0,
-    "points on a car at 40 m": 33.0,
-    "points on a pedestrian at 10 m": 262.0,
-    "points on a cyclist at 10 m": 546.0,
-    "range of 99.9 % [m]": 73.0,
-    "highest beam [deg]": 3.7,
-}
+    "points a sweep": 118_900.0, "cells hit": 0.761, "ground residual [mm]": 21.6,
+    "ground reflectance": 0.244, "  its deviation": 0.097, "reflectance of all points": 0.262,
+    "  95th percentile": 0.49, "  zeros": 0.118, "reflectance of cars": 0.161,
+    "reflectance of pedestrians": 0.343, "reflectance of cyclists": 0.277,
+    "points on a car at 10 m": 1345.0, "points on a car at 20 m": 210.0,
+    "points on a car at 40 m": 33.0, "points on a pedestrian at 10 m": 262.0,
+    "points on a cyclist at 10 m": 546.0, "range of 99.9 % [m]": 73.0, "highest beam [deg]": 3.7,
+}  # fmt: skip
 """Measured in scans of KITTI (Geiger et al., "Vision meets Robotics", IJRR 2013)."""
 
 
@@ -246,13 +235,9 @@ def measure(scan: Scan) -> ScanFigures:
             found = ObjectFigures(box.kind, box.range_m, int(inside.sum()), own, mean)
             objects.append(found)
     return ScanFigures(
-        seen,
-        scan.reflectance,
-        _share_of_cells(seen),
-        residuals_m,
-        scan.reflectance[ground],
+        seen, scan.reflectance, _share_of_cells(seen), residuals_m, scan.reflectance[ground],
         tuple(objects),
-    )
+    )  # fmt: skip
 
 
 def _share_of_cells(seen: Directions) -> float:
@@ -288,10 +273,8 @@ def _ground(p_m: Float64) -> tuple[NDArray[np.intp], Float64]:
 
 
 POINTS_AT = (
-    *(("car", range_m) for range_m in (10.0, 20.0, 40.0)),
-    ("pedestrian", 10.0),
-    ("cyclist", 10.0),
-)
+    *(("car", range_m) for range_m in (10.0, 20.0, 40.0)), ("pedestrian", 10.0), ("cyclist", 10.0),
+)  # fmt: skip
 
 
 def points_at(objects: Sequence[tuple[float, int]], range_m: float) -> tuple[float, float]:
@@ -332,18 +315,13 @@ def summarise(scans: list[ScanFigures]) -> dict[str, tuple[float, float, float]]
         return float((counts * means).sum() / counts.sum())
 
     values = [
-        len(range_m) / len(scans),
-        float(np.mean([figures.cells for figures in scans])),
+        len(range_m) / len(scans), float(np.mean([figures.cells for figures in scans])),
         1e3 * math.sqrt(float((residuals_m**2).mean())) if len(residuals_m) else math.nan,
         float(ground.mean()) if len(ground) else math.nan,
-        float(ground.std()) if len(ground) else math.nan,
-        float(reflectance.mean()),
-        float(np.quantile(reflectance, 0.95)),
-        float((reflectance == 0.0).mean()),
-        mean_of("car"),
-        mean_of("pedestrian"),
-        mean_of("cyclist"),
-    ]
+        float(ground.std()) if len(ground) else math.nan, float(reflectance.mean()),
+        float(np.quantile(reflectance, 0.95)), float((reflectance == 0.0).mean()), mean_of("car"),
+        mean_of("pedestrian"), mean_of("cyclist"),
+    ]  # fmt: skip
     counted = []
     for kind, away_m in POINTS_AT:
         of_kind = [thing for thing in objects if thing.kind == kind]
@@ -364,12 +342,9 @@ def main() -> None:
     source.add_argument("--kitti", type=Path, help="folder with velodyne, label_2 and calib")
     parser.add_argument("--n", type=int, default=12, help="number of scenes, or of frames of KITTI")
     parser.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        metavar="KEY=VALUE",
+        "--set", action="append", default=[], metavar="KEY=VALUE",
         help="override; default: shared.weather=ClearNoon, as KITTI was recorded in dry weather",
-    )
+    )  # fmt: skip
     arguments = parser.parse_args()
     if arguments.kitti is not None:
         scans = scans_of_kitti(arguments.kitti, arguments.n)

@@ -17,13 +17,9 @@ def measure_run(config: Config, n: int, workers: int) -> Summary:
     factory = PipelineFactory(config, n)
     with tempfile.TemporaryDirectory() as folder:
         return run(
-            make_plan(factory),
-            factory,
-            Path(folder) / "out",
-            workers=workers,
-            resume_command="",
+            make_plan(factory), factory, Path(folder) / "out", workers=workers, resume_command="",
             licences=partial(format_licences, factory),
-        )
+        )  # fmt: skip
 
 
 def cpu_s() -> float:

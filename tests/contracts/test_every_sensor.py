@@ -25,11 +25,9 @@ from gen_data.sensors import TABLE
 from tests.renderers.fake_library import FakeLibrary, box_mesh, plane_mesh
 
 GIVEN: dict[str, dict[str, Any]] = {
-    "rgb_camera": {"size_px": [32, 24]},
-    "depth_camera": {"size_px": [32, 24]},
-    "lidar": {"model": "VLP-16"},
-    "event_camera": {"size_px": [32, 24], "frames_per_step": 2},
-}
+    "rgb_camera": {"size_px": [32, 24]}, "depth_camera": {"size_px": [32, 24]},
+    "lidar": {"model": "VLP-16"}, "event_camera": {"size_px": [32, 24], "frames_per_step": 2},
+}  # fmt: skip
 """Fields that make a sensor faster than by default."""
 
 OFF_RIGS = ("plate_camera",)
@@ -63,18 +61,14 @@ def street() -> Scene:
         for k, b in enumerate(boxes, 1)
     ]
     lens = Intrinsics.from_hfov(32, 24, 1.0)
-    return add_twists(
-        Scene(
-            "test",
-            bodies=(*boxes, Body("ground", "ground")),
-            instances=tuple(things),
-            cameras=(Camera("color", SE3(), lens, rig="ego"),),
-            rigs=(Rig("ego", "ego", SE3((0.0, 0.0, 1.0))),),
-            lights=(Light("sun", "sun", direction=(0.0, 0.6, -0.8), illuminance_lux=5e4),),
-            environment=Environment(luminance_cd_m2=3000.0),
-            tracks=tuple(Trajectory(name, 0.1, way) for name, way in poses.items()),
-        )
-    )
+    return add_twists(Scene(
+        "test", bodies=(*boxes, Body("ground", "ground")), instances=tuple(things),
+        cameras=(Camera("color", SE3(), lens, rig="ego"),),
+        rigs=(Rig("ego", "ego", SE3((0.0, 0.0, 1.0))),),
+        lights=(Light("sun", "sun", direction=(0.0, 0.6, -0.8), illuminance_lux=5e4),),
+        environment=Environment(luminance_cd_m2=3000.0),
+        tracks=tuple(Trajectory(name, 0.1, way) for name, way in poses.items()),
+    ))  # fmt: skip
 
 
 def made(kind: str, **fields: Any) -> Any:

@@ -55,16 +55,10 @@ def test_nothing_asks_an_index_for_the_project_that_took_the_short_name() -> Non
     assert not found
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        "pip install 'gen-data[ray]'",
-        "uv pip install gen-data",
-        "pip install --upgrade 'gen-data>=1'",
-        'dependencies = ["numpy", "gen-data"]',
-        'version("gen-data")',
-    ],
-)
+@pytest.mark.parametrize("text", [
+    "pip install 'gen-data[ray]'", "uv pip install gen-data", "pip install --upgrade 'gen-data>=1'",
+    'dependencies = ["numpy", "gen-data"]', 'version("gen-data")',
+])  # fmt: skip
 def test_the_search_finds_requirements(text: str) -> None:
     """What it must not find stands for itself: the command, and folders of the user."""
     assert AS_REQUIREMENT.search(text)

@@ -24,12 +24,9 @@ def test_the_centre_of_the_first_pixel_is_at_one_half() -> None:
 
 @settings(max_examples=60, deadline=None, derandomize=True)
 @given(
-    st.integers(1, 12),
-    st.integers(1, 12),
-    st.floats(1, 2000),
-    st.floats(1, 2000),
+    st.integers(1, 12), st.integers(1, 12), st.floats(1, 2000), st.floats(1, 2000),
     st.floats(0.01, 50),
-)
+)  # fmt: skip
 def test_projecting_what_was_unprojected_gives_pixel_centres(
     width: int, height: int, fx: float, fy: float, z: float
 ) -> None:

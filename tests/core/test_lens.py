@@ -64,11 +64,9 @@ def test_known_lenses_are_those_of_opencv(lens: Lens) -> None:
 
 @settings(max_examples=40, deadline=None, derandomize=True)
 @given(
-    st.floats(-0.35, 0.35),
-    st.floats(-0.1, 0.1),
-    st.tuples(*[st.floats(-0.01, 0.01)] * 2),
+    st.floats(-0.35, 0.35), st.floats(-0.1, 0.1), st.tuples(*[st.floats(-0.01, 0.01)] * 2),
     st.tuples(*[SMALL] * 4),
-)
+)  # fmt: skip
 def test_any_brown_conrady_lens_is_that_of_opencv(
     k1: float, k2: float, tangential: tuple[float, float], others: tuple[float, ...]
 ) -> None:

@@ -8,12 +8,9 @@ from click.testing import CliRunner
 
 from gen_data.assets.image_decoding import read_exr
 from gen_data.cli.main import cli
-from gen_data.core import optional_packages
-from gen_data.core.distribution import install_command
-from gen_data.core.errors import AssetError, ConfigError
+from gen_data.core import distribution, errors, optional_packages
 from gen_data.core.optional_packages import EXTRAS, missing_packages
-from gen_data.exporters.rerun import Rerun
-from gen_data.exporters.usd import Usd
+from gen_data.exporters import rerun, usd
 from gen_data.usd.stage_reader import OpenStage
 from tests.wheels import HAS_RERUN
 
@@ -50,21 +47,21 @@ def test_features_without_their_package_name_the_extra_before_they_begin(
 ) -> None:
     """Exporters by ``check``, readers by the file, and the preview with what works without."""
     assert missing_packages("pxr", "h5py", "mcap") == (
-        "needs the packages h5py, mcap, usd-core: " + install_command("formats", "usd")
+        "needs the packages h5py, mcap, usd-core: " + distribution.install_command("formats", "usd")
     )
 
-    with pytest.raises(ConfigError, match=r"exporter 'usd' needs .*\[usd\]'"):
-        Usd().check(None)  # type: ignore[arg-type]
-    with pytest.raises(ConfigError, match=r"exporter 'rerun' needs .*\[preview\]'"):
-        Rerun().check(None)  # type: ignore[arg-type]
+    with pytest.raises(errors.ConfigError, match=r"exporter 'usd' needs .*\[usd\]'"):
+        usd.Usd().check(None)  # type: ignore[arg-type]
+    with pytest.raises(errors.ConfigError, match=r"exporter 'rerun' needs .*\[preview\]'"):
+        rerun.Rerun().check(None)  # type: ignore[arg-type]
 
-    with pytest.raises(AssetError, match=r"mine\.usda: needs .*\[usd\]'"):
+    with pytest.raises(errors.AssetError, match=r"mine\.usda: needs .*\[usd\]'"):
         OpenStage(tmp_path / "mine.usda", "mine.usda")
-    with pytest.raises(AssetError, match=r"sky\.exr: needs .*\[exr\]'"):
+    with pytest.raises(errors.AssetError, match=r"sky\.exr: needs .*\[exr\]'"):
         read_exr(b"", "sky.exr")
 
     done = CliRunner().invoke(cli, ["preview", "tabletop.yaml"])
 
-    assert isinstance(done.exception, ConfigError)
-    assert install_command("preview") in str(done.exception)
+    assert isinstance(done.exception, errors.ConfigError)
+    assert distribution.install_command("preview") in str(done.exception)
     assert "contact-sheet" in str(done.exception)

@@ -40,15 +40,12 @@ def test_disparity_is_focal_length_times_baseline_over_depth() -> None:
     assert baseline_m(*pair(SE3((0.54, 0.0, 0.0)))) == pytest.approx(0.54, abs=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("right", "why"),
-    [
-        (SE3((-0.2, 0.0, 0.0)), "to the right of"),
-        (SE3((0.2, 0.01, 0.0)), "below"),
-        (SE3((0.2, 0.0, 0.01)), "before the other"),
-        (SE3.about_z(0.01, (0.2, 0.0, 0.0)), "do not look the same way"),
-    ],
-)
+@pytest.mark.parametrize(("right", "why"), [
+    (SE3((-0.2, 0.0, 0.0)), "to the right of"),
+    (SE3((0.2, 0.01, 0.0)), "below"),
+    (SE3((0.2, 0.0, 0.01)), "before the other"),
+    (SE3.about_z(0.01, (0.2, 0.0, 0.0)), "do not look the same way"),
+])  # fmt: skip
 def test_cameras_that_are_no_rectified_pair_are_refused(right: SE3, why: str) -> None:
     """To the left, lower, farther ahead, or turned."""
     with pytest.raises(ValueError, match=why):

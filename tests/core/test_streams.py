@@ -27,16 +27,10 @@ def test_drawing_elsewhere_moves_nothing() -> None:
     assert (alone == after).all()
 
 
-@pytest.mark.parametrize(
-    "other",
-    [
-        replace(BASE, seed=8),
-        replace(BASE, scene=4),
-        replace(BASE, view=2),
-        replace(BASE, attempt=1),
-        replace(BASE, view=-1),
-    ],
-)
+@pytest.mark.parametrize("other", [
+    replace(BASE, seed=8), replace(BASE, scene=4), replace(BASE, view=2), replace(BASE, attempt=1),
+    replace(BASE, view=-1),
+])  # fmt: skip
 def test_each_part_of_the_key_matters(other: Streams) -> None:
     assert first(other) != first(BASE)
 

@@ -60,13 +60,9 @@ def program(system: str, code: str) -> list[str]:
 
 def run(system: str, code: str, folder: Path) -> str:
     done = subprocess.run(
-        program(system, code),
-        cwd=folder,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+        program(system, code), cwd=folder, env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
     assert done.returncode == 0, done.stderr
     return done.stdout
 
@@ -151,11 +147,9 @@ def test_a_helper_ends_with_its_parent_where_no_kernel_ends_it(tmp_path: Path) -
         child.wait()
     """
     parent = subprocess.Popen(
-        program("", code),
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        stdout=subprocess.PIPE,
+        program("", code), env={**os.environ, "PYTHONPATH": str(ROOT)}, stdout=subprocess.PIPE,
         text=True,
-    )
+    )  # fmt: skip
     assert parent.stdout is not None
     number = int(parent.stdout.readline())
     children = Path(f"/proc/{number}/task/{number}/children")

@@ -11,13 +11,11 @@ def draw_desk(seed: int) -> dict[str, object]:
     """A family in small: a range, a whole number, an option, a chance, and what follows them."""
     rng = variant_rng("desk", seed)
     return {
-        "width_m": rng.between(1.2, 1.8, "width_m"),
-        "shelves": rng.whole(2, 6, "shelves"),
+        "width_m": rng.between(1.2, 1.8, "width_m"), "shelves": rng.whole(2, 6, "shelves"),
         "style": rng.choose(("oak", "steel", "oak"), "style"),
-        "drawers": rng.chance(0.5, "drawers"),
-        "panel": rng.turn((False, True), "panel"),
+        "drawers": rng.chance(0.5, "drawers"), "panel": rng.turn((False, True), "panel"),
         "rest": rng.between(0.0, 1.0),
-    }
+    }  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -59,18 +57,15 @@ def test_draws_are_recorded_in_order_with_all_possible_values() -> None:
     assert drawn["drawers"].options == drawn["panel"].options == ("false", "true")
 
 
-@pytest.mark.parametrize(
-    ("name", "asked", "message"),
-    [
-        ("width_m", 1.81, "width_m expects a number from 1.2 to 1.8"),
-        ("width_m", "wide", "width_m expects a number from 1.2 to 1.8"),
-        ("width_m", (1.3, 1.4), "width_m expects a number from 1.2 to 1.8"),
-        ("shelves", 6, "shelves is none of 2, 3, 4, 5"),
-        ("shelves", 2.5, "shelves is none of 2, 3, 4, 5"),
-        ("style", "steal", "style is none of oak, steel (did you mean 'steel'?)"),
-        ("drawers", 1, "drawers is none of false, true"),
-    ],
-)
+@pytest.mark.parametrize(("name", "asked", "message"), [
+    ("width_m", 1.81, "width_m expects a number from 1.2 to 1.8"),
+    ("width_m", "wide", "width_m expects a number from 1.2 to 1.8"),
+    ("width_m", (1.3, 1.4), "width_m expects a number from 1.2 to 1.8"),
+    ("shelves", 6, "shelves is none of 2, 3, 4, 5"),
+    ("shelves", 2.5, "shelves is none of 2, 3, 4, 5"),
+    ("style", "steal", "style is none of oak, steel (did you mean 'steel'?)"),
+    ("drawers", 1, "drawers is none of false, true"),
+])  # fmt: skip
 def test_impossible_values_are_refused(name: str, asked: DrawnValue, message: str) -> None:
     """The message has the range, or all options and the nearest."""
     with drawing({name: asked}), pytest.raises(ValueError, match=f"^{re.escape(message)}$"):

@@ -31,16 +31,10 @@ def archive(tmp_path: Path) -> Path:
 @pytest.fixture
 def pack(archive: Path) -> Pack:
     return Pack(
-        name="boxes",
-        summary="a box",
-        client="pip",
-        package="package",
-        version="1.0",
-        sha256=sha256(archive.read_bytes()).hexdigest(),
-        licence="CC-BY-3.0",
-        wanted=("data/*",),
+        name="boxes", summary="a box", client="pip", package="package", version="1.0",
+        sha256=sha256(archive.read_bytes()).hexdigest(), licence="CC-BY-3.0", wanted=("data/*",),
         converter="tests.packs.converters:box",
-    )
+    )  # fmt: skip
 
 
 def fake_client(folder: Path, program: str, script: str) -> None:
@@ -111,14 +105,11 @@ def test_missing_clients_are_named(
     assert names_in(tmp_path / "packs") == set()
 
 
-@pytest.mark.parametrize(
-    ("said", "told"),
-    [
-        ("npm error code ENOTFOUND", "found no network"),
-        ("E: Could not resolve 'deb.debian.org'", "found no network"),
-        ("ERROR: No matching distribution found", "failed: ERROR: No matching distribution"),
-    ],
-)
+@pytest.mark.parametrize(("said", "told"), [
+    ("npm error code ENOTFOUND", "found no network"),
+    ("E: Could not resolve 'deb.debian.org'", "found no network"),
+    ("ERROR: No matching distribution found", "failed: ERROR: No matching distribution"),
+])  # fmt: skip
 def test_no_network_and_other_failures_are_told_apart(
     said: str, told: str, pack: Pack, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

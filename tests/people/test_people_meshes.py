@@ -14,24 +14,10 @@ from tests.people.bodies import KINDS, body_of
 
 # https://cocodataset.org/#keypoints-2020, in the order of its annotation files.
 COCO_17 = [
-    "nose",
-    "left_eye",
-    "right_eye",
-    "left_ear",
-    "right_ear",
-    "left_shoulder",
-    "right_shoulder",
-    "left_elbow",
-    "right_elbow",
-    "left_wrist",
-    "right_wrist",
-    "left_hip",
-    "right_hip",
-    "left_knee",
-    "right_knee",
-    "left_ankle",
-    "right_ankle",
-]
+    "nose", "left_eye", "right_eye", "left_ear", "right_ear", "left_shoulder", "right_shoulder",
+    "left_elbow", "right_elbow", "left_wrist", "right_wrist", "left_hip", "right_hip", "left_knee",
+    "right_knee", "left_ankle", "right_ankle",
+]  # fmt: skip
 SEEDS = range(12)
 POSES = ("walk", "run", "stand", "phone", "carry", "sit", "crouch", "bend_deep", "stand_crossed",
          "call", "walk_umbrella", "push_pram", "pull_suitcase", "wave")  # fmt: skip

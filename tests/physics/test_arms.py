@@ -147,10 +147,8 @@ def test_what_is_out_of_reach_is_refused(engine: Engine) -> None:
 
 
 HELD = {
-    "box 0.05 0.03 0.06": 0.03,
-    "cylinder 0.025 0.08": 0.05,
-    "box 0.02 0.06 0.02": 0.02,
-}
+    "box 0.05 0.03 0.06": 0.03, "cylinder 0.025 0.08": 0.05, "box 0.02 0.06 0.02": 0.02,
+}  # fmt: skip
 """Asset and the width at which the fingers must stop [m]."""
 
 

@@ -41,14 +41,11 @@ def hand_robot() -> RobotModel:
         for side in PADS
     ]
     return RobotModel(
-        links=("palm", "left", "right", "left_pad", "right_pad"),
-        joints=(*fingers, *pads),
-        visuals={},
-        collisions={link: link for link in COLLISIONS},
-        home=(0.04, 0.04),
+        links=("palm", "left", "right", "left_pad", "right_pad"), joints=(*fingers, *pads),
+        visuals={}, collisions={link: link for link in COLLISIONS}, home=(0.04, 0.04),
         gripper=Gripper("palm", SE3((0.0, 0.0, 0.07)), ("left_slide", "right_slide"), STROKE_M),
         no_collide=frozenset(),
-    )
+    )  # fmt: skip
 
 
 def tube(inner_m: float, outer_m: float, height_m: float) -> tuple[np.ndarray, ...]:
@@ -67,11 +64,9 @@ def tube(inner_m: float, outer_m: float, height_m: float) -> tuple[np.ndarray, .
 
 
 THINGS = {
-    "block": (box(0.03, 0.024, 0.05),),
-    "rod": (cylinder(0.02, 0.05),),
-    "ring": tube(0.05, 0.064, 0.03),
-    "wide": (box(0.09, 0.09, 0.05),),
-}
+    "block": (box(0.03, 0.024, 0.05),), "rod": (cylinder(0.02, 0.05),),
+    "ring": tube(0.05, 0.064, 0.03), "wide": (box(0.09, 0.09, 0.05),),
+}  # fmt: skip
 
 
 @pytest.fixture

@@ -35,10 +35,8 @@ NONE_FAIL = ("randomizers.things.failures={}", "shared.robot=franka_panda")
 def demonstrated(task: str, scene_index: int = 0, failures: str = "{}") -> Scene:
     robot = "franka_panda_suction" if tasks()[task].hand == "suction" else "franka_panda"
     changes = (
-        f"shared.task={task}",
-        f"randomizers.things.failures={failures}",
-        f"shared.robot={robot}",
-    )
+        f"shared.task={task}", f"randomizers.things.failures={failures}", f"shared.robot={robot}",
+    )  # fmt: skip
     with open_pipeline(load_config("arm_tasks.yaml", overrides=(*SMALL, *changes))) as pipeline:
         return pipeline.accepted_scene(scene_index).scene
 

@@ -6,14 +6,9 @@ from gen_data.core.colorimetry import temperature_to_chromaticity
 from gen_data.randomizers.color_space import hsv_to_linear, temperature_to_linear
 
 PLANCKIAN_XY = {
-    2000: (0.5267, 0.4133),
-    2856: (0.4476, 0.4075),
-    3000: (0.4369, 0.4041),
-    4000: (0.3805, 0.3768),
-    5000: (0.3451, 0.3516),
-    6500: (0.3135, 0.3237),
-    10000: (0.2807, 0.2884),
-}
+    2000: (0.5267, 0.4133), 2856: (0.4476, 0.4075), 3000: (0.4369, 0.4041), 4000: (0.3805, 0.3768),
+    5000: (0.3451, 0.3516), 6500: (0.3135, 0.3237), 10000: (0.2807, 0.2884),
+}  # fmt: skip
 """CIE 1931 chromaticities of a black body: Wyszecki and Stiles, "Color science", 1982; 2856 K is
 illuminant A of CIE 15."""
 

@@ -48,12 +48,10 @@ SCENE = Scene(
         Body("clutter/1", "bottle", SE3((-0.3, 0.2, 0.88)), instance_id=3, group="clutter"),
         Body("clutter/2", "ball", SE3((0.1, -0.2, 0.86)), 0.5, instance_id=4, group="clutter"),
     ),
-    surfaces=(TABLE,),
-    groups=(GROUP,),
-    focus=Region((0.0, 0.0, 0.86), (1.2, 0.8, 0.24)),
+    surfaces=(TABLE,), groups=(GROUP,), focus=Region((0.0, 0.0, 0.86), (1.2, 0.8, 0.24)),
     interior_m=((-2.8, -2.3, 0.1), (2.8, 2.3, 2.6)),
     cameras=(Camera("color", SE3(), LENSES["pinhole"]),),
-)
+)  # fmt: skip
 
 
 def seen_px(points_camera_m: Array, k: Intrinsics) -> Array:
@@ -92,31 +90,19 @@ def share_of(body: Body, camera: Camera) -> float:
 @pytest.mark.parametrize("lens", LENSES)
 @settings(max_examples=25, deadline=None)
 @given(
-    share=st.floats(0.03, 0.6),
-    azimuth=st.floats(-math.pi, math.pi),
-    elevation=st.floats(-1.5, 1.5),
-    aside=st.tuples(st.floats(-0.15, 0.15), st.floats(-0.15, 0.15)),
-    roll=st.floats(-0.5, 0.5),
-    seed=st.integers(0, 1000),
-)
+    share=st.floats(0.03, 0.6), azimuth=st.floats(-math.pi, math.pi),
+    elevation=st.floats(-1.5, 1.5), aside=st.tuples(st.floats(-0.15, 0.15), st.floats(-0.15, 0.15)),
+    roll=st.floats(-0.5, 0.5), seed=st.integers(0, 1000),
+)  # fmt: skip
 # The axis of a level camera would be within a milliradian of the vertical.
 @example(
-    share=0.5,
-    azimuth=2.5,
-    elevation=-1.4307098734166879,
-    aside=(-0.11049349607705886, 0.0),
-    roll=-0.5,
-    seed=0,
-)
+    share=0.5, azimuth=2.5, elevation=-1.4307098734166879, aside=(-0.11049349607705886, 0.0),
+    roll=-0.5, seed=0,
+)  # fmt: skip
 def test_thing_fills_its_share_at_its_place_through_any_lens(
-    lens: str,
-    share: float,
-    azimuth: float,
-    elevation: float,
-    aside: tuple[float, float],
-    roll: float,
-    seed: int,
-) -> None:
+    lens: str, share: float, azimuth: float, elevation: float, aside: tuple[float, float],
+    roll: float, seed: int,
+) -> None:  # fmt: skip
     """A cloud of points in any direction: longer side of its box, image of its centre, bearing."""
     k = LENSES[lens]
     # The corners of the fisheye's image are outside its field. Half of a panorama's width is 180
@@ -291,15 +277,12 @@ def test_empty_group_and_unreachable_share_are_rejected_with_a_reason() -> None:
     assert "the lens cannot show an object" in refused.value.rejection.reason
 
 
-@pytest.mark.parametrize(
-    ("given", "fact"),
-    [
-        ({"fills": Constant(0.001)}, "smallest object fills about 0.003.*larger room"),
-        ({"fills": Uniform(0.9, 1.0), "clearance_m": 0.8}, "largest object fills about.*smaller"),
-        ({"fills": Constant(0.2), "aim": Constant("cluter")}, "named 'cluter'.*mean 'clutter'"),
-        ({"fills": Constant(0.2), "camera": "colour"}, "no camera 'colour'.*mean 'color'"),
-    ],
-)
+@pytest.mark.parametrize(("given", "fact"), [
+    ({"fills": Constant(0.001)}, "smallest object fills about 0.003.*larger room"),
+    ({"fills": Uniform(0.9, 1.0), "clearance_m": 0.8}, "largest object fills about.*smaller"),
+    ({"fills": Constant(0.2), "aim": Constant("cluter")}, "named 'cluter'.*mean 'clutter'"),
+    ({"fills": Constant(0.2), "camera": "colour"}, "no camera 'colour'.*mean 'color'"),
+])  # fmt: skip
 def test_impossible_framing_is_refused_before_a_run(given: dict[str, object], fact: str) -> None:
     """Names, and shares that no place in the room gives to any object of the group."""
     pose = CameraPose(name="close", **{"aim": Constant("clutter"), **given})  # type: ignore[arg-type]

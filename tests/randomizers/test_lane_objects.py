@@ -79,14 +79,9 @@ def test_count_is_a_choice_of_all_places_and_ids_are_unique() -> None:
 def test_nothing_overlaps_even_when_lanes_are_walked_often(scattered: bool) -> None:
     """Every pair of rectangles is separated along one of their axes."""
     scene = drawn(
-        street(),
-        gap_m=Uniform(0.0, 0.1),
-        passes=4,
-        lateral=Uniform(-1.0, 1.0),
-        yaw_deg=Uniform(-180.0, 180.0),
-        count=Constant(120),
-        uniform_area=scattered,
-    )
+        street(), gap_m=Uniform(0.0, 0.1), passes=4, lateral=Uniform(-1.0, 1.0),
+        yaw_deg=Uniform(-180.0, 180.0), count=Constant(120), uniform_area=scattered,
+    )  # fmt: skip
     prints = [Footprint.of(b.T_world_body, FakeAssets().bounds_m(b.asset)) for b in scene.bodies]
 
     assert len(prints) == 120
@@ -240,14 +235,9 @@ sizes = st.floats(0.1, 3.0)
 
 
 @given(
-    x=st.floats(-4, 4),
-    y=st.floats(-4, 4),
-    yaw=st.floats(0, 6.3),
-    a=sizes,
-    b=sizes,
-    c=sizes,
+    x=st.floats(-4, 4), y=st.floats(-4, 4), yaw=st.floats(0, 6.3), a=sizes, b=sizes, c=sizes,
     d=sizes,
-)
+)  # fmt: skip
 def test_overlap_agrees_with_points_inside_both(
     x: float, y: float, yaw: float, a: float, b: float, c: float, d: float
 ) -> None:
@@ -284,12 +274,9 @@ def test_runs_repeat_an_asset_without_gaps() -> None:
 def test_occupancy_is_drawn_once_per_run() -> None:
     """Half of the runs are missing as a whole."""
     scene = drawn(
-        street(),
-        run_m=Constant(1.0),
-        gap_m=Constant(0.5),
-        occupancy=Probability(0.5),
+        street(), run_m=Constant(1.0), gap_m=Constant(0.5), occupancy=Probability(0.5),
         min_clearance_m=0.0,
-    )
+    )  # fmt: skip
     for y in (-1.5, 1.5):
         row = sorted(
             b.T_world_body.translation_m[0]

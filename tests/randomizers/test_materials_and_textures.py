@@ -70,10 +70,8 @@ def test_looks_change_objects_unless_other_targets_are_named(
     assert changed(scene, after(made(()), scene)) == {"clutter/0", "clutter/1"}
     assert changed(scene, after(made(("table",)), scene)) == {"table"}
     assert changed(scene, after(made(("table", "clutter")), scene)) == {
-        "table",
-        "clutter/0",
-        "clutter/1",
-    }
+        "table", "clutter/0", "clutter/1",
+    }  # fmt: skip
 
 
 @looks
@@ -103,14 +101,10 @@ def test_geometry_and_labels_are_left(
     assert now.instances == scene.instances
 
 
-@pytest.mark.parametrize(
-    "randomizer",
-    [
-        Textures(name="t", textures=("masonry", "wood")),
-        Backdrop(name="b", floor=("wood",), walls=("masonry",)),
-    ],
-    ids=lambda randomizer: randomizer.type,
-)
+@pytest.mark.parametrize("randomizer", [
+    Textures(name="t", textures=("masonry", "wood")),
+    Backdrop(name="b", floor=("wood",), walls=("masonry",)),
+], ids=lambda randomizer: randomizer.type)  # fmt: skip
 def test_a_plan_lists_the_texture_files_of_a_user_but_not_generated_textures(
     tmp_path: Path, randomizer: RandomizerBase
 ) -> None:

@@ -44,13 +44,10 @@ def cut_grate() -> MeshData:
         faces += [(first, first + 1, first + 2), (first, first + 2, first + 3)]
     points = np.array(vertices, np.float32)
     return MeshData(
-        points,
-        np.array(faces, np.int32),
-        np.broadcast_to(np.array([0, 0, 1], np.float32), points.shape).copy(),
-        points[:, :2] + 0.5,
-        np.zeros(len(faces), np.int32),
-        (replace(GRATE, texture="plain"),),
-    )
+        points, np.array(faces, np.int32),
+        np.broadcast_to(np.array([0, 0, 1], np.float32), points.shape).copy(), points[:, :2] + 0.5,
+        np.zeros(len(faces), np.int32), (replace(GRATE, texture="plain"),),
+    )  # fmt: skip
 
 
 def library() -> FakeLibrary:

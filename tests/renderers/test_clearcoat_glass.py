@@ -14,11 +14,7 @@ from gen_data.core.scene import Body, Camera, Environment, Light, Scene
 from gen_data.core.se3 import SE3, Vec3
 from gen_data.renderers.warp.device import open_device
 from gen_data.renderers.warp.renderer import WarpRenderer
-from gen_data.renderers.warp.scene.kernels.brdf import (
-    fresnel_dielectric,
-    pane_reflectance,
-    pane_transmittance,
-)
+from gen_data.renderers.warp.scene.kernels import brdf
 from gen_data.renderers.warp.settings import RenderSettings
 from tests.renderers.fake_library import (
     DARK,
@@ -38,12 +34,9 @@ FURNACE = Environment(luminance_cd_m2=100.0)
 
 
 def radiance_of(
-    bodies: tuple[Body, ...],
-    library: FakeLibrary,
-    camera: Camera,
-    lights: tuple[Light, ...] = (),
+    bodies: tuple[Body, ...], library: FakeLibrary, camera: Camera, lights: tuple[Light, ...] = (),
     environment: Environment = DARK,
-) -> np.ndarray:
+) -> np.ndarray:  # fmt: skip
     scene = Scene("t", bodies, lights=lights, environment=environment)
     camera = replace(camera, ev100=8.0)
     reading = WarpRenderer(library, "cpu", SHARP).render(scene, camera, RADIANCE)
@@ -67,14 +60,14 @@ def fresnel_by_angles(incidence_rad: float, ior: float) -> float:
 @wp.kernel
 def _fresnel(cosines: wp.array(dtype=float), eta: float, f: wp.array(dtype=float)):  # noqa: ANN202
     i = wp.tid()
-    f[i] = fresnel_dielectric(cosines[i], eta)
+    f[i] = brdf.fresnel_dielectric(cosines[i], eta)
 
 
 @wp.kernel
 def _pane(f: wp.array(dtype=float), tint: float, rt: wp.array(dtype=wp.vec2)):  # noqa: ANN202
     i = wp.tid()
     color = wp.vec3(tint)
-    rt[i] = wp.vec2(pane_reflectance(f[i], color)[0], pane_transmittance(f[i], color)[1])
+    rt[i] = wp.vec2(brdf.pane_reflectance(f[i], color)[0], brdf.pane_transmittance(f[i], color)[1])
 
 
 def test_reflectance_of_glass_is_fresnels() -> None:
@@ -180,12 +173,10 @@ def test_an_edge_behind_a_slab_is_displaced_as_snell_says() -> None:
     t sin(a) (1 - cos(a) / sqrt(n^2 - sin^2(a))).
     """
     thickness, turn, distance = 0.2, math.radians(40.0), 3.0
-    library = FakeLibrary(
-        {
-            "slab": box_mesh((1.6, 1.6, thickness), (replace(GLASS, thin=False),)),
-            "bright": box_mesh((4, 8, 0.01), (glowing(100.0),)),
-        }
-    )
+    library = FakeLibrary({
+        "slab": box_mesh((1.6, 1.6, thickness), (replace(GLASS, thin=False),)),
+        "bright": box_mesh((4, 8, 0.01), (glowing(100.0),)),
+    })  # fmt: skip
     pose = SE3((0, 0, 1.2), (math.cos(turn / 2), 0.0, math.sin(turn / 2), 0.0))
     bodies = (
         Body("slab", "slab", pose),
@@ -216,12 +207,10 @@ def test_an_edge_behind_a_slab_is_displaced_as_snell_says() -> None:
 def test_a_glass_ball_shows_the_world_upside_down_where_snell_says() -> None:
     """Rows at which the border between a bright and a dark half appears, within 1.5 px."""
     radius, middle, wall, border_m = 0.5, 2.0, 4.0, 0.15
-    library = FakeLibrary(
-        {
-            "ball": sphere_mesh(radius, 160, (replace(GLASS, thin=False),)),
-            "bright": box_mesh((20, 10, 0.01), (glowing(100.0),)),
-        }
-    )
+    library = FakeLibrary({
+        "ball": sphere_mesh(radius, 160, (replace(GLASS, thin=False),)),
+        "bright": box_mesh((20, 10, 0.01), (glowing(100.0),)),
+    })  # fmt: skip
     bodies = (
         Body("ball", "ball", SE3((0, 0, middle))),
         Body("low", "bright", SE3((0.0, 5.0 + border_m, wall + 0.005))),

@@ -41,25 +41,17 @@ def ball_in_furnace(**fields: object) -> np.ndarray:
     return replicates_of(scene, camera, library, 64, 8, max_bounces=128)
 
 
-@pytest.mark.parametrize(
-    "fields",
-    [
-        {"metallic": 1.0, "roughness": 0.0},
-        {"metallic": 1.0, "roughness": 0.3},
-        {"metallic": 1.0, "roughness": 0.7},
-        {"metallic": 1.0, "roughness": 1.0},
-        {"roughness": 0.1},
-        {"roughness": 0.6, "specular": 1.0},
-        {"roughness": 1.0, "specular": 0.0},
-        {"roughness": 0.5, "coat": 1.0, "coat_roughness": 0.0},
-        {"metallic": 1.0, "roughness": 0.4, "coat": 1.0, "coat_roughness": 0.5},
-        {"transmission": 1.0, "thin": True, "roughness": 0.5},
-        {"transmission": 1.0, "thin": False, "roughness": 0.0},
-        {"transmission": 1.0, "thin": True, "roughness": 0.0},
-        {"transmission": 0.6, "thin": True, "roughness": 0.05, "opacity": 0.5},
-    ],
-    ids=str,
-)
+@pytest.mark.parametrize("fields", [
+    {"metallic": 1.0, "roughness": 0.0}, {"metallic": 1.0, "roughness": 0.3},
+    {"metallic": 1.0, "roughness": 0.7}, {"metallic": 1.0, "roughness": 1.0}, {"roughness": 0.1},
+    {"roughness": 0.6, "specular": 1.0}, {"roughness": 1.0, "specular": 0.0},
+    {"roughness": 0.5, "coat": 1.0, "coat_roughness": 0.0},
+    {"metallic": 1.0, "roughness": 0.4, "coat": 1.0, "coat_roughness": 0.5},
+    {"transmission": 1.0, "thin": True, "roughness": 0.5},
+    {"transmission": 1.0, "thin": False, "roughness": 0.0},
+    {"transmission": 1.0, "thin": True, "roughness": 0.0},
+    {"transmission": 0.6, "thin": True, "roughness": 0.05, "opacity": 0.5},
+], ids=str)  # fmt: skip
 def test_what_takes_no_light_is_invisible_in_a_uniform_environment(fields: dict) -> None:
     """White furnace: radiance 100 in, 100 out, to 0.1 %, the error of the table of lobes."""
     images = ball_in_furnace(**fields)

@@ -349,15 +349,12 @@ def pointing_sky(direction: Vec3) -> Float32:
     return np.repeat(np.where(bright, 100.0, 0.1)[..., None], 3, axis=-1).astype(np.float32)
 
 
-@pytest.mark.parametrize(
-    ("direction", "yaw_rad", "seen"),
-    [
-        ((1.0, 0.0, 0.0), 0.0, (1.0, 0.0, 0.0)),
-        ((0.0, 1.0, 0.0), 0.0, (0.0, 1.0, 0.0)),
-        ((0.0, 0.0, 1.0), 0.0, (0.0, 0.0, 1.0)),
-        ((1.0, 0.0, 0.0), math.pi / 2, (0.0, 1.0, 0.0)),
-    ],
-)
+@pytest.mark.parametrize(("direction", "yaw_rad", "seen"), [
+    ((1.0, 0.0, 0.0), 0.0, (1.0, 0.0, 0.0)),
+    ((0.0, 1.0, 0.0), 0.0, (0.0, 1.0, 0.0)),
+    ((0.0, 0.0, 1.0), 0.0, (0.0, 0.0, 1.0)),
+    ((1.0, 0.0, 0.0), math.pi / 2, (0.0, 1.0, 0.0)),
+])  # fmt: skip
 @pytest.mark.parametrize("roughness", [0.05, 0.3])
 def test_the_sky_is_seen_and_mirrored_where_it_is(
     direction: Vec3, yaw_rad: float, seen: Vec3, roughness: float

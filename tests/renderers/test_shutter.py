@@ -20,16 +20,10 @@ from gen_data.renderers.warp.visibility.frame_context import CameraState, render
 from gen_data.renderers.warp.visibility.reprojection import make_bands, render_bands
 from tests.renderers.moving import FACING, LENS, MESHES, even_track, world
 
-LABELS = frozenset(
-    {
-        Channel.INSTANCE,
-        Channel.CATEGORY,
-        Channel.Z_DEPTH,
-        Channel.RANGE,
-        Channel.NORMALS,
-        Channel.OBJECT_COORDINATES,
-    }
-)
+LABELS = frozenset({
+    Channel.INSTANCE, Channel.CATEGORY, Channel.Z_DEPTH, Channel.RANGE, Channel.NORMALS,
+    Channel.OBJECT_COORDINATES,
+})  # fmt: skip
 ALL = LABELS | {Channel.RADIANCE, Channel.AMODAL}
 # Its face is 2.5 m away and 80 / 2.5 = 32 px wide and high.
 LAMP = Body("lamp", "lamp", SE3((0.0, 0.0, 3.0)), instance_id=1)

@@ -14,12 +14,10 @@ from tests.renderers import fake_library
 
 LABELS = frozenset(Channel) - {Channel.RGB, Channel.RADIANCE, Channel.AMODAL}
 MESHES = {
-    "box": fake_library.box_mesh(),
-    "plane": fake_library.plane_mesh(100.0),
+    "box": fake_library.box_mesh(), "plane": fake_library.plane_mesh(100.0),
     "sphere": fake_library.sphere_mesh(1.0, rings=256),
-    "coarse_sphere": fake_library.sphere_mesh(0.5, rings=12),
-    "room": fake_library.room_mesh(),
-}
+    "coarse_sphere": fake_library.sphere_mesh(0.5, rings=12), "room": fake_library.room_mesh(),
+}  # fmt: skip
 
 
 @pytest.fixture(params=["raster", "rays"])

@@ -52,12 +52,8 @@ def test_things_stand_on_one_another() -> None:
     """A bin on a table, moved and turned with it."""
     bench = {**DESK, "name": "bench", "at_m": (1.0, 0.0), "yaw_deg": 90}
     bin_ = {
-        "type": "bin",
-        "name": "bin",
-        "on": "bench",
-        "at_m": (0.2, 0.1),
-        "size_m": (0.4, 0.3, 0.2),
-    }
+        "type": "bin", "name": "bin", "on": "bench", "at_m": (0.2, 0.1), "size_m": (0.4, 0.3, 0.2),
+    }  # fmt: skip
     scene = built(bench, bin_)
 
     assert scene.body("bin").T_world_body.translation_m == pytest.approx((0.9, 0.2, 0.74))
@@ -249,18 +245,15 @@ def test_a_panel_need_not_be_seen(kind: str) -> None:
     assert (scene.lights[0].direction, scene.lights[0].body) == ((0.0, 0.6, -0.8), "")
 
 
-@pytest.mark.parametrize(
-    ("given", "said"),
-    [
-        ({"intensity_cd": -1}, "greater than or equal to 0"),
-        ({"intensity_cd": float("nan")}, "finite"),
-        ({"luminous_flux_lm": float("inf")}, "finite"),
-        ({"luminous_flux_lm": 100, "intensity_cd": 5}, "exclude each other"),
-        ({"kind": "rectangle", "size_m": (0.0, 1.0)}, "size_m must be above 0"),
-        ({"kind": "disk", "radius_m": 0}, "radius_m of a disk"),
-        ({"kind": "spot", "direction": (0, 0, 0)}, "direction must not be 0"),
-    ],
-)
+@pytest.mark.parametrize(("given", "said"), [
+    ({"intensity_cd": -1}, "greater than or equal to 0"),
+    ({"intensity_cd": float("nan")}, "finite"),
+    ({"luminous_flux_lm": float("inf")}, "finite"),
+    ({"luminous_flux_lm": 100, "intensity_cd": 5}, "exclude each other"),
+    ({"kind": "rectangle", "size_m": (0.0, 1.0)}, "size_m must be above 0"),
+    ({"kind": "disk", "radius_m": 0}, "radius_m of a disk"),
+    ({"kind": "spot", "direction": (0, 0, 0)}, "direction must not be 0"),
+])  # fmt: skip
 def test_an_impossible_lamp_is_refused_when_it_is_read(given: dict[str, object], said: str) -> None:
     with pytest.raises(ValidationError, match=said):
         built(DESK, {"type": "light", "name": "lamp", **given})
@@ -272,32 +265,26 @@ def test_backdrop_is_background() -> None:
     assert scene.body("ground").instance_id == 0
 
 
-@pytest.mark.parametrize(
-    ("chosen", "assets"),
-    [
-        ({"tags": ["household", "toy"]}, {"ball"}),
-        ({"any_of": ["part", "toy"]}, {"ball", "bolt", "nut"}),
-        ({"ids": ["can"]}, {"can?seed=0", "can?seed=1"}),
-        ({"ids": ["can?seed=1", "odd"]}, {"can?seed=1", "odd"}),
-        ({"tags": ["household"], "exclude": ["can", "toy"]}, {"bottle", "brick"}),
-    ],
-)
+@pytest.mark.parametrize(("chosen", "assets"), [
+    ({"tags": ["household", "toy"]}, {"ball"}),
+    ({"any_of": ["part", "toy"]}, {"ball", "bolt", "nut"}),
+    ({"ids": ["can"]}, {"can?seed=0", "can?seed=1"}),
+    ({"ids": ["can?seed=1", "odd"]}, {"can?seed=1", "odd"}),
+    ({"tags": ["household"], "exclude": ["can", "toy"]}, {"bottle", "brick"}),
+])  # fmt: skip
 def test_assets_are_chosen_by_tags_and_ids(chosen: dict[str, Any], assets: set[str]) -> None:
     """All tags, any tag, a family, single assets; less what is excluded."""
     assert set(built(DESK, clutter(assets=chosen, count=0)).groups[0].assets) == assets
 
 
-@pytest.mark.parametrize(
-    ("line", "message"),
-    [
-        (clutter(on="tabel"), r"elements\.clutter\.on: .*'tabel'.*did you mean 'table'"),
-        ({**ARM, "on": "tabel"}, r"elements\.arm\.on: .*'tabel'.*did you mean 'table'"),
-        (clutter(count=400), r"elements\.clutter\.count: 400 objects do not fit .*'table'"),
-        (clutter(count=60, placement="scatter"), r"elements\.clutter\.count: 60 objects do not"),
-        (clutter(assets={"tags": ["no_such_tag"]}), r"elements\.clutter\.assets: no asset matches"),
-        ({**DESK, "height_m": 0.5}, r"elements\.table: two elements have this name"),
-    ],
-)
+@pytest.mark.parametrize(("line", "message"), [
+    (clutter(on="tabel"), r"elements\.clutter\.on: .*'tabel'.*did you mean 'table'"),
+    ({**ARM, "on": "tabel"}, r"elements\.arm\.on: .*'tabel'.*did you mean 'table'"),
+    (clutter(count=400), r"elements\.clutter\.count: 400 objects do not fit .*'table'"),
+    (clutter(count=60, placement="scatter"), r"elements\.clutter\.count: 60 objects do not"),
+    (clutter(assets={"tags": ["no_such_tag"]}), r"elements\.clutter\.assets: no asset matches"),
+    ({**DESK, "height_m": 0.5}, r"elements\.table: two elements have this name"),
+])  # fmt: skip
 def test_impossible_relations_are_told_with_their_place(line: dict[str, Any], message: str) -> None:
     """One message naming the element, the fact and what was probably meant."""
     with pytest.raises(ConfigError, match=message):
@@ -315,19 +302,11 @@ def test_what_has_no_room_or_no_name_is_told() -> None:
         built(DESK, {**ARM, "asset": "bottle"})
 
 
-@pytest.mark.parametrize(
-    "line",
-    [
-        {**DESK, "hight_m": 0.7},
-        {**DESK, "name": "1st"},
-        {**DESK, "name": "a/b"},
-        {**DESK, "style": "glass"},
-        {"type": "shelf", "name": "s", "levels": 0},
-        clutter(count=-1),
-        clutter(placement="throw"),
-        {"type": "objects", "name": "o", "on": "table", "assets": {}},
-    ],
-)
+@pytest.mark.parametrize("line", [
+    {**DESK, "hight_m": 0.7}, {**DESK, "name": "1st"}, {**DESK, "name": "a/b"},
+    {**DESK, "style": "glass"}, {"type": "shelf", "name": "s", "levels": 0}, clutter(count=-1),
+    clutter(placement="throw"), {"type": "objects", "name": "o", "on": "table", "assets": {}},
+])  # fmt: skip
 def test_elements_are_strict(line: dict[str, Any]) -> None:
     """Unknown fields, names that would clash with paths, numbers out of range."""
     with pytest.raises(ValidationError):

@@ -124,15 +124,12 @@ def test_intrinsics_are_those_of_opencv() -> None:
     assert_projects(camera.nominal_intrinsics(), project_cv(D5))
 
 
-@pytest.mark.parametrize(
-    ("more", "center"),
-    [
-        ("", (320.5, 240.5)),
-        (", pixel_centers: halves", (320.0, 240.0)),
-        (", size_px: [1280, 960]", (160.25, 120.25)),
-        (", size_px: [1280, 1280]", (160.25, 40.25)),
-    ],
-)
+@pytest.mark.parametrize(("more", "center"), [
+    ("", (320.5, 240.5)),
+    (", pixel_centers: halves", (320.0, 240.0)),
+    (", size_px: [1280, 960]", (160.25, 120.25)),
+    (", size_px: [1280, 1280]", (160.25, 40.25)),
+])  # fmt: skip
 def test_a_principal_point_is_shifted_scaled_and_cropped(
     tmp_path: Path, more: str, center: tuple[float, float]
 ) -> None:
@@ -147,19 +144,16 @@ def test_a_principal_point_is_shifted_scaled_and_cropped(
     assert (found.fx_px, found.fy_px) == (500 * scale, 510 * scale)
 
 
-@pytest.mark.parametrize(
-    ("text", "fact"),
-    [
-        ("hfov_deg: 60, intrinsics: {fx_px: 5, fy_px: 5, cx_px: 1, cy_px: 1}",
-         "intrinsics: excludes hfov_deg"),
-        ("intrinsics: {fx_px: 500, fy_px: 500, cx_px: 1}", "missing key 'cy_px'"),
-        ("intrinsics: {fx_px: 0, fy_px: 500, cx_px: 1, cy_px: 1}", "0 is not"),
-        ("intrinsics: {fx_px: 500, fy_px: 500, cx_px: 1, cy_px: 1, size_px: [640, 400]}",
-         "is taller than the calibrated 640 x 400"),
-        ("hfov_deg: 60, lens: {model: calibrated, camera: euroc_cam0}", "leave out hfov_deg"),
-        ("lens: {model: calibrated, camera: euroc}", "expected one of euroc_cam0"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("text", "fact"), [
+    ("hfov_deg: 60, intrinsics: {fx_px: 5, fy_px: 5, cx_px: 1, cy_px: 1}",
+     "intrinsics: excludes hfov_deg"),
+    ("intrinsics: {fx_px: 500, fy_px: 500, cx_px: 1}", "missing key 'cy_px'"),
+    ("intrinsics: {fx_px: 0, fy_px: 500, cx_px: 1, cy_px: 1}", "0 is not"),
+    ("intrinsics: {fx_px: 500, fy_px: 500, cx_px: 1, cy_px: 1, size_px: [640, 400]}",
+     "is taller than the calibrated 640 x 400"),
+    ("hfov_deg: 60, lens: {model: calibrated, camera: euroc_cam0}", "leave out hfov_deg"),
+    ("lens: {model: calibrated, camera: euroc}", "expected one of euroc_cam0"),
+])  # fmt: skip
 def test_contradictions_are_refused(tmp_path: Path, text: str, fact: str) -> None:
     assert fact in told(tmp_path, text)
 
@@ -194,23 +188,13 @@ def test_zeros_of_a_thin_prism_are_no_obstacle(tmp_path: Path) -> None:
     assert_projects(sensor(tmp_path, LENS, content=zeros).nominal_intrinsics(), project_cv(D8))
 
 
-@pytest.mark.parametrize(
-    ("D", "fact"),
-    [
-        (
-            np.full(12, 0.01),
-            "camera.yaml:12:4: distortion: s1 to s4 (thin prism) other than 0 have no lens here",
-        ),
-        (
-            np.full(14, 0.01),
-            "camera.yaml:12:4: distortion: thin prism and tilted sensor other than 0",
-        ),
-        (
-            np.zeros(6),
-            "camera.yaml:15:10: distortion coefficients: expected 0 or 4 or 5 or 8 or 12 or 14",
-        ),
-    ],
-)
+@pytest.mark.parametrize(("D", "fact"), [
+    (np.full(12, 0.01),
+     "camera.yaml:12:4: distortion: s1 to s4 (thin prism) other than 0 have no lens here"),
+    (np.full(14, 0.01), "camera.yaml:12:4: distortion: thin prism and tilted sensor other than 0"),
+    (np.zeros(6),
+     "camera.yaml:15:10: distortion coefficients: expected 0 or 4 or 5 or 8 or 12 or 14"),
+])  # fmt: skip
 def test_coefficients_without_a_lens_are_refused(tmp_path: Path, D: Array, fact: str) -> None:
     text = told(tmp_path, LENS, content=opencv_text(D, ".yml", tmp_path))
     assert text.startswith(fact)
@@ -257,15 +241,12 @@ def test_cameras_of_a_kalibr_chain_project_as_opencv_does(tmp_path: Path) -> Non
     assert other.size_px == (512, 512)
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "fact"),
-    [
-        ("pinhole", "ds", "'ds' has no lens here; expected pinhole, or omni with xi 0"),
-        ("radtan", "fov", "'fov' has no lens here; expected radtan, equidistant or none"),
-        ("[812.4, 811.9, 318.7, 259.3]", "[812.4, 811.9]", "expected 4 numbers, got 2"),
-        ("[812.4, 811.9, 318.7, 259.3]", "[812.4, one, 1, 2]", "expected a number, got 'one'"),
-    ],
-)
+@pytest.mark.parametrize(("old", "new", "fact"), [
+    ("pinhole", "ds", "'ds' has no lens here; expected pinhole, or omni with xi 0"),
+    ("radtan", "fov", "'fov' has no lens here; expected radtan, equidistant or none"),
+    ("[812.4, 811.9, 318.7, 259.3]", "[812.4, 811.9]", "expected 4 numbers, got 2"),
+    ("[812.4, 811.9, 318.7, 259.3]", "[812.4, one, 1, 2]", "expected a number, got 'one'"),
+])  # fmt: skip
 def test_another_model_in_kalibr_is_refused(tmp_path: Path, old: str, new: str, fact: str) -> None:
     text = told(tmp_path, LENS.replace("}", ", camera: cam0}"), content=KALIBR.replace(old, new, 1))
     assert text.startswith("camera.yaml:")
@@ -281,30 +262,24 @@ def test_a_camera_must_be_named_where_there_are_several(tmp_path: Path) -> None:
     )
 
 
-@pytest.mark.parametrize(
-    ("line", "D", "fisheye"),
-    [
-        ("1 PINHOLE 640 512 812.4 811.9 319.2 259.8", np.zeros(4), False),
-        ("1 OPENCV 640 512 812.4 811.9 319.2 259.8 -0.21 0.09 0.0007 -0.0004", D5[:4], False),
-        ("1 FULL_OPENCV 640 512 812.4 811.9 319.2 259.8 " + " ".join(map(str, D8)), D8, False),
-        ("1 OPENCV_FISHEYE 640 512 812.4 811.9 319.2 259.8 " + " ".join(map(str, D4)), D4, True),
-    ],
-)
+@pytest.mark.parametrize(("line", "D", "fisheye"), [
+    ("1 PINHOLE 640 512 812.4 811.9 319.2 259.8", np.zeros(4), False),
+    ("1 OPENCV 640 512 812.4 811.9 319.2 259.8 -0.21 0.09 0.0007 -0.0004", D5[:4], False),
+    ("1 FULL_OPENCV 640 512 812.4 811.9 319.2 259.8 " + " ".join(map(str, D8)), D8, False),
+    ("1 OPENCV_FISHEYE 640 512 812.4 811.9 319.2 259.8 " + " ".join(map(str, D4)), D4, True),
+])  # fmt: skip
 def test_a_camera_of_colmap_projects(tmp_path: Path, line: str, D: Array, fisheye: bool) -> None:
     """COLMAP's pixel centres are at halves: its principal point is OpenCV's plus a half."""
     found = sensor(tmp_path, LENS, "cameras.txt", content=f"# cameras\n{line}\n")
     assert_projects(found.nominal_intrinsics(), project_cv(D, fisheye=fisheye))
 
 
-@pytest.mark.parametrize(
-    ("line", "expected"),
-    [
-        ("1 SIMPLE_PINHOLE 640 512 800 320 256", (800.0, 800.0, ())),
-        ("1 SIMPLE_RADIAL 640 512 800 320 256 -0.1", (800.0, 800.0, (-0.1, 0, 0, 0, 0, 0, 0, 0))),
-        ("7 RADIAL 640 512 800 320 256 -0.1 0.02", (800.0, 800.0, (-0.1, 0.02, 0, 0, 0, 0, 0, 0))),
-        ("1 RADIAL_FISHEYE 640 512 800 320 256 0.1 0.02", (800.0, 800.0, (0.1, 0.02, 0, 0))),
-    ],
-)
+@pytest.mark.parametrize(("line", "expected"), [
+    ("1 SIMPLE_PINHOLE 640 512 800 320 256", (800.0, 800.0, ())),
+    ("1 SIMPLE_RADIAL 640 512 800 320 256 -0.1", (800.0, 800.0, (-0.1, 0, 0, 0, 0, 0, 0, 0))),
+    ("7 RADIAL 640 512 800 320 256 -0.1 0.02", (800.0, 800.0, (-0.1, 0.02, 0, 0, 0, 0, 0, 0))),
+    ("1 RADIAL_FISHEYE 640 512 800 320 256 0.1 0.02", (800.0, 800.0, (0.1, 0.02, 0, 0))),
+])  # fmt: skip
 def test_simple_models_of_colmap(tmp_path: Path, line: str, expected: Any) -> None:
     found = sensor(tmp_path, LENS, "cameras.txt", content=line).nominal_intrinsics()
     assert (found.fx_px, found.fy_px, found.lens.coefficients) == expected
@@ -347,23 +322,16 @@ def test_a_calibration_replaces_an_inherited_field_of_view(tmp_path: Path) -> No
     assert found.fx_px == 812.4
 
 
-@pytest.mark.parametrize(
-    ("text", "content", "fact"),
-    [
-        (LENS, "", "there is no file 'camera.yaml'"),
-        (LENS, "a: 1\n", "camera.yaml:1:1: no camera found; expected a camera matrix"),
-        (
-            LENS + ", hfov_deg: 60",
-            "a: 1",
-            "hfov_deg: the file that lens names gives it: leave it out",
-        ),
-        (LENS, ROS % ("thin", 5, D5.tolist()), "'thin' is no lens here; expected one of plumb_bob"),
-        (LENS, ROS % ("plumb_bob", 5, D5.tolist()) + "k: [\n", "not valid YAML"),
-        (LENS, (ROS % ("plumb_bob", 5, D5.tolist())).replace("812.4, 0,", "812.4, 2,"), "skew 2"),
-        (LENS.replace("file", "fil"), "a: 1\n", "unknown key 'fil'"),
-        (LENS.replace("}", ", fishy: 1}"), "a: 1\n", "unknown key 'fishy'"),
-    ],
-)
+@pytest.mark.parametrize(("text", "content", "fact"), [
+    (LENS, "", "there is no file 'camera.yaml'"),
+    (LENS, "a: 1\n", "camera.yaml:1:1: no camera found; expected a camera matrix"),
+    (LENS + ", hfov_deg: 60", "a: 1", "hfov_deg: the file that lens names gives it: leave it out"),
+    (LENS, ROS % ("thin", 5, D5.tolist()), "'thin' is no lens here; expected one of plumb_bob"),
+    (LENS, ROS % ("plumb_bob", 5, D5.tolist()) + "k: [\n", "not valid YAML"),
+    (LENS, (ROS % ("plumb_bob", 5, D5.tolist())).replace("812.4, 0,", "812.4, 2,"), "skew 2"),
+    (LENS.replace("file", "fil"), "a: 1\n", "unknown key 'fil'"),
+    (LENS.replace("}", ", fishy: 1}"), "a: 1\n", "unknown key 'fishy'"),
+])  # fmt: skip
 def test_a_bad_file_is_refused(tmp_path: Path, text: str, content: str, fact: str) -> None:
     assert fact in told(tmp_path, text, content=content)
 
@@ -514,17 +482,12 @@ Tr_velo_to_cam: 0 -1 0 -0.004 0 0 -1 -0.076 1 0 0 -0.27
 """
 
 
-@pytest.mark.parametrize(
-    ("name", "content"),
-    [
-        ("000000.txt", OBJECT),
-        ("0000.txt", OBJECT.replace("R0_rect:", "R_rect").replace("velo_to_cam:", "velo_cam")),
-        (
-            "calib.txt",
-            OBJECT.replace("Tr_velo_to_cam", "Tr").replace("R0_rect: 1 0 0 0 1 0 0 0 1\n", ""),
-        ),
-    ],
-)
+@pytest.mark.parametrize(("name", "content"), [
+    ("000000.txt", OBJECT),
+    ("0000.txt", OBJECT.replace("R0_rect:", "R_rect").replace("velo_to_cam:", "velo_cam")),
+    ("calib.txt",
+     OBJECT.replace("Tr_velo_to_cam", "Tr").replace("R0_rect: 1 0 0 0 1 0 0 0 1\n", "")),
+])  # fmt: skip
 def test_a_kitti_calibration_places_from_the_scanner(
     tmp_path: Path, name: str, content: str
 ) -> None:
@@ -546,18 +509,15 @@ def test_a_kitti_calibration_places_from_the_scanner(
     )
 
 
-@pytest.mark.parametrize(
-    ("text", "name", "content", "fact"),
-    [
-        ("frame: cam9", "chain.yaml", KALIBR, "has no frame 'cam9'; expected one of cam0, cam1"),
-        ("frame: cam1, relative_to: imu", "chain.yaml", KALIBR, "has no frame 'imu'"),
-        ("frame: cam1, axes: sideways", "chain.yaml", KALIBR, "expected one of optical, body"),
-        ("frame: cam1", "chain.yaml", KALIBR.replace("0.9998", "0.7"), "T_cn_cnm1: is no rotation"),
-        ("frame: a", "tf.yaml", TF.replace("w: 0.8", "w: 1.8"), "is no unit quaternion"),
-        ("frame: a", "r.urdf", URDF.replace('rpy="0.1', 'rpy="'), "expected three numbers"),
-        ("frame: a", "r.urdf", "<sdf/>", "its root element is <sdf>, not <opencv_storage>"),
-    ],
-)
+@pytest.mark.parametrize(("text", "name", "content", "fact"), [
+    ("frame: cam9", "chain.yaml", KALIBR, "has no frame 'cam9'; expected one of cam0, cam1"),
+    ("frame: cam1, relative_to: imu", "chain.yaml", KALIBR, "has no frame 'imu'"),
+    ("frame: cam1, axes: sideways", "chain.yaml", KALIBR, "expected one of optical, body"),
+    ("frame: cam1", "chain.yaml", KALIBR.replace("0.9998", "0.7"), "T_cn_cnm1: is no rotation"),
+    ("frame: a", "tf.yaml", TF.replace("w: 0.8", "w: 1.8"), "is no unit quaternion"),
+    ("frame: a", "r.urdf", URDF.replace('rpy="0.1', 'rpy="'), "expected three numbers"),
+    ("frame: a", "r.urdf", "<sdf/>", "its root element is <sdf>, not <opencv_storage>"),
+])  # fmt: skip
 def test_bad_places_are_refused(
     tmp_path: Path, text: str, name: str, content: str, fact: str
 ) -> None:

@@ -78,15 +78,11 @@ REACH_M = 2.2 + math.sqrt(2.0)
 """Half of the car and sqrt(2) half edges of a cube turned by 45 degrees."""
 
 
-@pytest.mark.parametrize(
-    ("pose", "box_m", "touching"),
-    [
-        (SE3.about_z(math.pi / 4, (REACH_M + 0.01, 0.0, 0.0)), CUBE_M, False),
-        (SE3.about_z(math.pi / 4, (REACH_M - 0.01, 0.0, 0.0)), CUBE_M, True),
-        (SE3((0.0, 0.0, 1.51)), ((-9, -9, 0), (9, 9, 1)), False),
-    ],
-    ids=["a corner before", "a corner inside", "a bridge above"],
-)
+@pytest.mark.parametrize(("pose", "box_m", "touching"), [
+    (SE3.about_z(math.pi / 4, (REACH_M + 0.01, 0.0, 0.0)), CUBE_M, False),
+    (SE3.about_z(math.pi / 4, (REACH_M - 0.01, 0.0, 0.0)), CUBE_M, True),
+    (SE3((0.0, 0.0, 1.51)), ((-9, -9, 0), (9, 9, 1)), False),
+], ids=["a corner before", "a corner inside", "a bridge above"])  # fmt: skip
 def test_boxes_touch_exactly_where_they_reach(pose: SE3, box_m: Any, touching: bool) -> None:
     own, its = find_obstacles(standing([thing(2, "other", "building", pose, box_m)]))
 

@@ -113,13 +113,10 @@ def test_white_noise_has_the_density_of_the_data_sheet() -> None:
     assert abs(np.diff(forces(rows), axis=0).std() / (accelerometer * math.sqrt(2)) - 1.0) < 0.05
 
 
-@pytest.mark.parametrize(
-    ("fields", "words"),
-    [
-        ({"rate_hz": 33.0}, "rate_hz 33 does not fit step_s 0.1"),
-        ({"rig": "egg"}, "the scene has no rig 'egg'; its rigs: ego"),
-    ],
-)
+@pytest.mark.parametrize(("fields", "words"), [
+    ({"rate_hz": 33.0}, "rate_hz 33 does not fit step_s 0.1"),
+    ({"rig": "egg"}, "the scene has no rig 'egg'; its rigs: ego"),
+])  # fmt: skip
 def test_what_does_not_fit_the_scene_is_told(fields: dict, words: str) -> None:
     with pytest.raises(ConfigError, match=words):
         Imu(**fields).mount(world())

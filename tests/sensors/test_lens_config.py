@@ -30,14 +30,11 @@ def test_a_camera_is_a_pinhole_unless_a_lens_with_its_coefficients_is_given() ->
     assert lens.lens.coefficients == (-0.2, 0.0, 0.0, 0.001, 0.0, 0.0, 0.0, 0.01)
 
 
-@pytest.mark.parametrize(
-    ("lens", "hfov_deg"),
-    [
-        ({"model": "brown_conrady", "k1": -0.1, "k2": 0.02}, 80.0),
-        ({"model": "kannala_brandt", "k1": 0.01}, 185.0),
-        ({"model": "equirectangular"}, 360.0),
-    ],
-)
+@pytest.mark.parametrize(("lens", "hfov_deg"), [
+    ({"model": "brown_conrady", "k1": -0.1, "k2": 0.02}, 80.0),
+    ({"model": "kannala_brandt", "k1": 0.01}, 185.0),
+    ({"model": "equirectangular"}, 360.0),
+])  # fmt: skip
 def test_the_field_of_view_is_that_of_the_lens(lens: dict[str, Any], hfov_deg: float) -> None:
     """From the left edge of the image to the right one, at its middle row."""
     k = camera(lens=lens, hfov_deg=hfov_deg, size_px=(600, 300)).intrinsics
@@ -79,42 +76,27 @@ def test_a_published_camera_is_scaled_to_the_width_and_cut_to_the_height() -> No
     np.testing.assert_allclose(small.rays(places), whole.rays(there), atol=1e-8)
 
 
-@pytest.mark.parametrize(
-    ("given", "message"),
-    [
-        ({"lens": {"model": "brown_conrady", "k1": -0.9}}, "folds over inside the image"),
-        (
-            {"lens": {"model": "kannala_brandt", "k1": -0.3}, "hfov_deg": 100},
-            "folds over inside the image",
-        ),
-        (
-            {"lens": {"model": "brown_conrady"}, "hfov_deg": 190},
-            "nothing at 95 degrees from its axis",
-        ),
-        ({"hfov_deg": 175}, "too wide for a pinhole"),
-        ({"lens": {"model": "kannala_brandt", "p1": 0.1}}, "p1"),
-        ({"lens": {"model": "wide"}}, "model"),
-        (
-            {"lens": {"model": "calibrated", "camera": "euroc_cam0"}, "hfov_deg": 60},
-            "leave out hfov_deg",
-        ),
-    ],
-)
+@pytest.mark.parametrize(("given", "message"), [
+    ({"lens": {"model": "brown_conrady", "k1": -0.9}}, "folds over inside the image"),
+    ({"lens": {"model": "kannala_brandt", "k1": -0.3}, "hfov_deg": 100},
+     "folds over inside the image"),
+    ({"lens": {"model": "brown_conrady"}, "hfov_deg": 190}, "nothing at 95 degrees from its axis"),
+    ({"hfov_deg": 175}, "too wide for a pinhole"),
+    ({"lens": {"model": "kannala_brandt", "p1": 0.1}}, "p1"),
+    ({"lens": {"model": "wide"}}, "model"),
+    ({"lens": {"model": "calibrated", "camera": "euroc_cam0"}, "hfov_deg": 60},
+     "leave out hfov_deg"),
+])  # fmt: skip
 def test_what_is_no_lens_is_refused_before_anything(given: dict[str, Any], message: str) -> None:
     with pytest.raises(ValidationError, match=message):
         RgbCamera.model_validate(given)
 
 
-@pytest.mark.parametrize(
-    "given",
-    [
-        {"hfov_deg": 30},
-        {"hfov_deg": 90},
-        {"lens": {"model": "kannala_brandt"}, "hfov_deg": 150},
-        {"lens": {"model": "kannala_brandt", "field_deg": 60}, "hfov_deg": 120},
-        {"lens": {"model": "equirectangular"}, "hfov_deg": 360},
-    ],
-)
+@pytest.mark.parametrize("given", [
+    {"hfov_deg": 30}, {"hfov_deg": 90}, {"lens": {"model": "kannala_brandt"}, "hfov_deg": 150},
+    {"lens": {"model": "kannala_brandt", "field_deg": 60}, "hfov_deg": 120},
+    {"lens": {"model": "equirectangular"}, "hfov_deg": 360},
+])  # fmt: skip
 def test_a_camera_is_mounted_with_the_whole_focus_in_view(given: dict[str, Any]) -> None:
     """However wide: all of the region is in the image, its centre in the middle."""
     focus = Region((0.5, -0.2, 0.75), (1.2, 0.8, 0.4))
@@ -153,15 +135,10 @@ class Rendering:
 )
 def test_photographs_are_focused_along_the_axis_or_at_a_distance(lens: str, depth: Channel) -> None:
     """What lies beside a fisheye has no depth along its axis."""
-    sensor = RgbCamera.model_validate(
-        {
-            "name": "eye",
-            "size_px": (32, 24),
-            "lens": {"model": lens},
-            "channels": ("rgb",),
-            "image_pipeline": {"focus": {"pixel_um": 3.0}},
-        }
-    )
+    sensor = RgbCamera.model_validate({
+        "name": "eye", "size_px": (32, 24), "lens": {"model": lens}, "channels": ("rgb",),
+        "image_pipeline": {"focus": {"pixel_um": 3.0}},
+    })  # fmt: skip
     renderer = Rendering()
 
     reading = sensor.capture(

@@ -46,18 +46,15 @@ def test_beams_of_the_hdl64_pass_beside_their_axis_at_two_heights() -> None:
     assert make_sweep(device, 0.0).origins_m is None
 
 
-@pytest.mark.parametrize(
-    ("name", "rings", "top", "bottom", "pulses"),
-    [
-        ("VLP-16", 16, 15.0, -15.0, 28_935),
-        ("HDL-32E", 32, 32 / 3, -92 / 3, 69_440),
-        ("HDL-64E", 64, 2.0, -73 / 3, 133_331),
-        ("OS1-64", 64, 22.5, -22.5, 65_536),
-        ("RPLIDAR-A1", 1, 0.0, 0.0, 1_454),
-        ("OS1-128", 128, 22.5, -22.5, 131_072),
-        ("carla", 32, 15.0, -25.0, 2_250),
-    ],
-)
+@pytest.mark.parametrize(("name", "rings", "top", "bottom", "pulses"), [
+    ("VLP-16", 16, 15.0, -15.0, 28_935),
+    ("HDL-32E", 32, 32 / 3, -92 / 3, 69_440),
+    ("HDL-64E", 64, 2.0, -73 / 3, 133_331),
+    ("OS1-64", 64, 22.5, -22.5, 65_536),
+    ("RPLIDAR-A1", 1, 0.0, 0.0, 1_454),
+    ("OS1-128", 128, 22.5, -22.5, 131_072),
+    ("carla", 32, 15.0, -25.0, 2_250),
+])  # fmt: skip
 def test_rings_and_pulses_are_those_of_the_data_sheet(
     name: str, rings: int, top: float, bottom: float, pulses: int
 ) -> None:

@@ -6,28 +6,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from gen_data.core import errors, se3, streams
 from gen_data.core.asset_types import SURFACES
 from gen_data.core.capture import POINT, LidarHits, LidarRays, PointCloud, SecondaryHits
-from gen_data.core.errors import ConfigError
 from gen_data.core.scene import Camera, Lidar, Scene, Weather
-from gen_data.core.se3 import SE3
-from gen_data.core.streams import Rng, Streams
 from gen_data.sensors.camera.rgb_camera import RgbCamera
-from gen_data.sensors.lidar import lidar_detection
-from gen_data.sensors.lidar.lidar_atmosphere import (
-    add_atmosphere,
-    fog_peak,
-    optical_depth,
-    rain_extinction_per_m,
-)
+from gen_data.sensors.lidar import lidar_atmosphere, lidar_detection
 from gen_data.sensors.lidar.lidar_sensor import LidarSensor
 from gen_data.sensors.lidar.scan_pattern import lidar_model
 
 MODEL = lidar_model("VLP-16")
 
 
-def rng(seed: int = 0) -> Rng:
-    return Streams(seed=seed, scene=0).rng("sensor/lidar")
+def rng(seed: int = 0) -> streams.Rng:
+    return streams.Streams(seed=seed, scene=0).rng("sensor/lidar")
 
 
 def echoes(ranges_m: np.ndarray, reflectance: float = 0.5) -> LidarHits:
@@ -35,13 +27,10 @@ def echoes(ranges_m: np.ndarray, reflectance: float = 0.5) -> LidarHits:
     ranges_m = np.asarray(ranges_m, np.float32)
     hit = np.isfinite(ranges_m)
     return LidarHits(
-        ranges_m,
-        np.where(hit, np.float32(reflectance), np.float32(0)),
-        hit.astype(np.float32),
-        np.where(hit, 7, 0).astype(np.uint16),
-        np.where(hit, 2, 0).astype(np.uint16),
+        ranges_m, np.where(hit, np.float32(reflectance), np.float32(0)), hit.astype(np.float32),
+        np.where(hit, 7, 0).astype(np.uint16), np.where(hit, 2, 0).astype(np.uint16),
         np.zeros(ranges_m.shape, np.uint8),
-    )
+    )  # fmt: skip
 
 
 class Wall:
@@ -179,9 +168,9 @@ def test_fog_dims_intensity_by_beer_and_lambert(fog_per_m: float) -> None:
 
 def test_rain_dims_by_goodin_s_law() -> None:
     """0.01 R^0.6 per metre: 0.0398 at 10 mm/h; nothing without rain."""
-    assert rain_extinction_per_m(10.0) == pytest.approx(0.01 * 10.0**0.6)
-    assert rain_extinction_per_m(0.0) == 0.0
-    depth = optical_depth(
+    assert lidar_atmosphere.rain_extinction_per_m(10.0) == pytest.approx(0.01 * 10.0**0.6)
+    assert lidar_atmosphere.rain_extinction_per_m(0.0) == 0.0
+    depth = lidar_atmosphere.optical_depth(
         Weather(rain_mm_h=10.0), MODEL, 1.7, np.zeros((1, 1), np.float32), np.float32([[25.0]])
     )
     assert depth[0, 0] == pytest.approx(0.25 * 10.0**0.6, rel=1e-5)
@@ -194,14 +183,16 @@ def test_fog_that_thins_with_height_is_integrated_along_the_beam(up: float) -> N
     r = (np.arange(200_000) + 0.5) * (40.0 / 200_000)
     expected = (0.02 * np.exp(-(1.7 + up * r) / 12.0)).mean() * 40.0
 
-    depth = optical_depth(weather, MODEL, 1.7, np.float32([[up]]), np.float32([[40.0]]))
+    depth = lidar_atmosphere.optical_depth(
+        weather, MODEL, 1.7, np.float32([[up]]), np.float32([[40.0]])
+    )
 
     assert depth[0, 0] == pytest.approx(expected, rel=1e-4)
 
 
 def test_dense_fog_answers_itself_a_few_metres_away_and_thicker_fog_more() -> None:
     """Points of air, no instance, near the scanner; none in clear air (Hahner et al. 2021)."""
-    peak_m, _ = fog_peak(0.06)
+    peak_m, _ = lidar_atmosphere.fog_peak(0.06)
     points = scan(LidarSensor(model="HDL-64E"), Wall(90.0), Weather(fog_extinction_per_m=0.06))
     air = points[points["surface"] == SURFACES.index("air")]
     ranges_m = np.linalg.norm(air["position_m"].astype(float), axis=1)
@@ -212,7 +203,7 @@ def test_dense_fog_answers_itself_a_few_metres_away_and_thicker_fog_more() -> No
     assert np.median(ranges_m) == pytest.approx(peak_m, rel=0.1)
     assert not (scan(LidarSensor(), Wall(90.0))["surface"] == SURFACES.index("air")).any()
 
-    strengths = [fog_peak(a)[1] for a in (0.005, 0.01, 0.02, 0.06)]
+    strengths = [lidar_atmosphere.fog_peak(a)[1] for a in (0.005, 0.01, 0.02, 0.06)]
 
     assert strengths == sorted(strengths)
 
@@ -221,7 +212,7 @@ def test_the_air_has_a_sensitivity_of_its_own() -> None:
     """Neither the loss nearby nor the sensitivity to solid targets changes its returns."""
     model = lidar_model("HDL-64E")
     one, two = (
-        add_atmosphere(
+        lidar_atmosphere.add_atmosphere(
             lidar_detection.make_pulses(echoes(np.full((500, 1), 90.0)), device),
             Weather(fog_extinction_per_m=0.06, rain_mm_h=20.0, snow_mm_h=2.0),
             device,
@@ -404,9 +395,9 @@ def test_the_mount_turns_left_and_upwards_and_needs_a_camera_listed_before_it() 
     np.testing.assert_allclose(left.rotate(ahead), [[0.0, 1.0, 0.0]], atol=1e-5)
     np.testing.assert_allclose(up.rotate(ahead), [[0.0, 0.0, 1.0]], atol=1e-5)
     assert up.translation_m == (0.1, 0.2, 0.3)
-    assert isinstance(up, SE3)
+    assert isinstance(up, se3.SE3)
 
-    with pytest.raises(ConfigError, match=r"camera 'color'.*none"):
+    with pytest.raises(errors.ConfigError, match=r"camera 'color'.*none"):
         LidarSensor().mount(Scene("t"))
 
 
@@ -419,13 +410,9 @@ def test_the_strongest_return_is_the_strongest_of_all_that_detours_add() -> None
     m = len(ray)
     far_m = first.range_m[ray, 0] + np.where(draw.random(m) < 0.4, 0.3, 4.0) * draw.random(m)
     detours = SecondaryHits(
-        ray,
-        far_m.astype(np.float32),
-        (draw.random(m) ** 4).astype(np.float32),
-        np.full(m, 9, np.uint16),
-        np.full(m, 3, np.uint16),
-        np.full(m, 1, np.uint8),
-    )
+        ray, far_m.astype(np.float32), (draw.random(m) ** 4).astype(np.float32),
+        np.full(m, 9, np.uint16), np.full(m, 3, np.uint16), np.full(m, 1, np.uint8),
+    )  # fmt: skip
     seen = replace(first, detours=detours)
 
     strongest = lidar_detection.make_pulses(seen, MODEL, "strongest")

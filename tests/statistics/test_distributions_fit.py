@@ -152,16 +152,10 @@ def test_drawn_values_are_pinned() -> None:
     rng = Streams(seed=7, scene=3, view=1, attempt=2, index=16).rng("randomizer/golden")
 
     values = [
-        Uniform(0.6, 1.2).draw(rng),
-        LogUniform(200, 2000).draw(rng),
-        Normal(0.5, 0.1).draw(rng),
-        Normal(0.5, 0.1, clip=(0, 0.6)).draw(rng),
-        UniformInteger(3, 12).draw(rng),
-        Choice({"matte": 3, "glossy": 1}).draw(rng),
-        Choice((1.0, 2.0, 3.0)).draw(rng),
-        Sequence(("a", "b", "c")).draw(rng),
-        Probability(0.3).draw(rng),
-        Uniform(-1, 1).draw(rng),
-    ]
+        Uniform(0.6, 1.2).draw(rng), LogUniform(200, 2000).draw(rng), Normal(0.5, 0.1).draw(rng),
+        Normal(0.5, 0.1, clip=(0, 0.6)).draw(rng), UniformInteger(3, 12).draw(rng),
+        Choice({"matte": 3, "glossy": 1}).draw(rng), Choice((1.0, 2.0, 3.0)).draw(rng),
+        Sequence(("a", "b", "c")).draw(rng), Probability(0.3).draw(rng), Uniform(-1, 1).draw(rng),
+    ]  # fmt: skip
 
     assert values == GOLDEN

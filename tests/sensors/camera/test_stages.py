@@ -435,15 +435,12 @@ def test_given_values_win_over_a_preset() -> None:
     assert (pipeline.image_sensor.bits, pipeline.image_sensor.full_well_e) == (14, 10_000.0)
 
 
-@pytest.mark.parametrize(
-    ("values", "fact"),
-    [
-        ({"preset": "fone"}, "phone.*did you mean 'phone'"),
-        ({"color_matrix": [[1, 0.5, 0], [0, 1, 0], [0, 0, 1]]}, "grey stays grey"),
-        ({"exposure_control": {"time_s": [0.1, 0.01]}}, "time_s must rise"),
-        ({"vignetting": 1.5}, "1.5"),
-    ],
-)
+@pytest.mark.parametrize(("values", "fact"), [
+    ({"preset": "fone"}, "phone.*did you mean 'phone'"),
+    ({"color_matrix": [[1, 0.5, 0], [0, 1, 0], [0, 0, 1]]}, "grey stays grey"),
+    ({"exposure_control": {"time_s": [0.1, 0.01]}}, "time_s must rise"),
+    ({"vignetting": 1.5}, "1.5"),
+])  # fmt: skip
 def test_impossible_cameras_are_refused(values: dict[str, Any], fact: str) -> None:
     with pytest.raises(ValidationError, match=fact):
         made(**values)
