@@ -43,9 +43,7 @@ def test_kittis_navigation_unit_is_where_its_calibration_has_it() -> None:
     """``calib_imu_to_velo``: (-0.81, 0.32, -0.80), to a centimetre."""
     scene = rig_scene("kitti_rig")
     scanner = scene.lidar("velodyne").T_world_lidar
-    imu = scene.device("oxts_imu").T_world_device
-
-    offset = (imu.inverse() @ scanner).translation_m
+    offset = (scene.device("oxts_imu").T_world_device.inverse() @ scanner).translation_m
     assert offset == pytest.approx((0.81, 0.32, 0.80), abs=0.01)
 
 

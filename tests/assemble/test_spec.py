@@ -92,9 +92,7 @@ def test_resolved_document_makes_the_same_spec_again(tmp_path: Path) -> None:
     plan = {"config": first.resolved, "name": first.name}
     (tmp_path / "plan.json").write_text(json.dumps(plan))
 
-    again = load_config(str(tmp_path))
-
-    assert again == first
+    assert load_config(str(tmp_path)) == first
 
 
 @pytest.mark.parametrize("name", ["parking", "tabletop"])

@@ -199,8 +199,7 @@ def test_scene_that_is_handed_in_stays_as_it_is(kind: str) -> None:
 @each
 def test_same_stream_draws_the_same_scene_in_any_process(kind: str) -> None:
     """Equal draws from a second call and from a copy in another process."""
-    copy = pickle.loads(pickle.dumps(made(kind)))
-    by_copy = copy(*world_of(kind), rng_of("stream"))
+    by_copy = pickle.loads(pickle.dumps(made(kind)))(*world_of(kind), rng_of("stream"))
 
     assert drawn(kind) == drawn(kind) == by_copy
 
@@ -217,9 +216,7 @@ def test_other_streams_draw_other_scenes(kind: str) -> None:
 def test_scene_holds_plain_values_only(kind: str) -> None:
     """The scene has no numpy scalars: it reads back from JSON as the same scene."""
     scene = drawn(kind)
-    plain = serialization.to_plain(scene)
-
-    assert_plain(plain)
+    assert_plain(serialization.to_plain(scene))
     assert serialization.from_plain(Scene, json.loads(serialization.canonical_json(scene))) == scene
 
 

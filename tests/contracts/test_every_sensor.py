@@ -93,8 +93,7 @@ def data(returned: SensorReading | PointCloud | Measurements) -> bytes:
 def test_mounting_adds_it_by_its_name_and_leaves_the_scene_alone(kind: str) -> None:
     """The new scene has it among cameras, lidars or devices; it survives serialisation."""
     before = canonical_json(street())
-    sensor = made(kind)
-    scene = place_sensors(sensor.mount(street()))
+    scene = place_sensors(made(kind).mount(street()))
 
     assert canonical_json(street()) == before
     names = [s.name for s in (*scene.cameras, *scene.lidars, *scene.devices)]

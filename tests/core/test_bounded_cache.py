@@ -50,9 +50,7 @@ def test_values_are_bounded_by_number_and_the_oldest_go() -> None:
 
         return cache.get(name, make)
 
-    values = [get(name) for name in "abcad"]
-
-    assert values == [1, 2, 3, 1, 4]
+    assert [get(name) for name in "abcad"] == [1, 2, 3, 1, 4]
     assert [name in cache for name in "abcd"] == [True, False, True, True]
     assert get("b") == 5
     assert len(cache) == 3

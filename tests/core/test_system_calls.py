@@ -121,12 +121,10 @@ def test_a_data_set_in_use_is_locked(system: str, tmp_path: Path) -> None:
 
     first = start()
     assert first.stdout.readline() == "True\n"  # type: ignore[union-attr]
-    second = start()
-    assert second.communicate()[0] == "False\n"
+    assert start().communicate()[0] == "False\n"
     first.kill()
     first.communicate()
-    third = start()
-    assert third.communicate()[0] == "True\n"
+    assert start().communicate()[0] == "True\n"
 
 
 def test_a_helper_ends_with_its_parent_where_no_kernel_ends_it(tmp_path: Path) -> None:

@@ -206,8 +206,7 @@ def test_a_mesh_of_the_author_that_is_another_one_is_named(
 
 def test_a_shard_that_differs_is_named_and_nothing_is_sealed(author: Path, reader: Path) -> None:
     """Again by the same command, which finds it on the disk."""
-    second = read_recipe(reader / "recipe.yaml").recipe.shards[1]
-    edit(reader, second, "f" * 64)
+    edit(reader, read_recipe(reader / "recipe.yaml").recipe.shards[1], "f" * 64)
 
     for _ in range(2):
         lines = refused(reader, gen_data.DeterminismError, 5)
@@ -236,8 +235,7 @@ def test_a_finished_data_set_is_proven_again(reader: Path, out: str) -> None:
 
 def test_the_files_of_the_author_name_sample_and_field(author: Path, reader: Path) -> None:
     gen_data.generate(author / "tiny.yaml", N, out=reader / "author", seed=4, workers=0)
-    first = read_recipe(reader / "recipe.yaml").recipe.shards[0]
-    edit(reader, first, "f" * 64)
+    edit(reader, read_recipe(reader / "recipe.yaml").recipe.shards[0], "f" * 64)
 
     lines = refused(reader, gen_data.DeterminismError, 5, against="author")
 

@@ -61,5 +61,4 @@ def test_another_pack_content_is_another_data_set(factory: PipelineFactory, tmp_
 
 
 def test_panoramas_that_may_light_a_scene_belong_to_the_data_set(factory: PipelineFactory) -> None:
-    environments = [name for name in make_plan(factory).assets if name.startswith("environment/")]
-    assert environments
+    assert [name for name in make_plan(factory).assets if name.startswith("environment/")]

@@ -40,8 +40,7 @@ def distances_m(points: np.ndarray, mesh: MeshData) -> np.ndarray:
 def test_the_lowest_vertex_stands_on_the_ground(kind: str, pose: str) -> None:
     """The ground is z = 0, whatever a person does."""
     for phase in (0.0, 0.3125):
-        mesh = made(draw_person(3, pose, phase), kind).mesh
-        assert mesh.vertices_m[:, 2].min() == 0.0
+        assert made(draw_person(3, pose, phase), kind).mesh.vertices_m[:, 2].min() == 0.0
 
 
 @pytest.mark.parametrize("kind", KINDS)

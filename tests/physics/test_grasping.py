@@ -123,8 +123,7 @@ def test_fingers_close_around_a_body_where_it_is(world: World) -> None:
 
 def test_a_leg_is_slowed_down_to_the_speed_of_a_point() -> None:
     """Differences of knots, for a joint that moves the point by 0.3 m per radian."""
-    leg = Leg((0.0,), (1.0,), 0.5)
-    slow = limit_speed(leg, [(0.0, 0.0, 0.0), (0.3, 0.0, 0.0)], 0.15)
+    slow = limit_speed(Leg((0.0,), (1.0,), 0.5), [(0.0, 0.0, 0.0), (0.3, 0.0, 0.0)], 0.15)
 
     x_m = 0.3 * np.array([positions[0] for _, positions in sample_positions([slow])])
     fastest_m_s = np.diff(x_m).max() / 0.05

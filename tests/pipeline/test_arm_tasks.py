@@ -47,8 +47,7 @@ QUICK = ("open_drawer",)
 @pytest.mark.parametrize("task", cases(sorted(tasks()), QUICK))
 def test_every_task_is_demonstrated_with_success(task: str) -> None:
     """Its phases are those of the program; things are named in the instruction, not braced."""
-    scene = demonstrated(task)
-    (arm,) = scene.articulations
+    (arm,) = demonstrated(task).articulations
     assert arm.episode is not None
     assert arm.assignment is not None
     assert (arm.assignment.name, arm.episode.succeeded, arm.episode.failure) == (task, True, "")

@@ -163,8 +163,7 @@ def test_scene_that_is_never_valid_is_rejected_with_the_tally() -> None:
         made.sample(3)
 
     assert str(error.value).startswith("scene 1: no valid layout in 5 attempts (")
-    counts = Counter(r.reason for r in error.value.rejections)
-    assert sum(counts.values()) == 5
+    assert sum(Counter(r.reason for r in error.value.rejections).values()) == 5
     assert "Try: 1. fewer objects (randomizers.clutter.count)" in str(error.value)
 
 

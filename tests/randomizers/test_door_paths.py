@@ -79,8 +79,7 @@ def test_the_nearest_garden_counts(library: AssetLibrary) -> None:
 
 def test_what_stands_in_the_way_stays(library: AssetLibrary) -> None:
     """A path would run through it."""
-    lane = garden(0.5 * GARDEN_M, 1.0)
-    scene = street(library, lane)
+    scene = street(library, garden(0.5 * GARDEN_M, 1.0))
     group = ObjectGroup("things", (), ("bench?seed=0",), 0, "along", lanes=("garden",))
     (door,) = [point for point in library.keypoints(HOUSE) if point.name == "door"]
     thing = Member("bench?seed=0", SE3((-door.position_m[1], 3.0, RISE_M / 2)))

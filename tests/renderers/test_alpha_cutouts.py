@@ -160,8 +160,7 @@ def test_a_mesh_without_coverage_is_drawn_as_ever() -> None:
     for texture in (full, plain):
         assets = library()
         assets.textures["grate"] = texture
-        settings = RenderSettings(visibility="rays")
-        renderer = WarpRenderer(assets, "cpu", settings)
+        renderer = WarpRenderer(assets, "cpu", RenderSettings(visibility="rays"))
         readings.append(renderer.render(scene_of("grate"), PINHOLE, CHANNELS).channels)
     for channel in sorted(readings[0]):
         np.testing.assert_array_equal(readings[0][channel], readings[1][channel])

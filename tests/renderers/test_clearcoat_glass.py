@@ -348,8 +348,7 @@ def test_emission_maps_scale_the_emitted_luminance() -> None:
 
 def test_occlusion_maps_darken_ambient_light_only() -> None:
     """An even sky of 100 cd/m^2 on an albedo of 0.5: 50 and 50 * 128 / 255; the sun stays."""
-    texture = TextureData(WHITE, occlusion=halves(255, 128, 1))
-    bodies, library = mapped(texture, MATTE)
+    bodies, library = mapped(TextureData(WHITE, occlusion=halves(255, 128, 1)), MATTE)
 
     dim, bright = of_halves(radiance_of(bodies, library, FROM_ABOVE, environment=FURNACE))
     assert bright == pytest.approx(50.0, rel=0.01)
@@ -439,9 +438,7 @@ def test_a_coat_mirrors_what_is_around(color: Vec3) -> None:
     bodies = (Body("floor", "floor"), Body("wall", "wall", SE3((0, 3.0, 0.0))))
     angle = math.radians(60.0)
     eye = (0.0, -2.0 * math.sin(angle), 2.0 * math.cos(angle))
-    camera = camera_at(eye, (0, 0, 0), (15, 15), 2.0)
-
-    seen = radiance_of(bodies, library, camera)[7, 7]
+    seen = radiance_of(bodies, library, camera_at(eye, (0, 0, 0), (15, 15), 2.0))[7, 7]
 
     schlick = 0.04 + 0.96 * (1.0 - math.cos(angle)) ** 5
     np.testing.assert_allclose(seen, 1000.0 * schlick, rtol=0.03)

@@ -177,8 +177,7 @@ def test_open_ground_is_as_bright_with_shadows_as_without(name: str) -> None:
 
     lit, _ = luminance_of(scene, library)
 
-    image = library.environment(name)
-    up = irradiance(image, np.array([[0.0, 0.0, 1.0]]))[0]
+    up = irradiance(library.environment(name), np.array([[0.0, 0.0, 1.0]]))[0]
     expected = up * MEAN_CD_M2 * 0.5 / math.pi
     np.testing.assert_allclose(lit, np.broadcast_to(expected, lit.shape), rtol=0.02)
 

@@ -316,8 +316,7 @@ def test_mesh_uvs_put_v_0_at_the_bottom_of_the_image() -> None:
 
 def test_uvs_along_a_line_show_the_texture_along_that_line() -> None:
     """A plane whose u is 3/4 everywhere, without an area in UV space, shows green above blue."""
-    material = Material((1.0, 1.0, 1.0), 1.0, specular=0.0, texture="t")
-    mesh = plane_mesh(2.0, (material,))
+    mesh = plane_mesh(2.0, (Material((1.0, 1.0, 1.0), 1.0, specular=0.0, texture="t"),))
     line = replace(
         mesh, uvs=np.stack([np.full(4, 0.75), mesh.uvs[:, 1]], axis=-1, dtype=np.float32)
     )

@@ -130,8 +130,7 @@ def test_same_weather_makes_the_same_bytes_in_another_renderer(library: FakeLibr
 def test_even_fog_follows_beer_and_lambert(renderer: WarpRenderer) -> None:
     """In front of black, fog has the radiance L (1 - exp(-beta r)) in uniform light L."""
     beta, sky = 0.05, 200.0
-    weather = Weather(fog_extinction_per_m=beta)
-    scene = street(weather, Environment(luminance_cd_m2=sky))
+    scene = street(Weather(fog_extinction_per_m=beta), Environment(luminance_cd_m2=sky))
     reading = renderer.render(scene, AHEAD, SEEN)
     wall = reading.channels[Channel.INSTANCE] == 1
     expected = sky * (1.0 - np.exp(-beta * reading.channels[Channel.RANGE][wall].astype(float)))

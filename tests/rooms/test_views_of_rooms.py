@@ -220,8 +220,7 @@ def test_a_carrier_too_wide_for_a_room_is_rejected_with_a_remedy() -> None:
 def test_the_map_of_a_room_agrees_with_outlines() -> None:
     """Occupied cells are in a box of what stands; free ones at most in its empty corners."""
     scene = states(flat(), is_open=OFF)
-    pose = se3.SE3((0.0, 0.0, 0.0))
-    truth = sample.EgoTruth(rig="carrier", T_world_ego=pose)
+    truth = sample.EgoTruth(rig="carrier", T_world_ego=se3.SE3((0.0, 0.0, 0.0)))
     made = (
         BevMap(px_m=0.05, reach_m=6.0).annotate_frame({"": scene}, open_library(()), truth).birdseye
     )

@@ -196,8 +196,7 @@ def test_zeros_of_a_thin_prism_are_no_obstacle(tmp_path: Path) -> None:
      "camera.yaml:15:10: distortion coefficients: expected 0 or 4 or 5 or 8 or 12 or 14"),
 ])  # fmt: skip
 def test_coefficients_without_a_lens_are_refused(tmp_path: Path, D: Array, fact: str) -> None:
-    text = told(tmp_path, LENS, content=opencv_text(D, ".yml", tmp_path))
-    assert text.startswith(fact)
+    assert told(tmp_path, LENS, content=opencv_text(D, ".yml", tmp_path)).startswith(fact)
 
 
 @pytest.mark.parametrize(

@@ -73,8 +73,7 @@ def test_no_event_is_lost_or_told_twice_between_steps() -> None:
 
     def counts(step_s: float) -> np.ndarray:
         sensor = EventCamera(rig="ego", frames_per_step=round(step_s / 0.05), **QUIET)
-        scene = replace(world(), step_s=step_s)
-        mounted = place_sensors(sensor.mount(scene))
+        mounted = place_sensors(sensor.mount(replace(world(), step_s=step_s)))
         total = np.zeros(SIZE_PX[::-1], int)
         for k in range(1, round(1.0 / step_s) + 1):
             then = scene_at(mounted, round(k * step_s, 9))
@@ -90,8 +89,7 @@ def test_no_event_is_lost_or_told_twice_between_steps() -> None:
 def test_events_do_not_come_back_from_small_changes() -> None:
     """Up and down by a fifth of the threshold: at most one event where a level lies in between."""
     sensor = EventCamera(rig="ego", frames_per_step=20, **QUIET)
-    film = Film(lambda t: 50.0 * math.exp(0.04 * math.sin(200.0 * t)))
-    rows = seen(sensor, film, 1).rows
+    rows = seen(sensor, Film(lambda t: 50.0 * math.exp(0.04 * math.sin(200.0 * t))), 1).rows
     pixel = rows["y_px"].astype(int) * SIZE_PX[0] + rows["x_px"]
 
     assert np.bincount(pixel).max() == 1
@@ -138,8 +136,7 @@ def test_events_know_what_their_pixel_shows() -> None:
 
 def test_still_pictures_make_no_events_but_noise() -> None:
     """Leakage of 2 Hz, shot noise of 8 Hz in the dark, a quarter of it in the light (v2e)."""
-    quiet = EventCamera(rig="ego", **QUIET)
-    assert len(seen(quiet, Film(lambda t: 0.5), 4).rows) == 0
+    assert len(seen(EventCamera(rig="ego", **QUIET), Film(lambda t: 0.5), 4).rows) == 0
 
     scene = np.full((100, 200), 1e-6)
     scene[:, 100:] = 1e6

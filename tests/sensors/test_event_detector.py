@@ -132,8 +132,7 @@ def test_obstacle_that_only_reaches_into_the_way_counts_from_where_it_does() -> 
 
 
 def test_far_obstacles_are_not_reported() -> None:
-    wall = thing(4, "wall", "building", SE3((40.0, 0.0, 0.0)), WALL_M)
-    scene = world(others=[wall])
+    scene = world(others=[thing(4, "wall", "building", SE3((40.0, 0.0, 0.0)), WALL_M)])
 
     assert len(of_kind(reading(EventDetector(obstacle_m=30.0), scene, 0).rows, "obstacle")) == 0
     assert len(of_kind(reading(EventDetector(obstacle_m=40.0), scene, 0).rows, "obstacle")) == 1

@@ -152,8 +152,7 @@ def test_sensors_inside_the_body_that_carries_them_are_refused(
 def test_a_sheet_of_a_few_lines_has_the_rest_of_a_named_scanner(tmp_path: Path) -> None:
     """VLP-16: 1,808 columns a turn, 2.79 mrad; its own lasers from the top, its turns and range."""
     text = "like: VLP-16\nelevations_deg: [-10, -5, 0, 5]\nrotation_hz: 20\nrange_m: [0.2, 40]\n"
-    sensor = spec(tmp_path, "model: short.yaml", short_yaml=text).sensors[1]
-    device = sensor.device
+    device = spec(tmp_path, "model: short.yaml", short_yaml=text).sensors[1].device
 
     np.testing.assert_allclose(np.degrees(device.elevations_rad()), [5, 0, -5, -10])
     assert (device.name, device.rotation_hz, device.range_m) == ("short", 20, (0.2, 40))
@@ -167,8 +166,7 @@ def test_a_step_in_azimuth_gives_the_pulses_of_a_turn(tmp_path: Path) -> None:
     text = "like: OS1-64\nelevations_deg: [3, 1, -2]\nazimuth_step_deg: 0.5\n"
     for line in ("model: s.yaml", "model: s.yaml\n    rotation_hz: 5"):
         sensor = spec(tmp_path, line, s_yaml=text).sensors[1]
-        sweep = make_sweep(sensor.device, 0.0)
-        assert len(sweep.ring) == 3 * 720
+        assert len(make_sweep(sensor.device, 0.0).ring) == 3 * 720
         # Its own lasers have no offsets of the other scanner's.
         assert sensor.device.azimuth_offsets_deg == ()
 

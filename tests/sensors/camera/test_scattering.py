@@ -46,9 +46,7 @@ def test_a_drop_shows_the_scene_upside_down() -> None:
 def test_drops_at_the_rim_of_small_images_are_cut_off() -> None:
     """Centres on corners, radii larger than the image."""
     image = np.full((5, 9, 3), 2.0, np.float32)
-    drops = np.array([[0.0, 0.0, 4.0, 1.0], [9.0, 5.0, 30.0, 2.0]])
-
-    seen = refract_in_drops(image, drops)
+    seen = refract_in_drops(image, np.array([[0.0, 0.0, 4.0, 1.0], [9.0, 5.0, 30.0, 2.0]]))
 
     assert np.isfinite(seen).all()
     assert seen.max() <= 2.0 + 1e-5

@@ -159,8 +159,7 @@ def test_hot_pixels_stay_where_they_are() -> None:
 @pytest.mark.parametrize("method", ["bilinear", "edge_aware"])
 def test_demosaicing_gives_flat_colours_back(pattern: Pattern, method: Any) -> None:
     """Each filter's colour is found again in its own channel."""
-    raw = mosaic(flat(0.8, 0.4, 0.1), pattern)
-    image = isp.demosaic(raw, pattern, method, 1.0)
+    image = isp.demosaic(mosaic(flat(0.8, 0.4, 0.1), pattern), pattern, method, 1.0)
     np.testing.assert_allclose(image[4:-4, 4:-4], flat(0.8, 0.4, 0.1)[4:-4, 4:-4], atol=2e-4)
 
 
