@@ -62,10 +62,9 @@ def fit_scans(first: int, scans: int, scenes: int) -> FittedRows:
     """Fit sweeps of one scanner."""
     real = scanner(
         white_intensity=SCANNER["reflectance gain"],
-        response={**RESPONSE, "dark": SCANNER["dark returns"]},
-        window=SCANNER["dropout"],
+        response={**RESPONSE, "dark": SCANNER["dark returns"]}, window=SCANNER["dropout"],
         range_m=(0.5, SCANNER["range"]),
-    )
+    )  # fmt: skip
     made = [rescan(one, real) for one in illuminations(range(first, first + scans), real)]
     seeds = range(first + STRIDE // 2, first + STRIDE // 2 + scenes)
     return lidar_fit.fit_lidar(illuminations(seeds, scanner(response=RESPONSE)), made, 0).quantities

@@ -85,9 +85,8 @@ def run_weakness(out: Path, sizes: Mapping[str, int]) -> bool:
 
 
 EXPERIMENTS: Mapping[str, Callable[[Path, Mapping[str, int]], bool]] = {
-    "ranking": run_ranking,
-    "weakness": run_weakness,
-}
+    "ranking": run_ranking, "weakness": run_weakness,
+}  # fmt: skip
 
 
 def make(config: Path, n: int, folder: Path, seed: int | None = None) -> Path:

@@ -103,11 +103,10 @@ def time_sweeps(device: str, rays: int, repeats: int, small: bool) -> dict[str, 
             packed_ms = _wall_ms(anew)
             kernels, _ = timed_activity(anew, device)
             figures[name] = {
-                "rays": count * copies,
-                "ms": median(_wall_ms(anew) for _ in range(repeats)),
+                "rays": count * copies, "ms": median(_wall_ms(anew) for _ in range(repeats)),
                 "with_packing_ms": packed_ms,
                 "kernels": sorted(((n, ms) for n, (_, ms) in kernels.items()), key=lambda r: -r[1]),
-            }
+            }  # fmt: skip
     return figures
 
 
@@ -142,7 +141,6 @@ def time_paths(device: str, size_px: tuple[int, int], samples: int) -> dict[str,
         kernels, _ = timed_activity(lambda: pipeline.sample(2), device)
     paths = size_px[0] * size_px[1] * samples
     return {
-        "s": spent_s,
-        "paths_per_s": paths / spent_s,
+        "s": spent_s, "paths_per_s": paths / spent_s,
         "kernels": sorted(((n, c, ms) for n, (c, ms) in kernels.items()), key=lambda r: -r[2])[:8],
-    }
+    }  # fmt: skip

@@ -65,9 +65,8 @@ def test_a_checkout_imports_its_own_folders(tmp_path: Path, links: bool) -> None
 
     assert name == "tabletop"
     assert [Path(file).resolve() for file in files] == [
-        place / "exporters/__init__.py",
-        place / "generator/core/se3.py",
-    ]
+        place / "exporters/__init__.py", place / "generator/core/se3.py",
+    ]  # fmt: skip
 
 
 @pytest.mark.skipif(

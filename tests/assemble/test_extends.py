@@ -113,9 +113,8 @@ randomizers: [{type: materials, name: clutter}]
     plain = load_config_document(written(folder, own)).plain()
 
     assert plain["randomizers"] == [
-        {"type": "colors", "name": "colors"},
-        {"type": "materials", "name": "clutter"},
-    ]
+        {"type": "colors", "name": "colors"}, {"type": "materials", "name": "clutter"},
+    ]  # fmt: skip
     assert (plain["exporters"], plain["elements"], plain["annotations"]) == ([], {}, [])
     assert "without" not in plain
 
@@ -143,7 +142,7 @@ def test_an_error_in_an_inherited_value_points_to_its_own_file(folder: Path) -> 
     assert message.startswith(f"{folder / 'base.yaml'}:7:43: randomizers[0].count: ")
 
 
-def test_a_circle_is_named(folder: Path) -> None:
+def test_a_chain_has_an_end_and_a_circle_is_named(folder: Path) -> None:
     first = written(folder, "extends: b.yaml\n", "a.yaml")
     second = written(folder, "extends: a.yaml\n", "b.yaml")
 
@@ -152,8 +151,6 @@ def test_a_circle_is_named(folder: Path) -> None:
     assert message.startswith(f"{second}:1:10: extends: extends itself: ")
     assert f"{first} -> {second} -> {first}" in message
 
-
-def test_a_chain_has_an_end(folder: Path) -> None:
     for k in range(10):
         written(folder, f"extends: c{k + 1}.yaml\n", f"c{k}.yaml")
     written(folder, BASE, "c10.yaml")

@@ -116,10 +116,9 @@ def test_plan_and_generate_refuse_all_faults_with_the_same_message(tmp_path: Pat
     config = table(
         {**BENT, "name": "left", "channels": ["rgb"]},
         {**CAMERA, "name": "middle", "channels": [*PAIR], "stereo_with": "right"},
-        {**CAMERA, "name": "right"},
-        exporters=[{"type": "bop", "camera": "left"}],
+        {**CAMERA, "name": "right"}, exporters=[{"type": "bop", "camera": "left"}],
         splits={"train": 1},
-    )
+    )  # fmt: skip
     file = tmp_path / "mine.yaml"
     file.write_text(yaml.safe_dump(config))
     planned = CliRunner().invoke(cli, ["plan", str(file), "--n", "2"])

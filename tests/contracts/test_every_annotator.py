@@ -27,9 +27,8 @@ from tests.streets import thin_street
 pytestmark = pytest.mark.slow
 
 ANNOTATORS: dict[str, type[interfaces.AnyAnnotator]] = {
-    **{name: TABLE.load(name) for name in TABLE},
-    "stranger_distance": Distance,
-}
+    **{name: TABLE.load(name) for name in TABLE}, "stranger_distance": Distance,
+}  # fmt: skip
 each = pytest.mark.parametrize("name", ANNOTATORS)
 
 CONFIG = "street_sequence"

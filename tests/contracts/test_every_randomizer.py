@@ -89,11 +89,10 @@ def houses_and_garden() -> Scene:
 def table_with_hands() -> Scene:
     """A table, a group of hands and one of fruit, and two cameras."""
     elements = (
-        room.Room(name="room"),
-        surface.SurfaceElement(name="table"),
+        room.Room(name="room"), surface.SurfaceElement(name="table"),
         Objects(name="hands", on="table", count=0, assets=AssetChoice(tags=("body_part",))),
         Objects(name="objects", on="table", count=0, assets=AssetChoice(ids=("apple", "carton"))),
-    )
+    )  # fmt: skip
     lens = intrinsics.Intrinsics.from_hfov(64, 48, 1.0)
     cameras = tuple(Camera(name, SE3((0.0, 0.0, 1.5)), lens) for name in ("left", "right"))
     return replace(builder.build_scene("test", elements, open_library(())), cameras=cameras)
@@ -131,12 +130,11 @@ def nominal_scene() -> Scene:
     """
     household, shapes = AssetChoice(tags=("household",)), AssetChoice(tags=("random_shape",))
     elements = (
-        room.Room(name="room"),
-        surface.SurfaceElement(name="table"),
+        room.Room(name="room"), surface.SurfaceElement(name="table"),
         robot.Robot(name="arm", asset="two_link", on="table", at_m=(-0.45, 0.0)),
         Objects(name="objects", on="table", count=4, assets=household),
         Objects(name="distractors", on="table", count=1, assets=shapes, annotate=False),
-    )
+    )  # fmt: skip
     lens = intrinsics.Intrinsics.from_hfov(64, 48, 1.0)
     cameras = tuple(
         Camera(name, look_at((1.0, 0.0, 1.5), (0.0, 0.0, 0.8)), lens) for name in ("left", "right")

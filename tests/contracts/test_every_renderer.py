@@ -21,9 +21,8 @@ from gen_data.renderers import TABLE
 from tests.renderers.fake_library import FakeLibrary, box_mesh, camera_at
 
 SETTINGS: Mapping[str, type[RendererSettings]] = {
-    **{name: TABLE.load(name) for name in TABLE},
-    "stranger_boxes": BoxesPlugin,
-}
+    **{name: TABLE.load(name) for name in TABLE}, "stranger_boxes": BoxesPlugin,
+}  # fmt: skip
 each = pytest.mark.parametrize("name", SETTINGS)
 
 ARRAYS = {

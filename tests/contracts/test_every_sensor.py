@@ -107,10 +107,9 @@ def test_it_is_where_its_description_says(kind: str) -> None:
     sensor = made(kind, rate_hz=10.0, time_offset_s=0.01)
     info, scene = sensor.describe(), sensor.mount(street())
     places = {
-        Modality.CAMERA: (scene.cameras, SensorReading),
-        Modality.LIDAR: (scene.lidars, PointCloud),
+        Modality.CAMERA: (scene.cameras, SensorReading), Modality.LIDAR: (scene.lidars, PointCloud),
         Modality.DEVICE: (scene.devices, Measurements),
-    }
+    }  # fmt: skip
     mounted, returned = places[info.modality]
 
     assert (info.name, info.rate_hz, info.time_offset_s) == ("unit", 10.0, 0.01)

@@ -25,10 +25,9 @@ def test_a_single_pixel_has_a_box_of_one_by_one_and_no_pixel_none() -> None:
 
 @settings(max_examples=150, deadline=None, derandomize=True)
 @given(
-    arrays(bool, st.tuples(st.integers(1, 8), st.integers(1, 8))),
+    arrays(bool, st.tuples(st.integers(1, 8), st.integers(1, 8))), st.integers(-5, 5),
     st.integers(-5, 5),
-    st.integers(-5, 5),
-)
+)  # fmt: skip
 def test_the_tight_box_holds_all_pixels_and_no_border(mask: np.ndarray, x0: int, y0: int) -> None:
     """Checked pixel by pixel, with the mask placed anywhere in the image."""
     box = tight_box(mask, x0, y0)

@@ -90,10 +90,9 @@ def test_any_fisheye_is_opencvs(
 
 @settings(max_examples=60, deadline=None, derandomize=True)
 @given(
-    st.sampled_from([KITTI, TUM_VI, Lens("equirectangular")]),
-    st.floats(-0.6, 0.6),
+    st.sampled_from([KITTI, TUM_VI, Lens("equirectangular")]), st.floats(-0.6, 0.6),
     st.floats(-0.5, 0.5),
-)
+)  # fmt: skip
 def test_rays_are_the_inverse_of_project(lens: Lens, x: float, y: float) -> None:
     """Anywhere in the image, not only at centres."""
     camera = camera_of(lens)

@@ -35,7 +35,7 @@ def test_a_value_asked_for_moves_no_other(name: str, asked: DrawnValue, value: o
     assert drawn[name].value == asked
 
 
-def test_names_change_no_draw() -> None:
+def test_names_change_no_draw_and_outside_of_assets_nothing_is_recorded() -> None:
     """A stream with names is the stream without them."""
     named, plain = variant_rng("desk", 7), variant_rng("desk", 7)
     assert named.between(2.0, 3.0, "a") == plain.between(2.0, 3.0)
@@ -44,6 +44,10 @@ def test_names_change_no_draw() -> None:
     assert named.whole(2, 7, "d") == int(plain.between(2, 7))
     assert named.turn("xyz", "e") == "y"
     assert named.random() == plain.random()
+
+    rng = variant_rng("square", 0)
+    assert isinstance(rng, VariantRng)
+    assert rng.drawing is None
 
 
 def test_draws_are_recorded_in_order_with_all_possible_values() -> None:
@@ -82,10 +86,3 @@ def test_the_first_stream_decides_which_streams_belong_to_the_asset() -> None:
     assert own == again == 0.2
     assert 0.2 not in (content, after)
     assert list(drawn) == ["height_m"]
-
-
-def test_a_generator_outside_of_an_asset_records_nothing() -> None:
-    """Streams of templates and randomizers have no parameters."""
-    rng = variant_rng("square", 0)
-    assert isinstance(rng, VariantRng)
-    assert rng.drawing is None

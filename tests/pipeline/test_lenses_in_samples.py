@@ -14,9 +14,8 @@ SMALL = (
     "sensors.color.size_px=[200, 160]",
     "sensors.color.lens={model: kannala_brandt, k1: 0.02, k2: -0.005}",
     "randomizers.lens.hfov_deg={uniform: [90, 110]}",
-    "randomizers.lens.lens={k1: {uniform: [0.0, 0.04]}}",
-    "exporters=[{type: coco}]",
-)
+    "randomizers.lens.lens={k1: {uniform: [0.0, 0.04]}}", "exporters=[{type: coco}]",
+)  # fmt: skip
 
 
 @pytest.fixture(scope="module")

@@ -37,16 +37,13 @@ def test_linear_rgb_has_the_chromaticity_and_luminance_one(kelvin: int) -> None:
     assert xy == pytest.approx(PLANCKIAN_XY[kelvin], abs=1.5e-3)
 
 
-def test_candles_are_red_and_skies_are_blue() -> None:
-    """Order of the channels; no channel is negative where the gamut ends."""
+def test_candles_are_red_skies_blue_and_hues_turn_through_the_primaries() -> None:
+    """No channel is negative where the gamut ends; no saturation is grey."""
     candle, sky = temperature_to_linear(1700.0), temperature_to_linear(12000.0)
 
     assert candle[0] > candle[1] > candle[2] >= 0.0
     assert sky[2] > sky[1] > sky[0] > 0.0
 
-
-def test_hue_turns_through_the_primaries() -> None:
-    """Red, green, blue at thirds; no saturation is grey."""
     assert hsv_to_linear(0.0, 1.0, 1.0) == (1.0, 0.0, 0.0)
     assert hsv_to_linear(1 / 3, 1.0, 1.0) == pytest.approx((0.0, 1.0, 0.0), abs=1e-6)
     assert hsv_to_linear(2 / 3, 1.0, 1.0) == pytest.approx((0.0, 0.0, 1.0), abs=1e-6)

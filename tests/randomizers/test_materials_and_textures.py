@@ -216,12 +216,11 @@ def test_a_probability_is_a_number_or_a_flag(kind: str, written: str, mean: floa
     assert isinstance(randomizer.probability.draw(rng_of()), bool)
 
 
-@pytest.mark.parametrize(
-    ("written", "fact"),
-    [("1.5", "probability needs a number in [0, 1], got 1.5"),
-     ("-1", "probability needs a number in [0, 1], got -1"),
-     ("yes", "expected a probability in [0, 1], true or false, got 'yes' (did you mean true?)")],
-)  # fmt: skip
+@pytest.mark.parametrize(("written", "fact"), [
+    ("1.5", "probability needs a number in [0, 1], got 1.5"),
+    ("-1", "probability needs a number in [0, 1], got -1"),
+    ("yes", "expected a probability in [0, 1], true or false, got 'yes' (did you mean true?)"),
+])  # fmt: skip
 def test_an_impossible_probability_is_told_with_its_place(written: str, fact: str) -> None:
     """The column is that of the value."""
     problems = Problems()

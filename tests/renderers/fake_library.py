@@ -44,10 +44,9 @@ def room_mesh(
 
 
 def sphere_mesh(
-    radius_m: float = 0.5,
-    rings: int = 32,
+    radius_m: float = 0.5, rings: int = 32,
     materials: tuple[asset_types.Material, ...] = (asset_types.Material(),),
-) -> asset_types.MeshData:
+) -> asset_types.MeshData:  # fmt: skip
     polar = np.linspace(0.0, np.pi, rings + 1)
     azimuth = np.linspace(0.0, 2 * np.pi, 2 * rings + 1)
     p, a = np.meshgrid(polar, azimuth, indexing="ij")
@@ -91,11 +90,10 @@ class FakeLibrary:
     """An AssetLibrary over dictionaries handed in by a test."""
 
     def __init__(
-        self,
-        meshes: dict[str, asset_types.MeshData],
+        self, meshes: dict[str, asset_types.MeshData],
         textures: dict[str, asset_types.TextureData] | None = None,
         environments: dict[str, asset_types.Float32] | None = None,
-    ) -> None:
+    ) -> None:  # fmt: skip
         self.meshes = meshes
         self.textures = textures or {}
         self.environments = {"environment/neutral?seed=0": uniform_sky(), **(environments or {})}

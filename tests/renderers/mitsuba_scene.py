@@ -139,11 +139,10 @@ def _light(light: Light) -> dict[str, Any]:
     frame[:3, 0], frame[:3, 1] = side * half[0], np.cross(normal, side) * half[1]
     frame[:3, 2], frame[:3, 3] = normal, position
     return {
-        "type": light.kind,
-        "to_world": mi.ScalarTransform4f(frame),
+        "type": light.kind, "to_world": mi.ScalarTransform4f(frame),
         "bsdf": {"type": "diffuse", "reflectance": _rgb((0.0, 0.0, 0.0))},
         "emitter": {"type": "area", "radiance": _rgb(tuple(power / area_m2))},
-    }
+    }  # fmt: skip
 
 
 def _any_side(normal: np.ndarray) -> list[float]:

@@ -53,10 +53,9 @@ def cut_grate() -> MeshData:
 def library() -> FakeLibrary:
     plain = TextureData(np.full((4, 4, 3), 200, np.uint8))
     meshes = {
-        "grate": plane_mesh(1.0, (GRATE,)),
-        "cut": cut_grate(),
+        "grate": plane_mesh(1.0, (GRATE,)), "cut": cut_grate(),
         "floor": plane_mesh(12.0, (Material((0.5, 0.5, 0.5), 1.0, specular=0.0),)),
-    }
+    }  # fmt: skip
     return FakeLibrary(meshes, {"grate": grate_texture(), "plain": plain})
 
 
@@ -74,11 +73,10 @@ def scene_of(asset: str) -> Scene:
 
 PINHOLE = camera_at((0.4, -2.2, 1.4), (0.1, 0.4, 0.4), (240, 180), 50.0, ev100=9.0)
 FISHEYE = Camera(
-    "camera",
-    look_at((0.4, -1.2, 1.2), (0.1, 0.4, 0.4)),
+    "camera", look_at((0.4, -1.2, 1.2), (0.1, 0.4, 0.4)),
     Intrinsics(200, 160, 90.0, 90.0, 100.0, 80.0, Lens("kannala_brandt", (0.01, 0.0, 0.0, 0.0))),
     9.0,
-)
+)  # fmt: skip
 
 
 @pytest.mark.parametrize("method", ["raster", "rays"])

@@ -179,9 +179,8 @@ def test_an_edge_behind_a_slab_is_displaced_as_snell_says() -> None:
     })  # fmt: skip
     pose = SE3((0, 0, 1.2), (math.cos(turn / 2), 0.0, math.sin(turn / 2), 0.0))
     bodies = (
-        Body("slab", "slab", pose),
-        Body("right", "bright", SE3((2.0, 0.0, distance + 0.005))),
-    )
+        Body("slab", "slab", pose), Body("right", "bright", SE3((2.0, 0.0, distance + 0.005))),
+    )  # fmt: skip
     focal_px = 600.0
 
     row = radiance_of(bodies, library, forward_camera((301, 5), focal_px))[2, :, 1]
@@ -277,10 +276,9 @@ def test_an_edge_in_a_mirror_is_the_mean_of_tones_of_a_camera_with_many_photosit
     pixel_m = 13.0 * 2.0 * math.tan(math.radians(10.0)) / 64
     edge_m = 0.35 * pixel_m
     bodies = (
-        Body("mirror", "mirror"),
-        Body("bright", "bright", SE3((10.0 + edge_m, 0.0, 10.05))),
+        Body("mirror", "mirror"), Body("bright", "bright", SE3((10.0 + edge_m, 0.0, 10.05))),
         Body("dim", "dim", SE3((-10.0 + edge_m, 0.0, 10.05))),
-    )
+    )  # fmt: skip
     white, brightest = 100.0, 1000.0
     renderer = WarpRenderer(FakeLibrary(meshes), "cpu", RenderSettings(antialias=8))
     scene = Scene("t", bodies, environment=DARK)
@@ -412,10 +410,9 @@ def test_glass_out_of_sight_changes_no_byte() -> None:
     plain = Material((0.3, 0.5, 0.2), 0.2, texture="map")
     texture = TextureData(halves(90, 200, 3))
     meshes = {
-        "floor": plane_mesh(6.0, (plain,)),
-        "box": box_mesh((0.5, 0.5, 0.5)),
+        "floor": plane_mesh(6.0, (plain,)), "box": box_mesh((0.5, 0.5, 0.5)),
         "ball": sphere_mesh(0.3, 16, (replace(GLASS, thin=False, coat=1.0),)),
-    }
+    }  # fmt: skip
     library = FakeLibrary(meshes, {"map": texture})
     sun = Light("sun", "sun", direction=(0.5, 0.2, -0.8), illuminance_lux=5000.0)
     bodies = (Body("floor", "floor"), Body("box", "box", SE3((0, 0, 0.25))))

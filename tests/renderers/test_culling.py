@@ -13,10 +13,9 @@ from gen_data.renderers.warp.visibility.gbuffer import bodies_within, project_ve
 from tests.renderers import fake_library
 
 MESHES = {
-    "box": fake_library.box_mesh(),
-    "sphere": fake_library.sphere_mesh(0.5, rings=12),
+    "box": fake_library.box_mesh(), "sphere": fake_library.sphere_mesh(0.5, rings=12),
     "room": fake_library.room_mesh(),
-}
+}  # fmt: skip
 
 
 def ring_of_boxes() -> Scene:

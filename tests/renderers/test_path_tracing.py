@@ -227,19 +227,17 @@ def mixed_scene() -> tuple[Scene, Camera, FakeLibrary]:
             "ball": sphere_mesh(0.4, 24, (glossy,)),
             "steel": sphere_mesh(0.3, 24, (Material((0.7, 0.7, 0.7), 0.45, 1.0),)),
         },
-        None,
-        {"patch": sky},
-    )
+        None, {"patch": sky},
+    )  # fmt: skip
     lights = (
         Light("ball", "sphere", (0.8, -0.6, 1.2), intensity_cd=120.0, radius_m=0.35),
         Light("panel", "rectangle", (-0.9, 0.0, 1.3), (0.6, 0.0, -0.8), side=(0.0, 1.0, 0.0),
               size_m=(0.8, 0.8), intensity_cd=150.0),
     )  # fmt: skip
     bodies = (
-        Body("p", "plane"),
-        Body("ball", "ball", SE3((0.3, 0.2, 0.4))),
+        Body("p", "plane"), Body("ball", "ball", SE3((0.3, 0.2, 0.4))),
         Body("steel", "steel", SE3((-0.5, -0.1, 0.3))),
-    )
+    )  # fmt: skip
     environment = Environment("patch", luminance_cd_m2=40.0)
     camera = camera_at((0.0, -2.2, 1.2), (0.0, 0.0, 0.2), (24, 18), hfov_deg=45.0)
     return Scene("mixed", bodies, lights=lights, environment=environment), camera, library

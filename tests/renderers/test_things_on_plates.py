@@ -156,10 +156,9 @@ def test_the_foreground_hides_exactly() -> None:
     left = slice(0, SIZE_PX[0] // 2)
     right = slice(SIZE_PX[0] // 2, None)
     hidden = seen(
-        PlateLibrary(empty_photo(), half_mask()),
-        world(cube=True, photo=True),
+        PlateLibrary(empty_photo(), half_mask()), world(cube=True, photo=True),
         SEEN | {Channel.AMODAL},
-    )
+    )  # fmt: skip
     assert (composite().channels[Channel.INSTANCE][:, left] == 1).any(), "the cube is behind it"
     np.testing.assert_array_equal(photographed(hidden)[:, left], empty_photo()[:, left])
     assert not hidden.channels[Channel.INSTANCE][:, left].any()

@@ -104,9 +104,8 @@ def two_boxes() -> Scene:
     near = Body("near", "box", SE3((0.5, 0.0, 2.5)), instance_id=7, part_id=2)
     far = Body("far", "box", SE3((0.0, 0.0, 4.0)), instance_id=65535)
     instances = (
-        Instance(7, "near", "a", 3, "box", parts=("x", "y")),
-        Instance(65535, "far", "b", 4, "box"),
-    )
+        Instance(7, "near", "a", 3, "box", parts=("x", "y")), Instance(65535, "far", "b", 4, "box"),
+    )  # fmt: skip
     return scene_of(near, far, instances=instances)
 
 

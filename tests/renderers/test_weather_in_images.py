@@ -70,10 +70,9 @@ def renderer(library: FakeLibrary) -> WarpRenderer:
 
 def street(weather: Weather, environment: Environment = DARK, *lights: Light) -> Scene:
     bodies = (
-        Body("road", "road"),
-        Body("wall", "black", SE3((25.0, 0.0, 0.0)), instance_id=1),
+        Body("road", "road"), Body("wall", "black", SE3((25.0, 0.0, 0.0)), instance_id=1),
         Body("box", "box", SE3((6.0, 0.5, 0.5)), instance_id=2),
-    )
+    )  # fmt: skip
     named = tuple(Instance(k, name, name, k, name) for k, name in ((1, "wall"), (2, "box")))
     return Scene("t", bodies, named, lights=lights, environment=environment, weather=weather)
 
@@ -215,13 +214,12 @@ def test_what_moves_keeps_no_ground_dry(
     )
     walker = Instance(1, "p", "person", 1, "lid", attributes=(("behaviour", "walking"),))
     moving: dict[str, dict[str, Any]] = {
-        "drives": {"group": driving},
-        "walks": {"group": parked, "instances": (walker,)},
+        "drives": {"group": driving}, "walks": {"group": parked, "instances": (walker,)},
         "has a trajectory": {
             "group": parked,
             "tracks": (motion.Trajectory("lid", 0.1, (lid.T_world_body, SE3((0.1, 0.0, 1.4)))),),
         },
-    }
+    }  # fmt: skip
     dry, sheltered, wet = road(0.0, parked), road(1.0, parked), road(1.0, **moving[mover])
 
     assert sheltered == pytest.approx(dry, rel=0.03)

@@ -78,12 +78,11 @@ class Bullet:
     def fix(self, mesh: trimesh.Trimesh) -> None:
         """Add triangles that do not move; their inner edges push nothing aside."""
         shape = self.pb.createCollisionShape(
-            self.pb.GEOM_MESH,
-            vertices=(SCALE * mesh.vertices).tolist(),
+            self.pb.GEOM_MESH, vertices=(SCALE * mesh.vertices).tolist(),
             indices=mesh.faces.ravel().tolist(),
             flags=self.pb.GEOM_FORCE_CONCAVE_TRIMESH | self.pb.GEOM_CONCAVE_INTERNAL_EDGE,
             **self.here,
-        )
+        )  # fmt: skip
         self.pb.createMultiBody(0, shape, **self.here)
 
     def drop(self, name: str, mesh: trimesh.Trimesh) -> None:

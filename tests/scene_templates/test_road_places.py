@@ -37,9 +37,8 @@ def built(*elements: Element) -> Scene:
 
 @pytest.fixture(
     params=[(road, place) for road in (TOWN, BENT) for place in PLACES],
-    ids=lambda p: f"{'bent' if p[0] is BENT else 'town'}-{p[1].type}",
-    scope="module",
-)
+    ids=lambda p: f"{'bent' if p[0] is BENT else 'town'}-{p[1].type}", scope="module",
+)  # fmt: skip
 def scene(request: pytest.FixtureRequest) -> Scene:
     return built(*request.param)
 

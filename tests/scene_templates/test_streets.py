@@ -19,10 +19,9 @@ from tests.libraries import library
 def crossing() -> list[object]:
     """Two roads that meet at a junction; the second leads away from it."""
     return [
-        Road(name="main", length_m=60.0),
-        Junction(name="cross", after="main"),
+        Road(name="main", length_m=60.0), Junction(name="cross", after="main"),
         Road(name="on", after="cross/0", length_m=40.0),
-    ]
+    ]  # fmt: skip
 
 
 def built(*elements: object) -> Scene:

@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from gen_data.core.capture import Channel, SensorReading
+from gen_data.core.capture import Channel
 from gen_data.core.lens import COEFFICIENTS
 from gen_data.core.scene import Camera, Region, Scene
 from gen_data.core.streams import Streams
 from gen_data.sensors.camera.lens_models import CALIBRATIONS
 from gen_data.sensors.camera.rgb_camera import RgbCamera
+from tests.sensors.recorder import Recorder
 
 
 def camera(**given: Any) -> Camera:
@@ -112,24 +113,6 @@ def test_a_camera_is_mounted_with_the_whole_focus_in_view(given: dict[str, Any])
     np.testing.assert_allclose(found.intrinsics.project(centre), [320, 240], atol=0.01)
 
 
-class Rendering:
-    """A renderer of even light, 2 m away in every direction, that remembers what was asked for."""
-
-    def __init__(self) -> None:
-        self.asked: frozenset[Channel] = frozenset()
-
-    def render(self, scene: Scene, camera: Camera, channels: frozenset[Channel]) -> SensorReading:
-        del scene
-        self.asked = channels
-        shape = (camera.intrinsics.height_px, camera.intrinsics.width_px)
-        images = {
-            Channel.RADIANCE: np.full((*shape, 3), 50.0, np.float32),
-            Channel.RANGE: np.full(shape, 2.0, np.float32),
-            Channel.Z_DEPTH: np.full(shape, 2.0, np.float32),
-        }
-        return SensorReading(camera.name, camera, images, ev100=8.0)
-
-
 @pytest.mark.parametrize(
     ("lens", "depth"), [("pinhole", Channel.Z_DEPTH), ("kannala_brandt", Channel.RANGE)]
 )
@@ -139,11 +122,9 @@ def test_photographs_are_focused_along_the_axis_or_at_a_distance(lens: str, dept
         "name": "eye", "size_px": (32, 24), "lens": {"model": lens}, "channels": ("rgb",),
         "image_pipeline": {"focus": {"pixel_um": 3.0}},
     })  # fmt: skip
-    renderer = Rendering()
+    renderer, rng = Recorder(), Streams(seed=0, scene=0).rng("eye")
 
-    reading = sensor.capture(
-        sensor.mount(Scene("t")), renderer, frozenset(), Streams(seed=0, scene=0).rng("eye")
-    )
+    reading = sensor.capture(sensor.mount(Scene("t")), renderer, frozenset(), rng)
 
     assert renderer.asked == {Channel.RADIANCE, depth}
     assert reading.channels[Channel.RGB].shape == (24, 32, 3)

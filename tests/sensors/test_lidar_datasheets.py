@@ -119,10 +119,9 @@ def test_what_is_wrong_with_a_model_is_told_with_its_place(
 
 CAR = FakeLibrary({"car": box_mesh((4.0, 1.8, 1.5))})
 STREET = Scene(
-    "street",
-    (Body("ego", "car", SE3((0.0, 0.0, 0.75))),),
+    "street", (Body("ego", "car", SE3((0.0, 0.0, 0.75))),),
     rigs=(Rig("rig", "ego", SE3((-1.2, 0.0, -0.75))),),
-)
+)  # fmt: skip
 
 
 @pytest.mark.parametrize("kind", [LidarSensor, RgbCamera])

@@ -123,10 +123,9 @@ def test_a_normal_is_finite_at_the_ends_of_the_unit_interval() -> None:
     assert Normal(0, 1, (-2, 1)).draw(Ends(1 - 2**-53)) == 1  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize(
-    "distribution",
-    [Uniform(0, 1), LogUniform(1, 9), Normal(0, 1, clip=(-1, 1)), Choice({"a": 1, "b": 2})],
-)
+@pytest.mark.parametrize("distribution", [
+    Uniform(0, 1), LogUniform(1, 9), Normal(0, 1, clip=(-1, 1)), Choice({"a": 1, "b": 2}),
+])  # fmt: skip
 def test_each_value_costs_exactly_one_random_number(distribution: Distribution[Any]) -> None:
     """So that a difference in the last bit never shifts the draws that follow."""
     rng, reference = stream("cost"), stream("cost")
