@@ -218,15 +218,16 @@ def test_ideal_odometer_on_a_circle() -> None:
 
 
 def test_going_backwards_counts_down() -> None:
-    """2 m/s against its heading; an encoder counts whole pulses of 4 cm."""
-    rows = readings(
-        ideal_odometer(distance_step_m=0.04), world(straight((0.0, 0.0), (-2.0, 0.0))), 6
-    )
+    """2 m/s against its heading; an encoder of 3 cm counts whole pulses, 0.2 m are 6.67 of them."""
+    backwards = world(straight((0.0, 0.0), (-2.0, 0.0)))
+    rows = readings(ideal_odometer(), backwards, 6)
+    counted = readings(ideal_odometer(distance_step_m=0.03), backwards, 6)
 
     assert rows["distance_m"][-1] == pytest.approx(-1.0, abs=1e-6)
     assert rows["speed_m_s"][-1] == pytest.approx(-2.0, abs=1e-5)
-    pulses = rows["distance_m"] / 0.04
-    assert np.allclose(pulses, np.rint(pulses), atol=1e-4)
+    pulses = np.rint(counted["distance_m"] / 0.03)
+    assert pulses.tolist() == [0, -7, -14, -20, -27, -34]
+    assert np.allclose(counted["distance_m"], 0.03 * pulses, atol=1e-6)
 
 
 def test_scale_error_stays_through_a_sequence() -> None:
