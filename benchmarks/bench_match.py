@@ -23,15 +23,9 @@ from tests.matching.scenes import RESPONSE, exposures, illuminations, scanner
 
 BASE = ImagePipeline.model_validate({"preset": "industrial", "focus": None})
 CAMERA = {
-    "exposure": -0.7,
-    "tone": 1.375,
-    "white balance": 0.3,
-    "saturation": 0.75,
-    "blur": 1.0,
-    "noise": 3000.0,
-    "read noise": 12.0,
-    "JPEG quality": 92.0,
-}
+    "exposure": -0.7, "tone": 1.375, "white balance": 0.3, "saturation": 0.75, "blur": 1.0,
+    "noise": 3000.0, "read noise": 12.0, "JPEG quality": 92.0,
+}  # fmt: skip
 SCANNER = {"reflectance gain": 0.25, "dark returns": 0.2, "dropout": 0.7, "range": 30.0}
 FittedRows = Iterable[FittedQuantity]
 STRIDE = 1000
@@ -68,10 +62,9 @@ def fit_scans(first: int, scans: int, scenes: int) -> FittedRows:
     """Fit sweeps of one scanner."""
     real = scanner(
         white_intensity=SCANNER["reflectance gain"],
-        response={**RESPONSE, "dark": SCANNER["dark returns"]},
-        window=SCANNER["dropout"],
+        response={**RESPONSE, "dark": SCANNER["dark returns"]}, window=SCANNER["dropout"],
         range_m=(0.5, SCANNER["range"]),
-    )
+    )  # fmt: skip
     made = [rescan(one, real) for one in illuminations(range(first, first + scans), real)]
     seeds = range(first + STRIDE // 2, first + STRIDE // 2 + scenes)
     return lidar_fit.fit_lidar(illuminations(seeds, scanner(response=RESPONSE)), made, 0).quantities

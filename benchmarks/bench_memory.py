@@ -137,14 +137,10 @@ def main() -> None:
     print(f"{machine()}, {arguments.workers} worker(s), {arguments.scene}, {' '.join(overrides)}")
     with tempfile.TemporaryDirectory() as folder:
         summary = run(
-            identity.make_plan(factory),
-            factory,
-            Path(folder) / "out",
-            workers=arguments.workers,
-            resume_command="",
-            progress=recorder.observe,
+            identity.make_plan(factory), factory, Path(folder) / "out", workers=arguments.workers,
+            resume_command="", progress=recorder.observe,
             licences=partial(identity.format_licences, factory),
-        )
+        )  # fmt: skip
     print(format_summary(summary))
     for name in ("Rss", "Pss"):
         peak = max((reading[name] for _, reading in recorder.rows), default=0.0)

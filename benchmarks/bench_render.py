@@ -1,8 +1,9 @@
 """CPU milliseconds per rendered frame, by kernel: ``python -m benchmarks.bench_render``.
 
 640x480, the shipped tabletop with the arm and exactly ten objects, two soft-shadow lamps and
-environment light; RGB, depth, instance and category, then amodal silhouettes too. One process,
-one core; scenes are drawn and settled before the clock starts.
+environment light, or the first camera of another configuration; RGB, depth, instance and category,
+then amodal silhouettes too. One process, one core; scenes are drawn and settled before the clock
+starts.
 """
 
 import argparse
@@ -10,11 +11,13 @@ import time
 from collections import defaultdict
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from benchmarks.bench_tabletop import make_config
+from gen_data.assemble.config import Config, load_config
 from gen_data.assemble.pipeline_factory import open_pipeline
 from gen_data.core import interfaces, streams
 from gen_data.core.capture import Channel, SensorReading
@@ -25,9 +28,9 @@ from gen_data.sensors.camera.image_pipeline import ImagePipeline, capture_photog
 LABELLED = frozenset({Channel.RGB, Channel.Z_DEPTH, Channel.INSTANCE, Channel.CATEGORY})
 
 
-def settle_tabletops(count: int) -> tuple[list[Scene], interfaces.AssetLibrary]:
+def settle_scenes(config: Config, count: int) -> tuple[list[Scene], interfaces.AssetLibrary]:
     """Settled scenes and the library of their assets."""
-    with open_pipeline(make_config(1)) as pipeline:
+    with open_pipeline(config) as pipeline:
         return [pipeline.sample(i).scene for i in range(count)], pipeline.assets
 
 
@@ -76,9 +79,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--scenes", type=int, default=8)
     parser.add_argument("--repeats", type=int, default=5)
+    parser.add_argument("--config", default="", help="another configuration, such as street")
     arguments = parser.parse_args()
 
-    scenes, assets = settle_tabletops(arguments.scenes)
+    overrides = ("views_per_scene=1",)
+    named = partial(load_config, arguments.config, seed=1, overrides=overrides)
+    config = named() if arguments.config else make_config(1)
+    scenes, assets = settle_scenes(config, arguments.scenes)
     started_s = time.perf_counter()
     renderer = WarpRenderer(assets, "cpu")
     photograph(renderer, scenes[0], LABELLED)

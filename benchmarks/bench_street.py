@@ -10,14 +10,10 @@ from benchmarks.runs import format_summary, machine, measure_run
 from gen_data.assemble.config import Config, load_config
 
 OVERRIDES = (
-    "views_per_scene=5",
-    "shared.traffic=busy",
-    "randomizers.traffic.gap_m={uniform: [4, 20]}",
-    "randomizers.traffic.count=20",
-    "randomizers.parked.count=10",
-    "randomizers.people.gap_m={uniform: [0.5, 8]}",
-    "randomizers.people.count=40",
-)
+    "views_per_scene=5", "shared.traffic=busy", "randomizers.traffic.gap_m={uniform: [4, 20]}",
+    "randomizers.traffic.count=20", "randomizers.parked.count=10",
+    "randomizers.people.gap_m={uniform: [0.5, 8]}", "randomizers.people.count=40",
+)  # fmt: skip
 
 
 def make_config(weather: str) -> Config:

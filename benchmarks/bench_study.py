@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import gen_data
-from benchmarks import bench_training, runs
+from benchmarks import runs
 from gen_data.lab.study.adapt import CURRICULUM, adapt, tabulate
 from gen_data.lab.study.experiment import Experiment, Variant, list_runs, perform, prepare
 from gen_data.lab.study.study import run_study
@@ -85,9 +85,8 @@ def run_weakness(out: Path, sizes: Mapping[str, int]) -> bool:
 
 
 EXPERIMENTS: Mapping[str, Callable[[Path, Mapping[str, int]], bool]] = {
-    "ranking": run_ranking,
-    "weakness": run_weakness,
-}
+    "ranking": run_ranking, "weakness": run_weakness,
+}  # fmt: skip
 
 
 def make(config: Path, n: int, folder: Path, seed: int | None = None) -> Path:
@@ -140,7 +139,7 @@ def main() -> None:
     is_right = EXPERIMENTS[name](out / name, args)
     spent_s = time.perf_counter() - started_s
     print(f"\n{name}: {'as expected' if is_right else 'NOT as expected'}")
-    print(f"{spent_s:.0f} s, {bench_training.cpu_s():.0f} CPU s; {runs.machine()}")
+    print(f"{spent_s:.0f} s, {runs.cpu_s():.0f} CPU s; {runs.machine()}")
     raise SystemExit(0 if is_right else 1)
 
 

@@ -23,13 +23,10 @@ OVERRIDES = ("randomizers.clutter.count=10", "randomizers.lamps.count=2")
 # All features of lights and materials: balls, spots, rectangles, disks and visible panels; coats,
 # panes, solid glass, metal, bumps. Mirrors, panoramas and metering are in the scene anyway.
 EVERYTHING = (
-    *OVERRIDES,
-    "randomizers.lamps.kind={choice: [sphere, spot, rectangle, disk]}",
-    "randomizers.lamps.visible=true",
-    "randomizers.finish.coated={probability: 0.4}",
-    "randomizers.finish.clear={probability: 0.2}",
-    "randomizers.finish.solid={probability: 0.5}",
-)
+    *OVERRIDES, "randomizers.lamps.kind={choice: [sphere, spot, rectangle, disk]}",
+    "randomizers.lamps.visible=true", "randomizers.finish.coated={probability: 0.4}",
+    "randomizers.finish.clear={probability: 0.2}", "randomizers.finish.solid={probability: 0.5}",
+)  # fmt: skip
 
 
 def make_config(views_per_scene: int) -> Config:
@@ -83,19 +80,14 @@ def _load_bodies(pybullet: Any, client: int, bodies: Any, assets: Any, folder: P
             lines += [f"f {a}//{a} {b}//{b} {c}//{c}" for a, b, c in mesh.faces + 1]
             path.write_text("\n".join(lines))
         shape = pybullet.createVisualShape(
-            pybullet.GEOM_MESH,
-            fileName=str(path),
-            meshScale=[body.scale] * 3,
-            rgbaColor=[0.7, 0.6, 0.5, 1],
-            physicsClientId=client,
-        )
+            pybullet.GEOM_MESH, fileName=str(path), meshScale=[body.scale] * 3,
+            rgbaColor=[0.7, 0.6, 0.5, 1], physicsClientId=client,
+        )  # fmt: skip
         w, x, y, z = body.T_world_body.quaternion_wxyz
         pybullet.createMultiBody(
-            baseVisualShapeIndex=shape,
-            basePosition=body.T_world_body.translation_m,
-            baseOrientation=[x, y, z, w],
-            physicsClientId=client,
-        )
+            baseVisualShapeIndex=shape, basePosition=body.T_world_body.translation_m,
+            baseOrientation=[x, y, z, w], physicsClientId=client,
+        )  # fmt: skip
 
 
 def _draw(pybullet: Any, client: int, camera: Any, folder: Path) -> None:
@@ -111,14 +103,10 @@ def _draw(pybullet: Any, client: int, camera: Any, folder: Path) -> None:
     projection[2, 3] = -2 * far_m * near_m / (far_m - near_m)
     projection[3, 2] = -1
     _, _, rgba, depth, ids = pybullet.getCameraImage(
-        k.width_px,
-        k.height_px,
-        viewMatrix=view.T.ravel().tolist(),
-        projectionMatrix=projection.T.ravel().tolist(),
-        shadow=1,
-        renderer=pybullet.ER_TINY_RENDERER,
-        physicsClientId=client,
-    )
+        k.width_px, k.height_px, viewMatrix=view.T.ravel().tolist(),
+        projectionMatrix=projection.T.ravel().tolist(), shadow=1,
+        renderer=pybullet.ER_TINY_RENDERER, physicsClientId=client,
+    )  # fmt: skip
     shape = (k.height_px, k.width_px)
     images = {
         "rgb": np.reshape(rgba, (*shape, 4)).astype(np.uint8)[..., 2::-1],

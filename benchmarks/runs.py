@@ -1,6 +1,7 @@
 """Helpers of the benchmarks that measure whole runs."""
 
 import platform
+import resource
 import tempfile
 from functools import partial
 from pathlib import Path
@@ -16,13 +17,15 @@ def measure_run(config: Config, n: int, workers: int) -> Summary:
     factory = PipelineFactory(config, n)
     with tempfile.TemporaryDirectory() as folder:
         return run(
-            make_plan(factory),
-            factory,
-            Path(folder) / "out",
-            workers=workers,
-            resume_command="",
+            make_plan(factory), factory, Path(folder) / "out", workers=workers, resume_command="",
             licences=partial(format_licences, factory),
-        )
+        )  # fmt: skip
+
+
+def cpu_s() -> float:
+    """CPU time of this process and of its finished children."""
+    used = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    return sum(one.ru_utime + one.ru_stime for one in used)
 
 
 def machine() -> str:

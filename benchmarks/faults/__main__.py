@@ -13,27 +13,17 @@ from pathlib import Path
 from benchmarks.faults.results import Result, Scale, print_table, to_plain
 
 CAMPAIGNS = {
-    "kills_at_calls": "crashes:kills_at_calls",
-    "kills_at_instants": "crashes:kills_at_instants",
-    "errnos_at_calls": "crashes:errnos_at_calls",
-    "errnos_for_ever": "crashes:errnos_for_ever",
-    "crash_states": "crashes:crash_states",
-    "power_cuts": "power_cuts:power_cuts",
-    "out_of_memory": "memory:out_of_memory",
-    "simulated_runs": "orders:simulated_runs",
-    "orders": "orders:orders",
-    "samples_alone": "orders:samples_alone",
-    "ray": "orders:ray",
-    "environments": "environments:environments",
-    "bit_flips": "bit_flips:bit_flips",
-    "objects": "elsewhere:objects",
-    "foreign": "elsewhere:foreign",
-    "derived": "elsewhere:derived",
-    "caches": "elsewhere:caches",
-    "structured_configurations": "configurations:structured",
+    "kills_at_calls": "crashes:kills_at_calls", "kills_at_instants": "crashes:kills_at_instants",
+    "errnos_at_calls": "crashes:errnos_at_calls", "errnos_for_ever": "crashes:errnos_for_ever",
+    "crash_states": "crashes:crash_states", "power_cuts": "power_cuts:power_cuts",
+    "out_of_memory": "memory:out_of_memory", "simulated_runs": "orders:simulated_runs",
+    "orders": "orders:orders", "samples_alone": "orders:samples_alone", "ray": "orders:ray",
+    "environments": "environments:environments", "bit_flips": "bit_flips:bit_flips",
+    "objects": "elsewhere:objects", "foreign": "elsewhere:foreign", "derived": "elsewhere:derived",
+    "caches": "elsewhere:caches", "structured_configurations": "configurations:structured",
     "mutated_configurations": "configurations:mutated_bytes",
     "hostile_assets": "assets:hostile_assets",
-}
+}  # fmt: skip
 
 
 def load(name: str) -> Callable[[Scale, Path], Result]:

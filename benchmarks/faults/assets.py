@@ -25,10 +25,8 @@ def hostile_assets(scale: Scale, folder: Path) -> Result:
     )
     subprocess.run(
         [sys.executable, "-m", "pytest", "-q", "-m", "hostile", f"--junitxml={report}", *files],
-        cwd=ROOT,
-        capture_output=True,
-        check=False,
-    )
+        cwd=ROOT, capture_output=True, check=False,
+    )  # fmt: skip
     slowest_s = 0.0
     for case in ET.parse(report).iter("testcase"):
         bad = case.find("failure") if case.find("failure") is not None else case.find("error")

@@ -22,23 +22,9 @@ UNEXPECTED = 99
 """Exit code of a child with an error that is not a GenDataError."""
 
 WRITING_CALLS = [
-    "mkdir",
-    "openat",
-    "write",
-    "pwrite64",
-    "fsync",
-    "fdatasync",
-    "rename",
-    "renameat",
-    "renameat2",
-    "link",
-    "linkat",
-    "unlink",
-    "unlinkat",
-    "rmdir",
-    "ftruncate",
-    "close",
-]
+    "mkdir", "openat", "write", "pwrite64", "fsync", "fdatasync", "rename", "renameat", "renameat2",
+    "link", "linkat", "unlink", "unlinkat", "rmdir", "ftruncate", "close",
+]  # fmt: skip
 
 
 @dataclass(frozen=True)

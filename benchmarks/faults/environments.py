@@ -157,14 +157,9 @@ def _generate(environment: Environment, folder: Path) -> str:
     old = os.umask(environment.umask)
     try:
         done = subprocess.run(
-            [*environment.prefix, *command, *options],
-            cwd=environment.cwd.format(**places),
-            env=variables,
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            check=False,
-            timeout=300,
-        )
+            [*environment.prefix, *command, *options], cwd=environment.cwd.format(**places),
+            env=variables, stdin=subprocess.DEVNULL, capture_output=True, check=False, timeout=300,
+        )  # fmt: skip
     finally:
         os.umask(old)
     text = done.stderr.decode(errors="replace")

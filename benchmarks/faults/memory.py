@@ -11,23 +11,14 @@ from benchmarks.faults.results import Result, Scale
 from gen_data.core.errors import GenDataError, WorkerLost
 from gen_data.core.sample import Sample
 from gen_data.runner.run import Settings, run
-from tests.runner.doubles import (
-    RESUME,
-    FakeFactory,
-    FakePipeline,
-    Trouble,
-    fake_plan,
-    make,
-    tree_digest,
-    write_raw_images,
-)
+from tests.runner import doubles
 
 CGROUP = Path("/sys/fs/cgroup/memory")
 LIMIT_BYTES = 400 << 20
 GREEDY_BYTES = 1 << 30
 
 
-class GreedyPipeline(FakePipeline):
+class GreedyPipeline(doubles.FakePipeline):
     """Takes more memory than the limit for one sample."""
 
     def sample(self, index: int) -> Sample:
@@ -38,10 +29,10 @@ class GreedyPipeline(FakePipeline):
         return super().sample(index)
 
 
-class GreedyFactory(FakeFactory):
+class GreedyFactory(doubles.FakeFactory):
     """Makes the greedy pipeline."""
 
-    def __call__(self) -> FakePipeline:
+    def __call__(self) -> doubles.FakePipeline:
         """The pipeline."""
         return GreedyPipeline(self.n, self.trouble)
 
@@ -68,9 +59,9 @@ def out_of_memory(scale: Scale, folder: Path) -> Result:
     )
     shards = {path.stem for path in (folder / "out/shards").glob("*.json")}
     result.add(shards == {"000000", "000002"}, f"finished shards: {sorted(shards)}")
-    make(folder / "out")
-    make(folder / "reference")
-    equal = tree_digest(folder / "out") == tree_digest(folder / "reference")
+    doubles.make(folder / "out")
+    doubles.make(folder / "reference")
+    equal = doubles.tree_digest(folder / "out") == doubles.tree_digest(folder / "reference")
     result.add(equal, "with enough memory, the resumed data set has other bytes")
     result.notes.append("message, other shards, resumption")
     return result
@@ -93,13 +84,9 @@ def _enter_and_run(group: Path, folder: Path, message: Path) -> None:
     (group / "cgroup.procs").write_text(str(os.getpid()))
     try:
         run(
-            fake_plan(),
-            GreedyFactory(10, Trouble()),
-            folder / "out",
-            workers=1,
-            resume_command=RESUME,
-            settings=Settings(write_media=write_raw_images),
-        )
+            doubles.fake_plan(), GreedyFactory(10, doubles.Trouble()), folder / "out", workers=1,
+            resume_command=doubles.RESUME, settings=Settings(write_media=doubles.write_raw_images),
+        )  # fmt: skip
     except GenDataError as error:
         message.write_text(f"{type(error).__name__}: {error}", "utf-8")
         sys.exit(error.exit_code)

@@ -98,12 +98,9 @@ def ray(scale: results.Scale, folder: Path) -> results.Result:
         result.skip("all", "this version has no tests/runner/test_ray*.py")
         return result
     done = subprocess.run(
-        [sys.executable, "-m", "pytest", "-q", "-m", "slow or not slow", *tests],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+        [sys.executable, "-m", "pytest", "-q", "-m", "slow or not slow", *tests], cwd=ROOT,
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
     result.add(done.returncode == 0, done.stdout[-500:])
     result.notes.append(done.stdout.strip().splitlines()[-1])
     return result

@@ -59,14 +59,9 @@ class Recording:
     replay: Replay
 
     def make(
-        self,
-        out: Path | str,
-        *,
-        workers: int = 0,
-        shards: range | None = None,
-        repair: bool = False,
-        delay_s: float = 0.0,
-    ) -> Summary:
+        self, out: Path | str, *, workers: int = 0, shards: range | None = None,
+        repair: bool = False, delay_s: float = 0.0,
+    ) -> Summary:  # fmt: skip
         """Make the data set, or the rest of it.
 
         Args:
@@ -78,14 +73,9 @@ class Recording:
         """
         replay: Callable[[], Any] = self.replay if delay_s == 0.0 else Slow(self.replay, delay_s)
         return run(
-            self.plan,
-            replay,
-            out,
-            workers=workers,
-            resume_command=RESUME,
-            licences=str,
+            self.plan, replay, out, workers=workers, resume_command=RESUME, licences=str,
             settings=Settings(shards=shards, repair=repair),
-        )
+        )  # fmt: skip
 
 
 @dataclass(frozen=True)

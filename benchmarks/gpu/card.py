@@ -24,21 +24,15 @@ def describe_card(device: str) -> dict[str, Any]:
     """Device, driver, memory, and the machine around it."""
     opened = open_device(device)
     facts: dict[str, Any] = {
-        "date": date.today().isoformat(),
-        "device": opened.name,
-        "processor": machine(),
-        "cores": usable_cores(),
-        "python": sys.version.split()[0],
-        "warp": wp.config.version,
-    }
+        "date": date.today().isoformat(), "device": opened.name, "processor": machine(),
+        "cores": usable_cores(), "python": sys.version.split()[0], "warp": wp.config.version,
+    }  # fmt: skip
     if opened.is_cuda:
         facts |= {
-            "arch": f"sm_{opened.arch}",
-            "multiprocessors": opened.sm_count,
-            "memory_mb": round(opened.total_memory / 1e6),
-            "driver": ask_driver("driver_version"),
+            "arch": f"sm_{opened.arch}", "multiprocessors": opened.sm_count,
+            "memory_mb": round(opened.total_memory / 1e6), "driver": ask_driver("driver_version"),
             "cuda": {"driver": wp.get_cuda_driver_version(), "warp": wp.get_cuda_toolkit_version()},
-        }
+        }  # fmt: skip
     return facts
 
 
@@ -50,10 +44,8 @@ def compile_modules(device: str) -> dict[str, Any]:
     wall_s = time.time() - started_s
     made = [path for path in folder.glob("wp_gen_data.*/*") if path.stat().st_mtime >= started_s]
     return {
-        "complete": complete,
-        "wall_s": round(wall_s, 1),
-        "compiled": len({p.parent for p in made}),
-    }
+        "complete": complete, "wall_s": round(wall_s, 1), "compiled": len({p.parent for p in made}),
+    }  # fmt: skip
 
 
 def load_modules(device: str) -> dict[str, dict[str, float]]:

@@ -72,12 +72,9 @@ def time_kernels(config: str, device: str, views: int, small: bool) -> dict[str,
     )
     taken = 0 if opened.is_cpu else before - opened.free_memory
     return {
-        "wall_ms": [round(ms, 2) for ms in walls],
-        "timed_wall_ms": timed_ms / views,
-        "device_ms": sum(row[2] for row in table),
-        "device_mb": taken / 1e6,
-        "table": table,
-    }
+        "wall_ms": [round(ms, 2) for ms in walls], "timed_wall_ms": timed_ms / views,
+        "device_ms": sum(row[2] for row in table), "device_mb": taken / 1e6, "table": table,
+    }  # fmt: skip
 
 
 def time_sweeps(device: str, rays: int, repeats: int, small: bool) -> dict[str, Any]:
@@ -106,11 +103,10 @@ def time_sweeps(device: str, rays: int, repeats: int, small: bool) -> dict[str, 
             packed_ms = _wall_ms(anew)
             kernels, _ = timed_activity(anew, device)
             figures[name] = {
-                "rays": count * copies,
-                "ms": median(_wall_ms(anew) for _ in range(repeats)),
+                "rays": count * copies, "ms": median(_wall_ms(anew) for _ in range(repeats)),
                 "with_packing_ms": packed_ms,
                 "kernels": sorted(((n, ms) for n, (_, ms) in kernels.items()), key=lambda r: -r[1]),
-            }
+            }  # fmt: skip
     return figures
 
 
@@ -132,12 +128,9 @@ def _wall_ms(work: Callable[[], object]) -> float:
 def time_paths(device: str, size_px: tuple[int, int], samples: int) -> dict[str, Any]:
     """Seconds per path-traced image of the shipped table, and paths per second."""
     texts = (
-        f"render.device={device}",
-        f"render.samples={samples}",
-        "render.denoise=false",
-        f"sensors[0].size_px=[{size_px[0]}, {size_px[1]}]",
-        "views_per_scene=3",
-    )
+        f"render.device={device}", f"render.samples={samples}", "render.denoise=false",
+        f"sensors[0].size_px=[{size_px[0]}, {size_px[1]}]", "views_per_scene=3",
+    )  # fmt: skip
     with open_pipeline(
         load_config("tabletop_pathtraced.yaml", seed=1, overrides=texts)
     ) as pipeline:
@@ -148,7 +141,6 @@ def time_paths(device: str, size_px: tuple[int, int], samples: int) -> dict[str,
         kernels, _ = timed_activity(lambda: pipeline.sample(2), device)
     paths = size_px[0] * size_px[1] * samples
     return {
-        "s": spent_s,
-        "paths_per_s": paths / spent_s,
+        "s": spent_s, "paths_per_s": paths / spent_s,
         "kernels": sorted(((n, c, ms) for n, (c, ms) in kernels.items()), key=lambda r: -r[2])[:8],
-    }
+    }  # fmt: skip

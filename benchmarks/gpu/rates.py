@@ -37,14 +37,9 @@ def overrides_of(config: str, device: str, small: bool) -> tuple[str, ...]:
 
 
 def measure_rates(
-    config: str,
-    device: str,
-    workers: Sequence[int],
-    window_s: float,
-    limit_s: float,
-    small: bool,
+    config: str, device: str, workers: Sequence[int], window_s: float, limit_s: float, small: bool,
     scenes: int,
-) -> dict[str, Any]:
+) -> dict[str, Any]:  # fmt: skip
     """Samples per second in memory and to disk, by number of workers, as far as time suffices.
 
     Args:

@@ -155,12 +155,9 @@ def draw_again(pipeline: Pipeline, line: bytes, index: int) -> Sample:
     _, _, sensors = pipeline.config.open_scene(streams)
     number = kept.scene_index * info.views_per_scene + kept.view_index
     streams = Streams(
-        info.seed,
-        kept.scene_index,
-        view=kept.view_index,
-        attempt=kept.view_attempts - 1,
+        info.seed, kept.scene_index, view=kept.view_index, attempt=kept.view_attempts - 1,
         index=number,
-    )
+    )  # fmt: skip
     view = DrawnView(number, scene_time.place_sensors(kept.scene), streams)
     return pipeline.read_sensors(view, sensors, index % info.steps_per_scene)
 
@@ -245,12 +242,9 @@ def _judge_nothing(one: Any, other: Any, beside: str) -> str:
 
 
 _JUDGES = {
-    "digest": _judge_digest,
-    "image": _judge_image,
-    "points": _judge_points,
-    "count": _judge_count,
+    "digest": _judge_digest, "image": _judge_image, "points": _judge_points, "count": _judge_count,
     "values": _judge_nothing,
-}
+}  # fmt: skip
 
 
 def store_references(name: str, folder: str) -> str:

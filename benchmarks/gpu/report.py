@@ -14,13 +14,11 @@ GOALS = (
 def format_report(figures: Mapping[str, Any], failures: Mapping[str, str]) -> str:
     """Markdown of everything measured, then the goals, then what is missing."""
     parts = [
-        _card(figures.get("card") or {}),
-        _correctness(figures.get("correct") or {}),
+        _card(figures.get("card") or {}), _correctness(figures.get("correct") or {}),
         _rates(figures.get("rates") or {}),
         _sweeps(figures.get("sweeps") or {}, figures.get("paths") or {}),
-        _kernels(figures.get("kernels") or {}),
-        _goals(figures),
-    ]
+        _kernels(figures.get("kernels") or {}), _goals(figures),
+    ]  # fmt: skip
     if failures:
         parts.append("\n".join(["Missing:", *(f"- {n}: {why}" for n, why in failures.items())]))
     return "\n\n".join(part for part in parts if part)

@@ -196,12 +196,11 @@ def by_usd_core(root: Path) -> Iterator[View]:
             width, height = prim.GetAttribute("genData:imageSize").Get()
             px, py = width / camera.horizontalAperture, height / camera.verticalAperture
             lens = (
-                camera.focalLength * px,
-                camera.focalLength * py,
+                camera.focalLength * px, camera.focalLength * py,
                 width / 2 - camera.horizontalApertureOffset * px,
                 height / 2 + camera.verticalApertureOffset * py,
                 *(prim.GetAttribute("genData:lens:coefficients").Get() or ()),
-            )
+            )  # fmt: skip
             # USD's cameras look along -Z, with Y up; its matrices stand to the right of points.
             pose = np.array(camera.transform).T @ np.diag([1.0, -1.0, -1.0, 1.0])
             name = image_name(int(path.stem), prim.GetName())

@@ -93,14 +93,10 @@ def by_graspnet(root: Path) -> Iterator[View]:
 
     for path in sorted(root.glob("*/*_grasps.npy")):
         grasps = GraspGroup().from_npy(str(path))
-        rows = np.column_stack(
-            [
-                grasps.scores,
-                grasps.widths,
-                grasps.rotation_matrices.reshape(-1, 9),
-                grasps.translations,
-            ]
-        )
+        rows = np.column_stack([
+            grasps.scores, grasps.widths, grasps.rotation_matrices.reshape(-1, 9),
+            grasps.translations,
+        ])  # fmt: skip
         numbers = np.unique(grasps.object_ids)
         things = (thing(str(int(k)), rows[grasps.object_ids == k]) for k in numbers)
         yield View(path.stem.removesuffix("_grasps"), tuple(things))

@@ -165,13 +165,11 @@ def scan_class(instance: Instance) -> str:
 
 SCAN_RIDERS = {"bicycle": "bicyclist", "motorcycle": "motorcyclist"}
 SCAN_CLASSES = {
-    **dict.fromkeys(("car", "van"), "car"),
-    **dict.fromkeys(("bus", "tram"), "other-vehicle"),
+    **dict.fromkeys(("car", "van"), "car"), **dict.fromkeys(("bus", "tram"), "other-vehicle"),
     **dict.fromkeys(("pedestrian", "person"), "person"),
-    **{name: name for name in ("bicycle", "motorcycle", "truck")},
-    "cyclist": "bicyclist",
+    **{name: name for name in ("bicycle", "motorcycle", "truck")}, "cyclist": "bicyclist",
     "motorcyclist": "motorcyclist",
-}
+}  # fmt: skip
 
 
 def measurements(folder: Path) -> Iterator[View]:

@@ -30,17 +30,14 @@ def test_names_and_mappings_may_be_mixed(tmp_path: Path) -> None:
     assert list(found) == ["boxes2d", "bev_map", "lanes"]
 
 
-@pytest.mark.parametrize(
-    ("annotations", "fault"),
-    [
-        ("[{type: bev_map, pxm: 0.5}]", r"annotations\[0\].pxm: unknown key .*'px_m'"),
-        ("[{type: bev_map, px_m: -1}]", r"annotations\[0\].px_m: "),
-        ("[{type: boxes2d, px_m: 1}]", r"annotations\[0\].px_m: unknown key"),
-        ("[lanes, {type: lanes, far_m: 9}]", "the annotation 'lanes' is listed twice"),
-        ("[{type: bev_mpa}]", "unknown annotation 'bev_mpa'; .*did you mean 'bev_map'"),
-        ("[{px_m: 1}]", "unknown annotation"),
-    ],
-)
+@pytest.mark.parametrize(("annotations", "fault"), [
+    ("[{type: bev_map, pxm: 0.5}]", r"annotations\[0\].pxm: unknown key .*'px_m'"),
+    ("[{type: bev_map, px_m: -1}]", r"annotations\[0\].px_m: "),
+    ("[{type: boxes2d, px_m: 1}]", r"annotations\[0\].px_m: unknown key"),
+    ("[lanes, {type: lanes, far_m: 9}]", "the annotation 'lanes' is listed twice"),
+    ("[{type: bev_mpa}]", "unknown annotation 'bev_mpa'; .*did you mean 'bev_map'"),
+    ("[{px_m: 1}]", "unknown annotation"),
+])  # fmt: skip
 def test_what_cannot_be_is_told_at_its_place(tmp_path: Path, annotations: str, fault: str) -> None:
     with pytest.raises(ConfigError, match=rf"some.yaml:4:\d+: .*{fault}"):
         loaded(tmp_path, annotations)

@@ -9,20 +9,15 @@ from gen_data.core.errors import ConfigError
 LONG = "a" * 65
 
 
-@pytest.mark.parametrize(
-    ("override", "message"),
-    [
-        (f"sensors.color.name={LONG}", "--set:1:20: sensors[0].name: 'aaa"),
-        (f"randomizers.clutter.name={LONG}", "--set:1:26: randomizers[0].name: 'aaa"),
-        ("randomizers.distractors.name=a b", "--set:1:30: randomizers[1].name: 'a b' does not"),
-        (f"elements.clutter.name={LONG}", "--set:1:23: elements[3].name: 'aaa"),
-        (
-            "exporters=[{type: coco}, {type: coco}]",
-            "--set:1:33: exporters[1].type: the exporter 'coco' is listed twice; expected it once",
-        ),
-        ("randomizers.clutter.count=1000000000", "--set:1:27: randomizers[0].count: 1000000000"),
-    ],
-)
+@pytest.mark.parametrize(("override", "message"), [
+    (f"sensors.color.name={LONG}", "--set:1:20: sensors[0].name: 'aaa"),
+    (f"randomizers.clutter.name={LONG}", "--set:1:26: randomizers[0].name: 'aaa"),
+    ("randomizers.distractors.name=a b", "--set:1:30: randomizers[1].name: 'a b' does not"),
+    (f"elements.clutter.name={LONG}", "--set:1:23: elements[3].name: 'aaa"),
+    ("exporters=[{type: coco}, {type: coco}]",
+     "--set:1:33: exporters[1].type: the exporter 'coco' is listed twice; expected it once"),
+    ("randomizers.clutter.count=1000000000", "--set:1:27: randomizers[0].count: 1000000000"),
+])  # fmt: skip
 def test_names_counts_and_repetitions_are_refused_when_read(override: str, message: str) -> None:
     """Names of any length were accepted, and the disk refused them after the start."""
     with pytest.raises(ConfigError) as caught:
@@ -66,16 +61,11 @@ def test_errors_across_plugins_are_found_before_engines_start(override: str, mes
     assert str(caught.value).startswith(message)
 
 
-@pytest.mark.parametrize(
-    ("override", "message"),
-    [
-        (
-            "randomizers.pose.mode={choice: {hod: 1}}",
-            "--set:1:23: randomizers[3].mode: there is no 'hod'; expected one of joints,",
-        ),
-        ("randomizers.lamps.kind={choice: [sphere, sqare]}", "--set:1:24: randomizers[9].kind:"),
-    ],
-)
+@pytest.mark.parametrize(("override", "message"), [
+    ("randomizers.pose.mode={choice: {hod: 1}}",
+     "--set:1:23: randomizers[3].mode: there is no 'hod'; expected one of joints,"),
+    ("randomizers.lamps.kind={choice: [sphere, sqare]}", "--set:1:24: randomizers[9].kind:"),
+])  # fmt: skip
 def test_names_that_may_be_drawn_are_checked_when_read(override: str, message: str) -> None:
     """The sample that drew the name ended the run."""
     with pytest.raises(ConfigError) as caught:

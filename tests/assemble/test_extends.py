@@ -58,20 +58,16 @@ exporters: [{type: kitti}]
     plain = load_config_document(written(folder, own)).plain()
 
     assert plain == {
-        "seed": 3,
-        "template": "tabletop",
-        "render": {"max_lamps": 8, "device": "cpu"},
+        "seed": 3, "template": "tabletop", "render": {"max_lamps": 8, "device": "cpu"},
         "shared": {"side": {"uniform": [0, 1]}},
         "elements": {"table": {"height_m": 0.8, "top_size_m": [1, 1]}},
         "randomizers": [
             {"type": "objects", "name": "clutter", "count": 3, "upright": True},
-            {"type": "colors", "name": "colors"},
-            {"type": "materials", "name": "finish"},
+            {"type": "colors", "name": "colors"}, {"type": "materials", "name": "finish"},
         ],
         "sensors": [{"type": "rgb_camera", "name": "color", "size_px": [64, 48], "hfov_deg": 60}],
-        "annotations": ["poses"],
-        "exporters": [{"type": "kitti"}],
-    }
+        "annotations": ["poses"], "exporters": [{"type": "kitti"}],
+    }  # fmt: skip
 
 
 def test_a_list_of_outputs_replaces_the_inherited_one(folder: Path) -> None:
@@ -117,9 +113,8 @@ randomizers: [{type: materials, name: clutter}]
     plain = load_config_document(written(folder, own)).plain()
 
     assert plain["randomizers"] == [
-        {"type": "colors", "name": "colors"},
-        {"type": "materials", "name": "clutter"},
-    ]
+        {"type": "colors", "name": "colors"}, {"type": "materials", "name": "clutter"},
+    ]  # fmt: skip
     assert (plain["exporters"], plain["elements"], plain["annotations"]) == ([], {}, [])
     assert "without" not in plain
 
@@ -147,7 +142,7 @@ def test_an_error_in_an_inherited_value_points_to_its_own_file(folder: Path) -> 
     assert message.startswith(f"{folder / 'base.yaml'}:7:43: randomizers[0].count: ")
 
 
-def test_a_circle_is_named(folder: Path) -> None:
+def test_a_chain_has_an_end_and_a_circle_is_named(folder: Path) -> None:
     first = written(folder, "extends: b.yaml\n", "a.yaml")
     second = written(folder, "extends: a.yaml\n", "b.yaml")
 
@@ -156,8 +151,6 @@ def test_a_circle_is_named(folder: Path) -> None:
     assert message.startswith(f"{second}:1:10: extends: extends itself: ")
     assert f"{first} -> {second} -> {first}" in message
 
-
-def test_a_chain_has_an_end(folder: Path) -> None:
     for k in range(10):
         written(folder, f"extends: c{k + 1}.yaml\n", f"c{k}.yaml")
     written(folder, BASE, "c10.yaml")

@@ -26,23 +26,18 @@ def refusal(folder: Path, *lines: str) -> str:
     return str(caught.value)
 
 
-@pytest.mark.parametrize(
-    ("given", "column", "field", "fact"),
-    [
-        ("textures, name: t, textures: [wod]", 41, "textures", "there is no texture 'wod'"),
-        ("backdrop, name: room, walls: [plastre]", 41, "walls", "there is no texture 'plastre'"),
-        ("environment, name: e, images: [studoi]", 42, "images", "no environment is 'studoi'"),
-        ("environment, name: e, images: [indoor, studoi]", 42, "images",
-         "no environment is 'studoi'"),
-        ("objects, name: cluter", 5, "group", "no object group 'cluter'"),
-        ("objects, name: clutter, weights: {mugg: 2}", 45, "weights", "no category 'mugg'"),
-        ("camera_pose, name: orbit, aim: cluter", 43, "aim",
-         "nothing in the scene is named 'cluter'"),
-        ("camera_pose, name: orbit, camera: colour", 46, "camera", "no camera 'colour'"),
-        ("camera_pose, name: orbit, aim: clutter, fills: 0.0005", 59, "fills",
-         "at most 0.0005 of the image of camera 'color'"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("given", "column", "field", "fact"), [
+    ("textures, name: t, textures: [wod]", 41, "textures", "there is no texture 'wod'"),
+    ("backdrop, name: room, walls: [plastre]", 41, "walls", "there is no texture 'plastre'"),
+    ("environment, name: e, images: [studoi]", 42, "images", "no environment is 'studoi'"),
+    ("environment, name: e, images: [indoor, studoi]", 42, "images", "no environment is 'studoi'"),
+    ("objects, name: cluter", 5, "group", "no object group 'cluter'"),
+    ("objects, name: clutter, weights: {mugg: 2}", 45, "weights", "no category 'mugg'"),
+    ("camera_pose, name: orbit, aim: cluter", 43, "aim", "nothing in the scene is named 'cluter'"),
+    ("camera_pose, name: orbit, camera: colour", 46, "camera", "no camera 'colour'"),
+    ("camera_pose, name: orbit, aim: clutter, fills: 0.0005", 59, "fills",
+     "at most 0.0005 of the image of camera 'color'"),
+])  # fmt: skip
 def test_an_unknown_name_is_refused_with_its_place_before_anything_runs(
     tmp_path: Path, given: str, column: int, field: str, fact: str
 ) -> None:

@@ -44,14 +44,11 @@ def refusal(config: dict[str, Any]) -> str:
 
 def test_every_exporter_and_every_camera_that_does_not_fit_is_named() -> None:
     """Two formats of pinholes, two bent cameras, in one message."""
-    message = refusal(
-        cart(
-            {**BENT, "name": "front"},
-            {**BENT, "name": "side", "yaw_deg": 90},
-            {**CAMERA, "name": "rear", "yaw_deg": 180},
-            exporters=[{"type": "solo"}, {"type": "kitti", "camera": "front"}, {"type": "coco"}],
-        )
-    )
+    message = refusal(cart(
+        {**BENT, "name": "front"}, {**BENT, "name": "side", "yaw_deg": 90},
+        {**CAMERA, "name": "rear", "yaw_deg": 180},
+        exporters=[{"type": "solo"}, {"type": "kitti", "camera": "front"}, {"type": "coco"}],
+    ))  # fmt: skip
 
     lens = "has a lens of the model 'kannala_brandt'"
     assert f"exporter 'solo': camera 'front' {lens}, camera 'side' {lens}, but" in message
@@ -74,25 +71,20 @@ PAIR = ("rgb", "disparity")
 
 def test_cameras_without_a_rig_are_no_stereo_pair() -> None:
     """``camera_pose`` gives each a pose of its own; the position is that of ``stereo_with``."""
-    message = refusal(
-        table(
-            {**CAMERA, "name": "left", "channels": [*PAIR], "stereo_with": "right"},
-            {**CAMERA, "name": "right"},
-        )
-    )
+    message = refusal(table(
+        {**CAMERA, "name": "left", "channels": [*PAIR], "stereo_with": "right"},
+        {**CAMERA, "name": "right"},
+    ))  # fmt: skip
 
     assert "sensors[0].stereo_with: 'left' and 'right' are no rectified pair: " in message
     assert "mount them on one rig" in message
 
 
-@pytest.mark.parametrize(
-    ("right", "fault"),
-    [
-        ({"offset_m": [1.0, -0.1, 0.9], "yaw_deg": 2}, "they do not look the same way"),
-        ({"offset_m": [1.0, 0.1, 0.9]}, "not straight to its right"),
-        ({"offset_m": [1.0, -0.1, 0.9], "hfov_deg": 61}, "they are not the same pinhole"),
-    ],
-)
+@pytest.mark.parametrize(("right", "fault"), [
+    ({"offset_m": [1.0, -0.1, 0.9], "yaw_deg": 2}, "they do not look the same way"),
+    ({"offset_m": [1.0, 0.1, 0.9]}, "not straight to its right"),
+    ({"offset_m": [1.0, -0.1, 0.9], "hfov_deg": 61}, "they are not the same pinhole"),
+])  # fmt: skip
 def test_pairs_on_a_rig_are_compared(right: dict[str, Any], fault: str) -> None:
     """Turned, on the wrong side, with another lens: each is refused before the first sample."""
     left = {**CAMERA, "name": "left", "channels": [*PAIR], "stereo_with": "right"}
@@ -124,10 +116,9 @@ def test_plan_and_generate_refuse_all_faults_with_the_same_message(tmp_path: Pat
     config = table(
         {**BENT, "name": "left", "channels": ["rgb"]},
         {**CAMERA, "name": "middle", "channels": [*PAIR], "stereo_with": "right"},
-        {**CAMERA, "name": "right"},
-        exporters=[{"type": "bop", "camera": "left"}],
+        {**CAMERA, "name": "right"}, exporters=[{"type": "bop", "camera": "left"}],
         splits={"train": 1},
-    )
+    )  # fmt: skip
     file = tmp_path / "mine.yaml"
     file.write_text(yaml.safe_dump(config))
     planned = CliRunner().invoke(cli, ["plan", str(file), "--n", "2"])

@@ -6,12 +6,9 @@ from functools import cache
 import numpy as np
 import pytest
 
-from gen_data.assemble.config import load_config
-from gen_data.assemble.pipeline_factory import nominal_scene
-from gen_data.core.errors import ConfigError
+from gen_data.assemble import config, pipeline_factory
+from gen_data.core import errors, scene_time, se3
 from gen_data.core.scene import Scene
-from gen_data.core.scene_time import place_sensors
-from gen_data.core.se3 import SE3
 from gen_data.sensors.camera.rgb_camera import RgbCamera
 from gen_data.sensors.lidar.lidar_sensor import LidarSensor
 from tests.libraries import library
@@ -20,11 +17,11 @@ from tests.libraries import library
 @cache
 def rig_scene(name: str, *overrides: str) -> Scene:
     """The nominal scene of a configuration, every sensor in its place."""
-    spec = load_config(name, overrides=overrides)
-    return place_sensors(nominal_scene(spec, spec.probes[0], library()))
+    spec = config.load_config(name, overrides=overrides)
+    return scene_time.place_sensors(pipeline_factory.nominal_scene(spec, spec.probes[0], library()))
 
 
-def on_rig(scene: Scene, pose: SE3) -> SE3:
+def on_rig(scene: Scene, pose: se3.SE3) -> se3.SE3:
     return scene.rig_pose("ego").inverse() @ pose
 
 
@@ -46,9 +43,7 @@ def test_kittis_navigation_unit_is_where_its_calibration_has_it() -> None:
     """``calib_imu_to_velo``: (-0.81, 0.32, -0.80), to a centimetre."""
     scene = rig_scene("kitti_rig")
     scanner = scene.lidar("velodyne").T_world_lidar
-    imu = scene.device("oxts_imu").T_world_device
-
-    offset = (imu.inverse() @ scanner).translation_m
+    offset = (scene.device("oxts_imu").T_world_device.inverse() @ scanner).translation_m
     assert offset == pytest.approx((0.81, 0.32, 0.80), abs=0.01)
 
 
@@ -69,7 +64,7 @@ def test_nuscenes_cameras_see_all_around() -> None:
 
 def test_nuscenes_cameras_are_released_as_the_scanner_passes_them() -> None:
     """At a camera's offset in time, a clockwise turn of 50 ms has reached its axis, to a degree."""
-    spec = load_config("nuscenes_rig")
+    spec = config.load_config("nuscenes_rig")
     scanner = next(s for s in spec.sensors if isinstance(s, LidarSensor))
     cameras = [s for s in spec.sensors if isinstance(s, RgbCamera)]
     for camera in cameras:
@@ -82,12 +77,12 @@ def test_nuscenes_cameras_are_released_as_the_scanner_passes_them() -> None:
 @pytest.mark.slow
 def test_a_sensor_inside_its_carrier_is_refused() -> None:
     """A camera in the middle of the car sees nothing but the car."""
-    with pytest.raises(ConfigError, match=r"'image_02': offset_m is .* inside 'ego'"):
+    with pytest.raises(errors.ConfigError, match=r"'image_02': offset_m is .* inside 'ego'"):
         rig_scene("kitti_rig", "sensors.image_02.offset_m=[1.0, 0, 0.7]")
 
 
 @pytest.mark.slow
 def test_elements_that_a_configuration_adds_can_be_overridden_by_name() -> None:
-    spec = load_config("kitti_rig", overrides=("elements.ego.asset=car?seed=4",))
+    spec = config.load_config("kitti_rig", overrides=("elements.ego.asset=car?seed=4",))
 
     assert next(e for e in spec.probes[0].elements if e.name == "ego").asset == "car?seed=4"

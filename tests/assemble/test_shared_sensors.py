@@ -54,19 +54,13 @@ def test_a_sensor_captures_with_the_parameters_of_its_scene(tmp_path: Path) -> N
     assert [sensor.exposure.time_s for sensor in sensors] == [0.004, 0.001]
 
 
-@pytest.mark.parametrize(
-    ("sensor", "field", "column"),
-    [
-        ("{type: rgb_camera, name: $shared.lens}", "sensors[0].name", 30),
-        ("{type: rgb_camera, name: a, size_px: [64, $shared.height_px]}", "sensors[0].size_px", 42),
-        (
-            "{type: rgb_camera, name: a, lens: {switch: lens, wide: {model: pinhole}}}",
-            "sensors[0].lens.model",
-            39,
-        ),
-        ("{switch: lens, wide: {type: rgb_camera, name: a}}", "sensors[0]", 5),
-    ],
-)
+@pytest.mark.parametrize(("sensor", "field", "column"), [
+    ("{type: rgb_camera, name: $shared.lens}", "sensors[0].name", 30),
+    ("{type: rgb_camera, name: a, size_px: [64, $shared.height_px]}", "sensors[0].size_px", 42),
+    ("{type: rgb_camera, name: a, lens: {switch: lens, wide: {model: pinhole}}}",
+     "sensors[0].lens.model", 39),
+    ("{switch: lens, wide: {type: rgb_camera, name: a}}", "sensors[0]", 5),
+])  # fmt: skip
 def test_what_all_samples_have_in_common_cannot_depend_on_a_shared_value(
     tmp_path: Path, sensor: str, field: str, column: int
 ) -> None:

@@ -22,6 +22,4 @@ def test_four_samples_of_all_weathers_are_four_scenes_in_different_weather() -> 
 @pytest.mark.slow
 def test_the_receiver_of_carla_has_a_fix_in_the_first_scene() -> None:
     """CARLA's has one everywhere; the first street is in an old town."""
-    data = gen_data.Dataset("carla_table.yaml")
-
-    assert all(data[0].measurements["gnss"]["quality"] == 1)
+    assert all(gen_data.Dataset("carla_table.yaml")[0].measurements["gnss"]["quality"] == 1)

@@ -63,15 +63,12 @@ def test_override_of_an_unknown_element_is_refused(tmp_path: Path) -> None:
 def test_command_line_wins_over_file_and_template() -> None:
     """``--set`` reaches elements and randomizers by name, the top level, and absent sections."""
     spec = load_config(
-        "tabletop.yaml",
-        seed=0,
+        "tabletop.yaml", seed=0,
         overrides=(
-            "elements.table.height_m=0.6",
-            "randomizers.clutter.count=3",
-            "physics.settle_time_s_max=2.5",
-            "views_per_scene=2",
+            "elements.table.height_m=0.6", "randomizers.clutter.count=3",
+            "physics.settle_time_s_max=2.5", "views_per_scene=2",
         ),
-    )
+    )  # fmt: skip
 
     assert spec.general.seed == 0
     assert {e.name: e for e in spec.probes[0].elements}["table"].height_m == 0.6
@@ -95,9 +92,7 @@ def test_resolved_document_makes_the_same_spec_again(tmp_path: Path) -> None:
     plan = {"config": first.resolved, "name": first.name}
     (tmp_path / "plan.json").write_text(json.dumps(plan))
 
-    again = load_config(str(tmp_path))
-
-    assert again == first
+    assert load_config(str(tmp_path)) == first
 
 
 @pytest.mark.parametrize("name", ["parking", "tabletop"])
@@ -126,21 +121,18 @@ def test_spec_crosses_process_borders() -> None:
     assert pickle.loads(pickle.dumps(spec)) == spec
 
 
-@pytest.mark.parametrize(
-    ("text", "fact"),
-    [
-        ("seed: 1\n" + CAMERA, "template: expected the name of a template"),
-        ("template: tabeltop\n" + CAMERA, "did you mean 'tabletop.yaml'?"),
-        ("template: [{type: room}]\n" + CAMERA, "a list of elements has the key 'elements'"),
-        ("template: tabletop\n", "sensors: at least one sensor is needed"),
-        ("template: tabletop\nseed: -1\n" + CAMERA, "seed: "),
-        ("template: tabletop\nsplits: {train: 0.5, val: 0.1}\n" + CAMERA, "shares must sum to 1"),
-        ("template: tabletop\nrandomizers: {a: 1}\n" + CAMERA, "randomizers: expected a list"),
-        ("template: tabletop\nrandomizers: [{name: a}]\n" + CAMERA, "randomizers[0].type: "),
-        ("template: tabletop\nannotations: [boxes]\n" + CAMERA, "unknown annotation 'boxes'"),
-        ("template: tabletop\nrender: {device: gpu}\n" + CAMERA, "render.device: "),
-    ],
-)
+@pytest.mark.parametrize(("text", "fact"), [
+    ("seed: 1\n" + CAMERA, "template: expected the name of a template"),
+    ("template: tabeltop\n" + CAMERA, "did you mean 'tabletop.yaml'?"),
+    ("template: [{type: room}]\n" + CAMERA, "a list of elements has the key 'elements'"),
+    ("template: tabletop\n", "sensors: at least one sensor is needed"),
+    ("template: tabletop\nseed: -1\n" + CAMERA, "seed: "),
+    ("template: tabletop\nsplits: {train: 0.5, val: 0.1}\n" + CAMERA, "shares must sum to 1"),
+    ("template: tabletop\nrandomizers: {a: 1}\n" + CAMERA, "randomizers: expected a list"),
+    ("template: tabletop\nrandomizers: [{name: a}]\n" + CAMERA, "randomizers[0].type: "),
+    ("template: tabletop\nannotations: [boxes]\n" + CAMERA, "unknown annotation 'boxes'"),
+    ("template: tabletop\nrender: {device: gpu}\n" + CAMERA, "render.device: "),
+])  # fmt: skip
 def test_wrong_configuration_is_refused(tmp_path: Path, text: str, fact: str) -> None:
     assert fact in refusal(written(tmp_path, text))
 

@@ -33,13 +33,10 @@ def test_an_unusual_key_is_quoted(tmp_path: Path, section: str, key: str) -> Non
     assert all(re.match(rf"\S+own\.yaml:2:\d+: {named}: ", line) for line in lines), lines
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ('" lements": []', r"1:1: \[' lements'\]: unknown key"),
-        ('{elements: [], defaults: {" prop": {}}}', r"1:27: defaults\[' prop'\]: no element"),
-    ],
-)
+@pytest.mark.parametrize(("text", "message"), [
+    ('" lements": []', r"1:1: \[' lements'\]: unknown key"),
+    ('{elements: [], defaults: {" prop": {}}}', r"1:27: defaults\[' prop'\]: no element"),
+])  # fmt: skip
 def test_an_unusual_key_of_a_template_is_quoted(tmp_path: Path, text: str, message: str) -> None:
     (tmp_path / "table.yaml").write_text(f"{text}\n")
     (tmp_path / "own.yaml").write_text("template: table.yaml\nsensors: [{type: rgb_camera}]\n")

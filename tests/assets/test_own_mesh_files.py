@@ -335,7 +335,7 @@ def test_3mf_builds_components_in_their_unit_with_their_colours(tmp_path: Path) 
 
 @pytest.mark.slow
 def test_step_is_meshed_in_metres(tmp_path: Path) -> None:
-    """A file without a shape is one clear error; see benchmarks/own_meshes.py for whole files."""
+    """A file without a shape is one clear error."""
     pytest.importorskip("cascadio")
     (tmp_path / "a.step").write_text(
         "ISO-10303-21;\nHEADER;\nENDSEC;\nDATA;\nENDSEC;\nEND-ISO-10303-21;\n"

@@ -34,37 +34,18 @@ def test_equal_views_have_no_difference() -> None:
     assert compare(found) == Comparison(objects=2, worst=0.0, iou=1.0, lens=0.0)
 
 
-@pytest.mark.parametrize(
-    ("found", "name", "value"),
-    [
-        (replace(STATED, things=(replace(CUP, numbers=CUP.numbers + 0.25), BOWL)), "worst", 0.25),
-        (
-            replace(STATED, things=(replace(CUP, mask=MASK & (MASK.cumsum(1) < 4)), BOWL)),
-            "iou",
-            0.75,
-        ),
-        (replace(STATED, lens=(100.0, 100.0, 5.5, 4.0, -0.3)), "lens", 0.5),
-        (replace(STATED, lens=(100.0, 100.0, 5.0, 4.0)), "lens", 0.3),
-        (
-            replace(STATED, things=(CUP,)),
-            "faults",
-            ["000000003_color: bowl [6. 0. 8. 3.] is missing"],
-        ),
-        (
-            replace(STATED, things=(CUP, replace(BOWL, category="cup"))),
-            "faults",
-            [
-                "000000003_color: cup [6. 0. 8. 3.] is not in the data set",
-                "000000003_color: bowl [6. 0. 8. 3.] is missing",
-            ],
-        ),
-        (
-            replace(STATED, name="000000004_color"),
-            "faults",
-            ["000000003_color is missing", "000000004_color is not in the data set"],
-        ),
-    ],
-)
+@pytest.mark.parametrize(("found", "name", "value"), [
+    (replace(STATED, things=(replace(CUP, numbers=CUP.numbers + 0.25), BOWL)), "worst", 0.25),
+    (replace(STATED, things=(replace(CUP, mask=MASK & (MASK.cumsum(1) < 4)), BOWL)), "iou", 0.75),
+    (replace(STATED, lens=(100.0, 100.0, 5.5, 4.0, -0.3)), "lens", 0.5),
+    (replace(STATED, lens=(100.0, 100.0, 5.0, 4.0)), "lens", 0.3),
+    (replace(STATED, things=(CUP,)), "faults", ["000000003_color: bowl [6. 0. 8. 3.] is missing"]),
+    (replace(STATED, things=(CUP, replace(BOWL, category="cup"))), "faults",
+     ["000000003_color: cup [6. 0. 8. 3.] is not in the data set",
+      "000000003_color: bowl [6. 0. 8. 3.] is missing"]),
+    (replace(STATED, name="000000004_color"), "faults",
+     ["000000003_color is missing", "000000004_color is not in the data set"]),
+])  # fmt: skip
 def test_differences_are_measured_and_named(found: View, name: str, value: object) -> None:
     """Half of a mask's row is a quarter of it; absent lens terms count."""
     assert getattr(compare(found), name) == value

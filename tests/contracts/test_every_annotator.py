@@ -18,26 +18,22 @@ from stranger.annotation import Distance
 from gen_data.annotations import TABLE
 from gen_data.annotations.annotate import Thresholds, annotate_ego, annotate_reading
 from gen_data.assemble.pipeline_factory import open_pipeline
-from gen_data.core.capture import Channel, SensorReading
-from gen_data.core.errors import ConfigError
-from gen_data.core.interfaces import Annotator, AnyAnnotator, AssetLibrary, ImageAnnotator
+from gen_data.core import capture, errors, interfaces, serialization
 from gen_data.core.sample import EgoTruth, ImageTruth, ObjectTruth
 from gen_data.core.scene import Scene
-from gen_data.core.serialization import canonical_json, to_plain
 from tests.streets import thin_street
 
 # All of them label one street, of which assets and kernels are made first.
 pytestmark = pytest.mark.slow
 
-ANNOTATORS: dict[str, type[AnyAnnotator]] = {
-    **{name: TABLE.load(name) for name in TABLE},
-    "stranger_distance": Distance,
-}
+ANNOTATORS: dict[str, type[interfaces.AnyAnnotator]] = {
+    **{name: TABLE.load(name) for name in TABLE}, "stranger_distance": Distance,
+}  # fmt: skip
 each = pytest.mark.parametrize("name", ANNOTATORS)
 
 CONFIG = "street_sequence"
 SMALL = ("sensors[0].size_px=[160, 90]", "exporters=[]", "annotations=[]")
-DISTANCES = frozenset({Channel.Z_DEPTH, Channel.RANGE})
+DISTANCES = frozenset({capture.Channel.Z_DEPTH, capture.Channel.RANGE})
 NEED_A_RIG = ("bev_map",)
 FEW_PX = Thresholds(min_visible_px=1, min_box_px=1)
 
@@ -47,8 +43,8 @@ class World:
     """A sample's scene, one reading of it, and the assets of both."""
 
     scene: Scene
-    reading: SensorReading
-    assets: AssetLibrary
+    reading: capture.SensorReading
+    assets: interfaces.AssetLibrary
 
 
 @cache
@@ -61,7 +57,7 @@ def world() -> World:
         return World(sample.scene, reading, pipeline.assets)
 
 
-def made(name: str) -> AnyAnnotator:
+def made(name: str) -> interfaces.AnyAnnotator:
     return ANNOTATORS[name]()
 
 
@@ -118,7 +114,7 @@ def test_it_fills_in_its_own_fields_and_no_other(name: str) -> None:
         bare = ObjectTruth(truth.instance, truth.visible_px, truth.box)
         assert changed(bare, truth) == allowed - empty_fields(truth, allowed)
         assert set(truth.extra) == ({name} - set(TABLE))
-    assert isinstance(made(name), Annotator) == bool(image.objects)
+    assert isinstance(made(name), interfaces.Annotator) == bool(image.objects)
     assert changed(ImageTruth(image.camera, ()), image) == documented(ImageTruth).get(name, set())
     if frame is not None:
         bare_frame = EgoTruth(frame.rig, frame.T_world_ego, frame.twist)
@@ -148,10 +144,10 @@ def test_its_arguments_stay_as_they_are(name: str) -> None:
     """Scene and pixels."""
     given = world()
     pixels = {channel: image.copy() for channel, image in given.reading.channels.items()}
-    before = canonical_json(given.scene)
+    before = serialization.canonical_json(given.scene)
     annotated(name)
 
-    assert canonical_json(given.scene) == before
+    assert serialization.canonical_json(given.scene) == before
     for channel, image in given.reading.channels.items():
         assert image.tobytes() == pixels[channel].tobytes()
 
@@ -161,7 +157,7 @@ def test_it_needs_no_other_channel_than_it_names(name: str) -> None:
     """Other channels need not be rendered."""
     given, channels = world(), made(name).channels
     images = {c: image for c, image in given.reading.channels.items() if c in channels}
-    outlines = given.reading.silhouettes if Channel.AMODAL in channels else {}
+    outlines = given.reading.silhouettes if capture.Channel.AMODAL in channels else {}
     lean = replace(given.reading, channels=images, silhouettes=outlines)
 
     assert plain(annotated(name, replace(given, reading=lean))[0].objects) == plain(
@@ -178,7 +174,7 @@ def test_an_empty_scene_has_empty_truth(name: str) -> None:
     scene = Scene("empty", cameras=(given.reading.camera,))
     reading = replace(given.reading, channels=nothing, silhouettes={})
     if name in NEED_A_RIG:
-        with pytest.raises(ConfigError, match=f"annotation '{name}': the scene has no rig"):
+        with pytest.raises(errors.ConfigError, match=f"annotation '{name}': the scene has no rig"):
             annotated(name, World(scene, reading, given.assets))
         return
     image, frame = annotated(name, World(scene, reading, given.assets))
@@ -192,6 +188,6 @@ def test_images_are_annotated_as_a_whole_where_objects_are_not() -> None:
     """The scene of these tests gives annotators of images and of samples non-empty results."""
     image, _ = annotated("lanes")
 
-    assert isinstance(made("lanes"), ImageAnnotator)
+    assert isinstance(made("lanes"), interfaces.ImageAnnotator)
     assert image.borders
-    assert to_plain(world().scene)["rigs"]
+    assert serialization.to_plain(world().scene)["rigs"]

@@ -43,21 +43,18 @@ def test_the_list_of_all_names_fits_a_terminal() -> None:
     assert " ".join(lines).count("name_") == 99
 
 
-@pytest.mark.parametrize(
-    ("name", "contains"),
-    [
-        ("rgb_camera.lens", "brown_conrady"),
-        ("brown_conrady", "k1"),
-        ("labels", "min_visible_px"),
-        ("labels.map", "min_box_px"),
-        ("splits", "round_robin"),
-        ("physics", "engine"),
-        ("rgb_camera.image_pipeline", "vignetting"),
-        ("coco.rectify", "hfov_deg"),
-        ("section/labels", "min_visible_px"),
-        ("lidar.model", "range_m"),
-    ],
-)
+@pytest.mark.parametrize(("name", "contains"), [
+    ("rgb_camera.lens", "brown_conrady"),
+    ("brown_conrady", "k1"),
+    ("labels", "min_visible_px"),
+    ("labels.map", "min_box_px"),
+    ("splits", "round_robin"),
+    ("physics", "engine"),
+    ("rgb_camera.image_pipeline", "vignetting"),
+    ("coco.rectify", "hfov_deg"),
+    ("section/labels", "min_visible_px"),
+    ("lidar.model", "range_m"),
+])  # fmt: skip
 def test_nested_mappings_and_sections_are_described(name: str, contains: str) -> None:
     """By their path, or by the word that selects them."""
     assert contains in describe_name(name)

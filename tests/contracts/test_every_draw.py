@@ -9,17 +9,14 @@ from hashlib import sha256
 import numpy as np
 import pytest
 
-from gen_data.assets.asset_arrays import pack_imported
-from gen_data.assets.asset_ids import AssetId, ParameterValue, parse_asset_id
-from gen_data.assets.families import own_families
+from gen_data.assets import asset_arrays, asset_ids, families, importer
 from gen_data.assets.family import Family
-from gen_data.assets.importer import ImportedMesh
 from gen_data.core.variant_rng import Draw, VariantRng, drawing
 from tests.tiers import cases
 
 FAMILIES = {
     name: family
-    for name, family in own_families().items()
+    for name, family in families.own_families().items()
     if isinstance(family, Family) and family.variants
 }
 QUICK = {"desk", "chair", "mug", "gear", "wardrobe/door", "cone", "wheelie_bin", "building/shed"}
@@ -76,7 +73,7 @@ class Variants:
                 self._made[seed] = self.make(seed)
             yield seed, self._made[seed]
 
-    def make(self, seed: int, **asked: ParameterValue) -> Made:
+    def make(self, seed: int, **asked: asset_ids.ParameterValue) -> Made:
         """An object with values asked for, after checks."""
         with drawing(asked) as draws, names_drawn_twice() as twice:
             solid = self.family.build(**{**self.family.parameters, "seed": seed})
@@ -85,7 +82,7 @@ class Variants:
         assert len(solid.collision.parts_m)
         for key, value in asked.items():
             assert draws[key].value == pytest.approx(value)
-        arrays = pack_imported(ImportedMesh(solid.mesh, solid.collision, {}))
+        arrays = asset_arrays.pack_imported(importer.ImportedMesh(solid.mesh, solid.collision, {}))
         parts = b"".join(array.tobytes() for _, array in sorted(arrays.items()))
         return Made(draws, tuple(twice), sha256(parts).digest())
 
@@ -121,7 +118,7 @@ def every(names: Iterable[str]) -> pytest.MarkDecorator:
     return pytest.mark.parametrize("variants", cases(sorted(names), QUICK), indirect=True)
 
 
-def some_values(draw: Draw) -> tuple[ParameterValue, ...]:
+def some_values(draw: Draw) -> tuple[asset_ids.ParameterValue, ...]:
     """The lowest, middle and highest value; of a range, the ends and the value drawn."""
     if draw.is_range:
         low, high = (float(end) for end in draw.options if isinstance(end, (int, float)))
@@ -139,7 +136,7 @@ def test_every_family_has_a_named_draw_or_a_reason(variants: Variants) -> None:
         assert re.fullmatch("[a-z][a-z0-9_]*", key)
         assert key not in {"seed", *variants.family.parameters}
         for value in draw.options:
-            asked = parse_asset_id(str(AssetId(variants.name, {key: value})))
+            asked = asset_ids.parse_asset_id(str(asset_ids.AssetId(variants.name, {key: value})))
             assert asked.parameters[key] == value
 
 

@@ -21,21 +21,15 @@ from gen_data.renderers import TABLE
 from tests.renderers.fake_library import FakeLibrary, box_mesh, camera_at
 
 SETTINGS: Mapping[str, type[RendererSettings]] = {
-    **{name: TABLE.load(name) for name in TABLE},
-    "stranger_boxes": BoxesPlugin,
-}
+    **{name: TABLE.load(name) for name in TABLE}, "stranger_boxes": BoxesPlugin,
+}  # fmt: skip
 each = pytest.mark.parametrize("name", SETTINGS)
 
 ARRAYS = {
-    Channel.RADIANCE: ("f4", (3,)),
-    Channel.Z_DEPTH: ("f4", ()),
-    Channel.RANGE: ("f4", ()),
-    Channel.NORMALS: ("f4", (3,)),
-    Channel.INSTANCE: ("u2", ()),
-    Channel.PART: ("u2", ()),
-    Channel.CATEGORY: ("u2", ()),
-    Channel.OBJECT_COORDINATES: ("f4", (3,)),
-}
+    Channel.RADIANCE: ("f4", (3,)), Channel.Z_DEPTH: ("f4", ()), Channel.RANGE: ("f4", ()),
+    Channel.NORMALS: ("f4", (3,)), Channel.INSTANCE: ("u2", ()), Channel.PART: ("u2", ()),
+    Channel.CATEGORY: ("u2", ()), Channel.OBJECT_COORDINATES: ("f4", (3,)),
+}  # fmt: skip
 """Type and last axis of the channels that every renderer makes, as listed at ``Channel``."""
 LABELS = frozenset(ARRAYS) - {Channel.RADIANCE}
 CHANNELS = frozenset(ARRAYS) | {Channel.AMODAL}

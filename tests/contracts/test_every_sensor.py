@@ -25,11 +25,9 @@ from gen_data.sensors import TABLE
 from tests.renderers.fake_library import FakeLibrary, box_mesh, plane_mesh
 
 GIVEN: dict[str, dict[str, Any]] = {
-    "rgb_camera": {"size_px": [32, 24]},
-    "depth_camera": {"size_px": [32, 24]},
-    "lidar": {"model": "VLP-16"},
-    "event_camera": {"size_px": [32, 24], "frames_per_step": 2},
-}
+    "rgb_camera": {"size_px": [32, 24]}, "depth_camera": {"size_px": [32, 24]},
+    "lidar": {"model": "VLP-16"}, "event_camera": {"size_px": [32, 24], "frames_per_step": 2},
+}  # fmt: skip
 """Fields that make a sensor faster than by default."""
 
 OFF_RIGS = ("plate_camera",)
@@ -63,18 +61,14 @@ def street() -> Scene:
         for k, b in enumerate(boxes, 1)
     ]
     lens = Intrinsics.from_hfov(32, 24, 1.0)
-    return add_twists(
-        Scene(
-            "test",
-            bodies=(*boxes, Body("ground", "ground")),
-            instances=tuple(things),
-            cameras=(Camera("color", SE3(), lens, rig="ego"),),
-            rigs=(Rig("ego", "ego", SE3((0.0, 0.0, 1.0))),),
-            lights=(Light("sun", "sun", direction=(0.0, 0.6, -0.8), illuminance_lux=5e4),),
-            environment=Environment(luminance_cd_m2=3000.0),
-            tracks=tuple(Trajectory(name, 0.1, way) for name, way in poses.items()),
-        )
-    )
+    return add_twists(Scene(
+        "test", bodies=(*boxes, Body("ground", "ground")), instances=tuple(things),
+        cameras=(Camera("color", SE3(), lens, rig="ego"),),
+        rigs=(Rig("ego", "ego", SE3((0.0, 0.0, 1.0))),),
+        lights=(Light("sun", "sun", direction=(0.0, 0.6, -0.8), illuminance_lux=5e4),),
+        environment=Environment(luminance_cd_m2=3000.0),
+        tracks=tuple(Trajectory(name, 0.1, way) for name, way in poses.items()),
+    ))  # fmt: skip
 
 
 def made(kind: str, **fields: Any) -> Any:
@@ -99,8 +93,7 @@ def data(returned: SensorReading | PointCloud | Measurements) -> bytes:
 def test_mounting_adds_it_by_its_name_and_leaves_the_scene_alone(kind: str) -> None:
     """The new scene has it among cameras, lidars or devices; it survives serialisation."""
     before = canonical_json(street())
-    sensor = made(kind)
-    scene = place_sensors(sensor.mount(street()))
+    scene = place_sensors(made(kind).mount(street()))
 
     assert canonical_json(street()) == before
     names = [s.name for s in (*scene.cameras, *scene.lidars, *scene.devices)]
@@ -114,10 +107,9 @@ def test_it_is_where_its_description_says(kind: str) -> None:
     sensor = made(kind, rate_hz=10.0, time_offset_s=0.01)
     info, scene = sensor.describe(), sensor.mount(street())
     places = {
-        Modality.CAMERA: (scene.cameras, SensorReading),
-        Modality.LIDAR: (scene.lidars, PointCloud),
+        Modality.CAMERA: (scene.cameras, SensorReading), Modality.LIDAR: (scene.lidars, PointCloud),
         Modality.DEVICE: (scene.devices, Measurements),
-    }
+    }  # fmt: skip
     mounted, returned = places[info.modality]
 
     assert (info.name, info.rate_hz, info.time_offset_s) == ("unit", 10.0, 0.01)

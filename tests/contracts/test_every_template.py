@@ -91,9 +91,7 @@ def test_configuration_satisfies_the_schema_that_editors_check_it_against(name: 
     """jsonschema, an independent validator, finds no error in any file that is shipped."""
     document = load_yaml(Path(configs.__path__[0]) / f"{name}.yaml").plain()
 
-    errors = [error.json_path for error in validator().iter_errors(document)]
-
-    assert not errors
+    assert not [error.json_path for error in validator().iter_errors(document)]
 
 
 @pytest.mark.parametrize("name", cases(CONFIGS, QUICK))

@@ -5,7 +5,7 @@ import numpy as np
 from gen_data.core.bounded_cache import ByteCache, CountCache
 
 
-def test_bytes_are_bounded_whatever_the_sizes() -> None:
+def test_bytes_are_bounded_whatever_the_sizes_and_a_larger_value_displaces_all() -> None:
     """A thousand arrays of up to 400 bytes, at most 1,000 bytes of them at a time."""
     cache: ByteCache[np.ndarray] = ByteCache(1000)
     for k in range(1000):
@@ -14,9 +14,6 @@ def test_bytes_are_bounded_whatever_the_sizes() -> None:
         held = [cache.get(name, lambda: np.zeros(1)).nbytes for name in list(cache._values)]
         assert sum(held) <= 1000
 
-
-def test_a_value_larger_than_the_bound_displaces_all_others() -> None:
-    cache: ByteCache[np.ndarray] = ByteCache(1000)
     cache.get("small", lambda: np.zeros(100, np.uint8))
     cache.get("large", lambda: np.zeros(5000, np.uint8))
 
@@ -53,9 +50,7 @@ def test_values_are_bounded_by_number_and_the_oldest_go() -> None:
 
         return cache.get(name, make)
 
-    values = [get(name) for name in "abcad"]
-
-    assert values == [1, 2, 3, 1, 4]
+    assert [get(name) for name in "abcad"] == [1, 2, 3, 1, 4]
     assert [name in cache for name in "abcd"] == [True, False, True, True]
     assert get("b") == 5
     assert len(cache) == 3

@@ -9,7 +9,7 @@ from gen_data.core.boxes import BoxPx, OrientedBox, tight_box
 from gen_data.core.se3 import SE3
 
 
-def test_a_single_pixel_has_a_box_of_one_by_one() -> None:
+def test_a_single_pixel_has_a_box_of_one_by_one_and_no_pixel_none() -> None:
     """Half-open, so width is a plain difference."""
     mask = np.zeros((7, 9), bool)
     mask[5, 3] = True
@@ -19,19 +19,15 @@ def test_a_single_pixel_has_a_box_of_one_by_one() -> None:
     assert box == BoxPx(3, 5, 4, 6)
     assert (box.width_px, box.height_px) == (1, 1)
 
-
-def test_an_empty_mask_has_no_box() -> None:
-    """None, not a box of no size."""
     assert tight_box(np.zeros((4, 4), bool)) is None
     assert tight_box(np.zeros((0, 0), bool)) is None
 
 
 @settings(max_examples=150, deadline=None, derandomize=True)
 @given(
-    arrays(bool, st.tuples(st.integers(1, 8), st.integers(1, 8))),
+    arrays(bool, st.tuples(st.integers(1, 8), st.integers(1, 8))), st.integers(-5, 5),
     st.integers(-5, 5),
-    st.integers(-5, 5),
-)
+)  # fmt: skip
 def test_the_tight_box_holds_all_pixels_and_no_border(mask: np.ndarray, x0: int, y0: int) -> None:
     """Checked pixel by pixel, with the mask placed anywhere in the image."""
     box = tight_box(mask, x0, y0)

@@ -43,17 +43,16 @@ def test_codes_stand_for_the_light_of_the_standard(code: int, linear: float) -> 
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
-def test_every_byte_survives_decoding_and_encoding(dtype: type[np.float32 | np.float64]) -> None:
+def test_types_are_kept_and_every_byte_survives_decoding_and_encoding(
+    dtype: type[np.float32 | np.float64],
+) -> None:
+    """Shape [h, w, 3] gives [h, w]; each channel has its own weight."""
     codes = np.arange(256)
     again = colorimetry.srgb_encode(colorimetry.srgb_decode((codes / 255.0).astype(dtype)))
 
     assert again.dtype == dtype
     assert np.array_equal(np.floor(again * 255.0 + 0.5), codes)
 
-
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
-def test_luminance_keeps_the_type_of_the_image(dtype: type[np.float32 | np.float64]) -> None:
-    """Shape [h, w, 3] gives [h, w]; each channel has its own weight."""
     image = np.eye(3, dtype=dtype)[None] * np.array(100.0, dtype)
 
     assert colorimetry.luminance(image).dtype == dtype

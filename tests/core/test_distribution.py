@@ -39,8 +39,11 @@ def origin(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
     return record
 
 
-def test_the_name_is_that_of_the_project() -> None:
+def test_a_checkout_has_the_name_of_the_project_and_installs_extras_of_itself() -> None:
+    """By its path: the command works in any folder."""
     assert f'[project]\nname = "{DISTRIBUTION}"\n' in (ROOT / "pyproject.toml").read_text()
+
+    assert install_command("ray", "cloud") == f"pip install -e '{ROOT}[cloud,ray]'"
 
 
 def test_nothing_asks_an_index_for_the_project_that_took_the_short_name() -> None:
@@ -55,25 +58,14 @@ def test_nothing_asks_an_index_for_the_project_that_took_the_short_name() -> Non
     assert not found
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        "pip install 'gen-data[ray]'",
-        "uv pip install gen-data",
-        "pip install --upgrade 'gen-data>=1'",
-        'dependencies = ["numpy", "gen-data"]',
-        'version("gen-data")',
-    ],
-)
+@pytest.mark.parametrize("text", [
+    "pip install 'gen-data[ray]'", "uv pip install gen-data", "pip install --upgrade 'gen-data>=1'",
+    'dependencies = ["numpy", "gen-data"]', 'version("gen-data")',
+])  # fmt: skip
 def test_the_search_finds_requirements(text: str) -> None:
     """What it must not find stands for itself: the command, and folders of the user."""
     assert AS_REQUIREMENT.search(text)
     assert not AS_REQUIREMENT.search(text.replace("gen-data", DISTRIBUTION))
-
-
-def test_a_checkout_installs_extras_of_itself() -> None:
-    """By its path: the command works in any folder."""
-    assert install_command("ray", "cloud") == f"pip install -e '{ROOT}[cloud,ray]'"
 
 
 @pytest.mark.parametrize("name", ["checkout", "gen_data_perception-1-py3-none-any.whl"])

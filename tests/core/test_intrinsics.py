@@ -24,12 +24,9 @@ def test_the_centre_of_the_first_pixel_is_at_one_half() -> None:
 
 @settings(max_examples=60, deadline=None, derandomize=True)
 @given(
-    st.integers(1, 12),
-    st.integers(1, 12),
-    st.floats(1, 2000),
-    st.floats(1, 2000),
+    st.integers(1, 12), st.integers(1, 12), st.floats(1, 2000), st.floats(1, 2000),
     st.floats(0.01, 50),
-)
+)  # fmt: skip
 def test_projecting_what_was_unprojected_gives_pixel_centres(
     width: int, height: int, fx: float, fy: float, z: float
 ) -> None:
@@ -51,14 +48,12 @@ def test_projection_is_that_of_the_calibration_matrix() -> None:
     np.testing.assert_allclose(VGA.project(p_camera), homogeneous[:, :2] / homogeneous[:, 2:])
 
 
-def test_what_lies_behind_has_no_image() -> None:
+def test_what_lies_behind_has_no_image_and_what_saw_nothing_no_point() -> None:
     pixels = VGA.project(np.array([[0.0, 0, 1], [0, 0, 0], [0, 0, -1]]))
 
     assert np.isfinite(pixels[0]).all()
     assert np.isnan(pixels[1:]).all()
 
-
-def test_pixels_that_saw_nothing_have_no_point() -> None:
     depth = np.array([[1.0, np.inf]])
 
     points = Intrinsics(2, 1, 1.0, 1.0, 1.0, 0.5).unproject(depth)

@@ -31,11 +31,17 @@ def test_each_border_is_listed_once_and_knows_what_it_parts(traffic: str) -> Non
     assert found == {"road": [0.0], "lane": [3.0], "edge": [-3.0, 6.0]}
 
 
-def test_a_median_parts_two_edges() -> None:
-    """Nothing drives on it: its sides are edges."""
+def test_a_median_parts_two_edges_and_junctions_and_paths_have_no_borders() -> None:
+    """Nothing drives on a median: its sides are edges. Paths of junctions cross each other."""
     found = offsets(lane_borders(road(lanes=(1.0, 1.0), lane_width_m=3.0, median_m=2.0)))
 
     assert found == {"road": [], "lane": [], "edge": [-4.0, -1.0, 1.0, 4.0]}
+
+    line = ((0.0, 0.0, 0.0), (9.0, 0.0, 0.0))
+    lanes = (Lane("turn", "driving", line, 3.0, junction=True), Lane("path", "sidewalk", line, 3.0))
+
+    assert lane_borders(lanes) == ()
+    assert len(lane_borders((Lane("a", "driving", line, 3.0),))) == 2
 
 
 @pytest.mark.parametrize("traffic", ["right", "left"])
@@ -67,12 +73,3 @@ def test_sides_are_seen_in_the_direction_of_travel() -> None:
 
     assert border_line(lane, "left") == ((2.0, 0.0, 1.1), (2.0, -10.0, 1.1))
     assert border_line(lane, "right") == ((-2.0, 0.0, 0.9), (-2.0, -10.0, 0.9))
-
-
-def test_junctions_and_other_strips_have_no_borders() -> None:
-    """Their paths cross each other; people keep to no lane."""
-    line = ((0.0, 0.0, 0.0), (9.0, 0.0, 0.0))
-    lanes = (Lane("turn", "driving", line, 3.0, junction=True), Lane("path", "sidewalk", line, 3.0))
-
-    assert lane_borders(lanes) == ()
-    assert len(lane_borders((Lane("a", "driving", line, 3.0),))) == 2

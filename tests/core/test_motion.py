@@ -135,15 +135,13 @@ def test_even_acceleration_is_exact_from_the_first_to_the_last_instant() -> None
         assert twist.acceleration_m_s2[0] == pytest.approx(-3.0, abs=1e-8)
 
 
-def test_outside_its_knots_a_body_stands_still() -> None:
+def test_outside_its_knots_a_body_stands_still_and_one_knot_is_no_track() -> None:
     """Before the first and after the last knot."""
     track = track_of([(0, 0, 0), (1, 0, 0)])
     assert track.pose(0.0) == track.knots[0]
     assert track.pose(9.0) == track.knots[-1]
     assert track.twist(9.0) == STILL
 
-
-def test_a_track_of_one_knot_is_refused() -> None:
     with pytest.raises(ValueError, match="two knots"):
         Trajectory("car", 0.1, (SE3(),))
 
@@ -151,32 +149,27 @@ def test_a_track_of_one_knot_is_refused() -> None:
 def scene() -> Scene:
     """A car with a lamp, a rig and sensors on it, which drives 1 m in 1 s along X."""
     k = Intrinsics.from_hfov(8, 6, 1.0)
-    return place_sensors(
-        Scene(
-            "test",
-            bodies=(
-                Body("car", "box", SE3(), instance_id=1),
-                Body("tree", "box", SE3((5.0, 5.0, 0.0)), instance_id=2),
-            ),
-            instances=(
-                Instance(1, "car", "car", 1, "box", attributes=(("brake", "off"),)),
-                Instance(2, "tree", "tree", 2, "box"),
-            ),
-            lights=(
-                Light("lamp", "spot", position_m=(2.0, 0.5, 0.6), body="car"),
-                Light("sun", "sun"),
-            ),
-            cameras=(Camera("color", SE3(), k, rig="ego", T_rig_camera=SE3((1.0, 0.0, 1.5))),),
-            lidars=(Lidar("top", "", SE3((0.0, 0.0, 2.0)), rig="ego"),),
-            devices=(Device("imu", "imu", "ego", SE3((0.1, 0.0, 0.3))),),
-            rigs=(Rig("ego", "car", SE3((0.0, 0.0, 0.1))),),
-            tracks=(Trajectory("car", 1.0, (SE3(), SE3((1.0, 0.0, 0.0)))),),
-            changes=(
-                StateChange(0.5, "car", asset="box?lit", attributes=(("brake", "on"),)),
-                StateChange(0.8, "car", attributes=(("brake", "off"),)),
-            ),
-        )
-    )
+    return place_sensors(Scene(
+        "test",
+        bodies=(
+            Body("car", "box", SE3(), instance_id=1),
+            Body("tree", "box", SE3((5.0, 5.0, 0.0)), instance_id=2),
+        ),
+        instances=(
+            Instance(1, "car", "car", 1, "box", attributes=(("brake", "off"),)),
+            Instance(2, "tree", "tree", 2, "box"),
+        ),
+        lights=(Light("lamp", "spot", position_m=(2.0, 0.5, 0.6), body="car"), Light("sun", "sun")),
+        cameras=(Camera("color", SE3(), k, rig="ego", T_rig_camera=SE3((1.0, 0.0, 1.5))),),
+        lidars=(Lidar("top", "", SE3((0.0, 0.0, 2.0)), rig="ego"),),
+        devices=(Device("imu", "imu", "ego", SE3((0.1, 0.0, 0.3))),),
+        rigs=(Rig("ego", "car", SE3((0.0, 0.0, 0.1))),),
+        tracks=(Trajectory("car", 1.0, (SE3(), SE3((1.0, 0.0, 0.0)))),),
+        changes=(
+            StateChange(0.5, "car", asset="box?lit", attributes=(("brake", "on"),)),
+            StateChange(0.8, "car", attributes=(("brake", "off"),)),
+        ),
+    ))  # fmt: skip
 
 
 def test_everything_on_a_moving_body_moves_with_it() -> None:
@@ -219,14 +212,10 @@ def test_changes_hold_until_the_next_one() -> None:
         assert then.body("car").asset == then.instance(1).asset == asset
 
 
-def test_the_way_to_an_instant_does_not_matter() -> None:
-    """By another instant or straight: the same bodies."""
-    detour = scene_at(scene_at(scene(), 0.3), 0.7)
-    assert detour.bodies == scene_at(scene(), 0.7).bodies
+def test_the_way_to_an_instant_does_not_matter_and_instances_have_its_velocities() -> None:
+    """By another instant or straight: the same bodies. One metre in one second; the tree stands."""
+    assert scene_at(scene_at(scene(), 0.3), 0.7).bodies == scene_at(scene(), 0.7).bodies
 
-
-def test_what_moves_is_known_to_its_instance() -> None:
-    """One metre in one second; the tree stands."""
     then = scene_at(scene(), 0.5)
     assert then.instance(1).twist.velocity_m_s == pytest.approx((1.0, 0.0, 0.0))
     assert then.instance(2).twist == STILL

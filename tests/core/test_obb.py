@@ -3,7 +3,7 @@
 import math
 
 import numpy as np
-from hypothesis import assume, given
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linprog
 
@@ -42,6 +42,7 @@ def have_a_common_point(a: SE3, half_a: Vec3, b: SE3, half_b: Vec3, larger_m: fl
     return bool(answer.status == 0)
 
 
+@settings(deadline=None)
 @given(PLACES, TURNS, HALVES, PLACES, TURNS, HALVES)
 def test_boxes_touch_where_a_linear_program_finds_a_common_point(
     place_a: Vec3, turn_a: Vec3, half_a: Vec3, place_b: Vec3, turn_b: Vec3, half_b: Vec3
@@ -54,6 +55,7 @@ def test_boxes_touch_where_a_linear_program_finds_a_common_point(
     assert boxes_touch(a, half_a, b, half_b) == surely
 
 
+@settings(deadline=None)
 @given(PLACES, TURNS, HALVES, PLACES, HALVES)
 def test_parallel_boxes_touch_where_their_intervals_do(
     place_a: Vec3, turn: Vec3, half_a: Vec3, between: Vec3, half_b: Vec3
@@ -67,6 +69,7 @@ def test_parallel_boxes_touch_where_their_intervals_do(
     assert boxes_touch(a, half_a, b, half_b) == all(gap < 0.0 for gap in gaps)
 
 
+@settings(deadline=None)
 @given(PLACES, HALVES, PLACES, HALVES, st.floats(-4.0, 4.0), st.floats(-4.0, 4.0))
 def test_rectangles_overlap_where_upright_boxes_of_one_height_touch(
     place_a: Vec3, half_a: Vec3, place_b: Vec3, half_b: Vec3, yaw_a: float, yaw_b: float

@@ -8,12 +8,9 @@ from click.testing import CliRunner
 
 from gen_data.assets.image_decoding import read_exr
 from gen_data.cli.main import cli
-from gen_data.core import optional_packages
-from gen_data.core.distribution import install_command
-from gen_data.core.errors import AssetError, ConfigError
+from gen_data.core import distribution, errors, optional_packages
 from gen_data.core.optional_packages import EXTRAS, missing_packages
-from gen_data.exporters.rerun import Rerun
-from gen_data.exporters.usd import Usd
+from gen_data.exporters import rerun, usd
 from gen_data.usd.stage_reader import OpenStage
 from tests.wheels import HAS_RERUN
 
@@ -45,31 +42,26 @@ def test_what_is_installed_is_not_missing() -> None:
     assert missing_packages(*here) == ""
 
 
-def test_several_missing_packages_are_one_command(bare: None) -> None:
+def test_features_without_their_package_name_the_extra_before_they_begin(
+    bare: None, tmp_path: Path
+) -> None:
+    """Exporters by ``check``, readers by the file, and the preview with what works without."""
     assert missing_packages("pxr", "h5py", "mcap") == (
-        "needs the packages h5py, mcap, usd-core: " + install_command("formats", "usd")
+        "needs the packages h5py, mcap, usd-core: " + distribution.install_command("formats", "usd")
     )
 
+    with pytest.raises(errors.ConfigError, match=r"exporter 'usd' needs .*\[usd\]'"):
+        usd.Usd().check(None)  # type: ignore[arg-type]
+    with pytest.raises(errors.ConfigError, match=r"exporter 'rerun' needs .*\[preview\]'"):
+        rerun.Rerun().check(None)  # type: ignore[arg-type]
 
-def test_exporters_are_refused_before_anything_is_rendered(bare: None) -> None:
-    """By ``check``, which a run calls first."""
-    with pytest.raises(ConfigError, match=r"exporter 'usd' needs .*\[usd\]'"):
-        Usd().check(None)  # type: ignore[arg-type]
-    with pytest.raises(ConfigError, match=r"exporter 'rerun' needs .*\[preview\]'"):
-        Rerun().check(None)  # type: ignore[arg-type]
-
-
-def test_files_that_cannot_be_read_name_themselves(bare: None, tmp_path: Path) -> None:
-    """A stage and a panorama of a user."""
-    with pytest.raises(AssetError, match=r"mine\.usda: needs .*\[usd\]'"):
+    with pytest.raises(errors.AssetError, match=r"mine\.usda: needs .*\[usd\]'"):
         OpenStage(tmp_path / "mine.usda", "mine.usda")
-    with pytest.raises(AssetError, match=r"sky\.exr: needs .*\[exr\]'"):
+    with pytest.raises(errors.AssetError, match=r"sky\.exr: needs .*\[exr\]'"):
         read_exr(b"", "sky.exr")
 
-
-def test_the_preview_names_its_extra_and_what_works_without(bare: None) -> None:
     done = CliRunner().invoke(cli, ["preview", "tabletop.yaml"])
 
-    assert isinstance(done.exception, ConfigError)
-    assert install_command("preview") in str(done.exception)
+    assert isinstance(done.exception, errors.ConfigError)
+    assert distribution.install_command("preview") in str(done.exception)
     assert "contact-sheet" in str(done.exception)

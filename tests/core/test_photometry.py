@@ -41,10 +41,17 @@ def test_intensity_over_all_directions_sums_to_the_flux(light: Light) -> None:
     )
 
 
-def test_a_sun_has_no_flux() -> None:
-    """It is at infinity: only what arrives is known."""
+def test_a_sun_has_no_flux_and_a_ball_no_luminance() -> None:
+    """500 lx at 3 m are 4500 cd; 60 cd of 0.6 m^2 are 100 cd/m^2."""
     with pytest.raises(ValueError, match="not a flux"):
         photometry.flux_to_intensity_cd(Light("s", "sun"), 100.0)
+
+    assert photometry.illuminance_to_intensity_cd(SPHERE, 500.0, 3.0) == 4500.0
+
+    panel = Light("r", "rectangle", intensity_cd=60.0, size_m=(1.2, 0.5))
+    assert photometry.luminance_cd_m2(panel) == pytest.approx(100.0)
+    with pytest.raises(ValueError, match="no panel"):
+        photometry.luminance_cd_m2(SPHERE)
 
 
 @pytest.mark.parametrize("distance_m", [0.3, 1.0, 7.0])
@@ -65,19 +72,6 @@ def test_panels_give_the_illuminance_that_was_asked_for(distance_m: float) -> No
                 lambda r: 2.0 * math.pi * r * arriving(r, 0.0), 0.0, light.radius_m
             )
         assert photometry.luminance_cd_m2(lit) * per_luminance == pytest.approx(500.0, rel=1e-6)
-
-
-def test_balls_follow_the_inverse_square_law() -> None:
-    """500 lx at 3 m are 4500 cd."""
-    assert photometry.illuminance_to_intensity_cd(SPHERE, 500.0, 3.0) == 4500.0
-
-
-def test_only_panels_have_a_luminance() -> None:
-    """60 cd of 0.6 m^2 are 100 cd/m^2; a point has none."""
-    panel = Light("r", "rectangle", intensity_cd=60.0, size_m=(1.2, 0.5))
-    assert photometry.luminance_cd_m2(panel) == pytest.approx(100.0)
-    with pytest.raises(ValueError, match="no panel"):
-        photometry.luminance_cd_m2(SPHERE)
 
 
 @pytest.mark.parametrize("direction", [(0.0, 0.0, -1.0), (0.6, 0.0, -0.8), (0.0, -1.0, 0.0)])

@@ -11,20 +11,16 @@ from gen_data.core.plugins import PluginTable
 TABLE = PluginTable("noun", {"fraction": "fractions:Fraction", "decimal": "decimal:Decimal"})
 
 
-def test_a_plug_in_is_loaded_by_its_name() -> None:
+def test_a_plug_in_is_loaded_by_its_name_and_an_unknown_name_told_with_all() -> None:
     from fractions import Fraction
 
     assert TABLE.load("fraction") is Fraction
 
-
-def test_names_are_sorted() -> None:
     assert TABLE.names() == ("decimal", "fraction")
     assert list(TABLE) == ["decimal", "fraction"]
     assert "decimal" in TABLE
     assert "float" not in TABLE
 
-
-def test_an_unknown_name_is_told_with_all_known_ones() -> None:
     with pytest.raises(ConfigError) as caught:
         TABLE.load("fractoin")
 
@@ -80,16 +76,13 @@ def test_a_complete_plug_in_is_loaded() -> None:
     assert SQUARES.load("complete") is Complete
 
 
-@pytest.mark.parametrize(
-    ("name", "fault"),
-    [
-        ("lacking", r"square 'lacking': .*:Lacking lacks area; see .*interfaces.Square"),
-        ("misnamed", r'Misnamed needs a field `type: Literal\["misnamed"\] = "misnamed"`'),
-        ("plain", "Plain cannot be read from YAML: derive it from .*Strict"),
-        ("gone", "square 'gone': no_such_module:Class cannot be imported: No module named"),
-        ("absent", "square 'absent': .*:NoSuchClass cannot be imported: .*NoSuchClass"),
-    ],
-)
+@pytest.mark.parametrize(("name", "fault"), [
+    ("lacking", r"square 'lacking': .*:Lacking lacks area; see .*interfaces.Square"),
+    ("misnamed", r'Misnamed needs a field `type: Literal\["misnamed"\] = "misnamed"`'),
+    ("plain", "Plain cannot be read from YAML: derive it from .*Strict"),
+    ("gone", "square 'gone': no_such_module:Class cannot be imported: No module named"),
+    ("absent", "square 'absent': .*:NoSuchClass cannot be imported: .*NoSuchClass"),
+])  # fmt: skip
 def test_a_class_that_is_no_plug_in_is_refused_with_the_reason(name: str, fault: str) -> None:
     """When it is loaded, not when the missing member is used."""
     with pytest.raises(ConfigError, match=fault):

@@ -29,11 +29,10 @@ class Strict:
         self.__dict__["own"].Parse(data, is_final)
 
 
-@pytest.mark.parametrize(
-    "start",
-    [b'<?xml version="0.0" ?>', b"<?xml version='2'?>", b'\xef\xbb\xbf<?xml version = "0.0"?>',
-     b'<?xml version="1.0"?>', b'<?xml version="1.1" encoding="utf-8"?>', b""],
-)  # fmt: skip
+@pytest.mark.parametrize("start", [
+    b'<?xml version="0.0" ?>', b"<?xml version='2'?>", b'\xef\xbb\xbf<?xml version = "0.0"?>',
+    b'<?xml version="1.0"?>', b'<?xml version="1.1" encoding="utf-8"?>', b"",
+])  # fmt: skip
 def test_any_version_is_read_as_version_1(start: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
     """Those of pybullet declare version 0.0, which newer parsers refuse; lines and columns stay."""
     monkeypatch.setattr(expat, "ParserCreate", Strict)

@@ -37,9 +37,16 @@ def assert_same_pose(a: SE3, b: SE3) -> None:
 
 @QUICK
 @given(poses)
-def test_a_pose_and_its_inverse_cancel(pose: SE3) -> None:
+def test_a_pose_and_its_inverse_cancel_and_its_matrix_gives_it_back(pose: SE3) -> None:
+    """All four branches of Shepperd's method; the scalar part is never negative."""
     assert_same_pose(pose.inverse() @ pose, IDENTITY)
     assert_same_pose(pose @ pose.inverse(), IDENTITY)
+
+    back = SE3.from_matrix(pose.matrix())
+
+    assert_same_pose(back, pose)
+    assert back.quaternion_wxyz[0] >= 0
+    assert math.hypot(*back.quaternion_wxyz) == pytest.approx(1.0, abs=1e-12)
 
 
 @QUICK
@@ -57,29 +64,15 @@ def test_composition_is_associative(a: SE3, b: SE3, c: SE3) -> None:
 
 
 @QUICK
-@given(poses)
-def test_a_matrix_gives_its_pose_back(pose: SE3) -> None:
-    """All four branches of Shepperd's method; the scalar part is never negative."""
-    back = SE3.from_matrix(pose.matrix())
-
-    assert_same_pose(back, pose)
-    assert back.quaternion_wxyz[0] >= 0
-    assert math.hypot(*back.quaternion_wxyz) == pytest.approx(1.0, abs=1e-12)
-
-
-@QUICK
 @given(quaternions())
-def test_rotation_matrices_agree_with_scipy(q: tuple[float, float, float, float]) -> None:
+def test_rotation_matrices_are_proper_and_agree_with_scipy(
+    q: tuple[float, float, float, float],
+) -> None:
     """An independent implementation; scipy puts the scalar last."""
     expected = Rotation.from_quat([q[1], q[2], q[3], q[0]]).as_matrix()
 
     np.testing.assert_allclose(SE3((0, 0, 0), q).rotation(), expected, atol=1e-12)
 
-
-@QUICK
-@given(quaternions())
-def test_rotations_are_proper(q: tuple[float, float, float, float]) -> None:
-    """Orthonormal, determinant +1."""
     rotation = SE3((0, 0, 0), q).rotation()
 
     np.testing.assert_allclose(rotation @ rotation.T, np.eye(3), atol=1e-12)

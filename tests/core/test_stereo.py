@@ -37,20 +37,15 @@ def test_disparity_is_focal_length_times_baseline_over_depth() -> None:
 
     assert disparity_px(depths_m, FOCAL_PX * BASELINE_M).tolist() == [[10.0, 5.0, 0.0]]
 
-
-def test_the_baseline_is_what_lies_between_the_cameras() -> None:
     assert baseline_m(*pair(SE3((0.54, 0.0, 0.0)))) == pytest.approx(0.54, abs=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("right", "why"),
-    [
-        (SE3((-0.2, 0.0, 0.0)), "to the right of"),
-        (SE3((0.2, 0.01, 0.0)), "below"),
-        (SE3((0.2, 0.0, 0.01)), "before the other"),
-        (SE3.about_z(0.01, (0.2, 0.0, 0.0)), "do not look the same way"),
-    ],
-)
+@pytest.mark.parametrize(("right", "why"), [
+    (SE3((-0.2, 0.0, 0.0)), "to the right of"),
+    (SE3((0.2, 0.01, 0.0)), "below"),
+    (SE3((0.2, 0.0, 0.01)), "before the other"),
+    (SE3.about_z(0.01, (0.2, 0.0, 0.0)), "do not look the same way"),
+])  # fmt: skip
 def test_cameras_that_are_no_rectified_pair_are_refused(right: SE3, why: str) -> None:
     """To the left, lower, farther ahead, or turned."""
     with pytest.raises(ValueError, match=why):
@@ -92,16 +87,13 @@ def test_what_the_other_camera_sees_agrees_with_lines_of_sight(sign: float) -> N
     assert (seen == (inside & ~met))[:, certain].all()
 
 
-def test_a_projector_may_reach_beyond_the_image() -> None:
+def test_a_projector_may_reach_beyond_the_image_and_nothing_is_seen_by_nobody() -> None:
     """Points beside its image are seen if one says so; column 4 has one half a pixel outside."""
     flat = np.full((2, 20), 5.0, np.float32)
 
     assert is_seen_by_both(flat, flat)[0].tolist() == [False] * 5 + [True] * 15
     assert is_seen_by_both(flat, flat, beyond=True).all()
 
-
-def test_nothing_is_seen_by_nobody() -> None:
-    """Where there is no surface there is none for the other camera either."""
     nothing = np.zeros((2, 6), np.float32)
 
     assert not is_seen_by_both(nothing, nothing, beyond=True).any()

@@ -60,13 +60,9 @@ def program(system: str, code: str) -> list[str]:
 
 def run(system: str, code: str, folder: Path) -> str:
     done = subprocess.run(
-        program(system, code),
-        cwd=folder,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+        program(system, code), cwd=folder, env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
     assert done.returncode == 0, done.stderr
     return done.stdout
 
@@ -125,12 +121,10 @@ def test_a_data_set_in_use_is_locked(system: str, tmp_path: Path) -> None:
 
     first = start()
     assert first.stdout.readline() == "True\n"  # type: ignore[union-attr]
-    second = start()
-    assert second.communicate()[0] == "False\n"
+    assert start().communicate()[0] == "False\n"
     first.kill()
     first.communicate()
-    third = start()
-    assert third.communicate()[0] == "True\n"
+    assert start().communicate()[0] == "True\n"
 
 
 def test_a_helper_ends_with_its_parent_where_no_kernel_ends_it(tmp_path: Path) -> None:
@@ -151,11 +145,9 @@ def test_a_helper_ends_with_its_parent_where_no_kernel_ends_it(tmp_path: Path) -
         child.wait()
     """
     parent = subprocess.Popen(
-        program("", code),
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        stdout=subprocess.PIPE,
+        program("", code), env={**os.environ, "PYTHONPATH": str(ROOT)}, stdout=subprocess.PIPE,
         text=True,
-    )
+    )  # fmt: skip
     assert parent.stdout is not None
     number = int(parent.stdout.readline())
     children = Path(f"/proc/{number}/task/{number}/children")

@@ -11,13 +11,11 @@ def draw_desk(seed: int) -> dict[str, object]:
     """A family in small: a range, a whole number, an option, a chance, and what follows them."""
     rng = variant_rng("desk", seed)
     return {
-        "width_m": rng.between(1.2, 1.8, "width_m"),
-        "shelves": rng.whole(2, 6, "shelves"),
+        "width_m": rng.between(1.2, 1.8, "width_m"), "shelves": rng.whole(2, 6, "shelves"),
         "style": rng.choose(("oak", "steel", "oak"), "style"),
-        "drawers": rng.chance(0.5, "drawers"),
-        "panel": rng.turn((False, True), "panel"),
+        "drawers": rng.chance(0.5, "drawers"), "panel": rng.turn((False, True), "panel"),
         "rest": rng.between(0.0, 1.0),
-    }
+    }  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -37,7 +35,7 @@ def test_a_value_asked_for_moves_no_other(name: str, asked: DrawnValue, value: o
     assert drawn[name].value == asked
 
 
-def test_names_change_no_draw() -> None:
+def test_names_change_no_draw_and_outside_of_assets_nothing_is_recorded() -> None:
     """A stream with names is the stream without them."""
     named, plain = variant_rng("desk", 7), variant_rng("desk", 7)
     assert named.between(2.0, 3.0, "a") == plain.between(2.0, 3.0)
@@ -46,6 +44,10 @@ def test_names_change_no_draw() -> None:
     assert named.whole(2, 7, "d") == int(plain.between(2, 7))
     assert named.turn("xyz", "e") == "y"
     assert named.random() == plain.random()
+
+    rng = variant_rng("square", 0)
+    assert isinstance(rng, VariantRng)
+    assert rng.drawing is None
 
 
 def test_draws_are_recorded_in_order_with_all_possible_values() -> None:
@@ -59,18 +61,15 @@ def test_draws_are_recorded_in_order_with_all_possible_values() -> None:
     assert drawn["drawers"].options == drawn["panel"].options == ("false", "true")
 
 
-@pytest.mark.parametrize(
-    ("name", "asked", "message"),
-    [
-        ("width_m", 1.81, "width_m expects a number from 1.2 to 1.8"),
-        ("width_m", "wide", "width_m expects a number from 1.2 to 1.8"),
-        ("width_m", (1.3, 1.4), "width_m expects a number from 1.2 to 1.8"),
-        ("shelves", 6, "shelves is none of 2, 3, 4, 5"),
-        ("shelves", 2.5, "shelves is none of 2, 3, 4, 5"),
-        ("style", "steal", "style is none of oak, steel (did you mean 'steel'?)"),
-        ("drawers", 1, "drawers is none of false, true"),
-    ],
-)
+@pytest.mark.parametrize(("name", "asked", "message"), [
+    ("width_m", 1.81, "width_m expects a number from 1.2 to 1.8"),
+    ("width_m", "wide", "width_m expects a number from 1.2 to 1.8"),
+    ("width_m", (1.3, 1.4), "width_m expects a number from 1.2 to 1.8"),
+    ("shelves", 6, "shelves is none of 2, 3, 4, 5"),
+    ("shelves", 2.5, "shelves is none of 2, 3, 4, 5"),
+    ("style", "steal", "style is none of oak, steel (did you mean 'steel'?)"),
+    ("drawers", 1, "drawers is none of false, true"),
+])  # fmt: skip
 def test_impossible_values_are_refused(name: str, asked: DrawnValue, message: str) -> None:
     """The message has the range, or all options and the nearest."""
     with drawing({name: asked}), pytest.raises(ValueError, match=f"^{re.escape(message)}$"):
@@ -87,10 +86,3 @@ def test_the_first_stream_decides_which_streams_belong_to_the_asset() -> None:
     assert own == again == 0.2
     assert 0.2 not in (content, after)
     assert list(drawn) == ["height_m"]
-
-
-def test_a_generator_outside_of_an_asset_records_nothing() -> None:
-    """Streams of templates and randomizers have no parameters."""
-    rng = variant_rng("square", 0)
-    assert isinstance(rng, VariantRng)
-    assert rng.drawing is None

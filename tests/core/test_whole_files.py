@@ -55,16 +55,14 @@ def test_an_interrupted_file_leaves_nothing(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
-def test_a_full_disk_leaves_no_half_of_a_contact_sheet(tmp_path: Path, full_disk: None) -> None:
+def test_a_full_disk_leaves_no_half_of_a_report_or_contact_sheet(
+    tmp_path: Path, full_disk: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
     noise = np.random.default_rng(1).integers(0, 256, (64, 64, 3), np.uint8)
     with pytest.raises(StorageError, match="No space left"):
         write_sheet(noise, tmp_path / "sheet.png")
     assert not list(tmp_path.iterdir())
 
-
-def test_a_full_disk_leaves_no_half_of_a_report(
-    tmp_path: Path, full_disk: None, monkeypatch: pytest.MonkeyPatch
-) -> None:
     monkeypatch.setattr("gen_data.report.html_page.format_page", lambda sets: "<p>" * 1000)
     with pytest.raises(StorageError, match="No space left"):
         report_command._write(tmp_path / "report.html", [])

@@ -84,10 +84,9 @@ def test_links_lead_to_files(page: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "page",
-    [page for page in [*PAGES, *TUTORIALS] if page not in OLD_NAMES],
+    "page", [page for page in [*PAGES, *TUTORIALS] if page not in OLD_NAMES],
     ids=lambda page: page.name,
-)
+)  # fmt: skip
 def test_modules_exist(page: Path) -> None:
     """Dotted names below ``gen_data``, and paths of files in the repository."""
     text = page.read_text("utf-8")

@@ -16,14 +16,9 @@ EXAMPLES = ROOT / "examples"
 def run(folder: Path, *arguments: str, path: str = "") -> str:
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), path])}
     done = subprocess.run(
-        [sys.executable, *arguments],
-        cwd=folder,
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=600,
-    )
+        [sys.executable, *arguments], cwd=folder, env=environment, capture_output=True, text=True,
+        check=False, timeout=600,
+    )  # fmt: skip
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 
@@ -31,9 +26,7 @@ def run(folder: Path, *arguments: str, path: str = "") -> str:
 @pytest.mark.slow
 def test_the_first_data_set_is_drawn(tmp_path: Path) -> None:
     """One line per box, and a picture."""
-    lines = run(tmp_path, str(EXAMPLES / "first_dataset.py")).splitlines()
-
-    assert len(lines) > 4
+    assert len(run(tmp_path, str(EXAMPLES / "first_dataset.py")).splitlines()) > 4
     assert (tmp_path / "first_dataset.png").stat().st_size > 10_000
 
 

@@ -152,10 +152,9 @@ def test_pictures_are_drawn_and_small() -> None:
 
 
 @pytest.mark.parametrize(
-    "job",
-    [job for job in pictures.find_jobs() if job.kind in ("sensor", "renderer")][::12],
+    "job", [job for job in pictures.find_jobs() if job.kind in ("sensor", "renderer")][::12],
     ids=lambda job: job.path.stem,
-)
+)  # fmt: skip
 def test_configurations_of_strips_are_valid(job: pictures.Job) -> None:
     """Fields and values exist; the others are checked when they are drawn."""
     strip = job.entry

@@ -34,12 +34,9 @@ def gen_data(*arguments: str, cwd: Path, **variables: str) -> subprocess.Complet
         for stream in streams:
             stream.touch()
         request = {
-            "arguments": arguments,
-            "cwd": str(cwd),
-            "environment": {**environment(), **variables},
-            "stdout": str(streams[0]),
-            "stderr": str(streams[1]),
-        }
+            "arguments": arguments, "cwd": str(cwd), "environment": {**environment(), **variables},
+            "stdout": str(streams[0]), "stderr": str(streams[1]),
+        }  # fmt: skip
         code = _answer(_server(), json.dumps(request))
         texts = [stream.read_text(encoding="utf-8") for stream in streams]
     return subprocess.CompletedProcess(command(*arguments), code, *texts)
@@ -49,13 +46,9 @@ def gen_data(*arguments: str, cwd: Path, **variables: str) -> subprocess.Complet
 def _server() -> subprocess.Popen[str]:
     """The process that forks commands; it ends when this one closes its input."""
     return subprocess.Popen(
-        [sys.executable, "-m", "tests.end_to_end.cli_server"],
-        cwd=ROOT,
-        env=environment(),
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
-    )
+        [sys.executable, "-m", "tests.end_to_end.cli_server"], cwd=ROOT, env=environment(),
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+    )  # fmt: skip
 
 
 def _answer(server: subprocess.Popen[str], request: str) -> int:

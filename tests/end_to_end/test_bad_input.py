@@ -21,25 +21,20 @@ def assert_refused(tmp_path: Path, arguments: tuple[str, ...], code: int, *texts
     assert not list(tmp_path.rglob("*.png"))
 
 
-@pytest.mark.parametrize(
-    ("arguments", "texts"),
-    [
-        (("--config", "tabletop.yaml", "--n", "0"), ("n: 0",)),
-        (("--config", "tabletop.yaml", "--n", "-3"), ("n: -3",)),
-        (("--config", "tabletop.yaml"), ("--n is missing",)),
-        (("--n", "2"), ("--config is missing",)),
-        (("--seed", "3", "plan", "shelf.yaml", "--n", "2"), ("--seed cannot precede a command",)),
-        (("--config", "tabletop.yaml", "--n", "x"), ("--n",)),
-        (("--config", "tabletop.yaml", *JOB, "--seed", "-1"), ("--seed: -1 is negative",)),
-        (("--config", "tabletop.yaml", *JOB, "--workers", "-1"), ("workers: -1",)),
-        (("--config", "tabletop.yaml", *JOB, "--without", "colour"), ("did you mean 'colors'?",)),
-        (("--config", "tabletop.yaml", *JOB, "--set", "views_per_scene"), ("KEY=VALUE",)),
-        (
-            ("--config", "tabletop.yaml", *JOB, "--set", f"{COUNT}={{uniform_integer: [9, 2]}}"),
-            ("[9, 2]", "low <= high"),
-        ),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("arguments", "texts"), [
+    (("--config", "tabletop.yaml", "--n", "0"), ("n: 0",)),
+    (("--config", "tabletop.yaml", "--n", "-3"), ("n: -3",)),
+    (("--config", "tabletop.yaml"), ("--n is missing",)),
+    (("--n", "2"), ("--config is missing",)),
+    (("--seed", "3", "plan", "shelf.yaml", "--n", "2"), ("--seed cannot precede a command",)),
+    (("--config", "tabletop.yaml", "--n", "x"), ("--n",)),
+    (("--config", "tabletop.yaml", *JOB, "--seed", "-1"), ("--seed: -1 is negative",)),
+    (("--config", "tabletop.yaml", *JOB, "--workers", "-1"), ("workers: -1",)),
+    (("--config", "tabletop.yaml", *JOB, "--without", "colour"), ("did you mean 'colors'?",)),
+    (("--config", "tabletop.yaml", *JOB, "--set", "views_per_scene"), ("KEY=VALUE",)),
+    (("--config", "tabletop.yaml", *JOB, "--set", f"{COUNT}={{uniform_integer: [9, 2]}}"),
+     ("[9, 2]", "low <= high")),
+])  # fmt: skip
 def test_misuse_exits_2(tmp_path: Path, arguments: tuple[str, ...], texts: tuple[str, ...]) -> None:
     """Usage and configuration errors name the argument or field, and what was expected."""
     assert_refused(tmp_path, arguments, 2, *texts)
@@ -83,23 +78,17 @@ def user_assets(folder: Path) -> tuple[str, ...]:
 TETRAHEDRON = "v 0 0 0\nv .1 0 0\nv 0 .1 0\nv 0 0 .1\nf 1 2 3\nf 1 2 4\nf 1 3 4\nf 2 3 4\n"
 
 
-@pytest.mark.parametrize(
-    ("files", "texts"),
-    [
-        (
-            {
-                "bad.obj": ("mtllib bad.mtl\nusemtl m\n" + TETRAHEDRON).encode(),
-                "bad.mtl": b"newmtl m\nmap_Kd cracked.PNG\n",
-                "cracked.PNG": b"\x89PNG\r\n\x1a\n" + bytes(range(200)),
-            },
-            ("cracked.PNG", "unreadable image", "save it again"),
-        ),
-        ({"bad.glb": b"glTF\x02\0\0\0" + bytes(range(99))}, ("bad.glb", "malformed glTF")),
-        ({"bad.usdc": b"PXR-USDC" + bytes(range(256)) * 4}, ("bad.usdc", "unreadable USD")),
-        ({"bad.usda": b"#usda 1.0\ndef Mesh {{{"}, ("bad.usda", "unreadable USD")),
-    ],
-    ids=["png", "glb", "usdc", "usda"],
-)
+@pytest.mark.parametrize(("files", "texts"), [
+    ({
+         "bad.obj": ("mtllib bad.mtl\nusemtl m\n" + TETRAHEDRON).encode(),
+         "bad.mtl": b"newmtl m\nmap_Kd cracked.PNG\n",
+         "cracked.PNG": b"\x89PNG\r\n\x1a\n" + bytes(range(200)),
+     },
+     ("cracked.PNG", "unreadable image", "save it again")),
+    ({"bad.glb": b"glTF\x02\0\0\0" + bytes(range(99))}, ("bad.glb", "malformed glTF")),
+    ({"bad.usdc": b"PXR-USDC" + bytes(range(256)) * 4}, ("bad.usdc", "unreadable USD")),
+    ({"bad.usda": b"#usda 1.0\ndef Mesh {{{"}, ("bad.usda", "unreadable USD")),
+], ids=["png", "glb", "usdc", "usda"])  # fmt: skip
 def test_corrupt_files_of_assets_exit_with_3(
     tmp_path: Path, files: dict[str, bytes], texts: tuple[str, ...]
 ) -> None:

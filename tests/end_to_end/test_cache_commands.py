@@ -53,9 +53,7 @@ def test_clear_removes_the_named_cache_only(caches: Path) -> None:
 
 def test_clear_removes_every_cache_and_no_result(caches: Path) -> None:
     """Shards that wait for their upload are results; assets come back when they are used."""
-    done = CliRunner().invoke(cache, ["clear"])
-
-    assert done.exit_code == 0
+    assert CliRunner().invoke(cache, ["clear"]).exit_code == 0
     assert not list((caches / "gen-data").glob("format-*"))
     assert (caches / "gen-data/staging/s3/shard/image.png").stat().st_size == 1000
     assert len(open_library().mesh("mug?seed=1").faces) > 0

@@ -38,13 +38,9 @@ def test_killed_run_resumes_to_the_same_bytes(dataset: Path, tmp_path: Path) -> 
     """After SIGKILL to the whole process group, the same command resumes."""
     arguments = command(*MAIN_JOB, "--workers", "1", "--out", "killed")
     process = subprocess.Popen(
-        arguments,
-        cwd=tmp_path,
-        env=environment(),
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-        start_new_session=True,
-    )
+        arguments, cwd=tmp_path, env=environment(), stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL, start_new_session=True,
+    )  # fmt: skip
     deadline_s = time.monotonic() + 300
     while not list((tmp_path / "killed" / "shards").glob("*.json")):
         assert process.poll() is None, "the run ended before it could be killed"
@@ -70,8 +66,7 @@ def test_every_object_is_labelled_where_it_is_seen(dataset: Path) -> None:
             shard = dataset / "shards" / f"{index // 5:06d}" / "color" / "instance"
             ids = np.asarray(Image.open(shard / f"{index:09d}.png"))
             for annotation in (a for a in coco["annotations"] if a["image_id"] == image["id"]):
-                instance_id = annotation["instance_id"]
-                rows, columns = np.nonzero(ids == instance_id)
+                rows, columns = np.nonzero(ids == annotation["instance_id"])
                 x, y = int(columns.min()), int(rows.min())
                 box = [x, y, int(columns.max()) - x + 1, int(rows.max()) - y + 1]
                 assert (annotation["bbox"], annotation["area"]) == (box, len(rows))

@@ -57,15 +57,12 @@ def test_a_label_map_makes_a_data_set_of_the_users_classes(dataset: Path, tmp_pa
     assert json.loads((tmp_path / "out/plan.json").read_text())["config"]["labels"]["map"]
 
 
-@pytest.mark.parametrize(
-    ("arguments", "code", "text"),
-    [
-        (("-f", "coconut"), 2, "unknown exporter 'coconut'.*did you mean 'coco'"),
-        (("-f", "kitti_stereo"), 2, "camera"),
-        (("-f", "birdseye"), 2, "reads the annotations .*which the data set does not have"),
-        (("-f", "coco", "--label-map", "bad.yaml"), 2, "bad.yaml:1:9: others: unknown value"),
-    ],
-)
+@pytest.mark.parametrize(("arguments", "code", "text"), [
+    (("-f", "coconut"), 2, "unknown exporter 'coconut'.*did you mean 'coco'"),
+    (("-f", "kitti_stereo"), 2, "camera"),
+    (("-f", "birdseye"), 2, "reads the annotations .*which the data set does not have"),
+    (("-f", "coco", "--label-map", "bad.yaml"), 2, "bad.yaml:1:9: others: unknown value"),
+])  # fmt: skip
 def test_what_cannot_be_exported_is_refused_before_anything_is_written(
     dataset: Path, tmp_path: Path, arguments: tuple[str, ...], code: int, text: str
 ) -> None:
@@ -158,31 +155,27 @@ DEEP = "[" * 100_000
 S = "shards/000000"
 
 
-@pytest.mark.parametrize(
-    ("name", "text"),
-    [
-        ("plan.json", None),
-        ("plan.json", ""),
-        ("plan.json", "[]"),
-        ("plan.json", DEEP),
-        ("plan.json", "a folder"),
-        ("plan.json", '"format_version":99'),
-        ("manifest.json", None),
-        ("manifest.json", "{}"),
-        ("manifest.json", '{"info": [], "dataset_id": ""}'),
-        ("manifest.json", DEEP),
-        ("manifest.json", "a folder"),
-        (f"{S}/labels.jsonl", None),
-        (f"{S}/labels.jsonl", ""),
-        (f"{S}/labels.jsonl", "null\n"),
-        (f"{S}/labels.jsonl", "{}\n"),
-        (f"{S}/labels.jsonl", DEEP + "\n"),
-        (f"{S}/scenes.jsonl", None),
-        (f"{S}/scenes.jsonl", "{}\n"),
-        (f"{S}/scenes.jsonl", "NaN\n"),
-    ],
-    ids=lambda value: str(value)[:30],
-)
+@pytest.mark.parametrize(("name", "text"), [
+    ("plan.json", None),
+    ("plan.json", ""),
+    ("plan.json", "[]"),
+    ("plan.json", DEEP),
+    ("plan.json", "a folder"),
+    ("plan.json", '"format_version":99'),
+    ("manifest.json", None),
+    ("manifest.json", "{}"),
+    ("manifest.json", '{"info": [], "dataset_id": ""}'),
+    ("manifest.json", DEEP),
+    ("manifest.json", "a folder"),
+    (f"{S}/labels.jsonl", None),
+    (f"{S}/labels.jsonl", ""),
+    (f"{S}/labels.jsonl", "null\n"),
+    (f"{S}/labels.jsonl", "{}\n"),
+    (f"{S}/labels.jsonl", DEEP + "\n"),
+    (f"{S}/scenes.jsonl", None),
+    (f"{S}/scenes.jsonl", "{}\n"),
+    (f"{S}/scenes.jsonl", "NaN\n"),
+], ids=lambda value: str(value)[:30])  # fmt: skip
 def test_damaged_files_are_named(
     dataset: Path, tmp_path: Path, name: str, text: str | None
 ) -> None:

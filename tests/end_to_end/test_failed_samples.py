@@ -14,11 +14,9 @@ from gen_data.runner.deep_verify import find_invalid_samples
 from gen_data.runner.verify import verify
 
 TINY = [
-    "sensors.color.size_px=[48, 32]",
-    "shard_size=2",
-    "randomizers.clutter.count=2",
+    "sensors.color.size_px=[48, 32]", "shard_size=2", "randomizers.clutter.count=2",
     "splits={train: 1}",
-]
+]  # fmt: skip
 FAILS = 1
 
 
@@ -50,8 +48,8 @@ def test_the_plan_is_that_of_a_run_without_the_options(folder: Path) -> None:
     assert not {"skip_failed", "sample_timeout_s"} & config.keys()
 
 
-def test_an_opened_data_set_has_the_other_samples(folder: Path) -> None:
-    """Their numbers are those of the plan."""
+def test_the_data_set_and_its_loader_have_the_other_samples_and_all_are_valid(folder: Path) -> None:
+    """Their numbers are those of the plan; each comes once per epoch."""
     data = gen_data.open(folder)
 
     assert len(data) == 3
@@ -60,21 +58,16 @@ def test_an_opened_data_set_has_the_other_samples(folder: Path) -> None:
     with pytest.raises(SampleIndexError):
         data[3]
 
-
-def test_a_loader_gives_the_other_samples(folder: Path) -> None:
-    """Each of them once per epoch."""
     loader = gen_data.Loader(gen_data.open(folder), number_of, batch_size=1)
 
     assert [batch[0] for batch in loader] == [0, 2, 3]
 
+    assert verify(folder, full=True).samples == 3
+    assert list(find_invalid_samples(folder)) == []
+
 
 def number_of(sample: gen_data.Sample) -> int:
     return sample.index
-
-
-def test_every_sample_of_the_data_set_is_valid(folder: Path) -> None:
-    assert verify(folder, full=True).samples == 3
-    assert list(find_invalid_samples(folder)) == []
 
 
 @pytest.mark.parametrize("form", ["coco", "yolo", "voc"])

@@ -139,21 +139,18 @@ def test_the_comments_of_init_tell_how_to_omit_the_robot(template: str, tmp_path
     assert ("'arm'" in text) == (template == "tabletop")
 
 
-@pytest.mark.parametrize(
-    ("arguments", "code", "text"),
-    [
-        (("--template", "tabeltop"), 2, "unknown configuration.*did you mean 'tabletop'"),
-        (("--mesh", "none.stl"), 3, "none.stl: no such file"),
-        (("--mesh", "junk.stl"), 3, "junk.stl: cut off"),
-        (("--mesh", "junk.xyz"), 3, "junk.xyz: is not a readable mesh; expected one of .*obj"),
-        (("--mesh", "box.off"), 3, "box.off: is not a readable mesh"),
-        (("--mesh", "empty"), 3, "empty: has no mesh"),
-        (("--mesh", "bare.obj"), 3, r"bare.obj: .*missing file bare.mtl"),
-        (("--mesh", "box.stl", "--class", "a", "--class", "b"), 2, "2 names for 1 mesh"),
-        (("--class", "a"), 2, "expected --mesh with it"),
-        (("--template", "kitti_rig", "--mesh", "junk.stl"), 2, "take no objects of your own"),
-    ],
-)
+@pytest.mark.parametrize(("arguments", "code", "text"), [
+    (("--template", "tabeltop"), 2, "unknown configuration.*did you mean 'tabletop'"),
+    (("--mesh", "none.stl"), 3, "none.stl: no such file"),
+    (("--mesh", "junk.stl"), 3, "junk.stl: cut off"),
+    (("--mesh", "junk.xyz"), 3, "junk.xyz: is not a readable mesh; expected one of .*obj"),
+    (("--mesh", "box.off"), 3, "box.off: is not a readable mesh"),
+    (("--mesh", "empty"), 3, "empty: has no mesh"),
+    (("--mesh", "bare.obj"), 3, r"bare.obj: .*missing file bare.mtl"),
+    (("--mesh", "box.stl", "--class", "a", "--class", "b"), 2, "2 names for 1 mesh"),
+    (("--class", "a"), 2, "expected --mesh with it"),
+    (("--template", "kitti_rig", "--mesh", "junk.stl"), 2, "take no objects of your own"),
+])  # fmt: skip
 def test_init_refuses_what_it_cannot_write(
     tmp_path: Path, arguments: tuple[str, ...], code: int, text: str
 ) -> None:
@@ -204,15 +201,12 @@ def test_formats_lists_every_exporter(tmp_path: Path) -> None:
         assert any(line.split()[:1] == [name] and len(line.split()) > 3 for line in lines), name
 
 
-@pytest.mark.parametrize(
-    ("name", "text"),
-    [
-        ("log_uniform", "log"),
-        ("kitti", "far_m"),
-        ("street_sequence", "extends"),
-        ("tabletop", "template tabletop"),
-    ],
-)
+@pytest.mark.parametrize(("name", "text"), [
+    ("log_uniform", "log"),
+    ("kitti", "far_m"),
+    ("street_sequence", "extends"),
+    ("tabletop", "template tabletop"),
+])  # fmt: skip
 def test_describe_knows_all_that_is_configured(name: str, text: str, tmp_path: Path) -> None:
     done = gen_data("describe", name, cwd=tmp_path)
 

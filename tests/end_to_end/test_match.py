@@ -100,18 +100,15 @@ def test_a_fitted_configuration_can_be_planned(folder: Path) -> None:
     assert done.returncode == 0, done.stderr
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (("absent", "configs/base.yaml"), "absent: is no folder; expected one"),
-        (("real", "configs/base.yaml", "--camera", "colour"), "--camera: there is no such sensor"),
-        (("real", "configs/base.yaml", "--scenes", "1"), "scenes: 1 is too few; expected"),
-        (("real", "configs/base.yaml", "--out", "a.txt"), "a.txt; expected a name"),
-        (("real", "configs/base.yaml", "--out", "configs/base.yaml"), "configuration itself"),
-        (("real", "real"), "real: is a folder; expected a configuration to extend"),
-        (("s3://bucket/real", "configs/base.yaml"), "s3://bucket/real"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("arguments", "message"), [
+    (("absent", "configs/base.yaml"), "absent: is no folder; expected one"),
+    (("real", "configs/base.yaml", "--camera", "colour"), "--camera: there is no such sensor"),
+    (("real", "configs/base.yaml", "--scenes", "1"), "scenes: 1 is too few; expected"),
+    (("real", "configs/base.yaml", "--out", "a.txt"), "a.txt; expected a name"),
+    (("real", "configs/base.yaml", "--out", "configs/base.yaml"), "configuration itself"),
+    (("real", "real"), "real: is a folder; expected a configuration to extend"),
+    (("s3://bucket/real", "configs/base.yaml"), "s3://bucket/real"),
+])  # fmt: skip
 def test_wrong_arguments_are_told(
     unmatched: Path, arguments: tuple[str, ...], message: str
 ) -> None:

@@ -10,18 +10,15 @@ from gen_data.core.errors import GenDataError, did_you_mean, one_of
 from tests.end_to_end.running import gen_data as run
 
 
-@pytest.mark.parametrize(
-    ("arguments", "expected"),
-    [
-        (("generate", "tabletop.yaml", "--n", "3"), "gen-data --config tabletop.yaml --n 3"),
-        (("run", "--config", "tabletop.yaml", "--n", "3"), "gen-data --config tabletop.yaml --n 3"),
-        (("tabletop.yaml", "-n", "3"), "gen-data --config tabletop.yaml -n 3"),
-        (("tabletop",), "gen-data --config tabletop"),
-        (("mine.yaml", "--n", "3"), "gen-data --config mine.yaml --n 3"),
-        (("verfy", "out/x"), "did you mean 'verify'?"),
-        (("frobnicate",), "there is no command 'frobnicate'; see: gen-data --help"),
-    ],
-)
+@pytest.mark.parametrize(("arguments", "expected"), [
+    (("generate", "tabletop.yaml", "--n", "3"), "gen-data --config tabletop.yaml --n 3"),
+    (("run", "--config", "tabletop.yaml", "--n", "3"), "gen-data --config tabletop.yaml --n 3"),
+    (("tabletop.yaml", "-n", "3"), "gen-data --config tabletop.yaml -n 3"),
+    (("tabletop",), "gen-data --config tabletop"),
+    (("mine.yaml", "--n", "3"), "gen-data --config mine.yaml --n 3"),
+    (("verfy", "out/x"), "did you mean 'verify'?"),
+    (("frobnicate",), "there is no command 'frobnicate'; see: gen-data --help"),
+])  # fmt: skip
 def test_what_is_no_command_is_told_what_was_probably_meant(
     arguments: tuple[str, ...], expected: str, tmp_path: Path
 ) -> None:
@@ -31,17 +28,14 @@ def test_what_is_no_command_is_told_what_was_probably_meant(
     assert len(done.stderr.splitlines()) == 1
 
 
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        ("verify", "nosuch"),
-        ("certify", "nosuch"),
-        ("export", "nosuch", "-f", "coco", "-o", "x"),
-        ("rerender", "nosuch", "-o", "x"),
-        ("report", "nosuch"),
-        ("repair", "nosuch"),
-    ],
-)
+@pytest.mark.parametrize("arguments", [
+    ("verify", "nosuch"),
+    ("certify", "nosuch"),
+    ("export", "nosuch", "-f", "coco", "-o", "x"),
+    ("rerender", "nosuch", "-o", "x"),
+    ("report", "nosuch"),
+    ("repair", "nosuch"),
+])  # fmt: skip
 def test_a_missing_folder_is_called_so(arguments: tuple[str, ...], tmp_path: Path) -> None:
     """With the nearest name beside it."""
     (tmp_path / "nosuchh").mkdir()
@@ -99,31 +93,26 @@ def test_many_names_are_the_nearest_five() -> None:
 DATA = gen_data.Dataset("tabletop.yaml", n=2)
 
 
-@pytest.mark.parametrize(
-    "call",
-    [
-        lambda: gen_data.Dataset("tabletop.yaml", n=1.5),
-        lambda: gen_data.Dataset("tabletop.yaml", n="5"),
-        lambda: gen_data.Dataset("tabletop.yaml", seed=float("nan")),
-        lambda: gen_data.Dataset("tabletop.yaml", seed=1.5),
-        lambda: gen_data.generate("tabletop.yaml", 1.5, out="x"),
-        lambda: gen_data.generate("tabletop.yaml", "5", out="x"),
-        lambda: gen_data.open(b"x"),
-        lambda: gen_data.open("a\0b"),
-        lambda: gen_data.open("ftp://host/data"),
-        lambda: gen_data.open(None),
-        lambda: gen_data.Dataset(7),
-        lambda: gen_data.Dataset("tabletop.yaml", n=2)["val"],
-        lambda: gen_data.Dataset("tabletop.yaml", n=2)[0.5],
-        lambda: gen_data.Dataset("tabletop.yaml", n=2).relabelled([1]),
-        lambda: gen_data.Loader(DATA, str, batch_size=1.5),
-        lambda: gen_data.Loader(DATA, str, rank="0"),
-        lambda: gen_data.Loader(DATA, str).load_state_dict({"x": 1}),
-        lambda: gen_data.Loader(DATA, str).load_state_dict(
-            {"epoch": "1", "position": 0, "seed": 0}
-        ),
-    ],
-)
+@pytest.mark.parametrize("call", [
+    lambda: gen_data.Dataset("tabletop.yaml", n=1.5),
+    lambda: gen_data.Dataset("tabletop.yaml", n="5"),
+    lambda: gen_data.Dataset("tabletop.yaml", seed=float("nan")),
+    lambda: gen_data.Dataset("tabletop.yaml", seed=1.5),
+    lambda: gen_data.generate("tabletop.yaml", 1.5, out="x"),
+    lambda: gen_data.generate("tabletop.yaml", "5", out="x"),
+    lambda: gen_data.open(b"x"),
+    lambda: gen_data.open("a\0b"),
+    lambda: gen_data.open("ftp://host/data"),
+    lambda: gen_data.open(None),
+    lambda: gen_data.Dataset(7),
+    lambda: gen_data.Dataset("tabletop.yaml", n=2)["val"],
+    lambda: gen_data.Dataset("tabletop.yaml", n=2)[0.5],
+    lambda: gen_data.Dataset("tabletop.yaml", n=2).relabelled([1]),
+    lambda: gen_data.Loader(DATA, str, batch_size=1.5),
+    lambda: gen_data.Loader(DATA, str, rank="0"),
+    lambda: gen_data.Loader(DATA, str).load_state_dict({"x": 1}),
+    lambda: gen_data.Loader(DATA, str).load_state_dict({"epoch": "1", "position": 0, "seed": 0}),
+])  # fmt: skip
 def test_misuse_from_python_is_one_of_our_errors(call: Any) -> None:
     """Not TypeError, KeyError or ValueError from inside."""
     with pytest.raises(GenDataError) as error:
@@ -144,14 +133,11 @@ def data_set(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("text", "expected"),
-    [
-        ("kitty", "--format kitty: unknown exporter 'kitty'"),
-        ("{type: kitti, rectfy: true}", "--format '{type: kitti, rectfy: true}': rectfy: unknown"),
-        ("{type: kitti, cameras: [colr]}", "cameras: 'colr' fits no sensor"),
-    ],
-)
+@pytest.mark.parametrize(("text", "expected"), [
+    ("kitty", "--format kitty: unknown exporter 'kitty'"),
+    ("{type: kitti, rectfy: true}", "--format '{type: kitti, rectfy: true}': rectfy: unknown"),
+    ("{type: kitti, cameras: [colr]}", "cameras: 'colr' fits no sensor"),
+])  # fmt: skip
 def test_faults_of_formats_name_the_option(text: str, expected: str, data_set: Path) -> None:
     """Not the override that it becomes, nor JSON that nobody typed."""
     done = run("export", "small", "--out", "x", "--format", text, cwd=data_set)

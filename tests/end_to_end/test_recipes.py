@@ -188,14 +188,11 @@ def test_another_version_alone_has_the_exit_code_of_determinism(reader: Path) ->
     assert f"versions.gen-data: 9.8.7 made it, {__version__} is here; install" in lines[0]
 
 
-@pytest.mark.parametrize(
-    ("change", "fact"),
-    [
-        (lambda mesh: mesh.write_text(BLOCK.replace(".1", ".2")), "own.user/block: was changed"),
-        (lambda mesh: mesh.rename(mesh.with_name("other.obj")), "own.user/block: is missing"),
-        (lambda mesh: mesh.with_name("new.obj").write_text(BLOCK), "own: lacks user/new, which"),
-    ],
-)
+@pytest.mark.parametrize(("change", "fact"), [
+    (lambda mesh: mesh.write_text(BLOCK.replace(".1", ".2")), "own.user/block: was changed"),
+    (lambda mesh: mesh.rename(mesh.with_name("other.obj")), "own.user/block: is missing"),
+    (lambda mesh: mesh.with_name("new.obj").write_text(BLOCK), "own: lacks user/new, which"),
+])  # fmt: skip
 def test_a_mesh_of_the_author_that_is_another_one_is_named(
     reader: Path, change: Any, fact: str
 ) -> None:
@@ -209,8 +206,7 @@ def test_a_mesh_of_the_author_that_is_another_one_is_named(
 
 def test_a_shard_that_differs_is_named_and_nothing_is_sealed(author: Path, reader: Path) -> None:
     """Again by the same command, which finds it on the disk."""
-    second = read_recipe(reader / "recipe.yaml").recipe.shards[1]
-    edit(reader, second, "f" * 64)
+    edit(reader, read_recipe(reader / "recipe.yaml").recipe.shards[1], "f" * 64)
 
     for _ in range(2):
         lines = refused(reader, gen_data.DeterminismError, 5)
@@ -239,8 +235,7 @@ def test_a_finished_data_set_is_proven_again(reader: Path, out: str) -> None:
 
 def test_the_files_of_the_author_name_sample_and_field(author: Path, reader: Path) -> None:
     gen_data.generate(author / "tiny.yaml", N, out=reader / "author", seed=4, workers=0)
-    first = read_recipe(reader / "recipe.yaml").recipe.shards[0]
-    edit(reader, first, "f" * 64)
+    edit(reader, read_recipe(reader / "recipe.yaml").recipe.shards[0], "f" * 64)
 
     lines = refused(reader, gen_data.DeterminismError, 5, against="author")
 
@@ -259,13 +254,10 @@ def test_labels_that_differ_are_named(reader: Path) -> None:
     assert lines[0].startswith("shards/000002/labels.jsonl: differs from the recipe")
 
 
-@pytest.mark.parametrize(
-    ("was", "fact"),
-    [
-        (r"README.md: \S+", "README.md: differs from the recipe"),
-        (r"dataset_id: \S+", "an exported file differs, or dataset_id of the recipe was changed"),
-    ],
-)
+@pytest.mark.parametrize(("was", "fact"), [
+    (r"README.md: \S+", "README.md: differs from the recipe"),
+    (r"dataset_id: \S+", "an exported file differs, or dataset_id of the recipe was changed"),
+])  # fmt: skip
 def test_files_outside_of_shards_are_compared(reader: Path, was: str, fact: str) -> None:
     key = was.partition(":")[0]
     edit(reader, was, f'{key}: "{"3" * 64}"')
@@ -311,12 +303,10 @@ def test_images_are_compared_with_those_of_the_author(
 
 
 EDITS = {
-    "n": ("^n: 5", "n: 6"),
-    "name": ("^name: tiny", "name: small"),
+    "n": ("^n: 5", "n: 6"), "name": ("^name: tiny", "name: small"),
     "config.randomizers": (r"\[0.8, 1\]", "[0.8, 1.5]"),
-    "config.sensors": (r"\[48, 32\]", "[48, 33]"),
-    "config.splits": ("train: 1", "train: 2"),
-}
+    "config.sensors": (r"\[48, 32\]", "[48, 33]"), "config.splits": ("train: 1", "train: 2"),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("field", EDITS)
@@ -342,21 +332,18 @@ def read_checksum(reader: Path, field: str) -> str:
     return str(plain["checksums"][field])
 
 
-@pytest.mark.parametrize(
-    ("was", "now", "fact"),
-    [
-        ("^format: 1", "format: 2", "format: 2 is newer than this gen-data; expected 1: update"),
-        ("^format: 1", "format: one", "format: one is not a format of recipes; expected 1"),
-        ("^format: 1\n", "", "format: missing; expected a recipe, as gen-data recipe prints"),
-        ("^n: 5", "n: five", "n: expected a whole number"),
-        ("^seed: 3", "sede: 3", "sede: unknown key 'sede'"),
-        (r"^shards:\n.*", "shards:", "shards: 2 digests; expected 3, one for each shard"),
-        ("^name: tiny", "name: ../tiny", "name: '../tiny' cannot name a file"),
-        ("numpy: .*", "numpy: '1; touch marker'", "versions.numpy: '1; touch marker' does not"),
-        ("numpy:", "--index-url:", "versions.--index-url: '--index-url' does not match"),
-        ("^config:\n", "config:\n  extends: a.yaml\n", "checksums: lacks 'config.extends'"),
-    ],
-)
+@pytest.mark.parametrize(("was", "now", "fact"), [
+    ("^format: 1", "format: 2", "format: 2 is newer than this gen-data; expected 1: update"),
+    ("^format: 1", "format: one", "format: one is not a format of recipes; expected 1"),
+    ("^format: 1\n", "", "format: missing; expected a recipe, as gen-data recipe prints"),
+    ("^n: 5", "n: five", "n: expected a whole number"),
+    ("^seed: 3", "sede: 3", "sede: unknown key 'sede'"),
+    (r"^shards:\n.*", "shards:", "shards: 2 digests; expected 3, one for each shard"),
+    ("^name: tiny", "name: ../tiny", "name: '../tiny' cannot name a file"),
+    ("numpy: .*", "numpy: '1; touch marker'", "versions.numpy: '1; touch marker' does not"),
+    ("numpy:", "--index-url:", "versions.--index-url: '--index-url' does not match"),
+    ("^config:\n", "config:\n  extends: a.yaml\n", "checksums: lacks 'config.extends'"),
+])  # fmt: skip
 def test_a_wrong_recipe_is_an_error_with_its_place(
     reader: Path, was: str, now: str, fact: str
 ) -> None:
@@ -416,14 +403,10 @@ def test_trust_reads_such_a_folder(reader: Path) -> None:
     assert "assets.own.user/block: is missing" in lines[0]
 
 
-@pytest.mark.parametrize(
-    "config",
-    [
-        {"extends": "marker.yaml"},
-        {"elements": {"clutter": {"count": 1}}, "template": "marker.yaml"},
-        {"sensors": [{"type": "lidar", "name": "top", "model": "marker.yaml"}]},
-    ],
-)
+@pytest.mark.parametrize("config", [
+    {"extends": "marker.yaml"}, {"elements": {"clutter": {"count": 1}}, "template": "marker.yaml"},
+    {"sensors": [{"type": "lidar", "name": "top", "model": "marker.yaml"}]},
+])  # fmt: skip
 def test_a_configuration_that_names_further_files_is_refused(
     reader: Path, config: dict[str, Any]
 ) -> None:

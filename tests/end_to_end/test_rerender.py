@@ -81,16 +81,13 @@ def test_other_cameras_see_the_same_scenes(dataset: Path, tmp_path: Path) -> Non
         assert one.scene.instances == other.scene.instances
 
 
-@pytest.mark.parametrize(
-    ("arguments", "text"),
-    [
-        (("--set", "views_per_scene=2"), "views_per_scene: cannot change, as rerender keeps"),
-        (("--redraw", "lamp"), "--redraw lamp: there is no such randomizer.*'lamps'"),
-        (("--set", "clutter.count=3", "--workers", "1"), "randomizers.clutter: moves, adds or"),
-        (("--set", "lamps.count=-1"), "lamps.*count"),
-        (("--sensors", "empty.yaml"), "empty.yaml: sensors: missing"),
-    ],
-)
+@pytest.mark.parametrize(("arguments", "text"), [
+    (("--set", "views_per_scene=2"), "views_per_scene: cannot change, as rerender keeps"),
+    (("--redraw", "lamp"), "--redraw lamp: there is no such randomizer.*'lamps'"),
+    (("--set", "clutter.count=3", "--workers", "1"), "randomizers.clutter: moves, adds or"),
+    (("--set", "lamps.count=-1"), "lamps.*count"),
+    (("--sensors", "empty.yaml"), "empty.yaml: sensors: missing"),
+])  # fmt: skip
 def test_what_would_change_the_scenes_is_refused(
     dataset: Path, tmp_path: Path, arguments: tuple[str, ...], text: str
 ) -> None:

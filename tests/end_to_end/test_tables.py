@@ -88,18 +88,11 @@ def helps(group: click.Group, names: tuple[str, ...] = ()) -> list[tuple[str, ..
     return found
 
 
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        *helps(cli),
-        ("--help",),
-        ("assets", "list"),
-        ("formats",),
-        ("plan", "tabletop.yaml", "--n", "20"),
-        pytest.param(("plan", "kitti_rig.yaml", "--n", "20"), marks=pytest.mark.slow),
-    ],
-    ids=" ".join,
-)
+@pytest.mark.parametrize("arguments", [
+    *helps(cli), ("--help",), ("assets", "list"), ("formats",),
+    ("plan", "tabletop.yaml", "--n", "20"),
+    pytest.param(("plan", "kitti_rig.yaml", "--n", "20"), marks=pytest.mark.slow),
+], ids=" ".join)  # fmt: skip
 def test_help_fits_a_terminal(arguments: tuple[str, ...], monkeypatch: pytest.MonkeyPatch) -> None:
     """Examples of commands, which nobody wraps, too."""
     monkeypatch.setenv("COLUMNS", "80")

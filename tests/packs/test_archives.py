@@ -124,14 +124,11 @@ def test_a_bomb_is_refused_before_the_disk_is_full(
     assert files_in(tmp_path / "out") == {}
 
 
-@pytest.mark.parametrize(
-    ("limits", "message"),
-    [
-        (Limits(members=1), "more than 1 members"),
-        (Limits(file_bytes=4), "more than 4"),
-        (Limits(total_bytes=6), "exceed 6 bytes"),
-    ],
-)
+@pytest.mark.parametrize(("limits", "message"), [
+    (Limits(members=1), "more than 1 members"),
+    (Limits(file_bytes=4), "more than 4"),
+    (Limits(total_bytes=6), "exceed 6 bytes"),
+])  # fmt: skip
 def test_every_limit_is_kept(limits: Limits, message: str, tmp_path: Path) -> None:
     """Number of members, size of one, size of all."""
     with pytest.raises(AssetError, match=message):

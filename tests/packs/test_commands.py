@@ -36,15 +36,12 @@ def test_list_finds_assets_by_tags(tmp_path: Path) -> None:
     assert "pybullet/teddy" in done.stdout and "franka" not in done.stdout
 
 
-@pytest.mark.parametrize(
-    ("tags", "said"),
-    [
-        (("hausehold",), "no asset has the tag 'hausehold' (did you mean 'household'?)"),
-        (("conveyor",), "no asset has the tag 'conveyor'"),
-        (("toy", "robot"), "no asset has all of the tags toy, robot; each of them has some"),
-        (("user",), "no asset has the tag 'user'"),
-    ],
-)
+@pytest.mark.parametrize(("tags", "said"), [
+    (("hausehold",), "no asset has the tag 'hausehold' (did you mean 'household'?)"),
+    (("conveyor",), "no asset has the tag 'conveyor'"),
+    (("toy", "robot"), "no asset has all of the tags toy, robot; each of them has some"),
+    (("user",), "no asset has the tag 'user'"),
+])  # fmt: skip
 def test_a_list_without_an_asset_tells_why(tags: tuple[str, ...], said: str) -> None:
     """Instead of nothing, with which a misspelt tag looks like a thing that is not there."""
     done = CliRunner().invoke(cli, ["assets", "list", *tags])
@@ -54,17 +51,14 @@ def test_a_list_without_an_asset_tells_why(tags: tuple[str, ...], said: str) -> 
     assert done.stdout == ""
 
 
-@pytest.mark.parametrize(
-    ("arguments", "code", "said"),
-    [
-        (("install", "catalog"), 2, "did you mean 'catalogue'"),
-        (("install", "all", "--from", "archive"), 2, "--from takes the archive of one pack"),
-        (("install", "hdri", "--from", "archive"), 3, "sha256 is"),
-        (("install", "hdri", "--from", "nowhere"), 2, "does not exist"),
-        (("remove", "hdri"), 3, "not installed"),
-        (("verify", "hdri"), 3, "not installed"),
-    ],
-)
+@pytest.mark.parametrize(("arguments", "code", "said"), [
+    (("install", "catalog"), 2, "did you mean 'catalogue'"),
+    (("install", "all", "--from", "archive"), 2, "--from takes the archive of one pack"),
+    (("install", "hdri", "--from", "archive"), 3, "sha256 is"),
+    (("install", "hdri", "--from", "nowhere"), 2, "does not exist"),
+    (("remove", "hdri"), 3, "not installed"),
+    (("verify", "hdri"), 3, "not installed"),
+])  # fmt: skip
 def test_errors_have_one_message_and_their_exit_code(
     arguments: tuple[str, ...], code: int, said: str, tmp_path: Path
 ) -> None:

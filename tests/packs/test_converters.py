@@ -9,8 +9,7 @@ import cv2
 import numpy as np
 import pytest
 
-from gen_data.assets.image_decoding import decode_radiance
-from gen_data.assets.installed_packs import TAG
+from gen_data.assets import image_decoding, installed_packs
 from gen_data.assets.library import open_library
 from gen_data.content.packs import panoramas, robosuite, sweethome3d
 from gen_data.content.packs.sweethome3d import (
@@ -21,9 +20,7 @@ from gen_data.content.packs.sweethome3d import (
     mesh_entry,
     read_selection,
 )
-from gen_data.core.errors import AssetError
-from gen_data.core.kinematics import link_poses
-from gen_data.core.se3 import SE3
+from gen_data.core import errors, kinematics, se3
 from tests.packs.converters import BOX
 
 FACTS = """
@@ -44,7 +41,7 @@ def test_the_selection_is_sound() -> None:
     assert len(ids) == len(set(ids)) > 250
     for group, choice in chosen:
         entry = mesh_entry(choice, group, _model(Path()), selection.finishes)
-        assert entry.category and TAG in entry.tags, choice.id
+        assert entry.category and installed_packs.TAG in entry.tags, choice.id
 
 
 def test_every_vehicle_that_drives_has_wheels_in_order() -> None:
@@ -165,14 +162,11 @@ def test_a_region_takes_its_triangles_and_no_others(tmp_path: Path) -> None:
     assert [point.name for point in library.keypoints("test/box")] == ["lamp"]
 
 
-@pytest.mark.parametrize(
-    ("finish", "expected"),
-    [
-        ({"base_color": [0.01, 0.01, 0.01]}, ((0.01, 0.01, 0.01), 1.0, 0.0)),
-        ({"base_color": [0.5, 0.6, 0.6], "transmission": 0.9}, ((0.5, 0.6, 0.6), 1.0, 0.9)),
-        ({"roughness": 0.1}, ((0.0, 0.0, 0.0), 0.25, 0.0)),
-    ],
-)
+@pytest.mark.parametrize(("finish", "expected"), [
+    ({"base_color": [0.01, 0.01, 0.01]}, ((0.01, 0.01, 0.01), 1.0, 0.0)),
+    ({"base_color": [0.5, 0.6, 0.6], "transmission": 0.9}, ((0.5, 0.6, 0.6), 1.0, 0.9)),
+    ({"roughness": 0.1}, ((0.0, 0.0, 0.0), 0.25, 0.0)),
+])  # fmt: skip
 def test_a_finish_with_a_colour_hides_what_the_files_surface_let_through(
     finish: dict[str, object], expected: tuple[object, float, float], tmp_path: Path
 ) -> None:
@@ -192,7 +186,7 @@ def test_a_finish_with_a_colour_hides_what_the_files_surface_let_through(
 
 def test_a_package_without_a_selected_model_is_refused(tmp_path: Path) -> None:
     """It is another release of the catalogue."""
-    with pytest.raises(AssetError, match="holds no model"):
+    with pytest.raises(errors.AssetError, match="holds no model"):
         sweethome3d.convert(tmp_path, tmp_path / "out")
 
 
@@ -205,7 +199,7 @@ def test_a_panorama_survives_the_radiance_file() -> None:
     brightest = image.max(axis=2, keepdims=True)
     assert np.abs(read - image).max() > 0.0
     assert (np.abs(read - image) <= brightest / 256.0 + 1e-6).all()
-    assert decode_radiance(data, "test").shape == (8, 16, 3)
+    assert image_decoding.decode_radiance(data, "test").shape == (8, 16, 3)
 
 
 def test_an_exr_in_a_script_is_read(tmp_path: Path) -> None:
@@ -221,7 +215,7 @@ def test_an_exr_in_a_script_is_read(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("script", [b"", b"export default 1", b"base64,@@@"])
 def test_a_script_without_an_image_is_an_error(script: bytes) -> None:
-    with pytest.raises(AssetError, match="no base64"):
+    with pytest.raises(errors.AssetError, match="no base64"):
         panoramas.exr_bytes(script, "test")
 
 
@@ -268,12 +262,12 @@ def test_an_mjcf_arm_becomes_a_robot(package: Path, tmp_path: Path) -> None:
     elbow = robot.movable[0]
     assert (elbow.name, elbow.lower, elbow.upper) == ("elbow", -1.0, 2.0)
     assert robot.gripper is not None and robot.gripper.finger_joints == robosuite._FINGERS
-    poses = link_poses(robot, SE3(), (0.0, 0.0, 0.0))
+    poses = kinematics.link_poses(robot, se3.SE3(), (0.0, 0.0, 0.0))
     # Half a turn about Z takes +Y to -Y; the flange's quaternion maps X to Y, Y to Z, Z to X.
     assert np.allclose(poses["gripper_base"].translation_m, (0.0, -0.5, 1.0))
     turned = poses["gripper_base"].rotation() @ np.eye(3)
     assert np.allclose(turned, np.diag([-1.0, -1.0, 1.0]) @ np.eye(3)[[2, 0, 1]])
-    opened = link_poses(robot, SE3(), (0.0, 0.03, 0.03))
+    opened = kinematics.link_poses(robot, se3.SE3(), (0.0, 0.03, 0.03))
     for finger, side in (("left", 1.0), ("right", -1.0)):
         moved = poses["gripper_base"].inverse() @ opened[finger]
         rest = poses["gripper_base"].inverse() @ poses[finger]
@@ -288,7 +282,7 @@ def test_a_body_with_two_joints_is_refused(package: Path, tmp_path: Path) -> Non
     joint = '<joint name="elbow" axis="0 1 0" range="-1 2"/>'
     path.write_text(text.replace(joint, joint + joint.replace("elbow", "two")), encoding="utf-8")
     (tmp_path / "out").mkdir()
-    with pytest.raises(AssetError, match="only one hinge or slide"):
+    with pytest.raises(errors.AssetError, match="only one hinge or slide"):
         robosuite.convert(package, tmp_path / "out")
 
 
@@ -303,7 +297,7 @@ def test_gimbal_lock_keeps_the_rotation(tmp_path: Path) -> None:
         _add_origin(element, Element("geom", quat=f"{w} {x} {y} {z}"))
         roll, pitch, yaw = (float(v) for v in element[0].attrib["rpy"].split())
         norm = math.sqrt(w * w + x * x + y * y + z * z)
-        expected = SE3((0, 0, 0), (w / norm, x / norm, y / norm, z / norm)).rotation()
+        expected = se3.SE3((0, 0, 0), (w / norm, x / norm, y / norm, z / norm)).rotation()
         assert np.allclose(_about(2, yaw) @ _about(1, pitch) @ _about(0, roll), expected, atol=1e-8)
 
 

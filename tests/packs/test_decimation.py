@@ -12,12 +12,10 @@ def sheet(n: int, textured: bool) -> TriangleSoup:
     x, y = np.meshgrid(np.linspace(0, 1, n + 1), np.linspace(0, 1, n + 1), indexing="ij")
     points = np.stack([x, y, 0.05 * np.sin(3.0 * x) * np.cos(2.0 * y)], axis=2)
     a, b, c, d = points[:-1, :-1], points[1:, :-1], points[1:, 1:], points[:-1, 1:]
-    corners = np.concatenate(
-        [
-            np.stack([a, b, c], axis=2).reshape(-1, 3, 3),
-            np.stack([a, c, d], axis=2).reshape(-1, 3, 3),
-        ]
-    )
+    corners = np.concatenate([
+        np.stack([a, b, c], axis=2).reshape(-1, 3, 3),
+        np.stack([a, c, d], axis=2).reshape(-1, 3, 3),
+    ])  # fmt: skip
     slot = MaterialSlot("cloth", Material(texture="t" if textured else ""))
     zeros = np.zeros(len(corners), dtype=np.int64)
     return TriangleSoup(corners, corners[..., :2].copy(), None, zeros, zeros, (slot,))
@@ -50,13 +48,11 @@ def test_a_material_of_few_triangles_is_left_alone() -> None:
     """Each of them may be one whole side of a box."""
     large, small = sheet(40, textured=False), sheet(3, textured=False)
     both = TriangleSoup(
-        np.concatenate([large.corners, small.corners + 2.0]),
-        None,
-        None,
+        np.concatenate([large.corners, small.corners + 2.0]), None, None,
         np.repeat([0, 1], [len(large), len(small)]),
         np.zeros(len(large) + len(small), dtype=np.int64),
         (large.slots[0], MaterialSlot("lid", Material(roughness=0.9))),
-    )
+    )  # fmt: skip
     thinned = decimate(both, 400)
     assert (thinned.face_slots == 1).sum() == 18
     assert (thinned.face_slots == 0).sum() < 600

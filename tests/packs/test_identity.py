@@ -28,16 +28,10 @@ def installed_box(tmp_path: Path, side: str) -> None:
     with zipfile.ZipFile(archive, "w") as file:
         file.writestr("data/box.obj", BOX.replace("v 1", f"v {side}"))
     pack = Pack(
-        name="boxes",
-        summary="a box",
-        client="pip",
-        package="package",
-        version="1.0",
-        sha256=sha256(archive.read_bytes()).hexdigest(),
-        licence="CC-BY-3.0",
-        wanted=("data/*",),
+        name="boxes", summary="a box", client="pip", package="package", version="1.0",
+        sha256=sha256(archive.read_bytes()).hexdigest(), licence="CC-BY-3.0", wanted=("data/*",),
         converter="tests.packs.converters:box",
-    )
+    )  # fmt: skip
     install(pack, packs_dir(), archive)
 
 
@@ -67,5 +61,4 @@ def test_another_pack_content_is_another_data_set(factory: PipelineFactory, tmp_
 
 
 def test_panoramas_that_may_light_a_scene_belong_to_the_data_set(factory: PipelineFactory) -> None:
-    environments = [name for name in make_plan(factory).assets if name.startswith("environment/")]
-    assert environments
+    assert [name for name in make_plan(factory).assets if name.startswith("environment/")]

@@ -31,16 +31,17 @@ def archive(tmp_path: Path) -> Path:
 @pytest.fixture
 def pack(archive: Path) -> Pack:
     return Pack(
-        name="boxes",
-        summary="a box",
-        client="pip",
-        package="package",
-        version="1.0",
-        sha256=sha256(archive.read_bytes()).hexdigest(),
-        licence="CC-BY-3.0",
-        wanted=("data/*",),
+        name="boxes", summary="a box", client="pip", package="package", version="1.0",
+        sha256=sha256(archive.read_bytes()).hexdigest(), licence="CC-BY-3.0", wanted=("data/*",),
         converter="tests.packs.converters:box",
-    )
+    )  # fmt: skip
+
+
+@pytest.fixture
+def installed(pack: Pack, archive: Path, tmp_path: Path) -> Path:
+    """Folder of packs with this one."""
+    install(pack, tmp_path / "packs", archive)
+    return tmp_path / "packs"
 
 
 def fake_client(folder: Path, program: str, script: str) -> None:
@@ -72,8 +73,7 @@ def test_an_installed_pack_joins_the_library(pack: Pack, archive: Path, tmp_path
 
 def test_without_packs_the_library_is_as_before(tmp_path: Path) -> None:
     """A missing folder is fine and is not created."""
-    library = library_with(tmp_path / "packs", tmp_path)
-    assert library.find(("pack",)) == ()
+    assert library_with(tmp_path / "packs", tmp_path).find(("pack",)) == ()
     assert not (tmp_path / "packs").exists()
 
 
@@ -111,14 +111,11 @@ def test_missing_clients_are_named(
     assert names_in(tmp_path / "packs") == set()
 
 
-@pytest.mark.parametrize(
-    ("said", "told"),
-    [
-        ("npm error code ENOTFOUND", "found no network"),
-        ("E: Could not resolve 'deb.debian.org'", "found no network"),
-        ("ERROR: No matching distribution found", "failed: ERROR: No matching distribution"),
-    ],
-)
+@pytest.mark.parametrize(("said", "told"), [
+    ("npm error code ENOTFOUND", "found no network"),
+    ("E: Could not resolve 'deb.debian.org'", "found no network"),
+    ("ERROR: No matching distribution found", "failed: ERROR: No matching distribution"),
+])  # fmt: skip
 def test_no_network_and_other_failures_are_told_apart(
     said: str, told: str, pack: Pack, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -151,12 +148,10 @@ def test_a_killed_installation_leaves_nothing(pack: Pack, archive: Path, tmp_pat
     assert names_in(folder) == {"boxes"}
 
 
-def test_a_failed_exchange_keeps_the_old_pack(pack: Pack, archive: Path, tmp_path: Path) -> None:
-    folder = tmp_path / "packs"
-    install(pack, folder, archive)
+def test_a_failed_exchange_keeps_the_old_pack(pack: Pack, archive: Path, installed: Path) -> None:
     with pytest.raises(AssetError, match="none of the wanted"):
-        install(replace(pack, wanted=("models/*",)), folder, archive)
-    verify("boxes", folder)
+        install(replace(pack, wanted=("models/*",)), installed, archive)
+    verify("boxes", installed)
 
 
 def test_two_installations_at_once_stay_apart(pack: Pack, archive: Path, tmp_path: Path) -> None:
@@ -171,40 +166,32 @@ def test_two_installations_at_once_stay_apart(pack: Pack, archive: Path, tmp_pat
 
 
 @pytest.mark.parametrize("damage", ["changed", "missing", "was not installed"])
-def test_verify_finds_differences(damage: str, pack: Pack, archive: Path, tmp_path: Path) -> None:
+def test_verify_finds_differences(damage: str, installed: Path) -> None:
     """One byte, one file less, one file more."""
-    folder = tmp_path / "packs"
-    install(pack, folder, archive)
-    assert len(verify("boxes", folder).files) == 2
-    model = folder / "boxes" / "box.obj"
+    assert len(verify("boxes", installed).files) == 2
+    model = installed / "boxes" / "box.obj"
     if damage == "changed":
         model.write_text(BOX.replace("v 1", "v 2", 1), encoding="utf-8")
     elif damage == "missing":
         model.unlink()
     else:
-        (folder / "boxes" / "more.obj").write_text(BOX, encoding="utf-8")
+        model.with_name("more.obj").write_text(BOX, encoding="utf-8")
     with pytest.raises(VerificationError, match=damage):
-        verify("boxes", folder)
+        verify("boxes", installed)
 
 
-def test_a_removed_pack_is_gone(pack: Pack, archive: Path, tmp_path: Path) -> None:
-    folder = tmp_path / "packs"
-    install(pack, folder, archive)
-    remove("boxes", folder)
-    assert names_in(folder) == set()
+def test_a_removed_pack_is_gone(installed: Path) -> None:
+    remove("boxes", installed)
+    assert names_in(installed) == set()
     with pytest.raises(AssetError, match="not installed"):
-        remove("boxes", folder)
+        remove("boxes", installed)
 
 
-def test_a_new_conversion_makes_packs_out_of_date(
-    pack: Pack, archive: Path, tmp_path: Path
-) -> None:
+def test_a_new_conversion_makes_packs_out_of_date(pack: Pack, installed: Path) -> None:
     """An upgrade of gen-data then requires a new installation."""
-    folder = tmp_path / "packs"
-    assert not is_installed(pack, folder)
-    install(pack, folder, archive)
-    assert is_installed(pack, folder)
-    assert not is_installed(replace(pack, revision=pack.revision + 1), folder)
+    assert is_installed(pack, installed)
+    assert not is_installed(pack, installed.parent / "none")
+    assert not is_installed(replace(pack, revision=pack.revision + 1), installed)
 
 
 def test_installing_twice_gives_the_same_digest(pack: Pack, archive: Path, tmp_path: Path) -> None:
@@ -219,12 +206,10 @@ def test_a_folder_without_rights_is_told(pack: Pack, archive: Path, tmp_path: Pa
         install(pack, tmp_path / "packs", archive)
 
 
-def test_a_damaged_record_says_what_to_do(pack: Pack, archive: Path, tmp_path: Path) -> None:
-    folder = tmp_path / "packs"
-    install(pack, folder, archive)
-    (folder / "boxes" / "pack.json").write_text("{", encoding="utf-8")
+def test_a_damaged_record_says_what_to_do(installed: Path) -> None:
+    (installed / "boxes" / "pack.json").write_text("{", encoding="utf-8")
     with pytest.raises(AssetError, match="install the pack again"):
-        installed_packs(folder)
+        installed_packs(installed)
 
 
 def test_an_unknown_pack_is_answered_with_the_nearest() -> None:

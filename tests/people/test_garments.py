@@ -78,8 +78,7 @@ def test_prints_are_on_the_chest() -> None:
 
 def test_textured_garments_have_coordinates_and_skin_has_none() -> None:
     """Corners of a garment span several decimetres of its texture."""
-    solid = simple_person(3, "stand", 0.0)
-    mesh = solid.mesh
+    mesh = simple_person(3, "stand", 0.0).mesh
     mapped = [k for k, m in enumerate(mesh.materials) if m.texture and m.texture_scale_m == 0.0]
     assert mapped
     for slot in mapped:

@@ -49,8 +49,7 @@ def test_fingers_at_rest_lie_side_by_side_and_flex_more_from_index_to_little(sid
 def test_what_is_held_touches_palm_and_fingers_without_filling_the_hand(pose: str) -> None:
     """Some vertices of the hand lie within 1 cm of the thing; the wrist's joint does not."""
     person = draw_person(5, pose)
-    body = body_of("pack")
-    solid = build_person(person, dress_person(person, body))
+    solid = build_person(person, dress_person(person, body_of("pack")))
     mesh = solid.mesh
     roles = np.array([material.role for material in mesh.materials])[mesh.face_slots]
     wrist = next(k for k in solid.keypoints if k.name == "right_wrist").position_m

@@ -5,11 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gen_data.content.people.analytic_body import simple_body
-from gen_data.content.people.carried_things import Sheet, make_things
-from gen_data.content.people.edges import border_edges, calm
+from gen_data.content.people import analytic_body, carried_things, edges, head_layout
 from gen_data.content.people.face_textures import EYES, FACES, eyes, face
-from gen_data.content.people.head_layout import lay_out_eyes, lay_out_head
 from gen_data.content.people.person import draw_person
 from gen_data.content.people.person_mesh import build_person, dress_person
 from gen_data.content.procedural.material_presets import hex_to_srgb8
@@ -27,7 +24,7 @@ def texel(texture: TextureData, uv: np.ndarray) -> np.ndarray:
 def built(haircut: str, pose: str = "stand") -> MeshData:
     person = draw_person(3, pose)
     person = replace(person, haircut=haircut, outfit=replace(person.outfit, headwear=""))
-    return build_person(person, dress_person(person, simple_body())).mesh
+    return build_person(person, dress_person(person, analytic_body.simple_body())).mesh
 
 
 def faces_of(mesh: MeshData, role: str) -> np.ndarray:
@@ -44,7 +41,7 @@ def test_brows_and_lips_lie_where_the_body_has_them() -> None:
     """Places of the template body: forehead, brow, cheek and lips."""
     image = face(list(FACES).index("woman_made_up"))
     places = np.array([(0.148, 0.02, 0.777), (0.14, 0.033, 0.7555), (0.155, 0.003, 0.668)])
-    forehead, brow, lips = (texel(image, uv) for uv in lay_out_head(places))
+    forehead, brow, lips = (texel(image, uv) for uv in head_layout.lay_out_head(places))
     assert brow.mean() < 0.75 * forehead.mean()
     assert lips[0] - lips[1] > forehead[0] - forehead[1] + 30.0
 
@@ -52,7 +49,7 @@ def test_brows_and_lips_lie_where_the_body_has_them() -> None:
 def test_a_beard_darkens_the_jaw_only() -> None:
     """The chin is darker than that of a woman, the cheek under the eye is not."""
     names = list(FACES)
-    chin, cheek = lay_out_head(np.array([(0.148, 0.005, 0.632), (0.13, 0.045, 0.705)]))
+    chin, cheek = head_layout.lay_out_head(np.array([(0.148, 0.005, 0.632), (0.13, 0.045, 0.705)]))
     bearded, bare = face(names.index("man_bearded")), face(names.index("woman"))
     assert texel(bearded, chin).mean() < 0.7 * texel(bare, chin).mean()
     assert texel(bearded, cheek).mean() > 0.9 * texel(bare, cheek).mean()
@@ -62,7 +59,7 @@ def test_a_beard_darkens_the_jaw_only() -> None:
 def test_eyes_have_a_pupil_in_an_iris_of_their_colour(cell: int) -> None:
     """From the middle outward: black, the colour of the table, white."""
     middle, ring, white = (
-        texel(eyes(0), lay_out_eyes(np.array([(0.137, 0.0308 + y, 0.7276)]), cell)[0])
+        texel(eyes(0), head_layout.lay_out_eyes(np.array([(0.137, 0.0308 + y, 0.7276)]), cell)[0])
         for y in (0.0, 0.0042, 0.0078)
     )
     colour = np.array(hex_to_srgb8(list(EYES.values())[cell]), dtype=np.float64)
@@ -108,7 +105,7 @@ def test_calm_vectors_of_a_border_hardly_change_from_one_vertex_to_the_next() ->
     vectors = np.stack([np.cos(turn), np.sin(turn), np.where(np.arange(6) % 2, 1.0, -1.0)], axis=1)
     vectors = np.concatenate([[(0.0, 0.0, 1.0)], vectors])
 
-    smooth = calm(vectors, border_edges(faces), 6)
+    smooth = edges.calm(vectors, edges.border_edges(faces), 6)
 
     np.testing.assert_array_equal(smooth[0], vectors[0])
     assert np.abs(smooth[1:, 2]).max() < 0.02
@@ -118,7 +115,7 @@ def umbrella_of(pose: str) -> tuple[MeshData, np.ndarray, np.ndarray]:
     """A person, the vertices of the umbrella's cloth, and the right wrist."""
     person = draw_person(3, pose)
     person = replace(person, outfit=replace(person.outfit, bag=""))
-    solid = build_person(person, dress_person(person, simple_body()))
+    solid = build_person(person, dress_person(person, analytic_body.simple_body()))
     counts = np.bincount(solid.mesh.face_slots, minlength=len(solid.mesh.materials))
     bags = [k for k, material in enumerate(solid.mesh.materials) if material.role == "bag"]
     cloth = max(bags, key=lambda k: int(counts[k]))
@@ -149,11 +146,11 @@ def test_a_closed_umbrella_hangs_from_the_hand(pose: str) -> None:
 def test_an_open_umbrella_has_eight_ribs_with_struts() -> None:
     """Rods of six triangles: two for each rib, one strut."""
     person = draw_person(3, "stand_umbrella")
-    figure = dress_person(person, simple_body())
-    made: list[Sheet] = []
-    original = make_things
+    figure = dress_person(person, analytic_body.simple_body())
+    made: list[carried_things.Sheet] = []
+    original = carried_things.make_things
 
-    def kept(carrier: object) -> list[Sheet]:
+    def kept(carrier: object) -> list[carried_things.Sheet]:
         made.extend(original(carrier))  # type: ignore[arg-type]
         return made
 

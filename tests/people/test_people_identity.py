@@ -34,16 +34,13 @@ def test_one_person_in_ten_is_a_child() -> None:
     assert 0.17 < len(seniors) / len(drawn) < 0.26
 
 
-def test_a_pose_that_is_asked_for_leaves_the_person_the_same() -> None:
-    """Pose has a stream of its own."""
+def test_a_pose_or_a_phase_leaves_the_person_the_same() -> None:
+    """Pose has a stream of its own; sixteen phases of a stride need as many meshes."""
     walking, sitting = draw_person(7, "walk", 0.5), draw_person(7, "sit")
     assert walking.outfit == sitting.outfit and walking.skin == sitting.skin
     assert walking.height_m == sitting.height_m
     assert (walking.pose, walking.step, sitting.pose) == ("walk", 8, "sit")
 
-
-def test_phases_are_rounded_to_sixteenths() -> None:
-    """So that a data set needs at most sixteen meshes per walking person."""
     assert [draw_person(1, "walk", p).step for p in (0.0, 0.03, 0.04, 0.97, 1.0)] == [0, 0, 1, 0, 0]
 
 

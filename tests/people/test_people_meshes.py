@@ -14,24 +14,10 @@ from tests.people.bodies import KINDS, body_of
 
 # https://cocodataset.org/#keypoints-2020, in the order of its annotation files.
 COCO_17 = [
-    "nose",
-    "left_eye",
-    "right_eye",
-    "left_ear",
-    "right_ear",
-    "left_shoulder",
-    "right_shoulder",
-    "left_elbow",
-    "right_elbow",
-    "left_wrist",
-    "right_wrist",
-    "left_hip",
-    "right_hip",
-    "left_knee",
-    "right_knee",
-    "left_ankle",
-    "right_ankle",
-]
+    "nose", "left_eye", "right_eye", "left_ear", "right_ear", "left_shoulder", "right_shoulder",
+    "left_elbow", "right_elbow", "left_wrist", "right_wrist", "left_hip", "right_hip", "left_knee",
+    "right_knee", "left_ankle", "right_ankle",
+]  # fmt: skip
 SEEDS = range(12)
 POSES = ("walk", "run", "stand", "phone", "carry", "sit", "crouch", "bend_deep", "stand_crossed",
          "call", "walk_umbrella", "push_pram", "pull_suitcase", "wave")  # fmt: skip
@@ -54,8 +40,7 @@ def distances_m(points: np.ndarray, mesh: MeshData) -> np.ndarray:
 def test_the_lowest_vertex_stands_on_the_ground(kind: str, pose: str) -> None:
     """The ground is z = 0, whatever a person does."""
     for phase in (0.0, 0.3125):
-        mesh = made(draw_person(3, pose, phase), kind).mesh
-        assert mesh.vertices_m[:, 2].min() == 0.0
+        assert made(draw_person(3, pose, phase), kind).mesh.vertices_m[:, 2].min() == 0.0
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -195,9 +180,8 @@ def test_a_pose_is_the_same_whatever_the_same_person_did_before() -> None:
     first = simple_person(7, "walk", 0.25).mesh
     simple_person(7, "sit", 0.0)
     again, fresh = (
-        simple_person(7, "walk", 0.25).mesh,
-        made(draw_person(7, "walk", 0.25), "simple"),
-    )
+        simple_person(7, "walk", 0.25).mesh, made(draw_person(7, "walk", 0.25), "simple"),
+    )  # fmt: skip
     for name in ("vertices_m", "normals", "faces", "face_slots"):
         expected = getattr(first, name).tobytes()
         assert getattr(again, name).tobytes() == expected

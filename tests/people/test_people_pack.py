@@ -17,9 +17,8 @@ from gen_data.content.people.person_mesh import build_person, dress_person
 GROUPS = {
     "body": ("face", "scalp", "lips", "brows", "arms", "hands", "legs", "upper_legs"),
     "helper-tights": ("torso", "sleeves", "hips", "thighs", "shins", "ankles", "shoes", "soles"),
-    "helper-skirt": ("skirt_top", "skirt_middle", "skirt_end"),
-    "helper-hair": ("hair", "hair_end"),
-}
+    "helper-skirt": ("skirt_top", "skirt_middle", "skirt_end"), "helper-hair": ("hair", "hair_end"),
+}  # fmt: skip
 TALL_M = 0.1
 
 

@@ -68,12 +68,9 @@ def cylinder(
     angle = np.arange(24) * 2 * math.pi / 24
     ring = np.stack([np.cos(angle), np.sin(angle), np.zeros(24)], axis=1)
     top = radius_m if top_radius_m is None else top_radius_m
-    return np.concatenate(
-        [
-            ring * radius_m + [0, 0, z_m - height_m / 2],
-            ring * top + [0, 0, z_m + height_m / 2],
-        ]
-    )
+    return np.concatenate([
+        ring * radius_m + [0, 0, z_m - height_m / 2], ring * top + [0, 0, z_m + height_m / 2],
+    ])  # fmt: skip
 
 
 def ball(radius_m: float) -> np.ndarray:
@@ -103,12 +100,10 @@ def tray(x: float, y: float, z: float, wall_m: float) -> tuple[np.ndarray, ...]:
     """An open bin: floor and four walls of one thickness, outer size x, y, z."""
     side = (x - wall_m) / 2, (y - wall_m) / 2
     return (
-        box(x, y, wall_m, at=(0, 0, (wall_m - z) / 2)),
-        box(wall_m, y, z, at=(side[0], 0, 0)),
-        box(wall_m, y, z, at=(-side[0], 0, 0)),
-        box(x, wall_m, z, at=(0, side[1], 0)),
+        box(x, y, wall_m, at=(0, 0, (wall_m - z) / 2)), box(wall_m, y, z, at=(side[0], 0, 0)),
+        box(wall_m, y, z, at=(-side[0], 0, 0)), box(x, wall_m, z, at=(0, side[1], 0)),
         box(x, wall_m, z, at=(0, -side[1], 0)),
-    )
+    )  # fmt: skip
 
 
 def _thinned(points: np.ndarray) -> np.ndarray:
@@ -131,12 +126,9 @@ def gantry() -> RobotModel:
             hinge("shoulder", "post", "upper", (0, 0, 0.1)),
             hinge("elbow", "upper", "fore", (0.3, 0, 0)),
         ),
-        visuals=bars,
-        collisions=bars,
-        home=(0.0, 0.5),
-        gripper=None,
+        visuals=bars, collisions=bars, home=(0.0, 0.5), gripper=None,
         no_collide=frozenset({("upper", "fore")}),
-    )
+    )  # fmt: skip
 
 
 ROBOTS = {"panda": cache(panda), "gantry": gantry}
@@ -165,15 +157,9 @@ def thing(
 
 
 HOUSEHOLD = (
-    "box 0.19 0.06 0.28",
-    "box 0.15 0.22 0.025",
-    "cylinder 0.033 0.12",
-    "mug 0.04 0.10",
-    "ball 0.035",
-    "cone 0.04 0.12",
-    "box 0.05 0.05 0.05",
-    "cylinder 0.08 0.02",
-)
+    "box 0.19 0.06 0.28", "box 0.15 0.22 0.025", "cylinder 0.033 0.12", "mug 0.04 0.10",
+    "ball 0.035", "cone 0.04 0.12", "box 0.05 0.05 0.05", "cylinder 0.08 0.02",
+)  # fmt: skip
 
 
 def random_turn(rng: np.random.Generator) -> SE3:

@@ -95,8 +95,7 @@ def test_an_arm_through_the_table_is_refused(engine: Engine) -> None:
 
 def test_an_arm_folded_into_itself_is_refused(engine: Engine) -> None:
     """The hand inside the shoulder is within all limits, and impossible."""
-    folded = (0.0, -1.7, 0.0, -3.05, 0.0, 0.3, 0.0)
-    goal = ArmGoal("joints", joint_candidates=(folded,))
+    goal = ArmGoal("joints", joint_candidates=((0.0, -1.7, 0.0, -3.05, 0.0, 0.3, 0.0),))
 
     settled = engine.settle(armed(table_scene(), goal))
 
@@ -124,8 +123,7 @@ def test_reach_avoids_what_already_lies_there_and_ignores_what_has_yet_to_fall(
 ) -> None:
     """The same box in the hand's way: scattered it forbids the pose, dropped it falls around."""
     box = thing("box", "box 0.2 0.2 0.3", x=0.1, above_m=0.151)
-    target = above_table(0.1, 0.0, 0.2)
-    goal = ArmGoal("reach", pose_candidates=(target,))
+    goal = ArmGoal("reach", pose_candidates=(above_table(0.1, 0.0, 0.2),))
 
     scattered = engine.settle(armed(table_scene(box, placement="scatter"), goal))
     dropped = engine.settle(armed(table_scene(box, placement="drop"), goal))
@@ -147,10 +145,8 @@ def test_what_is_out_of_reach_is_refused(engine: Engine) -> None:
 
 
 HELD = {
-    "box 0.05 0.03 0.06": 0.03,
-    "cylinder 0.025 0.08": 0.05,
-    "box 0.02 0.06 0.02": 0.02,
-}
+    "box 0.05 0.03 0.06": 0.03, "cylinder 0.025 0.08": 0.05, "box 0.02 0.06 0.02": 0.02,
+}  # fmt: skip
 """Asset and the width at which the fingers must stop [m]."""
 
 
@@ -305,8 +301,7 @@ def test_a_candidate_of_the_wrong_length_is_a_mistake_not_a_rejection(
 
 def test_two_arms_avoid_each_other(engine: Engine) -> None:
     """The second arm may not take the place of the first."""
-    target = above_table(0.0, 0.0, 0.3)
-    goal = ArmGoal("reach", pose_candidates=(target,))
+    goal = ArmGoal("reach", pose_candidates=(above_table(0.0, 0.0, 0.3),))
     scene = armed(table_scene(), goal)
     opposite = SE3.about_z(math.pi, (0.45, 0.0, TABLE_TOP_Z_M))
     other = replace(scene.articulations[0], name="other", instance_id=8, T_world_base=opposite)

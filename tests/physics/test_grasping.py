@@ -41,14 +41,11 @@ def hand_robot() -> RobotModel:
         for side in PADS
     ]
     return RobotModel(
-        links=("palm", "left", "right", "left_pad", "right_pad"),
-        joints=(*fingers, *pads),
-        visuals={},
-        collisions={link: link for link in COLLISIONS},
-        home=(0.04, 0.04),
+        links=("palm", "left", "right", "left_pad", "right_pad"), joints=(*fingers, *pads),
+        visuals={}, collisions={link: link for link in COLLISIONS}, home=(0.04, 0.04),
         gripper=Gripper("palm", SE3((0.0, 0.0, 0.07)), ("left_slide", "right_slide"), STROKE_M),
         no_collide=frozenset(),
-    )
+    )  # fmt: skip
 
 
 def tube(inner_m: float, outer_m: float, height_m: float) -> tuple[np.ndarray, ...]:
@@ -67,11 +64,9 @@ def tube(inner_m: float, outer_m: float, height_m: float) -> tuple[np.ndarray, .
 
 
 THINGS = {
-    "block": (box(0.03, 0.024, 0.05),),
-    "rod": (cylinder(0.02, 0.05),),
-    "ring": tube(0.05, 0.064, 0.03),
-    "wide": (box(0.09, 0.09, 0.05),),
-}
+    "block": (box(0.03, 0.024, 0.05),), "rod": (cylinder(0.02, 0.05),),
+    "ring": tube(0.05, 0.064, 0.03), "wide": (box(0.09, 0.09, 0.05),),
+}  # fmt: skip
 
 
 @pytest.fixture
@@ -128,8 +123,7 @@ def test_fingers_close_around_a_body_where_it_is(world: World) -> None:
 
 def test_a_leg_is_slowed_down_to_the_speed_of_a_point() -> None:
     """Differences of knots, for a joint that moves the point by 0.3 m per radian."""
-    leg = Leg((0.0,), (1.0,), 0.5)
-    slow = limit_speed(leg, [(0.0, 0.0, 0.0), (0.3, 0.0, 0.0)], 0.15)
+    slow = limit_speed(Leg((0.0,), (1.0,), 0.5), [(0.0, 0.0, 0.0), (0.3, 0.0, 0.0)], 0.15)
 
     x_m = 0.3 * np.array([positions[0] for _, positions in sample_positions([slow])])
     fastest_m_s = np.diff(x_m).max() / 0.05

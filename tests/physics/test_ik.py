@@ -77,11 +77,9 @@ def levelled_arm() -> RobotModel:
 
     slide = Joint("slide", "prismatic", "l3", "l4", SE3((0.2, 0.0, 0.0)), (1.0, 0.0, 0.0), 0.0, 0.4)
     joints = (
-        joint(0, 0.0, "", 1.0, 0.0),
-        joint(1, 0.5, "j0", -2.0, 0.2),
-        joint(2, 0.5, "j1", 0.5, -0.1),
+        joint(0, 0.0, "", 1.0, 0.0), joint(1, 0.5, "j0", -2.0, 0.2), joint(2, 0.5, "j1", 0.5, -0.1),
         slide,
-    )
+    )  # fmt: skip
     links = tuple(f"l{k}" for k in range(5))
     gripper = Gripper("l4", SE3(), (), 0.08)
     return RobotModel(links, joints, {}, {}, (0.0, 0.2, 0.0, 0.0), gripper, frozenset())

@@ -28,12 +28,9 @@ def test_link_poses_are_those_of_an_independent_simulator(client: int) -> None:
     base = SE3.about_z(0.7, (0.3, -0.2, 0.75))
     w, x, y, z = base.quaternion_wxyz
     number = pybullet.loadURDF(
-        str(urdf_path()),
-        base.translation_m,
-        (x, y, z, w),
-        useFixedBase=True,
+        str(urdf_path()), base.translation_m, (x, y, z, w), useFixedBase=True,
         physicsClientId=client,
-    )
+    )  # fmt: skip
     rng = np.random.Generator(np.random.Philox(key=1))
 
     for _ in range(20):
@@ -166,14 +163,11 @@ def test_the_opening_is_read_back_from_positions(opening: float) -> None:
         assert kinematics.gripper_opening(robot, positions) == pytest.approx(opening, abs=1e-5)
 
 
-@pytest.mark.parametrize(
-    ("followers", "fault"),
-    [
-        ([turning("a", "x", "fingr")], r"'a' mimics 'fingr', which does not exist.*'finger'"),
-        ([turning("a", "x", "a")], "'a' mimics itself through 'a'"),
-        ([turning("a", "x", "b"), turning("b", "y", "a")], "'a' mimics itself through 'b'"),
-    ],
-)
+@pytest.mark.parametrize(("followers", "fault"), [
+    ([turning("a", "x", "fingr")], r"'a' mimics 'fingr', which does not exist.*'finger'"),
+    ([turning("a", "x", "a")], "'a' mimics itself through 'a'"),
+    ([turning("a", "x", "b"), turning("b", "y", "a")], "'a' mimics itself through 'b'"),
+])  # fmt: skip
 def test_followers_without_a_leader_are_refused(followers: list[Joint], fault: str) -> None:
     """Unknown joints, and circles of any length."""
     with pytest.raises(ValueError, match=fault):

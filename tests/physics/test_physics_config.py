@@ -15,16 +15,10 @@ from gen_data.runner.identity import make_plan
 from tests.physics.doubles import Solids
 
 
-@pytest.mark.parametrize(
-    "wrong",
-    [
-        {"settle_time_s_max": -1.0},
-        {"time_step_s": 0.1},
-        {"guard_walls": "yes"},
-        {"gravity_m_s2": 3.7},
-        {"layout_attempts_max": 0},
-    ],
-)
+@pytest.mark.parametrize("wrong", [
+    {"settle_time_s_max": -1.0}, {"time_step_s": 0.1}, {"guard_walls": "yes"},
+    {"gravity_m_s2": 3.7}, {"layout_attempts_max": 0},
+])  # fmt: skip
 def test_nonsense_is_refused(wrong: dict[str, object]) -> None:
     """Negative times, coarse steps, words for booleans, unknown keys, no attempt at all."""
     with pytest.raises(ValidationError):

@@ -35,10 +35,8 @@ NONE_FAIL = ("randomizers.things.failures={}", "shared.robot=franka_panda")
 def demonstrated(task: str, scene_index: int = 0, failures: str = "{}") -> Scene:
     robot = "franka_panda_suction" if tasks()[task].hand == "suction" else "franka_panda"
     changes = (
-        f"shared.task={task}",
-        f"randomizers.things.failures={failures}",
-        f"shared.robot={robot}",
-    )
+        f"shared.task={task}", f"randomizers.things.failures={failures}", f"shared.robot={robot}",
+    )  # fmt: skip
     with open_pipeline(load_config("arm_tasks.yaml", overrides=(*SMALL, *changes))) as pipeline:
         return pipeline.accepted_scene(scene_index).scene
 
@@ -49,8 +47,7 @@ QUICK = ("open_drawer",)
 @pytest.mark.parametrize("task", cases(sorted(tasks()), QUICK))
 def test_every_task_is_demonstrated_with_success(task: str) -> None:
     """Its phases are those of the program; things are named in the instruction, not braced."""
-    scene = demonstrated(task)
-    (arm,) = scene.articulations
+    (arm,) = demonstrated(task).articulations
     assert arm.episode is not None
     assert arm.assignment is not None
     assert (arm.assignment.name, arm.episode.succeeded, arm.episode.failure) == (task, True, "")

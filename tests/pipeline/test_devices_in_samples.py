@@ -26,12 +26,8 @@ from tests.pipeline.test_pipeline import AcceptingPhysics, TwoBoxes
 from tests.sensors.streetcar import CAR_M, BoxRays, thing, world
 
 SENSORS: tuple[Instrument, ...] = (
-    Imu(),
-    Gnss(rate_hz=5.0),
-    Odometer(),
-    Radar(offset_m=(2.2, 0.0, 0.5)),
-    EventDetector(),
-)
+    Imu(), Gnss(rate_hz=5.0), Odometer(), Radar(offset_m=(2.2, 0.0, 0.5)), EventDetector(),
+)  # fmt: skip
 STEPS = 4
 
 

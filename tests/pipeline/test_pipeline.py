@@ -90,12 +90,9 @@ class OneCamera:
 
 
 def pipeline(
-    *randomizers: Any,
-    physics: Any = None,
-    seed: int = 7,
-    views_per_scene: int = 3,
+    *randomizers: Any, physics: Any = None, seed: int = 7, views_per_scene: int = 3,
     splits: Mapping[str, float] | None = None,
-) -> Pipeline:
+) -> Pipeline:  # fmt: skip
     sensor = OneCamera()
     recipe = PipelineConfig(
         open_scene=lambda streams: (sensor.mount(Scene("test")), randomizers, (sensor,)),
@@ -166,8 +163,7 @@ def test_scene_that_is_never_valid_is_rejected_with_the_tally() -> None:
         made.sample(3)
 
     assert str(error.value).startswith("scene 1: no valid layout in 5 attempts (")
-    counts = Counter(r.reason for r in error.value.rejections)
-    assert sum(counts.values()) == 5
+    assert sum(Counter(r.reason for r in error.value.rejections).values()) == 5
     assert "Try: 1. fewer objects (randomizers.clutter.count)" in str(error.value)
 
 
@@ -280,11 +276,9 @@ def test_boxes_leave_out_mirrors_unless_all_is_labelled(
 ) -> None:
     """A body of twice its size; what other code measures it by stays whole."""
     scene = Scene(
-        "test",
-        bodies=(Body("car", "box", SE3((1.0, 0.0, 0.5)), scale=2.0, instance_id=1),),
-        instances=(Instance(1, "car", "car", 0, "box"),),
-        box3d=extent,
-    )
+        "test", bodies=(Body("car", "box", SE3((1.0, 0.0, 0.5)), scale=2.0, instance_id=1),),
+        instances=(Instance(1, "car", "car", 0, "box"),), box3d=extent,
+    )  # fmt: skip
 
     (car,) = finalize_scene(scene, WithMirrors(), {"car": 1}).instances  # type: ignore[arg-type]
 

@@ -51,13 +51,10 @@ def test_random_assignment_is_that_of_earlier_releases() -> None:
     assert drawn == "rrrrrrrrrerrrrerrrarrrrr"
 
 
-@pytest.mark.parametrize(
-    ("count", "assignment", "message"),
-    [
-        (1, "round_robin", "splits: 1 scene leaves val and test empty; expected more scenes, or"),
-        (2, "random", "expected more scenes, splits.assign: round_robin, or other shares"),
-    ],
-)
+@pytest.mark.parametrize(("count", "assignment", "message"), [
+    (1, "round_robin", "splits: 1 scene leaves val and test empty; expected more scenes, or"),
+    (2, "random", "expected more scenes, splits.assign: round_robin, or other shares"),
+])  # fmt: skip
 def test_an_empty_split_is_warned_of_with_a_remedy(
     count: int, assignment: Assignment, message: str
 ) -> None:
@@ -109,15 +106,12 @@ def test_a_configuration_says_how_scenes_are_assigned() -> None:
     assert spec.general.splits.assign == "round_robin"
 
 
-@pytest.mark.parametrize(
-    ("given", "shares"),
-    [
-        ("{train: 1.0}", {"train": 1.0}),
-        ("{val: 1}", {"val": 1.0}),
-        ("{train: 0.9, test: 0.1}", {"train": 0.9, "test": 0.1}),
-        ("{assign: round_robin}", {"train": 0.8, "val": 0.1, "test": 0.1}),
-    ],
-)
+@pytest.mark.parametrize(("given", "shares"), [
+    ("{train: 1.0}", {"train": 1.0}),
+    ("{val: 1}", {"val": 1.0}),
+    ("{train: 0.9, test: 0.1}", {"train": 0.9, "test": 0.1}),
+    ("{assign: round_robin}", {"train": 0.8, "val": 0.1, "test": 0.1}),
+])  # fmt: skip
 def test_shares_that_are_not_given_are_zero_beside_those_that_are(
     given: str, shares: dict[str, float], tmp_path: Path
 ) -> None:

@@ -17,15 +17,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from gen_data.assemble.config import load_config
 from gen_data.assemble.pipeline_factory import PipelineFactory, open_pipeline
+from gen_data.core import errors, interfaces, lane_geometry, scene_time, se3, serialization
 from gen_data.core.capture import Channel
-from gen_data.core.errors import ConfigError
-from gen_data.core.interfaces import AssetLibrary
-from gen_data.core.lane_geometry import LaneLine
 from gen_data.core.sample import Sample
 from gen_data.core.scene import Instance, Scene
-from gen_data.core.scene_time import scene_at
-from gen_data.core.se3 import SE3, turns_of
-from gen_data.core.serialization import to_plain
 from gen_data.pipeline import Pipeline
 from tests.embree import RayCaster
 from tests.streets import thin_street
@@ -47,7 +42,7 @@ FLAT = ("relief",)
 class Street:
     """A view of a street with its ground."""
 
-    def __init__(self, scene: Scene, assets: AssetLibrary) -> None:
+    def __init__(self, scene: Scene, assets: interfaces.AssetLibrary) -> None:
         self.scene = scene
         ground = [
             b for b in self.scene.bodies
@@ -100,7 +95,7 @@ def streets() -> dict[str, Street]:
 def _places(scene: Scene, kinds: Sequence[str] = ("driving", "sidewalk")) -> NDArray[np.float64]:
     """Places on the lanes of a level street, [n, 3]."""
     rng = np.random.default_rng(0)
-    lines = [LaneLine(lane) for lane in scene.lanes if lane.kind in kinds]
+    lines = [lane_geometry.LaneLine(lane) for lane in scene.lanes if lane.kind in kinds]
     poses = [
         line.pose(float(at), float(0.4 * line.lane.width_m * side))
         for line in lines
@@ -176,8 +171,8 @@ def test_people_walk_upright_on_the_ground(streets: dict[str, Street]) -> None:
     assert len(people) >= 3
     for person in people:
         before = level[person.name].T_world_instance
-        _, pitch, roll = turns_of(person.T_world_instance)
-        assert (pitch, roll) == turns_of(before)[1:]
+        _, pitch, roll = se3.turns_of(person.T_world_instance)
+        assert (pitch, roll) == se3.turns_of(before)[1:]
         places = [before.translation_m, person.T_world_instance.translation_m]
         flat = places[0][2] - streets["flat"].ground_m(places[:1])[0]
         assert places[1][2] - hills.ground_m(places[1:])[0] == pytest.approx(flat, abs=0.025)
@@ -192,7 +187,7 @@ def test_lanes_lie_on_the_ground(streets: dict[str, Street]) -> None:
     for lane in hills.scene.lanes:
         if lane.kind not in ("driving", "sidewalk"):
             continue
-        line = LaneLine(lane)
+        line = lane_geometry.LaneLine(lane)
         at = np.linspace(0.5, line.length_m - 0.5, 80)
         points = np.array([line.pose(float(s)).translation_m for s in at])
         gap_m = points[:, 2] - hills.ground_m(points)
@@ -221,7 +216,7 @@ def hilly_samples() -> Iterator[tuple[Pipeline, list[Sample]]]:
 
 
 def _cast_to_ground(
-    pipeline: Pipeline, sample: Sample, T_world_eye: SE3, rays: NDArray[np.float64]
+    pipeline: Pipeline, sample: Sample, T_world_eye: se3.SE3, rays: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Distances along unit rays [..., 3] of an eye to the ground that it sees; NaN = none."""
     here, bodies = T_world_eye.inverse(), sample.scene.bodies
@@ -294,7 +289,7 @@ def test_samples_on_relief_do_not_depend_on_the_order_of_their_making(
     config = thin_street("street.yaml", *STREET, *HILLS, "views_per_scene=1")
     with open_pipeline(config, frozenset({Channel.RANGE, Channel.INSTANCE})) as pipeline:
         again = pipeline.sample(1)
-    assert to_plain(again.scene) == to_plain(samples[1].scene)
+    assert serialization.to_plain(again.scene) == serialization.to_plain(samples[1].scene)
     for channel, values in samples[1].capture.readings["color"].channels.items():
         np.testing.assert_array_equal(again.capture.readings["color"].channels[channel], values)
 
@@ -306,7 +301,7 @@ def test_level_relief_is_no_relief() -> None:
     with open_pipeline(thin_street("street.yaml", *STREET, *level)) as pipeline:
         one = Street.first(pipeline).scene
     with open_pipeline(thin_street("street.yaml", *STREET, without=FLAT)) as pipeline:
-        assert to_plain(one) == to_plain(Street.first(pipeline).scene)
+        assert serialization.to_plain(one) == serialization.to_plain(Street.first(pipeline).scene)
 
 
 @pytest.mark.slow
@@ -319,7 +314,7 @@ def test_traffic_follows_the_ground_at_every_instant() -> None:
     names = {track.body for track in street.scene.tracks}
     travelled, checked = [], 0
     for time_s in np.linspace(0.0, 2.0, 7):
-        scene = scene_at(street.scene, float(time_s))
+        scene = scene_time.scene_at(street.scene, float(time_s))
         moved = replace(scene, instances=scene.instances)
         for instance in moved.instances:
             wheels = _wheels_m(instance)
@@ -339,5 +334,5 @@ def test_relief_without_roads_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "table.yaml"
     path.write_text("extends: tabletop.yaml\nrandomizers:\n  - {type: relief, name: hills}\n")
     config = load_config(str(path))
-    with pytest.raises(ConfigError, match=r"table\.yaml:3:5: .*no element of type road"):
+    with pytest.raises(errors.ConfigError, match=r"table\.yaml:3:5: .*no element of type road"):
         PipelineFactory(config, n=1).check()

@@ -15,19 +15,11 @@ from gen_data.core.se3 import SE3, Array, Vec3
 from gen_data.core.streams import Rng, Streams
 
 FURNITURE_M: dict[str, tuple[float, ...]] = {
-    "table": (1.2, 0.8, 0.74),
-    "shelf": (0.9, 0.32, 1.6),
-    "bin": (0.6, 0.4, 0.22),
-    "box": (0.2, 0.2, 0.2),
-    "room": (5.0, 4.0, 2.8),
-    "gantry": (1.6, 1.0, 1.8),
-    "pedestal": (0.3, 0.3, 0.7),
-    "plane": (4.0, 4.0, 0.0),
-    "light_panel": (0.6, 0.6),
-    "backdrop": (3.0, 3.0, 2.2),
-    "street_lamp": (0.4, 0.4, 6.0),
-    "walker": (0.5, 0.5, 1.7),
-}
+    "table": (1.2, 0.8, 0.74), "shelf": (0.9, 0.32, 1.6), "bin": (0.6, 0.4, 0.22),
+    "box": (0.2, 0.2, 0.2), "room": (5.0, 4.0, 2.8), "gantry": (1.6, 1.0, 1.8),
+    "pedestal": (0.3, 0.3, 0.7), "plane": (4.0, 4.0, 0.0), "light_panel": (0.6, 0.6),
+    "backdrop": (3.0, 3.0, 2.2), "street_lamp": (0.4, 0.4, 6.0), "walker": (0.5, 0.5, 1.7),
+}  # fmt: skip
 SLOTS = {"room": 7, "table": 2, "shelf": 2}
 
 
@@ -87,11 +79,9 @@ ENVIRONMENTS = {
 
 PLATES = tuple(f"plate/{k}" for k in range(64))
 PLATE = Plate(
-    (640, 480),
-    500.0,
-    upright_pose(np.array([0.0, -1.0, 0.0]), 1.5),
+    (640, 480), 500.0, upright_pose(np.array([0.0, -1.0, 0.0]), 1.5),
     ((100.0, 470.0), (540.0, 470.0), (400.0, 300.0), (240.0, 300.0)),
-)
+)  # fmt: skip
 """All photographs show the same; the number is in the colour of the ground."""
 
 
@@ -196,14 +186,10 @@ def two_link_arm() -> RobotModel:
     links = ("base", "upper", "hand", *fingers)
     meshes = {link: f"two_link/{link}" for link in links}
     return RobotModel(
-        links=links,
-        joints=joints,
-        visuals=meshes,
-        collisions=meshes,
-        home=(0.4, 0.9, 0.04, 0.04),
+        links=links, joints=joints, visuals=meshes, collisions=meshes, home=(0.4, 0.9, 0.04, 0.04),
         gripper=Gripper("hand", SE3((0.0, 0.0, 0.35)), ("left_slide", "right_slide"), 0.08),
         no_collide=frozenset(),
-    )
+    )  # fmt: skip
 
 
 def rng_of(name: str = "test", scene: int = 0, index: int = 0) -> Rng:
@@ -211,14 +197,11 @@ def rng_of(name: str = "test", scene: int = 0, index: int = 0) -> Rng:
 
 
 def surface_scene(
-    size_m: tuple[float, float] = (1.2, 0.8),
-    *,
+    size_m: tuple[float, float] = (1.2, 0.8), *,
     assets: tuple[str, ...] = ("bottle", "brick", "can?seed=0", "can?seed=1"),
-    placement: str = "drop",
-    clearance_m: float = 1.5,
-    keep_out: tuple[Vec3, ...] = (),
+    placement: str = "drop", clearance_m: float = 1.5, keep_out: tuple[Vec3, ...] = (),
     levels: int = 1,
-) -> Scene:
+) -> Scene:  # fmt: skip
     """An empty group ``clutter`` on surfaces above each other, the lowest 1 m over the floor."""
     surfaces = tuple(
         SupportSurface(f"s{k}", "s", SE3((0.2, -0.1, 1.0 + k * clearance_m)), size_m, clearance_m)
@@ -236,13 +219,9 @@ def surface_scene(
 
 
 def _asset(
-    asset_id: str,
-    kind: str,
-    category: str,
-    tags: tuple[str, ...],
-    mass_kg: float = 0.0,
+    asset_id: str, kind: str, category: str, tags: tuple[str, ...], mass_kg: float = 0.0,
     stackable: bool = False,
-) -> Asset:
+) -> Asset:  # fmt: skip
     return Asset(
         asset_id,
         kind,  # type: ignore[arg-type]

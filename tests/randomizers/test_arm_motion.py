@@ -77,11 +77,10 @@ def test_a_given_way_is_taken_as_it_stands() -> None:
         scene("brick"),
         way=(
             Stop(joints_deg=(10.0, -90.0), opening=0.5),
-            Stop(reach_m=(0.1, 0.2, 1.0), yaw_deg=90.0),
-            Stop(grasp=("clutter",)),
+            Stop(reach_m=(0.1, 0.2, 1.0), yaw_deg=90.0), Stop(grasp=("clutter",)),
             Stop(place_m=(0.2, -0.1)),
         ),
-    )
+    )  # fmt: skip
 
     assert way[0].joint_candidates[0] == pytest.approx((math.pi / 18, -math.pi / 2), abs=1e-6)
     assert way[0].gripper_opening == 0.5
@@ -93,15 +92,12 @@ def test_a_given_way_is_taken_as_it_stands() -> None:
     assert way[3].pose_candidates[0].translation_m == (0.2, -0.1, 0.74)
 
 
-@pytest.mark.parametrize(
-    ("given", "message"),
-    [
-        ({"way": (Stop(joints_deg=(1.0,)),)}, r"way\[0\].*1 positions for the 2 joints"),
-        ({"way": (Stop(place_m=(2.0, 0.0)),)}, r"no surface at \(2.0, 0.0\)"),
-        ({"way": (Stop(grasp=("cluter",)),)}, "did you mean 'clutter'"),
-        ({"objects": ("cups",)}, "no object group 'cups'"),
-    ],
-)
+@pytest.mark.parametrize(("given", "message"), [
+    ({"way": (Stop(joints_deg=(1.0,)),)}, r"way\[0\].*1 positions for the 2 joints"),
+    ({"way": (Stop(place_m=(2.0, 0.0)),)}, r"no surface at \(2.0, 0.0\)"),
+    ({"way": (Stop(grasp=("cluter",)),)}, "did you mean 'clutter'"),
+    ({"objects": ("cups",)}, "no object group 'cups'"),
+])  # fmt: skip
 def test_what_cannot_be_is_a_mistake_that_is_named(given: dict[str, object], message: str) -> None:
     with pytest.raises(ConfigError, match=message):
         drawn(scene("brick"), **given)

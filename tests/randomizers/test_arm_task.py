@@ -2,6 +2,7 @@
 
 from collections import Counter
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -42,6 +43,8 @@ def test_the_table_has_tasks_of_many_kinds() -> None:
         "reach", "move", "grasp", "place", "grip"}  # fmt: skip
     assert {c.measure for t in table.values() for c in t.success} == {
         "offset", "height", "gap", "tilt", "travel"}  # fmt: skip
+    # The hand is no body of the scene.
+    assert any(c.body == HAND for c in table["reach"].success)
 
 
 @pytest.mark.parametrize("name", sorted(tasks()))
@@ -53,34 +56,30 @@ def test_instructions_name_things_of_the_task(name: str) -> None:
     assert text.endswith(".")
 
 
-def test_a_task_that_refers_to_an_unknown_thing_is_refused() -> None:
+def made(task: str, name: str = "things", **table: Task) -> ArmTask:
+    return ArmTask(name=name, task=Constant(task), tasks=table)
+
+
+BOXES = replace(SCENE, groups=(replace(GROUP, assets=("box", "bin")),))
+
+
+@pytest.mark.parametrize(("make", "error", "message"), [
+    (lambda: Task.model_validate_json(MINIMAL % "cup"), ValidationError, "is no object 'cup'"),
+    (lambda: Task.model_validate_json((MINIMAL % "it").replace("{it}.", "{lid}.")),
+     ValidationError, "there is no object 'lid'"),
+    (lambda: Failures(slip=0.7, miss=0.4), ValidationError, "add up to more than 1"),
+    (lambda: made("dance").possible_assets(FakeAssets()),
+     ConfigError, r"randomizers\.things\.task: unknown task"),
+    (lambda: made("reach", name="toys").check(SCENE, FakeAssets()),
+     ConfigError, r"randomizers\.toys\.group: the template has no object group 'toys'"),
+    (lambda: made("suck", suck=SUCK).check(BOXES, FakeAssets()),
+     ConfigError, r"'suck' needs suction, but arm 'arm' .* has fingers; .*panda_suction"),
+])  # fmt: skip
+def test_a_task_that_cannot_be_is_refused_by_its_field(make: Any, error: Any, message: str) -> None:
+    """Unknown things, shares, tasks and groups; suction with fingers, by a robot that would do."""
     assert Task.model_validate_json(MINIMAL % "it")
-    with pytest.raises(ValidationError, match="there is no object 'cup'"):
-        Task.model_validate_json(MINIMAL % "cup")
-    with pytest.raises(ValidationError, match="there is no object 'lid'"):
-        Task.model_validate_json((MINIMAL % "it").replace("{it}.", "{lid}."))
-
-
-def test_a_task_that_cannot_be_is_refused_by_its_field() -> None:
-    with pytest.raises(ValidationError, match="add up to more than 1"):
-        Failures(slip=0.7, miss=0.4)
-    with pytest.raises(ConfigError, match=r"randomizers\.things\.task: unknown task"):
-        ArmTask(name="things", task=Constant("dance")).possible_assets(FakeAssets())
-    with pytest.raises(
-        ConfigError, match=r"randomizers\.toys\.group: the template has no object group 'toys'"
-    ):
-        ArmTask(name="toys", task=Constant("reach")).check(SCENE, FakeAssets())
-
-
-def test_a_task_for_suction_is_refused_with_fingers() -> None:
-    """By the name of the task, with a robot that would do."""
-    group = replace(GROUP, assets=("box", "bin"))
-    scene = replace(SCENE, groups=(group,))
-    task = ArmTask(name="things", task=Constant("suck"), tasks={"suck": SUCK})
-    with pytest.raises(
-        ConfigError, match=r"'suck' needs suction, but arm 'arm' .* has fingers; .*panda_suction"
-    ):
-        task.check(scene, FakeAssets())
+    with pytest.raises(error, match=message):
+        make()
 
 
 FREE = Task.model_validate_json(
@@ -89,11 +88,8 @@ FREE = Task.model_validate_json(
  "program": [{"verb": "grasp", "at": "it", "phase": "pick"}],
  "success": [{"measure": "distance", "body": "it", "other": "hand", "at_most": 0.1}]}"""
 )
-TILT = FREE.model_copy(
-    update={
-        "program": (*FREE.program, Step(verb="move", phase="tilt", turn_deg=30, axis=(1, 0, 0)))
-    }
-)
+TURN = Step(verb="move", phase="tilt", turn_deg=30, axis=(1, 0, 0))
+TILT = FREE.model_copy(update={"program": (*FREE.program, TURN)})
 
 
 def drawn(
@@ -114,7 +110,7 @@ def test_failures_follow_their_shares() -> None:
     """Chi-square over 4,000 scenes; its false-alarm rate is 1e-4 over seeds, and the seed fixed."""
     shares = {"slip": 0.1, "miss": 0.05, "collision": 0.2, "": 0.65}
     failures = Failures(slip=0.1, miss=0.05, collision=0.2)
-    task = ArmTask(name="things", task=Constant("free"), tasks={"free": FREE}, failures=failures)
+    task = made("free", free=FREE).model_copy(update={"failures": failures})
     counts = Counter(failure_of(task, scene) for scene in range(4000))
     assert set(counts) == set(shares)
     expected = [4000 * share for share in shares.values()]
@@ -153,11 +149,9 @@ def test_a_success_cannot_be_labelled_as_a_failure() -> None:
 def test_an_arm_with_too_few_joints_is_refused(task: Task, needed: str) -> None:
     """Place and rotation about the vertical are four degrees of freedom, any pose six."""
     scene = replace(SCENE, groups=(replace(GROUP, assets=("box",)),))
-    randomizer = ArmTask(name="things", task=Constant("free"), tasks={"free": task})
-    with pytest.raises(
-        ConfigError, match=rf"'free' needs {needed} .* \(two_link\) has 2; expected"
-    ):
-        randomizer.check(scene, FakeAssets())
+    message = rf"'free' needs {needed} .* \(two_link\) has 2; expected"
+    with pytest.raises(ConfigError, match=message):
+        made("free", free=task).check(scene, FakeAssets())
 
 
 @pytest.mark.parametrize("begins_m", [0.1, 0.45])
@@ -172,8 +166,3 @@ def test_things_lie_where_the_workspace_of_the_arm_begins(begins_m: float) -> No
     usual, moved = (drawn(task, assets=assets).bodies[0] for assets in (None, Reaching()))
     step = np.subtract(moved.T_world_body.translation_m, usual.T_world_body.translation_m)
     assert step == pytest.approx([begins_m - 0.3, 0.0, 0.0], abs=1e-6)
-
-
-def test_hands_are_named_in_conditions() -> None:
-    """``hand`` is no body of the scene."""
-    assert any(c.body == HAND for c in tasks()["reach"].success)

@@ -6,14 +6,9 @@ from gen_data.core.colorimetry import temperature_to_chromaticity
 from gen_data.randomizers.color_space import hsv_to_linear, temperature_to_linear
 
 PLANCKIAN_XY = {
-    2000: (0.5267, 0.4133),
-    2856: (0.4476, 0.4075),
-    3000: (0.4369, 0.4041),
-    4000: (0.3805, 0.3768),
-    5000: (0.3451, 0.3516),
-    6500: (0.3135, 0.3237),
-    10000: (0.2807, 0.2884),
-}
+    2000: (0.5267, 0.4133), 2856: (0.4476, 0.4075), 3000: (0.4369, 0.4041), 4000: (0.3805, 0.3768),
+    5000: (0.3451, 0.3516), 6500: (0.3135, 0.3237), 10000: (0.2807, 0.2884),
+}  # fmt: skip
 """CIE 1931 chromaticities of a black body: Wyszecki and Stiles, "Color science", 1982; 2856 K is
 illuminant A of CIE 15."""
 
@@ -42,16 +37,13 @@ def test_linear_rgb_has_the_chromaticity_and_luminance_one(kelvin: int) -> None:
     assert xy == pytest.approx(PLANCKIAN_XY[kelvin], abs=1.5e-3)
 
 
-def test_candles_are_red_and_skies_are_blue() -> None:
-    """Order of the channels; no channel is negative where the gamut ends."""
+def test_candles_are_red_skies_blue_and_hues_turn_through_the_primaries() -> None:
+    """No channel is negative where the gamut ends; no saturation is grey."""
     candle, sky = temperature_to_linear(1700.0), temperature_to_linear(12000.0)
 
     assert candle[0] > candle[1] > candle[2] >= 0.0
     assert sky[2] > sky[1] > sky[0] > 0.0
 
-
-def test_hue_turns_through_the_primaries() -> None:
-    """Red, green, blue at thirds; no saturation is grey."""
     assert hsv_to_linear(0.0, 1.0, 1.0) == (1.0, 0.0, 0.0)
     assert hsv_to_linear(1 / 3, 1.0, 1.0) == pytest.approx((0.0, 1.0, 0.0), abs=1e-6)
     assert hsv_to_linear(2 / 3, 1.0, 1.0) == pytest.approx((0.0, 0.0, 1.0), abs=1e-6)

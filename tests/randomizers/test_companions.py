@@ -119,8 +119,7 @@ def test_a_mesh_that_stands_joins_a_circle_but_walks_with_nobody(
     tmp_path: Path, pose: str, companions: int
 ) -> None:
     """A figure from a file has one pose, which its attributes state."""
-    figure = trimesh.creation.box((0.4, 0.5, 1.8))
-    figure.export(tmp_path / "figure.obj")
+    trimesh.creation.box((0.4, 0.5, 1.8)).export(tmp_path / "figure.obj")
     (tmp_path / "assets.yaml").write_text(
         "licence: CC0-1.0\nauthor: Someone\nsource: workshop\n"
         "assets:\n  - {id: figure, file: figure.obj, category: person, mass_kg: 75,\n"

@@ -59,15 +59,12 @@ def test_a_path_leads_from_the_door_to_the_edge_of_the_street(library: AssetLibr
     assert path[path[:, 1] < 0.1, 2].mean() == pytest.approx(RISE_M + 0.04, abs=0.03)
 
 
-@pytest.mark.parametrize(
-    "lanes",
-    [
-        pytest.param((), id="no garden"),
-        pytest.param((garden(0.5 * GARDEN_M, -1.0),), id="garden of the other side of a street"),
-        pytest.param((garden(20.0, 1.0),), id="far away"),
-        pytest.param((garden(-20.0, 1.0),), id="behind the house"),
-    ],
-)
+@pytest.mark.parametrize("lanes", [
+    pytest.param((), id="no garden"),
+    pytest.param((garden(0.5 * GARDEN_M, -1.0),), id="garden of the other side of a street"),
+    pytest.param((garden(20.0, 1.0),), id="far away"),
+    pytest.param((garden(-20.0, 1.0),), id="behind the house"),
+])  # fmt: skip
 def test_houses_without_a_garden_get_none(library: AssetLibrary, lanes: tuple[Lane, ...]) -> None:
     assert laid(street(library, *lanes), library) == []
 
@@ -82,8 +79,7 @@ def test_the_nearest_garden_counts(library: AssetLibrary) -> None:
 
 def test_what_stands_in_the_way_stays(library: AssetLibrary) -> None:
     """A path would run through it."""
-    lane = garden(0.5 * GARDEN_M, 1.0)
-    scene = street(library, lane)
+    scene = street(library, garden(0.5 * GARDEN_M, 1.0))
     group = ObjectGroup("things", (), ("bench?seed=0",), 0, "along", lanes=("garden",))
     (door,) = [point for point in library.keypoints(HOUSE) if point.name == "door"]
     thing = Member("bench?seed=0", SE3((-door.position_m[1], 3.0, RISE_M / 2)))

@@ -21,9 +21,8 @@ SCENE = Scene(
         Body("drone", "drone?seed=0", SE3((0.0, 0.0, 50.1))),
         Body("drone_gimbal", "gimbal", SE3((0.0, 0.0, 50.0))),
     ),
-    rigs=(Rig("drone", "drone"), Rig("drone_gimbal", "drone_gimbal")),
-    lanes=(ROAD,),
-)
+    rigs=(Rig("drone", "drone"), Rig("drone_gimbal", "drone_gimbal")), lanes=(ROAD,),
+)  # fmt: skip
 
 
 class Nothing:
@@ -77,8 +76,7 @@ def test_a_constant_bank_flies_a_circle_of_the_known_radius() -> None:
 @pytest.mark.parametrize("seed", range(8))
 def test_the_optical_axis_meets_the_road_at_time_0(seed: int) -> None:
     """At the drawn height above the ground there, and no nearer to the road's ends than allowed."""
-    scene = flown(seed, offset_m=0.0, residual=0.0, from_end_m=90.0)
-    pose = scene.rig_pose("drone_gimbal")
+    pose = flown(seed, offset_m=0.0, residual=0.0, from_end_m=90.0).rig_pose("drone_gimbal")
     eye, axis = np.array(pose.translation_m), pose.rotation()[:, 0]
     hit = eye + axis * ((3.0 - eye[2]) / axis[2])
 
@@ -115,14 +113,14 @@ def test_flights_cover_the_sequence_and_the_exposures_around_it() -> None:
     assert DroneFlight(name="flight", duration_s=4.0).motion_duration_s == 4.0
 
 
-def test_what_is_missing_is_named() -> None:
-    """A template without a drone, without such a road, and roads that are too short."""
-    with pytest.raises(ConfigError, match="no drone 'drone'; there is none: list an element"):
-        flown(scene=replace(SCENE, rigs=()))
-    with pytest.raises(ConfigError, match="no driving lane on side; there is main"):
-        flown(roads=("side",))
-    with pytest.raises(LayoutRejected):
-        flown(from_end_m=201.0)
+@pytest.mark.parametrize(("given", "error", "message"), [
+    ({"scene": replace(SCENE, rigs=())}, ConfigError, "no drone 'drone'; there is none: list an"),
+    ({"roads": ("side",)}, ConfigError, "no driving lane on side; there is main"),
+    ({"from_end_m": 201.0}, LayoutRejected, None),
+], ids=["a template without a drone", "no such road", "roads that are too short"])  # fmt: skip
+def test_what_is_missing_is_named(given: dict[str, Any], error: Any, message: str | None) -> None:
+    with pytest.raises(error, match=message):
+        flown(**given)
 
 
 @pytest.mark.slow

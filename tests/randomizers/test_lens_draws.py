@@ -70,20 +70,13 @@ def test_a_lens_that_folds_over_is_drawn_again() -> None:
         drawn(lens=Coefficients(k1=Constant(-0.9), k2=Constant(0.0)))
 
 
-@pytest.mark.parametrize(
-    ("given", "message"),
-    [
-        ({"camera": "bend"}, "no camera 'bend'.*did you mean 'bent'"),
-        (
-            {"camera": "straight", "lens": Coefficients(k1=Constant(0.1))},
-            "camera 'straight' has a lens of the model 'pinhole' with no coefficients, not k1",
-        ),
-        (
-            {"camera": "straight", "hfov_deg": Uniform(100.0, 200.0)},
-            "200 degrees is too wide for the pinhole",
-        ),
-    ],
-)
+@pytest.mark.parametrize(("given", "message"), [
+    ({"camera": "bend"}, "no camera 'bend'.*did you mean 'bent'"),
+    ({"camera": "straight", "lens": Coefficients(k1=Constant(0.1))},
+     "camera 'straight' has a lens of the model 'pinhole' with no coefficients, not k1"),
+    ({"camera": "straight", "hfov_deg": Uniform(100.0, 200.0)},
+     "200 degrees is too wide for the pinhole"),
+])  # fmt: skip
 def test_what_no_camera_has_is_refused(given: dict[str, Any], message: str) -> None:
     with pytest.raises(ConfigError, match=message):
         drawn(**given)

@@ -128,10 +128,8 @@ def test_illuminance_can_follow_a_sequence() -> None:
 
 
 PANELS = {
-    "width_m": Uniform(0.4, 0.9),
-    "panel_aspect": Uniform(0.5, 0.8),
-    "radius_m": Uniform(0.2, 0.3),
-}
+    "width_m": Uniform(0.4, 0.9), "panel_aspect": Uniform(0.5, 0.8), "radius_m": Uniform(0.2, 0.3),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("kind", ["rectangle", "disk"])

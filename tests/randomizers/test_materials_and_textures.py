@@ -70,10 +70,8 @@ def test_looks_change_objects_unless_other_targets_are_named(
     assert changed(scene, after(made(()), scene)) == {"clutter/0", "clutter/1"}
     assert changed(scene, after(made(("table",)), scene)) == {"table"}
     assert changed(scene, after(made(("table", "clutter")), scene)) == {
-        "table",
-        "clutter/0",
-        "clutter/1",
-    }
+        "table", "clutter/0", "clutter/1",
+    }  # fmt: skip
 
 
 @looks
@@ -103,14 +101,10 @@ def test_geometry_and_labels_are_left(
     assert now.instances == scene.instances
 
 
-@pytest.mark.parametrize(
-    "randomizer",
-    [
-        Textures(name="t", textures=("masonry", "wood")),
-        Backdrop(name="b", floor=("wood",), walls=("masonry",)),
-    ],
-    ids=lambda randomizer: randomizer.type,
-)
+@pytest.mark.parametrize("randomizer", [
+    Textures(name="t", textures=("masonry", "wood")),
+    Backdrop(name="b", floor=("wood",), walls=("masonry",)),
+], ids=lambda randomizer: randomizer.type)  # fmt: skip
 def test_a_plan_lists_the_texture_files_of_a_user_but_not_generated_textures(
     tmp_path: Path, randomizer: RandomizerBase
 ) -> None:
@@ -222,12 +216,11 @@ def test_a_probability_is_a_number_or_a_flag(kind: str, written: str, mean: floa
     assert isinstance(randomizer.probability.draw(rng_of()), bool)
 
 
-@pytest.mark.parametrize(
-    ("written", "fact"),
-    [("1.5", "probability needs a number in [0, 1], got 1.5"),
-     ("-1", "probability needs a number in [0, 1], got -1"),
-     ("yes", "expected a probability in [0, 1], true or false, got 'yes' (did you mean true?)")],
-)  # fmt: skip
+@pytest.mark.parametrize(("written", "fact"), [
+    ("1.5", "probability needs a number in [0, 1], got 1.5"),
+    ("-1", "probability needs a number in [0, 1], got -1"),
+    ("yes", "expected a probability in [0, 1], true or false, got 'yes' (did you mean true?)"),
+])  # fmt: skip
 def test_an_impossible_probability_is_told_with_its_place(written: str, fact: str) -> None:
     """The column is that of the value."""
     problems = Problems()

@@ -32,11 +32,9 @@ def table(things: tuple[str, ...]) -> Scene:
 
 def reaching(*, holding: bool) -> ReachingHand:
     return ReachingHand(
-        name="hands",
-        probability=Probability(1.0),
-        holding=Probability(float(holding)),
+        name="hands", probability=Probability(1.0), holding=Probability(float(holding)),
         raised_m=Constant(0.0),
-    )
+    )  # fmt: skip
 
 
 @pytest.mark.parametrize("radius_m", [0.018, 0.026, 0.033, 0.04, 0.046])
@@ -63,8 +61,7 @@ def test_a_grasping_hand_touches_and_hardly_enters_a_cylinder(radius_m: float, s
 @pytest.mark.parametrize("thing", HELD)
 def test_what_is_held_stands_in_the_hand_above_the_table(thing: str, library: Library) -> None:
     """No skin is deeper than 3 mm in the object; neither is below the table's top."""
-    scene = reaching(holding=True)(table((thing,)), library, rng_of(thing))
-    hand, held = scene.bodies
+    hand, held = reaching(holding=True)(table((thing,)), library, rng_of(thing)).bodies
     points = hand.T_world_body.apply(library.vertices_m(hand.asset).astype(np.float64))
     radii = measure_radii(library.vertices_m(thing), np.array([0.0]))
     assert radii is not None
@@ -96,8 +93,7 @@ def test_others_keep_clear_of_the_arm(library: Library) -> None:
 
 def test_hands_are_labelled(library: Library) -> None:
     """Category, pose, side and tone; 21 joints with the bones of a hand."""
-    scene = reaching(holding=True)(table(HELD), library, rng_of())
-    hand = scene.instances[0]
+    hand = reaching(holding=True)(table(HELD), library, rng_of()).instances[0]
     asset = library.get(hand.asset)
     skeleton = find_skeleton(JOINTS)
 
@@ -108,8 +104,7 @@ def test_hands_are_labelled(library: Library) -> None:
 
 
 def test_nothing_is_held_that_is_too_wide(library: Library) -> None:
-    scene = reaching(holding=True)(table(("vase?seed=5",)), library, rng_of())
-    (hand,) = scene.bodies
+    (hand,) = reaching(holding=True)(table(("vase?seed=5",)), library, rng_of()).bodies
 
     assert "grasp" not in hand.asset
 

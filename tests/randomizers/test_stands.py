@@ -7,11 +7,8 @@ import numpy as np
 import pytest
 
 from gen_data.config.distributions import Constant
-from gen_data.core.errors import ConfigError
+from gen_data.core import errors, scene_time, se3, stereo
 from gen_data.core.scene import Region, Scene
-from gen_data.core.scene_time import place_sensors
-from gen_data.core.se3 import SE3, turned, turns_of
-from gen_data.core.stereo import baseline_m
 from gen_data.randomizers.camera_pose import CameraPose
 from gen_data.randomizers.rig_calibration import RigCalibration
 from gen_data.scene_templates.stand import Stand
@@ -32,7 +29,7 @@ def pair(**stand: Any) -> Scene:
         LidarSensor(name="scan", rig="pair", offset_m=(0.0, 0.0, 0.1)),
     ):
         scene = sensor.mount(scene)
-    return place_sensors(scene)
+    return scene_time.place_sensors(scene)
 
 
 def posed(scene: Scene, k: int = 0, **given: Any) -> Scene:
@@ -47,7 +44,7 @@ def test_a_fixed_stand_looks_straight_down() -> None:
     left = scene.camera("left").T_world_camera
     assert left.translation_m == pytest.approx((0.5, 0.03, 1.7), abs=1e-6)
     np.testing.assert_allclose(left.rotation()[:, 2], [0.0, 0.0, -1.0], atol=1e-7)
-    assert baseline_m(scene.camera("left"), scene.camera("right")) == pytest.approx(0.06)
+    assert stereo.baseline_m(scene.camera("left"), scene.camera("right")) == pytest.approx(0.06)
 
 
 def test_an_orbiting_stand_keeps_its_pair_rectified() -> None:
@@ -58,14 +55,14 @@ def test_an_orbiting_stand_keeps_its_pair_rectified() -> None:
 
         away_m = np.subtract(left.T_world_camera.translation_m, FOCUS.center_m)
         assert float(np.linalg.norm(away_m)) == pytest.approx(0.9, abs=3e-6)
-        assert baseline_m(left, right) == pytest.approx(0.06, abs=3e-6)
+        assert stereo.baseline_m(left, right) == pytest.approx(0.06, abs=3e-6)
 
 
 def test_everything_on_a_stand_moves_with_it() -> None:
     """The scanner's place as seen by a camera is that of its mount."""
     before, after = pair(), posed(pair(), azimuth_deg=Constant(40.0))
 
-    def seen(scene: Scene) -> SE3:
+    def seen(scene: Scene) -> se3.SE3:
         return scene.camera("left").T_world_camera.inverse() @ scene.lidar("scan").T_world_lidar
 
     assert after.lidar("scan").T_world_lidar != before.lidar("scan").T_world_lidar
@@ -80,15 +77,12 @@ def test_the_named_camera_of_a_stand_is_aimed() -> None:
     np.testing.assert_allclose(eye[:2], 0.0, atol=5e-6)
 
 
-@pytest.mark.parametrize(
-    ("given", "told"),
-    [
-        ({"rig": "paar"}, "there is no stand 'paar'; expected one of pair"),
-        ({"camera": "middle"}, "no camera 'middle' on the rig 'pair'; expected one of left, right"),
-    ],
-)
+@pytest.mark.parametrize(("given", "told"), [
+    ({"rig": "paar"}, "there is no stand 'paar'; expected one of pair"),
+    ({"camera": "middle"}, "no camera 'middle' on the rig 'pair'; expected one of left, right"),
+])  # fmt: skip
 def test_an_unknown_name_is_refused(given: dict[str, Any], told: str) -> None:
-    with pytest.raises(ConfigError, match=told):
+    with pytest.raises(errors.ConfigError, match=told):
         posed(pair(), **given)
 
 
@@ -106,7 +100,7 @@ def test_a_whole_rig_is_disturbed_as_one() -> None:
 
 @pytest.mark.parametrize("turns_deg", [(10, 20, 30), (-170, -89, 5), (60, 90, 0), (0, -90, 0)])
 def test_turns_of_a_pose_make_it_again(turns_deg: tuple[float, float, float]) -> None:
-    pose = turned((1.0, 2.0, 3.0), *(math.radians(a) for a in turns_deg))
+    pose = se3.turned((1.0, 2.0, 3.0), *(math.radians(a) for a in turns_deg))
     np.testing.assert_allclose(
-        turned((1.0, 2.0, 3.0), *turns_of(pose)).matrix(), pose.matrix(), atol=1e-12
+        se3.turned((1.0, 2.0, 3.0), *se3.turns_of(pose)).matrix(), pose.matrix(), atol=1e-12
     )

@@ -9,12 +9,9 @@ import pytest
 from scipy.stats import chisquare
 
 from gen_data.config.distributions import Constant
-from gen_data.core.asset_types import Material
-from gen_data.core.colorimetry import luminance
+from gen_data.core import asset_types, colorimetry, se3
 from gen_data.core.scene import Body, Instance, Light, ObjectGroup, Scene
-from gen_data.core.se3 import SE3
-from gen_data.randomizers.daylight import set_daylight
-from gen_data.randomizers.vehicle_lights import VehicleLights
+from gen_data.randomizers import daylight, vehicle_lights
 from gen_data.randomizers.vehicle_paint import ON_ROADS, PAINTS, VehiclePaint
 from gen_data.sky.sky import SkyModel
 from tests.randomizers.doubles import FakeAssets, rng_of
@@ -26,7 +23,7 @@ def road(count: int = 1, dark: bool = False) -> Scene:
         Body(
             f"traffic/{k}",
             "wagon",
-            SE3.about_z(0.5 * np.pi, (3.0 * k, 0.0, 0.75)),
+            se3.SE3.about_z(0.5 * np.pi, (3.0 * k, 0.0, 0.75)),
             instance_id=k + 1,
             group="traffic",
         )
@@ -35,15 +32,15 @@ def road(count: int = 1, dark: bool = False) -> Scene:
     instances = tuple(Instance(k + 1, b.name, "car", 0, "wagon") for k, b in enumerate(bodies))
     group = ObjectGroup("traffic", (), ("wagon",), count, "along", lanes=("driving",))
     scene = Scene("test", bodies=bodies, instances=instances, groups=(group,))
-    return set_daylight(scene, SkyModel(1, -30.0 if dark else 40.0, 2.5, 0.0), 0.0)
+    return daylight.set_daylight(scene, SkyModel(1, -30.0 if dark else 40.0, 2.5, 0.0), 0.0)
 
 
-def slots(body: Body) -> dict[str, Material]:
+def slots(body: Body) -> dict[str, asset_types.Material]:
     return {material.role: material for material in body.materials}
 
 
 def lit(scene: Scene, **fields: Any) -> Scene:
-    return VehicleLights(name="lights", **fields)(scene, FakeAssets(), rng_of())
+    return vehicle_lights.VehicleLights(name="lights", **fields)(scene, FakeAssets(), rng_of())
 
 
 def named(color: tuple[float, float, float]) -> str:
@@ -92,8 +89,8 @@ def test_only_paint_is_painted_and_dust_takes_everything_towards_its_colour() ->
         for dirt in (0.0, 0.8)
     )
 
-    assert slots(clean)["glass"] == Material(role="glass")
-    assert slots(clean)["paint"] != Material(role="paint")
+    assert slots(clean)["glass"] == asset_types.Material(role="glass")
+    assert slots(clean)["paint"] != asset_types.Material(role="paint")
     for role in ("paint", "glass", "tyre"):
         assert slots(dirty)[role].roughness > slots(clean)[role].roughness
 
@@ -128,12 +125,10 @@ def test_lights_glow_by_role_and_are_labelled() -> None:
 
     assert glowing == {"brakelight", "indicator_left"}
     emission = np.array(slots(scene.bodies[0])["brakelight"].emission_cd_m2)
-    assert float(luminance(emission)) == pytest.approx(9000.0, rel=0.01)
+    assert float(colorimetry.luminance(emission)) == pytest.approx(9000.0, rel=0.01)
     assert dict(scene.instances[0].attributes) == {
-        "brake_lights": "on",
-        "head_lights": "off",
-        "indicator": "left",
-    }
+        "brake_lights": "on", "head_lights": "off", "indicator": "left",
+    }  # fmt: skip
     assert [light.name for light in scene.lights] == [light.name for light in road().lights]
 
 

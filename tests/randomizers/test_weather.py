@@ -81,7 +81,7 @@ def test_fields_replace_what_the_preset_says() -> None:
     assert scene.weather.wetness == PRESETS["HardRainNoon"].condition.weather.wetness
 
 
-def test_time_of_day_takes_other_suns_away_and_leaves_lamps() -> None:
+def test_time_of_day_takes_other_suns_away_and_leaves_lamps_and_clouds() -> None:
     """One sun at most; lamps are not its business."""
     lamp = Light("lamp", "sphere", intensity_cd=10.0)
     scene = Scene("t", lights=(Light("old", "sun", illuminance_lux=5.0), lamp))
@@ -89,6 +89,13 @@ def test_time_of_day_takes_other_suns_away_and_leaves_lamps() -> None:
 
     assert [light.name for light in noon.lights] == ["sun", "lamp"]
     assert drawn("time_of_day", noon, sun_altitude_deg=-20).lights == (lamp,)
+
+    rainy = drawn("weather", preset="HardRainNoon")
+
+    assert dict(drawn("time_of_day", rainy).shared)["cloudiness"] == 1.0
+    clear = drawn("time_of_day", rainy, cloudiness=0.1)
+    assert dict(clear.shared)["cloudiness"] == 0.1
+    assert clear.weather == rainy.weather
 
 
 def test_time_of_day_can_be_preethams() -> None:
@@ -105,15 +112,6 @@ def test_time_of_day_can_be_preethams() -> None:
     assert sun.illuminance_lux == pytest.approx(
         daylight.preetham_sun_lux(math.radians(40.0), 3.0), rel=1e-3
     )
-
-
-def test_time_of_day_keeps_the_clouds_of_the_weather() -> None:
-    rainy = drawn("weather", preset="HardRainNoon")
-
-    assert dict(drawn("time_of_day", rainy).shared)["cloudiness"] == 1.0
-    clear = drawn("time_of_day", rainy, cloudiness=0.1)
-    assert dict(clear.shared)["cloudiness"] == 0.1
-    assert clear.weather == rainy.weather
 
 
 def test_clouds_dim_and_soften_the_sun() -> None:

@@ -5,15 +5,12 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from gen_data.core import asset_types
-from gen_data.core.errors import AssetError
+from gen_data.core import asset_types, errors, scene, se3
 from gen_data.core.intrinsics import Intrinsics
-from gen_data.core.scene import Camera, Environment
-from gen_data.core.se3 import SE3, Vec3, look_at
 
 
 def box_mesh(
-    size_m: Vec3 = (1.0, 1.0, 1.0),
+    size_m: se3.Vec3 = (1.0, 1.0, 1.0),
     materials: tuple[asset_types.Material, ...] = (asset_types.Material(),),
 ) -> asset_types.MeshData:
     corners, normals, uvs, faces = [], [], [], []
@@ -35,7 +32,7 @@ def box_mesh(
 
 
 def room_mesh(
-    size_m: Vec3 = (6.0, 6.0, 3.0),
+    size_m: se3.Vec3 = (6.0, 6.0, 3.0),
     materials: tuple[asset_types.Material, ...] = (asset_types.Material(),),
 ) -> asset_types.MeshData:
     """A box seen from inside, floor at z = 0."""
@@ -47,10 +44,9 @@ def room_mesh(
 
 
 def sphere_mesh(
-    radius_m: float = 0.5,
-    rings: int = 32,
+    radius_m: float = 0.5, rings: int = 32,
     materials: tuple[asset_types.Material, ...] = (asset_types.Material(),),
-) -> asset_types.MeshData:
+) -> asset_types.MeshData:  # fmt: skip
     polar = np.linspace(0.0, np.pi, rings + 1)
     azimuth = np.linspace(0.0, 2 * np.pi, 2 * rings + 1)
     p, a = np.meshgrid(polar, azimuth, indexing="ij")
@@ -80,13 +76,10 @@ def plane_mesh(
 
 def _mesh(vertices, faces, normals, uvs, materials) -> asset_types.MeshData:  # noqa: ANN001
     return asset_types.MeshData(
-        np.asarray(vertices, np.float32),
-        np.asarray(faces, np.int32),
-        np.asarray(normals, np.float32),
-        np.asarray(uvs, np.float32),
-        np.zeros(len(faces), np.int32),
-        materials,
-    )
+        np.asarray(vertices, np.float32), np.asarray(faces, np.int32),
+        np.asarray(normals, np.float32), np.asarray(uvs, np.float32),
+        np.zeros(len(faces), np.int32), materials,
+    )  # fmt: skip
 
 
 def uniform_sky(height: int = 16) -> asset_types.Float32:
@@ -97,17 +90,16 @@ class FakeLibrary:
     """An AssetLibrary over dictionaries handed in by a test."""
 
     def __init__(
-        self,
-        meshes: dict[str, asset_types.MeshData],
+        self, meshes: dict[str, asset_types.MeshData],
         textures: dict[str, asset_types.TextureData] | None = None,
         environments: dict[str, asset_types.Float32] | None = None,
-    ) -> None:
+    ) -> None:  # fmt: skip
         self.meshes = meshes
         self.textures = textures or {}
         self.environments = {"environment/neutral?seed=0": uniform_sky(), **(environments or {})}
 
     def get(self, asset_id: str) -> asset_types.Asset:
-        raise AssetError(f"unknown asset '{asset_id}'")
+        raise errors.AssetError(f"unknown asset '{asset_id}'")
 
     def find(self, tags: Iterable[str], kind: str = "object") -> tuple[asset_types.Asset, ...]:
         return ()
@@ -121,7 +113,7 @@ class FakeLibrary:
     def body_bounds_m(self, asset_id: str) -> None:
         """None: there are no mirrors."""
 
-    def bounds_m(self, asset_id: str) -> tuple[Vec3, Vec3]:
+    def bounds_m(self, asset_id: str) -> tuple[se3.Vec3, se3.Vec3]:
         return self.meshes[asset_id].bounds_m()
 
     def vertices_m(self, asset_id: str) -> asset_types.Float32:
@@ -131,7 +123,7 @@ class FakeLibrary:
         return ()
 
     def robot(self, asset_id: str) -> asset_types.RobotModel:
-        raise AssetError(f"'{asset_id}' is no robot")
+        raise errors.AssetError(f"'{asset_id}' is no robot")
 
     def mesh(self, asset_id: str) -> asset_types.MeshData:
         return self.meshes[asset_id]
@@ -147,24 +139,21 @@ class FakeLibrary:
 
 
 def camera_at(
-    eye_m: Vec3,
-    target_m: Vec3,
-    size_px: tuple[int, int] = (64, 48),
-    hfov_deg: float = 60.0,
-    ev100: float | None = None,
-) -> Camera:
+    eye_m: se3.Vec3, target_m: se3.Vec3, size_px: tuple[int, int] = (64, 48),
+    hfov_deg: float = 60.0, ev100: float | None = None,
+) -> scene.Camera:  # fmt: skip
     intrinsics = Intrinsics.from_hfov(*size_px, math.radians(hfov_deg))
-    return Camera("camera", look_at(eye_m, target_m), intrinsics, ev100)
+    return scene.Camera("camera", se3.look_at(eye_m, target_m), intrinsics, ev100)
 
 
-def forward_camera(size_px: tuple[int, int] = (64, 48), focal_px: float = 50.0) -> Camera:
+def forward_camera(size_px: tuple[int, int] = (64, 48), focal_px: float = 50.0) -> scene.Camera:
     """A camera at the origin whose frame is the world's: X right, Y down, Z forward."""
     width_px, height_px = size_px
     intrinsics = Intrinsics(
         width_px, height_px, focal_px, focal_px, 0.5 * width_px, 0.5 * height_px
     )
-    return Camera("camera", SE3(), intrinsics)
+    return scene.Camera("camera", se3.SE3(), intrinsics)
 
 
-DARK = Environment(luminance_cd_m2=0.0, visible=False)
+DARK = scene.Environment(luminance_cd_m2=0.0, visible=False)
 MATTE = asset_types.Material(base_color=(0.5, 0.5, 0.5), roughness=1.0, specular=0.0)

@@ -18,14 +18,10 @@ GLOWING = Material(base_color=(0.0, 0.0, 0.0), specular=0.0, emission_cd_m2=(100
 FACING = SE3((0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0))
 """Turns a plane towards a camera that looks along Z."""
 
-MESHES = FakeLibrary(
-    {
-        "box": box_mesh(),
-        "lamp": box_mesh(materials=(GLOWING,)),
-        "wall": plane_mesh(200.0),
-        "speck": box_mesh((1e-3, 1e-3, 1e-3)),
-    }
-)
+MESHES = FakeLibrary({
+    "box": box_mesh(), "lamp": box_mesh(materials=(GLOWING,)), "wall": plane_mesh(200.0),
+    "speck": box_mesh((1e-3, 1e-3, 1e-3)),
+})  # fmt: skip
 
 
 def even_track(body: str, start: SE3, velocity_m_s: Vec3, turn_rad_s: float = 0.0) -> Trajectory:
@@ -46,15 +42,10 @@ def even_track(body: str, start: SE3, velocity_m_s: Vec3, turn_rad_s: float = 0.
 
 
 def world(
-    *bodies: Body,
-    tracks: tuple[Trajectory, ...] = (),
-    changes: tuple[StateChange, ...] = (),
-    camera_velocity_m_s: Vec3 = (0.0, 0.0, 0.0),
-    camera_turn_rad_s: float = 0.0,
-    lens: Intrinsics = LENS,
-    shutter: Shutter = INSTANT,
-    time_s: float = 0.2,
-) -> Scene:
+    *bodies: Body, tracks: tuple[Trajectory, ...] = (), changes: tuple[StateChange, ...] = (),
+    camera_velocity_m_s: Vec3 = (0.0, 0.0, 0.0), camera_turn_rad_s: float = 0.0,
+    lens: Intrinsics = LENS, shutter: Shutter = INSTANT, time_s: float = 0.2,
+) -> Scene:  # fmt: skip
     """Bodies in front of a camera on a moving body; its frame is the world's at 0 s."""
     instances = tuple(
         Instance(b.instance_id, b.name, "thing", 1, b.asset, T_world_instance=b.T_world_body)
@@ -64,15 +55,8 @@ def world(
     ride = even_track("speck", IDENTITY, camera_velocity_m_s, camera_turn_rad_s)
     camera = Camera("camera", IDENTITY, lens, 5.0, rig="eye", shutter=shutter)
     scene = Scene(
-        "moving",
-        bodies=(*bodies, Body("speck", "speck", SE3((0.0, 0.0, -1.0)))),
-        instances=instances,
-        cameras=(camera,),
-        rigs=(Rig("eye", "speck"),),
-        environment=DARK,
-        step_s=STEP_S,
-        tracks=(*tracks, ride),
-        changes=changes,
-        time_s=-1.0,
-    )
+        "moving", bodies=(*bodies, Body("speck", "speck", SE3((0.0, 0.0, -1.0)))),
+        instances=instances, cameras=(camera,), rigs=(Rig("eye", "speck"),), environment=DARK,
+        step_s=STEP_S, tracks=(*tracks, ride), changes=changes, time_s=-1.0,
+    )  # fmt: skip
     return scene_at(place_sensors(scene), time_s)

@@ -17,15 +17,10 @@ from tests.renderers.embree import cast, near_edges
 from tests.renderers.fake_library import FakeLibrary, box_mesh, camera_at, room_mesh, sphere_mesh
 
 LABELS = frozenset({Channel.Z_DEPTH, Channel.INSTANCE})
-LIBRARY = FakeLibrary(
-    {
-        "room": room_mesh(),
-        "slab": box_mesh((1.6, 1.2, 0.04)),
-        "box": box_mesh((0.2, 0.3, 0.1)),
-        "ball": sphere_mesh(0.1, rings=24),
-        "egg": sphere_mesh(0.07, rings=9),
-    }
-)
+LIBRARY = FakeLibrary({
+    "room": room_mesh(), "slab": box_mesh((1.6, 1.2, 0.04)), "box": box_mesh((0.2, 0.3, 0.1)),
+    "ball": sphere_mesh(0.1, rings=24), "egg": sphere_mesh(0.07, rings=9),
+})  # fmt: skip
 
 
 def assert_agrees_with_embree(
@@ -86,14 +81,10 @@ def test_scenes_of_users_agree_with_embree(tabletop: Pipeline, index: int) -> No
     assert_sample_agrees(tabletop, index)
 
 
-@pytest.mark.parametrize(
-    "numbers",
-    [
-        pytest.param(range(3, 7), marks=pytest.mark.slow),
-        pytest.param(range(7, 23), marks=pytest.mark.exhaustive),
-    ],
-    ids=["four", "sixteen"],
-)
+@pytest.mark.parametrize("numbers", [
+    pytest.param(range(3, 7), marks=pytest.mark.slow),
+    pytest.param(range(7, 23), marks=pytest.mark.exhaustive),
+], ids=["four", "sixteen"])  # fmt: skip
 def test_scenes_of_both_kinds_agree_with_embree(tabletop: Pipeline, numbers: range) -> None:
     """Further scenes, for cases that a few might miss."""
     renderer = WarpRenderer(LIBRARY, "cpu")

@@ -44,22 +44,18 @@ def cut_grate() -> MeshData:
         faces += [(first, first + 1, first + 2), (first, first + 2, first + 3)]
     points = np.array(vertices, np.float32)
     return MeshData(
-        points,
-        np.array(faces, np.int32),
-        np.broadcast_to(np.array([0, 0, 1], np.float32), points.shape).copy(),
-        points[:, :2] + 0.5,
-        np.zeros(len(faces), np.int32),
-        (replace(GRATE, texture="plain"),),
-    )
+        points, np.array(faces, np.int32),
+        np.broadcast_to(np.array([0, 0, 1], np.float32), points.shape).copy(), points[:, :2] + 0.5,
+        np.zeros(len(faces), np.int32), (replace(GRATE, texture="plain"),),
+    )  # fmt: skip
 
 
 def library() -> FakeLibrary:
     plain = TextureData(np.full((4, 4, 3), 200, np.uint8))
     meshes = {
-        "grate": plane_mesh(1.0, (GRATE,)),
-        "cut": cut_grate(),
+        "grate": plane_mesh(1.0, (GRATE,)), "cut": cut_grate(),
         "floor": plane_mesh(12.0, (Material((0.5, 0.5, 0.5), 1.0, specular=0.0),)),
-    }
+    }  # fmt: skip
     return FakeLibrary(meshes, {"grate": grate_texture(), "plain": plain})
 
 
@@ -77,11 +73,10 @@ def scene_of(asset: str) -> Scene:
 
 PINHOLE = camera_at((0.4, -2.2, 1.4), (0.1, 0.4, 0.4), (240, 180), 50.0, ev100=9.0)
 FISHEYE = Camera(
-    "camera",
-    look_at((0.4, -1.2, 1.2), (0.1, 0.4, 0.4)),
+    "camera", look_at((0.4, -1.2, 1.2), (0.1, 0.4, 0.4)),
     Intrinsics(200, 160, 90.0, 90.0, 100.0, 80.0, Lens("kannala_brandt", (0.01, 0.0, 0.0, 0.0))),
     9.0,
-)
+)  # fmt: skip
 
 
 @pytest.mark.parametrize("method", ["raster", "rays"])
@@ -163,8 +158,7 @@ def test_a_mesh_without_coverage_is_drawn_as_ever() -> None:
     for texture in (full, plain):
         assets = library()
         assets.textures["grate"] = texture
-        settings = RenderSettings(visibility="rays")
-        renderer = WarpRenderer(assets, "cpu", settings)
+        renderer = WarpRenderer(assets, "cpu", RenderSettings(visibility="rays"))
         readings.append(renderer.render(scene_of("grate"), PINHOLE, CHANNELS).channels)
     for channel in sorted(readings[0]):
         np.testing.assert_array_equal(readings[0][channel], readings[1][channel])

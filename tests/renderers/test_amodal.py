@@ -90,9 +90,7 @@ def test_an_instance_out_of_sight_has_an_empty_silhouette() -> None:
     """Behind the camera: a mask of no rows and no columns."""
     body = Body("box", "box", SE3((0.0, 0.0, -3.0)), instance_id=1)
 
-    reading = rendered(scene_of(body), forward_camera())
-
-    assert reading.silhouettes[1].mask.shape == (0, 0)
+    assert rendered(scene_of(body), forward_camera()).silhouettes[1].mask.shape == (0, 0)
 
 
 def test_a_body_cut_by_the_plane_of_the_camera_is_bounded_by_the_canvas() -> None:

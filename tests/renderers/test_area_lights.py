@@ -7,18 +7,15 @@ import numpy as np
 import pytest
 import warp as wp
 
-from gen_data.core.asset_types import Material
+from gen_data.core import asset_types, se3
 from gen_data.core.capture import Channel
 from gen_data.core.photometry import add_fixture, fixture_asset, luminance_cd_m2
 from gen_data.core.scene import Body, Camera, Light, Scene
-from gen_data.core.se3 import SE3, Vec3
 from gen_data.renderers.warp.device import open_device
 from gen_data.renderers.warp.realtime.light_selection import main_lamps
 from gen_data.renderers.warp.renderer import WarpRenderer
-from gen_data.renderers.warp.scene.brdf_albedo_lut import lobe_albedo
-from gen_data.renderers.warp.scene.kernels import analytic_lights, records
-from gen_data.renderers.warp.scene.kernels.brdf import make_brdf, specular_lobe
-from gen_data.renderers.warp.scene.scene_packing import lamp_records
+from gen_data.renderers.warp.scene import brdf_albedo_lut, scene_packing
+from gen_data.renderers.warp.scene.kernels import analytic_lights, brdf, records
 from gen_data.renderers.warp.settings import RenderSettings
 from tests.embree import RayCaster, placed
 from tests.renderers.fake_library import DARK, MATTE, FakeLibrary, box_mesh, camera_at, plane_mesh
@@ -97,14 +94,14 @@ def _at_points(  # noqa: ANN202, PLR0917
     share = analytic_lights.relative_illuminance(lamps[0], beam, p[i], n[i])
     lux[i] = beam.normal_lux[1] * share
     n_v = wp.dot(n[i], v[i])
-    s = make_brdf(table, wp.vec3(1.0, 1.0, 1.0), roughness, 1.0, 0.5, n_v)
+    s = brdf.make_brdf(table, wp.vec3(1.0, 1.0, 1.0), roughness, 1.0, 0.5, n_v)
     alpha = s.roughness * s.roughness
     ray = n[i] * (2.0 * n_v) - v[i]
     way = analytic_lights.representative_direction(lamps[0], beam, p[i], ray, alpha)
     n_l = wp.max(wp.dot(n[i], way), 1.0e-3)
     wider = analytic_lights.lobe_widening(lamps[0], beam, alpha)
     if share > 0.0:
-        lobe = specular_lobe(s, n[i], v[i], way, n_l, wider)
+        lobe = brdf.specular_lobe(s, n[i], v[i], way, n_l, wider)
         mirrored[i] = (
             lobe[1]
             * n_l
@@ -119,7 +116,7 @@ def _at_points(  # noqa: ANN202, PLR0917
         leaves = -wp.dot(to_part, lamps[0].direction)
         cosine = wp.dot(n[i], to_part)
         if leaves > 0.0 and cosine > 0.0:
-            lobe = specular_lobe(s, n[i], v[i], to_part, cosine, 0.0)
+            lobe = brdf.specular_lobe(s, n[i], v[i], to_part, cosine, 0.0)
             total += lobe[1] * cosine * leaves / squared
     summed[i] = total * area_m2 * lamps[0].radiance[1]
 
@@ -132,8 +129,8 @@ def at_points(
     q, area_m2 = points_on(light, 60)
     outputs = [wp.zeros(len(p), dtype=float, device="cpu") for _ in range(3)]
     vectors = [wp.array(a.astype(np.float32), dtype=wp.vec3, device="cpu") for a in (p, n, v, q)]
-    lamps = wp.array(lamp_records([light]), dtype=records.LightRecord, device="cpu")
-    table = wp.array(lobe_albedo(), dtype=wp.vec2, device="cpu")
+    lamps = wp.array(scene_packing.lamp_records([light]), dtype=records.LightRecord, device="cpu")
+    table = wp.array(brdf_albedo_lut.lobe_albedo(), dtype=wp.vec2, device="cpu")
     inputs = [lamps, table, *vectors, area_m2, roughness]
     wp.launch(_at_points, len(p), inputs, outputs, device="cpu")
     lux, mirrored, summed = (output.numpy() for output in outputs)
@@ -240,15 +237,11 @@ def test_a_matte_plane_under_a_ceiling_panel_is_lit_as_by_quadrature() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "light",
-    [
-        replace(RECTANGLE, position_m=(0.0, 0.0, 1.6), direction=(0.0, 0.0, -1.0)),
-        replace(RECTANGLE, position_m=(-0.8, 0.0, 1.0), direction=(0.8, 0.0, -0.6), side=(0, 1, 0)),
-        replace(DISK, position_m=(0.3, -0.6, 1.2), direction=(0.0, 0.6, -0.8)),
-    ],
-    ids=["ceiling", "softbox", "disk"],
-)
+@pytest.mark.parametrize("light", [
+    replace(RECTANGLE, position_m=(0.0, 0.0, 1.6), direction=(0.0, 0.0, -1.0)),
+    replace(RECTANGLE, position_m=(-0.8, 0.0, 1.0), direction=(0.8, 0.0, -0.6), side=(0, 1, 0)),
+    replace(DISK, position_m=(0.3, -0.6, 1.2), direction=(0.0, 0.6, -0.8)),
+], ids=["ceiling", "softbox", "disk"])  # fmt: skip
 def test_shadows_of_panels_are_as_soft_as_their_shape_says(light: Light) -> None:
     """A block on a plane, against 1600 Embree rays per point to all parts of the panel.
 
@@ -257,7 +250,7 @@ def test_shadows_of_panels_are_as_soft_as_their_shape_says(light: Light) -> None
     the unshaded light, towards the dark.
     """
     library = FakeLibrary({"plane": plane_mesh(20.0, (MATTE,)), "box": box_mesh()})
-    block = Body("b", "box", SE3.about_z(0.5, (0.1, 0.1, 0.15)), 0.3)
+    block = Body("b", "box", se3.SE3.about_z(0.5, (0.1, 0.1, 0.15)), 0.3)
     scene = Scene("t", (Body("p", "plane"), block), lights=(light,), environment=DARK)
     camera = camera_at((0.0, -0.01, 6.0), (0.0, 0.0, 0.0), (320, 240), hfov_deg=14.0)
 
@@ -286,7 +279,7 @@ def test_a_panel_is_seen_in_its_fixture_and_labels_do_not_know_it() -> None:
     """As bright as I / A from the front, dark from behind; instance 0; no self-shadow."""
     light = replace(RECTANGLE, position_m=(0.0, 0.0, 1.0), direction=(0.0, 0.0, -1.0))
     asset = fixture_asset(light)
-    glass = Material((0.8, 0.8, 0.8), role="lamp")
+    glass = asset_types.Material((0.8, 0.8, 0.8), role="lamp")
     meshes = {asset: _fixture_mesh((1.2, 0.6, 0.04), glass), "plane": plane_mesh(20.0, (MATTE,))}
     library = FakeLibrary(meshes)
     scene = Scene("t", (Body("p", "plane"),), environment=DARK)
@@ -295,14 +288,13 @@ def test_a_panel_is_seen_in_its_fixture_and_labels_do_not_know_it() -> None:
     renderer = WarpRenderer(library, "cpu", PLAIN)
     wanted = frozenset({Channel.RADIANCE, Channel.INSTANCE, Channel.Z_DEPTH})
 
-    def middle(eye_m: Vec3, target_m: Vec3) -> tuple[float, int, float]:
+    def middle(eye_m: se3.Vec3, target_m: se3.Vec3) -> tuple[float, int, float]:
         camera = camera_at(eye_m, target_m, (24, 18), hfov_deg=20.0)
         channels = renderer.render(scene, camera, wanted).channels
         return (
-            float(channels[Channel.RADIANCE][9, 12, 1]),
-            int(channels[Channel.INSTANCE][9, 12]),
+            float(channels[Channel.RADIANCE][9, 12, 1]), int(channels[Channel.INSTANCE][9, 12]),
             float(channels[Channel.Z_DEPTH][9, 12]),
-        )
+        )  # fmt: skip
 
     before, behind = middle((0.0, 0.01, 0.3), (0, 0, 1)), middle((0.0, 0.01, 3.0), (0, 0, 1))
     below = middle((0.9, 0.0, 0.5), (0.0, 0.0, 0.0))
@@ -317,7 +309,7 @@ def test_a_panel_is_seen_in_its_fixture_and_labels_do_not_know_it() -> None:
     assert below[0] == pytest.approx(float(unseen.channels[Channel.RADIANCE][9, 12, 1]), rel=1e-5)
 
 
-def _fixture_mesh(size_m: Vec3, front: Material):  # noqa: ANN202
+def _fixture_mesh(size_m: se3.Vec3, front: asset_types.Material):  # noqa: ANN202
     """A box that stands on z = 0, its lower side in a slot of its own."""
     mesh = box_mesh(size_m, (MATTE, front))
     vertices = mesh.vertices_m + np.array([0.0, 0.0, 0.5 * size_m[2]], np.float32)
@@ -332,7 +324,7 @@ def test_of_many_panels_those_that_light_what_is_seen_are_kept() -> None:
     far = replace(down, position_m=(0.0, 0.0, 20.0))
     p, n = np.zeros((1, 3)), np.array([[0.0, 0.0, 1.0]])
 
-    kept = main_lamps(lamp_records([away, far, down]), p, n, 2)
+    kept = main_lamps(scene_packing.lamp_records([away, far, down]), p, n, 2)
 
     assert kept.tolist() == [1, 2]
 
@@ -342,8 +334,8 @@ def test_a_mirror_shows_a_panel_once(visible: bool) -> None:
     """As bright as the panel times the metal's 0.9, whether by a reflected ray or by the lobe."""
     light = replace(RECTANGLE, position_m=(0.0, 0.0, 1.0), direction=(0.0, 0.0, -1.0))
     asset = fixture_asset(light)
-    glass = Material((0.8, 0.8, 0.8), role="lamp")
-    silver = Material((0.9, 0.9, 0.9), 0.08, 1.0)
+    glass = asset_types.Material((0.8, 0.8, 0.8), role="lamp")
+    silver = asset_types.Material((0.9, 0.9, 0.9), 0.08, 1.0)
     meshes = {asset: _fixture_mesh((1.2, 0.6, 0.04), glass), "plane": plane_mesh(20.0, (silver,))}
     library = FakeLibrary(meshes)
     scene = Scene("t", (Body("p", "plane"),), environment=DARK)

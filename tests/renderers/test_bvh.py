@@ -29,13 +29,10 @@ STACK = 128
 
 @wp.kernel
 def trace_mesh(
-    tree: wp.array(dtype=wp.float32),
-    origins: wp.array(dtype=wp.vec3),
-    ways: wp.array(dtype=wp.vec3),
-    reach: float,
-    points: wp.array(dtype=wp.vec3),
+    tree: wp.array(dtype=wp.float32), origins: wp.array(dtype=wp.vec3),
+    ways: wp.array(dtype=wp.vec3), reach: float, points: wp.array(dtype=wp.vec3),
     faces: wp.array(dtype=wp.vec2i),
-) -> None:
+) -> None:  # fmt: skip
     i = wp.tid()
     found = first_in_mesh(tree, origins[i], ways[i], reach)
     points[i] = wp.vec3(float(found[0]), float(found[1]), float(found[2]))
@@ -45,14 +42,9 @@ def trace_mesh(
 
 @wp.kernel
 def trace_world(
-    world: World,
-    origins: wp.array(dtype=wp.vec3),
-    ways: wp.array(dtype=wp.vec3),
-    reach: float,
-    t: wp.array(dtype=float),
-    bodies: wp.array(dtype=int),
-    blocked: wp.array(dtype=int),
-) -> None:
+    world: World, origins: wp.array(dtype=wp.vec3), ways: wp.array(dtype=wp.vec3), reach: float,
+    t: wp.array(dtype=float), bodies: wp.array(dtype=int), blocked: wp.array(dtype=int),
+) -> None:  # fmt: skip
     i = wp.tid()
     met = closest_hit(world, origins[i], ways[i], reach, HOLES)
     t[i] = met.t
@@ -170,13 +162,10 @@ def geometric_series(count: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 MESHES = {
-    "one face": soup(0, 1),
-    "eight faces": soup(1, 8),
-    "nine faces": soup(2, 9),
-    "a soup": soup(3, 700),
-    "a geometric series": geometric_series(100),
+    "one face": soup(0, 1), "eight faces": soup(1, 8), "nine faces": soup(2, 9),
+    "a soup": soup(3, 700), "a geometric series": geometric_series(100),
     "faces on top of each other": (soup(4, 1)[0], np.tile(np.int32([[0, 1, 2]]), (3000, 1))),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", MESHES)

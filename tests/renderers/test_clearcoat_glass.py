@@ -14,11 +14,7 @@ from gen_data.core.scene import Body, Camera, Environment, Light, Scene
 from gen_data.core.se3 import SE3, Vec3
 from gen_data.renderers.warp.device import open_device
 from gen_data.renderers.warp.renderer import WarpRenderer
-from gen_data.renderers.warp.scene.kernels.brdf import (
-    fresnel_dielectric,
-    pane_reflectance,
-    pane_transmittance,
-)
+from gen_data.renderers.warp.scene.kernels import brdf
 from gen_data.renderers.warp.settings import RenderSettings
 from tests.renderers.fake_library import (
     DARK,
@@ -38,12 +34,9 @@ FURNACE = Environment(luminance_cd_m2=100.0)
 
 
 def radiance_of(
-    bodies: tuple[Body, ...],
-    library: FakeLibrary,
-    camera: Camera,
-    lights: tuple[Light, ...] = (),
+    bodies: tuple[Body, ...], library: FakeLibrary, camera: Camera, lights: tuple[Light, ...] = (),
     environment: Environment = DARK,
-) -> np.ndarray:
+) -> np.ndarray:  # fmt: skip
     scene = Scene("t", bodies, lights=lights, environment=environment)
     camera = replace(camera, ev100=8.0)
     reading = WarpRenderer(library, "cpu", SHARP).render(scene, camera, RADIANCE)
@@ -67,14 +60,14 @@ def fresnel_by_angles(incidence_rad: float, ior: float) -> float:
 @wp.kernel
 def _fresnel(cosines: wp.array(dtype=float), eta: float, f: wp.array(dtype=float)):  # noqa: ANN202
     i = wp.tid()
-    f[i] = fresnel_dielectric(cosines[i], eta)
+    f[i] = brdf.fresnel_dielectric(cosines[i], eta)
 
 
 @wp.kernel
 def _pane(f: wp.array(dtype=float), tint: float, rt: wp.array(dtype=wp.vec2)):  # noqa: ANN202
     i = wp.tid()
     color = wp.vec3(tint)
-    rt[i] = wp.vec2(pane_reflectance(f[i], color)[0], pane_transmittance(f[i], color)[1])
+    rt[i] = wp.vec2(brdf.pane_reflectance(f[i], color)[0], brdf.pane_transmittance(f[i], color)[1])
 
 
 def test_reflectance_of_glass_is_fresnels() -> None:
@@ -180,17 +173,14 @@ def test_an_edge_behind_a_slab_is_displaced_as_snell_says() -> None:
     t sin(a) (1 - cos(a) / sqrt(n^2 - sin^2(a))).
     """
     thickness, turn, distance = 0.2, math.radians(40.0), 3.0
-    library = FakeLibrary(
-        {
-            "slab": box_mesh((1.6, 1.6, thickness), (replace(GLASS, thin=False),)),
-            "bright": box_mesh((4, 8, 0.01), (glowing(100.0),)),
-        }
-    )
+    library = FakeLibrary({
+        "slab": box_mesh((1.6, 1.6, thickness), (replace(GLASS, thin=False),)),
+        "bright": box_mesh((4, 8, 0.01), (glowing(100.0),)),
+    })  # fmt: skip
     pose = SE3((0, 0, 1.2), (math.cos(turn / 2), 0.0, math.sin(turn / 2), 0.0))
     bodies = (
-        Body("slab", "slab", pose),
-        Body("right", "bright", SE3((2.0, 0.0, distance + 0.005))),
-    )
+        Body("slab", "slab", pose), Body("right", "bright", SE3((2.0, 0.0, distance + 0.005))),
+    )  # fmt: skip
     focal_px = 600.0
 
     row = radiance_of(bodies, library, forward_camera((301, 5), focal_px))[2, :, 1]
@@ -216,12 +206,10 @@ def test_an_edge_behind_a_slab_is_displaced_as_snell_says() -> None:
 def test_a_glass_ball_shows_the_world_upside_down_where_snell_says() -> None:
     """Rows at which the border between a bright and a dark half appears, within 1.5 px."""
     radius, middle, wall, border_m = 0.5, 2.0, 4.0, 0.15
-    library = FakeLibrary(
-        {
-            "ball": sphere_mesh(radius, 160, (replace(GLASS, thin=False),)),
-            "bright": box_mesh((20, 10, 0.01), (glowing(100.0),)),
-        }
-    )
+    library = FakeLibrary({
+        "ball": sphere_mesh(radius, 160, (replace(GLASS, thin=False),)),
+        "bright": box_mesh((20, 10, 0.01), (glowing(100.0),)),
+    })  # fmt: skip
     bodies = (
         Body("ball", "ball", SE3((0, 0, middle))),
         Body("low", "bright", SE3((0.0, 5.0 + border_m, wall + 0.005))),
@@ -288,10 +276,9 @@ def test_an_edge_in_a_mirror_is_the_mean_of_tones_of_a_camera_with_many_photosit
     pixel_m = 13.0 * 2.0 * math.tan(math.radians(10.0)) / 64
     edge_m = 0.35 * pixel_m
     bodies = (
-        Body("mirror", "mirror"),
-        Body("bright", "bright", SE3((10.0 + edge_m, 0.0, 10.05))),
+        Body("mirror", "mirror"), Body("bright", "bright", SE3((10.0 + edge_m, 0.0, 10.05))),
         Body("dim", "dim", SE3((-10.0 + edge_m, 0.0, 10.05))),
-    )
+    )  # fmt: skip
     white, brightest = 100.0, 1000.0
     renderer = WarpRenderer(FakeLibrary(meshes), "cpu", RenderSettings(antialias=8))
     scene = Scene("t", bodies, environment=DARK)
@@ -359,8 +346,7 @@ def test_emission_maps_scale_the_emitted_luminance() -> None:
 
 def test_occlusion_maps_darken_ambient_light_only() -> None:
     """An even sky of 100 cd/m^2 on an albedo of 0.5: 50 and 50 * 128 / 255; the sun stays."""
-    texture = TextureData(WHITE, occlusion=halves(255, 128, 1))
-    bodies, library = mapped(texture, MATTE)
+    bodies, library = mapped(TextureData(WHITE, occlusion=halves(255, 128, 1)), MATTE)
 
     dim, bright = of_halves(radiance_of(bodies, library, FROM_ABOVE, environment=FURNACE))
     assert bright == pytest.approx(50.0, rel=0.01)
@@ -424,10 +410,9 @@ def test_glass_out_of_sight_changes_no_byte() -> None:
     plain = Material((0.3, 0.5, 0.2), 0.2, texture="map")
     texture = TextureData(halves(90, 200, 3))
     meshes = {
-        "floor": plane_mesh(6.0, (plain,)),
-        "box": box_mesh((0.5, 0.5, 0.5)),
+        "floor": plane_mesh(6.0, (plain,)), "box": box_mesh((0.5, 0.5, 0.5)),
         "ball": sphere_mesh(0.3, 16, (replace(GLASS, thin=False, coat=1.0),)),
-    }
+    }  # fmt: skip
     library = FakeLibrary(meshes, {"map": texture})
     sun = Light("sun", "sun", direction=(0.5, 0.2, -0.8), illuminance_lux=5000.0)
     bodies = (Body("floor", "floor"), Body("box", "box", SE3((0, 0, 0.25))))
@@ -450,9 +435,7 @@ def test_a_coat_mirrors_what_is_around(color: Vec3) -> None:
     bodies = (Body("floor", "floor"), Body("wall", "wall", SE3((0, 3.0, 0.0))))
     angle = math.radians(60.0)
     eye = (0.0, -2.0 * math.sin(angle), 2.0 * math.cos(angle))
-    camera = camera_at(eye, (0, 0, 0), (15, 15), 2.0)
-
-    seen = radiance_of(bodies, library, camera)[7, 7]
+    seen = radiance_of(bodies, library, camera_at(eye, (0, 0, 0), (15, 15), 2.0))[7, 7]
 
     schlick = 0.04 + 0.96 * (1.0 - math.cos(angle)) ** 5
     np.testing.assert_allclose(seen, 1000.0 * schlick, rtol=0.03)

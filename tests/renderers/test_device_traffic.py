@@ -114,11 +114,9 @@ def test_results_are_read_as_they_were_written() -> None:
     """Five elements of each type, written through the parts of one memory."""
     rng = np.random.default_rng(3)
     written = [
-        rng.integers(0, 65536, 5).astype(np.uint16),
-        rng.standard_normal((5, 3)).astype(np.float32),
-        rng.integers(-9, 9, (5, 2)).astype(np.int32),
-        rng.standard_normal(5).astype(np.float32),
-    ]
+        rng.integers(0, 65536, 5).astype(np.uint16), rng.standard_normal((5, 3)).astype(np.float32),
+        rng.integers(-9, 9, (5, 2)).astype(np.int32), rng.standard_normal(5).astype(np.float32),
+    ]  # fmt: skip
     together = Readback.allocate(5, (wp.uint16, wp.vec3, wp.vec2i, float), CPU)
     for part, values in zip(together.parts, written, strict=True):
         part.assign(values)

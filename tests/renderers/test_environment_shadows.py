@@ -6,22 +6,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gen_data.core.asset_types import Float32, Material
+from gen_data.core import asset_types, se3
 from gen_data.core.capture import Channel
 from gen_data.core.scene import Body, Environment, Light, Region, Scene
-from gen_data.core.se3 import SE3, Vec3
 from gen_data.renderers.warp.device import open_device
 from gen_data.renderers.warp.renderer import WarpRenderer
-from gen_data.renderers.warp.scene.environment_maps import (
-    SkyLamp,
-    remove_peaks,
-    upload_environment,
-    upload_split,
-)
+from gen_data.renderers.warp.scene import environment_maps
 from gen_data.renderers.warp.settings import RenderSettings
-from tests.embree import RayCaster, placed
+from tests import embree, tiers
 from tests.renderers import fake_library
-from tests.tiers import sampled
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 PLAIN = RenderSettings(ambient_occlusion_radius_m=0.0, antialias=1)
@@ -40,7 +33,7 @@ def directions(height: int) -> tuple[np.ndarray, np.ndarray]:
     return d, solid
 
 
-def panorama(*lights: tuple[Vec3, float, float], height: int = 256) -> Float32:
+def panorama(*lights: tuple[se3.Vec3, float, float], height: int = 256) -> asset_types.Float32:
     """A grey sky, brighter above, with disks: direction, radius [rad], factor on the sky."""
     d, solid = directions(height)
     image = np.repeat(0.6 + 0.4 * d[..., 2:], 3, axis=2) * (0.9, 1.0, 1.2)
@@ -59,7 +52,7 @@ def irradiance(image: np.ndarray, normals: np.ndarray) -> np.ndarray:
     return np.asarray(cosine @ (solid[..., None] * image).reshape(-1, 3))
 
 
-def disc_irradiance(lamp: SkyLamp, normals: np.ndarray) -> np.ndarray:
+def disc_irradiance(lamp: environment_maps.SkyLamp, normals: np.ndarray) -> np.ndarray:
     """Irradiance of a uniform disk in the sky, by summation over 4000 points."""
     k = np.arange(4000) + 0.5
     cosine = 1.0 - (1.0 - math.cos(lamp.angular_radius_rad)) * k / 4000
@@ -81,21 +74,20 @@ def every_normal() -> np.ndarray:
 
 
 SKIES = {
-    "sun": (((0.6, 0.3, 0.7), 0.012, 20000.0),),
-    "window": (((0.9, -0.2, 0.25), 0.3, 25.0),),
+    "sun": (((0.6, 0.3, 0.7), 0.012, 20000.0),), "window": (((0.9, -0.2, 0.25), 0.3, 25.0),),
     "two soft boxes": (((0.5, 0.5, 0.6), 0.25, 40.0), ((-0.8, 0.1, 0.4), 0.15, 60.0)),
     "sun in its halo": (((0.7, -0.3, 0.5), 0.02, 6000.0), ((0.7, -0.3, 0.5), 0.25, 12.0)),
     "at the seam": (((-1.0, 0.01, 0.4), 0.1, 100.0),),
     "at the zenith": (((0.02, 0.01, 1.0), 0.12, 80.0),),
-}
+}  # fmt: skip
 
 
-@pytest.mark.parametrize("sky", sampled(SKIES, 3))
+@pytest.mark.parametrize("sky", tiers.sampled(SKIES, 3))
 def test_lamps_and_the_rest_give_the_irradiance_of_the_panorama(sky: str) -> None:
     """On surfaces of any orientation, to 1 % of the brightest one's irradiance."""
     image, normals = panorama(*SKIES[sky]), every_normal()
 
-    rest, lamps = remove_peaks(image)
+    rest, lamps = environment_maps.remove_peaks(image)
 
     whole = irradiance(image, normals)
     parts = irradiance(rest, normals) + sum(disc_irradiance(lamp, normals) for lamp in lamps)
@@ -108,10 +100,10 @@ def test_lamps_and_the_rest_give_the_irradiance_of_the_panorama(sky: str) -> Non
 @pytest.mark.parametrize(("radius_rad", "luminance"), [(0.03, 3000.0), (0.1, 200.0), (0.3, 30.0)])
 @pytest.mark.parametrize("towards", [(0.6, 0.3, 0.7), (-1.0, 0.0, 0.5), (0.1, 0.0, 1.0)])
 def test_a_disc_in_the_sky_is_found_where_and_as_large_as_it_is(
-    towards: Vec3, radius_rad: float, luminance: float
+    towards: se3.Vec3, radius_rad: float, luminance: float
 ) -> None:
     """To half a degree and a twelfth of its size; texels are 0.7 degrees wide."""
-    _, lamps = remove_peaks(panorama((towards, radius_rad, luminance)))
+    _, lamps = environment_maps.remove_peaks(panorama((towards, radius_rad, luminance)))
 
     unit = np.asarray(towards) / np.linalg.norm(towards)
     assert len(lamps) == 1
@@ -127,7 +119,7 @@ def test_a_fine_panorama_is_lit_and_mirrored_like_a_coarse_one() -> None:
     image = panorama(((0.6, 0.3, 0.7), 0.05, 900.0), height=1200)
     device = open_device("cpu")
 
-    split = upload_split(image, upload_environment(image, device))
+    split = environment_maps.upload_split(image, environment_maps.upload_environment(image, device))
 
     (lamp,) = split.lamps
     normals = every_normal()[::25]
@@ -141,7 +133,7 @@ def test_a_fine_panorama_is_lit_and_mirrored_like_a_coarse_one() -> None:
 def test_even_and_cloudy_skies_stay_as_they_are() -> None:
     """Nothing outstanding in the panorama: no lamp, and the same image."""
     for image in (panorama(), panorama(((0.5, 0.5, 0.6), 0.6, 3.0))):
-        rest, lamps = remove_peaks(image)
+        rest, lamps = environment_maps.remove_peaks(image)
 
         assert lamps == ()
         assert rest is image
@@ -184,8 +176,7 @@ def test_open_ground_is_as_bright_with_shadows_as_without(name: str) -> None:
 
     lit, _ = luminance_of(scene, library)
 
-    image = library.environment(name)
-    up = irradiance(image, np.array([[0.0, 0.0, 1.0]]))[0]
+    up = irradiance(library.environment(name), np.array([[0.0, 0.0, 1.0]]))[0]
     expected = up * MEAN_CD_M2 * 0.5 / math.pi
     np.testing.assert_allclose(lit, np.broadcast_to(expected, lit.shape), rtol=0.02)
 
@@ -197,7 +188,7 @@ def test_a_block_throws_the_shadow_that_the_panorama_implies(name: str, yaw_rad:
 
     The rest of the sky is taken as unshaded on both sides: it throws no shadow here.
     """
-    block = Body("b", "box", SE3.about_z(0.3, (0.0, 0.0, 0.15)), 0.3)
+    block = Body("b", "box", se3.SE3.about_z(0.3, (0.0, 0.0, 0.15)), 0.3)
     scene, library = scene_under(Environment(name, MEAN_CD_M2, yaw_rad=yaw_rad), block)
 
     lit, p = luminance_of(scene, library)
@@ -211,7 +202,7 @@ def test_a_block_throws_the_shadow_that_the_panorama_implies(name: str, yaw_rad:
     weights = luminance[bright] * solid[bright] * np.maximum(towards[:, 2], 0.0)
     on_ground = (p[..., 2] < 1e-3).reshape(-1)
     ground = p.reshape(-1, 3)[on_ground]
-    caster = RayCaster(placed(block, library))
+    caster = embree.RayCaster(embree.placed(block, library))
     hidden = caster.is_blocked(ground[:, None], towards[None], near=1e-3)
     whole = irradiance(image, np.array([[0.0, 0.0, 1.0]]))[0] @ LUMINANCE
     expected = (whole - hidden @ weights) / whole
@@ -227,7 +218,7 @@ def test_a_block_throws_the_shadow_that_the_panorama_implies(name: str, yaw_rad:
 
 def test_shadows_can_be_switched_off() -> None:
     """Then the whole panorama is light without shadows, as it is when other lamps outshine it."""
-    block = Body("b", "ball", SE3((0.0, 0.0, 0.6)), 0.4)
+    block = Body("b", "ball", se3.SE3((0.0, 0.0, 0.6)), 0.4)
     scene, library = scene_under(Environment("sun", MEAN_CD_M2), block)
 
     with_shadow, p = luminance_of(scene, library)
@@ -245,7 +236,7 @@ def test_shadows_can_be_switched_off() -> None:
 def test_nothing_changes_where_no_shadow_would_be_seen(what: str) -> None:
     """The same bytes as without: light in a closed room does not come from the sky."""
     environment = Environment("sun", MEAN_CD_M2)
-    block = Body("b", "box", SE3((0.0, 0.0, 0.15)), 0.3)
+    block = Body("b", "box", se3.SE3((0.0, 0.0, 0.15)), 0.3)
     scene, library = scene_under(environment, block)
     if what == "a sun of its own":
         sun = Light("s", "sun", direction=(0.6, 0.0, -0.8), illuminance_lux=1000.0)
@@ -288,14 +279,14 @@ def test_the_sun_of_a_panorama_is_seen_where_it_is() -> None:
 
 def test_the_sun_of_a_panorama_is_seen_through_a_pane() -> None:
     """Clear glass transmits 0.92 of it; the part that a lamp represents stays visible."""
-    pane = Material((1.0, 1.0, 1.0), 0.0, transmission=1.0)
+    pane = asset_types.Material((1.0, 1.0, 1.0), 0.0, transmission=1.0)
     scene, library = scene_under(Environment("sun", MEAN_CD_M2))
     library.meshes["sheet"] = fake_library.plane_mesh(6.0, (pane,))
     towards = 10.0 * np.array((0.6, 0.3, 0.7))
     camera = fake_library.camera_at(
         (0.0, 0.0, 0.5), tuple(towards.tolist()), (33, 25), hfov_deg=20.0, ev100=8.0
     )
-    behind = replace(scene, bodies=(*scene.bodies, Body("s", "sheet", SE3((0.0, 0.0, 2.0)))))
+    behind = replace(scene, bodies=(*scene.bodies, Body("s", "sheet", se3.SE3((0.0, 0.0, 2.0)))))
     open_air, through = (
         WarpRenderer(library, "cpu", PLAIN)
         .render(one, camera, frozenset({Channel.RADIANCE}))

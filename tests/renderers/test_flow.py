@@ -19,17 +19,10 @@ from gen_data.renderers.warp.renderer import WarpRenderer
 from tests.renderers.fake_library import FakeLibrary, box_mesh
 from tests.renderers.moving import FACING, LENS, MESHES, STEP_S, even_track, world
 
-ALL = frozenset(
-    {
-        Channel.FLOW_FORWARD,
-        Channel.FLOW_BACKWARD,
-        Channel.FLOW_OCCLUDED_FORWARD,
-        Channel.FLOW_OCCLUDED_BACKWARD,
-        Channel.SCENE_FLOW,
-        Channel.INSTANCE,
-        Channel.Z_DEPTH,
-    }
-)
+ALL = frozenset({
+    Channel.FLOW_FORWARD, Channel.FLOW_BACKWARD, Channel.FLOW_OCCLUDED_FORWARD,
+    Channel.FLOW_OCCLUDED_BACKWARD, Channel.SCENE_FLOW, Channel.INSTANCE, Channel.Z_DEPTH,
+})  # fmt: skip
 WALL = Body("wall", "wall", replace(FACING, translation_m=(0.0, 0.0, 6.0)))
 
 
@@ -92,13 +85,10 @@ def test_the_sky_is_at_infinity_and_flows_by_rotation_alone(renderer: WarpRender
     assert np.array_equal(seen[Channel.FLOW_OCCLUDED_FORWARD] == 0, inside)
 
 
-@pytest.mark.parametrize(
-    "lens",
-    [
-        Lens("brown_conrady", (-0.2, 0.05, 0.001, -0.002, 0.0, 0.0, 0.0, 0.0), 1.2),
-        Lens("kannala_brandt", (-0.02, 0.01, -0.004, 0.0005), 1.4),
-    ],
-)
+@pytest.mark.parametrize("lens", [
+    Lens("brown_conrady", (-0.2, 0.05, 0.001, -0.002, 0.0, 0.0, 0.0, 0.0), 1.2),
+    Lens("kannala_brandt", (-0.02, 0.01, -0.004, 0.0005), 1.4),
+])  # fmt: skip
 def test_a_moving_box_flows_through_a_lens_as_in_opencv(renderer: WarpRenderer, lens: Lens) -> None:
     """Points of a face, located by OpenCV's undistortion, moved and projected by OpenCV."""
     intrinsics = replace(LENS, lens=lens)
@@ -268,8 +258,7 @@ def test_a_pixel_that_a_moving_thing_covers_is_occluded(renderer: WarpRenderer) 
     box = Body("box", "box", start, instance_id=1)
     scene = world(WALL, box, tracks=(even_track("box", start, (4.0, 1.0, 0.0)),))
     now = images(renderer, scene)
-    later = scene_at(scene, scene.time_s + STEP_S)
-    then = images(renderer, later)
+    then = images(renderer, scene_at(scene, scene.time_s + STEP_S))
 
     wall = (now[Channel.INSTANCE] == 0) & (now[Channel.FLOW_FORWARD] == 0.0).all(axis=-1)
     covered = wall & (then[Channel.INSTANCE] == 1)

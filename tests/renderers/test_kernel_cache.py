@@ -11,12 +11,7 @@ from pathlib import Path
 import pytest
 
 from gen_data.core.errors import CacheWarning, StorageError
-from gen_data.renderers.warp.kernel_cache import (
-    fill_cache,
-    link_modules,
-    private_folder,
-    remove_damaged_modules,
-)
+from gen_data.renderers.warp import kernel_cache
 
 MODULES = ("wp_gen_data.kernels.a_0123abc", "wp_gen_data.kernels.b_0123abc")
 
@@ -57,23 +52,23 @@ def empty(path: Path) -> None:
 @pytest.mark.parametrize("damage", [flip_bit, cut_off, empty])
 def test_a_damaged_module_is_removed_alone(folder: Path, damage: Callable[[Path], None]) -> None:
     """Its next user compiles it again; a module of the same name with other bytes is then right."""
-    assert remove_damaged_modules(folder) == ()
+    assert kernel_cache.remove_damaged_modules(folder) == ()
     damage(folder / MODULES[0] / "m.cpu27.o")
 
-    assert remove_damaged_modules(folder) == (MODULES[0],)
+    assert kernel_cache.remove_damaged_modules(folder) == (MODULES[0],)
 
     assert not (folder / MODULES[0]).exists()
     assert (folder / MODULES[1]).exists()
     (folder / MODULES[0]).mkdir()
     (folder / MODULES[0] / "m.cpu27.o").write_bytes(object_file(b"compiled again"))
-    assert remove_damaged_modules(folder) == ()
+    assert kernel_cache.remove_damaged_modules(folder) == ()
 
 
 def test_a_module_that_was_never_complete_is_found_without_a_digest(folder: Path) -> None:
     """A power cut while it was written."""
     cut_off(folder / MODULES[1] / "m.cpu27.o")
 
-    assert remove_damaged_modules(folder) == (MODULES[1],)
+    assert kernel_cache.remove_damaged_modules(folder) == (MODULES[1],)
 
 
 def test_sources_other_programs_and_compilations_in_progress_do_not_matter(folder: Path) -> None:
@@ -83,10 +78,10 @@ def test_sources_other_programs_and_compilations_in_progress_do_not_matter(folde
     for path in (unfinished, others):
         path.mkdir()
         (path / "m.o").write_bytes(b"half")
-    remove_damaged_modules(folder)
+    kernel_cache.remove_damaged_modules(folder)
     (folder / MODULES[0] / "m.cpp").write_text("changed")
 
-    assert remove_damaged_modules(folder) == ()
+    assert kernel_cache.remove_damaged_modules(folder) == ()
     assert unfinished.exists()
     assert others.exists()
 
@@ -119,62 +114,62 @@ def test_a_filled_cache_that_cannot_be_written_is_linked_in_silence(
     folder: Path, temporary: Path, number: int
 ) -> None:
     """Modules that are missing from it are compiled beside the links."""
-    remove_damaged_modules(folder)
+    kernel_cache.remove_damaged_modules(folder)
     (folder / STAMP).touch()
 
-    used = fill_cache(folder, STAMP, refusing(folder, number=number))
+    used = kernel_cache.fill_cache(folder, STAMP, refusing(folder, number=number))
 
     assert used.parent == temporary / f"gendata-kernels-{os.getuid()}"
     assert stat.S_IMODE(used.parent.stat().st_mode) == 0o700
     assert {path.name: path.readlink() for path in used.iterdir() if path.is_symlink()} == {
         name: folder / name for name in MODULES
     }
-    assert remove_damaged_modules(used) == ()
+    assert kernel_cache.remove_damaged_modules(used) == ()
 
 
 def test_missing_and_damaged_kernels_of_such_a_cache_are_compiled_elsewhere(
     folder: Path, temporary: Path
 ) -> None:
-    remove_damaged_modules(folder)
+    kernel_cache.remove_damaged_modules(folder)
     (folder / STAMP).touch()
     flip_bit(folder / MODULES[0] / "m.cpu27.o")
 
     with pytest.warns(CacheWarning, match=rf"gen-data\.lock: Read-only .* into {temporary}") as got:
-        used = fill_cache(folder, STAMP, refusing(folder))
+        used = kernel_cache.fill_cache(folder, STAMP, refusing(folder))
 
     assert len(got) == 1
     assert {path.name for path in used.iterdir()} == {MODULES[1], "wp_gen_data.new", STAMP}
     # The second run is silent.
-    assert fill_cache(folder, STAMP, refusing(folder)) == used
+    assert kernel_cache.fill_cache(folder, STAMP, refusing(folder)) == used
 
 
 def test_a_filled_cache_suffices_if_nothing_is_written(folder: Path, temporary: Path) -> None:
     (folder / STAMP).touch()
-    assert fill_cache(folder, STAMP, refusing(folder, temporary)) == folder
+    assert kernel_cache.fill_cache(folder, STAMP, refusing(folder, temporary)) == folder
 
 
 def test_unkeepable_kernels_are_an_error_with_the_remedy(folder: Path, temporary: Path) -> None:
     with pytest.warns(CacheWarning), pytest.raises(StorageError) as caught:
-        fill_cache(folder, STAMP, refusing(folder, temporary, number=errno.ENOSPC))
+        kernel_cache.fill_cache(folder, STAMP, refusing(folder, temporary, number=errno.ENOSPC))
     assert "No space left" in str(caught.value) and "\n" not in str(caught.value)
     assert "WARP_CACHE_PATH or XDG_CACHE_HOME" in str(caught.value)
 
 
 def test_a_private_folder_that_others_can_write_is_not_used(temporary: Path) -> None:
     """Machine code is run from it."""
-    private_folder().chmod(0o755)
+    kernel_cache.private_folder().chmod(0o755)
     with pytest.raises(PermissionError, match="not a folder of this user alone"):
-        private_folder()
+        kernel_cache.private_folder()
     private_folder_path = temporary / f"gendata-kernels-{os.getuid()}"
     private_folder_path.rmdir()
     private_folder_path.symlink_to(temporary)
     with pytest.raises(PermissionError, match="not a folder of this user alone"):
-        private_folder()
+        kernel_cache.private_folder()
 
 
 def test_links_to_removed_modules_are_removed(folder: Path, temporary: Path) -> None:
-    used = link_modules(folder)
+    used = kernel_cache.link_modules(folder)
     (folder / MODULES[0]).rename(folder / "elsewhere")
 
-    assert link_modules(folder) == used
+    assert kernel_cache.link_modules(folder) == used
     assert [path.name for path in used.iterdir()] == [MODULES[1]]

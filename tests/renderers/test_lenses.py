@@ -143,8 +143,7 @@ def test_a_pinhole_has_no_table_of_directions() -> None:
 @pytest.mark.parametrize("name", CAMERAS)
 def test_ranges_are_embrees_along_opencvs_directions(name: str) -> None:
     """Boxes and balls before and beside the camera: 0.1 mm and equal ids on 99.9 % of pixels."""
-    rng = np.random.default_rng(8)
-    spots = rng.uniform((-2.0, -2.0, 0.8), (2.0, 2.0, 3.0), (24, 3))
+    spots = np.random.default_rng(8).uniform((-2.0, -2.0, 0.8), (2.0, 2.0, 3.0), (24, 3))
     bodies = [Body("room", "room", SE3((0.0, 0.0, -0.5)))]
     bodies += [
         Body(f"b{k}", ("box", "ball")[k % 2], SE3(tuple(spot), turned(k)), 0.5, k + 1)

@@ -11,11 +11,9 @@ from tests.embree import RayCaster, placed
 from tests.renderers.fake_library import FakeLibrary, box_mesh, plane_mesh, room_mesh, sphere_mesh
 
 MESHES = {
-    "room": room_mesh((60.0, 60.0, 20.0)),
-    "box": box_mesh((1.8, 4.0, 1.5)),
-    "ball": sphere_mesh(0.8, rings=24),
-    "plane": plane_mesh(400.0),
-}
+    "room": room_mesh((60.0, 60.0, 20.0)), "box": box_mesh((1.8, 4.0, 1.5)),
+    "ball": sphere_mesh(0.8, rings=24), "plane": plane_mesh(400.0),
+}  # fmt: skip
 
 
 def random_scene(seed: int) -> tuple[Scene, Lidar]:
@@ -26,15 +24,11 @@ def random_scene(seed: int) -> tuple[Scene, Lidar]:
     for k in range(40):
         q = rng.normal(size=4)
         place = np.asarray(away) + rng.uniform((-25, -25, 0), (25, 25, 6))
-        bodies.append(
-            Body(
-                f"b{k}",
-                str(rng.choice(["box", "ball"])),
-                SE3(tuple(map(float, place)), tuple(map(float, q / np.linalg.norm(q)))),
-                float(rng.uniform(0.4, 1.8)),
-                instance_id=k + 1,
-            )
-        )
+        bodies.append(Body(
+            f"b{k}", str(rng.choice(["box", "ball"])),
+            SE3(tuple(map(float, place)), tuple(map(float, q / np.linalg.norm(q)))),
+            float(rng.uniform(0.4, 1.8)), instance_id=k + 1,
+        ))  # fmt: skip
     things = tuple(Instance(k + 1, f"b{k}", "thing", 1, "box") for k in range(40))
     q = np.array([1.0, *rng.normal(scale=0.05, size=3)])
     eye = tuple(float(v) for v in np.add(away, (0.3, -0.4, 8.0)))

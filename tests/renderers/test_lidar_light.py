@@ -120,8 +120,7 @@ def test_colourful_paint_is_brighter_than_grey_of_its_darkness() -> None:
 def test_surfaces_are_numbered_by_role() -> None:
     """Roles without a number are 0."""
     for role, number in (("asphalt", SURFACES.index("asphalt")), ("eyes", 0)):
-        echoes = seen_at(Material(role=role), [10.0])
-        assert echoes.surface[0, 0] == number
+        assert seen_at(Material(role=role), [10.0]).surface[0, 0] == number
 
 
 def test_camera_and_lidar_see_the_same_world() -> None:
@@ -136,8 +135,7 @@ def test_camera_and_lidar_see_the_same_world() -> None:
     scene = Scene("street", tuple(bodies))
     camera = camera_at((0.0, 0.0, 1.65), (10.0, 0.0, 1.5), (1242, 375), 81.4)
     renderer = WarpRenderer(library, "cpu")
-    channels = frozenset({Channel.Z_DEPTH, Channel.INSTANCE})
-    reading = renderer.render(scene, camera, channels)
+    reading = renderer.render(scene, camera, frozenset({Channel.Z_DEPTH, Channel.INSTANCE}))
     # At the camera itself nothing is hidden from one and seen by the other; rays through pixels.
     k = camera.intrinsics
     v, u = (a.ravel() + 0.5 for a in np.mgrid[4:370:7, 4:1240:7])

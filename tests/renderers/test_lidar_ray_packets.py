@@ -17,13 +17,10 @@ from tests.renderers.fake_library import FakeLibrary, box_mesh
 SIDE_M = 0.4
 WINDOW = Material((0.01, 0.01, 0.01), 0.05, role="window")
 GLASS = Material((0.01, 0.01, 0.01), 0.05, role="glass")
-LIBRARY = FakeLibrary(
-    {
-        "cube": box_mesh((SIDE_M, SIDE_M, SIDE_M)),
-        "window": box_mesh((0.1, 4.0, 4.0), (WINDOW,)),
-        "pane": box_mesh((0.01, 4.0, 4.0), (GLASS,)),
-    }
-)
+LIBRARY = FakeLibrary({
+    "cube": box_mesh((SIDE_M, SIDE_M, SIDE_M)), "window": box_mesh((0.1, 4.0, 4.0), (WINDOW,)),
+    "pane": box_mesh((0.01, 4.0, 4.0), (GLASS,)),
+})  # fmt: skip
 LIDAR = Lidar("top", "color")
 
 

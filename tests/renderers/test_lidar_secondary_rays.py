@@ -19,14 +19,10 @@ GREY = Material((0.4, 0.4, 0.4), 1.0, specular=0.0)
 GLASS = Material((0.01, 0.01, 0.01), 0.05, role="glass")
 WINDOW = Material((0.01, 0.01, 0.01), 0.05, role="window")
 ASPHALT = Material((0.05, 0.05, 0.05), 1.0, specular=0.0, role="asphalt")
-LIBRARY = FakeLibrary(
-    {
-        "wall": box_mesh((0.2, 60.0, 60.0), (GREY,)),
-        "pane": box_mesh((0.006, 60.0, 60.0), (GLASS,)),
-        "window": box_mesh((0.2, 60.0, 60.0), (WINDOW,)),
-        "road": plane_mesh(400.0, (ASPHALT,)),
-    }
-)
+LIBRARY = FakeLibrary({
+    "wall": box_mesh((0.2, 60.0, 60.0), (GREY,)), "pane": box_mesh((0.006, 60.0, 60.0), (GLASS,)),
+    "window": box_mesh((0.2, 60.0, 60.0), (WINDOW,)), "road": plane_mesh(400.0, (ASPHALT,)),
+})  # fmt: skip
 AHEAD = np.array([[1.0, 0.0, 0.0]], np.float32)
 
 

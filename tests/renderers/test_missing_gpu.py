@@ -31,27 +31,12 @@ def machine(monkeypatch: pytest.MonkeyPatch) -> Any:
     return answer
 
 
-@pytest.mark.parametrize(
-    ("toolkit", "driver", "text"),
-    [
-        (
-            None,
-            None,
-            "this build of warp-lang has no CUDA; install the one for Linux or Windows on",
-        ),
-        ((13, 4), None, "no NVIDIA driver was found; install one for CUDA 13.0 or newer"),
-        (
-            (13, 4),
-            (12, 9),
-            "its NVIDIA driver is for CUDA 12.9, but warp-lang needs 13.0; update it",
-        ),
-        (
-            (13, 4),
-            (13, 0),
-            "the NVIDIA driver shows no device; compare nvidia-smi and CUDA_VISIBLE",
-        ),
-    ],
-)
+@pytest.mark.parametrize(("toolkit", "driver", "text"), [
+    (None, None, "this build of warp-lang has no CUDA; install the one for Linux or Windows on"),
+    ((13, 4), None, "no NVIDIA driver was found; install one for CUDA 13.0 or newer"),
+    ((13, 4), (12, 9), "its NVIDIA driver is for CUDA 12.9, but warp-lang needs 13.0; update it"),
+    ((13, 4), (13, 0), "the NVIDIA driver shows no device; compare nvidia-smi and CUDA_VISIBLE"),
+])  # fmt: skip
 def test_an_unusable_gpu_is_told_with_why(
     machine: Any, toolkit: Any, driver: Any, text: str
 ) -> None:
@@ -77,13 +62,10 @@ def test_a_gpu_that_warp_cannot_compile_for_is_refused(machine: Any) -> None:
     assert open_device("cuda").alias == "cuda:0"
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        "Failed to allocate 4915200 bytes on device 'cuda:0'",
-        "Warp CUDA error 2: out of memory (in function wp_alloc_device_async, warp.cu:675)",
-    ],
-)
+@pytest.mark.parametrize("text", [
+    "Failed to allocate 4915200 bytes on device 'cuda:0'",
+    "Warp CUDA error 2: out of memory (in function wp_alloc_device_async, warp.cu:675)",
+])  # fmt: skip
 def test_a_full_gpu_is_an_error_that_names_workers_and_device(text: str) -> None:
     """Not the limits of the system's memory."""
     with pytest.raises(OutOfMemory) as refused, explain_errors("sample 3"):

@@ -59,15 +59,13 @@ class Picture:
 
 def cornell() -> Picture:
     """A closed box: diffuse surfaces, many bounces, one rectangle."""
-    library = fake_library.FakeLibrary(
-        {
-            "room": fake_library.room_mesh((2, 2, 2), matte(0.7)),
-            "wall": fake_library.box_mesh((0.02, 2, 2), matte(0.6, 0.05, 0.05)),
-            "shade": fake_library.plane_mesh(0.6, matte(0.0)),
-            "box": fake_library.box_mesh((0.5, 0.5, 1.0), matte(0.3, 0.6, 0.2)),
-            "ball": fake_library.sphere_mesh(0.35, 32, matte(0.7)),
-        }
-    )
+    library = fake_library.FakeLibrary({
+        "room": fake_library.room_mesh((2, 2, 2), matte(0.7)),
+        "wall": fake_library.box_mesh((0.02, 2, 2), matte(0.6, 0.05, 0.05)),
+        "shade": fake_library.plane_mesh(0.6, matte(0.0)),
+        "box": fake_library.box_mesh((0.5, 0.5, 1.0), matte(0.3, 0.6, 0.2)),
+        "ball": fake_library.sphere_mesh(0.35, 32, matte(0.7)),
+    })  # fmt: skip
     bodies = (
         Body("room", "room"),
         Body("wall", "wall", SE3((-0.98, 0.0, 1.0))),
@@ -102,20 +100,15 @@ def panel_pose(behind_m: float) -> SE3:
 
 
 def still_life(
-    material: Material,
-    bsdf: Mapping[str, Any],
-    *lights: Light,
-    exact: bool = True,
+    material: Material, bsdf: Mapping[str, Any], *lights: Light, exact: bool = True,
     sky: float = 60.0,
-) -> Picture:
-    library = fake_library.FakeLibrary(
-        {
-            "ground": fake_library.plane_mesh(6.0, matte(0.4, 0.35, 0.3)),
-            "ball": fake_library.sphere_mesh(0.5, 64, (material,)),
-            "box": fake_library.box_mesh((0.3, 0.3, 0.6), matte(0.1, 0.2, 0.6)),
-            "back": fake_library.box_mesh((*PANEL.size_m, 1e-3), matte(0.0)),
-        }
-    )
+) -> Picture:  # fmt: skip
+    library = fake_library.FakeLibrary({
+        "ground": fake_library.plane_mesh(6.0, matte(0.4, 0.35, 0.3)),
+        "ball": fake_library.sphere_mesh(0.5, 64, (material,)),
+        "box": fake_library.box_mesh((0.3, 0.3, 0.6), matte(0.1, 0.2, 0.6)),
+        "back": fake_library.box_mesh((*PANEL.size_m, 1e-3), matte(0.0)),
+    })  # fmt: skip
     bodies = (
         Body("ground", "ground"),
         # Mitsuba's panel hides the sky behind it.

@@ -40,8 +40,7 @@ def test_an_edge_is_as_grey_as_it_is_covered(visibility: str) -> None:
     scene = Scene("t", (glowing(SE3((left_m + 0.5, 0.0, 2.5)), emission=300.0),), environment=DARK)
     camera = forward_camera()
 
-    settings = RenderSettings(visibility=visibility)
-    smooth = radiance_of(scene, camera, settings)[24, 20:25, 0]
+    smooth = radiance_of(scene, camera, RenderSettings(visibility=visibility))[24, 20:25, 0]
     rough = radiance_of(scene, camera, RenderSettings(antialias=1))[24, 20:25, 0]
 
     np.testing.assert_allclose(rough, [0.0, 0.0, 0.0, 300.0, 300.0], rtol=1e-5)

@@ -9,17 +9,14 @@ import numpy as np
 import pytest
 import warp as wp
 
+from gen_data.core import bounded_cache, se3, shutter
 from gen_data.core.asset_types import Material, TextureData
-from gen_data.core.bounded_cache import ObjectCache
 from gen_data.core.capture import Channel
 from gen_data.core.scene import Body, Light, Scene, Weather
-from gen_data.core.se3 import SE3
-from gen_data.core.shutter import Shutter
-from gen_data.renderers.warp.device import open_device
+from gen_data.renderers.warp import device, settings
 from gen_data.renderers.warp.renderer import WarpRenderer
 from gen_data.renderers.warp.scene.device_cache import DeviceCache
 from gen_data.renderers.warp.scene.scene_packing import pack_world
-from gen_data.renderers.warp.settings import RenderSettings
 from tests.renderers.fake_library import FakeLibrary, box_mesh, camera_at, plane_mesh
 from tests.renderers.moving import even_track
 
@@ -28,11 +25,10 @@ LIBRARY = FakeLibrary(
     {"box": box_mesh(), "floor": plane_mesh(20.0)}, {"brick": CHECKER, "ash": CHECKER}
 )
 SCENE = Scene(
-    "cubes",
-    (Body("floor", "floor"), Body("box", "box", SE3((0.0, 0.0, 0.5)), instance_id=1)),
+    "cubes", (Body("floor", "floor"), Body("box", "box", se3.SE3((0.0, 0.0, 0.5)), instance_id=1)),
     lights=(Light("lamp", "sphere", (1.0, 2.0, 3.0), intensity_cd=900.0),),
     weather=Weather(wetness=0.8, puddles=0.3, seed=4),
-)
+)  # fmt: skip
 EYES = tuple(
     camera_at(eye_m, (0.0, 0.0, 0.5), size_px=(96, 64))
     for eye_m in ((3.0, 0.5, 2.0), (-1.0, 3.0, 1.5))
@@ -42,7 +38,7 @@ CHANNELS = frozenset({Channel.RADIANCE, Channel.Z_DEPTH, Channel.INSTANCE})
 
 def test_values_are_kept_by_identity_and_the_oldest_go() -> None:
     """An equal but different object is another key; a value requested again is the same."""
-    cache: ObjectCache[int] = ObjectCache(2)
+    cache: bounded_cache.ObjectCache[int] = bounded_cache.ObjectCache(2)
     first, second, third = [1], [1], [1]
     made: list[int] = []
 
@@ -73,7 +69,7 @@ def test_another_scene_is_packed_anew() -> None:
     red = (Material((0.8, 0.1, 0.1)),)
     before = renderer.render(SCENE, EYES[0], CHANNELS).channels
     floor, box = SCENE.bodies
-    moved = replace(SCENE, bodies=(floor, replace(box, T_world_body=SE3((0.0, 1.0, 0.5)))))
+    moved = replace(SCENE, bodies=(floor, replace(box, T_world_body=se3.SE3((0.0, 1.0, 0.5)))))
     painted = replace(SCENE, bodies=(floor, replace(box, materials=red)))
 
     after = renderer.render(moved, EYES[0], CHANNELS).channels
@@ -88,7 +84,7 @@ def test_another_scene_is_packed_anew() -> None:
 
 def test_textures_of_several_bodies_find_their_places() -> None:
     """Materials with and without textures, in any order of bodies."""
-    cache = DeviceCache(LIBRARY, open_device("cpu"))
+    cache = DeviceCache(LIBRARY, device.open_device("cpu"))
     plain, brick, wood = (Material(texture=name) for name in ("", "brick", "ash"))
     looks = ((plain,), (brick,), (wood,), (plain,), (brick,))
     bodies = tuple(Body(f"{k}", "box", materials=look) for k, look in enumerate(looks))
@@ -154,13 +150,12 @@ def test_images_depend_on_no_memory_of_earlier_frames(
     coated = (Material((0.8, 0.1, 0.1), coat=1.0),)
     floor, box = SCENE.bodies
     scene = replace(
-        SCENE,
-        bodies=(floor, replace(box, materials=coated)),
+        SCENE, bodies=(floor, replace(box, materials=coated)),
         tracks=(even_track("box", box.T_world_body, (1.0, 0.5, 0.2), 1.0),),
-    )
-    camera = replace(EYES[0], shutter=Shutter(0.08, 0.2, 4))
+    )  # fmt: skip
+    camera = replace(EYES[0], shutter=shutter.Shutter(0.08, 0.2, 4))
     channels = CHANNELS | {Channel.NORMALS, Channel.RANGE, Channel.CATEGORY}
-    renderer = WarpRenderer(LIBRARY, "cpu", RenderSettings(visibility=visibility))
+    renderer = WarpRenderer(LIBRARY, "cpu", settings.RenderSettings(visibility=visibility))
     drawn = []
 
     for byte in (0x3F, 0x00, 0xC1):

@@ -316,8 +316,7 @@ def test_mesh_uvs_put_v_0_at_the_bottom_of_the_image() -> None:
 
 def test_uvs_along_a_line_show_the_texture_along_that_line() -> None:
     """A plane whose u is 3/4 everywhere, without an area in UV space, shows green above blue."""
-    material = Material((1.0, 1.0, 1.0), 1.0, specular=0.0, texture="t")
-    mesh = plane_mesh(2.0, (material,))
+    mesh = plane_mesh(2.0, (Material((1.0, 1.0, 1.0), 1.0, specular=0.0, texture="t"),))
     line = replace(
         mesh, uvs=np.stack([np.full(4, 0.75), mesh.uvs[:, 1]], axis=-1, dtype=np.float32)
     )
@@ -349,15 +348,12 @@ def pointing_sky(direction: Vec3) -> Float32:
     return np.repeat(np.where(bright, 100.0, 0.1)[..., None], 3, axis=-1).astype(np.float32)
 
 
-@pytest.mark.parametrize(
-    ("direction", "yaw_rad", "seen"),
-    [
-        ((1.0, 0.0, 0.0), 0.0, (1.0, 0.0, 0.0)),
-        ((0.0, 1.0, 0.0), 0.0, (0.0, 1.0, 0.0)),
-        ((0.0, 0.0, 1.0), 0.0, (0.0, 0.0, 1.0)),
-        ((1.0, 0.0, 0.0), math.pi / 2, (0.0, 1.0, 0.0)),
-    ],
-)
+@pytest.mark.parametrize(("direction", "yaw_rad", "seen"), [
+    ((1.0, 0.0, 0.0), 0.0, (1.0, 0.0, 0.0)),
+    ((0.0, 1.0, 0.0), 0.0, (0.0, 1.0, 0.0)),
+    ((0.0, 0.0, 1.0), 0.0, (0.0, 0.0, 1.0)),
+    ((1.0, 0.0, 0.0), math.pi / 2, (0.0, 1.0, 0.0)),
+])  # fmt: skip
 @pytest.mark.parametrize("roughness", [0.05, 0.3])
 def test_the_sky_is_seen_and_mirrored_where_it_is(
     direction: Vec3, yaw_rad: float, seen: Vec3, roughness: float

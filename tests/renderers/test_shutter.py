@@ -20,16 +20,10 @@ from gen_data.renderers.warp.visibility.frame_context import CameraState, render
 from gen_data.renderers.warp.visibility.reprojection import make_bands, render_bands
 from tests.renderers.moving import FACING, LENS, MESHES, even_track, world
 
-LABELS = frozenset(
-    {
-        Channel.INSTANCE,
-        Channel.CATEGORY,
-        Channel.Z_DEPTH,
-        Channel.RANGE,
-        Channel.NORMALS,
-        Channel.OBJECT_COORDINATES,
-    }
-)
+LABELS = frozenset({
+    Channel.INSTANCE, Channel.CATEGORY, Channel.Z_DEPTH, Channel.RANGE, Channel.NORMALS,
+    Channel.OBJECT_COORDINATES,
+})  # fmt: skip
 ALL = LABELS | {Channel.RADIANCE, Channel.AMODAL}
 # Its face is 2.5 m away and 80 / 2.5 = 32 px wide and high.
 LAMP = Body("lamp", "lamp", SE3((0.0, 0.0, 3.0)), instance_id=1)
@@ -214,8 +208,7 @@ def test_bands_of_a_still_world_make_the_whole_image(renderer: WarpRenderer, len
         wall, replace(LAMP, scale=0.7), shutter=Shutter(0.0, 0.05), time_s=0.0,
         lens=replace(LENS, lens=lens),
     )  # fmt: skip
-    context = renderer._context
-    near = render_view(CameraState.of(scene, scene.cameras[0]), context)
+    near = render_view(CameraState.of(scene, scene.cameras[0]), renderer._context)
     whole_bands = make_bands(near.state, [0])
     rows = make_bands(near.state, list(range(0, LENS.height_px, 5)))
 
@@ -253,8 +246,7 @@ def test_points_are_projected_where_their_rows_show_them(renderer: WarpRenderer)
 def test_a_point_that_sinks_is_met_by_the_row_that_reads_it() -> None:
     """The solution of v = v0 + c (v / h - 1/2) readout, to a thousandth of a pixel."""
     track = even_track("lamp", SE3((0.0, -0.3, 3.0)), (0.0, 2.0, 0.0))
-    shutter = Shutter(0.0, 0.08)
-    scene = world(LAMP, tracks=(track,), shutter=shutter, time_s=0.0)
+    scene = world(LAMP, tracks=(track,), shutter=Shutter(0.0, 0.08), time_s=0.0)
     _, image_px = project_rolling_shutter(
         scene, scene.cameras[0], np.zeros((1, 3)), scene.instances[0]
     )

@@ -12,12 +12,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from gen_data.core import plates
+from gen_data.core import colorimetry, errors, motion, plates
 from gen_data.core.asset_types import Asset, Material, TextureData
 from gen_data.core.capture import Channel, SensorReading
-from gen_data.core.colorimetry import srgb_encode
-from gen_data.core.errors import SampleError
-from gen_data.core.motion import Trajectory
 from gen_data.core.scene import Body, Camera, Instance, Scene, Weather
 from gen_data.core.se3 import SE3, look_at
 from gen_data.renderers.warp.renderer import WarpRenderer
@@ -96,7 +93,7 @@ def photographed(reading: SensorReading) -> NDArray[np.uint8]:
     linear = np.clip(
         reading.channels[Channel.RADIANCE].astype(np.float64) / plates.WHITE_CD_M2, 0.0, 1.0
     )
-    return np.asarray((255.0 * srgb_encode(linear)).round(), np.uint8)
+    return np.asarray((255.0 * colorimetry.srgb_encode(linear)).round(), np.uint8)
 
 
 @cache
@@ -159,10 +156,9 @@ def test_the_foreground_hides_exactly() -> None:
     left = slice(0, SIZE_PX[0] // 2)
     right = slice(SIZE_PX[0] // 2, None)
     hidden = seen(
-        PlateLibrary(empty_photo(), half_mask()),
-        world(cube=True, photo=True),
+        PlateLibrary(empty_photo(), half_mask()), world(cube=True, photo=True),
         SEEN | {Channel.AMODAL},
-    )
+    )  # fmt: skip
     assert (composite().channels[Channel.INSTANCE][:, left] == 1).any(), "the cube is behind it"
     np.testing.assert_array_equal(photographed(hidden)[:, left], empty_photo()[:, left])
     assert not hidden.channels[Channel.INSTANCE][:, left].any()
@@ -197,11 +193,9 @@ def test_a_moving_thing_blurs_on_the_photograph() -> None:
     knots = tuple(replace(cube, translation_m=(5.0, 0.1 + 0.3 * k, 0.5)) for k in range(5))
     exposed = replace(scene.cameras[0].shutter, exposure_s=0.04)
     scene = replace(
-        scene,
-        tracks=(Trajectory("cube", 0.1, knots),),
-        cameras=(replace(scene.cameras[0], shutter=exposed),),
-        time_s=0.1,
-    )
+        scene, tracks=(motion.Trajectory("cube", 0.1, knots),),
+        cameras=(replace(scene.cameras[0], shutter=exposed),), time_s=0.1,
+    )  # fmt: skip
     channels = SEEN | {Channel.FLOW_FORWARD}
     reading = seen(PlateLibrary(empty_photo(), half_mask()), scene, channels)
     flow = reading.channels[Channel.FLOW_FORWARD]
@@ -218,12 +212,12 @@ def test_what_contradicts_the_photograph_is_refused() -> None:
     """A moved camera, other light and weather, with the randomizers to remove."""
     library, scene = PlateLibrary(empty_photo()), world(cube=True, photo=True)
     moved = replace(scene.cameras[0], T_world_camera=SE3((0.0, 0.0, 2.0)))
-    with pytest.raises(SampleError, match="not where the photograph was taken from"):
+    with pytest.raises(errors.SampleError, match="not where the photograph was taken from"):
         seen(library, replace(scene, cameras=(moved,)))
     sky = replace(scene.environment, image="environment/neutral?seed=0")
-    with pytest.raises(SampleError, match="other light; remove the randomizers"):
+    with pytest.raises(errors.SampleError, match="other light; remove the randomizers"):
         seen(library, replace(scene, environment=sky))
-    with pytest.raises(SampleError, match="has its own; remove the randomizer weather"):
+    with pytest.raises(errors.SampleError, match="has its own; remove the randomizer weather"):
         seen(library, replace(scene, weather=Weather(wetness=0.5)))
 
 

@@ -8,10 +8,8 @@ import numpy as np
 import pytest
 import warp as wp
 
-from gen_data.core.asset_types import Material
+from gen_data.core import asset_types, intrinsics, motion
 from gen_data.core.capture import Channel, SensorReading
-from gen_data.core.intrinsics import Intrinsics
-from gen_data.core.motion import Trajectory
 from gen_data.core.scene import (
     Body,
     Camera,
@@ -35,8 +33,7 @@ from gen_data.renderers.warp.atmosphere.precipitation import (
 from gen_data.renderers.warp.device import open_device
 from gen_data.renderers.warp.realtime.light_selection import main_lamps
 from gen_data.renderers.warp.renderer import WarpRenderer
-from gen_data.renderers.warp.scene.device_cache import DeviceCache
-from gen_data.renderers.warp.scene.scene_packing import pack_world
+from gen_data.renderers.warp.scene import device_cache, scene_packing
 from gen_data.renderers.warp.settings import RenderSettings
 from tests.randomizers.doubles import rng_of
 from tests.renderers.fake_library import FakeLibrary, box_mesh, plane_mesh
@@ -45,13 +42,13 @@ pytestmark = pytest.mark.slow
 
 RADIANCE = frozenset({Channel.RADIANCE})
 SEEN = frozenset({Channel.RADIANCE, Channel.RANGE, Channel.INSTANCE})
-LENS = Intrinsics(96, 64, 80.0, 80.0, 48.0, 32.0)
-FINE = Intrinsics(288, 192, 240.0, 240.0, 144.0, 96.0)
+LENS = intrinsics.Intrinsics(96, 64, 80.0, 80.0, 48.0, 32.0)
+FINE = intrinsics.Intrinsics(288, 192, 240.0, 240.0, 144.0, 96.0)
 AHEAD = Camera("front", look_at((0.0, 0.0, 1.5), (10.0, 0.0, 1.2)), LENS)
 DOWN = Camera("top", look_at((0.0, 0.0, 3.0), (0.0, 0.0, 0.0)), LENS)
 PLAIN = RenderSettings(ambient_occlusion_radius_m=0.0, antialias=1)
-ASPHALT = (Material(base_color=(0.3, 0.3, 0.3), roughness=0.95, specular=0.0),)
-BLACK = (Material(base_color=(0.0, 0.0, 0.0), roughness=1.0, specular=0.0),)
+ASPHALT = (asset_types.Material(base_color=(0.3, 0.3, 0.3), roughness=0.95, specular=0.0),)
+BLACK = (asset_types.Material(base_color=(0.0, 0.0, 0.0), roughness=1.0, specular=0.0),)
 SUN = Light("sun", "sun", direction=(0.8, 0.0, -0.6), illuminance_lux=1500.0)
 DARK = Environment(luminance_cd_m2=0.0)
 LANES: tuple[LaneKind, LaneKind] = ("parking", "driving")
@@ -60,14 +57,10 @@ STORM = Weather(0.02, 20.0, 30.0, 2.0, 0.9, 0.4, 0.4, 0.05, seed=5)
 
 @pytest.fixture(scope="module")
 def library() -> FakeLibrary:
-    return FakeLibrary(
-        {
-            "road": plane_mesh(60.0, ASPHALT),
-            "black": box_mesh((0.2, 60.0, 60.0), BLACK),
-            "lid": box_mesh((0.8, 0.8, 0.05), ASPHALT),
-            "box": box_mesh((1.0, 1.0, 1.0), ASPHALT),
-        }
-    )
+    return FakeLibrary({
+        "road": plane_mesh(60.0, ASPHALT), "black": box_mesh((0.2, 60.0, 60.0), BLACK),
+        "lid": box_mesh((0.8, 0.8, 0.05), ASPHALT), "box": box_mesh((1.0, 1.0, 1.0), ASPHALT),
+    })  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -77,10 +70,9 @@ def renderer(library: FakeLibrary) -> WarpRenderer:
 
 def street(weather: Weather, environment: Environment = DARK, *lights: Light) -> Scene:
     bodies = (
-        Body("road", "road"),
-        Body("wall", "black", SE3((25.0, 0.0, 0.0)), instance_id=1),
+        Body("road", "road"), Body("wall", "black", SE3((25.0, 0.0, 0.0)), instance_id=1),
         Body("box", "box", SE3((6.0, 0.5, 0.5)), instance_id=2),
-    )
+    )  # fmt: skip
     named = tuple(Instance(k, name, name, k, name) for k, name in ((1, "wall"), (2, "box")))
     return Scene("t", bodies, named, lights=lights, environment=environment, weather=weather)
 
@@ -137,8 +129,7 @@ def test_same_weather_makes_the_same_bytes_in_another_renderer(library: FakeLibr
 def test_even_fog_follows_beer_and_lambert(renderer: WarpRenderer) -> None:
     """In front of black, fog has the radiance L (1 - exp(-beta r)) in uniform light L."""
     beta, sky = 0.05, 200.0
-    weather = Weather(fog_extinction_per_m=beta)
-    scene = street(weather, Environment(luminance_cd_m2=sky))
+    scene = street(Weather(fog_extinction_per_m=beta), Environment(luminance_cd_m2=sky))
     reading = renderer.render(scene, AHEAD, SEEN)
     wall = reading.channels[Channel.INSTANCE] == 1
     expected = sky * (1.0 - np.exp(-beta * reading.channels[Channel.RANGE][wall].astype(float)))
@@ -223,13 +214,12 @@ def test_what_moves_keeps_no_ground_dry(
     )
     walker = Instance(1, "p", "person", 1, "lid", attributes=(("behaviour", "walking"),))
     moving: dict[str, dict[str, Any]] = {
-        "drives": {"group": driving},
-        "walks": {"group": parked, "instances": (walker,)},
+        "drives": {"group": driving}, "walks": {"group": parked, "instances": (walker,)},
         "has a trajectory": {
             "group": parked,
-            "tracks": (Trajectory("lid", 0.1, (lid.T_world_body, SE3((0.1, 0.0, 1.4)))),),
+            "tracks": (motion.Trajectory("lid", 0.1, (lid.T_world_body, SE3((0.1, 0.0, 1.4)))),),
         },
-    }
+    }  # fmt: skip
     dry, sheltered, wet = road(0.0, parked), road(1.0, parked), road(1.0, **moving[mover])
 
     assert sheltered == pytest.approx(dry, rel=0.03)
@@ -279,7 +269,7 @@ def test_water_stands_in_gutters_less_on_crowns_and_seldom_on_soil(renderer: War
 
 def test_puddles_mirror_what_stands_behind_them(renderer: WarpRenderer) -> None:
     """The whole road under water: a lit wall appears in it with Fresnel's reflectance."""
-    glow = (Material(base_color=(0.0, 0.0, 0.0), roughness=1.0, specular=0.0,
+    glow = (asset_types.Material(base_color=(0.0, 0.0, 0.0), roughness=1.0, specular=0.0,
                      emission_cd_m2=(200.0, 200.0, 200.0)),)  # fmt: skip
     scene = street(Weather(puddles=1.0))
     wall = replace(scene.body("wall"), materials=glow)
@@ -378,8 +368,8 @@ def test_lamps_that_light_the_view_are_kept(library: FakeLibrary) -> None:
         for k in range(40)
     )
     scene = street(Weather(), DARK, *lamps, SUN)
-    cache = DeviceCache(library, open_device("cpu"))
-    records = pack_world(scene, AHEAD, cache).record.lamps.numpy()
+    cache = device_cache.DeviceCache(library, open_device("cpu"))
+    records = scene_packing.pack_world(scene, AHEAD, cache).record.lamps.numpy()
     ground = np.stack([np.linspace(1.0, 20.0, 60), np.zeros(60), np.zeros(60)], axis=-1)
     up = np.tile([0.0, 0.0, 1.0], (60, 1))
 

@@ -42,8 +42,7 @@ def test_a_closed_room_keeps_its_energy(reflectance: float) -> None:
 
 def test_a_red_floor_colours_what_comes_from_below() -> None:
     """The share of red is larger in light from the floor than in light from the ceiling."""
-    sides = (*grey(0.6)[:5], (0.6, 0.05, 0.05))
-    room = LitRoom((0.0, 0.0, 0.0), (4.0, 4.0, 2.5), sides)
+    room = LitRoom((0.0, 0.0, 0.0), (4.0, 4.0, 2.5), (*grey(0.6)[:5], (0.6, 0.05, 0.05)))
     (volume,) = find_interreflection([room], [lamp((2.0, 2.0, 2.0), 1000.0)])
     red = light_of(volume)[..., 0] / light_of(volume).sum(axis=-1)
 
@@ -140,8 +139,7 @@ def test_an_empty_room_agrees_with_paths(kind: str) -> None:
         b for b in scene.bodies if b.name.rpartition("/")[2].partition("_")[0] != "window"
     )
     scene = replace(scene, bodies=bodies, lights=(bulb,))
-    rooms = find_lit_rooms(scene, "room", library())
-    volumes = find_interreflection(rooms, scene.lights)
+    volumes = find_interreflection(find_lit_rooms(scene, "room", library()), scene.lights)
     eye = (high[0] - 0.4, high[1] - 0.4, 1.6)
     camera = Camera("c", look_at(eye, (low[0], low[1], 0.9)), Intrinsics.from_hfov(48, 36, 1.2))
     images = []

@@ -25,33 +25,13 @@ from tests.libraries import library
 from tests.tiers import seeds as of_seeds
 
 KINDS = (
-    "living_room",
-    "kitchen",
-    "bedroom",
-    "office",
-    "bathroom",
-    "workshop",
-    "warehouse",
-    "apartment",
-)
+    "living_room", "kitchen", "bedroom", "office", "bathroom", "workshop", "warehouse", "apartment",
+)  # fmt: skip
 AGAINST_WALLS = (
-    "bed",
-    "bookcase",
-    "cooker",
-    "dresser",
-    "filing_cabinet",
-    "kitchen_sink",
-    "pallet_rack",
-    "refrigerator",
-    "sofa",
-    "steel_rack",
-    "toilet",
-    "tool_cabinet",
-    "tv_stand",
-    "wardrobe",
-    "wash_basin",
-    "washing_machine",
-)
+    "bed", "bookcase", "cooker", "dresser", "filing_cabinet", "kitchen_sink", "pallet_rack",
+    "refrigerator", "sofa", "steel_rack", "toilet", "tool_cabinet", "tv_stand", "wardrobe",
+    "wash_basin", "washing_machine",
+)  # fmt: skip
 MAY_STAND_FREE = {"warehouse": {"pallet_rack"}}
 MOVABLE = {"armchair", "chair", "clothes_pile", "office_chair", "stool"}
 STRUCTURE = {"floor", "ceiling", "wall", "door", "window"}
@@ -156,15 +136,9 @@ def test_no_two_pieces_overlap(kind: str, seeds: range) -> None:
 def _is_inside_shelf(a: Body, b: Body) -> bool:
     """Whether one of two is a shelf or seat, whose box, with back or tap, holds what is on it."""
     shelves = {
-        "armchair",
-        "bookcase",
-        "chair",
-        "pallet_rack",
-        "sofa",
-        "steel_rack",
-        "trolley",
+        "armchair", "bookcase", "chair", "pallet_rack", "sofa", "steel_rack", "trolley",
         "wash_basin",
-    }
+    }  # fmt: skip
     return bool({family(a), family(b)} & shelves)
 
 
@@ -224,31 +198,11 @@ def test_pieces_that_need_a_wall_touch_one(kind: str, seeds: range) -> None:
 def test_small_things_stand_on_something(kind: str, seeds: range) -> None:
     """Under the middle of what is not on the floor, a wall or the ceiling, there is a surface."""
     hung = {
-        "bathroom_cabinet",
-        "coat_hooks",
-        "draped_clothes",
-        "light_switch",
-        "notice_board",
-        "parts_bins",
-        "pegboard",
-        "roll_holder",
-        "socket",
-        "utensil_rail",
-        "wall_calendar",
-        "wall_shelf",
-        "picture",
-        "mirror",
-        "radiator",
-        "towel",
-        "wall_clock",
-        "whiteboard",
-        "curtain",
-        "wall_unit",
-        "range_hood",
-        "ceiling_lamp",
-        "tube_lamp",
-        "wash_basin",
-    }
+        "bathroom_cabinet", "coat_hooks", "draped_clothes", "light_switch", "notice_board",
+        "parts_bins", "pegboard", "roll_holder", "socket", "utensil_rail", "wall_calendar",
+        "wall_shelf", "picture", "mirror", "radiator", "towel", "wall_clock", "whiteboard",
+        "curtain", "wall_unit", "range_hood", "ceiling_lamp", "tube_lamp", "wash_basin",
+    }  # fmt: skip
     for seed in seeds:
         placed = pieces(furnished(kind, seed))
         for body in placed:
@@ -403,13 +357,10 @@ def test_furnish_needs_a_room_layout() -> None:
         Furnish(name="furniture")(Scene("empty"), library(), Streams(3, 1).rng("furniture"))
 
 
-@pytest.mark.parametrize(
-    ("count", "least"),
-    [
-        pytest.param(28, 100, marks=pytest.mark.slow),
-        pytest.param(200, 140, marks=pytest.mark.exhaustive),
-    ],
-)
+@pytest.mark.parametrize(("count", "least"), [
+    pytest.param(28, 100, marks=pytest.mark.slow),
+    pytest.param(200, 140, marks=pytest.mark.exhaustive),
+])  # fmt: skip
 def test_no_two_rooms_are_nearly_alike_and_many_categories_occur(count: int, least: int) -> None:
     """Sets of (family, place to 0.25 m) share less than a quarter."""
     kinds = [k for k in KINDS if k != "apartment"]

@@ -11,12 +11,10 @@ import pytest
 from gen_data.annotations.bev_map import BevMap
 from gen_data.assets.library import open_library
 from gen_data.config import distributions as dist
+from gen_data.core import intrinsics, sample, se3
 from gen_data.core.errors import ConfigError, LayoutRejected
-from gen_data.core.intrinsics import Intrinsics
-from gen_data.core.sample import EgoTruth
 from gen_data.core.scene import Camera, Scene
 from gen_data.core.scene_time import scene_at
-from gen_data.core.se3 import SE3
 from gen_data.core.streams import Streams
 from gen_data.randomizers.ceiling_camera import CeilingCamera
 from gen_data.randomizers.furnish import Furnish
@@ -24,9 +22,7 @@ from gen_data.randomizers.object_states import ObjectStates
 from gen_data.randomizers.room_camera import RoomCamera
 from gen_data.randomizers.room_lighting import RoomLighting
 from gen_data.randomizers.room_path import RoomPath
-from gen_data.scene_templates.builder import build_scene
-from gen_data.scene_templates.carrier import Carrier
-from gen_data.scene_templates.room_layout import RoomLayout
+from gen_data.scene_templates import builder, carrier, room_layout
 from tests.rooms.test_layouts import distance_m, heights_m, library
 
 ON, OFF = dist.Constant(True), dist.Constant(False)
@@ -35,9 +31,9 @@ ON, OFF = dist.Constant(True), dist.Constant(False)
 @cache
 def flat(seed: int = 1, kind: str = "apartment") -> Scene:
     """A furnished apartment, or room, with a camera and a carrier."""
-    elements = (RoomLayout(name="room", kind=kind), Carrier(name="carrier"))
-    camera = Camera("color", SE3((0.0, 0.0, 1.5)), Intrinsics.from_hfov(64, 48, 1.2))
-    scene = replace(build_scene("test", elements, library()), cameras=(camera,))
+    elements = (room_layout.RoomLayout(name="room", kind=kind), carrier.Carrier(name="carrier"))
+    camera = Camera("color", se3.SE3((0.0, 0.0, 1.5)), intrinsics.Intrinsics.from_hfov(64, 48, 1.2))
+    scene = replace(builder.build_scene("test", elements, library()), cameras=(camera,))
     for attempt in range(4):
         try:
             return Furnish(name="f")(scene, library(), Streams(5, seed, attempt=attempt).rng("f"))
@@ -224,8 +220,7 @@ def test_a_carrier_too_wide_for_a_room_is_rejected_with_a_remedy() -> None:
 def test_the_map_of_a_room_agrees_with_outlines() -> None:
     """Occupied cells are in a box of what stands; free ones at most in its empty corners."""
     scene = states(flat(), is_open=OFF)
-    pose = SE3((0.0, 0.0, 0.0))
-    truth = EgoTruth(rig="carrier", T_world_ego=pose)
+    truth = sample.EgoTruth(rig="carrier", T_world_ego=se3.SE3((0.0, 0.0, 0.0)))
     made = (
         BevMap(px_m=0.05, reach_m=6.0).annotate_frame({"": scene}, open_library(()), truth).birdseye
     )

@@ -29,6 +29,7 @@ def built(*lines: dict[str, Any]) -> Scene:
 
 ROOM = {"type": "room", "name": "room", "size_m": (5, 4, 2.8)}
 DESK = {"type": "surface", "name": "table", "top_size_m": TABLE_M, "height_m": 0.74}
+TINY = {**DESK, "top_size_m": (0.19, 0.19)}
 ARM = {"type": "robot", "name": "arm", "asset": "two_link", "on": "table", "at_m": (-0.45, 0.1)}
 
 
@@ -52,12 +53,8 @@ def test_things_stand_on_one_another() -> None:
     """A bin on a table, moved and turned with it."""
     bench = {**DESK, "name": "bench", "at_m": (1.0, 0.0), "yaw_deg": 90}
     bin_ = {
-        "type": "bin",
-        "name": "bin",
-        "on": "bench",
-        "at_m": (0.2, 0.1),
-        "size_m": (0.4, 0.3, 0.2),
-    }
+        "type": "bin", "name": "bin", "on": "bench", "at_m": (0.2, 0.1), "size_m": (0.4, 0.3, 0.2),
+    }  # fmt: skip
     scene = built(bench, bin_)
 
     assert scene.body("bin").T_world_body.translation_m == pytest.approx((0.9, 0.2, 0.74))
@@ -154,35 +151,28 @@ def test_things_too_high_for_a_shelf_are_not_put_there_nominally() -> None:
     assert not {b.asset for b in scene.bodies} & {"bottle", "ball"}
 
 
-def test_instances_count_from_one_in_the_order_of_creation() -> None:
-    """Background has none; furniture has one and no annotation."""
-    scene = built(ROOM, clutter(count=2), DESK, ARM)
+@pytest.mark.parametrize("annotate", [True, False])
+def test_instances_count_from_one_in_the_order_of_creation(annotate: bool) -> None:
+    """Background has none, furniture no annotation; ``annotate`` goes to each object."""
+    scene = built(ROOM, clutter(count=2, annotate=annotate), DESK, ARM)
 
     assert [(i.instance_id, i.name, i.annotated) for i in scene.instances] == [
-        (1, "table", False),
-        (2, "arm", True),
-        (3, "clutter/0", True),
-        (4, "clutter/1", True),
-    ]
+        (1, "table", False), (2, "arm", True),
+        (3, "clutter/0", annotate), (4, "clutter/1", annotate),
+    ]  # fmt: skip
+    assert scene.groups[0].annotated == annotate
     assert scene.body("room").instance_id == 0
 
 
-def test_groups_that_are_not_annotated_have_instances_without_labels() -> None:
-    """``annotate: false`` goes to the group and to each of its objects."""
-    scene = built(DESK, clutter(count=2, annotate=False))
-
-    assert not scene.groups[0].annotated
-    assert [i.annotated for i in scene.instances if i.name.startswith("clutter")] == [False, False]
-
-
-def test_hollow_prop_is_background_and_others_are_not() -> None:
+def test_hollow_props_and_backdrops_are_background_and_others_are_not() -> None:
     """Cameras may be under a gantry, so that its bounding box must not count."""
     gantry = {"type": "prop", "name": "gantry", "asset": "gantry?size_m=1.6,1,1.8"}
     plinth = {"type": "prop", "name": "plinth", "asset": "pedestal?size_m=0.3,0.3,0.7"}
-    scene = built({**gantry, "hollow": True}, plinth)
+    backdrop = {"type": "backdrop", "name": "ground", "asset": "plane?size_m=6,6"}
+    scene = built({**gantry, "hollow": True}, plinth, backdrop)
 
-    assert scene.body("gantry").instance_id == 0
-    assert scene.body("plinth").instance_id == 1
+    numbers = [scene.body(name).instance_id for name in ("gantry", "plinth", "ground")]
+    assert numbers == [0, 1, 0]
     with pytest.raises(ValidationError, match="exclude each other"):
         built({**gantry, "hollow": True, "annotate": True})
 
@@ -196,17 +186,14 @@ def test_focus_is_the_air_over_what_carries_objects() -> None:
     assert 0.74 < scene.focus.center_m[2] < 1.0
 
 
-def test_room_without_walls_has_an_id_of_its_own_and_the_same_bounds() -> None:
-    """Rooms with walls keep the id that they had before there were others."""
+def test_a_room_bounds_cameras_and_lights_with_or_without_walls() -> None:
+    """A hand's breadth inside; rooms with walls keep the id of before there were others."""
     room, terrace = built(ROOM), built({**ROOM, "walls": False})
 
     assert room.body("room").asset == "room?door=1&size_m=5,4,2.8&window=1"
     assert terrace.body("room").asset == "room?door=1&size_m=5,4,2.8&walls=0&window=1"
     assert terrace.interior_m == room.interior_m
 
-
-def test_room_bounds_cameras_and_lights() -> None:
-    """A hand's breadth inside its walls."""
     low, high = built(ROOM).interior_m
 
     assert (-2.5 < low[0] < -2.2) and (-2.0 < low[1] < -1.7) and (0.0 < low[2] < 0.3)
@@ -249,85 +236,64 @@ def test_a_panel_need_not_be_seen(kind: str) -> None:
     assert (scene.lights[0].direction, scene.lights[0].body) == ((0.0, 0.6, -0.8), "")
 
 
-@pytest.mark.parametrize(
-    ("given", "said"),
-    [
-        ({"intensity_cd": -1}, "greater than or equal to 0"),
-        ({"intensity_cd": float("nan")}, "finite"),
-        ({"luminous_flux_lm": float("inf")}, "finite"),
-        ({"luminous_flux_lm": 100, "intensity_cd": 5}, "exclude each other"),
-        ({"kind": "rectangle", "size_m": (0.0, 1.0)}, "size_m must be above 0"),
-        ({"kind": "disk", "radius_m": 0}, "radius_m of a disk"),
-        ({"kind": "spot", "direction": (0, 0, 0)}, "direction must not be 0"),
-    ],
-)
+@pytest.mark.parametrize(("given", "said"), [
+    ({"intensity_cd": -1}, "greater than or equal to 0"),
+    ({"intensity_cd": float("nan")}, "finite"),
+    ({"luminous_flux_lm": float("inf")}, "finite"),
+    ({"luminous_flux_lm": 100, "intensity_cd": 5}, "exclude each other"),
+    ({"kind": "rectangle", "size_m": (0.0, 1.0)}, "size_m must be above 0"),
+    ({"kind": "disk", "radius_m": 0}, "radius_m of a disk"),
+    ({"kind": "spot", "direction": (0, 0, 0)}, "direction must not be 0"),
+])  # fmt: skip
 def test_an_impossible_lamp_is_refused_when_it_is_read(given: dict[str, object], said: str) -> None:
     with pytest.raises(ValidationError, match=said):
         built(DESK, {"type": "light", "name": "lamp", **given})
 
 
-def test_backdrop_is_background() -> None:
-    scene = built({"type": "backdrop", "name": "ground", "asset": "plane?size_m=6,6"}, DESK)
-
-    assert scene.body("ground").instance_id == 0
-
-
-@pytest.mark.parametrize(
-    ("chosen", "assets"),
-    [
-        ({"tags": ["household", "toy"]}, {"ball"}),
-        ({"any_of": ["part", "toy"]}, {"ball", "bolt", "nut"}),
-        ({"ids": ["can"]}, {"can?seed=0", "can?seed=1"}),
-        ({"ids": ["can?seed=1", "odd"]}, {"can?seed=1", "odd"}),
-        ({"tags": ["household"], "exclude": ["can", "toy"]}, {"bottle", "brick"}),
-    ],
-)
+@pytest.mark.parametrize(("chosen", "assets"), [
+    ({"tags": ["household", "toy"]}, {"ball"}),
+    ({"any_of": ["part", "toy"]}, {"ball", "bolt", "nut"}),
+    ({"ids": ["can"]}, {"can?seed=0", "can?seed=1"}),
+    ({"ids": ["can?seed=1", "odd"]}, {"can?seed=1", "odd"}),
+    ({"tags": ["household"], "exclude": ["can", "toy"]}, {"bottle", "brick"}),
+])  # fmt: skip
 def test_assets_are_chosen_by_tags_and_ids(chosen: dict[str, Any], assets: set[str]) -> None:
     """All tags, any tag, a family, single assets; less what is excluded."""
     assert set(built(DESK, clutter(assets=chosen, count=0)).groups[0].assets) == assets
 
 
-@pytest.mark.parametrize(
-    ("line", "message"),
-    [
-        (clutter(on="tabel"), r"elements\.clutter\.on: .*'tabel'.*did you mean 'table'"),
-        ({**ARM, "on": "tabel"}, r"elements\.arm\.on: .*'tabel'.*did you mean 'table'"),
-        (clutter(count=400), r"elements\.clutter\.count: 400 objects do not fit .*'table'"),
-        (clutter(count=60, placement="scatter"), r"elements\.clutter\.count: 60 objects do not"),
-        (clutter(assets={"tags": ["no_such_tag"]}), r"elements\.clutter\.assets: no asset matches"),
-        ({**DESK, "height_m": 0.5}, r"elements\.table: two elements have this name"),
-    ],
-)
+@pytest.mark.parametrize(("line", "message"), [
+    (clutter(on="tabel"), r"elements\.clutter\.on: .*'tabel'.*did you mean 'table'"),
+    ({**ARM, "on": "tabel"}, r"elements\.arm\.on: .*'tabel'.*did you mean 'table'"),
+    (clutter(count=400), r"elements\.clutter\.count: 400 objects do not fit .*'table'"),
+    (clutter(count=60, placement="scatter"), r"elements\.clutter\.count: 60 objects do not"),
+    (clutter(assets={"tags": ["no_such_tag"]}), r"elements\.clutter\.assets: no asset matches"),
+    ({**DESK, "height_m": 0.5}, r"elements\.table: two elements have this name"),
+])  # fmt: skip
 def test_impossible_relations_are_told_with_their_place(line: dict[str, Any], message: str) -> None:
     """One message naming the element, the fact and what was probably meant."""
     with pytest.raises(ConfigError, match=message):
         built(DESK, line)
 
 
-def test_what_has_no_room_or_no_name_is_told() -> None:
-    """A table of 25 cm under things that are larger; the library knows the nearest names."""
-    tiny = {**DESK, "top_size_m": (0.19, 0.19)}
-    with pytest.raises(ConfigError, match="every asset is larger than surface 'table'"):
-        built(tiny, clutter(assets={"ids": ["ball"]}))
-    with pytest.raises(AssetError, match="did you mean 'bottle'"):
-        built(DESK, clutter(assets={"ids": ["botle"]}))
-    with pytest.raises(AssetError, match="is no robot"):
-        built(DESK, {**ARM, "asset": "bottle"})
+@pytest.mark.parametrize(("desk", "line", "error", "message"), [
+    (TINY, clutter(assets={"ids": ["ball"]}), ConfigError, "every asset is larger than surface"),
+    (DESK, clutter(assets={"ids": ["botle"]}), AssetError, "did you mean 'bottle'"),
+    (DESK, {**ARM, "asset": "bottle"}, AssetError, "is no robot"),
+])  # fmt: skip
+def test_what_has_no_room_or_no_name_is_told(
+    desk: Any, line: Any, error: Any, message: str
+) -> None:
+    """A table of 19 cm under larger objects; the library gives the nearest names."""
+    with pytest.raises(error, match=message):
+        built(desk, line)
 
 
-@pytest.mark.parametrize(
-    "line",
-    [
-        {**DESK, "hight_m": 0.7},
-        {**DESK, "name": "1st"},
-        {**DESK, "name": "a/b"},
-        {**DESK, "style": "glass"},
-        {"type": "shelf", "name": "s", "levels": 0},
-        clutter(count=-1),
-        clutter(placement="throw"),
-        {"type": "objects", "name": "o", "on": "table", "assets": {}},
-    ],
-)
+@pytest.mark.parametrize("line", [
+    {**DESK, "hight_m": 0.7}, {**DESK, "name": "1st"}, {**DESK, "name": "a/b"},
+    {**DESK, "style": "glass"}, {"type": "shelf", "name": "s", "levels": 0}, clutter(count=-1),
+    clutter(placement="throw"), {"type": "objects", "name": "o", "on": "table", "assets": {}},
+])  # fmt: skip
 def test_elements_are_strict(line: dict[str, Any]) -> None:
     """Unknown fields, names that would clash with paths, numbers out of range."""
     with pytest.raises(ValidationError):

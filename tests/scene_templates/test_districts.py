@@ -15,15 +15,11 @@ from gen_data.core.scene import Scene, SharedValue
 from gen_data.core.streams import Streams
 from gen_data.randomizers.lane_objects import LaneObjects as DrawLaneObjects
 from gen_data.randomizers.weather import PRESETS
-from gen_data.scene_templates.builder import build_scene
-from gen_data.scene_templates.crosswalk import Crosswalk
+from gen_data.scene_templates import builder, crosswalk, horizon, junction, signals
 from gen_data.scene_templates.element import Element
-from gen_data.scene_templates.horizon import Horizon
-from gen_data.scene_templates.junction import Junction
 from gen_data.scene_templates.lane_objects import LaneObjects
 from gen_data.scene_templates.objects import AssetChoice
 from gen_data.scene_templates.road import Road
-from gen_data.scene_templates.signals import Signals
 from tests.libraries import library
 from tests.randomizers.doubles import rng_of
 
@@ -38,7 +34,7 @@ def street() -> Config:
 
 
 def built(*elements: Element) -> Scene:
-    return build_scene("test", elements, library())
+    return builder.build_scene("test", elements, library())
 
 
 def test_absent_elements_leave_nothing_but_the_names_of_their_groups() -> None:
@@ -54,17 +50,14 @@ def test_absent_elements_leave_nothing_but_the_names_of_their_groups() -> None:
         DrawLaneObjects(name="bench").check(scene, library())
 
 
-@pytest.mark.parametrize(
-    ("element", "place"),
-    [
-        (Road(name="on", after="cross/0"), "elements.on.after: the element 'cross' is absent"),
-        (Signals(name="signals", junction="cross"), "elements.signals.junction: the element"),
-        (Crosswalk(name="zebra", road="side"), "elements.zebra.road: the element 'side'"),
-    ],
-)
+@pytest.mark.parametrize(("element", "place"), [
+    (Road(name="on", after="cross/0"), "elements.on.after: the element 'cross' is absent"),
+    (signals.Signals(name="signals", junction="cross"), "elements.signals.junction: the element"),
+    (crosswalk.Crosswalk(name="zebra", road="side"), "elements.zebra.road: the element 'side'"),
+])  # fmt: skip
 def test_relations_to_absent_elements_are_one_clear_error(element: Element, place: str) -> None:
     """The error names the field, the absent element and the remedy; absent ones may refer to it."""
-    absent = (Junction(name="cross", present=False), Road(name="side", present=False))
+    absent = (junction.Junction(name="cross", present=False), Road(name="side", present=False))
     with pytest.raises(ConfigError, match=place) as caught:
         built(Road(name="main"), *absent, element)
     assert f"or present: false for '{element.name}'" in str(caught.value)
@@ -90,7 +83,7 @@ def test_fronts_go_on_past_a_side_road_opposite() -> None:
     """The straight side of a T has houses as far back as the roads have; its corners have none."""
     scene = built(
         Road(name="main", length_m=40.0, setback_m=(5.0, 5.0)),
-        Junction(name="cross", after="main", arms_deg=(0.0, 90.0, 180.0), setback_m=5.0),
+        junction.Junction(name="cross", after="main", arms_deg=(0.0, 90.0, 180.0), setback_m=5.0),
         Road(name="on", after="cross/0", length_m=40.0, setback_m=(5.0, 5.0)),
     )
     lanes = {lane.name: lane for lane in scene.lanes}
@@ -113,7 +106,7 @@ def districts() -> dict[tuple[SharedValue, SharedValue], Scene]:
             seen.update(key)
             elements = config.scene_config(shared).elements
             roads = [e for e in elements if not isinstance(e, LaneObjects)]
-            scenes[key] = build_scene("street", roads, library())
+            scenes[key] = builder.build_scene("street", roads, library())
     return scenes
 
 
@@ -173,10 +166,8 @@ def test_groups_may_use_only_the_outer_or_the_inner_lanes() -> None:
         away_m[among] = {round(abs(y), 1) for y in places}
 
     assert {among: sorted(found) for among, found in away_m.items()} == {
-        "all": [1.8, 5.2],
-        "rightmost": [5.2],
-        "leftmost": [1.8],
-    }
+        "all": [1.8, 5.2], "rightmost": [5.2], "leftmost": [1.8],
+    }  # fmt: skip
 
 
 @pytest.mark.slow
@@ -212,7 +203,7 @@ def test_towers_stand_where_one_sees_a_city() -> None:
         shared = config.shared(Streams(5, number, index=number))
         # The other elements would take a hundred times as long.
         problems = Problems()
-        city = validate(resolve_shared(item, dict(shared)), Horizon, problems)
+        city = validate(resolve_shared(item, dict(shared)), horizon.Horizon, problems)
         problems.raise_if_any()
         assert city is not None
         assert sum(high - low for low, high in city.arcs_deg) <= 120.0
@@ -240,4 +231,4 @@ def test_trees_are_bare_where_snow_lies() -> None:
     leafy = {a.split("?")[0] for a in found if "bare" not in str(library().get(a).attributes)}
 
     assert leafy == {"tree/conifer", "tree/pine", "tree/thuja"}
-    assert [part.season for part in parts if isinstance(part, Horizon)][:1] == ["winter"]
+    assert [part.season for part in parts if isinstance(part, horizon.Horizon)][:1] == ["winter"]

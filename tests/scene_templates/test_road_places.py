@@ -8,13 +8,9 @@ import pytest
 from gen_data.content.scenery.shelters import pump_islands_m
 from gen_data.core.errors import ConfigError
 from gen_data.core.scene import Scene
-from gen_data.scene_templates.builder import build_scene
+from gen_data.scene_templates import builder, level_crossing, overpass, petrol_station, square
 from gen_data.scene_templates.element import Element
-from gen_data.scene_templates.level_crossing import LevelCrossing
-from gen_data.scene_templates.overpass import Overpass
-from gen_data.scene_templates.petrol_station import PetrolStation
 from gen_data.scene_templates.road import Road
-from gen_data.scene_templates.square import Square
 from gen_data.scene_templates.tram_line import TramLine
 from tests.libraries import library
 from tests.scenery.rays import cast
@@ -25,25 +21,24 @@ BENT = Road(
     setback_m=(14.0, 14.0), curvature_per_m=0.005, median_m=4.0, lanes=(2, 2),
 )  # fmt: skip
 PLACES: tuple[Element, ...] = (
-    Overpass(name="place", road="main", station_m=75.0),
-    Overpass(name="place", road="main", station_m=75.0, kind="steel", width_m=8.0),
-    LevelCrossing(name="place", road="main", station_m=75.0),
-    PetrolStation(name="place", road="main", station_m=75.0),
-    Square(name="place", road="main", station_m=75.0),
+    overpass.Overpass(name="place", road="main", station_m=75.0),
+    overpass.Overpass(name="place", road="main", station_m=75.0, kind="steel", width_m=8.0),
+    level_crossing.LevelCrossing(name="place", road="main", station_m=75.0),
+    petrol_station.PetrolStation(name="place", road="main", station_m=75.0),
+    square.Square(name="place", road="main", station_m=75.0),
 )
 VEHICLE_M = 4.4
 """Height that stays free: vehicles are at most 4 m high (Directive 96/53/EC)."""
 
 
 def built(*elements: Element) -> Scene:
-    return build_scene("test", elements, library())
+    return builder.build_scene("test", elements, library())
 
 
 @pytest.fixture(
     params=[(road, place) for road in (TOWN, BENT) for place in PLACES],
-    ids=lambda p: f"{'bent' if p[0] is BENT else 'town'}-{p[1].type}",
-    scope="module",
-)
+    ids=lambda p: f"{'bent' if p[0] is BENT else 'town'}-{p[1].type}", scope="module",
+)  # fmt: skip
 def scene(request: pytest.FixtureRequest) -> Scene:
     return built(*request.param)
 
@@ -159,7 +154,7 @@ def test_driveways_lead_from_the_gutter_to_the_forecourt(road: Road) -> None:
 
 def test_cars_stand_beside_the_islands_under_the_canopy() -> None:
     """With labels, clear of islands and of each other; none if nobody fills up."""
-    busy = PetrolStation(name="place", road="main", station_m=75.0, cars=1.0, seed=2)
+    busy = petrol_station.PetrolStation(name="place", road="main", station_m=75.0, cars=1.0, seed=2)
     made = built(TOWN, busy)
     canopy = next(b for b in made.bodies if b.name == "place/canopy")
     islands = pump_islands_m(2)

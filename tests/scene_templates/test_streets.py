@@ -19,10 +19,9 @@ from tests.libraries import library
 def crossing() -> list[object]:
     """Two roads that meet at a junction; the second leads away from it."""
     return [
-        Road(name="main", length_m=60.0),
-        Junction(name="cross", after="main"),
+        Road(name="main", length_m=60.0), Junction(name="cross", after="main"),
         Road(name="on", after="cross/0", length_m=40.0),
-    ]
+    ]  # fmt: skip
 
 
 def built(*elements: object) -> Scene:
@@ -54,13 +53,9 @@ def test_things_are_spread_evenly_over_all_lanes_of_their_kinds() -> None:
 def test_house_fronts_stand_on_the_frontage_and_face_the_street() -> None:
     """To the left of their lane, where the street is."""
     houses = LaneObjects(
-        name="houses",
-        lanes=("frontage",),
-        facing="left",
-        count=6,
-        assets=AssetChoice(ids=("building/residential",)),
-        annotate=False,
-    )
+        name="houses", lanes=("frontage",), facing="left", count=6,
+        assets=AssetChoice(ids=("building/residential",)), annotate=False,
+    )  # fmt: skip
     scene = built(houses)
     roads = [lane for lane in scene.lanes if lane.kind == "driving"]
     middle = np.array([p[:2] for lane in roads for p in lane.center_m])
@@ -85,18 +80,11 @@ def test_every_road_that_comes_to_a_junction_has_a_signal_that_faces_it() -> Non
         assert 3.5 < abs(y) < 6.0
 
 
-@pytest.mark.parametrize(
-    ("element", "fact"),
-    [
-        (Signals(name="signals", junction="corss"), "no road leads to a junction 'corss'"),
-        (
-            LaneObjects(
-                name="boats", lanes=("bicycle",), count=3, assets=AssetChoice(ids=("bench",))
-            ),
-            "no lane of kind bicycle",
-        ),
-    ],
-)
+@pytest.mark.parametrize(("element", "fact"), [
+    (Signals(name="signals", junction="corss"), "no road leads to a junction 'corss'"),
+    (LaneObjects(name="boats", lanes=("bicycle",), count=3, assets=AssetChoice(ids=("bench",))),
+     "no lane of kind bicycle"),
+])  # fmt: skip
 def test_what_has_no_place_is_one_clear_error(element: object, fact: str) -> None:
     with pytest.raises(ConfigError, match=fact):
         built(element)

@@ -8,8 +8,7 @@ from gen_data.content.scenery.awnings import awning_cloth, hanging_cloth
 
 def test_an_awning_sags_between_its_bars_and_has_two_sides() -> None:
     """The bars hold the cloth; half way it hangs below them; every sheet has another side."""
-    parts = awning_cloth((1.0, 2.0), (0.0, 2.4), [0.0, 0.5, 1.0], [3, 4], 0.2)
-    cloth = join_patches(parts)
+    cloth = join_patches(awning_cloth((1.0, 2.0), (0.0, 2.4), [0.0, 0.5, 1.0], [3, 4], 0.2))
     x, _, z = cloth.corners_m.reshape(-1, 3).T
     roof = z > 1.99
     straight = 2.4 - 0.4 * x

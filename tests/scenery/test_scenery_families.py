@@ -161,19 +161,16 @@ def test_facts_are_known_without_building(name: str) -> None:
         assert all(isinstance(value, str) for value in facts.attributes.values())
 
 
-@pytest.mark.parametrize(
-    ("name", "parameters"),
-    [
-        ("building/house", {"style": "huose"}),
-        ("building/house", {"style": "house", "region": "nroth"}),
-        ("tree/birch", {"species": "palm", "leaves": 1.0}),
-        ("tree/birch", {"species": "birch", "leaves": 1.5}),
-        ("traffic_sign", {"sign": "stopp"}),
-        ("traffic_light", {"mount": "poel"}),
-        ("barrier", {"style": "jersy"}),
-        ("fence", {"style": "pickts"}),
-    ],
-)
+@pytest.mark.parametrize(("name", "parameters"), [
+    ("building/house", {"style": "huose"}),
+    ("building/house", {"style": "house", "region": "nroth"}),
+    ("tree/birch", {"species": "palm", "leaves": 1.0}),
+    ("tree/birch", {"species": "birch", "leaves": 1.5}),
+    ("traffic_sign", {"sign": "stopp"}),
+    ("traffic_light", {"mount": "poel"}),
+    ("barrier", {"style": "jersy"}),
+    ("fence", {"style": "pickts"}),
+])  # fmt: skip
 def test_unknown_parameters_are_refused_by_name(name: str, parameters: dict[str, object]) -> None:
     wrong = next(str(v) for v in parameters.values() if v not in ("birch", "house", 1.0))
     with pytest.raises(AssetError, match=wrong):

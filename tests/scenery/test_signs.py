@@ -9,17 +9,13 @@ from gen_data.content.scenery.textures import sign_faces
 # Which colours a sign must show, by the convention's annex 1, and which it must not.
 SHOWS = {
     "speed_limit_50": ("red white black", "blue yellow"),
-    "no_entry": ("red white", "blue yellow black"),
-    "no_parking": ("red blue", "yellow black"),
-    "stop": ("red white", "blue yellow black"),
-    "yield": ("red white", "blue yellow black"),
-    "priority_road": ("yellow white", "blue red"),
-    "keep_right": ("blue white", "red yellow black"),
-    "danger": ("red white black", "blue yellow"),
-    "parking": ("blue white", "red yellow black"),
+    "no_entry": ("red white", "blue yellow black"), "no_parking": ("red blue", "yellow black"),
+    "stop": ("red white", "blue yellow black"), "yield": ("red white", "blue yellow black"),
+    "priority_road": ("yellow white", "blue red"), "keep_right": ("blue white", "red yellow black"),
+    "danger": ("red white black", "blue yellow"), "parking": ("blue white", "red yellow black"),
     "pedestrian_crossing": ("blue white black", "red yellow"),
     "one_way": ("blue white", "red yellow black"),
-}
+}  # fmt: skip
 # Prototype colours [8-bit sRGB]: the middle of what the words mean.
 WORDS = {
     "red": (190, 30, 25), "blue": (10, 85, 140), "yellow": (240, 200, 10),

@@ -8,24 +8,15 @@ import pytest
 from gen_data.assets.family import Solid
 from gen_data.content.scenery import FAMILIES
 from gen_data.content.scenery.utility_lines import utility_pole
-from gen_data.core.asset_types import Asset
-from gen_data.core.errors import AssetError
-from gen_data.core.scene import Body, Scene
-from gen_data.core.se3 import SE3, Vec3
+from gen_data.core import asset_types, errors, scene, se3
 from gen_data.randomizers.free_space import Footprint, is_clear, make_ground
+from tests import solids, tiers
 from tests.randomizers.doubles import FakeAssets
 from tests.scenery.clutter_limits import CLUTTER
-from tests.solids import digest, variant, volume_m3
-from tests.tiers import sampled
 
 ACROSS = (
-    "fence",
-    "garden_wall",
-    "road_barrier",
-    "construction_fence",
-    "scaffold",
-    "skip_container",
-)
+    "fence", "garden_wall", "road_barrier", "construction_fence", "scaffold", "skip_container",
+)  # fmt: skip
 """Families that run along Y, beside a street."""
 ALONG = ("parked_bicycle", "kick_scooter", "trailer", "dog", "pram")
 """Families that point along X, as vehicles do."""
@@ -38,40 +29,40 @@ def test_the_families_tagged_as_clutter_are_those_of_the_table() -> None:
     assert tagged == set(CLUTTER)
 
 
-@pytest.mark.parametrize("name", sampled(CLUTTER, 5))
+@pytest.mark.parametrize("name", tiers.sampled(CLUTTER, 5))
 def test_every_variant_is_as_long_and_wide_as_real_ones(name: str) -> None:
     """Extents along X and Y; heights and triangles are those of all scenery."""
     limits = CLUTTER[name]
     assert FAMILIES[name].variants >= limits.variants
     for seed in range(min(8, FAMILIES[name].variants)):
-        low, high = (np.array(edge) for edge in variant(name, seed).mesh.bounds_m())
+        low, high = (np.array(edge) for edge in solids.variant(name, seed).mesh.bounds_m())
         length, width, _ = high - low
         assert limits.length_m[0] <= length <= limits.length_m[1], seed
         assert limits.width_m[0] <= width <= limits.width_m[1], seed
         assert abs(low[2]) < 1e-5, seed
 
 
-@pytest.mark.parametrize("name", sampled(CLUTTER, 5))
+@pytest.mark.parametrize("name", tiers.sampled(CLUTTER, 5))
 def test_all_variants_differ(name: str) -> None:
     """No two seeds that are offered for selection are the same thing."""
     seeds = range(FAMILIES[name].variants)
 
-    assert len({digest(variant(name, seed)) for seed in seeds}) == len(seeds)
+    assert len({solids.digest(solids.variant(name, seed)) for seed in seeds}) == len(seeds)
 
 
 @pytest.mark.parametrize("name", CLUTTER)
 def test_surfaces_face_outward(name: str) -> None:
     """Closed parts prevail, so triangles turned inside out would make the volume negative."""
     for seed in range(4):
-        mesh = variant(name, seed).mesh
-        assert volume_m3(mesh.vertices_m[mesh.faces].astype(np.float64)) > 0.0, seed
+        mesh = solids.variant(name, seed).mesh
+        assert solids.volume_m3(mesh.vertices_m[mesh.faces].astype(np.float64)) > 0.0, seed
 
 
 @pytest.mark.parametrize("name", [*ACROSS, *ALONG])
 def test_pieces_extend_along_the_axis_of_their_kind(name: str) -> None:
     """Panels line a street along Y; vehicles point along X."""
     for seed in range(4):
-        low, high = (np.array(edge) for edge in variant(name, seed).mesh.bounds_m())
+        low, high = (np.array(edge) for edge in solids.variant(name, seed).mesh.bounds_m())
         length, width, _ = high - low
         if variant_is_upright_and_single(name, seed):
             assert (width > length) == (name in ACROSS), seed
@@ -89,7 +80,7 @@ def test_cables_of_different_poles_meet_at_mid_span() -> None:
 
 @pytest.mark.parametrize("span_m", [-1.0, 81.0])
 def test_spans_that_no_pole_carries_are_refused(span_m: float) -> None:
-    with pytest.raises(AssetError, match="span_m"):
+    with pytest.raises(errors.AssetError, match="span_m"):
         utility_pole(0, span_m)
 
 
@@ -107,13 +98,13 @@ class PoleAssets(FakeAssets):
 
     category = "utility_pole"
 
-    def get(self, asset_id: str) -> Asset:
+    def get(self, asset_id: str) -> asset_types.Asset:
         return replace(super().get("brick"), category=self.category)
 
-    def bounds_m(self, asset_id: str) -> tuple[Vec3, Vec3]:
+    def bounds_m(self, asset_id: str) -> tuple[se3.Vec3, se3.Vec3]:
         return (-17.5, -0.9, 0.0), (17.5, 0.9, 9.0)
 
-    def body_bounds_m(self, asset_id: str) -> tuple[Vec3, Vec3]:
+    def body_bounds_m(self, asset_id: str) -> tuple[se3.Vec3, se3.Vec3]:
         return (-0.2, -0.2, 0.0), (0.2, 0.2, 9.0)
 
 
@@ -126,12 +117,12 @@ class VehicleAssets(PoleAssets):
 @pytest.mark.parametrize(("assets", "is_free"), [(PoleAssets(), True), (VehicleAssets(), False)])
 def test_things_may_stand_below_the_cables_of_poles(assets: PoleAssets, is_free: bool) -> None:
     """Only the pole itself takes room, of the ground and of views."""
-    body = Body("pole", "pole", SE3(), instance_id=1)
+    body = scene.Body("pole", "pole", se3.SE3(), instance_id=1)
     ground = make_ground((body,), assets)
 
     assert not ground.is_free(Footprint(0.0, 0.0, 0.1, 0.1, 0.0))
     assert ground.is_free(Footprint(5.0, 0.0, 0.1, 0.1, 0.0)) == is_free
-    assert is_clear((5.0, 0.0, 1.5), Scene("test", bodies=(body,)), assets, 0.1) == is_free
+    assert is_clear((5.0, 0.0, 1.5), scene.Scene("test", bodies=(body,)), assets, 0.1) == is_free
 
 
 def cable_ends(solid: Solid, half_m: float) -> list[tuple[float, float]]:

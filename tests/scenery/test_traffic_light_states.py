@@ -89,15 +89,12 @@ def test_junctions_far_apart_are_independent(draw: Draw) -> None:
     assert agree == {1, 2}
 
 
-@pytest.mark.parametrize(
-    ("state", "lit"),
-    [
-        ("red", {"lens_red"}),
-        ("red_yellow", {"lens_red", "lens_yellow"}),
-        ("yellow", {"lens_yellow"}),
-        ("green", {"lens_green"}),
-    ],
-)
+@pytest.mark.parametrize(("state", "lit"), [
+    ("red", {"lens_red"}),
+    ("red_yellow", {"lens_red", "lens_yellow"}),
+    ("yellow", {"lens_yellow"}),
+    ("green", {"lens_green"}),
+])  # fmt: skip
 def test_exactly_the_lenses_of_a_state_emit_light(draw: Draw, state: str, lit: set[str]) -> None:
     """With the luminance that was asked for; everything else is dark."""
     scene = scene_of(("traffic_light?seed=2", 0.0, 0.0, 0.0))

@@ -6,13 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from gen_data.core.asset_types import SURFACES
+from gen_data.core import asset_types, motion, scene_time, streams
 from gen_data.core.capture import Channel, LidarHits, LidarRays, Measurements, SensorReading
-from gen_data.core.motion import Trajectory
 from gen_data.core.scene import Body, Camera, Instance, Lane, Lidar, Rig, Scene
-from gen_data.core.scene_time import add_twists, place_sensors, scene_at
 from gen_data.core.se3 import SE3, Vec3
-from gen_data.core.streams import Rng, Streams
 from gen_data.sensors.mounting import Instrument
 
 CAR_M = ((-2.2, -0.9, 0.0), (2.2, 0.9, 1.5))
@@ -42,9 +39,9 @@ def circle(radius_m: float, speed_m_s: float) -> Way:
     return pose
 
 
-def track_of(body: str, pose: Way, seconds: float = 4.0) -> Trajectory:
+def track_of(body: str, pose: Way, seconds: float = 4.0) -> motion.Trajectory:
     count = round(seconds / KNOT_S)
-    return Trajectory(body, KNOT_S, tuple(pose(k * KNOT_S) for k in range(count + 1)))
+    return motion.Trajectory(body, KNOT_S, tuple(pose(k * KNOT_S) for k in range(count + 1)))
 
 
 def thing(
@@ -52,51 +49,36 @@ def thing(
 ) -> tuple[Body, Instance]:
     body = Body(name, f"{category}?", pose, instance_id=number)
     instance = Instance(
-        number,
-        name,
-        category,
-        CATEGORIES[category],
-        f"{category}?",
-        T_world_instance=pose,
-        box_min_m=box_m[0],
-        box_max_m=box_m[1],
-        attributes=tuple(sorted(facts.items())),
-    )
+        number, name, category, CATEGORIES[category], f"{category}?", T_world_instance=pose,
+        box_min_m=box_m[0], box_max_m=box_m[1], attributes=tuple(sorted(facts.items())),
+    )  # fmt: skip
     return body, instance
 
 
 def world(
-    ego: Way | None = None,
-    others: Sequence[tuple[Body, Instance]] = (),
-    tracks: Sequence[Trajectory] = (),
-    lanes: Sequence[Lane] = (),
-    step_s: float = 0.1,
+    ego: Way | None = None, others: Sequence[tuple[Body, Instance]] = (),
+    tracks: Sequence[motion.Trajectory] = (), lanes: Sequence[Lane] = (), step_s: float = 0.1,
     seconds: float = 4.0,
-) -> Scene:
+) -> Scene:  # fmt: skip
     """An ego car with a rig at its origin, at 10 m/s along X, and what is around it."""
     ego = ego or straight((0.0, 0.0), (10.0, 0.0))
     things = [thing(1, "ego", "car", ego(0.0)), *others]
-    return add_twists(
-        Scene(
-            "test",
-            bodies=tuple(body for body, _ in things),
-            instances=tuple(instance for _, instance in things),
-            tracks=(track_of("ego", ego, seconds), *tracks),
-            rigs=(Rig("ego", "ego"),),
-            lanes=tuple(lanes),
-            step_s=step_s,
-        )
-    )
+    return scene_time.add_twists(Scene(
+        "test", bodies=tuple(body for body, _ in things),
+        instances=tuple(instance for _, instance in things),
+        tracks=(track_of("ego", ego, seconds), *tracks), rigs=(Rig("ego", "ego"),),
+        lanes=tuple(lanes), step_s=step_s,
+    ))  # fmt: skip
 
 
-def rng(step: int = 0, seed: int = 0, name: str = "sensor/device") -> Rng:
-    return Streams(seed, scene=0, view=0, step=step).rng(name)
+def rng(step: int = 0, seed: int = 0, name: str = "sensor/device") -> streams.Rng:
+    return streams.Streams(seed, scene=0, view=0, step=step).rng(name)
 
 
 def reading(sensor: Instrument, scene: Scene, step: int = 0, seed: int = 0) -> Measurements:
     """What a device reports at one step of a sequence."""
-    mounted = place_sensors(sensor.mount(scene))
-    then = add_twists(scene_at(mounted, step * scene.step_s))
+    mounted = scene_time.place_sensors(sensor.mount(scene))
+    then = scene_time.add_twists(scene_time.scene_at(mounted, step * scene.step_s))
     return sensor.capture(then, BoxRays(), frozenset(), rng(step, seed))
 
 
@@ -131,13 +113,10 @@ class BoxRays:
             return np.broadcast_to(values[:, None], shape).astype(kind)
 
         return LidarHits(
-            wide(best, np.float32),
-            wide(np.where(found, 0.5, 0.0), np.float32),
-            wide(found, np.float32),
-            wide(ids, np.uint16),
-            wide(categories, np.uint16),
-            np.full(shape, SURFACES.index(""), np.uint8),
-        )
+            wide(best, np.float32), wide(np.where(found, 0.5, 0.0), np.float32),
+            wide(found, np.float32), wide(ids, np.uint16), wide(categories, np.uint16),
+            np.full(shape, asset_types.SURFACES.index(""), np.uint8),
+        )  # fmt: skip
 
     def render(self, scene: Scene, camera: Camera, channels: frozenset[Channel]) -> SensorReading:
         raise AssertionError("this device does not look at pictures")

@@ -53,21 +53,17 @@ def board(asset: str, z_m: float, lean_rad: float = 0.0) -> Body:
 def scene(*bodies: Body, lens: Intrinsics | None = None) -> Scene:
     lens = lens or Intrinsics.from_hfov(*SIZE_PX, math.radians(HFOV_DEG))
     return Scene(
-        "test",
-        bodies=bodies,
-        cameras=(Camera("depth_camera", SE3(), lens),),
+        "test", bodies=bodies, cameras=(Camera("depth_camera", SE3(), lens),),
         lights=(Light("lamp", "sphere", position_m=(0.3, -1.0, 0.0), intensity_cd=100.0),),
         environment=Environment(luminance_cd_m2=10.0),
-    )
+    )  # fmt: skip
 
 
 def model(kind: str, range_m: tuple[float, float] = (0.0, 50.0), **principle: Any) -> DepthModel:
     plain = {
-        "size_px": SIZE_PX,
-        "hfov_deg": HFOV_DEG,
-        "range_m": range_m,
+        "size_px": SIZE_PX, "hfov_deg": HFOV_DEG, "range_m": range_m,
         "principle": {"kind": kind, **principle},
-    }
+    }  # fmt: skip
     return DepthModel.model_validate_json(json.dumps(plain))
 
 

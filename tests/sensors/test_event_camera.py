@@ -73,8 +73,7 @@ def test_no_event_is_lost_or_told_twice_between_steps() -> None:
 
     def counts(step_s: float) -> np.ndarray:
         sensor = EventCamera(rig="ego", frames_per_step=round(step_s / 0.05), **QUIET)
-        scene = replace(world(), step_s=step_s)
-        mounted = place_sensors(sensor.mount(scene))
+        mounted = place_sensors(sensor.mount(replace(world(), step_s=step_s)))
         total = np.zeros(SIZE_PX[::-1], int)
         for k in range(1, round(1.0 / step_s) + 1):
             then = scene_at(mounted, round(k * step_s, 9))
@@ -90,8 +89,7 @@ def test_no_event_is_lost_or_told_twice_between_steps() -> None:
 def test_events_do_not_come_back_from_small_changes() -> None:
     """Up and down by a fifth of the threshold: at most one event where a level lies in between."""
     sensor = EventCamera(rig="ego", frames_per_step=20, **QUIET)
-    film = Film(lambda t: 50.0 * math.exp(0.04 * math.sin(200.0 * t)))
-    rows = seen(sensor, film, 1).rows
+    rows = seen(sensor, Film(lambda t: 50.0 * math.exp(0.04 * math.sin(200.0 * t))), 1).rows
     pixel = rows["y_px"].astype(int) * SIZE_PX[0] + rows["x_px"]
 
     assert np.bincount(pixel).max() == 1
@@ -138,8 +136,7 @@ def test_events_know_what_their_pixel_shows() -> None:
 
 def test_still_pictures_make_no_events_but_noise() -> None:
     """Leakage of 2 Hz, shot noise of 8 Hz in the dark, a quarter of it in the light (v2e)."""
-    quiet = EventCamera(rig="ego", **QUIET)
-    assert len(seen(quiet, Film(lambda t: 0.5), 4).rows) == 0
+    assert len(seen(EventCamera(rig="ego", **QUIET), Film(lambda t: 0.5), 4).rows) == 0
 
     scene = np.full((100, 200), 1e-6)
     scene[:, 100:] = 1e6
@@ -161,7 +158,8 @@ def test_pixels_rest_after_an_event() -> None:
     assert apply_refractory_period(events, 0.0).time_s.tolist() == times_s.tolist()
 
 
-def test_a_reading_sees_its_first_and_last_instant_but_the_first_has_none() -> None:
+def test_pictures_are_rendered_once_and_none_while_nothing_moves() -> None:
+    """Four for three parts of a step; before a parked car one is enough, unless rain falls."""
     film = Film(lambda t: 0.5)
 
     assert len(seen(EventCamera(rig="ego"), film, 0).rows) == 0
@@ -170,9 +168,6 @@ def test_a_reading_sees_its_first_and_last_instant_but_the_first_has_none() -> N
 
     assert film.frames == 4
 
-
-def test_nothing_is_rendered_again_while_nothing_moves() -> None:
-    """Before a parked car one image is enough, unless rain falls; noise goes on."""
     parked = world(ego=straight((0.0, 0.0), (0.0, 0.0)))
     sensor = EventCamera(rig="ego", size_px=SIZE_PX, shot_noise_hz=20.0)
     dry, wet = Film(lambda t: 0.5), Film(lambda t: 0.5)

@@ -1,12 +1,13 @@
 """What happens to an ego car, against arithmetic."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
 
 from gen_data.core.errors import SampleError
-from gen_data.core.scene import Body, Lane, Rig
+from gen_data.core.scene import Body, Instance, Lane, Rig, Scene
 from gen_data.core.se3 import SE3
 from gen_data.sensors.events.event_detector import LIGHT_STATES, OCCURRENCES, EventDetector
 from gen_data.sensors.events.obb_queries import find_obstacles, gap_ahead_m, is_touching
@@ -22,6 +23,7 @@ from tests.sensors.streetcar import (
     world,
 )
 
+Things = list[tuple[Body, Instance]]
 LIGHT_M = ((-0.05, -0.14, 0.0), (0.35, 0.14, 3.2))
 
 
@@ -29,37 +31,37 @@ def of_kind(rows: np.ndarray, kind: str) -> np.ndarray:
     return rows[rows["occurrence"] == OCCURRENCES.index(kind)]
 
 
+def standing(others: Things) -> Scene:
+    return world(straight((0.0, 0.0), (0.0, 0.0)), others)
+
+
 def lane(y_m: float, length_m: float = 60.0, name: str = "lane") -> Lane:
     points = tuple((x, y_m, 0.0) for x in np.arange(0.0, length_m + 1.0, 2.0))
     return Lane(name, "driving", points, 3.5)
 
 
-def test_collision_is_noticed_when_the_bumper_arrives() -> None:
-    """At 10 m/s, 12 m of free way: after 1.2 s, once, with the speed."""
-    wall = thing(7, "wall", "building", SE3((12.0 + 2.2 + 0.1, 0.0, 0.0)), WALL_M)
-    rows = of_kind(readings(EventDetector(), world(others=[wall]), 16), "collision")
-
-    assert len(rows) == 1
-    assert rows[0]["time_s"] == pytest.approx(1.2, abs=0.0101)
-    assert (rows[0]["instance_id"], rows[0]["value"]) == (7, pytest.approx(10.0, abs=1e-4))
+WALL = thing(7, "wall", "building", SE3((12.0 + 2.2 + 0.1, 0.0, 0.0)), WALL_M)
+COMING = track_of("other", straight((20.0, 0.0), (-5.0, 0.0)))
 
 
-def test_collision_of_two_that_move_has_the_speed_between_them() -> None:
-    """10 m/s against 5 m/s, 15.6 m between bumpers: after 1.04 s."""
-    other = thing(2, "other", "car", SE3((20.0, 0.0, 0.0)))
-    coming = track_of("other", straight((20.0, 0.0), (-5.0, 0.0)))
-    scene = world(others=[other], tracks=[coming])
-    rows = of_kind(readings(EventDetector(events=("collision",)), scene, 16), "collision")
+@pytest.mark.parametrize(
+    ("others", "tracks", "expected"),
+    [
+        # At 10 m/s, 12 m of free way; 15.6 m between bumpers at 15 m/s; 2 cm between the sides.
+        ([WALL], [], (1.2, 7, 10.0)),
+        ([thing(2, "other", "car", SE3((20.0, 0.0, 0.0)))], [COMING], (1.04, 2, 15.0)),
+        ([thing(2, "parked", "car", SE3((8.0, 1.82, 0.0)))], [], None),
+    ],
+    ids=["when the bumper arrives", "with the speed between two that move", "not by passing by"],
+)
+def test_collision_is_noticed_once(others: Things, tracks: list, expected: Any) -> None:
+    scene = world(others=others, tracks=tracks)
+    rows = of_kind(readings(EventDetector(events=("collision",)), scene, 20), "collision")
+    found = [(row["time_s"], row["instance_id"], row["value"]) for row in rows]
 
-    assert rows["time_s"].tolist() == pytest.approx([1.04], abs=0.0101)
-    assert rows[0]["value"] == pytest.approx(15.0, abs=1e-4)
-
-
-def test_passing_beside_is_no_collision() -> None:
-    """2 cm between the sides."""
-    beside = thing(2, "parked", "car", SE3((8.0, 1.82, 0.0)))
-
-    assert len(of_kind(readings(EventDetector(), world(others=[beside]), 20), "collision")) == 0
+    time_s, number, speed = expected or (0.0, 0, 0.0)
+    row = (pytest.approx(time_s, abs=0.0101), number, pytest.approx(speed, abs=1e-4))
+    assert found == ([row] if expected else [])
 
 
 def test_crown_of_a_tree_is_no_wall() -> None:
@@ -71,22 +73,20 @@ def test_crown_of_a_tree_is_no_wall() -> None:
     assert len(of_kind(readings(EventDetector(), world(others=[ahead]), 20), "collision")) == 1
 
 
-def test_boxes_touch_exactly_where_their_corners_reach() -> None:
-    """A box turned by 45 degrees reaches sqrt(2) half edges ahead."""
-    cube = ((-1.0, -1.0, 0.0), (1.0, 1.0, 1.5))
-    turned = SE3.about_z(math.pi / 4)
-    for gap_m, expected in ((0.01, False), (-0.01, True)):
-        x_m = 2.2 + math.sqrt(2.0) + gap_m
-        other = thing(2, "cube", "car", SE3((x_m, 0.0, 0.0)) @ turned, cube)
-        own, its = find_obstacles(world(straight((0.0, 0.0), (0.0, 0.0)), [other]))
-        assert is_touching(own, its, 0.0) is expected
+CUBE_M = ((-1.0, -1.0, 0.0), (1.0, 1.0, 1.5))
+REACH_M = 2.2 + math.sqrt(2.0)
+"""Half of the car and sqrt(2) half edges of a cube turned by 45 degrees."""
 
 
-def test_boxes_above_each_other_do_not_touch() -> None:
-    bridge = thing(2, "bridge", "building", SE3((0.0, 0.0, 1.51)), ((-9, -9, 0), (9, 9, 1)))
-    own, its = find_obstacles(world(straight((0.0, 0.0), (0.0, 0.0)), [bridge]))
+@pytest.mark.parametrize(("pose", "box_m", "touching"), [
+    (SE3.about_z(math.pi / 4, (REACH_M + 0.01, 0.0, 0.0)), CUBE_M, False),
+    (SE3.about_z(math.pi / 4, (REACH_M - 0.01, 0.0, 0.0)), CUBE_M, True),
+    (SE3((0.0, 0.0, 1.51)), ((-9, -9, 0), (9, 9, 1)), False),
+], ids=["a corner before", "a corner inside", "a bridge above"])  # fmt: skip
+def test_boxes_touch_exactly_where_they_reach(pose: SE3, box_m: Any, touching: bool) -> None:
+    own, its = find_obstacles(standing([thing(2, "other", "building", pose, box_m)]))
 
-    assert not is_touching(own, its, 0.0)
+    assert is_touching(own, its, 0.0) is touching
 
 
 def test_changing_lanes_crosses_one_line() -> None:
@@ -125,15 +125,14 @@ def test_obstacle_is_the_nearest_thing_in_the_way() -> None:
 def test_obstacle_that_only_reaches_into_the_way_counts_from_where_it_does() -> None:
     """A beam across at 45 degrees enters the car's strip nearer than its middle."""
     beam = ((-10.0, -0.001, 0.0), (10.0, 0.001, 2.0))
-    crossing = thing(2, "beam", "building", SE3((12.0, 0.0, 0.0)) @ SE3.about_z(math.pi / 4), beam)
-    own, its = find_obstacles(world(straight((0.0, 0.0), (0.0, 0.0)), [crossing]))
+    crossing = thing(2, "beam", "building", SE3.about_z(math.pi / 4, (12.0, 0.0, 0.0)), beam)
+    own, its = find_obstacles(standing([crossing]))
 
     assert gap_ahead_m(own, its, 0.0) == pytest.approx(12.0 - 0.9 - 2.2, abs=5e-3)
 
 
 def test_far_obstacles_are_not_reported() -> None:
-    wall = thing(4, "wall", "building", SE3((40.0, 0.0, 0.0)), WALL_M)
-    scene = world(others=[wall])
+    scene = world(others=[thing(4, "wall", "building", SE3((40.0, 0.0, 0.0)), WALL_M)])
 
     assert len(of_kind(reading(EventDetector(obstacle_m=30.0), scene, 0).rows, "obstacle")) == 0
     assert len(of_kind(reading(EventDetector(obstacle_m=40.0), scene, 0).rows, "obstacle")) == 1
@@ -156,36 +155,34 @@ def test_proximity_is_the_distance_to_the_nearest_box() -> None:
     assert rows[0]["value"] == pytest.approx(2.9, abs=1e-6)
 
 
+def before_light(state: str) -> Scene:
+    """Our light faces the car, its line 40 m ahead; a green one faces the oncoming traffic."""
+    facing = SE3.about_z(math.pi, (60.6, -3.0, 0.0))
+    ours = thing(5, "ours", "traffic_light", facing, LIGHT_M, state=state)
+    theirs = thing(6, "theirs", "traffic_light", SE3((60.0, 3.0, 0.0)), LIGHT_M, state="green")
+    return world(straight((20.0, 0.0), (10.0, 0.0)), [ours, theirs], lanes=[lane(0.0)])
+
+
 @pytest.mark.parametrize("state", ["red", "yellow", "green", "red_yellow"])
 def test_light_at_the_end_of_the_lane_is_told(state: str) -> None:
-    """That which faces the car; the one of the oncoming traffic is not ours."""
-    ours = thing(
-        5, "ours", "traffic_light", SE3.about_z(math.pi, (60.6, -3.0, 0.0)), LIGHT_M, state=state
-    )
-    theirs = thing(6, "theirs", "traffic_light", SE3((60.0, 3.0, 0.0)), LIGHT_M, state="green")
-    scene = world(straight((20.0, 0.0), (10.0, 0.0)), [ours, theirs], lanes=[lane(0.0)])
-    rows = of_kind(reading(EventDetector(light_m=40.5), scene, 0).rows, "traffic_light")
+    rows = reading(EventDetector(light_m=40.5), before_light(state), 0).rows
+    rows = of_kind(rows, "traffic_light")
 
     assert rows["instance_id"].tolist() == [5]
     assert LIGHT_STATES[int(rows[0]["value"])] == state
 
 
-def test_light_far_ahead_does_not_matter_yet() -> None:
-    """Its line is 40 m away."""
-    ours = thing(
-        5, "ours", "traffic_light", SE3.about_z(math.pi, (60.6, -3.0, 0.0)), LIGHT_M, state="red"
-    )
-    scene = world(straight((20.0, 0.0), (10.0, 0.0)), [ours], lanes=[lane(0.0)])
-    sensor = EventDetector(light_m=30.0)
+@pytest.mark.parametrize(("step", "count"), [(0, 0), (12, 1)])
+def test_light_far_ahead_does_not_matter_yet(step: int, count: int) -> None:
+    """40 m and, after 1.2 s, 28 m before its line."""
+    rows = reading(EventDetector(light_m=30.0), before_light("red"), step).rows
 
-    assert len(of_kind(reading(sensor, scene, 0).rows, "traffic_light")) == 0
-    assert len(of_kind(reading(sensor, scene, 12).rows, "traffic_light")) == 1
+    assert len(of_kind(rows, "traffic_light")) == count
 
 
 def test_slow_watcher_reports_all_since_its_last_reading() -> None:
     """At 2 Hz in steps of 0.1 s: what happened at 1.2 s is told at 1.5 s."""
-    wall = thing(7, "wall", "building", SE3((14.3, 0.0, 0.0)), WALL_M)
-    rows = reading(EventDetector(rate_hz=2.0), world(others=[wall]), 15).rows
+    rows = reading(EventDetector(rate_hz=2.0), world(others=[WALL]), 15).rows
 
     assert of_kind(rows, "collision")["time_s"].tolist() == pytest.approx([1.2], abs=0.0101)
 

@@ -26,22 +26,25 @@ def rates(rows: np.ndarray) -> np.ndarray:
     return np.stack([rows[f"rate_{axis}_rad_s"] for axis in "xyz"], axis=1)
 
 
+def still(seconds: float = 4.0) -> Scene:
+    return world(straight((0.0, 0.0), (0.0, 0.0)), seconds=seconds)
+
+
 def test_device_at_rest_feels_gravity_alone() -> None:
     """Upwards, in its own axes: pitched up by 30 degrees, half of it is forward."""
-    still = world(straight((0.0, 0.0), (0.0, 0.0)))
-
-    rows = readings(Imu(noise=0, pitch_deg=30), still, 3)
+    rows = readings(Imu(noise=0, pitch_deg=30), still(), 3)
 
     expected = [GRAVITY * 0.5, 0.0, GRAVITY * math.cos(math.radians(30))]
     assert np.allclose(forces(rows), expected, atol=1e-6)
     assert np.allclose(rates(rows), 0.0, atol=1e-9)
 
 
-def test_circular_motion_is_felt_as_its_centripetal_acceleration() -> None:
-    """v^2 / r to the left and v / r about the upward axis: 20 m, 8 m/s."""
-    rows = readings(Imu(noise=0), world(circle(20.0, 8.0)), 10)
+@pytest.mark.parametrize("ahead_m", [0.0, 1.5])
+def test_circular_motion_is_felt_as_its_centripetal_acceleration(ahead_m: float) -> None:
+    """20 m, 8 m/s: v^2 / r to the left, v / r about the upward axis; ahead, omega^2 r backwards."""
+    rows = readings(Imu(noise=0, offset_m=(ahead_m, 0.0, 0.0)), world(circle(20.0, 8.0)), 10)
 
-    assert np.allclose(forces(rows), [0.0, 3.2, GRAVITY], atol=5e-3)
+    assert np.allclose(forces(rows), [-(0.4**2) * ahead_m, 3.2, GRAVITY], atol=5e-3)
     assert np.allclose(rates(rows), [0.0, 0.0, 0.4], atol=1e-4)
 
 
@@ -61,18 +64,8 @@ def test_a_growing_turn_is_felt_from_the_first_to_the_last_reading() -> None:
     assert np.allclose(forces(rows)[:, 1], 10.0 * rate, atol=1e-2)
 
 
-def test_lever_arm_adds_its_own_centripetal_acceleration() -> None:
-    """1.5 m ahead of the origin: omega^2 * 1.5 m backwards."""
-    rows = readings(Imu(noise=0, offset_m=(1.5, 0.0, 0.0)), world(circle(20.0, 8.0)), 5)
-
-    assert np.allclose(forces(rows)[:, 0], -(0.4**2) * 1.5, atol=5e-3)
-
-
 def test_braking_is_felt_backwards() -> None:
-    def braking(t: float) -> SE3:
-        return SE3((20.0 * t - 1.5 * t * t, 0.0, 0.0))
-
-    rows = readings(Imu(noise=0), world(braking), 10)
+    rows = readings(Imu(noise=0), world(lambda t: SE3((20.0 * t - 1.5 * t * t, 0.0, 0.0))), 10)
 
     assert np.allclose(forces(rows), [-3.0, 0.0, GRAVITY], atol=1e-6)
 
@@ -87,9 +80,8 @@ def test_readings_follow_each_other_evenly_over_steps() -> None:
 @pytest.mark.slow
 def test_bias_walks_on_from_step_to_step() -> None:
     """Steps made alone share one walk: its changes grow with time as a walk's do."""
-    still = world(straight((0.0, 0.0), (0.0, 0.0)), seconds=20.0)
     sensor = Imu(model="ADIS16448", rate_hz=10)
-    walks = np.stack([rates(readings(sensor, still, 101, seed))[:, 0] for seed in range(60)])
+    walks = np.stack([rates(readings(sensor, still(20.0), 101, seed))[:, 0] for seed in range(60)])
     biases = walks.mean(axis=1)
 
     assert abs(biases.std() / 8.7e-3 - 1.0) < 0.35
@@ -101,24 +93,19 @@ def test_bias_walks_on_from_step_to_step() -> None:
 
 def test_walk_grows_with_the_root_of_time() -> None:
     """A unit whose walk is all there is: after 100 readings ten times that of one."""
-    still = world(straight((0.0, 0.0), (0.0, 0.0)), seconds=20.0)
-    sensor = Imu(model="ADIS16448", rate_hz=10)
-    ends = np.array(
-        [
-            forces(reading(sensor, still, 100, seed).rows)[0, 0]
-            - forces(reading(sensor, still, 0, seed).rows)[0, 0]
-            for seed in range(400)
-        ]
-    )
-    white, walk = 2.0e-3 * math.sqrt(10.0), 3.0e-3 / math.sqrt(10.0)
+    scene, sensor = still(20.0), Imu(model="ADIS16448", rate_hz=10)
 
+    def force(step: int, seed: int) -> float:
+        return float(forces(reading(sensor, scene, step, seed).rows)[0, 0])
+
+    ends = np.array([force(100, seed) - force(0, seed) for seed in range(400)])
+    white, walk = 2.0e-3 * math.sqrt(10.0), 3.0e-3 / math.sqrt(10.0)
     assert abs(ends.std() / math.hypot(math.sqrt(2) * white, 10.0 * walk) - 1.0) < 0.1
 
 
 def test_white_noise_has_the_density_of_the_data_sheet() -> None:
     """0.2 degrees per root hour at 100 Hz: 5.8e-4 rad/s; 0.005 m/s per root hour: 8.3e-4 m/s^2."""
-    still = world(straight((0.0, 0.0), (0.0, 0.0)))
-    rows = readings(Imu(model="RT3003"), still, 40)
+    rows = readings(Imu(model="RT3003"), still(), 40)
 
     gyro = math.radians(0.2) / 60.0 * 10.0
     accelerometer = 0.005 / 60.0 * 10.0
@@ -126,13 +113,10 @@ def test_white_noise_has_the_density_of_the_data_sheet() -> None:
     assert abs(np.diff(forces(rows), axis=0).std() / (accelerometer * math.sqrt(2)) - 1.0) < 0.05
 
 
-@pytest.mark.parametrize(
-    ("fields", "words"),
-    [
-        ({"rate_hz": 33.0}, "rate_hz 33 does not fit step_s 0.1"),
-        ({"rig": "egg"}, "the scene has no rig 'egg'; its rigs: ego"),
-    ],
-)
+@pytest.mark.parametrize(("fields", "words"), [
+    ({"rate_hz": 33.0}, "rate_hz 33 does not fit step_s 0.1"),
+    ({"rig": "egg"}, "the scene has no rig 'egg'; its rigs: ego"),
+])  # fmt: skip
 def test_what_does_not_fit_the_scene_is_told(fields: dict, words: str) -> None:
     with pytest.raises(ConfigError, match=words):
         Imu(**fields).mount(world())
@@ -142,14 +126,8 @@ def test_geodetic_coordinates_of_known_places() -> None:
     """Equator, pole and 45 degrees, from the ellipsoid's published axes."""
     places = np.array([[0.0, 0.0, 0.0], [0.0, 90.0, 10.0], [90.0, 0.0, 5.0], [45.0, -90.0, 0.0]])
     # The last: N = a / sqrt(1 - e^2 / 2) = 6388838.290 m; x = N cos 45, z = (1 - e^2) N sin 45.
-    centred = np.array(
-        [
-            [6378137.0, 0.0, 0.0],
-            [0.0, 6378147.0, 0.0],
-            [0.0, 0.0, 6356757.314245],
-            [0.0, -4517590.878849, 4487348.408866],
-        ]
-    )
+    centred = np.array([[6378137.0, 0.0, 0.0], [0.0, 6378147.0, 0.0], [0.0, 0.0, 6356757.314245],
+                        [0.0, -4517590.878849, 4487348.408866]])  # fmt: skip
 
     assert np.allclose(geodetic_to_ecef(places), centred, atol=1e-4)
     back = ecef_to_geodetic(centred)
@@ -159,12 +137,18 @@ def test_geodetic_coordinates_of_known_places() -> None:
 
 def test_a_kilometre_north_and_east_is_the_published_share_of_a_degree() -> None:
     """At 49 degrees, one of latitude is 111.2095 km, one of longitude 73.1727 km (WGS 84)."""
-    ends = to_geodetic(
-        np.array([[1000.0, 0.0, 0.0], [0.0, 1000.0, 0.0]]), GeodeticOrigin(49.0, 8.0)
-    )
+    ends = to_geodetic(1000.0 * np.eye(3)[:2], GeodeticOrigin(49.0, 8.0))
 
     assert ends[1, 0] - 49.0 == pytest.approx(1000.0 / 111_209.5, rel=3e-5)
     assert ends[0, 1] - 8.0 == pytest.approx(1000.0 / 73_172.7, rel=3e-5)
+
+
+def moved_m(row: np.void, origin: GeodeticOrigin) -> np.ndarray:
+    """From the origin to a fix, east, north and up, through coordinates at the Earth's centre."""
+    fix = [row["latitude_deg"], row["longitude_deg"], row["altitude_m"]]
+    start = [origin.latitude_deg, origin.longitude_deg, origin.altitude_m]
+    ends = geodetic_to_ecef(np.array([start, fix]))
+    return np.asarray(origin.axes().T @ (ends[1] - ends[0]))
 
 
 def test_ideal_receiver_tells_where_the_antenna_is() -> None:
@@ -172,37 +156,23 @@ def test_ideal_receiver_tells_where_the_antenna_is() -> None:
     sensor = Gnss(noise=0, offset_m=(0.5, 0.0, 1.6), origin_deg=(49.0, 8.0), origin_altitude_m=100)
     row = reading(sensor, world(), 5).rows[0]
 
-    place = np.array([[row["latitude_deg"], row["longitude_deg"], row["altitude_m"]]])
-    turned = (
-        GeodeticOrigin(49.0, 8.0).axes().T
-        @ (geodetic_to_ecef(place) - geodetic_to_ecef(np.array([[49.0, 8.0, 100.0]])))[0]
-    )
-    assert np.allclose(turned, [5.5, 0.0, 1.6], atol=1e-4)
+    assert np.allclose(moved_m(row, GeodeticOrigin(49.0, 8.0, 100.0)), [5.5, 0.0, 1.6], atol=1e-4)
     assert row["velocity_east_m_s"] == pytest.approx(10.0, abs=1e-4)
     assert (row["quality"], row["satellites"]) == (1, 12)
 
 
 def test_receiver_errs_as_its_data_sheet_says() -> None:
     """2.5 m CEP: half of the fixes of many sequences are within 2.5 m."""
-    still = world(straight((0.0, 0.0), (0.0, 0.0)))
-    origin = GeodeticOrigin(49.0114, 8.4244, 115.0)
-    errors = []
-    for seed in range(300):
-        row = reading(Gnss(), still, 0, seed).rows[0]
-        place = np.array([[row["latitude_deg"], row["longitude_deg"], row["altitude_m"]]])
-        centre = geodetic_to_ecef(
-            np.array([[origin.latitude_deg, origin.longitude_deg, origin.altitude_m]])
-        )
-        errors.append((origin.axes().T @ (geodetic_to_ecef(place) - centre)[0])[:2])
-    circular = np.hypot(*np.array(errors).T)
+    scene, origin = still(), GeodeticOrigin(49.0114, 8.4244, 115.0)
+    rows = [reading(Gnss(), scene, 0, seed).rows[0] for seed in range(300)]
+    errors_m = [math.hypot(*moved_m(row, origin)[:2]) for row in rows]
 
-    assert np.median(circular) == pytest.approx(2.5, rel=0.12)
+    assert np.median(errors_m) == pytest.approx(2.5, rel=0.12)
 
 
 def test_errors_of_position_wander_slowly() -> None:
     """Neighbouring fixes share most of their error: the white part alone differs."""
-    still = world(straight((0.0, 0.0), (0.0, 0.0)), seconds=20.0)
-    rows = readings(Gnss(), still, 100)
+    rows = readings(Gnss(), still(20.0), 100)
     north = (rows["latitude_deg"] - rows["latitude_deg"][0]) * 111_209.5
 
     assert np.diff(north).std() == pytest.approx(0.5 * math.sqrt(2), rel=0.25)
@@ -229,18 +199,9 @@ def test_walls_hide_satellites_and_spoil_the_fix() -> None:
 
 
 def ideal_odometer(**fields: float) -> Odometer:
-    zero = dict.fromkeys(
-        (
-            "scale_error",
-            "distance_step_m",
-            "speed_noise_m_s",
-            "yaw_rate_noise_rad_s",
-            "yaw_rate_bias_rad_s",
-            "steering_noise_rad",
-        ),
-        0.0,
-    )
-    return Odometer(**{**zero, **fields})
+    errors = ("scale_error distance_step_m speed_noise_m_s yaw_rate_noise_rad_s yaw_rate_bias_rad_s"
+              " steering_noise_rad")  # fmt: skip
+    return Odometer(**{**dict.fromkeys(errors.split(), 0.0), **fields})
 
 
 def test_ideal_odometer_on_a_circle() -> None:
@@ -257,11 +218,16 @@ def test_ideal_odometer_on_a_circle() -> None:
 
 
 def test_going_backwards_counts_down() -> None:
-    """2 m/s against its heading."""
-    rows = readings(ideal_odometer(), world(straight((0.0, 0.0), (-2.0, 0.0))), 6)
+    """2 m/s against its heading; an encoder of 3 cm counts whole pulses, 0.2 m are 6.67 of them."""
+    backwards = world(straight((0.0, 0.0), (-2.0, 0.0)))
+    rows = readings(ideal_odometer(), backwards, 6)
+    counted = readings(ideal_odometer(distance_step_m=0.03), backwards, 6)
 
     assert rows["distance_m"][-1] == pytest.approx(-1.0, abs=1e-6)
     assert rows["speed_m_s"][-1] == pytest.approx(-2.0, abs=1e-5)
+    pulses = np.rint(counted["distance_m"] / 0.03)
+    assert pulses.tolist() == [0, -7, -14, -20, -27, -34]
+    assert np.allclose(counted["distance_m"], 0.03 * pulses, atol=1e-6)
 
 
 def test_scale_error_stays_through_a_sequence() -> None:
@@ -271,14 +237,6 @@ def test_scale_error_stays_through_a_sequence() -> None:
 
     assert all(np.ptp(share) < 1e-4 for share in shares)
     assert np.std([share[0] for share in shares]) == pytest.approx(0.05, rel=0.35)
-
-
-def test_encoder_counts_whole_pulses() -> None:
-    """Of 4 cm."""
-    rows = readings(ideal_odometer(distance_step_m=0.04), world(), 6)
-    pulses = rows["distance_m"] / 0.04
-
-    assert np.allclose(pulses, np.rint(pulses), atol=1e-4)
 
 
 def test_unused_walls_leave_inertial_readings_alone() -> None:

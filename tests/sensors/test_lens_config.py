@@ -7,40 +7,35 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from gen_data.core.capture import Channel, SensorReading
+from gen_data.core.capture import Channel
 from gen_data.core.lens import COEFFICIENTS
 from gen_data.core.scene import Camera, Region, Scene
 from gen_data.core.streams import Streams
 from gen_data.sensors.camera.lens_models import CALIBRATIONS
 from gen_data.sensors.camera.rgb_camera import RgbCamera
+from tests.sensors.recorder import Recorder
 
 
 def camera(**given: Any) -> Camera:
     return RgbCamera.model_validate({"name": "eye", **given}).mount(Scene("t")).camera("eye")
 
 
-def test_a_camera_is_a_pinhole_unless_it_says_otherwise() -> None:
-    """As it was before there were lenses."""
+def test_a_camera_is_a_pinhole_unless_a_lens_with_its_coefficients_is_given() -> None:
+    """By OpenCV's names, in OpenCV's order; those not given are 0."""
     assert camera().intrinsics == camera(lens={"model": "pinhole"}).intrinsics
     assert camera().intrinsics.straight
 
-
-def test_coefficients_go_to_their_places() -> None:
-    """By OpenCV's names, in OpenCV's order; those not given are 0."""
     lens = camera(lens={"model": "brown_conrady", "k1": -0.2, "p2": 0.001, "k6": 0.01}).intrinsics
 
     assert COEFFICIENTS["brown_conrady"] == ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
     assert lens.lens.coefficients == (-0.2, 0.0, 0.0, 0.001, 0.0, 0.0, 0.0, 0.01)
 
 
-@pytest.mark.parametrize(
-    ("lens", "hfov_deg"),
-    [
-        ({"model": "brown_conrady", "k1": -0.1, "k2": 0.02}, 80.0),
-        ({"model": "kannala_brandt", "k1": 0.01}, 185.0),
-        ({"model": "equirectangular"}, 360.0),
-    ],
-)
+@pytest.mark.parametrize(("lens", "hfov_deg"), [
+    ({"model": "brown_conrady", "k1": -0.1, "k2": 0.02}, 80.0),
+    ({"model": "kannala_brandt", "k1": 0.01}, 185.0),
+    ({"model": "equirectangular"}, 360.0),
+])  # fmt: skip
 def test_the_field_of_view_is_that_of_the_lens(lens: dict[str, Any], hfov_deg: float) -> None:
     """From the left edge of the image to the right one, at its middle row."""
     k = camera(lens=lens, hfov_deg=hfov_deg, size_px=(600, 300)).intrinsics
@@ -82,42 +77,27 @@ def test_a_published_camera_is_scaled_to_the_width_and_cut_to_the_height() -> No
     np.testing.assert_allclose(small.rays(places), whole.rays(there), atol=1e-8)
 
 
-@pytest.mark.parametrize(
-    ("given", "message"),
-    [
-        ({"lens": {"model": "brown_conrady", "k1": -0.9}}, "folds over inside the image"),
-        (
-            {"lens": {"model": "kannala_brandt", "k1": -0.3}, "hfov_deg": 100},
-            "folds over inside the image",
-        ),
-        (
-            {"lens": {"model": "brown_conrady"}, "hfov_deg": 190},
-            "nothing at 95 degrees from its axis",
-        ),
-        ({"hfov_deg": 175}, "too wide for a pinhole"),
-        ({"lens": {"model": "kannala_brandt", "p1": 0.1}}, "p1"),
-        ({"lens": {"model": "wide"}}, "model"),
-        (
-            {"lens": {"model": "calibrated", "camera": "euroc_cam0"}, "hfov_deg": 60},
-            "leave out hfov_deg",
-        ),
-    ],
-)
+@pytest.mark.parametrize(("given", "message"), [
+    ({"lens": {"model": "brown_conrady", "k1": -0.9}}, "folds over inside the image"),
+    ({"lens": {"model": "kannala_brandt", "k1": -0.3}, "hfov_deg": 100},
+     "folds over inside the image"),
+    ({"lens": {"model": "brown_conrady"}, "hfov_deg": 190}, "nothing at 95 degrees from its axis"),
+    ({"hfov_deg": 175}, "too wide for a pinhole"),
+    ({"lens": {"model": "kannala_brandt", "p1": 0.1}}, "p1"),
+    ({"lens": {"model": "wide"}}, "model"),
+    ({"lens": {"model": "calibrated", "camera": "euroc_cam0"}, "hfov_deg": 60},
+     "leave out hfov_deg"),
+])  # fmt: skip
 def test_what_is_no_lens_is_refused_before_anything(given: dict[str, Any], message: str) -> None:
     with pytest.raises(ValidationError, match=message):
         RgbCamera.model_validate(given)
 
 
-@pytest.mark.parametrize(
-    "given",
-    [
-        {"hfov_deg": 30},
-        {"hfov_deg": 90},
-        {"lens": {"model": "kannala_brandt"}, "hfov_deg": 150},
-        {"lens": {"model": "kannala_brandt", "field_deg": 60}, "hfov_deg": 120},
-        {"lens": {"model": "equirectangular"}, "hfov_deg": 360},
-    ],
-)
+@pytest.mark.parametrize("given", [
+    {"hfov_deg": 30}, {"hfov_deg": 90}, {"lens": {"model": "kannala_brandt"}, "hfov_deg": 150},
+    {"lens": {"model": "kannala_brandt", "field_deg": 60}, "hfov_deg": 120},
+    {"lens": {"model": "equirectangular"}, "hfov_deg": 360},
+])  # fmt: skip
 def test_a_camera_is_mounted_with_the_whole_focus_in_view(given: dict[str, Any]) -> None:
     """However wide: all of the region is in the image, its centre in the middle."""
     focus = Region((0.5, -0.2, 0.75), (1.2, 0.8, 0.4))
@@ -133,43 +113,18 @@ def test_a_camera_is_mounted_with_the_whole_focus_in_view(given: dict[str, Any])
     np.testing.assert_allclose(found.intrinsics.project(centre), [320, 240], atol=0.01)
 
 
-class Rendering:
-    """A renderer of even light, 2 m away in every direction, that remembers what was asked for."""
-
-    def __init__(self) -> None:
-        self.asked: frozenset[Channel] = frozenset()
-
-    def render(self, scene: Scene, camera: Camera, channels: frozenset[Channel]) -> SensorReading:
-        del scene
-        self.asked = channels
-        shape = (camera.intrinsics.height_px, camera.intrinsics.width_px)
-        images = {
-            Channel.RADIANCE: np.full((*shape, 3), 50.0, np.float32),
-            Channel.RANGE: np.full(shape, 2.0, np.float32),
-            Channel.Z_DEPTH: np.full(shape, 2.0, np.float32),
-        }
-        return SensorReading(camera.name, camera, images, ev100=8.0)
-
-
 @pytest.mark.parametrize(
     ("lens", "depth"), [("pinhole", Channel.Z_DEPTH), ("kannala_brandt", Channel.RANGE)]
 )
 def test_photographs_are_focused_along_the_axis_or_at_a_distance(lens: str, depth: Channel) -> None:
     """What lies beside a fisheye has no depth along its axis."""
-    sensor = RgbCamera.model_validate(
-        {
-            "name": "eye",
-            "size_px": (32, 24),
-            "lens": {"model": lens},
-            "channels": ("rgb",),
-            "image_pipeline": {"focus": {"pixel_um": 3.0}},
-        }
-    )
-    renderer = Rendering()
+    sensor = RgbCamera.model_validate({
+        "name": "eye", "size_px": (32, 24), "lens": {"model": lens}, "channels": ("rgb",),
+        "image_pipeline": {"focus": {"pixel_um": 3.0}},
+    })  # fmt: skip
+    renderer, rng = Recorder(), Streams(seed=0, scene=0).rng("eye")
 
-    reading = sensor.capture(
-        sensor.mount(Scene("t")), renderer, frozenset(), Streams(seed=0, scene=0).rng("eye")
-    )
+    reading = sensor.capture(sensor.mount(Scene("t")), renderer, frozenset(), rng)
 
     assert renderer.asked == {Channel.RADIANCE, depth}
     assert reading.channels[Channel.RGB].shape == (24, 32, 3)

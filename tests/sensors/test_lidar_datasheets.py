@@ -91,32 +91,26 @@ def test_a_table_of_beams_replaces_the_lasers_of_a_model(tmp_path: Path) -> None
     assert device.rotation_hz == 10
 
 
-@pytest.mark.parametrize(
-    ("table", "message"),
-    [
-        ("elevation_rad\n1\n", "table.csv:1:1: unknown column 'elevation_rad'; expected"),
-        ("azimuth_offset_deg\n1\n", "table.csv:1:1: expected columns elevation_deg"),
-        ("elevation_deg\n1\n one\n", "table.csv:3:2: elevation_deg: expected a number, got 'one'"),
-        ("elevation_deg\n1, 2\n", "table.csv:2:1: expected 1 numbers, got 2"),
-        ("elevation_deg\n1\n-91\n", "table.csv:3:1: sensors[1].beams[1][0]"),
-        ("", "table.csv:1:1: expected columns"),
-    ],
-)
+@pytest.mark.parametrize(("table", "message"), [
+    ("elevation_rad\n1\n", "table.csv:1:1: unknown column 'elevation_rad'; expected"),
+    ("azimuth_offset_deg\n1\n", "table.csv:1:1: expected columns elevation_deg"),
+    ("elevation_deg\n1\n one\n", "table.csv:3:2: elevation_deg: expected a number, got 'one'"),
+    ("elevation_deg\n1, 2\n", "table.csv:2:1: expected 1 numbers, got 2"),
+    ("elevation_deg\n1\n-91\n", "table.csv:3:1: sensors[1].beams[1][0]"),
+    ("", "table.csv:1:1: expected columns"),
+])  # fmt: skip
 def test_a_wrong_table_is_told_with_its_place(table: str, message: str, tmp_path: Path) -> None:
     assert message in told(tmp_path, "beams: table.csv", table_csv=table)
 
 
-@pytest.mark.parametrize(
-    ("line", "sheet", "message"),
-    [
-        ("model: sheet.yaml", SHEET.replace("60]", "6o]"), "sheet.yaml:4:16: sensors[1].model.ran"),
-        ("model: sheet.yaml", SHEET.replace("range_noise_m", "range_noise_cm"), "sheet.yaml:5:1"),
-        ("model: none.yaml", SHEET, "mine.yaml:5:12: there is no file 'none.yaml'"),
-        ("model: table.csv", SHEET, "mine.yaml:5:12: model: a table of beams belongs into 'beams'"),
-        ("beams: sheet.yaml", SHEET, "mine.yaml:5:12: beams: expected a list, or the name of a"),
-        ("model: HDL64", SHEET, "mine.yaml:5:12: sensors[1].model: expected one of"),
-    ],
-)
+@pytest.mark.parametrize(("line", "sheet", "message"), [
+    ("model: sheet.yaml", SHEET.replace("60]", "6o]"), "sheet.yaml:4:16: sensors[1].model.ran"),
+    ("model: sheet.yaml", SHEET.replace("range_noise_m", "range_noise_cm"), "sheet.yaml:5:1"),
+    ("model: none.yaml", SHEET, "mine.yaml:5:12: there is no file 'none.yaml'"),
+    ("model: table.csv", SHEET, "mine.yaml:5:12: model: a table of beams belongs into 'beams'"),
+    ("beams: sheet.yaml", SHEET, "mine.yaml:5:12: beams: expected a list, or the name of a"),
+    ("model: HDL64", SHEET, "mine.yaml:5:12: sensors[1].model: expected one of"),
+])  # fmt: skip
 def test_what_is_wrong_with_a_model_is_told_with_its_place(
     line: str, sheet: str, message: str, tmp_path: Path
 ) -> None:
@@ -125,23 +119,19 @@ def test_what_is_wrong_with_a_model_is_told_with_its_place(
 
 CAR = FakeLibrary({"car": box_mesh((4.0, 1.8, 1.5))})
 STREET = Scene(
-    "street",
-    (Body("ego", "car", SE3((0.0, 0.0, 0.75))),),
+    "street", (Body("ego", "car", SE3((0.0, 0.0, 0.75))),),
     rigs=(Rig("rig", "ego", SE3((-1.2, 0.0, -0.75))),),
-)
+)  # fmt: skip
 
 
 @pytest.mark.parametrize("kind", [LidarSensor, RgbCamera])
-@pytest.mark.parametrize(
-    ("offset_m", "buried"),
-    [
-        ((1.2, 0.0, 1.73), False),
-        ((1.2, 0.0, 1.46), False),
-        ((1.2, 0.0, 1.4), True),
-        ((3.5, 0.0, 0.7), False),
-        ((2.0, 0.5, 0.7), True),
-    ],
-)
+@pytest.mark.parametrize(("offset_m", "buried"), [
+    ((1.2, 0.0, 1.73), False),
+    ((1.2, 0.0, 1.46), False),
+    ((1.2, 0.0, 1.4), True),
+    ((3.5, 0.0, 0.7), False),
+    ((2.0, 0.5, 0.7), True),
+])  # fmt: skip
 def test_sensors_inside_the_body_that_carries_them_are_refused(
     kind: type[LidarSensor | RgbCamera], offset_m: tuple[float, float, float], buried: bool
 ) -> None:
@@ -161,8 +151,7 @@ def test_sensors_inside_the_body_that_carries_them_are_refused(
 def test_a_sheet_of_a_few_lines_has_the_rest_of_a_named_scanner(tmp_path: Path) -> None:
     """VLP-16: 1,808 columns a turn, 2.79 mrad; its own lasers from the top, its turns and range."""
     text = "like: VLP-16\nelevations_deg: [-10, -5, 0, 5]\nrotation_hz: 20\nrange_m: [0.2, 40]\n"
-    sensor = spec(tmp_path, "model: short.yaml", short_yaml=text).sensors[1]
-    device = sensor.device
+    device = spec(tmp_path, "model: short.yaml", short_yaml=text).sensors[1].device
 
     np.testing.assert_allclose(np.degrees(device.elevations_rad()), [5, 0, -5, -10])
     assert (device.name, device.rotation_hz, device.range_m) == ("short", 20, (0.2, 40))
@@ -176,8 +165,7 @@ def test_a_step_in_azimuth_gives_the_pulses_of_a_turn(tmp_path: Path) -> None:
     text = "like: OS1-64\nelevations_deg: [3, 1, -2]\nazimuth_step_deg: 0.5\n"
     for line in ("model: s.yaml", "model: s.yaml\n    rotation_hz: 5"):
         sensor = spec(tmp_path, line, s_yaml=text).sensors[1]
-        sweep = make_sweep(sensor.device, 0.0)
-        assert len(sweep.ring) == 3 * 720
+        assert len(make_sweep(sensor.device, 0.0).ring) == 3 * 720
         # Its own lasers have no offsets of the other scanner's.
         assert sensor.device.azimuth_offsets_deg == ()
 

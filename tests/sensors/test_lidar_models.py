@@ -27,7 +27,7 @@ def test_the_hdl64_has_two_blocks_of_lasers() -> None:
 
 
 def test_beams_of_the_hdl64_pass_beside_their_axis_at_two_heights() -> None:
-    """0.026 m from it, left and right in turn; blocks start at 0.209 and 0.124 m."""
+    """0.026 m from it, left and right in turn; other beams start at the origin."""
     sweep = make_sweep(lidar_model("HDL-64E"), 0.0)
     assert sweep.origins_m is not None
     origins, directions = sweep.origins_m.astype(float), sweep.directions.astype(float)
@@ -41,26 +41,20 @@ def test_beams_of_the_hdl64_pass_beside_their_axis_at_two_heights() -> None:
     np.testing.assert_allclose(heights, [0.209, 0.1956, 0.1243, 0.1052], atol=1e-5)
     assert make_sweep(lidar_model("VLP-16"), 0.0).origins_m is None
 
-
-def test_other_beams_of_a_device_start_at_its_origin() -> None:
-    """Heights and lateral offsets belong to the lasers that were replaced."""
     device = lidar_model("HDL-64E").with_beams([(1.0, 0.0), (-5.0, 0.0)])
 
     assert make_sweep(device, 0.0).origins_m is None
 
 
-@pytest.mark.parametrize(
-    ("name", "rings", "top", "bottom", "pulses"),
-    [
-        ("VLP-16", 16, 15.0, -15.0, 28_935),
-        ("HDL-32E", 32, 32 / 3, -92 / 3, 69_440),
-        ("HDL-64E", 64, 2.0, -73 / 3, 133_331),
-        ("OS1-64", 64, 22.5, -22.5, 65_536),
-        ("RPLIDAR-A1", 1, 0.0, 0.0, 1_454),
-        ("OS1-128", 128, 22.5, -22.5, 131_072),
-        ("carla", 32, 15.0, -25.0, 2_250),
-    ],
-)
+@pytest.mark.parametrize(("name", "rings", "top", "bottom", "pulses"), [
+    ("VLP-16", 16, 15.0, -15.0, 28_935),
+    ("HDL-32E", 32, 32 / 3, -92 / 3, 69_440),
+    ("HDL-64E", 64, 2.0, -73 / 3, 133_331),
+    ("OS1-64", 64, 22.5, -22.5, 65_536),
+    ("RPLIDAR-A1", 1, 0.0, 0.0, 1_454),
+    ("OS1-128", 128, 22.5, -22.5, 131_072),
+    ("carla", 32, 15.0, -25.0, 2_250),
+])  # fmt: skip
 def test_rings_and_pulses_are_those_of_the_data_sheet(
     name: str, rings: int, top: float, bottom: float, pulses: int
 ) -> None:
@@ -84,8 +78,8 @@ def test_every_direction_is_a_unit_vector_and_time_rises_within_a_sweep(name: st
     assert sweep.time_s[0] >= 0.0 and sweep.time_s[-1] <= 1.0 / model.rotation_hz
 
 
-def test_azimuths_are_even_and_turn_clockwise() -> None:
-    """From behind over the left and ahead in the middle, one step after the other."""
+def test_azimuths_turn_clockwise_evenly_and_lasers_of_an_os1_are_staggered() -> None:
+    """From behind over the left and ahead in the middle; four columns, 2.1 degrees apart."""
     _, azimuth, ring = angles_deg("VLP-16")
     of_one = azimuth[ring == 3]
     steps = np.diff(of_one)
@@ -93,9 +87,6 @@ def test_azimuths_are_even_and_turn_clockwise() -> None:
     np.testing.assert_allclose(steps, -360.0 / len(of_one), atol=1e-3)
     assert abs(of_one[len(of_one) // 2]) < 360.0 / len(of_one)
 
-
-def test_lasers_of_an_os1_are_staggered() -> None:
-    """Four columns, 2.1 degrees apart."""
     _, azimuth, ring = angles_deg("OS1-64")
     first = {k: azimuth[ring == k][300] for k in range(8)}
 
@@ -115,14 +106,11 @@ def test_a_rosette_fills_its_round_view_and_never_repeats() -> None:
     assert np.linalg.norm(one.directions - next_.directions, axis=1).mean() > 0.05
 
 
-def test_an_unknown_model_is_refused_with_the_nearest_name() -> None:
-    """The message lists what there is."""
+def test_an_unknown_or_impossible_model_is_refused() -> None:
+    """Neither lasers nor prisms is no scanner; ranges must rise."""
     with pytest.raises(ConfigError, match=r"VLP-16.*did you mean 'HDL-64E'"):
         lidar_model("HDL-64")
 
-
-def test_a_scanner_either_turns_or_draws_a_rosette() -> None:
-    """Neither lasers nor prisms is no scanner; ranges must rise."""
     plain = lidar_model("VLP-16").model_dump()
     with pytest.raises(ValidationError, match="elevations_deg or prisms"):
         LidarModel.model_validate({**plain, "elevations_deg": ()})

@@ -6,28 +6,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from gen_data.core import errors, se3, streams
 from gen_data.core.asset_types import SURFACES
 from gen_data.core.capture import POINT, LidarHits, LidarRays, PointCloud, SecondaryHits
-from gen_data.core.errors import ConfigError
 from gen_data.core.scene import Camera, Lidar, Scene, Weather
-from gen_data.core.se3 import SE3
-from gen_data.core.streams import Rng, Streams
 from gen_data.sensors.camera.rgb_camera import RgbCamera
-from gen_data.sensors.lidar import lidar_detection
-from gen_data.sensors.lidar.lidar_atmosphere import (
-    add_atmosphere,
-    fog_peak,
-    optical_depth,
-    rain_extinction_per_m,
-)
+from gen_data.sensors.lidar import lidar_atmosphere, lidar_detection
 from gen_data.sensors.lidar.lidar_sensor import LidarSensor
 from gen_data.sensors.lidar.scan_pattern import lidar_model
 
 MODEL = lidar_model("VLP-16")
 
 
-def rng(seed: int = 0) -> Rng:
-    return Streams(seed=seed, scene=0).rng("sensor/lidar")
+def rng(seed: int = 0) -> streams.Rng:
+    return streams.Streams(seed=seed, scene=0).rng("sensor/lidar")
 
 
 def echoes(ranges_m: np.ndarray, reflectance: float = 0.5) -> LidarHits:
@@ -35,13 +27,10 @@ def echoes(ranges_m: np.ndarray, reflectance: float = 0.5) -> LidarHits:
     ranges_m = np.asarray(ranges_m, np.float32)
     hit = np.isfinite(ranges_m)
     return LidarHits(
-        ranges_m,
-        np.where(hit, np.float32(reflectance), np.float32(0)),
-        hit.astype(np.float32),
-        np.where(hit, 7, 0).astype(np.uint16),
-        np.where(hit, 2, 0).astype(np.uint16),
+        ranges_m, np.where(hit, np.float32(reflectance), np.float32(0)), hit.astype(np.float32),
+        np.where(hit, 7, 0).astype(np.uint16), np.where(hit, 2, 0).astype(np.uint16),
         np.zeros(ranges_m.shape, np.uint8),
-    )
+    )  # fmt: skip
 
 
 class Wall:
@@ -78,7 +67,7 @@ def test_light_falls_with_the_square_of_range() -> None:
     assert light[2] == pytest.approx(1.0, rel=1e-5)
 
 
-def test_an_ideal_scan_reports_every_hit_where_it_is() -> None:
+def test_an_ideal_scan_reports_every_hit_where_it_is_through_a_clean_window() -> None:
     """All pulses, exact ranges, labels, one return each, intensity of the manual's scale."""
     points = scan(LidarSensor(model="VLP-16", ideal=True), Wall(30.0))
     ranges_m = np.linalg.norm(points["position_m"].astype(float), axis=1)
@@ -88,6 +77,22 @@ def test_an_ideal_scan_reports_every_hit_where_it_is() -> None:
     np.testing.assert_allclose(points["intensity"], 0.5 * 0.392, rtol=1e-5)
     assert (points["instance_id"] == 7).all() and (points["category_id"] == 2).all()
     assert (points["return_number"] == 1).all() and (points["return_count"] == 1).all()
+
+    sensor = LidarSensor(model="VLP-16", ideal=True)
+
+    assert (len(scan(sensor, Wall(0.4))), len(scan(sensor, Wall(100.5)))) == (0, 0)
+    assert len(scan(sensor, Wall(99.5))) == 1808 * 16
+
+    ideal = LidarSensor(model="VLP-16", ideal=True)
+    soiled = ideal.model_copy(update={"window": 0.2})
+
+    np.testing.assert_array_equal(scan(soiled, Wall(90.0)), scan(ideal, Wall(90.0)))
+
+    points = scan(LidarSensor(model="HDL-64E", ideal=True), Wall(30.0))
+    white = lidar_model("HDL-64E").white_intensity
+
+    np.testing.assert_allclose(points["intensity"], 0.5 * white, rtol=1e-5)
+    assert scan(LidarSensor(model="HDL-64E"), Wall(30.0))["intensity"].std() > 0.03
 
 
 class Mirrors(Wall):
@@ -138,13 +143,6 @@ def test_range_noise_is_that_of_the_data_sheet_on_steps_of_the_device() -> None:
     assert np.abs(steps - np.rint(steps)).max() < 2e-3
 
 
-def test_nothing_nearer_or_farther_than_the_device_reports() -> None:
-    sensor = LidarSensor(model="VLP-16", ideal=True)
-
-    assert (len(scan(sensor, Wall(0.4))), len(scan(sensor, Wall(100.5)))) == (0, 0)
-    assert len(scan(sensor, Wall(99.5))) == 1808 * 16
-
-
 def test_equal_streams_make_equal_bytes() -> None:
     """Weather and all; another stream makes others."""
     sensor = LidarSensor(model="VLP-16", returns="dual", divergence=True)
@@ -169,9 +167,9 @@ def test_fog_dims_intensity_by_beer_and_lambert(fog_per_m: float) -> None:
 
 def test_rain_dims_by_goodin_s_law() -> None:
     """0.01 R^0.6 per metre: 0.0398 at 10 mm/h; nothing without rain."""
-    assert rain_extinction_per_m(10.0) == pytest.approx(0.01 * 10.0**0.6)
-    assert rain_extinction_per_m(0.0) == 0.0
-    depth = optical_depth(
+    assert lidar_atmosphere.rain_extinction_per_m(10.0) == pytest.approx(0.01 * 10.0**0.6)
+    assert lidar_atmosphere.rain_extinction_per_m(0.0) == 0.0
+    depth = lidar_atmosphere.optical_depth(
         Weather(rain_mm_h=10.0), MODEL, 1.7, np.zeros((1, 1), np.float32), np.float32([[25.0]])
     )
     assert depth[0, 0] == pytest.approx(0.25 * 10.0**0.6, rel=1e-5)
@@ -184,14 +182,16 @@ def test_fog_that_thins_with_height_is_integrated_along_the_beam(up: float) -> N
     r = (np.arange(200_000) + 0.5) * (40.0 / 200_000)
     expected = (0.02 * np.exp(-(1.7 + up * r) / 12.0)).mean() * 40.0
 
-    depth = optical_depth(weather, MODEL, 1.7, np.float32([[up]]), np.float32([[40.0]]))
+    depth = lidar_atmosphere.optical_depth(
+        weather, MODEL, 1.7, np.float32([[up]]), np.float32([[40.0]])
+    )
 
     assert depth[0, 0] == pytest.approx(expected, rel=1e-4)
 
 
-def test_dense_fog_answers_itself_a_few_metres_away() -> None:
+def test_dense_fog_answers_itself_a_few_metres_away_and_thicker_fog_more() -> None:
     """Points of air, no instance, near the scanner; none in clear air (Hahner et al. 2021)."""
-    peak_m, _ = fog_peak(0.06)
+    peak_m, _ = lidar_atmosphere.fog_peak(0.06)
     points = scan(LidarSensor(model="HDL-64E"), Wall(90.0), Weather(fog_extinction_per_m=0.06))
     air = points[points["surface"] == SURFACES.index("air")]
     ranges_m = np.linalg.norm(air["position_m"].astype(float), axis=1)
@@ -202,12 +202,16 @@ def test_dense_fog_answers_itself_a_few_metres_away() -> None:
     assert np.median(ranges_m) == pytest.approx(peak_m, rel=0.1)
     assert not (scan(LidarSensor(), Wall(90.0))["surface"] == SURFACES.index("air")).any()
 
+    strengths = [lidar_atmosphere.fog_peak(a)[1] for a in (0.005, 0.01, 0.02, 0.06)]
+
+    assert strengths == sorted(strengths)
+
 
 def test_the_air_has_a_sensitivity_of_its_own() -> None:
     """Neither the loss nearby nor the sensitivity to solid targets changes its returns."""
     model = lidar_model("HDL-64E")
     one, two = (
-        add_atmosphere(
+        lidar_atmosphere.add_atmosphere(
             lidar_detection.make_pulses(echoes(np.full((500, 1), 90.0)), device),
             Weather(fog_extinction_per_m=0.06, rain_mm_h=20.0, snow_mm_h=2.0),
             device,
@@ -224,12 +228,6 @@ def test_the_air_has_a_sensitivity_of_its_own() -> None:
     assert (one.light[:, 1:] > 0.0).any(axis=0).all()
     np.testing.assert_array_equal(one.light[:, 1:], two.light[:, 1:])
     np.testing.assert_array_equal(one.range_m, two.range_m)
-
-
-def test_thicker_fog_answers_more() -> None:
-    strengths = [fog_peak(a)[1] for a in (0.005, 0.01, 0.02, 0.06)]
-
-    assert strengths == sorted(strengths)
 
 
 def test_snow_sends_back_more_than_rain() -> None:
@@ -286,17 +284,6 @@ def test_a_soiled_window_takes_light_both_ways() -> None:
         assert len(points) / pulses == pytest.approx(expected, abs=4.0 * spread)
     assert soiled["intensity"].mean() == pytest.approx(0.64 * clean["intensity"].mean(), rel=1e-4)
 
-
-def test_an_ideal_scanner_has_a_clean_window() -> None:
-    """Every hit, with the intensity of its reflectance."""
-    ideal = LidarSensor(model="VLP-16", ideal=True)
-    soiled = ideal.model_copy(update={"window": 0.2})
-
-    np.testing.assert_array_equal(scan(soiled, Wall(90.0)), scan(ideal, Wall(90.0)))
-
-
-def test_a_window_passes_some_light_and_at_most_all() -> None:
-    """Outside of (0, 1] it is refused."""
     for share in (0.0, 1.1, -0.5):
         with pytest.raises(ValueError, match="window"):
             LidarSensor(window=share)
@@ -332,7 +319,7 @@ def test_a_receiver_focused_at_a_distance_collects_less_nearby() -> None:
     np.testing.assert_allclose(light, expected, rtol=1e-5)
 
 
-def test_the_range_of_an_hdl64_follows_the_reflectance() -> None:
+def test_the_range_of_an_hdl64_follows_the_reflectance_by_an_exponential_loss() -> None:
     """As its manual says: 10 % at 50 m, 80 % at 120 m. Without a loss it would be 151 m."""
     model = lidar_model("HDL-64E")
     light = lidar_detection.received_light(np.float32([0.1, 0.8]), np.float32([50.0, 120.0]), model)
@@ -345,11 +332,6 @@ def test_the_range_of_an_hdl64_follows_the_reflectance() -> None:
         0
     ] == pytest.approx(1.0)
 
-
-def test_a_far_sensitivity_adds_an_exponential_loss() -> None:
-    """Equal steps of range divide light by equal factors, beside the lidar equation's."""
-    model = lidar_model("HDL-64E")
-    plain = model.model_copy(update={"seen_far": None})
     r = np.array([0.0, 50.0, 60.0, 70.0, np.inf], np.float32)
     seen = np.full(5, 0.3, np.float32)
 
@@ -403,23 +385,7 @@ def test_noise_spread_and_steps_of_intensities() -> None:
     assert (lidar_detection.laser_gains(16, 0.0) == 1.0).all()
 
 
-def test_an_ideal_scanner_reports_intensity_in_proportion() -> None:
-    """Neither response nor noise: reflectance times the value of white."""
-    points = scan(LidarSensor(model="HDL-64E", ideal=True), Wall(30.0))
-    white = lidar_model("HDL-64E").white_intensity
-
-    np.testing.assert_allclose(points["intensity"], 0.5 * white, rtol=1e-5)
-    noisy = scan(LidarSensor(model="HDL-64E"), Wall(30.0))
-    assert noisy["intensity"].std() > 0.03
-
-
-def test_a_scanner_needs_a_camera_listed_before_it() -> None:
-    """The message names what there is."""
-    with pytest.raises(ConfigError, match=r"camera 'color'.*none"):
-        LidarSensor().mount(Scene("t"))
-
-
-def test_the_mount_turns_left_and_upwards() -> None:
+def test_the_mount_turns_left_and_upwards_and_needs_a_camera_listed_before_it() -> None:
     """Yaw 90 looks along the rig's Y, pitch 90 along its Z."""
     ahead = np.array([[1.0, 0.0, 0.0]])
     left = scene_with(LidarSensor(yaw_deg=90.0)).lidars[0].T_rig_lidar
@@ -428,7 +394,10 @@ def test_the_mount_turns_left_and_upwards() -> None:
     np.testing.assert_allclose(left.rotate(ahead), [[0.0, 1.0, 0.0]], atol=1e-5)
     np.testing.assert_allclose(up.rotate(ahead), [[0.0, 0.0, 1.0]], atol=1e-5)
     assert up.translation_m == (0.1, 0.2, 0.3)
-    assert isinstance(up, SE3)
+    assert isinstance(up, se3.SE3)
+
+    with pytest.raises(errors.ConfigError, match=r"camera 'color'.*none"):
+        LidarSensor().mount(Scene("t"))
 
 
 def test_the_strongest_return_is_the_strongest_of_all_that_detours_add() -> None:
@@ -440,13 +409,9 @@ def test_the_strongest_return_is_the_strongest_of_all_that_detours_add() -> None
     m = len(ray)
     far_m = first.range_m[ray, 0] + np.where(draw.random(m) < 0.4, 0.3, 4.0) * draw.random(m)
     detours = SecondaryHits(
-        ray,
-        far_m.astype(np.float32),
-        (draw.random(m) ** 4).astype(np.float32),
-        np.full(m, 9, np.uint16),
-        np.full(m, 3, np.uint16),
-        np.full(m, 1, np.uint8),
-    )
+        ray, far_m.astype(np.float32), (draw.random(m) ** 4).astype(np.float32),
+        np.full(m, 9, np.uint16), np.full(m, 3, np.uint16), np.full(m, 1, np.uint8),
+    )  # fmt: skip
     seen = replace(first, detours=detours)
 
     strongest = lidar_detection.make_pulses(seen, MODEL, "strongest")

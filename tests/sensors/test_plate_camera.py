@@ -26,23 +26,17 @@ def on_a_plate() -> Scene:
     return build_scene("test", (PlateElement(name="plate"),), FakeAssets())
 
 
-def test_it_looks_as_the_photograph() -> None:
-    """Pose, lens and exposure, at its own size."""
+def test_it_looks_as_the_photograph_and_mounting_twice_changes_nothing() -> None:
+    """Pose, lens and exposure, at its own size; no lamps but its sun."""
     camera = made().mount(on_a_plate()).camera("color")
     assert camera.T_world_camera == PLATE.T_world_camera
     assert camera.intrinsics == fitted_intrinsics(PLATE.intrinsics, 320, 200)
     assert camera.ev100 == EV100
     assert (made().image_pipeline.preset, made().image_pipeline.tone) == ("photograph", "srgb")
 
-
-def test_mounting_twice_changes_nothing() -> None:
-    """Its image is the photograph's part already."""
     once = made().mount(on_a_plate())
     assert made().mount(once) == once
 
-
-def test_a_plate_has_no_lamps_but_its_sun() -> None:
-    """The default lamp of scenes without lights would light the photograph's ground."""
     scene = on_a_plate()
     assert has_plate(scene)
     assert scene.lights == ()

@@ -6,16 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from gen_data.core.asset_types import SURFACES
+from gen_data.core import asset_types, se3
 from gen_data.core.scene import Body, Instance, Scene, Weather
-from gen_data.core.se3 import SE3
 from gen_data.sensors.device_presets import load_preset, preset_names
-from gen_data.sensors.radar.radar_detection import (
-    TARGETS,
-    area_factor,
-    cross_section_m2,
-    silhouette_m2,
-)
+from gen_data.sensors.radar import radar_detection
 from gen_data.sensors.radar.radar_sensor import PRESETS, Radar, RadarModel
 from tests.sensors.streetcar import (
     PERSON_M,
@@ -40,7 +34,7 @@ def ideal(**fields: object) -> Radar:
 def car_at(
     x_m: float, y_m: float = 0.0, yaw: float = 0.0, number: int = 2
 ) -> tuple[Body, Instance]:
-    return thing(number, f"car/{number}", "car", SE3.about_z(yaw, (x_m, y_m, 0.0)))
+    return thing(number, f"car/{number}", "car", se3.SE3.about_z(yaw, (x_m, y_m, 0.0)))
 
 
 def detected_share(scene: Scene, readings: int, **fields: object) -> float:
@@ -68,7 +62,7 @@ def test_radial_velocity_is_the_relative_velocity_along_the_ray() -> None:
     assert np.allclose(rows["velocity_compensated_m_s"], np.array(velocity) @ along, atol=0.02)
 
 
-def test_what_recedes_is_positive() -> None:
+def test_what_recedes_is_positive_and_what_has_no_track_stands() -> None:
     """A car that drives away from one that stands."""
     scene = world(
         STILL, others=[car_at(30.0)], tracks=[track_of("car/2", straight((30.0, 0.0), (7.0, 0.0)))]
@@ -76,6 +70,12 @@ def test_what_recedes_is_positive() -> None:
     rows = reading(ideal(), scene, 0).rows
 
     assert np.allclose(rows["velocity_m_s"], 7.0, atol=0.02)
+
+    scene = world(STILL, others=[car_at(30.0)])
+    still = replace(scene, tracks=())
+
+    rows = reading(ideal(), still, 0).rows
+    assert np.allclose(rows["velocity_m_s"], 0.0)
 
 
 def test_turning_radar_sees_still_things_move_and_compensates_it() -> None:
@@ -103,7 +103,7 @@ def test_ideal_ranges_and_angles_are_those_of_the_near_face() -> None:
 @pytest.mark.slow
 def test_noise_of_range_azimuth_and_velocity_is_that_of_the_data_sheet() -> None:
     """Near scan: 0.1 m, 0.3 degrees ahead, 0.1 km/h; a post alone, which is one peak."""
-    post = thing(2, "post", "car", SE3((25.2, 0.0, 0.0)), ((-0.15, -0.15, 0), (0.15, 0.15, 1)))
+    post = thing(2, "post", "car", se3.SE3((25.2, 0.0, 0.0)), ((-0.15, -0.15, 0), (0.15, 0.15, 1)))
     scene = world(STILL, others=[post])
     kept = [
         row
@@ -138,18 +138,15 @@ def one_cell_share(range_m: float, readings: int) -> float:
     """How often a post of 10 dBsm is detected that lies in one cell of the far scan."""
     # Turned so that its aspect has the mean cross section: cos(4 * 22.5 degrees) = 0.
     post = thing(
-        2,
-        "post",
-        "car",
-        SE3.about_z(math.radians(22.5), (range_m + 2.2, -0.5, -1.0)),
+        2, "post", "car", se3.SE3.about_z(math.radians(22.5), (range_m + 2.2, -0.5, -1.0)),
         ((-0.45, -0.45, 0.0), (0.45, 0.45, 4.0)),
-    )
+    )  # fmt: skip
     return detected_share(world(STILL, others=[post]), readings)
 
 
 def test_pedestrians_are_lost_where_cars_are_not() -> None:
     """-8 dBsm against 10 dBsm at 100 m: 18 dB are the range to the power of 2.8."""
-    person = thing(2, "person", "person", SE3((100.0, 0.0, 0.0)), PERSON_M)
+    person = thing(2, "person", "person", se3.SE3((100.0, 0.0, 0.0)), PERSON_M)
 
     assert detected_share(world(STILL, others=[car_at(100.0)]), 30) > 0.9
     assert detected_share(world(STILL, others=[person]), 60) < 0.75
@@ -171,7 +168,7 @@ def test_rain_takes_what_itu_says() -> None:
 
 
 def test_a_car_behind_a_wall_gives_no_detection() -> None:
-    wall = thing(3, "wall", "building", SE3((20.0, 0.0, 0.0)), WALL_M)
+    wall = thing(3, "wall", "building", se3.SE3((20.0, 0.0, 0.0)), WALL_M)
     scene = world(STILL, others=[car_at(35.0), wall])
     for seed in range(10):
         ids = reading(Radar(false_alarms=0.0, **AHEAD), scene, 0, seed).rows["instance_id"]
@@ -185,8 +182,8 @@ def test_half_hidden_target_has_half_the_cross_section() -> None:
     A car is taken to fill 0.85 of its box; these boxes are full, so that half is 0.5 / 0.85.
     """
     rear = ((-0.05, -1.25, 0.2), (0.05, 1.25, 3.2))
-    car = thing(2, "car", "car", SE3((40.0, 0.0, 0.0)), rear)
-    cover = thing(3, "cover", "building", SE3((30.0, 5.0, 0.0)), ((-0.1, -5, 0), (0.1, 5, 5)))
+    car = thing(2, "car", "car", se3.SE3((40.0, 0.0, 0.0)), rear)
+    cover = thing(3, "cover", "building", se3.SE3((30.0, 5.0, 0.0)), ((-0.1, -5, 0), (0.1, 5, 5)))
 
     def total(*others: object) -> float:
         """Mean over shifts of the grid of rays."""
@@ -208,25 +205,23 @@ def test_cross_section_of_a_whole_car_is_its_own_at_any_range() -> None:
         assert 10.0 * math.log10(total) == pytest.approx(15.0, abs=1.0)
 
 
-def test_aspect_moves_the_cross_section_and_keeps_its_mean() -> None:
-    """5 dB more square on, 5 dB less across the corner, 10 dBsm in between."""
+def test_cross_sections_follow_the_aspect_and_silhouettes_the_faces() -> None:
+    """5 dB more square on, 5 dB less across the corner."""
     _, car = car_at(0.0)
     sides = {0.0: 15.0, 22.5: 10.0, 45.0: 5.0, 90.0: 15.0, 180.0: 15.0}
     for degrees, dbsm in sides.items():
         angle = math.radians(degrees)
         towards = np.array([math.cos(angle), math.sin(angle), 0.0])
-        found = cross_section_m2(TARGETS["car"], car, towards)
+        found = radar_detection.cross_section_m2(radar_detection.TARGETS["car"], car, towards)
         assert 10.0 * math.log10(found) == pytest.approx(dbsm, abs=1e-6)
 
-
-def test_silhouette_of_a_box_is_that_of_its_faces() -> None:
-    """From ahead 1.8 x 1.5 m; at 45 degrees both faces, each seen obliquely."""
-    _, car = car_at(0.0)
     half = math.sqrt(0.5)
 
-    assert silhouette_m2(car, np.array([1.0, 0.0, 0.0])) == pytest.approx(2.7)
+    assert radar_detection.silhouette_m2(car, np.array([1.0, 0.0, 0.0])) == pytest.approx(2.7)
     expected = half * (1.8 * 1.5 + 4.4 * 1.5)
-    assert silhouette_m2(car, np.array([half, half, 0.0])) == pytest.approx(expected)
+    assert radar_detection.silhouette_m2(car, np.array([half, half, 0.0])) == pytest.approx(
+        expected
+    )
 
 
 def test_false_alarms_come_at_the_given_rate_and_belong_to_nothing() -> None:
@@ -254,7 +249,7 @@ def test_neither_its_carrier_nor_what_is_outside_its_field_is_seen() -> None:
 def test_strongest_are_kept_and_the_nearest_comes_first() -> None:
     """A crowd of more cells than the device reports."""
     many = [
-        thing(k + 2, f"wall/{k}", "building", SE3((8.0 + 2.0 * k, -40.0 + k, 0.0)), WALL_M)
+        thing(k + 2, f"wall/{k}", "building", se3.SE3((8.0 + 2.0 * k, -40.0 + k, 0.0)), WALL_M)
         for k in range(60)
     ]
     rows = reading(ideal(), world(STILL, others=many), 0).rows
@@ -272,20 +267,11 @@ def test_every_make_is_complete(name: str) -> None:
         assert look.spacing_deg[0] < min(size for _, size in look.resolution.azimuth_deg)
 
 
-def test_unlabelled_motion_does_not_matter() -> None:
-    """A thing without twist stands still."""
-    scene = world(STILL, others=[car_at(30.0)])
-    still = replace(scene, tracks=())
-
-    rows = reading(ideal(), still, 0).rows
-    assert np.allclose(rows["velocity_m_s"], 0.0)
-
-
 def test_every_surface_sends_back_what_its_kind_does() -> None:
     """Whatever a ray may hit has a value; metal posts count by what they are."""
-    every = np.arange(len(SURFACES), dtype=np.uint8)
-    factors = area_factor("building", every)
+    every = np.arange(len(asset_types.SURFACES), dtype=np.uint8)
+    factors = radar_detection.area_factor("building", every)
 
     assert (factors > 0.0).all()
-    assert factors[SURFACES.index("asphalt")] == pytest.approx(10.0**-2.8)
-    assert (area_factor("barrier", every) == 1.0).all()
+    assert factors[asset_types.SURFACES.index("asphalt")] == pytest.approx(10.0**-2.8)
+    assert (radar_detection.area_factor("barrier", every) == 1.0).all()

@@ -17,15 +17,9 @@ def rays(
 ) -> Echo:
     zeros = np.zeros(len(range_m))
     return Echo(
-        np.array(range_m),
-        np.radians(azimuth_deg),
-        zeros,
-        zeros,
-        np.array(rcs_m2),
-        zeros,
-        np.array(ids),
-        np.array(ids),
-    )
+        np.array(range_m), np.radians(azimuth_deg), zeros, zeros, np.array(rcs_m2), zeros,
+        np.array(ids), np.array(ids),
+    )  # fmt: skip
 
 
 def keyed(keys: list[tuple[int, int, int, int]]) -> Cells:
@@ -67,7 +61,7 @@ def test_neighbours_flow_to_the_same_peak() -> None:
     assert find_peaks(slope, np.array([5.0, 2.0, 1.0, 3.0, 4.0])).tolist() == [0, 0, 1, 1, 1]
 
 
-def test_cells_apart_are_peaks_of_their_own() -> None:
+def test_cells_apart_are_peaks_and_nothing_has_none() -> None:
     """In any of the four directions, and also where numbers are negative."""
     for axis in range(4):
         near, far = [0, 0, 0, 0], [0, 0, 0, 0]
@@ -77,8 +71,6 @@ def test_cells_apart_are_peaks_of_their_own() -> None:
     touching = keyed([(-1, -1, 0, -1), (0, 0, 0, 0)])
     assert len(set(find_peaks(touching, np.array([1.0, 2.0])).tolist())) == 1
 
-
-def test_nothing_has_no_peaks() -> None:
     empty = rays([], [], [], [])
 
     assert len(find_peaks(make_cells(empty, NEAR), np.zeros(0))) == 0

@@ -123,10 +123,9 @@ def test_a_normal_is_finite_at_the_ends_of_the_unit_interval() -> None:
     assert Normal(0, 1, (-2, 1)).draw(Ends(1 - 2**-53)) == 1  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize(
-    "distribution",
-    [Uniform(0, 1), LogUniform(1, 9), Normal(0, 1, clip=(-1, 1)), Choice({"a": 1, "b": 2})],
-)
+@pytest.mark.parametrize("distribution", [
+    Uniform(0, 1), LogUniform(1, 9), Normal(0, 1, clip=(-1, 1)), Choice({"a": 1, "b": 2}),
+])  # fmt: skip
 def test_each_value_costs_exactly_one_random_number(distribution: Distribution[Any]) -> None:
     """So that a difference in the last bit never shifts the draws that follow."""
     rng, reference = stream("cost"), stream("cost")
@@ -152,16 +151,10 @@ def test_drawn_values_are_pinned() -> None:
     rng = Streams(seed=7, scene=3, view=1, attempt=2, index=16).rng("randomizer/golden")
 
     values = [
-        Uniform(0.6, 1.2).draw(rng),
-        LogUniform(200, 2000).draw(rng),
-        Normal(0.5, 0.1).draw(rng),
-        Normal(0.5, 0.1, clip=(0, 0.6)).draw(rng),
-        UniformInteger(3, 12).draw(rng),
-        Choice({"matte": 3, "glossy": 1}).draw(rng),
-        Choice((1.0, 2.0, 3.0)).draw(rng),
-        Sequence(("a", "b", "c")).draw(rng),
-        Probability(0.3).draw(rng),
-        Uniform(-1, 1).draw(rng),
-    ]
+        Uniform(0.6, 1.2).draw(rng), LogUniform(200, 2000).draw(rng), Normal(0.5, 0.1).draw(rng),
+        Normal(0.5, 0.1, clip=(0, 0.6)).draw(rng), UniformInteger(3, 12).draw(rng),
+        Choice({"matte": 3, "glossy": 1}).draw(rng), Choice((1.0, 2.0, 3.0)).draw(rng),
+        Sequence(("a", "b", "c")).draw(rng), Probability(0.3).draw(rng), Uniform(-1, 1).draw(rng),
+    ]  # fmt: skip
 
     assert values == GOLDEN

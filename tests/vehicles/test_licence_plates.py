@@ -29,17 +29,14 @@ def face(seed: int, rows: int = 1, country: str = "gb") -> np.ndarray:
     return difference > 150.0
 
 
-def test_plates_have_six_to_eight_letters_and_digits() -> None:
-    """Of those that cannot be taken for another; hardly any two are the same."""
+def test_plates_have_six_to_eight_letters_and_digits_all_of_which_differ() -> None:
+    """Of those that cannot be taken for another; strokes are on the grid of 4 by 6."""
     texts = [plate_text(seed) for seed in range(SEEDS)]
 
     assert all(re.fullmatch(r"[A-HJ-NPR-Z0-9 -]{7,9}", text) for text in texts)
     assert all(any(c.isdigit() for c in t) and any(c.isalpha() for c in t) for t in texts)
     assert len(set(texts)) > 0.98 * SEEDS
 
-
-def test_no_two_glyphs_look_the_same() -> None:
-    """Every glyph has its own strokes, on the grid of 4 by 6."""
     assert len(set(GLYPHS.values())) == len(GLYPHS) == 33
     points = [p for glyph in GLYPHS.values() for p in re.split("[ ,]", glyph)]
     assert all(re.fullmatch("[0-4][0-6]", point) for point in points)

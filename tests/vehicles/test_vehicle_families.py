@@ -395,12 +395,8 @@ def test_text_on_the_sides_reads_from_left_to_right() -> None:
 
 
 MIRROR_M = {
-    **dict.fromkeys(FROM_CARS, 0.25),
-    "truck": 0.2,
-    "fire_engine": 0.2,
-    "bus": 0.3,
-    "tractor": 0.3,
-}
+    **dict.fromkeys(FROM_CARS, 0.25), "truck": 0.2, "fire_engine": 0.2, "bus": 0.3, "tractor": 0.3,
+}  # fmt: skip
 """Width of both mirrors beside the body: at least this [m]."""
 
 

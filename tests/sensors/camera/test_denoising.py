@@ -4,26 +4,19 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from gen_data.core.asset_types import Float32
-from gen_data.core.colorimetry import luminance
-from gen_data.core.intrinsics import Intrinsics
-from gen_data.core.scene import Camera, Weather
-from gen_data.core.se3 import SE3
-from gen_data.core.streams import Streams
-from gen_data.sensors.camera.denoising import denoise, is_noisy
-from gen_data.sensors.camera.exposure import dimming_ev
-from gen_data.sensors.camera.image_pipeline import ImagePipeline, develop
+from gen_data.core import asset_types, colorimetry, intrinsics, scene, se3, streams
+from gen_data.sensors.camera import denoising, exposure, image_pipeline
 
 WHITE_E, READ_NOISE_E = 200.0, 3.0
 
 
-def noisy(image: Float32) -> Float32:
+def noisy(image: asset_types.Float32) -> asset_types.Float32:
     rng = np.random.default_rng(5)
     electrons = rng.poisson(image * WHITE_E) + READ_NOISE_E * rng.standard_normal(image.shape)
     return (electrons / WHITE_E).astype(np.float32)
 
 
-def grey(level: float) -> Float32:
+def grey(level: float) -> asset_types.Float32:
     return np.full((96, 96, 3), level, np.float32)
 
 
@@ -31,16 +24,16 @@ def grey(level: float) -> Float32:
 def test_grain_of_an_even_surface_falls_and_its_mean_stays(level: float) -> None:
     """A window of 81 pixels leaves at most half of luma's noise; the mean stays within 2 %."""
     before = noisy(grey(level))
-    after = denoise(before, WHITE_E, READ_NOISE_E, 1.0)
+    after = denoising.denoise(before, WHITE_E, READ_NOISE_E, 1.0)
 
-    assert np.std(luminance(after)) < 0.5 * np.std(luminance(before))
+    assert np.std(colorimetry.luminance(after)) < 0.5 * np.std(colorimetry.luminance(before))
     assert after.mean() == pytest.approx(level, rel=0.02, abs=0.002)
 
 
 def test_strong_filtering_is_the_mean_of_the_window() -> None:
     """The variance of white noise falls to 1/81: the mean of 9 x 9 independent pixels."""
-    before = luminance(noisy(grey(0.3)))
-    after = luminance(denoise(noisy(grey(0.3)), WHITE_E, READ_NOISE_E, 4.0))
+    before = colorimetry.luminance(noisy(grey(0.3)))
+    after = colorimetry.luminance(denoising.denoise(noisy(grey(0.3)), WHITE_E, READ_NOISE_E, 4.0))
 
     inner = np.s_[12:-12, 12:-12]
     assert np.var(after[inner]) == pytest.approx(np.var(before) / 81.0, rel=0.35)
@@ -49,44 +42,38 @@ def test_strong_filtering_is_the_mean_of_the_window() -> None:
 def test_colour_blotches_fall_more_than_grain() -> None:
     """Of red minus green is left a smaller share than of luma."""
     before = noisy(grey(0.2))
-    after = denoise(before, WHITE_E, READ_NOISE_E, 0.6)
+    after = denoising.denoise(before, WHITE_E, READ_NOISE_E, 0.6)
 
-    def left(of: Float32, made: Float32) -> float:
+    def left(of: asset_types.Float32, made: asset_types.Float32) -> float:
         return float(np.std(made) / np.std(of))
 
     chroma = left(before[..., 0] - before[..., 1], after[..., 0] - after[..., 1])
-    assert chroma < left(luminance(before), luminance(after))
+    assert chroma < left(colorimetry.luminance(before), colorimetry.luminance(after))
 
 
 def test_edges_stay() -> None:
     """Three pixels beside a strong edge, both sides have their own values."""
     image = grey(0.1)
     image[:, 48:] = 0.6
-    after = denoise(noisy(image), WHITE_E, READ_NOISE_E, 1.0)
+    after = denoising.denoise(noisy(image), WHITE_E, READ_NOISE_E, 1.0)
 
     assert after[:, 42:46].mean() == pytest.approx(0.1, rel=0.1)
     assert after[:, 50:54].mean() == pytest.approx(0.6, rel=0.1)
 
 
-def test_days_are_left_alone() -> None:
-    """The signal-to-noise ratio of middle grey, the root of its electrons, is 46 and 5."""
-    assert not is_noisy(12_000.0)
-    assert is_noisy(150.0)
-
-
 def picture(ev100: float, strength: float) -> NDArray[np.uint8]:
     """A grey wall at middle grey, by a small sensor with automatic exposure down to ISO 6400."""
-    eye = Camera("eye", SE3(), Intrinsics(64, 48, 60.0, 60.0, 32.0, 24.0), ev100=ev100)
-    pipeline = ImagePipeline.model_validate(
-        {
-            "image_sensor": {"full_well_e": 10_000, "read_noise_e": 2},
-            "exposure_control": {"f_number": 1.8, "time_s": [1e-5, 1 / 30], "iso": [50, 6400]},
-            "denoise": strength,
-        }
+    eye = scene.Camera(
+        "eye", se3.SE3(), intrinsics.Intrinsics(64, 48, 60.0, 60.0, 32.0, 24.0), ev100=ev100
     )
+    pipeline = image_pipeline.ImagePipeline.model_validate({
+        "image_sensor": {"full_well_e": 10_000, "read_noise_e": 2},
+        "exposure_control": {"f_number": 1.8, "time_s": [1e-5, 1 / 30], "iso": [50, 6400]},
+        "denoise": strength,
+    })  # fmt: skip
     wall = np.full((48, 64, 3), 0.18 * 1.2 * 2.0**ev100, np.float32)
-    rng = Streams(seed=5, scene=0).rng("test")
-    return develop(wall, None, eye, Weather(), pipeline, rng).rgb
+    rng = streams.Streams(seed=5, scene=0).rng("test")
+    return image_pipeline.develop(wall, None, eye, scene.Weather(), pipeline, rng).rgb
 
 
 def test_the_stage_changes_dim_pictures_alone() -> None:
@@ -97,8 +84,11 @@ def test_the_stage_changes_dim_pictures_alone() -> None:
     assert filtered.std() < 0.5 * raw.std()
     assert filtered.mean() == pytest.approx(raw.mean(), rel=0.03)
 
+    assert not denoising.is_noisy(12_000.0)
+    assert denoising.is_noisy(150.0)
+
 
 @pytest.mark.parametrize(("ev100", "stops"), [(0.0, 2.27), (2.0, 1.19), (5.0, 0.0), (14.0, 0.0)])
 def test_dim_scenes_stay_dark(ev100: float, stops: float) -> None:
     """Krawczyk's key of the luminance at middle grey, over that at 5 EV, in stops."""
-    assert dimming_ev(ev100) == pytest.approx(stops, abs=0.01)
+    assert exposure.dimming_ev(ev100) == pytest.approx(stops, abs=0.01)

@@ -26,6 +26,7 @@ from gen_data.sensors.camera.image_pipeline import (
 from gen_data.sensors.camera.isp import display_values, to_bytes
 from gen_data.sensors.camera.rgb_camera import RgbCamera
 from gen_data.sensors.device_presets import preset_names
+from tests.sensors.recorder import Recorder
 
 LENS = Intrinsics(64, 48, 60.0, 60.0, 32.0, 24.0)
 CAMERA = Camera("eye", SE3(), LENS, ev100=8.0)
@@ -40,20 +41,6 @@ def speckled(height: int = 48, width: int = 64) -> Any:
     """Radiance from black to five times white [cd/m^2]."""
     image = Streams(seed=2, scene=0).rng("image").uniform(0.0, 5.0, (height, width, 3)) ** 3
     return (image / 25.0 * WHITE_CD_M2).astype(np.float32)
-
-
-class Rendering:
-    """A renderer of one image that remembers the channels it was asked for."""
-
-    def __init__(self, radiance: Any) -> None:
-        self.radiance, self.asked = radiance, frozenset[Channel]()
-
-    def render(self, scene: Scene, camera: Camera, channels: frozenset[Channel]) -> SensorReading:
-        self.asked = channels
-        return SensorReading(camera.name, camera, dict.fromkeys(channels, self.radiance))
-
-    def scan(self, *_: Any) -> Any:
-        raise NotImplementedError
 
 
 def test_the_chain_has_the_order_of_a_camera() -> None:
@@ -93,7 +80,7 @@ def test_every_stage_of_a_camera_with_all_errors_changes_its_picture() -> None:
         assert (whole != picture(less, wet)).any(), key
 
 
-def test_ideal_is_a_preset_and_the_default() -> None:
+def test_ideal_is_the_default_and_reaches_every_exposure() -> None:
     """It exposes, and applies Uchimura's curve: nothing else happens to the radiance."""
     assert "ideal" in preset_names(PRESETS)
     assert ImagePipeline() == ImagePipeline(preset="ideal")
@@ -104,9 +91,6 @@ def test_ideal_is_a_preset_and_the_default() -> None:
     assert np.abs(photo.rgb.astype(int) - expected).max() <= 1
     assert photo.ev100 == 8.0
 
-
-def test_an_ideal_camera_reaches_every_exposure() -> None:
-    """Limits of time and gain are those of an image sensor."""
     night = np.full((48, 64, 3), 0.25 * 1.2 * 2.0**-9, np.float32)
     camera = Camera("eye", SE3(), LENS, ev100=-9.0)
 
@@ -143,7 +127,7 @@ def test_glare_ends_where_the_lens_shows_nothing() -> None:
 
 def test_renderers_are_asked_for_radiance_and_only_for_the_depth_that_is_needed() -> None:
     """RGB is the camera's; radiance is not kept unless it was asked for."""
-    renderer = Rendering(speckled())
+    renderer = Recorder(speckled())
 
     def captured(*channels: Channel) -> SensorReading:
         return capture_photograph(
@@ -173,17 +157,12 @@ def written(tmp_path: Path, text: str) -> str:
     return str(path)
 
 
-def test_deprecated_keys_are_read_with_a_warning_that_names_the_new_ones(tmp_path: Path) -> None:
+def test_deprecated_keys_are_read_with_a_warning_and_refused_beside_their_new_names(
+    tmp_path: Path,
+) -> None:
     """``formation`` with ``bloom``, ``shutter`` and ``photosites``, each told at its place."""
-    own = written(
-        tmp_path,
-        "sensors:\n"
-        "  - type: rgb_camera\n"
-        "    formation:\n"
-        "      bloom: 0.02\n"
-        "      shutter: {f_number: 4.0}\n"
-        "      photosites: {bits: 10}\n",
-    )
+    old = "{bloom: 0.02, shutter: {f_number: 4.0}, photosites: {bits: 10}}"
+    own = written(tmp_path, f"sensors:\n  - type: rgb_camera\n    formation: {old}\n")
 
     with pytest.warns(FutureWarning) as warned:
         (camera,) = load_config(own).sensors
@@ -197,9 +176,6 @@ def test_deprecated_keys_are_read_with_a_warning_that_names_the_new_ones(tmp_pat
     for name in ("glare", "exposure_control", "image_sensor"):
         assert any(f"called '{name}' now" in text for text in told), name
 
-
-def test_a_deprecated_key_beside_its_new_name_is_refused(tmp_path: Path) -> None:
-    """No value is dropped without a word."""
     own = written(tmp_path, "sensors:\n  - {type: rgb_camera, formation: {}, image_pipeline: {}}\n")
     with pytest.raises(ConfigError, match=r"own\.yaml:3:24: .*called 'image_pipeline' now"):
         load_config(own)
@@ -229,7 +205,7 @@ def test_cameras_of_a_rig_share_the_settings_of_one() -> None:
     left = Camera("left", SE3(), LENS, ev100=8.0)
     scene = Scene("t", cameras=(left, Camera("right", SE3(), LENS, ev100=8.0)))
     drawn = ImagePipeline.model_validate_json('{"exposure_error_ev": {"uniform": [-3, 0]}}')
-    grey = Rendering(np.full((48, 64, 3), 0.2 * WHITE_CD_M2, np.float32))
+    grey = Recorder(np.full((48, 64, 3), 0.2 * WHITE_CD_M2, np.float32))
 
     def level(name: str, settings_of: str = "") -> float:
         sensor = RgbCamera(

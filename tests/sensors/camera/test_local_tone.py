@@ -55,7 +55,7 @@ def test_a_lit_wall_stays_brighter_than_one_in_shade() -> None:
 
 
 def test_grey_stays_grey_and_colours_keep_their_order() -> None:
-    """Noise of any brightness and a size that no power of two divides."""
+    """Noise of any brightness and a size that no power of two divides; and a single pixel."""
     rng = Streams(seed=3, scene=0).rng("image")
     image = (rng.uniform(0.0, 2.5, (37, 61, 3)) ** 3).astype(np.float32)
     grey = np.repeat(image[..., :1], 3, axis=-1)
@@ -67,7 +67,4 @@ def test_grey_stays_grey_and_colours_keep_their_order() -> None:
     ordered = np.take_along_axis(shown, np.argsort(image), axis=-1)
     assert (np.diff(ordered, axis=-1) >= 0.0).all()
 
-
-def test_a_picture_of_a_pixel_has_a_tone() -> None:
-    """No scale is left to blend over."""
     assert fuse_exposures(patches(np.array([[0.1]]), 1), 1.0, WHITE, 1.0).shape == (1, 1, 3)

@@ -125,8 +125,7 @@ def test_edges_of_what_saturates_are_those_of_the_reduced_photograph() -> None:
         reading = capture_photograph(scene, renderer, camera, rgb, settings, rng())
         return reading.channels[Channel.RGB].astype(np.float64)
 
-    large = looking_along_z(80 * 8, 60 * 8)
-    expected = block_means(photo(large), 8)
+    expected = block_means(photo(looking_along_z(80 * 8, 60 * 8)), 8)
     reduced = photo(looking_along_z(80, 60), reduction=8.0)
     plain = photo(looking_along_z(80, 60))
 

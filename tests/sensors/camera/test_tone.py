@@ -68,21 +68,18 @@ def test_srgb_is_the_standard_and_clips_at_white(value: float) -> None:
     assert float(isp.display_values(np.array(value), "srgb")) == pytest.approx(expected, abs=1e-12)
 
 
-def test_linear_is_written_without_a_transfer_function() -> None:
-    """Half of white is half of the range."""
+def test_linear_has_no_transfer_function_and_filmic_keeps_middle_grey() -> None:
+    """A shoulder between 1 and 4 tells lights beyond white apart."""
     values = isp.display_values(np.array([-1.0, 0.0, 0.5, 2.0]), "linear")
     assert values.tolist() == [0.0, 0.0, 0.5, 1.0]
 
-
-def test_filmic_keeps_middle_grey_and_tells_lights_beyond_white_apart() -> None:
-    """Near the identity in the mid-tones, with a shoulder between 1 and 4."""
     assert abs(float(isp.filmic(np.array(0.18))) - 0.18) < 0.02
     assert float(isp.filmic(np.array(1.0))) < 0.9 < float(isp.filmic(np.array(4.0))) <= 1.0
 
 
 @pytest.mark.parametrize("tone", TONES)
-def test_every_curve_rises_from_black_to_white(tone: isp.Tone) -> None:
-    """Monotonic; darkness, and what is negative by noise, is 0; what is endless is 255."""
+def test_every_curve_rises_from_black_to_white_by_table_as_by_formula(tone: isp.Tone) -> None:
+    """Negative noise is 0, the endless 255; over fourteen stops at most one of 255 apart."""
     values = np.concatenate([[-1.0, 0.0], np.geomspace(1e-6, 1e6, 2000), [np.inf]])
     image = np.repeat(values.astype(np.float32)[:, None, None], 3, axis=2)
 
@@ -91,10 +88,6 @@ def test_every_curve_rises_from_black_to_white(tone: isp.Tone) -> None:
     assert (levels[0], levels[1], levels[-1]) == (0, 0, 255)
     assert (np.diff(levels) >= 0).all()
 
-
-@pytest.mark.parametrize("tone", TONES)
-def test_bytes_by_table_are_those_of_the_formula(tone: isp.Tone) -> None:
-    """For values over fourteen stops: at most one of 255 apart, and hardly ever."""
     stream = Streams(seed=3, scene=0).rng("values")
     image = (2.0 ** stream.uniform(-10.0, 4.0, (101, 64, 3))).astype(np.float32)
 

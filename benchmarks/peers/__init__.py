@@ -1,1 +1,0 @@
-"""Renderers of others, and the scenes that they draw beside this project's."""
