@@ -1,0 +1,1 @@
+"""Renderers of others, and the scenes that they draw beside this project's."""

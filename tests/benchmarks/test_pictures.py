@@ -1,0 +1,35 @@
+"""Counts of cars and people in pictures, on label files written by hand."""
+
+import math
+from pathlib import Path
+
+import pytest
+
+from benchmarks.bench_pictures import REAL, pictures_of_kitti, summarise
+
+ROWS = """\
+Car 0.00 0 0.00 100.00 150.00 160.00 190.00 1.50 1.60 4.00 3.00 1.70 4.00 0.00
+Car 0.00 2 0.00 100.00 150.00 120.00 160.00 1.60 1.70 3.00 -30.00 1.60 40.00 0.00
+Pedestrian 0.00 0 0.00 200.00 100.00 240.00 200.00 1.80 0.60 0.90 6.00 1.65 8.00 0.00
+Van 0.00 0 0.00 300.00 100.00 500.00 300.00 2.00 1.90 5.00 1.00 1.65 9.00 0.00
+DontCare -1 -1 -10 500.00 160.00 520.00 170.00 -1 -1 -1 -1000 -1000 -1000 -10
+"""
+
+
+def test_figures_of_label_files_are_those_of_a_count_by_hand(tmp_path: Path) -> None:
+    """Two pictures, one of them empty: a car 40 px and one 10 px high, a person of 100 px."""
+    (tmp_path / "label_2").mkdir()
+    (tmp_path / "label_2/000000.txt").write_text(ROWS)
+    (tmp_path / "label_2/000001.txt").write_text("")
+
+    figures = summarise(list(pictures_of_kitti(tmp_path, 2)))
+
+    assert {name for name, value in figures.items() if value == 0.5 and " px" in name} == {
+        "cars < 25 px", "cars 25-48 px", "people 96-192 px"
+    }  # fmt: skip
+    assert (figures["cars"], figures["people"], figures["cyclists"]) == (1.0, 0.5, 0.0)
+    assert figures["people: width / height, p50"] == 0.4
+    assert figures["people: distance, p50 [m]"] == pytest.approx(10.0)
+    assert figures["cars: length, p50 [m]"] == pytest.approx(3.5)
+    assert math.isnan(figures["people: mean grey"])
+    assert set(figures) == set(REAL)
