@@ -37,9 +37,13 @@ def run(code: str, folder: Path, first_on_path: Path | None = None) -> str:
     if first_on_path:
         variables["PYTHONPATH"] = str(first_on_path)
     done = subprocess.run(
-        [sys.executable, "-c", code], cwd=folder, env=variables, text=True, capture_output=True,
+        [sys.executable, "-c", code],
+        cwd=folder,
+        env=variables,
+        text=True,
+        capture_output=True,
         check=False,
-    )  # fmt: skip
+    )
     assert done.returncode == 0, done.stderr
     return done.stdout
 
@@ -65,8 +69,9 @@ def test_a_checkout_imports_its_own_folders(tmp_path: Path, links: bool) -> None
 
     assert name == "tabletop"
     assert [Path(file).resolve() for file in files] == [
-        place / "exporters/__init__.py", place / "generator/core/se3.py",
-    ]  # fmt: skip
+        place / "exporters/__init__.py",
+        place / "generator/core/se3.py",
+    ]
 
 
 @pytest.mark.skipif(

@@ -132,9 +132,13 @@ def output_of(program: str, *arguments: str) -> list[str]:
         "print('LOADED', *sorted(public - sys.stdlib_module_names))\n"
     )
     done = subprocess.run(
-        [sys.executable, "-c", report, *arguments], cwd=ROOT, capture_output=True, text=True,
-        check=True, env=environment(),
-    )  # fmt: skip
+        [sys.executable, "-c", report, *arguments],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
+        env=environment(),
+    )
     return done.stdout.splitlines()
 
 

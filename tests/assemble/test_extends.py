@@ -58,16 +58,20 @@ exporters: [{type: kitti}]
     plain = load_config_document(written(folder, own)).plain()
 
     assert plain == {
-        "seed": 3, "template": "tabletop", "render": {"max_lamps": 8, "device": "cpu"},
+        "seed": 3,
+        "template": "tabletop",
+        "render": {"max_lamps": 8, "device": "cpu"},
         "shared": {"side": {"uniform": [0, 1]}},
         "elements": {"table": {"height_m": 0.8, "top_size_m": [1, 1]}},
         "randomizers": [
             {"type": "objects", "name": "clutter", "count": 3, "upright": True},
-            {"type": "colors", "name": "colors"}, {"type": "materials", "name": "finish"},
+            {"type": "colors", "name": "colors"},
+            {"type": "materials", "name": "finish"},
         ],
         "sensors": [{"type": "rgb_camera", "name": "color", "size_px": [64, 48], "hfov_deg": 60}],
-        "annotations": ["poses"], "exporters": [{"type": "kitti"}],
-    }  # fmt: skip
+        "annotations": ["poses"],
+        "exporters": [{"type": "kitti"}],
+    }
 
 
 def test_a_list_of_outputs_replaces_the_inherited_one(folder: Path) -> None:
@@ -113,8 +117,9 @@ randomizers: [{type: materials, name: clutter}]
     plain = load_config_document(written(folder, own)).plain()
 
     assert plain["randomizers"] == [
-        {"type": "colors", "name": "colors"}, {"type": "materials", "name": "clutter"},
-    ]  # fmt: skip
+        {"type": "colors", "name": "colors"},
+        {"type": "materials", "name": "clutter"},
+    ]
     assert (plain["exporters"], plain["elements"], plain["annotations"]) == ([], {}, [])
     assert "without" not in plain
 

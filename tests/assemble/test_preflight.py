@@ -44,11 +44,14 @@ def refusal(config: dict[str, Any]) -> str:
 
 def test_every_exporter_and_every_camera_that_does_not_fit_is_named() -> None:
     """Two formats of pinholes, two bent cameras, in one message."""
-    message = refusal(cart(
-        {**BENT, "name": "front"}, {**BENT, "name": "side", "yaw_deg": 90},
-        {**CAMERA, "name": "rear", "yaw_deg": 180},
-        exporters=[{"type": "solo"}, {"type": "kitti", "camera": "front"}, {"type": "coco"}],
-    ))  # fmt: skip
+    message = refusal(
+        cart(
+            {**BENT, "name": "front"},
+            {**BENT, "name": "side", "yaw_deg": 90},
+            {**CAMERA, "name": "rear", "yaw_deg": 180},
+            exporters=[{"type": "solo"}, {"type": "kitti", "camera": "front"}, {"type": "coco"}],
+        )
+    )
 
     lens = "has a lens of the model 'kannala_brandt'"
     assert f"exporter 'solo': camera 'front' {lens}, camera 'side' {lens}, but" in message
@@ -71,10 +74,12 @@ PAIR = ("rgb", "disparity")
 
 def test_cameras_without_a_rig_are_no_stereo_pair() -> None:
     """``camera_pose`` gives each a pose of its own; the position is that of ``stereo_with``."""
-    message = refusal(table(
-        {**CAMERA, "name": "left", "channels": [*PAIR], "stereo_with": "right"},
-        {**CAMERA, "name": "right"},
-    ))  # fmt: skip
+    message = refusal(
+        table(
+            {**CAMERA, "name": "left", "channels": [*PAIR], "stereo_with": "right"},
+            {**CAMERA, "name": "right"},
+        )
+    )
 
     assert "sensors[0].stereo_with: 'left' and 'right' are no rectified pair: " in message
     assert "mount them on one rig" in message
@@ -116,9 +121,10 @@ def test_plan_and_generate_refuse_all_faults_with_the_same_message(tmp_path: Pat
     config = table(
         {**BENT, "name": "left", "channels": ["rgb"]},
         {**CAMERA, "name": "middle", "channels": [*PAIR], "stereo_with": "right"},
-        {**CAMERA, "name": "right"}, exporters=[{"type": "bop", "camera": "left"}],
+        {**CAMERA, "name": "right"},
+        exporters=[{"type": "bop", "camera": "left"}],
         splits={"train": 1},
-    )  # fmt: skip
+    )
     file = tmp_path / "mine.yaml"
     file.write_text(yaml.safe_dump(config))
     planned = CliRunner().invoke(cli, ["plan", str(file), "--n", "2"])

@@ -63,12 +63,15 @@ def test_override_of_an_unknown_element_is_refused(tmp_path: Path) -> None:
 def test_command_line_wins_over_file_and_template() -> None:
     """``--set`` reaches elements and randomizers by name, the top level, and absent sections."""
     spec = load_config(
-        "tabletop.yaml", seed=0,
+        "tabletop.yaml",
+        seed=0,
         overrides=(
-            "elements.table.height_m=0.6", "randomizers.clutter.count=3",
-            "physics.settle_time_s_max=2.5", "views_per_scene=2",
+            "elements.table.height_m=0.6",
+            "randomizers.clutter.count=3",
+            "physics.settle_time_s_max=2.5",
+            "views_per_scene=2",
         ),
-    )  # fmt: skip
+    )
 
     assert spec.general.seed == 0
     assert {e.name: e for e in spec.probes[0].elements}["table"].height_m == 0.6

@@ -82,8 +82,10 @@ def test_a_skin_takes_the_place_of_its_nodes_transform(builder: Builder, tmp_pat
     joints = np.array([[0, 1, 0, 0]] * 3, "<u1")
     weights = np.array([[0.25, 0.75, 0, 0]] * 3, "<f4")
     bind = np.stack([np.eye(4), np.diag([0.5, 0.5, 0.5, 1.0])]).astype("<f4")
-    builder.attributes |= {"JOINTS_0": builder.accessor(joints),
-                           "WEIGHTS_0": builder.accessor(weights)}  # fmt: skip
+    builder.attributes |= {
+        "JOINTS_0": builder.accessor(joints),
+        "WEIGHTS_0": builder.accessor(weights),
+    }
     matrices = builder.accessor(bind.reshape(-1, 16))
     builder.tree["nodes"] = [{"mesh": 0, "skin": 0, "scale": [5, 5, 5]}, {"name": "a"},
                              {"name": "b", "translation": [0, 1, 0]}]  # fmt: skip

@@ -42,8 +42,10 @@ def test_stored_bounds_are_those_of_the_mesh_which_is_not_read(
     of_body = first.body_bounds_m(asset)
     later = open_library(cache_dir=tmp_path)
     monkeypatch.delattr(type(later), "_imported")
-    assert later.bounds_m(asset) == (tuple(vertices_m.min(axis=0).tolist()),
-                                     tuple(vertices_m.max(axis=0).tolist()))  # fmt: skip
+    assert later.bounds_m(asset) == (
+        tuple(vertices_m.min(axis=0).tolist()),
+        tuple(vertices_m.max(axis=0).tolist()),
+    )
     assert later.body_bounds_m(asset) == of_body
     assert (of_body is not None) == asset.startswith("car")
 

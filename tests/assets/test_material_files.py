@@ -34,8 +34,10 @@ def gltf(folder: Path, material: dict[str, Any], **images: np.ndarray) -> None:
     made = Builder()
     made.attributes["TEXCOORD_0"] = made.accessor(np.array([[0, 0], [1, 0], [0, 1]], "<f4"))
     made.material(**{"name": "skin of it", **material})
-    made.tree |= {"textures": [{"source": k} for k in range(len(images))],
-                  "images": [{"uri": f"{name}.png"} for name in images]}  # fmt: skip
+    made.tree |= {
+        "textures": [{"source": k} for k in range(len(images))],
+        "images": [{"uri": f"{name}.png"} for name in images],
+    }
     made.write(folder, "t")
 
 
@@ -123,12 +125,24 @@ def test_gltf_images_become_maps(folder: Path) -> None:
     orm = np.dstack([checker(100, 200), checker(0, 255), checker(255, 0)])
     leaf = np.dstack([np.full((4, 4, 3), 90, np.uint8), checker(0, 200)])
     glow = np.dstack([checker(0, 255)] * 3)
-    gltf(folder, {
-        "alphaMode": "MASK", "alphaCutoff": 0.25, "occlusionTexture": {"index": 1},
-        "pbrMetallicRoughness": {"baseColorTexture": {"index": 0},
-                                 "metallicRoughnessTexture": {"index": 1}},
-        "emissiveFactor": [3, 3, 3], "emissiveTexture": {"index": 2}, "normalTexture": {"index": 2},
-    }, leaf=leaf, orm=orm, glow=glow)  # fmt: skip
+    gltf(
+        folder,
+        {
+            "alphaMode": "MASK",
+            "alphaCutoff": 0.25,
+            "occlusionTexture": {"index": 1},
+            "pbrMetallicRoughness": {
+                "baseColorTexture": {"index": 0},
+                "metallicRoughnessTexture": {"index": 1},
+            },
+            "emissiveFactor": [3, 3, 3],
+            "emissiveTexture": {"index": 2},
+            "normalTexture": {"index": 2},
+        },
+        leaf=leaf,
+        orm=orm,
+        glow=glow,
+    )
     material, texture = loaded(folder)
     assert texture is not None
     assert (material.roughness, material.metallic, material.opacity) == (1.0, 1.0, 1.0)

@@ -94,11 +94,18 @@ def textured_triangle(tmp_path: Path) -> Builder:
     png = made.view(np.fromfile(tmp_path / "i.png", np.uint8))
     made.tree |= {
         "nodes": [{"children": [1], "scale": [0.5] * 3}, {"mesh": 0, "translation": [2, 0, 0]}],
-        "images": [{"bufferView": png, "mimeType": "image/png"}], "textures": [{"source": 0}],
-    }  # fmt: skip
-    made.material(name="paint", pbrMetallicRoughness={
-        "baseColorTexture": {"index": 0}, "baseColorFactor": [0.5, 0.5, 0.5, 1],
-        "metallicFactor": 0, "roughnessFactor": 0.3})  # fmt: skip
+        "images": [{"bufferView": png, "mimeType": "image/png"}],
+        "textures": [{"source": 0}],
+    }
+    made.material(
+        name="paint",
+        pbrMetallicRoughness={
+            "baseColorTexture": {"index": 0},
+            "baseColorFactor": [0.5, 0.5, 0.5, 1],
+            "metallicFactor": 0,
+            "roughnessFactor": 0.3,
+        },
+    )
     return made
 
 

@@ -120,8 +120,11 @@ def test_meshes_joints_and_groups_are_those_of_mujoco(tmp_path: Path) -> None:
     links = described.links
     kinds = {n: ([s.kind for s in k.visuals], [s.kind for s in k.collisions])
              for n, k in links.items() if k.visuals or k.collisions}  # fmt: skip
-    assert kinds == {"base": (["mesh"], ["box"]), "upper": (["capsule"], ["cylinder"]),
-                     "hand": (["ellipsoid"], ["ellipsoid"])}  # fmt: skip
+    assert kinds == {
+        "base": (["mesh"], ["box"]),
+        "upper": (["capsule"], ["cylinder"]),
+        "hand": (["ellipsoid"], ["ellipsoid"]),
+    }
     assert links["base"].collisions[0].size == pytest.approx((0.2, 0.4, 0.6))
     assert links["upper"].collisions[0].size == pytest.approx((0.05, 0.4, 0.0))
 
@@ -172,8 +175,10 @@ def test_what_is_not_used_is_named_and_a_height_fields_file_not_opened(tmp_path:
     ball = """<body name="eye"><joint type="ball" name="look"/><geom size="0.1"/></body>
     </worldbody>"""
     described = read_mjcf(write(tmp_path, ARM.replace("</worldbody>", ball)), "arm.xml")
-    assert described.remarks == ("not used: 1 ball joint (it stays at its origin)",
-                                 "not used: 1 plane geom")  # fmt: skip
+    assert described.remarks == (
+        "not used: 1 ball joint (it stays at its origin)",
+        "not used: 1 plane geom",
+    )
     (tmp_path / "assets.yaml").write_text("robots: [{id: arm, file: arm.xml, licence: MIT}]\n")
     library = open_library([tmp_path], tmp_path / "cache", tmp_path)
     (finding,) = check_folder(tmp_path, library)

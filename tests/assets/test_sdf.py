@@ -207,8 +207,10 @@ def test_meshes_materials_and_textures_of_gazebo(tmp_path: Path) -> None:
 
 def test_a_mimic_follows_its_leader_from_a_reference(tmp_path: Path) -> None:
     """2 (x - 0.1) + 0.3 = 2 x + 0.1 (SDF 1.11)."""
-    mimic = ("</limit><mimic joint='hinge'><multiplier>2</multiplier><offset>0.3</offset>"
-             "<reference>0.1</reference></mimic>")  # fmt: skip
+    mimic = (
+        "</limit><mimic joint='hinge'><multiplier>2</multiplier><offset>0.3</offset>"
+        "<reference>0.1</reference></mimic>"
+    )
     second = HINGED[2].replace("hinge", "other").replace("<child>door", "<child>leaf")
     second = second.replace("</limit>", mimic)
     described = read(tmp_path, *HINGED, link("leaf"), second)
@@ -254,9 +256,12 @@ def test_what_is_not_used_is_named_and_a_loop_cut_after_its_first_joint(tmp_path
         '<link name="eye"><sensor name="s" type="camera"/><visual name="v"><geometry><plane>'
         "<normal>0 0 1</normal></plane></geometry></visual></link>",
     )
-    assert described.remarks == ("not used: 1 ball joint (it stays at its origin)",
-                                 "not used: 1 plane geometry", "not used: 1 plugin",
-                                 "not used: 1 sensor")  # fmt: skip
+    assert described.remarks == (
+        "not used: 1 ball joint (it stays at its origin)",
+        "not used: 1 plane geometry",
+        "not used: 1 plugin",
+        "not used: 1 sensor",
+    )
 
 
 @pytest.mark.parametrize(

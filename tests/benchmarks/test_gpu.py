@@ -115,8 +115,11 @@ def test_the_report_ends_with_the_goals_and_what_is_missing() -> None:
     assert text.splitlines()[-6:] == [
         "| 500 labelled samples/s to disk, tabletop | 50 | 10 % |",
         "| 2e+03 labelled samples/s in memory, tabletop | 150 | 8 % |",
-        "| 1e+09 rays/s of one launch | 5e+08 | 50 % |", "", "Missing:", "- paths: left out",
-    ]  # fmt: skip
+        "| 1e+09 rays/s of one launch | 5e+08 | 50 % |",
+        "",
+        "Missing:",
+        "- paths: left out",
+    ]
 
 
 WORKER = """
@@ -163,9 +166,11 @@ def test_measurements_that_would_end_too_late_are_left_out_and_named(
 
     assert found["memory"] == found["disk"] == {}
     assert found["left_out"] == [
-        "disk, 2 workers: 0 of them in time", "memory, 2 workers: 0 of them in time",
-        "disk, 1 workers: 0 of them in time", "memory, 1 workers: 0 of them in time",
-    ]  # fmt: skip
+        "disk, 2 workers: 0 of them in time",
+        "memory, 2 workers: 0 of them in time",
+        "disk, 1 workers: 0 of them in time",
+        "memory, 1 workers: 0 of them in time",
+    ]
 
 
 def test_references_that_are_too_large_to_be_carried_are_refused(

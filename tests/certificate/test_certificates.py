@@ -58,12 +58,14 @@ def test_a_good_set_passes_every_claim_and_figures_count_what_was_checked(certif
     assert certificate["holds"] is True
     assert certificate["dataset"]["samples"] == 64
     assert statuses == dict.fromkeys(
-        [*((name, "") for name in ("files", "run log", "samples", "boxes and masks", "draws")),
-         *(("exports", "coco"), ("pixels", "color"), ("laser points", "pseudo_lidar")),
-         *((name, "") for name in ("written again", "generated again", "distributions")),
-         ("splits", "")],
+        [
+            *((name, "") for name in ("files", "run log", "samples", "boxes and masks", "draws")),
+            *(("exports", "coco"), ("pixels", "color"), ("laser points", "pseudo_lidar")),
+            *((name, "") for name in ("written again", "generated again", "distributions")),
+            ("splits", ""),
+        ],
         "passed",
-    )  # fmt: skip
+    )
     # Four images of 200 pixels; the images of all 64 samples in COCO, which score 1.
     plain = json.loads((certified / "CERTIFICATE.json").read_bytes())
     figures = {c["name"]: c["findings"][0]["figures"] for c in plain["claims"]}

@@ -226,5 +226,8 @@ def test_fields_are_described_by_the_docstring_below_them() -> None:
         """Overruled."""
 
     rows = [(row.name, row.text) for row in describe_fields(Own)]
-    assert rows == [("boxes", "Whether it has boxes."), ("other", "From the section."),
-                    ("cameras", "All of them if empty.")]  # fmt: skip
+    assert rows == [
+        ("boxes", "Whether it has boxes."),
+        ("other", "From the section."),
+        ("cameras", "All of them if empty."),
+    ]

@@ -37,9 +37,11 @@ def test_a_document_becomes_plain_data_and_paths_to_nowhere_give_none() -> None:
     assert parse_yaml(TABLETOP, "t.yaml").plain() == {
         "seed": 7,
         "camera": {"fov_deg": 60, "size": [640, 480]},
-        "randomizers": [{"name": "clutter", "count": {"uniform_integer": [3, 12]}},
-                        {"name": "lamps"}],
-    }  # fmt: skip
+        "randomizers": [
+            {"name": "clutter", "count": {"uniform_integer": [3, 12]}},
+            {"name": "lamps"},
+        ],
+    }
     # Keys of lists, indices of mappings, and parts of scalars do not exist.
     document = parse_yaml(TABLETOP, "t.yaml")
     for path in [("x",), ("seed", "x"), ("randomizers", 2), ("randomizers", "a"), ("camera", 0)]:

@@ -118,8 +118,11 @@ def test_the_command_line_shows_a_warning_as_one_plain_line(tmp_path: Path) -> N
     path.write_text("extends: street.yaml\nrandomizers: [{type: along, name: x, sped: 1}]\n")
     done = subprocess.run(
         [sys.executable, "-m", "gen_data.cli", "--config", str(path), "--n", "1"],
-        capture_output=True, text=True, check=False, timeout=120,
-    )  # fmt: skip
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
+    )
     lines = done.stderr.splitlines()
     assert done.returncode == 2
     assert lines[0].startswith(

@@ -229,9 +229,13 @@ def test_all_mistakes_are_told_at_once_and_those_of_the_command_line_there() -> 
     """In the order of the file. The rest of the tree still points into its file."""
     text = "n: 0\ncamera: {fov_deg: 400, x: 1}\nwet: 1\nroughness: {uniform: [1, 0]}\n"
     places = [line.split(": ")[:2] for line in told(text).split("\n") if line.startswith("x.yaml")]
-    assert places == [["x.yaml:1:4", "n"], ["x.yaml:2:19", "camera.fov_deg"],
-                      ["x.yaml:2:24", "camera.x"], ["x.yaml:3:6", "wet"],
-                      ["x.yaml:4:22", "roughness"]]  # fmt: skip
+    assert places == [
+        ["x.yaml:1:4", "n"],
+        ["x.yaml:2:19", "camera.fov_deg"],
+        ["x.yaml:2:24", "camera.x"],
+        ["x.yaml:3:6", "wet"],
+        ["x.yaml:4:22", "roughness"],
+    ]
     document = with_override(parse_yaml("camera: {fov_deg: 60}", "x.yaml"), "camera.fov_deg", "400")
     problems = Problems()
     validate(document, Config, problems)

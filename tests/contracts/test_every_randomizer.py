@@ -105,9 +105,11 @@ def straight_road() -> Scene:
     cameras = tuple(Camera(name, SE3((0.0, 0.0, 1.5)), lens) for name in ("left", "right"))
     scene = builder.build_scene("test", (road.Road(name="main"),), open_library(()))
     return replace(
-        scene, bodies=(*scene.bodies, bench),
-        instances=(Instance(1, "bench", "bench", 0, bench.asset),), cameras=cameras,
-    )  # fmt: skip
+        scene,
+        bodies=(*scene.bodies, bench),
+        instances=(Instance(1, "bench", "bench", 0, bench.asset),),
+        cameras=cameras,
+    )
 
 
 def world_of(kind: str) -> tuple[Scene, interfaces.AssetIndex]:
@@ -158,12 +160,16 @@ def nominal_scene() -> Scene:
     persons = [Instance(w.instance_id, w.name, "person", 0, w.asset) for w in walkers]
     crowd = ObjectGroup("people", (), ("walker?seed=0",), 12, "along", lanes=("sidewalk",))
     return replace(
-        scene, bodies=(*scene.bodies, lamp, signal, plate, wagon, ego, drone, gimbal, *walkers),
+        scene,
+        bodies=(*scene.bodies, lamp, signal, plate, wagon, ego, drone, gimbal, *walkers),
         instances=(*scene.instances, labelled, carrier, *persons),
         rigs=(*scene.rigs, Rig("ego", "ego"), Rig("car", "lane_objects/0"), *flying),
-        cameras=cameras, lidars=(Lidar("roof", "", SE3((0.0, 0.0, 1.9)), rig="car"),), lanes=lanes,
-        groups=(*scene.groups, group, crowd), weather=Weather(rain_mm_h=5.0),
-    )  # fmt: skip
+        cameras=cameras,
+        lidars=(Lidar("roof", "", SE3((0.0, 0.0, 1.9)), rig="car"),),
+        lanes=lanes,
+        groups=(*scene.groups, group, crowd),
+        weather=Weather(rain_mm_h=5.0),
+    )
 
 
 def _walker(k: int) -> Body:

@@ -61,14 +61,18 @@ def street() -> Scene:
         for k, b in enumerate(boxes, 1)
     ]
     lens = Intrinsics.from_hfov(32, 24, 1.0)
-    return add_twists(Scene(
-        "test", bodies=(*boxes, Body("ground", "ground")), instances=tuple(things),
-        cameras=(Camera("color", SE3(), lens, rig="ego"),),
-        rigs=(Rig("ego", "ego", SE3((0.0, 0.0, 1.0))),),
-        lights=(Light("sun", "sun", direction=(0.0, 0.6, -0.8), illuminance_lux=5e4),),
-        environment=Environment(luminance_cd_m2=3000.0),
-        tracks=tuple(Trajectory(name, 0.1, way) for name, way in poses.items()),
-    ))  # fmt: skip
+    return add_twists(
+        Scene(
+            "test",
+            bodies=(*boxes, Body("ground", "ground")),
+            instances=tuple(things),
+            cameras=(Camera("color", SE3(), lens, rig="ego"),),
+            rigs=(Rig("ego", "ego", SE3((0.0, 0.0, 1.0))),),
+            lights=(Light("sun", "sun", direction=(0.0, 0.6, -0.8), illuminance_lux=5e4),),
+            environment=Environment(luminance_cd_m2=3000.0),
+            tracks=tuple(Trajectory(name, 0.1, way) for name, way in poses.items()),
+        )
+    )
 
 
 def made(kind: str, **fields: Any) -> Any:

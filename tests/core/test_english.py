@@ -22,16 +22,24 @@ BY_HAND = {
     for (one, two), names in ((key.split(), text.split(", ")) for key, text in MEASURES.items())
     for name in names
 } | {
-    "knife": ("a knife", "two knives"), "mouse": ("a mouse", "two mice"),
-    "person": ("a person", "two people"), "shelf": ("a shelf", "two shelves"),
-    "tomato": ("a tomato", "two tomatoes"), "utility pole": ("a utility pole", "two utility poles"),
+    "knife": ("a knife", "two knives"),
+    "mouse": ("a mouse", "two mice"),
+    "person": ("a person", "two people"),
+    "shelf": ("a shelf", "two shelves"),
+    "tomato": ("a tomato", "two tomatoes"),
+    "utility pole": ("a utility pole", "two utility poles"),
     # Of users' own files.
-    "leaf": ("a leaf", "two leaves"), "potato": ("a potato", "two potatoes"),
-    "sheep": ("a sheep", "two sheep"), "umbrella": ("an umbrella", "two umbrellas"),
-    "unicorn": ("a unicorn", "two unicorns"), "hourglass": ("an hourglass", "two hourglasses"),
-    "wine glass": ("a wine glass", "two wine glasses"), "woman": ("a woman", "two women"),
-    "piano": ("a piano", "two pianos"), "photo": ("a photo", "two photos"),
-}  # fmt: skip
+    "leaf": ("a leaf", "two leaves"),
+    "potato": ("a potato", "two potatoes"),
+    "sheep": ("a sheep", "two sheep"),
+    "umbrella": ("an umbrella", "two umbrellas"),
+    "unicorn": ("a unicorn", "two unicorns"),
+    "hourglass": ("an hourglass", "two hourglasses"),
+    "wine glass": ("a wine glass", "two wine glasses"),
+    "woman": ("a woman", "two women"),
+    "piano": ("a piano", "two pianos"),
+    "photo": ("a photo", "two photos"),
+}
 
 
 @cache

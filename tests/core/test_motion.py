@@ -149,27 +149,32 @@ def test_outside_its_knots_a_body_stands_still_and_one_knot_is_no_track() -> Non
 def scene() -> Scene:
     """A car with a lamp, a rig and sensors on it, which drives 1 m in 1 s along X."""
     k = Intrinsics.from_hfov(8, 6, 1.0)
-    return place_sensors(Scene(
-        "test",
-        bodies=(
-            Body("car", "box", SE3(), instance_id=1),
-            Body("tree", "box", SE3((5.0, 5.0, 0.0)), instance_id=2),
-        ),
-        instances=(
-            Instance(1, "car", "car", 1, "box", attributes=(("brake", "off"),)),
-            Instance(2, "tree", "tree", 2, "box"),
-        ),
-        lights=(Light("lamp", "spot", position_m=(2.0, 0.5, 0.6), body="car"), Light("sun", "sun")),
-        cameras=(Camera("color", SE3(), k, rig="ego", T_rig_camera=SE3((1.0, 0.0, 1.5))),),
-        lidars=(Lidar("top", "", SE3((0.0, 0.0, 2.0)), rig="ego"),),
-        devices=(Device("imu", "imu", "ego", SE3((0.1, 0.0, 0.3))),),
-        rigs=(Rig("ego", "car", SE3((0.0, 0.0, 0.1))),),
-        tracks=(Trajectory("car", 1.0, (SE3(), SE3((1.0, 0.0, 0.0)))),),
-        changes=(
-            StateChange(0.5, "car", asset="box?lit", attributes=(("brake", "on"),)),
-            StateChange(0.8, "car", attributes=(("brake", "off"),)),
-        ),
-    ))  # fmt: skip
+    return place_sensors(
+        Scene(
+            "test",
+            bodies=(
+                Body("car", "box", SE3(), instance_id=1),
+                Body("tree", "box", SE3((5.0, 5.0, 0.0)), instance_id=2),
+            ),
+            instances=(
+                Instance(1, "car", "car", 1, "box", attributes=(("brake", "off"),)),
+                Instance(2, "tree", "tree", 2, "box"),
+            ),
+            lights=(
+                Light("lamp", "spot", position_m=(2.0, 0.5, 0.6), body="car"),
+                Light("sun", "sun"),
+            ),
+            cameras=(Camera("color", SE3(), k, rig="ego", T_rig_camera=SE3((1.0, 0.0, 1.5))),),
+            lidars=(Lidar("top", "", SE3((0.0, 0.0, 2.0)), rig="ego"),),
+            devices=(Device("imu", "imu", "ego", SE3((0.1, 0.0, 0.3))),),
+            rigs=(Rig("ego", "car", SE3((0.0, 0.0, 0.1))),),
+            tracks=(Trajectory("car", 1.0, (SE3(), SE3((1.0, 0.0, 0.0)))),),
+            changes=(
+                StateChange(0.5, "car", asset="box?lit", attributes=(("brake", "on"),)),
+                StateChange(0.8, "car", attributes=(("brake", "off"),)),
+            ),
+        )
+    )
 
 
 def test_everything_on_a_moving_body_moves_with_it() -> None:

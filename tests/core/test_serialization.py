@@ -70,8 +70,9 @@ def test_a_scene_survives_json() -> None:
         template="tabletop",
         bodies=(Body("table", "table?seed=1", SE3.about_z(0.3, (1, 2, 3)), mass_kg=2.5),),
         surfaces=(SupportSurface("top", "table", SE3(), (1.2, 0.8), 1.0),),
-        lights=(Light("sun", "sun", illuminance_lux=1000.0),), environment=Environment(yaw_rad=0.5),
-    )  # fmt: skip
+        lights=(Light("sun", "sun", illuminance_lux=1000.0),),
+        environment=Environment(yaw_rad=0.5),
+    )
 
     assert from_plain(Scene, json.loads(canonical_json(scene))) == scene
 

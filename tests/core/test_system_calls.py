@@ -60,9 +60,13 @@ def program(system: str, code: str) -> list[str]:
 
 def run(system: str, code: str, folder: Path) -> str:
     done = subprocess.run(
-        program(system, code), cwd=folder, env={**os.environ, "PYTHONPATH": str(ROOT)},
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
+        program(system, code),
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert done.returncode == 0, done.stderr
     return done.stdout
 
@@ -145,9 +149,11 @@ def test_a_helper_ends_with_its_parent_where_no_kernel_ends_it(tmp_path: Path) -
         child.wait()
     """
     parent = subprocess.Popen(
-        program("", code), env={**os.environ, "PYTHONPATH": str(ROOT)}, stdout=subprocess.PIPE,
+        program("", code),
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        stdout=subprocess.PIPE,
         text=True,
-    )  # fmt: skip
+    )
     assert parent.stdout is not None
     number = int(parent.stdout.readline())
     children = Path(f"/proc/{number}/task/{number}/children")

@@ -26,9 +26,11 @@ def age(path: Path) -> None:
 def test_the_folder_of_a_killed_process_goes_with_the_next(tmp_path: Path) -> None:
     """While its process lives, an old folder stays; afterwards it is removed."""
     process = subprocess.Popen(
-        [sys.executable, "-c", OWNER], env={**os.environ, "TMPDIR": str(tmp_path)},
-        stdout=subprocess.PIPE, text=True,
-    )  # fmt: skip
+        [sys.executable, "-c", OWNER],
+        env={**os.environ, "TMPDIR": str(tmp_path)},
+        stdout=subprocess.PIPE,
+        text=True,
+    )
     assert process.stdout is not None
     folder = Path(process.stdout.readline().strip())
     age(folder)

@@ -11,11 +11,13 @@ def draw_desk(seed: int) -> dict[str, object]:
     """A family in small: a range, a whole number, an option, a chance, and what follows them."""
     rng = variant_rng("desk", seed)
     return {
-        "width_m": rng.between(1.2, 1.8, "width_m"), "shelves": rng.whole(2, 6, "shelves"),
+        "width_m": rng.between(1.2, 1.8, "width_m"),
+        "shelves": rng.whole(2, 6, "shelves"),
         "style": rng.choose(("oak", "steel", "oak"), "style"),
-        "drawers": rng.chance(0.5, "drawers"), "panel": rng.turn((False, True), "panel"),
+        "drawers": rng.chance(0.5, "drawers"),
+        "panel": rng.turn((False, True), "panel"),
         "rest": rng.between(0.0, 1.0),
-    }  # fmt: skip
+    }
 
 
 @pytest.mark.parametrize(

@@ -16,9 +16,14 @@ EXAMPLES = ROOT / "examples"
 def run(folder: Path, *arguments: str, path: str = "") -> str:
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), path])}
     done = subprocess.run(
-        [sys.executable, *arguments], cwd=folder, env=environment, capture_output=True, text=True,
-        check=False, timeout=600,
-    )  # fmt: skip
+        [sys.executable, *arguments],
+        cwd=folder,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=600,
+    )
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 

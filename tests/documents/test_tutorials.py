@@ -55,9 +55,10 @@ SMALLER = {
 """Texts of each page that are replaced, so that it runs within seconds."""
 
 SETUP = (
-    "python3 -m venv .venv && . .venv/bin/activate", "pip install . torch==2.13.0",
+    "python3 -m venv .venv && . .venv/bin/activate",
+    "pip install . torch==2.13.0",
     "pip install . ultralytics-opencv-headless",
-)  # fmt: skip
+)
 """Commands that make the environment in which the tests already run."""
 
 

@@ -46,9 +46,13 @@ def gen_data(*arguments: str, cwd: Path, **variables: str) -> subprocess.Complet
 def _server() -> subprocess.Popen[str]:
     """The process that forks commands; it ends when this one closes its input."""
     return subprocess.Popen(
-        [sys.executable, "-m", "tests.end_to_end.cli_server"], cwd=ROOT, env=environment(),
-        stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
-    )  # fmt: skip
+        [sys.executable, "-m", "tests.end_to_end.cli_server"],
+        cwd=ROOT,
+        env=environment(),
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
 
 
 def _answer(server: subprocess.Popen[str], request: str) -> int:

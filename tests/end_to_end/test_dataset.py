@@ -38,9 +38,13 @@ def test_killed_run_resumes_to_the_same_bytes(dataset: Path, tmp_path: Path) -> 
     """After SIGKILL to the whole process group, the same command resumes."""
     arguments = command(*MAIN_JOB, "--workers", "1", "--out", "killed")
     process = subprocess.Popen(
-        arguments, cwd=tmp_path, env=environment(), stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL, start_new_session=True,
-    )  # fmt: skip
+        arguments,
+        cwd=tmp_path,
+        env=environment(),
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )
     deadline_s = time.monotonic() + 300
     while not list((tmp_path / "killed" / "shards").glob("*.json")):
         assert process.poll() is None, "the run ended before it could be killed"

@@ -14,9 +14,11 @@ from gen_data.runner.deep_verify import find_invalid_samples
 from gen_data.runner.verify import verify
 
 TINY = [
-    "sensors.color.size_px=[48, 32]", "shard_size=2", "randomizers.clutter.count=2",
+    "sensors.color.size_px=[48, 32]",
+    "shard_size=2",
+    "randomizers.clutter.count=2",
     "splits={train: 1}",
-]  # fmt: skip
+]
 FAILS = 1
 
 

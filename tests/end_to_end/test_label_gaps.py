@@ -28,10 +28,14 @@ def room(*sensors: dict[str, Any], **sections: Any) -> dict[str, Any]:
         {"type": "carrier", "name": "cart"},
     ]  # fmt: skip
     return {
-        "elements": elements, "splits": {"train": 1},
-        "randomizers": [{"type": "objects", "name": "balls", "count": 4}], "sensors": [*sensors],
-        "annotations": ["boxes2d", "visibility"], "exporters": [{"type": "coco"}], **sections,
-    }  # fmt: skip
+        "elements": elements,
+        "splits": {"train": 1},
+        "randomizers": [{"type": "objects", "name": "balls", "count": 4}],
+        "sensors": [*sensors],
+        "annotations": ["boxes2d", "visibility"],
+        "exporters": [{"type": "coco"}],
+        **sections,
+    }
 
 
 SEES = {**CAMERA, "name": "color"}

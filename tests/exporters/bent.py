@@ -48,10 +48,14 @@ def opencv_maps(source: Intrinsics, target: Intrinsics) -> Any:
     module = cv2.fisheye if source.lens.model == "kannala_brandt" else cv2
     return np.stack(
         module.initUndistortRectifyMap(
-            opencv_matrix(source), np.array(source.lens.coefficients), np.eye(3),
-            opencv_matrix(target), size, cv2.CV_32FC1,
+            opencv_matrix(source),
+            np.array(source.lens.coefficients),
+            np.eye(3),
+            opencv_matrix(target),
+            size,
+            cv2.CV_32FC1,
         )
-    )  # fmt: skip
+    )
 
 
 def bent_reading(scene: Scene, camera: Camera) -> SensorReading:

@@ -91,12 +91,16 @@ def instance(
     """An object on the ground at (x, y); ``shape`` is ``box`` or ``ellipsoid``."""
     length, width, height = SIZES_M[category]
     return Instance(
-        instance_id=number, name=f"{category}/{number}", category=category,
-        category_id=CATEGORIES.index(category) + 1, asset=f"primitive/{shape}",
+        instance_id=number,
+        name=f"{category}/{number}",
+        category=category,
+        category_id=CATEGORIES.index(category) + 1,
+        asset=f"primitive/{shape}",
         T_world_instance=SE3.about_z(yaw_rad, (x_m, y_m, 0.0)),
-        box_min_m=(-0.5 * length, -0.5 * width, 0.0), box_max_m=(0.5 * length, 0.5 * width, height),
+        box_min_m=(-0.5 * length, -0.5 * width, 0.0),
+        box_max_m=(0.5 * length, 0.5 * width, height),
         keypoints=KEYPOINTS.get(category, ()),
-    )  # fmt: skip
+    )
 
 
 def level_camera(name: str = "color", size_px: tuple[int, int] = (160, 120)) -> Camera:
@@ -185,11 +189,13 @@ def street(index: int) -> tuple[Instance, ...]:
     if index % 4 == 3:
         return ()
     turn = 0.7 * index
-    return (instance(1, "car", 14.0, 3.0 - 0.4 * index, turn),
-            instance(2, "pedestrian", 9.0, -2.0, 1.0 + turn),
-            instance(3, "crate", 8.0, 1.6, -turn, shape="ellipsoid"),
-            instance(4, "crate", 12.0, 2.2, 0.3),
-            instance(7, "pedestrian", 7.0, -4.6 + 0.1 * index, turn))  # fmt: skip
+    return (
+        instance(1, "car", 14.0, 3.0 - 0.4 * index, turn),
+        instance(2, "pedestrian", 9.0, -2.0, 1.0 + turn),
+        instance(3, "crate", 8.0, 1.6, -turn, shape="ellipsoid"),
+        instance(4, "crate", 12.0, 2.2, 0.3),
+        instance(7, "pedestrian", 7.0, -4.6 + 0.1 * index, turn),
+    )
 
 
 def make_sample(
@@ -261,11 +267,14 @@ def driving_scene() -> Scene:
         for name, y_m in (("left", 0.0), ("right", -0.54))
     )
     scene = Scene(
-        "street", bodies=(*bodies, Body("ego", "car")), instances=things, cameras=cameras,
+        "street",
+        bodies=(*bodies, Body("ego", "car")),
+        instances=things,
+        cameras=cameras,
         lidars=(Lidar("top", "", SE3((0.0, 0.0, 1.73)), model="VLP-16", rig="ego"),),
         rigs=(Rig("ego", "ego"),),
         tracks=tuple(Trajectory(name, STEP_S, tuple(way), -0.2) for name, way in ways.items()),
-    )  # fmt: skip
+    )
     return add_twists(place_sensors(scene))
 
 
@@ -412,9 +421,14 @@ def make_info(
         for name, kind in kinds.items()
     ]
     info = DatasetInfo(
-        name="street", seed=7, n=n, views_per_scene=1, categories=CATEGORIES,
-        sensors=tuple(sensors), depth_scale_m=0.001,
-    )  # fmt: skip
+        name="street",
+        seed=7,
+        n=n,
+        views_per_scene=1,
+        categories=CATEGORIES,
+        sensors=tuple(sensors),
+        depth_scale_m=0.001,
+    )
     return replace(info, **changes)
 
 
@@ -478,10 +492,13 @@ class Props:
         solid = trimesh.creation.box() if box else trimesh.creation.icosphere(4, radius=0.5)
         vertices = (solid.vertices + np.array([0.0, 0.0, 0.5])) * (length, width, height)
         return asset_types.MeshData(
-            np.asarray(vertices, np.float32), np.asarray(solid.faces, np.int32),
-            np.asarray(solid.vertex_normals, np.float32), np.zeros((len(vertices), 2), np.float32),
-            np.zeros(len(solid.faces), np.int32), (asset_types.Material(),),
-        )  # fmt: skip
+            np.asarray(vertices, np.float32),
+            np.asarray(solid.faces, np.int32),
+            np.asarray(solid.vertex_normals, np.float32),
+            np.zeros((len(vertices), 2), np.float32),
+            np.zeros(len(solid.faces), np.int32),
+            (asset_types.Material(),),
+        )
 
     def materials(self, asset_id: str) -> tuple[asset_types.Material, ...]:
         return ()

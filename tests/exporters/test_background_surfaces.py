@@ -32,7 +32,7 @@ class Ground:
         slots = np.repeat(np.arange(3, dtype=np.int32), 2)
         return MeshData(
             vertices, faces.astype(np.int32), vertices * 0, empty, slots, self.materials("")
-        )  # fmt: skip
+        )
 
 
 def surfaces(world: Any, folder: Path, **changes: Any) -> tuple[Any, NDArray[Any]]:

@@ -235,8 +235,11 @@ def test_robots_and_ignored_objects_are_left_out(world: Any, tmp_path: Path) -> 
     changed = world.ignoring(replace(sample, scene=replace(sample.scene, articulations=(robot,))))
     root = world.export(Bop(), world.info(1), [changed], tmp_path)
     assets = [v["asset"] for v in read(root / "objects.json").values()]
-    assert assets == ["primitive/box/crate", "primitive/box/pedestrian",
-                      "primitive/ellipsoid/crate"]  # fmt: skip
+    assert assets == [
+        "primitive/box/crate",
+        "primitive/box/pedestrian",
+        "primitive/ellipsoid/crate",
+    ]
     assert len(read(root / "train/000000/scene_gt.json")["0"]) == len(truth.objects) - 2
 
 

@@ -87,13 +87,19 @@ def in_tum(folder: Path) -> Camera:
 READERS: dict[str, Callable[[Path], Camera]] = {
     "bop": lambda f: document(f / "camera.json", "fx", "fy", "cx", "cy"),
     "cityscapes": lambda f: document(min(f.rglob("*_camera.json")), "fx", "fy", "u0", "v0"),
-    "coco": in_coco, "croissant": in_croissant, "hdf5": in_hdf5, "huggingface": in_parquet,
+    "coco": in_coco,
+    "croissant": in_croissant,
+    "hdf5": in_hdf5,
+    "huggingface": in_parquet,
     "kitti": lambda f: (
-        calibration(f / "training/calib/000000.txt")["P2"].reshape(3, 4)[:, :3], "", ()
+        calibration(f / "training/calib/000000.txt")["P2"].reshape(3, 4)[:, :3],
+        "",
+        (),
     ),
     "scannet": lambda f: (np.loadtxt(min(f.rglob("intrinsic_depth.txt")))[:3, :3], "", ()),
-    "tfrecord": in_records, "tum_rgbd": in_tum,
-}  # fmt: skip
+    "tfrecord": in_records,
+    "tum_rgbd": in_tum,
+}
 
 
 @pytest.mark.parametrize("kind", READERS)

@@ -40,10 +40,12 @@ def files_of(root: Path, index: int) -> dict[str, Path]:
     """Files of a frame of the split train by their suffix."""
     stem = f"street/street_{index:06d}_000000_"
     gt = root / "gtFine/train"
-    return {**{k: gt / f"{stem}gtFine_{k}.png" for k in ("labelIds", "instanceIds", "color")},
-            "polygons": gt / f"{stem}gtFine_polygons.json",
-            "camera": root / f"camera/train/{stem}camera.json",
-            "image": root / f"leftImg8bit/train/{stem}leftImg8bit.png"}  # fmt: skip
+    return {
+        **{k: gt / f"{stem}gtFine_{k}.png" for k in ("labelIds", "instanceIds", "color")},
+        "polygons": gt / f"{stem}gtFine_polygons.json",
+        "camera": root / f"camera/train/{stem}camera.json",
+        "image": root / f"leftImg8bit/train/{stem}leftImg8bit.png",
+    }
 
 
 def pixels(path: Path) -> Any:

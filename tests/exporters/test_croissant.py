@@ -20,8 +20,13 @@ def dataset(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def published(world: Any, licence: str = "") -> DatasetInfo:
-    publication = Publication(license=licence, url="https://example.org", cite_as="nobody",
-                              date_published="2026-01-31", creators=("A. Author",))  # fmt: skip
+    publication = Publication(
+        license=licence,
+        url="https://example.org",
+        cite_as="nobody",
+        date_published="2026-01-31",
+        creators=("A. Author",),
+    )
     return replace(world.info(7), publication=publication)
 
 

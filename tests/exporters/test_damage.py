@@ -127,8 +127,13 @@ CHANGES: dict[str, tuple[Callable[[Any], Any], ...]] = {
     "arms": (everywhere(JointTrajectory, knots=raised),),
     "boxes": (everywhere(ObjectTruth, box=moved),),
     "cameras": (everywhere(Camera, T_world_camera=aside, T_rig_camera=aside),),
-    "categories": (everywhere(Instance, category=lambda name: EXCHANGED.get(name, name),
-                              category_id=lambda k: EXCHANGED.get(k, k)),),
+    "categories": (
+        everywhere(
+            Instance,
+            category=lambda name: EXCHANGED.get(name, name),
+            category_id=lambda k: EXCHANGED.get(k, k),
+        ),
+    ),
     "centres": (everywhere(Camera, intrinsics=shift_centre),),
     "corners": (everywhere(ObjectTruth, oriented_box=lambda c: (*c[1:], c[0])),),
     "depths": (pixels(Channel.Z_DEPTH, lambda a: a * np.float32(1.05)),),
@@ -145,12 +150,14 @@ CHANGES: dict[str, tuple[Callable[[Any], Any], ...]] = {
     "points": (records(PointCloud, "points", "position_m", lambda p: p[:, ::-1]),),
     "poses": (everywhere(ObjectTruth, T_camera_object=aside),),
     "shares": (everywhere(ObjectTruth, visible_fraction=lambda _: 0.0, occlusion=lambda s: 1 - s),),
-    "solids": (everywhere(Instance, box_min_m=narrow, box_max_m=narrow),
-               everywhere(OrientedBox, size_m=narrow)),
+    "solids": (
+        everywhere(Instance, box_min_m=narrow, box_max_m=narrow),
+        everywhere(OrientedBox, size_m=narrow),
+    ),
     "surroundings": (everywhere(EgoTruth, boxes3d=everywhere(OrientedBox, size_m=narrow)),),
     "texts": (everywhere(Utterance, answer=lambda _: "many"),),
     "times": (everywhere(Scene, PointCloud, SensorReading, time_s=lambda t: 1.5 * t + 0.05),),
-}  # fmt: skip
+}
 """Changed facts."""
 
 

@@ -23,10 +23,15 @@ from tests.randomizers.doubles import two_link_arm
 
 INSTRUCTION = "Put the crate on the mat."
 EPISODE = Episode(
-    False, "slip", (Span("pick", 0.0, 0.2), Span("place", 0.2, 0.4)), (Span("crate/0", 0.1, 0.3),),
-    (ContactSpan("arm/finger + crate/0", 0.1, 0.3, 0.1, (1.5, 2.5), ((0.1, 0.2, 0.3),) * 2),
-     ContactSpan("crate/0 + table", 0.2, 0.3, 0.1, (9.81,), ((0.0, 0.5, 0.75),))),
-)  # fmt: skip
+    False,
+    "slip",
+    (Span("pick", 0.0, 0.2), Span("place", 0.2, 0.4)),
+    (Span("crate/0", 0.1, 0.3),),
+    (
+        ContactSpan("arm/finger + crate/0", 0.1, 0.3, 0.1, (1.5, 2.5), ((0.1, 0.2, 0.3),) * 2),
+        ContactSpan("crate/0 + table", 0.2, 0.3, 0.1, (9.81,), ((0.0, 0.5, 0.75),)),
+    ),
+)
 
 
 def demonstrated(world: Any) -> Any:

@@ -30,8 +30,10 @@ def test_parquet_files_embed_images_and_name_and_card_count_them(dataset: Path, 
             assert row[column]["bytes"] == stored
     # Names have the number of files of their split; no other file is there.
     names = sorted(p.name for p in (dataset / "data").iterdir())
-    assert names == [*(f"train-{k:05d}-of-00003.parquet" for k in range(3)),
-                     "val-00000-of-00001.parquet"]  # fmt: skip
+    assert names == [
+        *(f"train-{k:05d}-of-00003.parquet" for k in range(3)),
+        "val-00000-of-00001.parquet",
+    ]
     assert sorted(p.name for p in dataset.iterdir()) == ["README.md", "data"]
     # Without num_bytes, datasets ignores a split's numbers.
     facts = card(dataset)

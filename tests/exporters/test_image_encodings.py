@@ -208,9 +208,7 @@ COCO = "annotations/{}_train.json"
 PHOTOGRAPHS: dict[str, Callable[[Path], Path]] = {
     # By number, as bop_toolkit looks for either ending.
     "bop": lambda f: next((f / "train/000000/rgb").glob("000000.*")),
-    "coco": lambda f: (
-        f / "train" / document(f, COCO.format("instances"))["images"][0]["file_name"]
-    ),
+    "coco": lambda f: f / "train" / document(f, COCO.format("instances"))["images"][0]["file_name"],
     "coco_panoptic": lambda f: (
         f / "train" / document(f, COCO.format("panoptic"))["images"][0]["file_name"]
     ),
@@ -218,20 +216,29 @@ PHOTOGRAPHS: dict[str, Callable[[Path], Path]] = {
         f / "train" / json_lines(f / "train/metadata.jsonl")[0]["image_file_name"]
     ),
     "cvat": lambda f: f / "train/images" / named_in_xml(f / "train/annotations.xml", "image"),
-    "label_studio": lambda f: f / unquote(
-        document(f, "train/tasks.json")[0]["data"]["image"]
-    ).partition("=label_studio/")[2],
-    "voc": lambda f: f / "VOCdevkit/VOC2012/JPEGImages" / named_in_xml(
-        next((f / "VOCdevkit/VOC2012/Annotations").iterdir()), "filename"
+    "label_studio": lambda f: (
+        f
+        / unquote(document(f, "train/tasks.json")[0]["data"]["image"]).partition("=label_studio/")[
+            2
+        ]
+    ),
+    "voc": lambda f: (
+        f
+        / "VOCdevkit/VOC2012/JPEGImages"
+        / named_in_xml(next((f / "VOCdevkit/VOC2012/Annotations").iterdir()), "filename")
     ),
     "yolo": lambda f: next((f / "detect/images/train").iterdir()),
-}  # fmt: skip
+}
 """The file that the first entry of a data set names."""
 READERS: dict[str, Callable[[Path], Found]] = {
-    "huggingface": in_parquet, "mcap": in_mcap, "rerun": in_recording, "solo": in_solo,
-    "tfrecord": in_records, "webdataset": in_tar,
+    "huggingface": in_parquet,
+    "mcap": in_mcap,
+    "rerun": in_recording,
+    "solo": in_solo,
+    "tfrecord": in_records,
+    "webdataset": in_tar,
     **{kind: lambda f, path=path: file_of(path(f)) for kind, path in PHOTOGRAPHS.items()},
-}  # fmt: skip
+}
 OPTIONS: dict[str, Any] = {"voc": {"images": "png"}, "yolo": {"tasks": ("detect",)}}
 STATED = {"mcap": {"jpeg": "jpeg", "webp": "webp"}, "rerun": {"jpeg": "image/jpeg"},
           "solo": {"jpeg": "Jpg"}, "tfrecord": {"jpeg": "jpeg"}}  # fmt: skip

@@ -105,8 +105,10 @@ def test_every_frame_has_both_images_and_those_of_the_next_step_and_a_split(tree
         assert first == second
     # The first sequence is for training, the second for validation.
     listed = {k: (tree / f"ImageSets/{k}.txt").read_text().split() for k in ("train", "val")}
-    assert listed == {"train": [f"{k:06d}" for k in range(3)],
-                      "val": [f"{k:06d}" for k in range(4, 7)]}  # fmt: skip
+    assert listed == {
+        "train": [f"{k:06d}" for k in range(3)],
+        "val": [f"{k:06d}" for k in range(4, 7)],
+    }
 
 
 def test_without_flow_the_last_step_is_a_frame_too(world: Any, tmp_path: Path) -> None:

@@ -30,9 +30,15 @@ def test_mot_rows_count_from_1_and_sequences_describe_them(exported: Any, sample
     folder = exported(MotChallenge())
     ini = configparser.ConfigParser()
     ini.read(folder / "street-train/street-0000/seqinfo.ini")
-    assert dict(ini["Sequence"]) == {"name": "street-0000", "imdir": "img1", "framerate": "10",
-                                     "seqlength": "4", "imwidth": "160", "imheight": "120",
-                                     "imext": ".png"}  # fmt: skip
+    assert dict(ini["Sequence"]) == {
+        "name": "street-0000",
+        "imdir": "img1",
+        "framerate": "10",
+        "seqlength": "4",
+        "imwidth": "160",
+        "imheight": "120",
+        "imext": ".png",
+    }
     assert (folder / "seqmaps/street-val.txt").read_text() == "name\nstreet-0001\n"
 
 
@@ -62,8 +68,11 @@ def trackeval_scores(dataset: Any, sequence: str, name: str) -> dict[str, float]
     results, _ = evaluator.evaluate([dataset], judges)
     (tracked,) = results.values()
     row = tracked["truth"][sequence][name]
-    return {"HOTA": float(row["HOTA"]["HOTA"].mean()), "MOTA": float(row["CLEAR"]["MOTA"]),
-            "IDF1": float(row["Identity"]["IDF1"])}  # fmt: skip
+    return {
+        "HOTA": float(row["HOTA"]["HOTA"].mean()),
+        "MOTA": float(row["CLEAR"]["MOTA"]),
+        "IDF1": float(row["Identity"]["IDF1"]),
+    }
 
 
 @pytest.mark.slow

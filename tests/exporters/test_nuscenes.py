@@ -135,9 +135,15 @@ def test_the_lowest_laser_is_ring_0_and_radar_files_have_the_fields_of_the_devic
     points["ring"] = [0, 30, 31]
     rings = np.frombuffer(nuscenes_files.lidar_bytes(points, 0), "<f4").reshape(-1, 5)[:, 4]
     assert rings.tolist() == [31, 1, 0]
-    rows = table_rows(Radar.columns, 2, range_m=[10.0, 20.0], azimuth_rad=[np.pi / 6, 0.0],
-                      velocity_m_s=[-8.0, -5.0], velocity_compensated_m_s=[-3.0, 0.1],
-                      rcs_dbsm=[12.5, 3.0])  # fmt: skip
+    rows = table_rows(
+        Radar.columns,
+        2,
+        range_m=[10.0, 20.0],
+        azimuth_rad=[np.pi / 6, 0.0],
+        velocity_m_s=[-8.0, -5.0],
+        velocity_compensated_m_s=[-3.0, 0.1],
+        rcs_dbsm=[12.5, 3.0],
+    )
     head, body = nuscenes_files.radar_bytes(rows).split(b"DATA binary\n")
     points = np.frombuffer(body[:-1], nuscenes_files.RADAR_POINT)
     assert nuscenes_files.RADAR_POINT.itemsize == 43

@@ -78,8 +78,10 @@ def detection_faults(devkit: Any, predicted: Callable[[Any], Any], folder: Path)
                 yield f"{name}: {error} {metrics.get_label_tp(name, error):.3f}"
 
 
-META = {f"use_{name}": name in ("camera", "lidar", "radar")
-        for name in ("camera", "lidar", "radar", "map", "external")}  # fmt: skip
+META = {
+    f"use_{name}": name in ("camera", "lidar", "radar")
+    for name in ("camera", "lidar", "radar", "map", "external")
+}
 
 
 def predictions(devkit: Any) -> dict[str, list[dict[str, Any]]]:

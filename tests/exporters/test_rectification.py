@@ -51,19 +51,25 @@ def test_the_default_pinhole_and_its_points_are_opencvs_without_empty_pixels() -
     source = LENSES["brown_conrady"]
     target = rectified_intrinsics(source, Rectify())
     K, _ = cv2.getOptimalNewCameraMatrix(
-        opencv_matrix(source), np.array(source.lens.coefficients), (160, 120), 0.0,
+        opencv_matrix(source),
+        np.array(source.lens.coefficients),
+        (160, 120),
+        0.0,
         centerPrincipalPoint=True,
-    )  # fmt: skip
+    )
     np.testing.assert_allclose(opencv_matrix(target), K, rtol=2e-3)
     assert target.fx_px / target.fy_px == pytest.approx(118.0 / 117.0)
     # Keypoints: ``cv2.undistortPoints`` with the new matrix.
     bent = Rectification(source, rectified_intrinsics(source, Rectify()))
     points = np.array([[20.3, 30.8], [80.0, 60.0], [150.1, 100.9]])
     theirs = cv2.undistortPoints(
-        (points - 0.5).reshape(-1, 1, 2), opencv_matrix(source), np.array(source.lens.coefficients),
-        R=np.eye(3), P=opencv_matrix(bent.target),
+        (points - 0.5).reshape(-1, 1, 2),
+        opencv_matrix(source),
+        np.array(source.lens.coefficients),
+        R=np.eye(3),
+        P=opencv_matrix(bent.target),
         criteria=(cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_COUNT, 100, 1e-12),
-    )  # fmt: skip
+    )
     np.testing.assert_allclose(bent.points(points) - 0.5, theirs[:, 0], atol=1e-6)
 
 

@@ -80,8 +80,10 @@ def test_recordings_hold_the_samples_and_the_tool_verifies_them(dataset: Path, w
     """Poses, pinholes, boxes, classes, and the bytes of the photographs."""
     assert problems(dataset, dataset.parent / "shards", world) == []
     assert [p.relative_to(dataset).as_posix() for p in sorted(dataset.glob("*/*"))] == [
-        "train/000000.rrd", "train/000001.rrd", "val/000000.rrd",
-    ]  # fmt: skip
+        "train/000000.rrd",
+        "train/000001.rrd",
+        "val/000000.rrd",
+    ]
     # The footer, which is written again, fits the chunks; a cut file does not pass.
     path = dataset / "train/000000.rrd"
     cut = dataset.parent / "cut.rrd"

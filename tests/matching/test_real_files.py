@@ -39,8 +39,12 @@ def test_photographs_are_read_and_all_else_is_counted_with_reasons(tmp_path: Pat
     assert photos[1].size_px == (200, 80)
     assert inventory.used["photographs"] == 2
     reasons = {why.split(" (")[0]: n for (_, why), n in inventory.skipped.items()}
-    assert reasons == {"unreadable image": 1, "smaller than 64 px": 1, "without colours": 1,
-                       "a label or depth image": 1}  # fmt: skip
+    assert reasons == {
+        "unreadable image": 1,
+        "smaller than 64 px": 1,
+        "without colours": 1,
+        "a label or depth image": 1,
+    }
     table = inventory_rows(inventory)
     assert table[0] == ("photographs", "6", "2", "4", "1 of 96 x 80 px, 1 of 200 x 80 px")
 

@@ -89,12 +89,14 @@ def test_an_arm_gets_its_meshes_and_fingers(package: Path, tmp_path: Path) -> No
     mesh = library.mesh("arms/mini/base_link")
     assert len(mesh.faces) == 3
     assert library.bounds_m("arms/mini/base_link") == (
-        pytest.approx((0.0, 0.0, 3.0), abs=1e-6), pytest.approx((1.0, 2.0, 3.5), abs=1e-6),
-    )  # fmt: skip
+        pytest.approx((0.0, 0.0, 3.0), abs=1e-6),
+        pytest.approx((1.0, 2.0, 3.5), abs=1e-6),
+    )
     colors = sorted(material.base_color for material in mesh.materials)
     assert colors == [
-        pytest.approx((0.1, 0.2, 0.4), abs=1e-3), pytest.approx((0.5, 0.5, 0.5), abs=1e-3),
-    ]  # fmt: skip
+        pytest.approx((0.1, 0.2, 0.4), abs=1e-3),
+        pytest.approx((0.5, 0.5, 0.5), abs=1e-3),
+    ]
     assert robot.gripper is not None and robot.gripper.cup is None
     assert robot.workspace_from_m == 0.2
     assert robot.home[0] == 0.5

@@ -48,11 +48,13 @@ def test_a_material_of_few_triangles_is_left_alone() -> None:
     """Each of them may be one whole side of a box."""
     large, small = sheet(40, textured=False), sheet(3, textured=False)
     both = TriangleSoup(
-        np.concatenate([large.corners, small.corners + 2.0]), None, None,
+        np.concatenate([large.corners, small.corners + 2.0]),
+        None,
+        None,
         np.repeat([0, 1], [len(large), len(small)]),
         np.zeros(len(large) + len(small), dtype=np.int64),
         (large.slots[0], MaterialSlot("lid", Material(roughness=0.9))),
-    )  # fmt: skip
+    )
     thinned = decimate(both, 400)
     assert (thinned.face_slots == 1).sum() == 18
     assert (thinned.face_slots == 0).sum() < 600

@@ -28,10 +28,16 @@ def installed_box(tmp_path: Path, side: str) -> None:
     with zipfile.ZipFile(archive, "w") as file:
         file.writestr("data/box.obj", BOX.replace("v 1", f"v {side}"))
     pack = Pack(
-        name="boxes", summary="a box", client="pip", package="package", version="1.0",
-        sha256=sha256(archive.read_bytes()).hexdigest(), licence="CC-BY-3.0", wanted=("data/*",),
+        name="boxes",
+        summary="a box",
+        client="pip",
+        package="package",
+        version="1.0",
+        sha256=sha256(archive.read_bytes()).hexdigest(),
+        licence="CC-BY-3.0",
+        wanted=("data/*",),
         converter="tests.packs.converters:box",
-    )  # fmt: skip
+    )
     install(pack, packs_dir(), archive)
 
 

@@ -31,10 +31,16 @@ def archive(tmp_path: Path) -> Path:
 @pytest.fixture
 def pack(archive: Path) -> Pack:
     return Pack(
-        name="boxes", summary="a box", client="pip", package="package", version="1.0",
-        sha256=sha256(archive.read_bytes()).hexdigest(), licence="CC-BY-3.0", wanted=("data/*",),
+        name="boxes",
+        summary="a box",
+        client="pip",
+        package="package",
+        version="1.0",
+        sha256=sha256(archive.read_bytes()).hexdigest(),
+        licence="CC-BY-3.0",
+        wanted=("data/*",),
         converter="tests.packs.converters:box",
-    )  # fmt: skip
+    )
 
 
 @pytest.fixture

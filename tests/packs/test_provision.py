@@ -153,6 +153,7 @@ def test_programs_open_the_library_that_provides_them() -> None:
         if "open_library(" in path.read_text("utf-8")
     }
     assert opened == {
-        "generator/assets/library.py", "generator/cli/asset_commands.py",
+        "generator/assets/library.py",
+        "generator/cli/asset_commands.py",
         "generator/packs/provision.py",
-    }  # fmt: skip
+    }

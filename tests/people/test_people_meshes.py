@@ -180,8 +180,9 @@ def test_a_pose_is_the_same_whatever_the_same_person_did_before() -> None:
     first = simple_person(7, "walk", 0.25).mesh
     simple_person(7, "sit", 0.0)
     again, fresh = (
-        simple_person(7, "walk", 0.25).mesh, made(draw_person(7, "walk", 0.25), "simple"),
-    )  # fmt: skip
+        simple_person(7, "walk", 0.25).mesh,
+        made(draw_person(7, "walk", 0.25), "simple"),
+    )
     for name in ("vertices_m", "normals", "faces", "face_slots"):
         expected = getattr(first, name).tobytes()
         assert getattr(again, name).tobytes() == expected

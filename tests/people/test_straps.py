@@ -15,9 +15,10 @@ def test_a_strap_lies_on_the_clothes_and_never_below_them() -> None:
     out = np.stack([np.cos(turn), np.sin(turn), 0.0 * turn], axis=2).reshape(-1, 3)
     skin = out * radius.reshape(-1, 1) + np.stack([0.0 * z, 0.0 * z, z], axis=2).reshape(-1, 3)
     carrier = SimpleNamespace(
-        surface=(skin, skin, out), scale=1.0,
+        surface=(skin, skin, out),
+        scale=1.0,
         person=SimpleNamespace(outfit=SimpleNamespace(bag_material=Material())),
-    )  # fmt: skip
+    )
     course = [(0.1, 0.1, 0.58), (0.13, 0.06, 0.43), (0.13, 0.06, 0.28), (0.1, 0.1, 0.18)]
 
     strap = _strap(carrier, course, 0.05)  # type: ignore[arg-type]

@@ -68,9 +68,12 @@ def cylinder(
     angle = np.arange(24) * 2 * math.pi / 24
     ring = np.stack([np.cos(angle), np.sin(angle), np.zeros(24)], axis=1)
     top = radius_m if top_radius_m is None else top_radius_m
-    return np.concatenate([
-        ring * radius_m + [0, 0, z_m - height_m / 2], ring * top + [0, 0, z_m + height_m / 2],
-    ])  # fmt: skip
+    return np.concatenate(
+        [
+            ring * radius_m + [0, 0, z_m - height_m / 2],
+            ring * top + [0, 0, z_m + height_m / 2],
+        ]
+    )
 
 
 def ball(radius_m: float) -> np.ndarray:
@@ -100,10 +103,12 @@ def tray(x: float, y: float, z: float, wall_m: float) -> tuple[np.ndarray, ...]:
     """An open bin: floor and four walls of one thickness, outer size x, y, z."""
     side = (x - wall_m) / 2, (y - wall_m) / 2
     return (
-        box(x, y, wall_m, at=(0, 0, (wall_m - z) / 2)), box(wall_m, y, z, at=(side[0], 0, 0)),
-        box(wall_m, y, z, at=(-side[0], 0, 0)), box(x, wall_m, z, at=(0, side[1], 0)),
+        box(x, y, wall_m, at=(0, 0, (wall_m - z) / 2)),
+        box(wall_m, y, z, at=(side[0], 0, 0)),
+        box(wall_m, y, z, at=(-side[0], 0, 0)),
+        box(x, wall_m, z, at=(0, side[1], 0)),
         box(x, wall_m, z, at=(0, -side[1], 0)),
-    )  # fmt: skip
+    )
 
 
 def _thinned(points: np.ndarray) -> np.ndarray:
@@ -126,9 +131,12 @@ def gantry() -> RobotModel:
             hinge("shoulder", "post", "upper", (0, 0, 0.1)),
             hinge("elbow", "upper", "fore", (0.3, 0, 0)),
         ),
-        visuals=bars, collisions=bars, home=(0.0, 0.5), gripper=None,
+        visuals=bars,
+        collisions=bars,
+        home=(0.0, 0.5),
+        gripper=None,
         no_collide=frozenset({("upper", "fore")}),
-    )  # fmt: skip
+    )
 
 
 ROBOTS = {"panda": cache(panda), "gantry": gantry}

@@ -34,13 +34,19 @@ def panda() -> RobotModel:
     chain = [name for name in ("panda_link0", *(j.child for j in joints)) if name in meshes]
     neighbours = {(a, b) for k, a in enumerate(chain) for b in chain[k + 1 : k + 3]}
     return RobotModel(
-        links=("panda_link0", *(j.child for j in joints)), joints=joints, visuals=assets,
-        collisions=assets, home=HOME,
+        links=("panda_link0", *(j.child for j in joints)),
+        joints=joints,
+        visuals=assets,
+        collisions=assets,
+        home=HOME,
         gripper=Gripper(
-            HAND, SE3((0.0, 0.0, 0.105)), ("panda_finger_joint1", "panda_finger_joint2"), 0.08,
+            HAND,
+            SE3((0.0, 0.0, 0.105)),
+            ("panda_finger_joint1", "panda_finger_joint2"),
+            0.08,
         ),
         no_collide=frozenset({*neighbours, ("panda_hand", "panda_rightfinger")}),
-    )  # fmt: skip
+    )
 
 
 def mesh_vertices(link: str) -> np.ndarray:

@@ -31,8 +31,10 @@ def test_a_world_that_is_never_closed_leaves_no_folder(tmp_path: Path) -> None:
     done = subprocess.run(
         [sys.executable, "-c", code],
         env={"PATH": "", "TMPDIR": str(tmp_path), "PYTHONPATH": str(Path(__file__).parents[2])},
-        capture_output=True, text=True, check=True,
-    )  # fmt: skip
+        capture_output=True,
+        text=True,
+        check=True,
+    )
 
     assert done.stdout.strip() == "1"
     assert not list(tmp_path.iterdir())

@@ -41,11 +41,14 @@ def hand_robot() -> RobotModel:
         for side in PADS
     ]
     return RobotModel(
-        links=("palm", "left", "right", "left_pad", "right_pad"), joints=(*fingers, *pads),
-        visuals={}, collisions={link: link for link in COLLISIONS}, home=(0.04, 0.04),
+        links=("palm", "left", "right", "left_pad", "right_pad"),
+        joints=(*fingers, *pads),
+        visuals={},
+        collisions={link: link for link in COLLISIONS},
+        home=(0.04, 0.04),
         gripper=Gripper("palm", SE3((0.0, 0.0, 0.07)), ("left_slide", "right_slide"), STROKE_M),
         no_collide=frozenset(),
-    )  # fmt: skip
+    )
 
 
 def tube(inner_m: float, outer_m: float, height_m: float) -> tuple[np.ndarray, ...]:

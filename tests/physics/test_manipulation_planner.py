@@ -41,8 +41,9 @@ def pick_and_place(asset: str = "box 0.05 0.03 0.06") -> Scene:
     """A thing at (0.1, 0.1) is carried past a can to TARGET, a quarter turn on."""
     scene = table_scene(
         thing("it", asset, x=0.1, y=0.1, above_m=0.05),
-        thing("can", "cylinder 0.03 0.12", x=0.12, y=-0.05, above_m=0.07), placement="scatter",
-    )  # fmt: skip
+        thing("can", "cylinder 0.03 0.12", x=0.12, y=-0.05, above_m=0.07),
+        placement="scatter",
+    )
     grasp = ArmGoal("grasp", objects=("it",), speed=SPEED)
     place = ArmGoal("place", pose_candidates=(spot(*TARGET, 0.5 * math.pi),), speed=SPEED)
     return going(scene, grasp, place)

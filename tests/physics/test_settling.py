@@ -235,11 +235,13 @@ def test_objects_on_neighbouring_tables_do_not_meet_each_others_walls(
     scene = replace(
         scene,
         bodies=(
-            *scene.bodies, Body("annex", "box 0.6 0.8 0.04", SE3((0.9, 0, TABLE_TOP_Z_M - 0.02))),
+            *scene.bodies,
+            Body("annex", "box 0.6 0.8 0.04", SE3((0.9, 0, TABLE_TOP_Z_M - 0.02))),
             far,
         ),
-        surfaces=(*scene.surfaces, other), groups=(*scene.groups, group),
-    )  # fmt: skip
+        surfaces=(*scene.surfaces, other),
+        groups=(*scene.groups, group),
+    )
 
     x, y, z = settled(engine, scene).body("far").T_world_body.translation_m
 

@@ -14,8 +14,9 @@ SMALL = (
     "sensors.color.size_px=[200, 160]",
     "sensors.color.lens={model: kannala_brandt, k1: 0.02, k2: -0.005}",
     "randomizers.lens.hfov_deg={uniform: [90, 110]}",
-    "randomizers.lens.lens={k1: {uniform: [0.0, 0.04]}}", "exporters=[{type: coco}]",
-)  # fmt: skip
+    "randomizers.lens.lens={k1: {uniform: [0.0, 0.04]}}",
+    "exporters=[{type: coco}]",
+)
 
 
 @pytest.fixture(scope="module")
@@ -47,9 +48,12 @@ def test_objects_are_where_opencv_projects_their_boxes(samples: list[Sample]) ->
                 continue
             # Edges bow outwards by less than two pixels at this size.
             places, _ = cv2.fisheye.projectPoints(
-                corners[:, None], np.zeros(3), np.zeros(3), k.matrix(),
+                corners[:, None],
+                np.zeros(3),
+                np.zeros(3),
+                k.matrix(),
                 np.array(k.lens.coefficients),
-            )  # fmt: skip
+            )
             low, high = places[:, 0].min(axis=0) - 2.0, places[:, 0].max(axis=0) + 2.0
             assert low[0] <= item.box.x_min and item.box.x_max <= high[0]
             assert low[1] <= item.box.y_min and item.box.y_max <= high[1]

@@ -11,9 +11,12 @@ from gen_data.assemble.pipeline_factory import PipelineFactory
 from gen_data.core.sample import Sample
 
 SMALL = (
-    "sensors[0].size_px=[128, 64]", "sensors[1].model=VLP-16", "sensors[1].ideal=true",
-    "sensors[1].motion_distortion=none", "sensors[2].size_px=[64, 32]",
-)  # fmt: skip
+    "sensors[0].size_px=[128, 64]",
+    "sensors[1].model=VLP-16",
+    "sensors[1].ideal=true",
+    "sensors[1].motion_distortion=none",
+    "sensors[2].size_px=[64, 32]",
+)
 
 
 @pytest.fixture(scope="module")

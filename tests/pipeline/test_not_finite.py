@@ -102,9 +102,12 @@ def moved_camera(value: float) -> Callable[[Scene], Scene]:
     (moved_camera, r"cameras(\[0\]\.T_world_camera| 'color': its pose is not rigid)"),
 ])  # fmt: skip
 def test_a_scene_with_nan_or_infinity_is_an_error_with_its_field(
-    pipeline: Pipeline, plant: Callable[[float], Callable[[Scene], Scene]], field: str,
-    value: float, tmp_path: Path,
-) -> None:  # fmt: skip
+    pipeline: Pipeline,
+    plant: Callable[[float], Callable[[Scene], Scene]],
+    field: str,
+    value: float,
+    tmp_path: Path,
+) -> None:
     """Light, material and pose; whether or not a kernel's clamp hides it from the image."""
     with pytest.raises(SampleError, match=field):
         write_alone(planted(pipeline, plant(value)), 0, tmp_path)

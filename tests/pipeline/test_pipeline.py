@@ -90,9 +90,12 @@ class OneCamera:
 
 
 def pipeline(
-    *randomizers: Any, physics: Any = None, seed: int = 7, views_per_scene: int = 3,
+    *randomizers: Any,
+    physics: Any = None,
+    seed: int = 7,
+    views_per_scene: int = 3,
     splits: Mapping[str, float] | None = None,
-) -> Pipeline:  # fmt: skip
+) -> Pipeline:
     sensor = OneCamera()
     recipe = PipelineConfig(
         open_scene=lambda streams: (sensor.mount(Scene("test")), randomizers, (sensor,)),
@@ -276,9 +279,11 @@ def test_boxes_leave_out_mirrors_unless_all_is_labelled(
 ) -> None:
     """A body of twice its size; what other code measures it by stays whole."""
     scene = Scene(
-        "test", bodies=(Body("car", "box", SE3((1.0, 0.0, 0.5)), scale=2.0, instance_id=1),),
-        instances=(Instance(1, "car", "car", 0, "box"),), box3d=extent,
-    )  # fmt: skip
+        "test",
+        bodies=(Body("car", "box", SE3((1.0, 0.0, 0.5)), scale=2.0, instance_id=1),),
+        instances=(Instance(1, "car", "car", 0, "box"),),
+        box3d=extent,
+    )
 
     (car,) = finalize_scene(scene, WithMirrors(), {"car": 1}).instances  # type: ignore[arg-type]
 

@@ -22,9 +22,11 @@ SIZE_PX = (240, 136)
 @pytest.fixture(scope="module")
 def pipeline() -> Iterator[Pipeline]:
     overrides = [
-        "sensors.dash.size_px=[240, 136]", "shared.district=arterial", "shared.weather=CloudyNoon",
+        "sensors.dash.size_px=[240, 136]",
+        "shared.district=arterial",
+        "shared.weather=CloudyNoon",
         "randomizers.people.count=4",
-    ]  # fmt: skip
+    ]
     with open_pipeline(load_config("street_motion", overrides=overrides)) as opened:
         yield opened
 

@@ -49,9 +49,14 @@ def run(*arguments: str, path: str, cwd: Path) -> subprocess.CompletedProcess[st
     """Run ``gen-data`` with a folder of installed packages on its path."""
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), path])}
     return subprocess.run(
-        command(*arguments), cwd=cwd, env=environment, capture_output=True, text=True, check=False,
+        command(*arguments),
+        cwd=cwd,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
         timeout=600,
-    )  # fmt: skip
+    )
 
 
 @pytest.fixture(scope="session")

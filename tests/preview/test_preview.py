@@ -103,12 +103,14 @@ def test_a_recording_joins_the_keypoints_of_each_object_by_itself() -> None:
                 Instance(k, f"person/{k}", "person", 1, "person", keypoints=points),
                 visible_px=9,
                 box=BoxPx(0, 0, 9, 9),
-                keypoints=(KeypointTruth("left_ankle", (0.0, 0.0, 2.0), (20.0, 20.0), 2),
-                           KeypointTruth("nose", (0.0, -9.0, 2.0))),
+                keypoints=(
+                    KeypointTruth("left_ankle", (0.0, 0.0, 2.0), (20.0, 20.0), 2),
+                    KeypointTruth("nose", (0.0, -9.0, 2.0)),
+                ),
             )
             for k in (4, 7)
         ),
-    )  # fmt: skip
+    )
     scene = Scene("street", instances=tuple(item.instance for item in truth.objects))
     capture = Capture({"color": SensorReading("color", camera, {})})
     stream = _Stream()
@@ -269,10 +271,13 @@ class _Triangles:
     def mesh(self, asset_id: str) -> MeshData:
         corners = np.eye(3, dtype=np.float32)
         return MeshData(
-            vertices_m=corners, faces=np.array([[0, 1, 2]], np.int32), normals=corners,
-            uvs=np.zeros((3, 2), np.float32), face_slots=np.zeros(1, np.int32),
+            vertices_m=corners,
+            faces=np.array([[0, 1, 2]], np.int32),
+            normals=corners,
+            uvs=np.zeros((3, 2), np.float32),
+            face_slots=np.zeros(1, np.int32),
             materials=(Material(),),
-        )  # fmt: skip
+        )
 
 
 def _moving(step_index: int, *, first: int = 0) -> Sample:

@@ -186,10 +186,14 @@ def two_link_arm() -> RobotModel:
     links = ("base", "upper", "hand", *fingers)
     meshes = {link: f"two_link/{link}" for link in links}
     return RobotModel(
-        links=links, joints=joints, visuals=meshes, collisions=meshes, home=(0.4, 0.9, 0.04, 0.04),
+        links=links,
+        joints=joints,
+        visuals=meshes,
+        collisions=meshes,
+        home=(0.4, 0.9, 0.04, 0.04),
         gripper=Gripper("hand", SE3((0.0, 0.0, 0.35)), ("left_slide", "right_slide"), 0.08),
         no_collide=frozenset(),
-    )  # fmt: skip
+    )
 
 
 def rng_of(name: str = "test", scene: int = 0, index: int = 0) -> Rng:
@@ -197,11 +201,14 @@ def rng_of(name: str = "test", scene: int = 0, index: int = 0) -> Rng:
 
 
 def surface_scene(
-    size_m: tuple[float, float] = (1.2, 0.8), *,
+    size_m: tuple[float, float] = (1.2, 0.8),
+    *,
     assets: tuple[str, ...] = ("bottle", "brick", "can?seed=0", "can?seed=1"),
-    placement: str = "drop", clearance_m: float = 1.5, keep_out: tuple[Vec3, ...] = (),
+    placement: str = "drop",
+    clearance_m: float = 1.5,
+    keep_out: tuple[Vec3, ...] = (),
     levels: int = 1,
-) -> Scene:  # fmt: skip
+) -> Scene:
     """An empty group ``clutter`` on surfaces above each other, the lowest 1 m over the floor."""
     surfaces = tuple(
         SupportSurface(f"s{k}", "s", SE3((0.2, -0.1, 1.0 + k * clearance_m)), size_m, clearance_m)
@@ -219,9 +226,13 @@ def surface_scene(
 
 
 def _asset(
-    asset_id: str, kind: str, category: str, tags: tuple[str, ...], mass_kg: float = 0.0,
+    asset_id: str,
+    kind: str,
+    category: str,
+    tags: tuple[str, ...],
+    mass_kg: float = 0.0,
     stackable: bool = False,
-) -> Asset:  # fmt: skip
+) -> Asset:
     return Asset(
         asset_id,
         kind,  # type: ignore[arg-type]

@@ -77,10 +77,11 @@ def test_a_given_way_is_taken_as_it_stands() -> None:
         scene("brick"),
         way=(
             Stop(joints_deg=(10.0, -90.0), opening=0.5),
-            Stop(reach_m=(0.1, 0.2, 1.0), yaw_deg=90.0), Stop(grasp=("clutter",)),
+            Stop(reach_m=(0.1, 0.2, 1.0), yaw_deg=90.0),
+            Stop(grasp=("clutter",)),
             Stop(place_m=(0.2, -0.1)),
         ),
-    )  # fmt: skip
+    )
 
     assert way[0].joint_candidates[0] == pytest.approx((math.pi / 18, -math.pi / 2), abs=1e-6)
     assert way[0].gripper_opening == 0.5

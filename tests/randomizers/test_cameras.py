@@ -16,9 +16,11 @@ from tests.randomizers.doubles import FakeAssets, rng_of
 FOCUS = Region((0.3, -0.2, 0.8), (1.2, 0.8, 0.25))
 LENS = intrinsics.Intrinsics.from_hfov(640, 480, math.radians(60.0))
 SCENE = Scene(
-    "test", focus=FOCUS, interior_m=((-2.3, -1.8, 0.1), (2.3, 1.8, 2.6)),
+    "test",
+    focus=FOCUS,
+    interior_m=((-2.3, -1.8, 0.1), (2.3, 1.8, 2.6)),
     cameras=(Camera("left", se3.SE3(), LENS), Camera("right", se3.SE3(), LENS)),
-)  # fmt: skip
+)
 
 
 def orbit(scene: Scene = SCENE, scene_index: int = 0, **given: object) -> Scene:

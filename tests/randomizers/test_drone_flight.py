@@ -21,8 +21,9 @@ SCENE = Scene(
         Body("drone", "drone?seed=0", SE3((0.0, 0.0, 50.1))),
         Body("drone_gimbal", "gimbal", SE3((0.0, 0.0, 50.0))),
     ),
-    rigs=(Rig("drone", "drone"), Rig("drone_gimbal", "drone_gimbal")), lanes=(ROAD,),
-)  # fmt: skip
+    rigs=(Rig("drone", "drone"), Rig("drone_gimbal", "drone_gimbal")),
+    lanes=(ROAD,),
+)
 
 
 class Nothing:

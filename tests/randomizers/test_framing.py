@@ -48,10 +48,12 @@ SCENE = Scene(
         Body("clutter/1", "bottle", SE3((-0.3, 0.2, 0.88)), instance_id=3, group="clutter"),
         Body("clutter/2", "ball", SE3((0.1, -0.2, 0.86)), 0.5, instance_id=4, group="clutter"),
     ),
-    surfaces=(TABLE,), groups=(GROUP,), focus=Region((0.0, 0.0, 0.86), (1.2, 0.8, 0.24)),
+    surfaces=(TABLE,),
+    groups=(GROUP,),
+    focus=Region((0.0, 0.0, 0.86), (1.2, 0.8, 0.24)),
     interior_m=((-2.8, -2.3, 0.1), (2.8, 2.3, 2.6)),
     cameras=(Camera("color", SE3(), LENSES["pinhole"]),),
-)  # fmt: skip
+)
 
 
 def seen_px(points_camera_m: Array, k: Intrinsics) -> Array:
@@ -100,9 +102,14 @@ def share_of(body: Body, camera: Camera) -> float:
     roll=-0.5, seed=0,
 )  # fmt: skip
 def test_thing_fills_its_share_at_its_place_through_any_lens(
-    lens: str, share: float, azimuth: float, elevation: float, aside: tuple[float, float],
-    roll: float, seed: int,
-) -> None:  # fmt: skip
+    lens: str,
+    share: float,
+    azimuth: float,
+    elevation: float,
+    aside: tuple[float, float],
+    roll: float,
+    seed: int,
+) -> None:
     """A cloud of points in any direction: longer side of its box, image of its centre, bearing."""
     k = LENSES[lens]
     # The corners of the fisheye's image are outside its field. Half of a panorama's width is 180

@@ -86,12 +86,21 @@ def test_object_states_move_its_parts_and_labels_state_the_joints(library: Libra
     # At home the door's Y is -X of the world; a quarter turn about -Z makes it +Y.
     assert (x, y) == pytest.approx((0.0, 1.0), abs=1e-6)
     assert attributes == {
-        "open_slide": "1", "joint_slide": "0.3", "joint_slide_type": "prismatic",
-        "joint_slide_limits": "0 0.3", "joint_slide_axis": "1 0 0", "open_hinge": "1",
-        "joint_hinge": "1.571", "joint_hinge_type": "revolute", "joint_hinge_limits": "0 1.571",
-        "joint_hinge_axis": "0 0 -1", "joint_knob": f"{math.pi / 4:.4g}",
-        "joint_knob_type": "revolute", "joint_knob_limits": "0 1", "joint_knob_axis": "1 0 0",
-    }  # fmt: skip
+        "open_slide": "1",
+        "joint_slide": "0.3",
+        "joint_slide_type": "prismatic",
+        "joint_slide_limits": "0 0.3",
+        "joint_slide_axis": "1 0 0",
+        "open_hinge": "1",
+        "joint_hinge": "1.571",
+        "joint_hinge_type": "revolute",
+        "joint_hinge_limits": "0 1.571",
+        "joint_hinge_axis": "0 0 -1",
+        "joint_knob": f"{math.pi / 4:.4g}",
+        "joint_knob_type": "revolute",
+        "joint_knob_limits": "0 1",
+        "joint_knob_axis": "1 0 0",
+    }
 
 
 @pytest.mark.slow

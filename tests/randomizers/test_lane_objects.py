@@ -92,9 +92,14 @@ def test_count_is_a_choice_of_all_places_and_ids_are_unique() -> None:
 def test_nothing_overlaps_even_when_lanes_are_walked_often(scattered: bool) -> None:
     """Every pair of rectangles is separated along one of their axes."""
     scene = drawn(
-        street(), gap_m=Uniform(0.0, 0.1), passes=4, lateral=Uniform(-1.0, 1.0),
-        yaw_deg=Uniform(-180.0, 180.0), count=Constant(120), uniform_area=scattered,
-    )  # fmt: skip
+        street(),
+        gap_m=Uniform(0.0, 0.1),
+        passes=4,
+        lateral=Uniform(-1.0, 1.0),
+        yaw_deg=Uniform(-180.0, 180.0),
+        count=Constant(120),
+        uniform_area=scattered,
+    )
     prints = [Footprint.of(b.T_world_body, FakeAssets().bounds_m(b.asset)) for b in scene.bodies]
 
     assert len(prints) == 120

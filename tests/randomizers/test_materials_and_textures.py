@@ -70,8 +70,10 @@ def test_looks_change_objects_unless_other_targets_are_named(
     assert changed(scene, after(made(()), scene)) == {"clutter/0", "clutter/1"}
     assert changed(scene, after(made(("table",)), scene)) == {"table"}
     assert changed(scene, after(made(("table", "clutter")), scene)) == {
-        "table", "clutter/0", "clutter/1",
-    }  # fmt: skip
+        "table",
+        "clutter/0",
+        "clutter/1",
+    }
 
 
 @looks

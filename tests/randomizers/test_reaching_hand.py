@@ -32,9 +32,11 @@ def table(things: tuple[str, ...]) -> Scene:
 
 def reaching(*, holding: bool) -> ReachingHand:
     return ReachingHand(
-        name="hands", probability=Probability(1.0), holding=Probability(float(holding)),
+        name="hands",
+        probability=Probability(1.0),
+        holding=Probability(float(holding)),
         raised_m=Constant(0.0),
-    )  # fmt: skip
+    )
 
 
 @pytest.mark.parametrize("radius_m", [0.018, 0.026, 0.033, 0.04, 0.046])

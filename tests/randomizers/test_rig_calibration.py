@@ -16,16 +16,20 @@ from gen_data.randomizers.rig_calibration import RigCalibration
 from tests.randomizers.doubles import FakeAssets, rng_of
 
 LENS = Intrinsics.from_hfov(64, 48, 1.0)
-SCENE = place_sensors(Scene(
-    "rigs", bodies=(Body("ego", "car", SE3.about_z(0.3, (5.0, 1.0, 0.0))), Body("hand", "arm")),
-    rigs=(Rig("ego", "ego", SE3((-1.0, 0.0, 0.0))), Rig("wrist", "hand")),
-    cameras=(
-        Camera("front", SE3(), LENS, None, "ego", SE3((1.7, 0.0, 1.5)) @ RIG_AXES.inverse()),
-        Camera("eye", SE3(), LENS, None, "wrist"), Camera("free", SE3((9.0, 9.0, 9.0)), LENS),
-    ),
-    lidars=(Lidar("roof", "", SE3((0.9, 0.0, 1.8)), rig="ego"),),
-    devices=(Device("imu", "imu", "ego", SE3((-0.05, 0.3, 0.9))),),
-))  # fmt: skip
+SCENE = place_sensors(
+    Scene(
+        "rigs",
+        bodies=(Body("ego", "car", SE3.about_z(0.3, (5.0, 1.0, 0.0))), Body("hand", "arm")),
+        rigs=(Rig("ego", "ego", SE3((-1.0, 0.0, 0.0))), Rig("wrist", "hand")),
+        cameras=(
+            Camera("front", SE3(), LENS, None, "ego", SE3((1.7, 0.0, 1.5)) @ RIG_AXES.inverse()),
+            Camera("eye", SE3(), LENS, None, "wrist"),
+            Camera("free", SE3((9.0, 9.0, 9.0)), LENS),
+        ),
+        lidars=(Lidar("roof", "", SE3((0.9, 0.0, 1.8)), rig="ego"),),
+        devices=(Device("imu", "imu", "ego", SE3((-0.05, 0.3, 0.9))),),
+    )
+)
 
 
 def drawn(scene_index: int = 0, **given: object) -> Scene:

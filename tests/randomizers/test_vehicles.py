@@ -127,8 +127,10 @@ def test_lights_glow_by_role_and_are_labelled() -> None:
     emission = np.array(slots(scene.bodies[0])["brakelight"].emission_cd_m2)
     assert float(colorimetry.luminance(emission)) == pytest.approx(9000.0, rel=0.01)
     assert dict(scene.instances[0].attributes) == {
-        "brake_lights": "on", "head_lights": "off", "indicator": "left",
-    }  # fmt: skip
+        "brake_lights": "on",
+        "head_lights": "off",
+        "indicator": "left",
+    }
     assert [light.name for light in scene.lights] == [light.name for light in road().lights]
 
 

@@ -44,9 +44,10 @@ def room_mesh(
 
 
 def sphere_mesh(
-    radius_m: float = 0.5, rings: int = 32,
+    radius_m: float = 0.5,
+    rings: int = 32,
     materials: tuple[asset_types.Material, ...] = (asset_types.Material(),),
-) -> asset_types.MeshData:  # fmt: skip
+) -> asset_types.MeshData:
     polar = np.linspace(0.0, np.pi, rings + 1)
     azimuth = np.linspace(0.0, 2 * np.pi, 2 * rings + 1)
     p, a = np.meshgrid(polar, azimuth, indexing="ij")
@@ -76,10 +77,13 @@ def plane_mesh(
 
 def _mesh(vertices, faces, normals, uvs, materials) -> asset_types.MeshData:  # noqa: ANN001
     return asset_types.MeshData(
-        np.asarray(vertices, np.float32), np.asarray(faces, np.int32),
-        np.asarray(normals, np.float32), np.asarray(uvs, np.float32),
-        np.zeros(len(faces), np.int32), materials,
-    )  # fmt: skip
+        np.asarray(vertices, np.float32),
+        np.asarray(faces, np.int32),
+        np.asarray(normals, np.float32),
+        np.asarray(uvs, np.float32),
+        np.zeros(len(faces), np.int32),
+        materials,
+    )
 
 
 def uniform_sky(height: int = 16) -> asset_types.Float32:
@@ -90,10 +94,11 @@ class FakeLibrary:
     """An AssetLibrary over dictionaries handed in by a test."""
 
     def __init__(
-        self, meshes: dict[str, asset_types.MeshData],
+        self,
+        meshes: dict[str, asset_types.MeshData],
         textures: dict[str, asset_types.TextureData] | None = None,
         environments: dict[str, asset_types.Float32] | None = None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.meshes = meshes
         self.textures = textures or {}
         self.environments = {"environment/neutral?seed=0": uniform_sky(), **(environments or {})}
@@ -139,9 +144,12 @@ class FakeLibrary:
 
 
 def camera_at(
-    eye_m: se3.Vec3, target_m: se3.Vec3, size_px: tuple[int, int] = (64, 48),
-    hfov_deg: float = 60.0, ev100: float | None = None,
-) -> scene.Camera:  # fmt: skip
+    eye_m: se3.Vec3,
+    target_m: se3.Vec3,
+    size_px: tuple[int, int] = (64, 48),
+    hfov_deg: float = 60.0,
+    ev100: float | None = None,
+) -> scene.Camera:
     intrinsics = Intrinsics.from_hfov(*size_px, math.radians(hfov_deg))
     return scene.Camera("camera", se3.look_at(eye_m, target_m), intrinsics, ev100)
 

@@ -23,9 +23,13 @@ def mitsuba() -> Any:
 
 
 def mitsuba_scene(
-    scene: Scene, camera: Camera, library: FakeLibrary, bsdfs: Mapping[str, Mapping[str, Any]],
-    environment: Mapping[str, Any] | None = None, max_bounces: int = 16,
-) -> Any:  # fmt: skip
+    scene: Scene,
+    camera: Camera,
+    library: FakeLibrary,
+    bsdfs: Mapping[str, Mapping[str, Any]],
+    environment: Mapping[str, Any] | None = None,
+    max_bounces: int = 16,
+) -> Any:
     """The scene, loaded.
 
     Args:
@@ -72,16 +76,21 @@ def _sensor(camera: Camera) -> dict[str, Any]:
     mi = mitsuba()
     k = camera.intrinsics
     return {
-        "type": "perspective", "fov_axis": "x",
+        "type": "perspective",
+        "fov_axis": "x",
         "fov": math.degrees(2.0 * math.atan(0.5 * k.width_px / k.fx_px)),
         "to_world": mi.ScalarTransform4f(camera.T_world_camera.matrix() @ MIRROR_XY),
         "near_clip": 0.01,
         "film": {
-            "type": "hdrfilm", "width": k.width_px, "height": k.height_px,
-            "rfilter": {"type": "box"}, "component_format": "float32", "pixel_format": "rgb",
+            "type": "hdrfilm",
+            "width": k.width_px,
+            "height": k.height_px,
+            "rfilter": {"type": "box"},
+            "component_format": "float32",
+            "pixel_format": "rgb",
         },
         "sampler": {"type": "independent"},
-    }  # fmt: skip
+    }
 
 
 def _rgb(color: tuple[float, ...]) -> dict[str, Any]:
@@ -125,9 +134,12 @@ def _light(light: Light) -> dict[str, Any]:
         )
         cutoff = math.degrees(light.cone_rad)
         return {
-            "type": "spot", "intensity": _rgb(tuple(power)), "cutoff_angle": cutoff,
-            "beam_width": light.even * cutoff, "to_world": to_world,
-        }  # fmt: skip
+            "type": "spot",
+            "intensity": _rgb(tuple(power)),
+            "cutoff_angle": cutoff,
+            "beam_width": light.even * cutoff,
+            "to_world": to_world,
+        }
     side = np.asarray(light.side, dtype=np.float64)
     half = 0.5 * np.asarray(light.size_m)
     area_m2 = light.size_m[0] * light.size_m[1]
@@ -139,10 +151,11 @@ def _light(light: Light) -> dict[str, Any]:
     frame[:3, 0], frame[:3, 1] = side * half[0], np.cross(normal, side) * half[1]
     frame[:3, 2], frame[:3, 3] = normal, position
     return {
-        "type": light.kind, "to_world": mi.ScalarTransform4f(frame),
+        "type": light.kind,
+        "to_world": mi.ScalarTransform4f(frame),
         "bsdf": {"type": "diffuse", "reflectance": _rgb((0.0, 0.0, 0.0))},
         "emitter": {"type": "area", "radiance": _rgb(tuple(power / area_m2))},
-    }  # fmt: skip
+    }
 
 
 def _any_side(normal: np.ndarray) -> list[float]:

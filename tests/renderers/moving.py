@@ -42,10 +42,15 @@ def even_track(body: str, start: SE3, velocity_m_s: Vec3, turn_rad_s: float = 0.
 
 
 def world(
-    *bodies: Body, tracks: tuple[Trajectory, ...] = (), changes: tuple[StateChange, ...] = (),
-    camera_velocity_m_s: Vec3 = (0.0, 0.0, 0.0), camera_turn_rad_s: float = 0.0,
-    lens: Intrinsics = LENS, shutter: Shutter = INSTANT, time_s: float = 0.2,
-) -> Scene:  # fmt: skip
+    *bodies: Body,
+    tracks: tuple[Trajectory, ...] = (),
+    changes: tuple[StateChange, ...] = (),
+    camera_velocity_m_s: Vec3 = (0.0, 0.0, 0.0),
+    camera_turn_rad_s: float = 0.0,
+    lens: Intrinsics = LENS,
+    shutter: Shutter = INSTANT,
+    time_s: float = 0.2,
+) -> Scene:
     """Bodies in front of a camera on a moving body; its frame is the world's at 0 s."""
     instances = tuple(
         Instance(b.instance_id, b.name, "thing", 1, b.asset, T_world_instance=b.T_world_body)
@@ -55,8 +60,15 @@ def world(
     ride = even_track("speck", IDENTITY, camera_velocity_m_s, camera_turn_rad_s)
     camera = Camera("camera", IDENTITY, lens, 5.0, rig="eye", shutter=shutter)
     scene = Scene(
-        "moving", bodies=(*bodies, Body("speck", "speck", SE3((0.0, 0.0, -1.0)))),
-        instances=instances, cameras=(camera,), rigs=(Rig("eye", "speck"),), environment=DARK,
-        step_s=STEP_S, tracks=(*tracks, ride), changes=changes, time_s=-1.0,
-    )  # fmt: skip
+        "moving",
+        bodies=(*bodies, Body("speck", "speck", SE3((0.0, 0.0, -1.0)))),
+        instances=instances,
+        cameras=(camera,),
+        rigs=(Rig("eye", "speck"),),
+        environment=DARK,
+        step_s=STEP_S,
+        tracks=(*tracks, ride),
+        changes=changes,
+        time_s=-1.0,
+    )
     return scene_at(place_sensors(scene), time_s)

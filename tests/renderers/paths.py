@@ -29,9 +29,14 @@ def radiance_of(
 
 
 def replicates_of(
-    scene: Scene, camera: Camera, library: FakeLibrary, samples: int, count: int,
-    lights: int = BOTH, max_bounces: int = 16,
-) -> np.ndarray:  # fmt: skip
+    scene: Scene,
+    camera: Camera,
+    library: FakeLibrary,
+    samples: int,
+    count: int,
+    lights: int = BOTH,
+    max_bounces: int = 16,
+) -> np.ndarray:
     """Independent images with different seeds, [count, h, w, 3]: their spread is the true error."""
     cache = DeviceCache(library, open_device("cpu"))
     tracer = PathTracer(cache, settings_of(samples, max_bounces))

@@ -44,10 +44,13 @@ def cut_grate() -> MeshData:
         faces += [(first, first + 1, first + 2), (first, first + 2, first + 3)]
     points = np.array(vertices, np.float32)
     return MeshData(
-        points, np.array(faces, np.int32),
-        np.broadcast_to(np.array([0, 0, 1], np.float32), points.shape).copy(), points[:, :2] + 0.5,
-        np.zeros(len(faces), np.int32), (replace(GRATE, texture="plain"),),
-    )  # fmt: skip
+        points,
+        np.array(faces, np.int32),
+        np.broadcast_to(np.array([0, 0, 1], np.float32), points.shape).copy(),
+        points[:, :2] + 0.5,
+        np.zeros(len(faces), np.int32),
+        (replace(GRATE, texture="plain"),),
+    )
 
 
 def library() -> FakeLibrary:
@@ -73,10 +76,11 @@ def scene_of(asset: str) -> Scene:
 
 PINHOLE = camera_at((0.4, -2.2, 1.4), (0.1, 0.4, 0.4), (240, 180), 50.0, ev100=9.0)
 FISHEYE = Camera(
-    "camera", look_at((0.4, -1.2, 1.2), (0.1, 0.4, 0.4)),
+    "camera",
+    look_at((0.4, -1.2, 1.2), (0.1, 0.4, 0.4)),
     Intrinsics(200, 160, 90.0, 90.0, 100.0, 80.0, Lens("kannala_brandt", (0.01, 0.0, 0.0, 0.0))),
     9.0,
-)  # fmt: skip
+)
 
 
 @pytest.mark.parametrize("method", ["raster", "rays"])

@@ -292,9 +292,10 @@ def test_a_panel_is_seen_in_its_fixture_and_labels_do_not_know_it() -> None:
         camera = camera_at(eye_m, target_m, (24, 18), hfov_deg=20.0)
         channels = renderer.render(scene, camera, wanted).channels
         return (
-            float(channels[Channel.RADIANCE][9, 12, 1]), int(channels[Channel.INSTANCE][9, 12]),
+            float(channels[Channel.RADIANCE][9, 12, 1]),
+            int(channels[Channel.INSTANCE][9, 12]),
             float(channels[Channel.Z_DEPTH][9, 12]),
-        )  # fmt: skip
+        )
 
     before, behind = middle((0.0, 0.01, 0.3), (0, 0, 1)), middle((0.0, 0.01, 3.0), (0, 0, 1))
     below = middle((0.9, 0.0, 0.5), (0.0, 0.0, 0.0))

@@ -29,10 +29,13 @@ STACK = 128
 
 @wp.kernel
 def trace_mesh(
-    tree: wp.array(dtype=wp.float32), origins: wp.array(dtype=wp.vec3),
-    ways: wp.array(dtype=wp.vec3), reach: float, points: wp.array(dtype=wp.vec3),
+    tree: wp.array(dtype=wp.float32),
+    origins: wp.array(dtype=wp.vec3),
+    ways: wp.array(dtype=wp.vec3),
+    reach: float,
+    points: wp.array(dtype=wp.vec3),
     faces: wp.array(dtype=wp.vec2i),
-) -> None:  # fmt: skip
+) -> None:
     i = wp.tid()
     found = first_in_mesh(tree, origins[i], ways[i], reach)
     points[i] = wp.vec3(float(found[0]), float(found[1]), float(found[2]))
@@ -42,9 +45,14 @@ def trace_mesh(
 
 @wp.kernel
 def trace_world(
-    world: World, origins: wp.array(dtype=wp.vec3), ways: wp.array(dtype=wp.vec3), reach: float,
-    t: wp.array(dtype=float), bodies: wp.array(dtype=int), blocked: wp.array(dtype=int),
-) -> None:  # fmt: skip
+    world: World,
+    origins: wp.array(dtype=wp.vec3),
+    ways: wp.array(dtype=wp.vec3),
+    reach: float,
+    t: wp.array(dtype=float),
+    bodies: wp.array(dtype=int),
+    blocked: wp.array(dtype=int),
+) -> None:
     i = wp.tid()
     met = closest_hit(world, origins[i], ways[i], reach, HOLES)
     t[i] = met.t

@@ -34,9 +34,12 @@ FURNACE = Environment(luminance_cd_m2=100.0)
 
 
 def radiance_of(
-    bodies: tuple[Body, ...], library: FakeLibrary, camera: Camera, lights: tuple[Light, ...] = (),
+    bodies: tuple[Body, ...],
+    library: FakeLibrary,
+    camera: Camera,
+    lights: tuple[Light, ...] = (),
     environment: Environment = DARK,
-) -> np.ndarray:  # fmt: skip
+) -> np.ndarray:
     scene = Scene("t", bodies, lights=lights, environment=environment)
     camera = replace(camera, ev100=8.0)
     reading = WarpRenderer(library, "cpu", SHARP).render(scene, camera, RADIANCE)

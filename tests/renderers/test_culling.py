@@ -32,9 +32,13 @@ def test_a_body_with_a_vertex_in_the_pyramid_is_kept(margin: float) -> None:
     """Vertices are projected by Intrinsics; most bodies are culled all the same."""
     scene, camera = ring_of_boxes(), fake_library.camera_at((0.0, 0.0, 0.0), (1.0, 0.2, 0.1))
     cache = device_cache.DeviceCache(fake_library.FakeLibrary(MESHES), open_device("cpu"))
-    kept = set(bodies_within(
-        pack_world(scene, camera, cache).body_records, pack_view(camera, cache), margin,
-    ))  # fmt: skip
+    kept = set(
+        bodies_within(
+            pack_world(scene, camera, cache).body_records,
+            pack_view(camera, cache),
+            margin,
+        )
+    )
     size = np.array([camera.intrinsics.width_px, camera.intrinsics.height_px])
     needed = set()
     for number, body in enumerate(scene.bodies):

@@ -176,9 +176,10 @@ def test_a_crown_is_as_bright_as_in_the_path_tracer(azimuth_deg: float) -> None:
     low, high = library.bounds_m(asset)
     place = SE3((0.0, 0.0, -low[2]))
     scene = Scene(
-        "t", (Body("tree", asset, place, instance_id=1),),
+        "t",
+        (Body("tree", asset, place, instance_id=1),),
         instances=(Instance(1, "tree", "tree", 0, asset),),
-    )  # fmt: skip
+    )
     scene = set_daylight(scene, SkyModel(0, 35.0, 2.5, 0.0, 0.18, "measured"), azimuth_deg)
     scene = replace(scene, environment=replace(scene.environment, visible=False))
     camera = camera_at((-30.0, 0.0, 1.6), (0.0, 0.0, 0.6 * (high[2] - low[2])), (64, 64), 24.0)

@@ -24,11 +24,15 @@ def random_scene(seed: int) -> tuple[Scene, Lidar]:
     for k in range(40):
         q = rng.normal(size=4)
         place = np.asarray(away) + rng.uniform((-25, -25, 0), (25, 25, 6))
-        bodies.append(Body(
-            f"b{k}", str(rng.choice(["box", "ball"])),
-            SE3(tuple(map(float, place)), tuple(map(float, q / np.linalg.norm(q)))),
-            float(rng.uniform(0.4, 1.8)), instance_id=k + 1,
-        ))  # fmt: skip
+        bodies.append(
+            Body(
+                f"b{k}",
+                str(rng.choice(["box", "ball"])),
+                SE3(tuple(map(float, place)), tuple(map(float, q / np.linalg.norm(q)))),
+                float(rng.uniform(0.4, 1.8)),
+                instance_id=k + 1,
+            )
+        )
     things = tuple(Instance(k + 1, f"b{k}", "thing", 1, "box") for k in range(40))
     q = np.array([1.0, *rng.normal(scale=0.05, size=3)])
     eye = tuple(float(v) for v in np.add(away, (0.3, -0.4, 8.0)))

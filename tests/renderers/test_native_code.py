@@ -72,7 +72,10 @@ def test_a_native_function_compiles_alone(name: str) -> None:
     text += f"{function.native_snippet}\n}}\n"
     compiler = ("g++", "-std=c++17", "-fsyntax-only", "-x", "c++", "-")
     done = subprocess.run(
-        [*compiler, "-I", str(Path(wp.__file__).parent / "native")], input=text,
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
+        [*compiler, "-I", str(Path(wp.__file__).parent / "native")],
+        input=text,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert done.returncode == 0, done.stderr

@@ -89,9 +89,14 @@ def lit_ground(light: Light, samples: int = 256) -> np.ndarray:
 
 
 TILTED = Light(
-    "panel", "rectangle", (0.9, 0.2, 1.1), (-0.6, 0.0, -0.8), side=(0.0, 1.0, 0.0),
-    size_m=(1.0, 0.6), intensity_cd=600.0,
-)  # fmt: skip
+    "panel",
+    "rectangle",
+    (0.9, 0.2, 1.1),
+    (-0.6, 0.0, -0.8),
+    side=(0.0, 1.0, 0.0),
+    size_m=(1.0, 0.6),
+    intensity_cd=600.0,
+)
 
 
 def lux_of_tilted() -> float:
@@ -227,8 +232,9 @@ def mixed_scene() -> tuple[Scene, Camera, FakeLibrary]:
             "ball": sphere_mesh(0.4, 24, (glossy,)),
             "steel": sphere_mesh(0.3, 24, (Material((0.7, 0.7, 0.7), 0.45, 1.0),)),
         },
-        None, {"patch": sky},
-    )  # fmt: skip
+        None,
+        {"patch": sky},
+    )
     lights = (
         Light("ball", "sphere", (0.8, -0.6, 1.2), intensity_cd=120.0, radius_m=0.35),
         Light("panel", "rectangle", (-0.9, 0.0, 1.3), (0.6, 0.0, -0.8), side=(0.0, 1.0, 0.0),

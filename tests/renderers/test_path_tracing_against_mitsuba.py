@@ -100,9 +100,12 @@ def panel_pose(behind_m: float) -> SE3:
 
 
 def still_life(
-    material: Material, bsdf: Mapping[str, Any], *lights: Light, exact: bool = True,
+    material: Material,
+    bsdf: Mapping[str, Any],
+    *lights: Light,
+    exact: bool = True,
     sky: float = 60.0,
-) -> Picture:  # fmt: skip
+) -> Picture:
     library = fake_library.FakeLibrary({
         "ground": fake_library.plane_mesh(6.0, matte(0.4, 0.35, 0.3)),
         "ball": fake_library.sphere_mesh(0.5, 64, (material,)),

@@ -25,10 +25,11 @@ LIBRARY = FakeLibrary(
     {"box": box_mesh(), "floor": plane_mesh(20.0)}, {"brick": CHECKER, "ash": CHECKER}
 )
 SCENE = Scene(
-    "cubes", (Body("floor", "floor"), Body("box", "box", se3.SE3((0.0, 0.0, 0.5)), instance_id=1)),
+    "cubes",
+    (Body("floor", "floor"), Body("box", "box", se3.SE3((0.0, 0.0, 0.5)), instance_id=1)),
     lights=(Light("lamp", "sphere", (1.0, 2.0, 3.0), intensity_cd=900.0),),
     weather=Weather(wetness=0.8, puddles=0.3, seed=4),
-)  # fmt: skip
+)
 EYES = tuple(
     camera_at(eye_m, (0.0, 0.0, 0.5), size_px=(96, 64))
     for eye_m in ((3.0, 0.5, 2.0), (-1.0, 3.0, 1.5))
@@ -150,9 +151,10 @@ def test_images_depend_on_no_memory_of_earlier_frames(
     coated = (Material((0.8, 0.1, 0.1), coat=1.0),)
     floor, box = SCENE.bodies
     scene = replace(
-        SCENE, bodies=(floor, replace(box, materials=coated)),
+        SCENE,
+        bodies=(floor, replace(box, materials=coated)),
         tracks=(even_track("box", box.T_world_body, (1.0, 0.5, 0.2), 1.0),),
-    )  # fmt: skip
+    )
     camera = replace(EYES[0], shutter=shutter.Shutter(0.08, 0.2, 4))
     channels = CHANNELS | {Channel.NORMALS, Channel.RANGE, Channel.CATEGORY}
     renderer = WarpRenderer(LIBRARY, "cpu", settings.RenderSettings(visibility=visibility))

@@ -156,9 +156,10 @@ def test_the_foreground_hides_exactly() -> None:
     left = slice(0, SIZE_PX[0] // 2)
     right = slice(SIZE_PX[0] // 2, None)
     hidden = seen(
-        PlateLibrary(empty_photo(), half_mask()), world(cube=True, photo=True),
+        PlateLibrary(empty_photo(), half_mask()),
+        world(cube=True, photo=True),
         SEEN | {Channel.AMODAL},
-    )  # fmt: skip
+    )
     assert (composite().channels[Channel.INSTANCE][:, left] == 1).any(), "the cube is behind it"
     np.testing.assert_array_equal(photographed(hidden)[:, left], empty_photo()[:, left])
     assert not hidden.channels[Channel.INSTANCE][:, left].any()
@@ -193,9 +194,11 @@ def test_a_moving_thing_blurs_on_the_photograph() -> None:
     knots = tuple(replace(cube, translation_m=(5.0, 0.1 + 0.3 * k, 0.5)) for k in range(5))
     exposed = replace(scene.cameras[0].shutter, exposure_s=0.04)
     scene = replace(
-        scene, tracks=(motion.Trajectory("cube", 0.1, knots),),
-        cameras=(replace(scene.cameras[0], shutter=exposed),), time_s=0.1,
-    )  # fmt: skip
+        scene,
+        tracks=(motion.Trajectory("cube", 0.1, knots),),
+        cameras=(replace(scene.cameras[0], shutter=exposed),),
+        time_s=0.1,
+    )
     channels = SEEN | {Channel.FLOW_FORWARD}
     reading = seen(PlateLibrary(empty_photo(), half_mask()), scene, channels)
     flow = reading.channels[Channel.FLOW_FORWARD]

@@ -57,10 +57,14 @@ STORM = Weather(0.02, 20.0, 30.0, 2.0, 0.9, 0.4, 0.4, 0.05, seed=5)
 
 @pytest.fixture(scope="module")
 def library() -> FakeLibrary:
-    return FakeLibrary({
-        "road": plane_mesh(60.0, ASPHALT), "black": box_mesh((0.2, 60.0, 60.0), BLACK),
-        "lid": box_mesh((0.8, 0.8, 0.05), ASPHALT), "box": box_mesh((1.0, 1.0, 1.0), ASPHALT),
-    })  # fmt: skip
+    return FakeLibrary(
+        {
+            "road": plane_mesh(60.0, ASPHALT),
+            "black": box_mesh((0.2, 60.0, 60.0), BLACK),
+            "lid": box_mesh((0.8, 0.8, 0.05), ASPHALT),
+            "box": box_mesh((1.0, 1.0, 1.0), ASPHALT),
+        }
+    )
 
 
 @pytest.fixture(scope="module")

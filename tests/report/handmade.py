@@ -45,13 +45,18 @@ def make_object(number: int, category: str, x_px: int = 20, side_px: int = 8) ->
     # Turned by pi about X, so that Z points back to the camera.
     pose = SE3((x_m, y_m, 3.0), (0.0, 1.0, 0.0, 0.0))
     return ObjectTruth(
-        instance, visible_px=side_px * side_px, box=box, amodal_box=box,
+        instance,
+        visible_px=side_px * side_px,
+        box=box,
+        amodal_box=box,
         box3d_camera=OrientedBox(pose, (side_m, side_m, side_m)),
-        mask=MaskPx(x_px, 20, np.ones((side_px, side_px), bool)), visible_fraction=1.0,
-        occlusion=0.0, truncation=0.0,
+        mask=MaskPx(x_px, 20, np.ones((side_px, side_px), bool)),
+        visible_fraction=1.0,
+        occlusion=0.0,
+        truncation=0.0,
         keypoints=(KeypointTruth("nose", (0.0, 0.0, 1.0), (30.0, 20.0), 2),),
         lidar_points={"top": 7, "front": 4},
-    )  # fmt: skip
+    )
 
 
 def make_image(rng: np.random.Generator) -> NDArray[np.uint8]:
@@ -111,11 +116,14 @@ def write_dataset(
 def _sample(index: int, objects: Sequence[ObjectTruth], camera: Camera) -> Sample:
     scene = Scene("hand", instances=tuple(o.instance for o in objects), cameras=(camera,))
     return Sample(
-        index=index, scene_index=index, view_index=0, split="train" if index % 4 else "val",
+        index=index,
+        scene_index=index,
+        view_index=0,
+        split="train" if index % 4 else "val",
         scene=scene,
         capture=Capture(
             {"color": SensorReading("color", camera, {})},
             {"top": PointCloud("top", Lidar("top", "color"), POINTS)},
         ),
         truth={"color": ImageTruth(camera, tuple(objects))},
-    )  # fmt: skip
+    )

@@ -18,11 +18,17 @@ from gen_data.report.label_statistics import Survey, collect_statistics
 def annotation(number: int, image_id: int, category_id: int, **keys: Any) -> dict[str, Any]:
     """A car, or a person, 5 m ahead and 12 m to the right: 13 m away."""
     return {
-        "id": number, "image_id": image_id, "category_id": category_id, "bbox": [3, 4, 30, 20],
-        "attributes": {"name": "it", "asset": "it"}, "occlusion": 0.0, "truncation": 0.0,
+        "id": number,
+        "image_id": image_id,
+        "category_id": category_id,
+        "bbox": [3, 4, 30, 20],
+        "attributes": {"name": "it", "asset": "it"},
+        "occlusion": 0.0,
+        "truncation": 0.0,
         "visible_fraction": 1.0,
-        "box3d": {"center_m": [12.0, 1.0, 5.0], "size_m": [4.0, 1.6, 1.5]}, **keys,
-    }  # fmt: skip
+        "box3d": {"center_m": [12.0, 1.0, 5.0], "size_m": [4.0, 1.6, 1.5]},
+        **keys,
+    }
 
 
 def write_coco(folder: Path, split: str, stem: str, n: int, rows: list[dict[str, Any]]) -> None:
@@ -167,8 +173,11 @@ def test_the_difficulties_are_those_of_the_devkit_and_counts_need_little_memory(
                "truncation": np.array([0.15, 0.0, 0.3, 0.0, 0.5])}  # fmt: skip
     levels = report_tables.DIFFICULTIES
     counted = [report_tables.counts_at(columns, level).tolist() for level in levels]
-    assert counted == [[True, False, False, False, False], [True, True, True, False, False],
-                       [True, True, True, False, True]]  # fmt: skip
+    assert counted == [
+        [True, False, False, False, False],
+        [True, True, True, False, False],
+        [True, True, True, False, True],
+    ]
     # 51,865 labelled objects in all, 11,295 of which are DontCare regions.
     assert sum(kind.objects for kind in report_tables.TYPES.values()) == 51_865 - 11_295
     # A million objects are 72 MB.

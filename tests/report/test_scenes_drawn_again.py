@@ -24,8 +24,13 @@ CASES = {
 def test_scenes_drawn_again_are_the_stored_ones(name: str, tmp_path: Path) -> None:
     """Also where pieces are separated after physics, or a view is lifted onto its relief."""
     config, overrides = CASES[name]
-    small = ("sensors.color.size_px=[64, 48]", "views_per_scene=2", "exporters=[]",
-             "annotations=[]", *overrides)  # fmt: skip
+    small = (
+        "sensors.color.size_px=[64, 48]",
+        "views_per_scene=2",
+        "exporters=[]",
+        "annotations=[]",
+        *overrides,
+    )
     gen_data.generate(config, 2, out=tmp_path / "set", workers=0, overrides=small)
     replay = replay_scenes(StoredSamples(tmp_path / "set"), 1)
     assert (replay.scenes, replay.differences) == (1, [])

@@ -78,11 +78,12 @@ class Bullet:
     def fix(self, mesh: trimesh.Trimesh) -> None:
         """Add triangles that do not move; their inner edges push nothing aside."""
         shape = self.pb.createCollisionShape(
-            self.pb.GEOM_MESH, vertices=(SCALE * mesh.vertices).tolist(),
+            self.pb.GEOM_MESH,
+            vertices=(SCALE * mesh.vertices).tolist(),
             indices=mesh.faces.ravel().tolist(),
             flags=self.pb.GEOM_FORCE_CONCAVE_TRIMESH | self.pb.GEOM_CONCAVE_INTERNAL_EDGE,
             **self.here,
-        )  # fmt: skip
+        )
         self.pb.createMultiBody(0, shape, **self.here)
 
     def drop(self, name: str, mesh: trimesh.Trimesh) -> None:
@@ -99,9 +100,13 @@ class Bullet:
         mass_kg = DENSITY_KG_M3 * max(hull.volume, 1e-6) * SCALE**3
         number = self.pb.createMultiBody(mass_kg, shape, basePosition=center.tolist(), **self.here)
         self.pb.changeDynamics(
-            number, -1, lateralFriction=0.5, rollingFriction=5e-4 * SCALE, restitution=0.0,
+            number,
+            -1,
+            lateralFriction=0.5,
+            rollingFriction=5e-4 * SCALE,
+            restitution=0.0,
             **self.here,
-        )  # fmt: skip
+        )
         self.starts[number] = name, center
 
     def fallen(self, seconds: float = 2.0) -> dict[str, tuple[float, float]]:

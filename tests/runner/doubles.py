@@ -180,13 +180,16 @@ def fake_sample(index: int) -> Sample:
     truth = ObjectTruth(instance, int(pixels.sum()), BoxPx(1, 1, 4, 3), mask=mask)
     light = Light("sun", "sun", illuminance_lux=float(rng.uniform(100.0, 900.0)))
     return Sample(
-        index=index, scene_index=index // 2, view_index=index % 2,
+        index=index,
+        scene_index=index // 2,
+        view_index=index % 2,
         split="val" if index // 2 % 4 == 3 else "train",
         scene=Scene("fake", instances=(instance,), lights=(light,), cameras=(camera,)),
         capture=Capture({"color": SensorReading("color", camera, {Channel.RGB: rgb})}),
-        truth={"color": ImageTruth(camera, (truth,))}, attempts=1 + index // 2 % 3,
+        truth={"color": ImageTruth(camera, (truth,))},
+        attempts=1 + index // 2 % 3,
         timings_s={"render": 0.25, "physics": 0.5},
-    )  # fmt: skip
+    )
 
 
 def write_raw_images(info: DatasetInfo, sample: Sample, shard_dir: Path) -> None:
@@ -215,10 +218,14 @@ def make(
     settings: Settings | None = None,
 ) -> Summary:
     return run(
-        fake_plan(n, shard_size), FakeFactory(n, trouble or Trouble()), out, workers=workers,
-        resume_command=RESUME, licences=lambda assets: f"# Assets\n\n{', '.join(assets)}\n",
+        fake_plan(n, shard_size),
+        FakeFactory(n, trouble or Trouble()),
+        out,
+        workers=workers,
+        resume_command=RESUME,
+        licences=lambda assets: f"# Assets\n\n{', '.join(assets)}\n",
         settings=settings or Settings(write_media=write_raw_images),
-    )  # fmt: skip
+    )
 
 
 def tree_digest(folder: Path) -> str:

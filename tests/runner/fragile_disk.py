@@ -168,7 +168,9 @@ class FragileDisk:
 
 
 REMAINS: tuple[Callable[[bytes], bytes], ...] = (
-    lambda data: b"", lambda data: data[: len(data) // 2], lambda data: b"\0" * len(data),
+    lambda data: b"",
+    lambda data: data[: len(data) // 2],
+    lambda data: b"\0" * len(data),
     lambda data: data,
-)  # fmt: skip
+)
 """What may be left of bytes that were not synced."""

@@ -63,12 +63,17 @@ def random_faults(rng: random.Random, samples: int) -> Faults:
         return rng.choice((0.0, 0.0, most / 10.0, most))
 
     return Faults(
-        dies_at_start=1.0 if rng.random() < 0.05 else rate(0.4), stops_at_start=rate(0.2),
-        dies=rate(0.1), stops=rate(0.05), dies_after_commit=rate(0.2), stays=rate(0.5),
-        loses_machine=rate(0.05), poisoned=rng.randrange(samples) if rng.random() < 0.2 else -1,
+        dies_at_start=1.0 if rng.random() < 0.05 else rate(0.4),
+        stops_at_start=rate(0.2),
+        dies=rate(0.1),
+        stops=rate(0.05),
+        dies_after_commit=rate(0.2),
+        stays=rate(0.5),
+        loses_machine=rate(0.05),
+        poisoned=rng.randrange(samples) if rng.random() < 0.2 else -1,
         fails_at=rng.randrange(samples) if rng.random() < 0.1 else -1,
         abort_s=rng.uniform(0.0, 60.0) if rng.random() < 0.2 else float("inf"),
-    )  # fmt: skip
+    )
 
 
 @dataclass

@@ -20,9 +20,15 @@ from gen_data.runner.run import Settings
 from gen_data.runner.shard_record import SplitCount
 from tests.runner.doubles import FakePipeline, Trouble, fake_plan, make
 
-PUBLICATION = Publication(title="Mugs", description="Mugs and bowls.", license="CC-BY-4.0",
-                          creators=("A. Author",), date_published="2026-01-31",
-                          cite_as="@misc{mugs}", version="2.1.0")  # fmt: skip
+PUBLICATION = Publication(
+    title="Mugs",
+    description="Mugs and bowls.",
+    license="CC-BY-4.0",
+    creators=("A. Author",),
+    date_published="2026-01-31",
+    cite_as="@misc{mugs}",
+    version="2.1.0",
+)
 LICENCES = "# Assets\n\n| source | licence | author | assets |\n|---|---|---|---|\n"
 LICENCES += "| here | MIT | me | mug |\n| there | CC0-1.0 | you | bowl |\n"
 

@@ -74,8 +74,12 @@ def test_a_failed_sample_leaves_no_file_and_no_change(tmp_path: Path, trouble: T
     whole, lacking = files_of(tmp_path / "whole"), files_of(tmp_path / "lacking")
     assert whole.keys() - lacking.keys() == {"shards/000001/color/rgb/000000005.png"}
     changed = {path for path in lacking if lacking[path] != whole[path]}
-    assert changed == {"shards/000001.json", "shards/000001/labels.jsonl",
-                       "shards/000001/scenes.jsonl", "shards/000001/lines/part.jsonl"}  # fmt: skip
+    assert changed == {
+        "shards/000001.json",
+        "shards/000001/labels.jsonl",
+        "shards/000001/scenes.jsonl",
+        "shards/000001/lines/part.jsonl",
+    }
     labels = "shards/000001/labels.jsonl"
     lines = whole[labels].splitlines()
     assert lacking[labels].splitlines() == [lines[0], *lines[2:]]

@@ -46,10 +46,15 @@ def make_at(
     url: str, n: int = 10, progress: Callable[[RunProgress], None] | None = None, **changes: object
 ) -> Summary:
     return run(
-        replace(fake_plan(n), **changes), FakeFactory(n), url, workers=0, resume_command="again",
-        progress=progress, licences=lambda assets: f"# Assets\n\n{', '.join(assets)}\n",
+        replace(fake_plan(n), **changes),
+        FakeFactory(n),
+        url,
+        workers=0,
+        resume_command="again",
+        progress=progress,
+        licences=lambda assets: f"# Assets\n\n{', '.join(assets)}\n",
         settings=Settings(write_media=write_raw_images),
-    )  # fmt: skip
+    )
 
 
 def download(url: str, folder: Path) -> Path:

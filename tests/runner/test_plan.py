@@ -52,11 +52,13 @@ def test_differences_name_the_field_as_in_yaml_once_and_both_values() -> None:
         config={"camera": {"fov_deg": 60}, "objects": [{"count": 4}], "added": True},
         assets={},
     )
-    assert compare_plans(old, new) == ["added: was (absent), now true",
-                                       "camera.fov_deg: was 50, now 60",
-                                       "objects[0].count: was 3, now 4",
-                                       f'assets.asset: was "{"00" * 32}", now (absent)',
-                                       "n: was 10, now 20"]  # fmt: skip
+    assert compare_plans(old, new) == [
+        "added: was (absent), now true",
+        "camera.fov_deg: was 50, now 60",
+        "objects[0].count: was 3, now 4",
+        f'assets.asset: was "{"00" * 32}", now (absent)',
+        "n: was 10, now 20",
+    ]
     # It is a field of the configuration and of the plan.
     old = replace(fake_plan(), seed=3, config={"seed": 3})
     new = replace(fake_plan(), seed=9, config={"seed": 9})

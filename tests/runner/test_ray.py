@@ -37,10 +37,13 @@ def make(out: Path, trouble: doubles.Trouble, workers: int = 0) -> Summary:
     """A data set, made in this process or by workers on the cluster."""
     cluster = RayCluster(cpus=1.0)
     return run(
-        replace(doubles.fake_plan(N, SHARD_SIZE), versions={}), doubles.FakeFactory(N, trouble),
-        out, workers=workers, resume_command="",
+        replace(doubles.fake_plan(N, SHARD_SIZE), versions={}),
+        doubles.FakeFactory(N, trouble),
+        out,
+        workers=workers,
+        resume_command="",
         settings=Settings(write_media=doubles.write_raw_images, open_pool=cluster.open_pool),
-    )  # fmt: skip
+    )
 
 
 def after_shards(out: Path, count: int, act: Callable[[], None]) -> threading.Thread:

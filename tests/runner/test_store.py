@@ -55,9 +55,16 @@ def test_a_finished_folder_holds_what_the_layout_says_with_sums_and_id(finished:
     computes dataset_id.
     """
     assert names_in(finished) == {
-        "plan.json", "shards", "lines", "LICENSES-ASSETS.md", "README.md", "croissant.json",
-        "SHA256SUMS", "manifest.json", "run",
-    }  # fmt: skip
+        "plan.json",
+        "shards",
+        "lines",
+        "LICENSES-ASSETS.md",
+        "README.md",
+        "croissant.json",
+        "SHA256SUMS",
+        "manifest.json",
+        "run",
+    }
     shards = {f"00000{k}{end}" for k in range(3) for end in ("", ".json")}
     assert names_in(finished / "shards") == shards
     assert not (finished / "run" / "tmp").exists()
@@ -87,8 +94,11 @@ def test_manifest_and_provenance_count_and_list_the_samples(finished: Path) -> N
     rows = [json.loads(line) for line in lines]
     keys = ("index", "scene_index", "view_index", "split", "base")
     assert [tuple(row[key] for key in keys) for row in rows] == [
-        (4, 2, 0, "train", None), (5, 2, 1, "train", 4), (6, 3, 0, "val", None), (7, 3, 1, "val", 6)
-    ]  # fmt: skip
+        (4, 2, 0, "train", None),
+        (5, 2, 1, "train", 4),
+        (6, 3, 0, "val", None),
+        (7, 3, 1, "val", 6),
+    ]
     assert rows[0]["scene"]["instances"][0]["name"] == "thing-4"
 
 

@@ -157,9 +157,11 @@ def test_instances_count_from_one_in_the_order_of_creation(annotate: bool) -> No
     scene = built(ROOM, clutter(count=2, annotate=annotate), DESK, ARM)
 
     assert [(i.instance_id, i.name, i.annotated) for i in scene.instances] == [
-        (1, "table", False), (2, "arm", True),
-        (3, "clutter/0", annotate), (4, "clutter/1", annotate),
-    ]  # fmt: skip
+        (1, "table", False),
+        (2, "arm", True),
+        (3, "clutter/0", annotate),
+        (4, "clutter/1", annotate),
+    ]
     assert scene.groups[0].annotated == annotate
     assert scene.body("room").instance_id == 0
 

@@ -166,8 +166,10 @@ def test_groups_may_use_only_the_outer_or_the_inner_lanes() -> None:
         away_m[among] = {round(abs(y), 1) for y in places}
 
     assert {among: sorted(found) for among, found in away_m.items()} == {
-        "all": [1.8, 5.2], "rightmost": [5.2], "leftmost": [1.8],
-    }  # fmt: skip
+        "all": [1.8, 5.2],
+        "rightmost": [5.2],
+        "leftmost": [1.8],
+    }
 
 
 @pytest.mark.slow

@@ -19,9 +19,10 @@ from tests.libraries import library
 def crossing() -> list[object]:
     """Two roads that meet at a junction; the second leads away from it."""
     return [
-        Road(name="main", length_m=60.0), Junction(name="cross", after="main"),
+        Road(name="main", length_m=60.0),
+        Junction(name="cross", after="main"),
         Road(name="on", after="cross/0", length_m=40.0),
-    ]  # fmt: skip
+    ]
 
 
 def built(*elements: object) -> Scene:
@@ -53,9 +54,13 @@ def test_things_are_spread_evenly_over_all_lanes_of_their_kinds() -> None:
 def test_house_fronts_stand_on_the_frontage_and_face_the_street() -> None:
     """To the left of their lane, where the street is."""
     houses = LaneObjects(
-        name="houses", lanes=("frontage",), facing="left", count=6,
-        assets=AssetChoice(ids=("building/residential",)), annotate=False,
-    )  # fmt: skip
+        name="houses",
+        lanes=("frontage",),
+        facing="left",
+        count=6,
+        assets=AssetChoice(ids=("building/residential",)),
+        annotate=False,
+    )
     scene = built(houses)
     roads = [lane for lane in scene.lanes if lane.kind == "driving"]
     middle = np.array([p[:2] for lane in roads for p in lane.center_m])

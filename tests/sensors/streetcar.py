@@ -49,26 +49,41 @@ def thing(
 ) -> tuple[Body, Instance]:
     body = Body(name, f"{category}?", pose, instance_id=number)
     instance = Instance(
-        number, name, category, CATEGORIES[category], f"{category}?", T_world_instance=pose,
-        box_min_m=box_m[0], box_max_m=box_m[1], attributes=tuple(sorted(facts.items())),
-    )  # fmt: skip
+        number,
+        name,
+        category,
+        CATEGORIES[category],
+        f"{category}?",
+        T_world_instance=pose,
+        box_min_m=box_m[0],
+        box_max_m=box_m[1],
+        attributes=tuple(sorted(facts.items())),
+    )
     return body, instance
 
 
 def world(
-    ego: Way | None = None, others: Sequence[tuple[Body, Instance]] = (),
-    tracks: Sequence[motion.Trajectory] = (), lanes: Sequence[Lane] = (), step_s: float = 0.1,
+    ego: Way | None = None,
+    others: Sequence[tuple[Body, Instance]] = (),
+    tracks: Sequence[motion.Trajectory] = (),
+    lanes: Sequence[Lane] = (),
+    step_s: float = 0.1,
     seconds: float = 4.0,
-) -> Scene:  # fmt: skip
+) -> Scene:
     """An ego car with a rig at its origin, at 10 m/s along X, and what is around it."""
     ego = ego or straight((0.0, 0.0), (10.0, 0.0))
     things = [thing(1, "ego", "car", ego(0.0)), *others]
-    return scene_time.add_twists(Scene(
-        "test", bodies=tuple(body for body, _ in things),
-        instances=tuple(instance for _, instance in things),
-        tracks=(track_of("ego", ego, seconds), *tracks), rigs=(Rig("ego", "ego"),),
-        lanes=tuple(lanes), step_s=step_s,
-    ))  # fmt: skip
+    return scene_time.add_twists(
+        Scene(
+            "test",
+            bodies=tuple(body for body, _ in things),
+            instances=tuple(instance for _, instance in things),
+            tracks=(track_of("ego", ego, seconds), *tracks),
+            rigs=(Rig("ego", "ego"),),
+            lanes=tuple(lanes),
+            step_s=step_s,
+        )
+    )
 
 
 def rng(step: int = 0, seed: int = 0, name: str = "sensor/device") -> streams.Rng:
@@ -113,10 +128,13 @@ class BoxRays:
             return np.broadcast_to(values[:, None], shape).astype(kind)
 
         return LidarHits(
-            wide(best, np.float32), wide(np.where(found, 0.5, 0.0), np.float32),
-            wide(found, np.float32), wide(ids, np.uint16), wide(categories, np.uint16),
+            wide(best, np.float32),
+            wide(np.where(found, 0.5, 0.0), np.float32),
+            wide(found, np.float32),
+            wide(ids, np.uint16),
+            wide(categories, np.uint16),
             np.full(shape, asset_types.SURFACES.index(""), np.uint8),
-        )  # fmt: skip
+        )
 
     def render(self, scene: Scene, camera: Camera, channels: frozenset[Channel]) -> SensorReading:
         raise AssertionError("this device does not look at pictures")

@@ -53,10 +53,12 @@ def board(asset: str, z_m: float, lean_rad: float = 0.0) -> Body:
 def scene(*bodies: Body, lens: Intrinsics | None = None) -> Scene:
     lens = lens or Intrinsics.from_hfov(*SIZE_PX, math.radians(HFOV_DEG))
     return Scene(
-        "test", bodies=bodies, cameras=(Camera("depth_camera", SE3(), lens),),
+        "test",
+        bodies=bodies,
+        cameras=(Camera("depth_camera", SE3(), lens),),
         lights=(Light("lamp", "sphere", position_m=(0.3, -1.0, 0.0), intensity_cd=100.0),),
         environment=Environment(luminance_cd_m2=10.0),
-    )  # fmt: skip
+    )
 
 
 def model(kind: str, range_m: tuple[float, float] = (0.0, 50.0), **principle: Any) -> DepthModel:

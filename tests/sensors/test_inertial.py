@@ -199,8 +199,10 @@ def test_walls_hide_satellites_and_spoil_the_fix() -> None:
 
 
 def ideal_odometer(**fields: float) -> Odometer:
-    errors = ("scale_error distance_step_m speed_noise_m_s yaw_rate_noise_rad_s yaw_rate_bias_rad_s"
-              " steering_noise_rad")  # fmt: skip
+    errors = (
+        "scale_error distance_step_m speed_noise_m_s yaw_rate_noise_rad_s yaw_rate_bias_rad_s"
+        " steering_noise_rad"
+    )
     return Odometer(**{**dict.fromkeys(errors.split(), 0.0), **fields})
 
 

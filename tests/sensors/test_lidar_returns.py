@@ -27,10 +27,13 @@ def echoes(ranges_m: np.ndarray, reflectance: float = 0.5) -> LidarHits:
     ranges_m = np.asarray(ranges_m, np.float32)
     hit = np.isfinite(ranges_m)
     return LidarHits(
-        ranges_m, np.where(hit, np.float32(reflectance), np.float32(0)), hit.astype(np.float32),
-        np.where(hit, 7, 0).astype(np.uint16), np.where(hit, 2, 0).astype(np.uint16),
+        ranges_m,
+        np.where(hit, np.float32(reflectance), np.float32(0)),
+        hit.astype(np.float32),
+        np.where(hit, 7, 0).astype(np.uint16),
+        np.where(hit, 2, 0).astype(np.uint16),
         np.zeros(ranges_m.shape, np.uint8),
-    )  # fmt: skip
+    )
 
 
 class Wall:
@@ -409,9 +412,13 @@ def test_the_strongest_return_is_the_strongest_of_all_that_detours_add() -> None
     m = len(ray)
     far_m = first.range_m[ray, 0] + np.where(draw.random(m) < 0.4, 0.3, 4.0) * draw.random(m)
     detours = SecondaryHits(
-        ray, far_m.astype(np.float32), (draw.random(m) ** 4).astype(np.float32),
-        np.full(m, 9, np.uint16), np.full(m, 3, np.uint16), np.full(m, 1, np.uint8),
-    )  # fmt: skip
+        ray,
+        far_m.astype(np.float32),
+        (draw.random(m) ** 4).astype(np.float32),
+        np.full(m, 9, np.uint16),
+        np.full(m, 3, np.uint16),
+        np.full(m, 1, np.uint8),
+    )
     seen = replace(first, detours=detours)
 
     strongest = lidar_detection.make_pulses(seen, MODEL, "strongest")

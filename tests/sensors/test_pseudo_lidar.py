@@ -33,9 +33,11 @@ def scene(lens: Intrinsics) -> Scene:
     thing = Instance(7, "box", "crate", 3, "box", True, (), place, low, high)
     pose = se3.look_at((0.0, 0.0, 2.0), (6.0, 0.0, 0.5))
     return Scene(
-        "test", bodies=(Body("box", "box", place, instance_id=7), Body("ground", "ground")),
-        instances=(thing,), cameras=(Camera("color", pose, lens),),
-    )  # fmt: skip
+        "test",
+        bodies=(Body("box", "box", place, instance_id=7), Body("ground", "ground")),
+        instances=(thing,),
+        cameras=(Camera("color", pose, lens),),
+    )
 
 
 def cloud_of(sensor: PseudoLidar, world: Scene) -> PointCloud:

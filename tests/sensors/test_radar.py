@@ -138,9 +138,12 @@ def one_cell_share(range_m: float, readings: int) -> float:
     """How often a post of 10 dBsm is detected that lies in one cell of the far scan."""
     # Turned so that its aspect has the mean cross section: cos(4 * 22.5 degrees) = 0.
     post = thing(
-        2, "post", "car", se3.SE3.about_z(math.radians(22.5), (range_m + 2.2, -0.5, -1.0)),
+        2,
+        "post",
+        "car",
+        se3.SE3.about_z(math.radians(22.5), (range_m + 2.2, -0.5, -1.0)),
         ((-0.45, -0.45, 0.0), (0.45, 0.45, 4.0)),
-    )  # fmt: skip
+    )
     return detected_share(world(STILL, others=[post]), readings)
 
 

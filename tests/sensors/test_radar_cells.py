@@ -17,9 +17,15 @@ def rays(
 ) -> Echo:
     zeros = np.zeros(len(range_m))
     return Echo(
-        np.array(range_m), np.radians(azimuth_deg), zeros, zeros, np.array(rcs_m2), zeros,
-        np.array(ids), np.array(ids),
-    )  # fmt: skip
+        np.array(range_m),
+        np.radians(azimuth_deg),
+        zeros,
+        zeros,
+        np.array(rcs_m2),
+        zeros,
+        np.array(ids),
+        np.array(ids),
+    )
 
 
 def keyed(keys: list[tuple[int, int, int, int]]) -> Cells:

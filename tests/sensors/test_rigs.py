@@ -39,10 +39,11 @@ def driven(*sensors: Any) -> Scene:
     start = SE3.about_z(0.5 * math.pi, (10.0, 5.0, 0.0))
     way = tuple(start @ SE3((0.4 * k, 0.0, 0.0)) for k in range(-5, 15))
     scene = Scene(
-        "drive", bodies=(Body("ego", CAR, start, collides=False),),
+        "drive",
+        bodies=(Body("ego", CAR, start, collides=False),),
         rigs=(Rig("ego", "ego", SE3((-1.0, 0.0, 0.0))),),
         tracks=(Trajectory("ego", 0.1, way, -0.5),),
-    )  # fmt: skip
+    )
     for sensor in sensors:
         scene = sensor.mount(scene)
     return place_sensors(scene)
@@ -87,8 +88,9 @@ def test_randomizers_of_poses_leave_cameras_on_rigs_alone(randomizer: Any) -> No
     lane = Lane("lane", "driving", ((-90.0, 40.0, 0.0), (90.0, 40.0, 0.0)), 3.5)
     scene = replace(
         driven(RgbCamera(name="front", rig="ego"), RgbCamera(name="free")),
-        bodies=(Body("ego", "brick"),), lanes=(lane,),
-    )  # fmt: skip
+        bodies=(Body("ego", "brick"),),
+        lanes=(lane,),
+    )
 
     moved = randomizer(scene, FakeAssets(), rng_of("poses"))
 
@@ -132,9 +134,10 @@ def sampled(
         return EgoTruth()
 
     scene = driven(
-        RgbCamera(name="early", rig="ego"), RgbCamera(name="late", rig="ego"),
+        RgbCamera(name="early", rig="ego"),
+        RgbCamera(name="late", rig="ego"),
         LidarSensor(name="top", rig="ego"),
-    )  # fmt: skip
+    )
     infos = tuple(
         SensorInfo(name, modality, time_offset_s=offsets_s.get(name, 0.0))
         for name, modality in (

@@ -173,9 +173,10 @@ def test_shells_are_by_volume(
     ],
 )
 def test_euler_angles_turn_about_fixed_axes(
-    euler_deg: tuple[float, float, float], vector: tuple[float, float, float],
+    euler_deg: tuple[float, float, float],
+    vector: tuple[float, float, float],
     image: tuple[float, float, float],
-) -> None:  # fmt: skip
+) -> None:
     """Roll about X, then pitch about Y, then yaw about Z, each right-handed (URDF)."""
     pose = SE3((0, 0, 0), EulerDeg(euler_deg).draw(stream("")))
 

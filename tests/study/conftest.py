@@ -74,7 +74,11 @@ def draw_results(real: RealSet, seed: int) -> list[dict[str, Any]]:
             box = [*rng.uniform(0.0, 300.0, 2), *rng.uniform(10.0, 90.0, 2)]
             rows.append((picture.image_id, int(rng.integers(1, 3)), box))
     return [
-        {"image_id": image_id, "category_id": category_id, "bbox": [float(v) for v in box],
-         "score": float(rng.uniform())}
+        {
+            "image_id": image_id,
+            "category_id": category_id,
+            "bbox": [float(v) for v in box],
+            "score": float(rng.uniform()),
+        }
         for image_id, category_id, box in rows
-    ]  # fmt: skip
+    ]

@@ -44,13 +44,17 @@ def test_ap_and_ap50_are_cocos_figures_also_of_resampled_pictures(drawn_set: Rea
     assert evaluation.summary(some) == pytest.approx(alone.summary(), abs=1e-12)
     # The truth itself, and an empty list.
     perfect = [
-        {"image_id": picture.image_id, "category_id": drawn_set.category_ids[thing.name],
-         "bbox": [x0, y0, x1 - x0, y1 - y0], "score": 0.9}
+        {
+            "image_id": picture.image_id,
+            "category_id": drawn_set.category_ids[thing.name],
+            "bbox": [x0, y0, x1 - x0, y1 - y0],
+            "score": 0.9,
+        }
         for picture in drawn_set.pictures
         for thing in picture.objects
         for x0, y0, x1, y1 in [thing.box]
         if not thing.is_ignored
-    ]  # fmt: skip
+    ]
     assert evaluate(drawn_set, perfect).summary() == pytest.approx([1.0, 1.0])
     assert evaluate(drawn_set, []).summary().tolist() == [0.0, 0.0]
 
@@ -60,9 +64,11 @@ def test_objects_are_found_missed_or_ignored(tmp_path: Path) -> None:
     """A hit, a miss, a crowd, a false alarm; detections below the best F1 do not count."""
     write_coco(
         tmp_path,
-        [[{"bbox": [5, 5, 20, 20]}, {"bbox": [40, 5, 20, 20]}],
-         [{"bbox": [0, 0, 30, 30], "iscrowd": 1}, {"bbox": [34, 10, 20, 20]}]],
-    )  # fmt: skip
+        [
+            [{"bbox": [5, 5, 20, 20]}, {"bbox": [40, 5, 20, 20]}],
+            [{"bbox": [0, 0, 30, 30], "iscrowd": 1}, {"bbox": [34, 10, 20, 20]}],
+        ],
+    )
     real = read_real(tmp_path)
 
     def row(image_id: int, box: list[float], score: float) -> dict[str, object]:

@@ -82,11 +82,15 @@ def test_yolos_boxes_and_polygons_are_read_in_pixels(tmp_path: Path) -> None:
     (tmp_path / "labels/train/9.txt").write_text("0 0.5 0.5 0.1 0.1\n")
     real = read_real(tmp_path)
     assert [p.objects for p in real.pictures] == [
-        (RealObject("plate", (24, 12, 40, 36)),), (RealObject("cup", (8, 0, 32, 36)),), (),
-    ]  # fmt: skip
+        (RealObject("plate", (24, 12, 40, 36)),),
+        (RealObject("cup", (8, 0, 32, 36)),),
+        (),
+    ]
     assert (real.layout, real.category_ids) == ("yolo", {"cup": 1, "plate": 2})
-    assert real.skipped == {"image without a label file, read as one without objects": 1,
-                            "image that is missing": 1}  # fmt: skip
+    assert real.skipped == {
+        "image without a label file, read as one without objects": 1,
+        "image that is missing": 1,
+    }
 
 
 def test_yolos_rows_with_keypoints_begin_with_the_box(tmp_path: Path) -> None:
@@ -147,9 +151,11 @@ def test_vocs_boxes_and_flags_are_read(tmp_path: Path) -> None:
     real = read_real(tmp_path)
     assert real.layout == "voc"
     assert [p.objects for p in real.pictures] == [
-        (RealObject("cup", (0, 2, 20, 30), truncation=1.0),
-         RealObject("cup", (4, 4, 5, 5), True, "partly occluded"))
-    ]  # fmt: skip
+        (
+            RealObject("cup", (0, 2, 20, 30), truncation=1.0),
+            RealObject("cup", (4, 4, 5, 5), True, "partly occluded"),
+        )
+    ]
 
 
 def test_what_cannot_be_used_is_counted_and_the_rest_chosen_evenly(tmp_path: Path) -> None:
@@ -161,9 +167,12 @@ def test_what_cannot_be_used_is_counted_and_the_rest_chosen_evenly(tmp_path: Pat
     write_picture(tmp_path / "images/5.png", (32, 24))
     whole, some = read_real(tmp_path), read_real(tmp_path, None, most=2)
     assert [p.image_id for p in whole.pictures] == [10, 13, 14, 16]
-    assert whole.skipped == {"image that is missing": 1, "image that cannot be read": 1,
-                             "object with an empty box": 1,
-                             "image of another size than its labels state": 1}  # fmt: skip
+    assert whole.skipped == {
+        "image that is missing": 1,
+        "image that cannot be read": 1,
+        "object with an empty box": 1,
+        "image of another size than its labels state": 1,
+    }
     assert [p.image_id for p in some.pictures] == [10, 13]
     assert some.skipped == {"picture beyond the largest number": 5, "object with an empty box": 1}
     for k in range(7):

@@ -206,6 +206,8 @@ def test_what_a_stage_holds_and_is_not_used_is_named(tmp_path: Path) -> None:
     points.Set([p + Gf.Vec3f(0, 0, 1) for p in points.Get(1.0)], 2.0)
     UsdGeom.BasisCurves.Define(stage, "/W/C")
     remarks = saved(stage, tmp_path).remarks
-    assert remarks == ("BasisCurves is not read, such as /W/C",
-                       "subdivision surfaces (catmullClark) are read as their cages",
-                       "points that move over time are read at the earliest time")  # fmt: skip
+    assert remarks == (
+        "BasisCurves is not read, such as /W/C",
+        "subdivision surfaces (catmullClark) are read as their cages",
+        "points that move over time are read at the earliest time",
+    )

@@ -83,8 +83,10 @@ def test_an_exported_world_comes_back_with_its_lights_and_cameras(tmp_path: Path
     for instance in scene.instances:
         name = instance.name.removeprefix("copy/World_").replace("clutter_", "clutter/")
         number = next(k for k, v in names.items() if v == name)
-        one, other = (first[Channel.INSTANCE] == number,
-                      second[Channel.INSTANCE] == instance.instance_id)  # fmt: skip
+        one, other = (
+            first[Channel.INSTANCE] == number,
+            second[Channel.INSTANCE] == instance.instance_id,
+        )
         assert one.sum() > 100
         assert (one & other).sum() / (one | other).sum() > 0.99
     both = np.isfinite(first[Channel.Z_DEPTH]) & np.isfinite(second[Channel.Z_DEPTH])

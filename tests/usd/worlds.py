@@ -46,10 +46,14 @@ def table_world(library: Library) -> Scene:
         Light("sun", "sun", direction=(0.6, 0.0, -0.8), illuminance_lux=4000.0),
     )  # fmt: skip
     return Scene(
-        "table", tuple(bodies), tuple(instances), lights=lights, cameras=(off_centre_camera(),),
+        "table",
+        tuple(bodies),
+        tuple(instances),
+        lights=lights,
+        cameras=(off_centre_camera(),),
         environment=Environment(luminance_cd_m2=80.0, yaw_rad=0.4),
         tracks=(Trajectory("clutter/0", STEP_S, way),),
-    )  # fmt: skip
+    )
 
 
 def exported(

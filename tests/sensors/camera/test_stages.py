@@ -319,8 +319,9 @@ def test_grey_stays_grey_through_matrix_and_mosaic() -> None:
     pipeline = made(
         image_sensor={"full_well_e": 1e7, "read_noise_e": 0, "prnu": 0, "dsnu_e": 0, "bits": 16},
         color_matrix=[[1.7, -0.55, -0.15], [-0.25, 1.45, -0.2], [0, -0.5, 1.5]],
-        exposure_control={"time_s": [1e-6, 10.0]}, tone="linear",
-    )  # fmt: skip
+        exposure_control={"time_s": [1e-6, 10.0]},
+        tone="linear",
+    )
     photo = photograph(flat(0.5, 0.5, 0.5) * WHITE_CD_M2, pipeline)
     assert np.abs(photo.astype(int) - 128).max() <= 1
 
