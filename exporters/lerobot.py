@@ -20,6 +20,16 @@ Features: ``observation.state``, the positions of all movable joints [rad or m];
 the order of ``contacts`` and separated by commas, ``annotation.contact_forces_n`` has the normal
 force and ``annotation.contact_points_m`` the point ``x y z`` in the world. ``timestamp`` is the
 frame's number divided by the frame rate.
+
+``geometry`` adds arrays: ``annotation.depth.<camera>`` and ``annotation.instance.<camera>``
+[h, w], the 16-bit images of the shards; ``annotation.object_id`` [n] and
+``annotation.object_pose`` [n, 7] of the annotated objects in the world, whose categories
+``annotation.objects`` lists; ``annotation.contact_id`` [n, 2], instances in contact, and
+``annotation.contact`` [n, 4]: normal force and point; ``annotation.relation`` [n, 3]: subject,
+predicate and object, whose numbers ``info.json`` explains; ``annotation.K.<camera>``,
+``annotation.T_world_camera.<camera>`` and, of bent lenses, ``annotation.distortion.<camera>``.
+Arrays have no statistics, since they are no inputs of policies. Rows without a value are 0.
+
 Joints are named in ``info.json``, in the order of the robot's description.
 
 An episode is a sequence: all instants of one view. Robots of different models have different
@@ -29,8 +39,8 @@ set. The task is a sentence made of the arm's goals and the objects that move.
 Bytes of Parquet files depend on the release of pyarrow.
 """
 
-from collections.abc import Iterable, Sequence
-from itertools import groupby
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import chain, groupby
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
@@ -38,7 +48,14 @@ from gen_data.core import capture, demonstrations, errors
 from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.sample import Sample
 from gen_data.core.scene import Articulation, Scene
-from gen_data.exporters import base, fragments, lerobot_files, lerobot_statistics, sequences
+from gen_data.exporters import (
+    base,
+    fragments,
+    lerobot_files,
+    lerobot_statistics,
+    sequences,
+    step_geometry,
+)
 from gen_data.exporters.conventions import ANY_LENS, Conventions
 from gen_data.exporters.sensor_selection import rgb_camera, rgb_cameras
 
@@ -58,6 +75,9 @@ class LeRobot(base.AssetExporter):
     Attributes:
         arm: Name of the arm; empty = the first one.
         version: Format: ``v3.0`` for LeRobot 0.4 and later, ``v2.1`` for earlier releases.
+        geometry: Geometry of every step: ``depth`` and ``instances``, images of these channels;
+            ``poses`` of objects, ``contacts``, ``relations`` (a scene graph, of the annotation of
+            that name) and ``calibration`` of the cameras.
     """
 
     type: Literal["lerobot"] = "lerobot"
@@ -68,13 +88,19 @@ class LeRobot(base.AssetExporter):
     image_formats: ClassVar[frozenset[str]] = base.ANY_FORMAT
     arm: str = ""
     version: Literal["v3.0", "v2.1"] = "v3.0"
+    geometry: tuple[step_geometry.Part, ...] = ()
+
+    @property
+    def needs(self) -> frozenset[str]:
+        """The annotation of the scene graph, where it is asked for."""
+        return frozenset({"relations"} & {*self.geometry})
 
     def check(self, info: DatasetInfo) -> None:
         """Reject a data set that this format cannot represent.
 
         Raises:
-            ConfigError: there are no sequences, a camera is missing or skips steps, or a library
-                is missing.
+            ConfigError: there are no sequences, a camera is missing, skips steps or lacks a
+                channel, or a library is missing.
         """
         base.check_installed(self.type, "pyarrow")
         if info.steps_per_scene < 2:
@@ -82,6 +108,7 @@ class LeRobot(base.AssetExporter):
                 f"exporter '{self.type}': episodes are sequences, but steps_per_scene is 1; "
                 "set steps_per_scene, and an arm that moves"
             )
+        step_geometry.check(info, self.geometry, self._cameras(info), self.type)
         for name in self._cameras(info):
             rate_hz = info.sensor(name).rate_hz
             if rate_hz is not None and rate_hz * info.step_s < 1.0 - 1e-9:
@@ -111,18 +138,40 @@ class LeRobot(base.AssetExporter):
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Write the episodes of all shards, then the totals of each data set."""
-        lines = fragments.fragment_rows(shard_dirs, self.type, sequences.FRAMES)
-        frames = (sequences.Frame(shard_dir, row) for shard_dir, row in lines)
         folders: dict[tuple[str, str], lerobot_files.RobotFiles] = {}
-        for episode in sequences.unbroken_episodes(frames):
-            first = episode[0].row
-            key = (first["split"], first["robot"])
+        arrays = self._arrays(shard_dirs)
+        for episode in self._episodes(shard_dirs):
+            key = data_set(first := episode[0].row)
             if key not in folders:
                 folder = dataset_dir / key[0] / key[1].replace("/", "_")
-                folders[key] = lerobot_files.LAYOUTS[self.version](info, folder, first)
+                layout = lerobot_files.LAYOUTS[self.version]
+                folders[key] = layout(info, folder, first, arrays.get(key, {}))
             folders[key].add_episode(episode)
         for files in folders.values():
             files.close()
+
+    def _episodes(self, shard_dirs: Sequence[Path]) -> Iterator[list[sequences.Frame]]:
+        lines = fragments.fragment_rows(shard_dirs, self.type, sequences.FRAMES)
+        return sequences.unbroken_episodes(sequences.Frame(*line) for line in lines)
+
+    def _arrays(
+        self, shard_dirs: Sequence[Path]
+    ) -> dict[tuple[str, str], dict[str, step_geometry.Array]]:
+        """Arrays of geometry of each data set, with room for the largest of its steps."""
+        if not self.geometry:
+            return {}
+        firsts: dict[tuple[str, str], Mapping[str, Any]] = {}
+        most: dict[tuple[str, str], dict[str, int]] = {}
+        for frame in chain.from_iterable(self._episodes(shard_dirs)):
+            key = data_set(frame.row)
+            firsts.setdefault(key, frame.row)
+            counts = most.setdefault(key, {})
+            for name, value in frame.row["geometry"].items():
+                counts[name] = max(counts.get(name, 1), len(value))
+        return {
+            key: step_geometry.array_features(self.geometry, first["images"], most[key])
+            for key, first in firsts.items()
+        }
 
     def _cameras(self, info: DatasetInfo) -> tuple[str, ...]:
         if not self.cameras:
@@ -141,7 +190,9 @@ class LeRobot(base.AssetExporter):
         }
         robot = self.library.robot(arm.asset)
         step = demonstrations.demonstration_step(arm, robot, time_s, info.step_s)
+        geometry = step_geometry.step_values(sample, step, self.geometry, images)
         return sequences.frame_facts(info, sample) | {
+            **({"geometry": geometry} if self.geometry else {}),
             "labels": {} if step is None else _labels(step),
             "robot": arm.asset,
             "joints": [joint.name for joint in robot.movable],
@@ -162,6 +213,11 @@ class LeRobot(base.AssetExporter):
             else f"exporter '{self.type}': the scene has no arm; add an element of type robot and "
             "the randomizer arm_motion"
         )
+
+
+def data_set(row: Mapping[str, Any]) -> tuple[str, str]:
+    """Split and robot of a frame: robots of different models have different joints."""
+    return row["split"], row["robot"]
 
 
 def _labels(step: demonstrations.DemonstrationStep) -> dict[str, Any]:
