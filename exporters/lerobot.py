@@ -16,7 +16,8 @@ Features: ``observation.state``, the positions of all movable joints [rad or m];
 ``observation.images.<camera>``. Demonstrations of tasks (randomizer ``arm_task``) add
 ``observation.ee_pose``, the grasp frame in the frame of the arm's base [m, quaternion w x y z];
 ``observation.gripper`` and ``action.gripper``, its opening from 0 to 1; and texts
-``annotation.{phase,held,contacts,failure}`` with ``annotation.succeeded``. Of every contact, in
+``annotation.{phase,held,contacts,failure}`` with ``annotation.succeeded``; twins also
+``annotation.recovered``, the failure that happened in a success. Of every contact, in
 the order of ``contacts`` and separated by commas, ``annotation.contact_forces_n`` has the normal
 force and ``annotation.contact_points_m`` the point ``x y z`` in the world. ``timestamp`` is the
 frame's number divided by the frame rate.
@@ -193,7 +194,7 @@ class LeRobot(base.AssetExporter):
         geometry = step_geometry.step_values(sample, step, self.geometry, images)
         return sequences.frame_facts(info, sample) | {
             **({"geometry": geometry} if self.geometry else {}),
-            "labels": {} if step is None else _labels(step),
+            "labels": {} if step is None else _labels(step, sample.scene.twins),
             "robot": arm.asset,
             "joints": [joint.name for joint in robot.movable],
             "state": demonstrations.joint_positions(arm, time_s),
@@ -220,15 +221,18 @@ def data_set(row: Mapping[str, Any]) -> tuple[str, str]:
     return row["split"], row["robot"]
 
 
-def _labels(step: demonstrations.DemonstrationStep) -> dict[str, Any]:
+def _labels(step: demonstrations.DemonstrationStep, twins: bool) -> dict[str, Any]:
     """Features of a demonstration at one instant."""
     pose = (*step.T_base_grasp.translation_m, *step.T_base_grasp.quaternion_wxyz)
     contacts = ", ".join(step.contacts)
     forces = ", ".join(f"{force_n:g}" for force_n in step.contact_forces_n)
     points = ", ".join(f"{x:g} {y:g} {z:g}" for x, y, z in step.contact_points_m)
     values = (pose, step.opening, step.opening_action, step.phase, step.held, contacts, forces,
-              points, step.succeeded, step.failure)  # fmt: skip
-    return dict(zip(lerobot_files.LABELS, values, strict=True))
+              points, step.succeeded, step.failure, step.recovered)  # fmt: skip
+    labels = dict(zip(lerobot_files.LABELS, values, strict=True))
+    if not twins:
+        del labels["annotation.recovered"]
+    return labels
 
 
 def task_sentence(scene: Scene, arm: Articulation) -> str:

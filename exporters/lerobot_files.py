@@ -55,8 +55,9 @@ LABELS = {
     "annotation.contact_points_m": "string",
     "annotation.succeeded": "bool",
     "annotation.failure": "string",
+    "annotation.recovered": "string",
 }
-"""Features of demonstrations and their types."""
+"""Features of demonstrations and their types; the last one of twins only."""
 COUNTERS = ("frame_index", "episode_index", "index", "task_index")
 
 

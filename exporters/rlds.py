@@ -13,8 +13,8 @@ Steps are lists of equal length under ``steps/``: ``observation/image/<camera>``
 (x, y, z, qw, qx, qy, qz of the grasp frame in the frame of the arm's base),
 ``observation/gripper``, ``action_gripper``, ``phase``, ``held``, ``contacts`` (separated by
 commas, as ``contact_forces_n`` and ``contact_points_m``, which are ``x y z``), and of the whole
-episode ``episode_metadata/{succeeded,failure,sequence}``. Vectors of all
-steps follow one another.
+episode ``episode_metadata/{succeeded,failure,sequence}``, of twins ``recovered`` too. Vectors of
+all steps follow one another.
 
 ``geometry`` adds PNG files of 16 bits, ``observation/{depth,instance}/<camera>``, and the arrays of
 ``lerobot`` by the same names without ``annotation.``, slashes for dots; ``features.json`` has the
@@ -138,6 +138,8 @@ def _features(
         "episode_metadata/succeeded": [int(succeeded)],
         "episode_metadata/failure": [first.get("annotation.failure", "").encode()],
     }
+    if "annotation.recovered" in first:
+        features["episode_metadata/recovered"] = [first["annotation.recovered"].encode()]
     for key, name in FLOATS.items():
         if name in first:
             features[key] = [value for row in rows for value in _as_list(row[name])]

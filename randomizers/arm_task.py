@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
 from pydantic import Field, model_validator
 from pydantic.config import JsonDict
@@ -52,15 +52,25 @@ class Failures(Strict):
         slip: The object slips out of the fingers on its way.
         miss: The fingers close above the object.
         collision: The hand knocks the object away before it reaches for it.
+        late: The arm waits until the time limit has passed.
+        wrong_object: The arm takes another object for the one it should grasp.
     """
 
     slip: float = Field(0.0, ge=0, le=1)
     miss: float = Field(0.0, ge=0, le=1)
     collision: float = Field(0.0, ge=0, le=1)
+    late: float = Field(0.0, ge=0, le=1)
+    wrong_object: float = Field(0.0, ge=0, le=1)
+
+    @property
+    def shares(self) -> dict[FailureKind, float]:
+        """Shares above 0 by kind, in the order in which they are drawn."""
+        kinds = get_args(FailureKind)[1:]
+        return {kind: share for kind in kinds if (share := getattr(self, kind)) > 0.0}
 
     @model_validator(mode="after")
     def _is_a_share(self) -> "Failures":
-        if self.slip + self.miss + self.collision > 1.0:
+        if sum(self.shares.values()) > 1.0:
             raise ValueError("the shares of failures add up to more than 1")
         return self
 
@@ -76,7 +86,11 @@ class ArmTask(RandomizerBase):
         tasks: Name of a YAML file of tasks next to the configuration, in addition to
             ``arm_tasks.yaml``; tasks of the same name replace those.
         arm: Name of the arm; empty = the first one.
-        failures: Shares of demonstrations that fail on purpose, of tasks that grasp.
+        failures: Shares of demonstrations that fail on purpose, of tasks that can fail so. With
+            ``twins`` of the configuration, where one of two demonstrations always fails, their
+            proportions; without any, all causes of a task are equally frequent.
+        time_limit_s: Time within which a task must be done; null = there is no limit, and nothing
+            is late.
         speed: Fraction of the joints' speed and acceleration limits to use.
     """
 
@@ -87,6 +101,7 @@ class ArmTask(RandomizerBase):
     group: str = ""
     arm: str = ""
     failures: Failures = Failures()
+    time_limit_s: float | None = Field(None, gt=0, le=600)
     speed: Annotated[dist.Scalar, dist.Bounds(0.01, 1.0)] = dist.Uniform(0.4, 0.7)
 
     def possible_assets(self, assets: interfaces.AssetIndex) -> tuple[str, ...]:
@@ -121,8 +136,19 @@ class ArmTask(RandomizerBase):
                 "a robot with one, such as franka_panda, robots/ur5e or robots/sawyer"
             )
         hand = "fingers" if gripper.cup is None else "suction"
+        if self.failures.late and self.time_limit_s is None:
+            raise errors.ConfigError(
+                f"randomizers.{self.name}.failures: late needs a time limit; expected "
+                "time_limit_s besides it [s]"
+            )
         for name in self._possible_tasks():
             task = self._table()[name]
+            if scene.twins and not self._causes(task):
+                asked = " and ".join(self.failures.shares) or "without a time_limit_s"
+                raise errors.ConfigError(
+                    f"randomizers.{self.name}.failures: twins of '{name}' cannot fail by {asked}; "
+                    f"expected one of {', '.join(task.causes)}, or another task"
+                )
             if task.hand not in (hand, None):
                 raise errors.ConfigError(
                     f"randomizers.{self.name}.task: '{name}' needs {task.hand}, but arm "
@@ -142,7 +168,7 @@ class ArmTask(RandomizerBase):
         table, arm = self._table(), self._find_arm(scene)
         check_known(name, tuple(table), f"randomizers.{self.name}.task: unknown task")
         task = table[name]
-        speed, failure = round(self.speed.draw(rng), 4), self._draw_failure(task, rng)
+        speed, failure = round(self.speed.draw(rng), 4), self._draw_failure(task, scene.twins, rng)
         group = self._find_group(scene)
         placed = self._place_things(task, arm, assets, rng)
         scene = remove_members(scene, group.name)
@@ -156,6 +182,8 @@ class ArmTask(RandomizerBase):
             tuple(_condition(condition, bodies) for condition in task.success),
             failure,
             tuple(_joints(task, bodies)),
+            deadline_s=self.time_limit_s,
+            mistaken=bodies[task.mistaken] if failure == "wrong_object" else "",
         )
         goals = tuple(
             replace(goal, speed=round(speed * step.pace, 4))
@@ -188,20 +216,26 @@ class ArmTask(RandomizerBase):
         known = ", ".join(arm.name for arm in scene.articulations) or "none: add a robot"
         raise errors.ConfigError(f"randomizers.{self.name}.arm: there is no arm; expected {known}")
 
-    def _draw_failure(self, task: Task, rng: streams.Rng) -> FailureKind:
+    def _causes(self, task: Task) -> dict[FailureKind, float]:
+        """Weights of the causes by which the failing twin of a task fails."""
+        shares = self.failures.shares or dict.fromkeys(get_args(FailureKind)[1:], 1.0)
+        limited = self.time_limit_s is not None
+        return {k: w for k, w in shares.items() if k in task.causes and (limited or k != "late")}
+
+    def _draw_failure(self, task: Task, twins: bool, rng: streams.Rng) -> FailureKind:
         """Draw a kind of failure once per scene: all attempts at a layout are to fail alike.
 
         Else a kind that physics refuses more often than others would be rarer than its share.
         """
         stream = replace(rng.streams, attempt=0).rng(f"{rng.name}/failure")
         draw = float(stream.uniform())
-        if not any(step.verb == "grasp" for step in task.program):
-            return ""
-        kinds: tuple[FailureKind, ...] = ("slip", "miss", "collision")
-        for kind in kinds:
-            draw -= getattr(self.failures, kind)
+        if twins:
+            causes = self._causes(task)
+            return [*causes][streams.pick_by_weight([*causes.values()], draw)]
+        for kind, share in self.failures.shares.items():
+            draw -= share
             if draw < 0.0:
-                return kind
+                return kind if kind in task.causes else ""
         return ""
 
     def _place_things(

@@ -159,6 +159,20 @@ class Task(base_model.Strict):
         tilts = any(step.turn_deg and step.axis[:2] != (0.0, 0.0) for step in self.program)
         return 6 if tilts else 4
 
+    @property
+    def mistaken(self) -> str:
+        """Object that may be taken for the first one that is grasped; empty = none."""
+        wanted = next((step.at for step in self.program if step.verb == "grasp"), "")
+        loose = (n for n, t in self.things.items() if t.mass_kg != 0.0 and t.joint is None)
+        return next((n for n in loose if n != wanted), "") if wanted else ""
+
+    @property
+    def causes(self) -> tuple[scene.FailureKind, ...]:
+        """Causes by which it can fail on purpose."""
+        grasps = any(step.verb == "grasp" for step in self.program)
+        wrong: tuple[scene.FailureKind, ...] = ("wrong_object",) if self.mistaken else ()
+        return (*(("slip", "miss", "collision") if grasps else ()), "late", *wrong)
+
     @model_validator(mode="after")
     def _names_its_things(self) -> "Task":
         used = [step.at for step in self.program] + [t.near for t in self.things.values()]

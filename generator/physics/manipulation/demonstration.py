@@ -28,7 +28,11 @@ _PAD_FRICTION_N_M = 0.05
 """Torque that turns a thing between two finger tips: a 100 g block held 2 cm off its centre does
 not turn by its weight (0.02 N m), and turns when its edge is pressed down with 2 N (assumed)."""
 _SETTLE_S = 0.6
-"""After the last goal, so that what was let go comes to rest."""
+"""After the last goal, so that what was let go comes to rest, and before a recovery."""
+_HESITATION_S = 1.0
+"""An arm that recovers from being late has waited for this time."""
+_IN_HAND: tuple[scene.FailureKind, ...] = ("", "late", "wrong_object")
+"""Failures with which the first body that is grasped stays in the hand."""
 
 
 def demonstrate(
@@ -36,41 +40,27 @@ def demonstrate(
 ) -> "Demonstration | errors.Rejection":
     """Plan and carry out the task of an arm goal by goal; each plan starts from what physics left.
 
-    A failure that was asked for befalls the first grasp. It is no reason to stop: the arm goes on
-    as if nothing had happened.
+    A failure that was asked for befalls the first grasp, or makes the arm wait in the middle of
+    its program. It is no reason to stop: the arm goes on as if nothing had happened, or, if the
+    assignment says that it recovers, looks at what has become of everything and tries again.
 
     Returns:
         The demonstration; or why a goal cannot be accomplished, or which condition of success does
-        not hold although no failure was asked for.
+        not hold although no failure was asked for, or the arm should have recovered.
     """
-    articulation = arm.articulation
-    assignment = articulation.assignment
+    assignment = arm.articulation.assignment
     assert assignment is not None
     shown = Demonstration(arm, world, planner.all_poses(), time_step_s)
-    first_grasp = next((g for g in articulation.task if g.kind == "grasp"), None)
-    for number, goal in enumerate(articulation.task, 1):
-        fails = goal is first_grasp
-        if assignment.failure == "collision" and fails:
-            blow = planner.plan_blow(goal, number)
-            if isinstance(blow, errors.Rejection):
-                return blow
-            shown.run(blow, "approach")
-        legs = planner.plan_goal(goal, number)
-        if isinstance(legs, errors.Rejection):
-            return legs
-        if assignment.failure == "miss" and fails:
-            legs = _without_approach(legs)
-        shown.run(legs, goal.phase or goal.kind)
-        if not assignment.failure:
-            planner.observe(shown.poses[-1])
-    shown.settle()
+    refused = _carry_out(planner, arm.articulation, assignment, shown)
+    if refused is not None:
+        return refused
     failed = shown.failed_conditions()
-    if assignment.failure and not failed:
+    if assignment.failure and not assignment.recovers and not failed:
         return errors.Rejection(
             f"task '{assignment.name}': it succeeds in spite of a {assignment.failure}",
             "fewer failures, or another task",
         )
-    if failed and not assignment.failure:
+    if failed and (assignment.recovers or not assignment.failure):
         first = failed[0]
         between = f" to '{first.other}'" if first.other else ""
         return errors.Rejection(
@@ -79,6 +69,71 @@ def demonstrate(
             f"other places of the things of task '{assignment.name}', or another task",
         )
     return shown
+
+
+def _carry_out(
+    planner: manipulation_planner.TaskPlanner,
+    articulation: scene.Articulation,
+    assignment: scene.Assignment,
+    shown: "Demonstration",
+) -> errors.Rejection | None:
+    """Carry out all goals, with the failure and perhaps the recovery; the reason if one cannot."""
+    goals, failure = articulation.task, assignment.failure
+    grasp = next((k for k, goal in enumerate(goals) if goal.kind == "grasp"), -1)
+    ahead = failure  # What is still to happen.
+    number = 0
+    while number < len(goals):
+        goal = goals[number]
+        if ahead == "late" and number == len(goals) // 2:
+            assert assignment.deadline_s is not None
+            if not assignment.recovers:
+                shown.wait(planner.positions, assignment.deadline_s - shown.end_s, "wait")
+                break
+            shown.wait(planner.positions, _HESITATION_S, "wait")
+            ahead = ""
+        if ahead in ("collision", "wrong_object") and number == grasp:
+            mishap = _mishap(planner, assignment, goal, number + 1, shown)
+            if mishap is not None:
+                return mishap
+            if ahead == "wrong_object" and not assignment.recovers:
+                number += 1
+                continue
+            if assignment.recovers:
+                ahead = shown.recover(planner)
+        legs = planner.plan_goal(goal, number + 1)
+        if isinstance(legs, errors.Rejection):
+            return legs
+        missed = ahead == "miss" and number == grasp
+        shown.run(_without_approach(legs) if missed else legs, goal.phase or goal.kind)
+        number += 1
+        if assignment.recovers and (missed or (ahead == "slip" and shown.has_slipped())):
+            ahead, number = shown.recover(planner), grasp
+        elif ahead in ("", "late"):
+            planner.observe(shown.poses[-1])
+    shown.settle()
+    return None
+
+
+def _mishap(
+    planner: manipulation_planner.TaskPlanner,
+    assignment: scene.Assignment,
+    goal: scene.ArmGoal,
+    number: int,
+    shown: "Demonstration",
+) -> errors.Rejection | None:
+    """What precedes the first grasp: a blow, or another body in the hand, which it may put back."""
+    if assignment.failure == "collision":
+        steps: list[tuple[scene.ArmGoal | None, str]] = [(None, "approach")]
+    else:
+        steps = [(replace(goal, objects=(assignment.mistaken,)), goal.phase or goal.kind)]
+        if assignment.recovers:
+            steps.append((planner.return_goal(assignment.mistaken, goal.speed), "return"))
+    for step, phase in steps:
+        legs = planner.plan_goal(step, number) if step else planner.plan_blow(goal, number)
+        if isinstance(legs, errors.Rejection):
+            return legs
+        shown.run(legs, phase)
+    return None
 
 
 def _without_approach(legs: list[Leg]) -> list[Leg]:
@@ -118,6 +173,7 @@ class Demonstration:
         self._torn = ""
         self._fingers = [arm.body(k) for k in kinematics.finger_links(arm.robot) if k in arm.links]
         self._first_held = ""
+        self._recovered: scene.FailureKind = ""
         self.legs: list[Leg] = []
         self.poses: list[dict[str, se3.SE3]] = []
 
@@ -156,10 +212,32 @@ class Demonstration:
         move = self._world.carry if leg.pivots else self._world.place
         move(held, pose)
 
+    @property
+    def end_s(self) -> float:
+        """Time of the latest knot, from the beginning."""
+        return max(0, len(self.poses) - 1) * STEP_S
+
     def settle(self) -> None:
         """Wait at the end until everything has come to rest."""
-        last = self.legs[-1]
-        self.run([Leg(last.end, last.end, _SETTLE_S, last.held)], "settle")
+        self.wait(self.legs[-1].end, _SETTLE_S, "settle")
+
+    def wait(self, positions: Sequence[float], duration_s: float, phase: str) -> None:
+        """Stand still for at least two knots."""
+        held = self.legs[-1].held if self.legs else None
+        knots = max(2, math.ceil(duration_s / STEP_S - 1e-9))
+        stay = tuple(positions)
+        self.run([Leg(stay, stay, round(knots * STEP_S, 6), held)], phase)
+
+    def has_slipped(self) -> bool:
+        """Whether the first body that was held has left the fingers."""
+        return self._held.count(self._first_held) >= _SLIP_KNOTS and not self._held[-1]
+
+    def recover(self, planner: manipulation_planner.TaskPlanner) -> scene.FailureKind:
+        """Notice the failure: wait, plan from what physics left, and let no other happen."""
+        self.wait(planner.positions, _SETTLE_S, "notice")
+        planner.look(self.poses[-1])
+        self._recovered = self._assignment.failure
+        return ""
 
     def episode(self, start_s: float) -> scene.Episode:
         """What happened, and whether it is a success, at times from ``start_s`` on."""
@@ -170,6 +248,7 @@ class Demonstration:
             tuple(_spans(self._phases, start_s)),
             tuple(span for span in _spans(self._held, start_s) if span.label),
             tuple(self._contact_spans(start_s)),
+            self._assignment.failure if succeeded and self._assignment.recovers else "",
         )
 
     def failed_conditions(self) -> list[scene.Condition]:
@@ -179,13 +258,21 @@ class Demonstration:
             for k, condition in enumerate(self._assignment.success)
             if not any(
                 condition.holds(values[k])
-                for values in (self._values if condition.ever else self._values[-1:])
+                for values in (self._judged if condition.ever else self._judged[-1:])
             )
         ]
 
     def value_at_end(self, condition: scene.Condition) -> float:
         """Value of a condition of success at the latest knot."""
-        return self._values[-1][self._assignment.success.index(condition)]
+        return self._judged[-1][self._assignment.success.index(condition)]
+
+    @property
+    def _judged(self) -> list[tuple[float, ...]]:
+        """Values up to the deadline."""
+        deadline_s = self._assignment.deadline_s
+        if deadline_s is None:
+            return self._values
+        return self._values[: math.floor(deadline_s / STEP_S + 1e-9) + 1]
 
     def _held_body(self, leg: Leg) -> str:
         """Name of the body that is in the hand on a leg; empty where it fails to hold it."""
@@ -198,7 +285,7 @@ class Demonstration:
             return ""
         body, failure = leg.held.body, self._assignment.failure
         self._first_held = self._first_held or body
-        if not failure or body != self._first_held:
+        if failure in _IN_HAND or self._recovered or body != self._first_held:
             return body
         slips_later = failure == "slip" and self._held.count(body) < _SLIP_KNOTS
         return body if slips_later else ""

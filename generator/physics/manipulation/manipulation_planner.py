@@ -129,6 +129,22 @@ class TaskPlanner:
             moved = T_grasp_world @ poses[self._held.body]
             self._held = replace(self._held, T_grasp_held=moved)
 
+    def look(self, poses: Mapping[str, SE3]) -> None:
+        """Plan from here on with all poses that physics tells, and with an empty hand."""
+        if self._held is not None:
+            self.resting[self._held.body] = poses[self._held.body]
+            self._held = None
+        self.observe(poses)
+
+    def return_goal(self, body: str, speed: float) -> scene.ArmGoal:
+        """The goal of putting a body, once it is grasped, back to where it rests now."""
+        pose = self.resting[body]
+        self._restore_world()
+        rest = self._rest_on_surface(body)
+        x, y, z = pose.translation_m
+        spot = SE3((x, y, z - (rest.translation_m[2] if rest else 0.0)))
+        return scene.ArmGoal("place", pose_candidates=(spot,), speed=speed)
+
     def plan_blow(self, goal: scene.ArmGoal, number: int) -> list[Leg] | errors.Rejection:
         """Timed legs of a closed hand that knock away the first object of a grasp.
 
