@@ -31,7 +31,8 @@ predicate and object, whose numbers ``info.json`` explains; ``annotation.K.<came
 ``annotation.T_world_camera.<camera>`` and, of bent lenses, ``annotation.distortion.<camera>``.
 Arrays have no statistics, since they are no inputs of policies. Rows without a value are 0.
 
-Joints are named in ``info.json``, in the order of the robot's description.
+Joints are named in ``info.json``, in the order of the robot's description. A task of several arms
+has the joints, hands and openings of all, one arm after the other, with names ``<arm>.<joint>``.
 
 An episode is a sequence: all instants of one view. Robots of different models have different
 joints and hence separate data sets; so have splits, since training takes all episodes of a data
@@ -41,6 +42,7 @@ Bytes of Parquet files depend on the release of pyarrow.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from itertools import chain, groupby
 from pathlib import Path
 from typing import Any, ClassVar, Literal
@@ -74,7 +76,7 @@ class LeRobot(base.AssetExporter):
     """LeRobot: joint positions and images of the episodes of one arm.
 
     Attributes:
-        arm: Name of the arm; empty = the first one.
+        arm: Name of the arm; empty = the first one. Arms that its task names are exported with it.
         version: Format: ``v3.0`` for LeRobot 0.4 and later, ``v2.1`` for earlier releases.
         geometry: Geometry of every step: ``depth`` and ``instances``, images of these channels;
             ``poses`` of objects, ``contacts``, ``relations`` (a scene graph, of the annotation of
@@ -125,7 +127,7 @@ class LeRobot(base.AssetExporter):
         Raises:
             ConfigError: the scene has no such arm.
         """
-        self._find_arm(scene)
+        self._find_arms(scene)
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
         """Write a line per frame: joints, task and statistics of images.
@@ -181,32 +183,40 @@ class LeRobot(base.AssetExporter):
         return tuple(rgb_camera(info, name, self.type) for name in names)
 
     def _row(self, info: DatasetInfo, sample: Sample, shard_dir: Path) -> dict[str, Any]:
-        arm = self._find_arm(sample.scene)
-        time_s = sample.scene.time_s
+        arms, time_s = self._find_arms(sample.scene), sample.scene.time_s
         images = {
             camera: lerobot_statistics.image_sums(
                 info.media_path(shard_dir, camera, capture.Channel.RGB, sample.index)
             )
             for camera in self._cameras(info)
         }
-        robot = self.library.robot(arm.asset)
-        step = demonstrations.demonstration_step(arm, robot, time_s, info.step_s)
-        geometry = step_geometry.step_values(sample, step, self.geometry, images)
+        robots = [self.library.robot(arm.asset) for arm in arms]
+        pairs = list(zip(arms, robots, strict=True))
+        steps = [demonstrations.demonstration_step(a, r, time_s, info.step_s) for a, r in pairs]
+        geometry = step_geometry.step_values(sample, steps[0], self.geometry, images)
         return sequences.frame_facts(info, sample) | {
             **({"geometry": geometry} if self.geometry else {}),
-            "labels": {} if step is None else _labels(step, sample.scene.twins),
-            "robot": arm.asset,
-            "joints": [joint.name for joint in robot.movable],
-            "state": demonstrations.joint_positions(arm, time_s),
-            "action": demonstrations.joint_positions(arm, time_s + info.step_s),
-            "task": task_sentence(sample.scene, arm),
+            **({"arms": [arm.name for arm in arms]} if len(arms) > 1 else {}),
+            "labels": _labels([step for step in steps if step], sample.scene.twins),
+            "robot": "+".join(arm.asset for arm in arms),
+            "joints": [
+                f"{arm.name}.{joint.name}" if len(arms) > 1 else joint.name
+                for arm, robot in pairs
+                for joint in robot.movable
+            ],
+            "state": _positions(arms, time_s),
+            "action": _positions(arms, time_s + info.step_s),
+            "task": task_sentence(sample.scene, arms[0]),
             "images": images,
         }
 
-    def _find_arm(self, scene: Scene) -> Articulation:
+    def _find_arms(self, scene: Scene) -> tuple[Articulation, ...]:
+        """The arm, and those that its task names, which share its episode."""
         for arm in scene.articulations:
             if self.arm in ("", arm.name):
-                return arm
+                named = {name for goal in arm.task for name in goal.arms} - {arm.name}
+                others = (a for a in scene.articulations if a.name in named)
+                return (arm, *(replace(a, episode=arm.episode) for a in others))
         known = ", ".join(arm.name for arm in scene.articulations) or "none"
         raise errors.ConfigError(
             f"exporter '{self.type}': the scene has no arm '{self.arm}'; expected one of: {known}"
@@ -221,14 +231,24 @@ def data_set(row: Mapping[str, Any]) -> tuple[str, str]:
     return row["split"], row["robot"]
 
 
-def _labels(step: demonstrations.DemonstrationStep, twins: bool) -> dict[str, Any]:
-    """Features of a demonstration at one instant."""
-    pose = (*step.T_base_grasp.translation_m, *step.T_base_grasp.quaternion_wxyz)
+def _positions(arms: Sequence[Articulation], time_s: float) -> list[float]:
+    return [q for arm in arms for q in demonstrations.joint_positions(arm, time_s)]
+
+
+def _labels(steps: Sequence[demonstrations.DemonstrationStep], twins: bool) -> dict[str, Any]:
+    """Features of a demonstration at one instant, with numbers of all its arms."""
+    if not steps:
+        return {}
+    step, poses = steps[0], [s.T_base_grasp for s in steps]
+    pose = [v for p in poses for v in (*p.translation_m, *p.quaternion_wxyz)]
+    openings: list[Any] = [[s.opening for s in steps], [s.opening_action for s in steps]]
+    if len(steps) == 1:
+        openings = [values[0] for values in openings]
     contacts = ", ".join(step.contacts)
     forces = ", ".join(f"{force_n:g}" for force_n in step.contact_forces_n)
     points = ", ".join(f"{x:g} {y:g} {z:g}" for x, y, z in step.contact_points_m)
-    values = (pose, step.opening, step.opening_action, step.phase, step.held, contacts, forces,
-              points, step.succeeded, step.failure, step.recovered)  # fmt: skip
+    values = (pose, *openings, step.phase, step.held, contacts, forces, points, step.succeeded,
+              step.failure, step.recovered)  # fmt: skip
     labels = dict(zip(lerobot_files.LABELS, values, strict=True))
     if not twins:
         del labels["annotation.recovered"]

@@ -182,7 +182,7 @@ class RobotFiles(ABC):
                 name: {
                     "dtype": LABELS[name],
                     "shape": [len(np.atleast_1d(value))],
-                    "names": [*POSE] if name == EE_POSE else None,
+                    "names": self._pose_names() if name == EE_POSE else None,
                 }
                 for name, value in self.first["labels"].items()
             },
@@ -207,6 +207,10 @@ class RobotFiles(ABC):
             "timestamp": {"dtype": "float32", **number},
             **{name: {"dtype": "int64", **number} for name in COUNTERS},
         }
+
+    def _pose_names(self) -> list[str]:
+        arms = self.first.get("arms", ())
+        return [f"{arm}.{name}" for arm in arms for name in POSE] if arms else [*POSE]
 
     def _meaning(self, name: str) -> dict[str, Any]:
         """Keys of ours in ``info.json``: unit of depths, and names of numbered predicates."""

@@ -222,7 +222,8 @@ class ArmGoal:
             grasp frame in the world. ``hold``: like reach, with ``grasped_object`` between the
             fingers. In tasks only: ``grasp`` picks up one of ``objects``, ``place`` puts the held
             object down, ``move`` passes ``waypoints`` in straight lines, ``grip`` opens or closes
-            the fingers, or closes them on the first of ``objects``, and lets go of a held one.
+            the fingers, or closes them on the first of ``objects``, and lets go of a held one;
+            with ``carries`` it then holds that object where it is.
         joint_candidates: One tuple per candidate [rad or m], arm joints in order.
         pose_candidates: ``T_world_grasp`` per candidate; for ``place``, a point on a surface and
             a rotation about Z of the object from its former pose at rest.
@@ -238,6 +239,8 @@ class ArmGoal:
         pivots: Whether a ``move`` leads the hand's origin along the waypoints without turning the
             hand; what it holds turns about the line between the fingers as contacts make it.
         phase: Name of this part of a demonstration in labels; empty = the kind.
+        arms: Names of the arms that pursue it, in demonstrations; several move together. Empty =
+            the arm whose task it is part of.
     """
 
     kind: Literal["joints", "reach", "hold", "grasp", "place", "move", "grip"]
@@ -252,6 +255,7 @@ class ArmGoal:
     touches: tuple[str, ...] = ()
     pivots: bool = False
     phase: str = ""
+    arms: tuple[str, ...] = field(default=(), metadata={serialization.SPARSE: True})
 
 
 Measure = Literal["distance", "offset", "height", "gap", "tilt", "travel"]

@@ -222,23 +222,33 @@ class Engine:
         recording = TrajectoryRecording(dict(resting))
         episodes: dict[str, Episode] = {}
         for arm, state in at_work:
-            others = [name for other, _ in arms if other is not arm for name in other.bodies]
-            obstacles = [*fixed, *others]
-            planner = TaskPlanner(arm, state, self._world, obstacles, resting, scene.surfaces)
-            parts = [link for link in arm.robot.links if link in arm.robot.visuals]
+            named = {name for goal in arm.articulation.task for name in goal.arms}
+            partners = [(a, s) for a, s in arms if a is not arm and a.articulation.name in named]
+            planners = [
+                TaskPlanner(
+                    one,
+                    its_state,
+                    self._world,
+                    [*fixed, *(n for a, _ in arms if a is not one for n in a.bodies)],
+                    resting,
+                    scene.surfaces,
+                )
+                for one, its_state in ((arm, state), *partners)
+            ]
             if arm.articulation.assignment is not None:
-                shown = demonstrate(planner, arm, self._world, self._config.time_step_s)
+                shown = demonstrate(planners, self._world, self._config.time_step_s)
                 if isinstance(shown, Rejection):
                     return shown
                 episodes[arm.articulation.name] = shown.episode(recording.end_s)
-                recording.add(arm, shown.legs, parts, shown.poses)
+                recording.add([(a, legs, _parts(a)) for a, legs in shown.legs], shown.poses)
                 resting = shown.poses[-1]
                 continue
+            planner = planners[0]
             plan = planner.plan()
             if isinstance(plan, Rejection):
                 return plan
             resting = planner.resting
-            recording.add(arm, plan, parts)
+            recording.add([(arm, plan, _parts(arm))])
         return replace(
             scene,
             tracks=(*scene.tracks, *recording.tracks()),
@@ -284,6 +294,11 @@ def _solids(scene: Scene) -> list[Body]:
     """Bodies that collide, without links of robots, whose geometry comes from their robot."""
     prefixes = tuple(f"{articulation.name}/" for articulation in scene.articulations)
     return [b for b in scene.bodies if b.collides and not b.name.startswith(prefixes)]
+
+
+def _parts(arm: Arm) -> list[str]:
+    """Links with a body in the scene."""
+    return [link for link in arm.robot.links if link in arm.robot.visuals]
 
 
 def _asked(arm: Articulation, recovers: bool) -> Articulation:

@@ -17,14 +17,14 @@ from gen_data.randomizers.arm_task_table import tasks
 from tests.tiers import exhaustive, slow
 
 SMALL = ("sensors.color.size_px=[96,72]", "sensors.wrist.size_px=[96,72]")
-LIMIT_S = 20.0
-ROWS = [(task, cause) for task, row in sorted(tasks().items()) for cause in row.causes]
+LIMIT_S = 25.0
+ROWS = [(task, cause) for task, row in sorted(tasks().items()) for cause in row.twin_causes]
 SLOW = {("stack", "wrong_object"), ("open_drawer", "late"), ("lift", "slip"), ("hang", "miss")}
 
 
 @contextmanager
 def twins(task: str, cause: str, *changes: str) -> Iterator[Pipeline]:
-    config = "arm_tasks.yaml"
+    config = "arm_pair.yaml" if tasks()[task].arms else "arm_tasks.yaml"
     robot = "franka_panda_suction" if tasks()[task].hand == "suction" else "franka_panda"
     given = (
         f"shared.task={task}",
