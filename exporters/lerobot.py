@@ -29,7 +29,7 @@ frame's number divided by the frame rate.
 ``annotation.contact`` [n, 4]: normal force and point; ``annotation.relation`` [n, 3]: subject,
 predicate and object, whose numbers ``info.json`` explains; ``annotation.K.<camera>``,
 ``annotation.T_world_camera.<camera>`` and, of bent lenses, ``annotation.distortion.<camera>``.
-Arrays have no statistics, since they are no inputs of policies. Rows without a value are 0.
+Arrays have no statistics, since policies do not read them. Rows without a value are 0.
 
 Joints are named in ``info.json``, in the order of the robot's description. A task of several arms
 has the joints, hands and openings of all, one arm after the other, with names ``<arm>.<joint>``.
@@ -211,7 +211,7 @@ class LeRobot(base.AssetExporter):
         }
 
     def _find_arms(self, scene: Scene) -> tuple[Articulation, ...]:
-        """The arm, and those that its task names, which share its episode."""
+        """The arm, and the arms that its task names, which share its episode."""
         for arm in scene.articulations:
             if self.arm in ("", arm.name):
                 named = {name for goal in arm.task for name in goal.arms} - {arm.name}

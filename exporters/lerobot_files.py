@@ -150,7 +150,7 @@ class RobotFiles(ABC):
         return int(rate_hz) if rate_hz.is_integer() else rate_hz
 
     def _texts(self) -> tuple[str, ...]:
-        """Features of geometry that are no arrays."""
+        """Texts among the features of geometry."""
         return (OBJECTS,) if OBJECTS in self.first.get("geometry", {}) else ()
 
     def _columns(self) -> dict[str, Any]:
@@ -213,7 +213,7 @@ class RobotFiles(ABC):
         return [f"{arm}.{name}" for arm in arms for name in POSE] if arms else [*POSE]
 
     def _meaning(self, name: str) -> dict[str, Any]:
-        """Keys of ours in ``info.json``: unit of depths, and names of numbered predicates."""
+        """Further keys in ``info.json``: unit of depths, names of numbered predicates."""
         if name.startswith("annotation.depth."):
             return {"unit_m": self.info.depth_scale_m}
         return {"predicates": [*PREDICATES]} if name == "annotation.relation" else {}

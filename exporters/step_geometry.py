@@ -1,7 +1,7 @@
 """Geometry of the steps of demonstrations, as arrays of the same shapes in a whole data set.
 
-What differs in number from step to step (objects, contacts, relations) fills the first rows of its
-array; the other rows are 0, and ids of instances start at 1. Poses are in the world.
+Objects, contacts and relations, which differ in number from step to step, fill the first rows of
+their arrays; the other rows are 0, and ids of instances start at 1. Poses are in the world.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -21,7 +21,7 @@ from gen_data.exporters.sequences import Frame
 
 Part = Literal["depth", "instances", "poses", "contacts", "relations", "calibration"]
 IMAGES = {"depth": Channel.Z_DEPTH, "instances": Channel.INSTANCE}
-"""Parts that are images: those of the shards, uint16."""
+"""Parts that are images of the shards, uint16."""
 PREDICATES: tuple[str, ...] = get_args(Predicate)
 POSE = ("x", "y", "z", "qw", "qx", "qy", "qz")
 OBJECTS = "annotation.objects"
@@ -33,8 +33,8 @@ class Array:
     """A feature of every step.
 
     Attributes:
-        shape: Of one step; -1 = as many rows as the step with most rows has, at least one.
-        names: Of the columns; empty = they have none.
+        shape: In one step; -1 = as many rows as the step with most rows has, at least one.
+        names: Names of the columns; empty = they have none.
     """
 
     dtype: Literal["float32", "int64", "uint16"]
@@ -114,7 +114,7 @@ def array_features(
     """Arrays of a data set by feature.
 
     Args:
-        parts: What to write.
+        parts: Parts to write.
         images: ``image_sums`` by camera, which have the sizes.
         most: Largest length of the values of ``step_values``, by feature, at least 1.
     """

@@ -303,7 +303,7 @@ class _Placed:
 
 
 def _task_frame(arms: Sequence[Articulation], assets: interfaces.AssetIndex) -> SE3:
-    """Frame of the places of things: of the arm's base, or midway between those of several.
+    """Frame of the places of objects: the arm's base, or midway between the bases of several.
 
     It is shifted ahead by as much as the workspace of the arm begins farther away than a Panda's.
     """

@@ -146,7 +146,7 @@ class Task(base_model.Strict):
         success: Conditions, all of which must hold.
         hand: Required kind of hand; None = either will do.
         arms: Names of its arms in the program, in the order in which the scene has them; empty =
-            one arm. Places of things are then ahead of the middle between their bases.
+            one arm. Places of objects are then ahead of the middle between their bases.
         recovers_from: Failures after which it can still be done; null = all that it can have.
     """
 
@@ -171,8 +171,10 @@ class Task(base_model.Strict):
     def mistaken(self) -> str:
         """Object that may be taken for the first one that is grasped; empty = none."""
         wanted = next((step.at for step in self.program if step.verb == "grasp"), "")
-        loose = (n for n, t in self.things.items() if t.mass_kg != 0.0 and t.joint is None)
-        return next((n for n in loose if n != wanted), "") if wanted else ""
+        for name, one in self.things.items():
+            if wanted and name != wanted and one.mass_kg != 0.0 and one.joint is None:
+                return name
+        return ""
 
     @property
     def causes(self) -> tuple[scene.FailureKind, ...]:

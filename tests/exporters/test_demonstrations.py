@@ -236,3 +236,55 @@ def test_geometry_of_every_step_is_in_rlds_as_lists_and_images(
     channels = related[1].capture.readings[camera].channels
     (ids,) = (a for c, a in channels.items() if c.value == "instance")
     assert np.array_equal(np.asarray(Image.open(io.BytesIO(file))), ids)
+
+
+def test_a_task_of_two_arms_has_the_joints_and_hands_of_both(
+    world: Any, samples: Any, tmp_path: Path
+) -> None:
+    """One after the other, named by arm; the episode is that of the arm with the task."""
+
+    def joined(sample: Any) -> Any:
+        (arm,) = sample.scene.articulations
+        other = replace(arm, name="other", task=(), assignment=None, episode=None)
+        goals = (*arm.task, replace(arm.task[0], arms=("arm", "other")))
+        arms = (replace(arm, task=goals), other)
+        return replace(sample, scene=replace(sample.scene, articulations=arms))
+
+    pairs = [joined(sample) for sample in samples]
+    folder = world.export(LeRobot(), drive_info(world), pairs, tmp_path) / "train/toys_arm+toys_arm"
+    rows = pyarrow.parquet.read_table(folder / "data/chunk-000/file-000.parquet").to_pylist()
+    features = json.loads((folder / "meta/info.json").read_text())["features"]
+
+    names = features["observation.state"]["names"]
+    assert names == ["arm.shoulder", "arm.elbow", "other.shoulder", "other.elbow"]
+    assert features["observation.ee_pose"]["names"][6:8] == ["arm.qz", "other.x"]
+    for row, sample in zip(rows, samples, strict=False):
+        positions = sample.scene.articulations[0].joint_track.positions(sample.scene.time_s)
+        assert np.allclose(row["observation.state"], [*positions, *positions], atol=1e-6)
+        assert len(row["observation.gripper"]) == 2
+        assert row["annotation.failure"] == "slip"
+
+
+def test_twins_name_the_failure_that_they_recovered_from(
+    world: Any, samples: Any, tmp_path: Path
+) -> None:
+    """Sequence 0 fails, sequence 1 recovers; both in one data set."""
+
+    def twin(sample: Any, k: int) -> Any:
+        (arm,) = sample.scene.articulations
+        episode = (
+            EPISODE if k < 4 else replace(EPISODE, succeeded=True, failure="", recovered="slip")
+        )
+        scene = replace(sample.scene, twins=True, articulations=(replace(arm, episode=episode),))
+        return replace(sample, split="train", scene=scene)
+
+    given = [twin(sample, k) for k, sample in enumerate(samples)]
+    folder = world.export(LeRobot(), drive_info(world), given, tmp_path) / "train/toys_arm"
+    rows = pyarrow.parquet.read_table(folder / "data/chunk-000/file-000.parquet").to_pylist()
+    assert [(row["annotation.failure"], row["annotation.recovered"]) for row in rows] == [
+        *[("slip", "")] * 4, *[("", "slip")] * 4]  # fmt: skip
+
+    records = world.export(Rlds(), drive_info(world), given, tmp_path / "rlds") / "train/toys_arm"
+    found = tfrecord_iterator(str(next(records.glob("*.tfrecord"))))
+    episodes = [example_pb2.Example.FromString(bytes(record)) for record in found]
+    assert [values(one, "episode_metadata/recovered") for one in episodes] == [[b""], [b"slip"]]
