@@ -82,7 +82,8 @@ def step_values(
     cameras: Iterable[str],
 ) -> dict[str, Any]:
     """Plain values of a step by feature, without padding and without images."""
-    scene, values = sample.scene, {}
+    scene = sample.scene
+    values: dict[str, Any] = {}
     if "poses" in parts:
         objects = [i for i in scene.instances if i.annotated]
         values[OBJECTS] = ", ".join(i.category for i in objects)

@@ -244,7 +244,7 @@ def _check_durations(config: Config) -> None:
 
 def _check_twins(config: Config) -> None:
     """Raise ConfigError if there is no task that twins could fail at."""
-    kinds = {randomizer.type for scene in config.probes for randomizer in scene.randomizers}
+    kinds = {getattr(r, "type", "") for scene in config.probes for r in scene.randomizers}
     node = config.document.get("twins")
     if config.general.twins and node is not None and "arm_task" not in kinds:
         refuse(
