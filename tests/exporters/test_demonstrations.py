@@ -19,6 +19,7 @@ from gen_data.core.scene import Assignment, ContactSpan, Episode, Span
 from gen_data.core.se3 import SE3
 from gen_data.exporters.lerobot import LeRobot
 from gen_data.exporters.rlds import Rlds
+from gen_data.exporters.step_geometry import Part
 from tests.exporters.drives import drive_info
 from tests.randomizers.doubles import two_link_arm
 
@@ -158,7 +159,7 @@ def test_an_arm_that_demonstrates_nothing_has_no_step(world: Any) -> None:
     assert demonstration_step(arm, two_link_arm(), 0.0, 0.1) is None
 
 
-PARTS = ("depth", "instances", "poses", "contacts", "relations", "calibration")
+PARTS: tuple[Part, ...] = ("depth", "instances", "poses", "contacts", "relations", "calibration")
 
 
 @pytest.fixture(scope="module")
