@@ -11,6 +11,7 @@ import json
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from math import prod
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -25,12 +26,15 @@ from gen_data.exporters.lerobot_statistics import (
 from gen_data.exporters.parquet_tables import (
     GROUP_ROWS,
     IMAGE,
+    array_column,
+    array_feature,
     list_feature,
     open_parquet,
     table_schema,
     value_feature,
 )
 from gen_data.exporters.sequences import Frame, write_text
+from gen_data.exporters.step_geometry import OBJECTS, POSE, PREDICATES, Array, step_array
 
 if TYPE_CHECKING:
     from pyarrow.parquet import ParquetWriter
@@ -40,7 +44,6 @@ CHUNK_FILES = 1000
 FILE_BYTES = 100 * 1024**2
 """Images in a file of several episodes, at most; LeRobot's default is 100 MiB."""
 EE_POSE = "observation.ee_pose"
-POSE = ["x", "y", "z", "qw", "qx", "qy", "qz"]
 LABELS = {
     EE_POSE: "float32",
     "observation.gripper": "float32",
@@ -52,8 +55,9 @@ LABELS = {
     "annotation.contact_points_m": "string",
     "annotation.succeeded": "bool",
     "annotation.failure": "string",
+    "annotation.recovered": "string",
 }
-"""Features of demonstrations and their types."""
+"""Features of demonstrations and their types; the last one of twins only."""
 COUNTERS = ("frame_index", "episode_index", "index", "task_index")
 
 
@@ -80,6 +84,7 @@ class RobotFiles(ABC):
 
     Attributes:
         first: Row of its first frame, whose joints and image sizes hold for all.
+        arrays: Arrays of geometry of every step, by feature.
     """
 
     version: ClassVar[str]
@@ -87,6 +92,7 @@ class RobotFiles(ABC):
     info: interfaces.DatasetInfo
     folder: Path
     first: Mapping[str, Any]
+    arrays: Mapping[str, Array] = field(default_factory=dict)
     _episodes: int = 0
     _frames: int = 0
     _tasks: dict[str, int] = field(default_factory=dict)
@@ -117,7 +123,13 @@ class RobotFiles(ABC):
         for start in range(0, len(frames), GROUP_ROWS):
             group = range(start, min(start + GROUP_ROWS, len(frames)))
             whole = [{**episode.rows[k], **_embedded(self.info, frames[k], k)} for k in group]
-            writer.write_table(pyarrow.Table.from_pylist(whole, writer.schema))
+            table = pyarrow.Table.from_pylist(
+                whole, pyarrow.schema([f for f in writer.schema if f.name not in self.arrays])
+            )
+            for name, array in self.arrays.items():
+                steps = [step_array(self.info, name, array, frames[k]) for k in group]
+                table = table.append_column(name, array_column(np.stack(steps)))
+            writer.write_table(table.select(writer.schema.names).cast(writer.schema))
 
     def _values(self, row: Mapping[str, Any], frame_index: int, task_index: int) -> dict[str, Any]:
         """Numbers and texts of one frame by feature."""
@@ -125,6 +137,7 @@ class RobotFiles(ABC):
             "observation.state": row["state"],
             "action": row["action"],
             **row["labels"],
+            **{name: row["geometry"][name] for name in self._texts()},
             "timestamp": frame_index / self._rate_hz(),
             "frame_index": frame_index,
             "episode_index": self._episodes,
@@ -136,6 +149,10 @@ class RobotFiles(ABC):
         rate_hz = round(1.0 / self.info.step_s, 6)
         return int(rate_hz) if rate_hz.is_integer() else rate_hz
 
+    def _texts(self) -> tuple[str, ...]:
+        """Texts among the features of geometry."""
+        return (OBJECTS,) if OBJECTS in self.first.get("geometry", {}) else ()
+
     def _columns(self) -> dict[str, Any]:
         """Features of the Parquet files, in the form of ``datasets``."""
         positions = list_feature(value_feature("float32"), len(self.first["joints"]))
@@ -146,6 +163,8 @@ class RobotFiles(ABC):
                 name: _column(LABELS[name], len(np.atleast_1d(value)))
                 for name, value in self.first["labels"].items()
             },
+            **dict.fromkeys(self._texts(), value_feature("string")),
+            **{name: array_feature(a.dtype, a.shape) for name, a in self.arrays.items()},
             **{_image_key(camera): IMAGE for camera in self.first["images"]},
             "timestamp": value_feature("float32"),
             **dict.fromkeys(COUNTERS, value_feature("int64")),
@@ -163,9 +182,19 @@ class RobotFiles(ABC):
                 name: {
                     "dtype": LABELS[name],
                     "shape": [len(np.atleast_1d(value))],
-                    "names": POSE if name == EE_POSE else None,
+                    "names": self._pose_names() if name == EE_POSE else None,
                 }
                 for name, value in self.first["labels"].items()
+            },
+            **{name: {"dtype": "string", **number} for name in self._texts()},
+            **{
+                name: {
+                    "dtype": array.dtype,
+                    "shape": [*array.shape],
+                    "names": [*array.names] or None,
+                    **self._meaning(name),
+                }
+                for name, array in self.arrays.items()
             },
             **{
                 _image_key(camera): {
@@ -178,6 +207,16 @@ class RobotFiles(ABC):
             "timestamp": {"dtype": "float32", **number},
             **{name: {"dtype": "int64", **number} for name in COUNTERS},
         }
+
+    def _pose_names(self) -> list[str]:
+        arms = self.first.get("arms", ())
+        return [f"{arm}.{name}" for arm in arms for name in POSE] if arms else [*POSE]
+
+    def _meaning(self, name: str) -> dict[str, Any]:
+        """Further keys in ``info.json``: unit of depths, names of numbered predicates."""
+        if name.startswith("annotation.depth."):
+            return {"unit_m": self.info.depth_scale_m}
+        return {"predicates": [*PREDICATES]} if name == "annotation.relation" else {}
 
     def _facts(self) -> dict[str, Any]:
         """Common contents of ``info.json`` in both formats."""
@@ -267,7 +306,11 @@ class FilesV30(RobotFiles):
 
     def _write_episode(self, episode: _Episode) -> None:
         length = len(episode.frames)
-        self._write_frames(self._open_data(_image_bytes(self.info, episode.frames)), episode)
+        size = _image_bytes(self.info, episode.frames)
+        size += length * sum(
+            np.dtype(a.dtype).itemsize * prod(a.shape) for a in self.arrays.values()
+        )
+        self._write_frames(self._open_data(size), episode)
         chunk, file = divmod(self._file, CHUNK_FILES)
         self._episode_rows.append(
             {

@@ -8,9 +8,11 @@ Reference: https://huggingface.co/docs/datasets/about_dataset_features.
 """
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 if TYPE_CHECKING:
     import pyarrow
@@ -33,6 +35,28 @@ def list_feature(feature: Mapping[str, Any], length: int = -1) -> dict[str, Any]
     return {"feature": feature, "length": length, "_type": "Sequence"}
 
 
+def array_feature(dtype: str, shape: Sequence[int]) -> dict[str, Any]:
+    """Feature of an array of one or two dimensions."""
+    if len(shape) == 1:
+        value = value_feature(dtype)
+        return value if shape[0] == 1 else list_feature(value, shape[0])
+    return {"shape": [*shape], "dtype": dtype, "_type": f"Array{len(shape)}D"}
+
+
+def array_column(values: "np.ndarray[Any, Any]") -> "pyarrow.Array":
+    """Column of an ``array_feature`` from the arrays of all rows, [n, ...]."""
+    import pyarrow
+
+    column = pyarrow.array(values.ravel())
+    if values.ndim == 2 and values.shape[1] > 1:
+        return pyarrow.FixedSizeListArray.from_arrays(column, values.shape[1])
+    for size in reversed(values.shape[1:] if values.ndim > 2 else ()):
+        column = pyarrow.ListArray.from_arrays(
+            np.arange(0, len(column) + 1, size, dtype=np.int32), column
+        )
+    return column
+
+
 def table_schema(features: Mapping[str, Any]) -> "pyarrow.Schema":
     """Parquet schema of features, which are also in its metadata."""
     import pyarrow
@@ -53,6 +77,8 @@ def _arrow_type(feature: Mapping[str, Any]) -> "pyarrow.DataType":
         case "Sequence":
             # A list_ of length -1 has any length.
             return pyarrow.list_(_arrow_type(feature["feature"]), feature["length"])
+        case "Array2D":
+            return pyarrow.list_(pyarrow.list_(pyarrow.type_for_alias(feature["dtype"])))
         case "Value":
             return pyarrow.type_for_alias(feature["dtype"])
     return pyarrow.struct({name: _arrow_type(inner) for name, inner in feature.items()})

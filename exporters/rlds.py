@@ -13,8 +13,12 @@ Steps are lists of equal length under ``steps/``: ``observation/image/<camera>``
 (x, y, z, qw, qx, qy, qz of the grasp frame in the frame of the arm's base),
 ``observation/gripper``, ``action_gripper``, ``phase``, ``held``, ``contacts`` (separated by
 commas, as ``contact_forces_n`` and ``contact_points_m``, which are ``x y z``), and of the whole
-episode ``episode_metadata/{succeeded,failure,sequence}``. Vectors of all
-steps follow one another.
+episode ``episode_metadata/{succeeded,failure,sequence}``, of twins ``recovered`` too. Vectors of
+all steps follow one another.
+
+``geometry`` adds PNG files of 16 bits, ``observation/{depth,instance}/<camera>``, and the arrays of
+``lerobot`` by the same names without ``annotation.``, slashes for dots; ``features.json`` has the
+shape of an array, the unit of depths and the names of numbered predicates.
 
 Reference: Ramos et al., RLDS: an ecosystem to generate, share and use datasets in reinforcement
 learning, 2021 (names and meaning of the keys of a step). Reading takes ``tf.io.parse_example``; the
@@ -22,10 +26,11 @@ files of TensorFlow Datasets that describe a builder are not written.
 """
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
+import numpy as np
 from pydantic import Field
 
 from gen_data.core.capture import Channel
@@ -33,7 +38,8 @@ from gen_data.core.interfaces import DatasetInfo
 from gen_data.core.serialization import canonical_json
 from gen_data.exporters import base, fragments, lerobot
 from gen_data.exporters.conventions import ANY_LENS, Conventions
-from gen_data.exporters.sequences import FRAMES, Frame, unbroken_episodes, write_text
+from gen_data.exporters.sequences import Frame, write_text
+from gen_data.exporters.step_geometry import OBJECTS, PREDICATES, Array, image_path, step_array
 from gen_data.exporters.tfrecord import Feature, encode_example, encode_features, frame_record
 
 FLOATS = {
@@ -83,35 +89,39 @@ class Rlds(lerobot.LeRobot):
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Write the episodes of all shards, and their keys."""
-        totals = Counter(_data_set(episode) for episode in self._episodes(shard_dirs))
+        totals = Counter(lerobot.data_set(episode[0].row) for episode in self._episodes(shard_dirs))
         written: Counter[tuple[str, str]] = Counter()
+        arrays = self._arrays(shard_dirs)
         for episode in self._episodes(shard_dirs):
-            key = _data_set(episode)
+            key = lerobot.data_set(episode[0].row)
             folder = dataset_dir / key[0] / key[1].replace("/", "_")
             folder.mkdir(parents=True, exist_ok=True)
-            features = _features(info, episode)
+            known = arrays.get(key, {})
+            features = _features(info, episode, known)
+            kinds = {_key(name): array for name, array in known.items()}
             if key not in written:
-                facts = _describe(features, len(episode))
+                facts = _describe(info, features, len(episode), kinds)
                 write_text(folder / "features.json", canonical_json(facts) + "\n")
             number = (written[key], totals[key], self.episodes_per_file)
             stem = fragments.numbered_stem("episodes", *number)
-            floats = {*FLOATS, *_REWARDS}
-            record = frame_record(encode_example(encode_features(features, floats, _INTEGERS)))
+            floats = {*FLOATS, *_REWARDS, *(k for k, a in kinds.items() if a.dtype == "float32")}
+            integers = (*_INTEGERS, *(k for k, a in kinds.items() if a.dtype == "int64"))
+            record = frame_record(encode_example(encode_features(features, floats, integers)))
             with (folder / f"{stem}.tfrecord").open("ab") as file:
                 file.write(record)
             written[key] += 1
 
-    def _episodes(self, shard_dirs: Sequence[Path]) -> Iterator[list[Frame]]:
-        rows = fragments.fragment_rows(shard_dirs, self.type, FRAMES)
-        return unbroken_episodes(Frame(shard_dir, row) for shard_dir, row in rows)
+
+def _key(name: str) -> str:
+    """Key of the record for an array of geometry."""
+    kind, _, camera = name.removeprefix("annotation.").partition(".")
+    is_image = camera and kind in ("depth", "instance")
+    return f"steps/{'observation/' if is_image else ''}{kind}{'/' if camera else ''}{camera}"
 
 
-def _data_set(episode: Sequence[Frame]) -> tuple[str, str]:
-    row = episode[0].row
-    return row["split"], row["robot"]
-
-
-def _features(info: DatasetInfo, frames: Sequence[Frame]) -> dict[str, Feature]:
+def _features(
+    info: DatasetInfo, frames: Sequence[Frame], arrays: Mapping[str, Array]
+) -> dict[str, Feature]:
     rows = [{**frame.row, **frame.row["labels"]} for frame in frames]
     first, last = rows[0], len(rows) - 1
     succeeded = bool(first.get("annotation.succeeded"))
@@ -128,6 +138,8 @@ def _features(info: DatasetInfo, frames: Sequence[Frame]) -> dict[str, Feature]:
         "episode_metadata/succeeded": [int(succeeded)],
         "episode_metadata/failure": [first.get("annotation.failure", "").encode()],
     }
+    if "annotation.recovered" in first:
+        features["episode_metadata/recovered"] = [first["annotation.recovered"].encode()]
     for key, name in FLOATS.items():
         if name in first:
             features[key] = [value for row in rows for value in _as_list(row[name])]
@@ -138,16 +150,35 @@ def _features(info: DatasetInfo, frames: Sequence[Frame]) -> dict[str, Feature]:
         features[f"steps/observation/image/{camera}"] = [
             info.media_path(f.shard_dir, camera, Channel.RGB, f.index).read_bytes() for f in frames
         ]
+    for name, array in arrays.items():
+        if array.dtype == "uint16":
+            paths = [image_path(info, name, frame) for frame in frames]
+            features[_key(name)] = [path.read_bytes() for path in paths]
+        else:
+            steps = [step_array(info, name, array, frame).ravel() for frame in frames]
+            features[_key(name)] = np.concatenate(steps).tolist()
+    if OBJECTS in first.get("geometry", {}):
+        features["steps/objects"] = [row["geometry"][OBJECTS].encode() for row in rows]
     return features
 
 
-def _describe(features: Mapping[str, Feature], steps: int) -> dict[str, Any]:
+def _describe(
+    info: DatasetInfo, features: Mapping[str, Feature], steps: int, arrays: Mapping[str, Array]
+) -> dict[str, Any]:
     """Type of every key, and length of its value in a step or in the episode."""
+    more: dict[str, dict[str, Any]] = {key: {"shape": [*a.shape]} for key, a in arrays.items()}
+    for key, facts in more.items():
+        if key.startswith("steps/observation/depth/"):
+            facts["unit_m"] = info.depth_scale_m
+    if "steps/relation" in more:
+        more["steps/relation"]["predicates"] = [*PREDICATES]
     kinds = dict.fromkeys((*FLOATS, *_REWARDS), "float32") | dict.fromkeys(_INTEGERS, "int64")
+    kinds |= {key: a.dtype for key, a in arrays.items() if a.dtype != "uint16"}
     return {
         key: {
             "dtype": kinds.get(key, "bytes"),
             "length": len(values) // (steps if key.startswith("steps/") else 1),
+            **more.get(key, {}),
         }
         for key, values in features.items()
     }

@@ -1,9 +1,9 @@
 """Tasks of robot arms: their objects, program and conditions of success, from a table."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
 from pydantic import Field, model_validator
 from pydantic.config import JsonDict
@@ -52,15 +52,25 @@ class Failures(Strict):
         slip: The object slips out of the fingers on its way.
         miss: The fingers close above the object.
         collision: The hand knocks the object away before it reaches for it.
+        late: The arm waits until the time limit has passed.
+        wrong_object: The arm takes another object for the one it should grasp.
     """
 
     slip: float = Field(0.0, ge=0, le=1)
     miss: float = Field(0.0, ge=0, le=1)
     collision: float = Field(0.0, ge=0, le=1)
+    late: float = Field(0.0, ge=0, le=1)
+    wrong_object: float = Field(0.0, ge=0, le=1)
+
+    @property
+    def shares(self) -> dict[FailureKind, float]:
+        """Shares above 0 by kind, in the order in which they are drawn."""
+        kinds = get_args(FailureKind)[1:]
+        return {kind: share for kind in kinds if (share := getattr(self, kind)) > 0.0}
 
     @model_validator(mode="after")
     def _is_a_share(self) -> "Failures":
-        if self.slip + self.miss + self.collision > 1.0:
+        if sum(self.shares.values()) > 1.0:
             raise ValueError("the shares of failures add up to more than 1")
         return self
 
@@ -75,8 +85,13 @@ class ArmTask(RandomizerBase):
         task: Name of a task.
         tasks: Name of a YAML file of tasks next to the configuration, in addition to
             ``arm_tasks.yaml``; tasks of the same name replace those.
-        arm: Name of the arm; empty = the first one.
-        failures: Shares of demonstrations that fail on purpose, of tasks that grasp.
+        arm: Name of the arm; empty = the first one. Tasks of several arms take the scene's other
+            arms, in their order.
+        failures: Shares of demonstrations that fail on purpose, of tasks that can fail so. With
+            ``twins`` of the configuration, where one of two demonstrations always fails, their
+            proportions; without any, all causes of a task are equally frequent.
+        time_limit_s: Time within which a task must be done; null = there is no limit, and nothing
+            is late.
         speed: Fraction of the joints' speed and acceleration limits to use.
     """
 
@@ -87,6 +102,7 @@ class ArmTask(RandomizerBase):
     group: str = ""
     arm: str = ""
     failures: Failures = Failures()
+    time_limit_s: float | None = Field(None, gt=0, le=600)
     speed: Annotated[dist.Scalar, dist.Bounds(0.01, 1.0)] = dist.Uniform(0.4, 0.7)
 
     def possible_assets(self, assets: interfaces.AssetIndex) -> tuple[str, ...]:
@@ -112,7 +128,32 @@ class ArmTask(RandomizerBase):
                     f"randomizers.{self.name}.task: the object group '{group.name}' lacks "
                     f"'{asset.partition('?')[0]}'; expected it among its assets (ids)"
                 )
-        arm = self._find_arm(scene)
+        arms = self._find_arms(scene)
+        if self.failures.late and self.time_limit_s is None:
+            raise errors.ConfigError(
+                f"randomizers.{self.name}.failures: late needs a time limit; expected "
+                "time_limit_s besides it [s]"
+            )
+        for name in self._possible_tasks():
+            task = self._table()[name]
+            if scene.twins and not self._causes(task):
+                asked = " and ".join(self.failures.shares) or "without a time_limit_s"
+                raise errors.ConfigError(
+                    f"randomizers.{self.name}.failures: twins of '{name}' cannot fail by {asked}; "
+                    f"expected one of {', '.join(task.twin_causes)}, or another task"
+                )
+            if len(arms) < len(task.arms):
+                raise errors.ConfigError(
+                    f"randomizers.{self.name}.task: '{name}' needs {len(task.arms)} arms, but the "
+                    f"scene has {len(arms)}; expected further elements of type robot, as in "
+                    "arm_pair.yaml, or another task"
+                )
+            for arm in arms[: max(1, len(task.arms))]:
+                self._check_arm(name, task, arm, assets)
+
+    def _check_arm(
+        self, name: str, task: Task, arm: Articulation, assets: interfaces.AssetIndex
+    ) -> None:
         robot = assets.robot(arm.asset)
         gripper, joints = robot.gripper, len(kinematics.arm_joints(robot))
         if gripper is None:
@@ -121,30 +162,29 @@ class ArmTask(RandomizerBase):
                 "a robot with one, such as franka_panda, robots/ur5e or robots/sawyer"
             )
         hand = "fingers" if gripper.cup is None else "suction"
-        for name in self._possible_tasks():
-            task = self._table()[name]
-            if task.hand not in (hand, None):
-                raise errors.ConfigError(
-                    f"randomizers.{self.name}.task: '{name}' needs {task.hand}, but arm "
-                    f"'{arm.name}' ({arm.asset}) has {hand}; expected another robot, such as "
-                    f"{_EXAMPLES[str(task.hand)]}"
-                )
-            if joints < task.joints_min:
-                raise errors.ConfigError(
-                    f"randomizers.{self.name}.task: '{name}' needs {task.joints_min} joints to "
-                    f"place {_FREEDOM[task.joints_min]}, but arm '{arm.name}' ({arm.asset}) has "
-                    f"{joints}; expected another robot, or another task"
-                )
+        if task.hand not in (hand, None):
+            raise errors.ConfigError(
+                f"randomizers.{self.name}.task: '{name}' needs {task.hand}, but arm "
+                f"'{arm.name}' ({arm.asset}) has {hand}; expected another robot, such as "
+                f"{_EXAMPLES[str(task.hand)]}"
+            )
+        if joints < task.joints_min:
+            raise errors.ConfigError(
+                f"randomizers.{self.name}.task: '{name}' needs {task.joints_min} joints to "
+                f"place {_FREEDOM[task.joints_min]}, but arm '{arm.name}' ({arm.asset}) has "
+                f"{joints}; expected another robot, or another task"
+            )
 
     def __call__(self, scene: Scene, assets: interfaces.AssetIndex, rng: streams.Rng) -> Scene:
         """Return the scene with the objects of a task, and an arm that has to perform it."""
         name = self.task.draw(rng)
-        table, arm = self._table(), self._find_arm(scene)
+        table = self._table()
         check_known(name, tuple(table), f"randomizers.{self.name}.task: unknown task")
         task = table[name]
-        speed, failure = round(self.speed.draw(rng), 4), self._draw_failure(task, rng)
+        arm, *others = self._find_arms(scene)[: max(1, len(task.arms))]
+        speed, failure = round(self.speed.draw(rng), 4), self._draw_failure(task, scene.twins, rng)
         group = self._find_group(scene)
-        placed = self._place_things(task, arm, assets, rng)
+        placed = self._place_things(task, (arm, *others), assets, rng)
         scene = remove_members(scene, group.name)
         members = [thing.member for thing in placed.values()]
         scene = add_members(scene, group, members, assets)
@@ -156,10 +196,14 @@ class ArmTask(RandomizerBase):
             tuple(_condition(condition, bodies) for condition in task.success),
             failure,
             tuple(_joints(task, bodies)),
+            deadline_s=self.time_limit_s,
+            mistaken=bodies[task.mistaken] if failure == "wrong_object" else "",
         )
         goals = tuple(
             replace(goal, speed=round(speed * step.pace, 4))
-            for step, goal in zip(task.program, _goals(task, placed, bodies, arm), strict=True)
+            for step, goal in zip(
+                task.program, _goals(task, placed, bodies, (arm, *others)), strict=True
+            )
         )
         changed = replace(arm, task=goals, assignment=assignment)
         return replace(
@@ -181,33 +225,47 @@ class ArmTask(RandomizerBase):
         check_known(name, tuple(known), fault)
         return known[name]
 
-    def _find_arm(self, scene: Scene) -> Articulation:
-        for arm in scene.articulations:
-            if self.arm in ("", arm.name):
-                return arm
+    def _find_arms(self, scene: Scene) -> tuple[Articulation, ...]:
+        """The arm that has the task, then all others."""
+        found = [arm for arm in scene.articulations if self.arm in ("", arm.name)][:1]
+        if found:
+            return (*found, *(arm for arm in scene.articulations if arm not in found))
         known = ", ".join(arm.name for arm in scene.articulations) or "none: add a robot"
         raise errors.ConfigError(f"randomizers.{self.name}.arm: there is no arm; expected {known}")
 
-    def _draw_failure(self, task: Task, rng: streams.Rng) -> FailureKind:
+    def _causes(self, task: Task) -> dict[FailureKind, float]:
+        """Weights of the causes by which the failing twin of a task fails."""
+        shares = self.failures.shares or dict.fromkeys(get_args(FailureKind)[1:], 1.0)
+        limited = self.time_limit_s is not None
+        return {
+            k: w for k, w in shares.items() if k in task.twin_causes and (limited or k != "late")
+        }
+
+    def _draw_failure(self, task: Task, twins: bool, rng: streams.Rng) -> FailureKind:
         """Draw a kind of failure once per scene: all attempts at a layout are to fail alike.
 
         Else a kind that physics refuses more often than others would be rarer than its share.
         """
         stream = replace(rng.streams, attempt=0).rng(f"{rng.name}/failure")
         draw = float(stream.uniform())
-        if not any(step.verb == "grasp" for step in task.program):
-            return ""
-        kinds: tuple[FailureKind, ...] = ("slip", "miss", "collision")
-        for kind in kinds:
-            draw -= getattr(self.failures, kind)
+        if twins:
+            causes = self._causes(task)
+            return [*causes][streams.pick_by_weight([*causes.values()], draw)]
+        for kind, share in self.failures.shares.items():
+            draw -= share
             if draw < 0.0:
-                return kind
+                return kind if kind in task.causes else ""
         return ""
 
     def _place_things(
-        self, task: Task, arm: Articulation, assets: interfaces.AssetIndex, rng: streams.Rng
+        self,
+        task: Task,
+        arms: Sequence[Articulation],
+        assets: interfaces.AssetIndex,
+        rng: streams.Rng,
     ) -> "dict[str, _Placed]":
         """Draw asset and pose of every object, apart from the ones before it."""
+        T_world_task = _task_frame(arms, assets)
         placed: dict[str, _Placed] = {}
         for name, thing in task.things.items():
             words = sorted(thing.assets)
@@ -215,7 +273,7 @@ class ArmTask(RandomizerBase):
             variants = _variants(thing.assets[chosen])
             asset = variants[int(rng.integers(len(variants)))]
             for _ in range(_TRIES):
-                found = _draw_place(thing, chosen, asset, arm, placed, assets, rng)
+                found = _draw_place(thing, chosen, asset, T_world_task, placed, assets, rng)
                 if thing.near or all(found.is_apart(other) for other in placed.values()):
                     placed[name] = found
                     break
@@ -244,11 +302,25 @@ class _Placed:
         return math.dist(self.middle_m[:2], other.middle_m[:2]) > one + two + _APART_M
 
 
+def _task_frame(arms: Sequence[Articulation], assets: interfaces.AssetIndex) -> SE3:
+    """Frame of the places of objects: the arm's base, or midway between the bases of several.
+
+    It is shifted ahead by as much as the workspace of the arm begins farther away than a Panda's.
+    """
+    first = arms[0].T_world_base
+    if len(arms) > 1:
+        bases = zip(*(arm.T_world_base.translation_m for arm in arms), strict=True)
+        x, y, z = (sum(values) / len(arms) for values in bases)
+        first = SE3((x, y, z), first.quaternion_wxyz)
+    ahead_m = max(assets.robot(arm.asset).workspace_from_m for arm in arms)
+    return first @ SE3((ahead_m - asset_types.WORKSPACE_FROM_M, 0.0, 0.0))
+
+
 def _draw_place(
     thing: Thing,
     words: str,
     asset: str,
-    arm: Articulation,
+    T_world_task: SE3,
     placed: Mapping[str, _Placed],
     assets: interfaces.AssetIndex,
     rng: streams.Rng,
@@ -261,8 +333,7 @@ def _draw_place(
         base = SE3.about_z(near.yaw_rad, (near.middle_m[0], near.middle_m[1], foot))
         yaw_rad += near.yaw_rad
     else:
-        ahead_m = assets.robot(arm.asset).workspace_from_m - asset_types.WORKSPACE_FROM_M
-        base = arm.T_world_base @ SE3((ahead_m, 0.0, 0.0))
+        base = T_world_task
     low, high = assets.bounds_m(asset)
     half = placement.half_extents_m(low, high, 1.0)
     fixed = thing.mass_kg == 0.0 or thing.joint is not None
@@ -298,12 +369,30 @@ def _joints(task: Task, bodies: Mapping[str, str]) -> Iterator[BodyJoint]:
 
 
 def _goals(
-    task: Task, placed: Mapping[str, _Placed], bodies: Mapping[str, str], arm: Articulation
+    task: Task,
+    placed: Mapping[str, _Placed],
+    bodies: Mapping[str, str],
+    arms: Sequence[Articulation],
 ) -> Iterator[ArmGoal]:
     """Goals of a program, in the world."""
+    roles = dict(zip(task.arms, arms, strict=True)) if task.arms else {}
+    for step, goal in zip(
+        task.program, _own_goals(task, placed, bodies, arms[0], roles), strict=True
+    ):
+        yield replace(goal, arms=tuple(roles[name].name for name in step.arms))
+
+
+def _own_goals(
+    task: Task,
+    placed: Mapping[str, _Placed],
+    bodies: Mapping[str, str],
+    leader: Articulation,
+    roles: Mapping[str, Articulation],
+) -> Iterator[ArmGoal]:
     latest_m: Vec3 = (0.0, 0.0, 0.0)
     held_yaw_rad = 0.0
     for step in task.program:
+        arm = roles[step.arms[0]] if step.arms else leader
         touches = tuple(bodies[name] for name in step.touches)
         if step.verb == "grasp":
             held_yaw_rad = placed[step.at].yaw_rad
@@ -311,7 +400,15 @@ def _goals(
             continue
         if step.verb == "grip":
             between = (bodies[step.at],) if step.at else ()
-            yield ArmGoal("grip", gripper_opening=step.opening, objects=between, phase=step.phase)
+            if step.carries:
+                held_yaw_rad = placed[step.at].yaw_rad
+            yield ArmGoal(
+                "grip",
+                gripper_opening=step.opening,
+                objects=between,
+                carries=step.carries,
+                phase=step.phase,
+            )
             continue
         frame = _frame(step, placed, arm)
         if step.verb == "move":

@@ -77,7 +77,8 @@ class Step(base_model.Strict):
         along: Object that the X axis of the step's frame points to, horizontally; ``own`` = the X
             axis of ``at``; empty = away from the arm. Z is up.
         carries: Whether ``reach`` takes the held object there. It keeps its rotation or turns by
-            eighths; with ``yaws``, its X axis is the step's, or turned evenly.
+            eighths; with ``yaws``, its X axis is the step's, or turned evenly. With ``grip``, the
+            fingers hold ``at`` from then on.
         offset_m: Offset of the goal of ``reach``, in the step's frame.
         yaw_deg: Angle of the hand against that frame; at 0 the fingers open along its Y.
         yaws: Number of evenly spaced rotations to try; 0 = two of the hand.
@@ -92,6 +93,7 @@ class Step(base_model.Strict):
             loose that the held object turns between them where it meets ``touches``.
         phase: Name of the step in labels.
         pace: Factor on the arm's speed.
+        arms: Which of the task's arms do it; several ``move`` together. Empty = the first one.
     """
 
     verb: Literal["reach", "move", "grasp", "place", "grip"]
@@ -110,6 +112,7 @@ class Step(base_model.Strict):
     pivots: bool = False
     phase: str = Field(min_length=1)
     pace: float = Field(1.0, gt=0, le=1)
+    arms: tuple[str, ...] = ()
 
 
 class Success(base_model.Strict):
@@ -142,6 +145,9 @@ class Task(base_model.Strict):
         program: Steps in order.
         success: Conditions, all of which must hold.
         hand: Required kind of hand; None = either will do.
+        arms: Names of its arms in the program, in the order in which the scene has them; empty =
+            one arm. Places of objects are then ahead of the middle between their bases.
+        recovers_from: Failures after which it can still be done; null = all that it can have.
     """
 
     instruction: str
@@ -149,6 +155,8 @@ class Task(base_model.Strict):
     program: tuple[Step, ...] = Field(min_length=1)
     success: tuple[Success, ...] = Field(min_length=1)
     hand: Literal["fingers", "suction"] | None = "fingers"
+    arms: tuple[str, ...] = ()
+    recovers_from: tuple[scene.FailureKind, ...] | None = None
 
     @property
     def joints_min(self) -> int:
@@ -159,6 +167,28 @@ class Task(base_model.Strict):
         tilts = any(step.turn_deg and step.axis[:2] != (0.0, 0.0) for step in self.program)
         return 6 if tilts else 4
 
+    @property
+    def mistaken(self) -> str:
+        """Object that may be taken for the first one that is grasped; empty = none."""
+        wanted = next((step.at for step in self.program if step.verb == "grasp"), "")
+        for name, one in self.things.items():
+            if wanted and name != wanted and one.mass_kg != 0.0 and one.joint is None:
+                return name
+        return ""
+
+    @property
+    def causes(self) -> tuple[scene.FailureKind, ...]:
+        """Causes by which it can fail on purpose."""
+        grasps = any(step.verb == "grasp" for step in self.program)
+        wrong: tuple[scene.FailureKind, ...] = ("wrong_object",) if self.mistaken else ()
+        return (*(("slip", "miss", "collision") if grasps else ()), "late", *wrong)
+
+    @property
+    def twin_causes(self) -> tuple[scene.FailureKind, ...]:
+        """Causes by which one of its twins can fail and from which the other recovers."""
+        wanted = self.causes if self.recovers_from is None else self.recovers_from
+        return tuple(cause for cause in self.causes if cause in wanted)
+
     @model_validator(mode="after")
     def _names_its_things(self) -> "Task":
         used = [step.at for step in self.program] + [t.near for t in self.things.values()]
@@ -168,6 +198,19 @@ class Task(base_model.Strict):
         unknown = sorted({*used} - {*self.things, "", "own", scene.HAND})
         if unknown:
             raise ValueError(f"there is no object '{unknown[0]}'")
+        strangers = {name for step in self.program for name in step.arms} - {*self.arms}
+        if strangers:
+            raise ValueError(
+                f"there is no arm '{min(strangers)}'; expected one of the task's arms: "
+                f"{', '.join(self.arms) or 'none'}"
+            )
+        odd = {*(self.recovers_from or ())} - {*self.causes}
+        if odd:
+            raise ValueError(
+                f"it cannot fail by '{min(odd)}'; expected some of: {', '.join(self.causes)}"
+            )
+        if any(len(step.arms) > 1 and step.verb != "move" for step in self.program):
+            raise ValueError("several arms can only 'move' together")
         return self
 
 

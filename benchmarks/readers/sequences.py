@@ -1,5 +1,6 @@
 """Readers of arms, clips, pairs of images, grasps, labelled scans and tables."""
 
+import json
 import sys
 import tempfile
 from collections.abc import Iterator
@@ -28,6 +29,60 @@ def by_lerobot(root: Path) -> Iterator[View]:
         for key in data.meta.camera_keys:
             pixels = 255.0 * row[key].permute(1, 2, 0).numpy()
             yield View(truth.image_name(k, key.rpartition(".")[2]), (thing("rgb", pixels),))
+
+
+def by_lerobot_geometry(root: Path) -> Iterator[View]:
+    """Geometry of LeRobot's rows: tensors of the shapes that ``info.json`` states."""
+    detection.import_torchvision()
+    from lerobot.datasets.lerobot_dataset import LeRobotDataset
+
+    (folder,) = root.glob("train/*")
+    data = LeRobotDataset("local/arm", root=folder)
+    marks = {key.removeprefix("annotation.") for key in data.features}
+    for k in range(len(data)):
+        row = data[k]
+        values = {key: row.get(f"annotation.{key}") for key in marks}
+        yield from geometry_views(
+            k, {key: v.numpy() for key, v in values.items() if hasattr(v, "numpy")}
+        )
+
+
+def by_tfrecord_geometry(root: Path) -> Iterator[View]:
+    """Geometry of the steps of an episode: lists, one after the other, and 16-bit PNG files."""
+    (path,) = root.glob("train/*/features.json")
+    facts = json.loads(path.read_text())
+    for row in records.examples(root, "train/*/*.tfrecord"):
+        for k in range(len(row["steps/is_first"])):
+            values = {}
+            for key, fact in facts.items():
+                name, shape = key.removeprefix("steps/").replace("/", "."), fact.get("shape")
+                if shape and fact["dtype"] == "bytes":
+                    file = np.frombuffer(row[key][k], np.uint8)
+                    values[name.removeprefix("observation.")] = decoded(file)
+                elif shape:
+                    values[name] = np.reshape(row[key], (-1, *shape))[k]
+            yield from geometry_views(k, values)
+
+
+def geometry_views(k: int, values: dict[str, Any]) -> Iterator[View]:
+    """Geometry of one step, by the names of its features; rows of 0 are no objects."""
+    ids = np.atleast_1d(values["object_id"])
+    things = [thing(f"pose {n}", p) for n, p in zip(ids, values["object_pose"], strict=True) if n]
+    edges = values["relation"][values["relation"].any(axis=1)]
+    touching = values["contact_id"].any(axis=1)
+    things.append(thing("relations", edges.astype(float)))
+    things.append(thing("contacts", values["contact"][touching]))
+    yield View(truth.image_name(k, "world"), tuple(things))
+    for key in (key for key in values if key.startswith("depth.")):
+        camera = key.partition(".")[2]
+        K, ids = values[f"K.{camera}"], values[f"instance.{camera}"]
+        of_camera = (
+            thing("depth", values[key].astype(float)),
+            thing("ids", ids.astype(float)),
+            thing("pose", values[f"T_world_camera.{camera}"][:3]),
+        )
+        lens = (K[0, 0], K[1, 1], K[0, 2], K[1, 2])
+        yield View(truth.image_name(k, camera), of_camera, tuple(map(float, lens)))
 
 
 def by_tfrecord_episodes(root: Path) -> Iterator[View]:

@@ -23,6 +23,7 @@ from benchmarks.readers.truth import (
     scanned_instances,
     scans,
     scans_and_lenses,
+    step_geometry,
 )
 from gen_data.core.scene import Instance
 from gen_data.exporters import cityscapes_classes, label_map
@@ -213,4 +214,8 @@ READERS: tuple[Reader, ...] = (
            because="32-bit floats"),
     Reader("tfrecord", "rlds", S.by_tfrecord_episodes, joints, "arm", "rad, grey", FLOATS,
            because="32-bit floats"),
+    Reader("lerobot", "lerobot", S.by_lerobot_geometry, step_geometry, "arm", "m, ids, 0.1 mm",
+           FLOATS, lens=FLOATS, because="32-bit floats"),
+    Reader("tfrecord", "rlds", S.by_tfrecord_geometry, step_geometry, "arm", "m, ids, 0.1 mm",
+           FLOATS, lens=FLOATS, because="32-bit floats"),
 )  # fmt: skip

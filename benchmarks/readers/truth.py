@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import chain
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,10 +13,13 @@ from numpy.typing import NDArray
 import gen_data
 from benchmarks.readers.views import Thing, View, cube, of_pixels, thing
 from gen_data.api.sample import CameraReading
-from gen_data.core.sample import MaskPx
+from gen_data.core.sample import MaskPx, Predicate
 from gen_data.core.scene import Instance, Scene
 from gen_data.core.se3 import SE3
 from gen_data.exporters import motchallenge
+
+DEPTH_UNIT_M = 0.0001
+"""Of 16-bit depth images, the default of ``DatasetInfo``."""
 
 
 def image_name(index: int, sensor: str) -> str:
@@ -213,6 +216,37 @@ def joints(folder: Path) -> Iterator[View]:
         (arm,) = sample.scene.articulations
         yield View(image_name(sample.index, "arm"), (thing("state", arm.joint_positions),))
     yield from Images((), {"rgb": lambda reading: reading.rgb})(folder)
+
+
+def step_geometry(folder: Path) -> Iterator[View]:
+    """What surrounds an arm: poses, contacts, relations, depths, instances and cameras."""
+    for sample in gen_data.open(folder):
+        (arm,) = sample.scene.articulations
+        things = [
+            thing(f"pose {i.instance_id}", (*at.translation_m, *at.quaternion_wxyz))
+            for i in sample.scene.instances
+            if i.annotated and (at := i.T_world_instance)
+        ]
+        assert sample.core.frame is not None
+        edges = [
+            (r.subject, get_args(Predicate).index(r.predicate), r.object)
+            for r in sample.core.frame.relations or ()
+        ]
+        at_s = min(sample.scene.time_s, arm.episode.phases[-1].end_s - 1e-3) if arm.episode else 0
+        touching = [
+            (force_n, *point_m)
+            for span in (arm.episode.contacts if arm.episode else ())
+            if span.start_s - 1e-6 <= at_s < span.end_s - 1e-6
+            for force_n, point_m in (span.at(at_s),)
+        ]
+        things += [thing("relations", np.ravel(edges)), thing("contacts", np.ravel(touching))]
+        yield View(image_name(sample.index, "world"), tuple(things))
+    stated = {
+        "depth": lambda r: np.where(np.isfinite(r.depth_m), r.depth_m / DEPTH_UNIT_M, 0).round(),
+        "ids": lambda r: r.instance_ids.astype(float),
+        "pose": pose,
+    }
+    yield from Images((), stated)(folder)
 
 
 def scans_and_lenses(folder: Path) -> Iterator[View]:

@@ -198,7 +198,7 @@ class SampleSequence(Sequence[Sample], AbstractContextManager["SampleSequence", 
     @property
     def _samples_per_scene(self) -> int:
         count: int = self.config.get("views_per_scene", 1) * self.config.get("steps_per_scene", 1)
-        return count
+        return 2 * count if self.config.get("twins") else count
 
     @property
     def _splits(self) -> Splits:

@@ -254,7 +254,7 @@ def make_factory(loaded: Config, n: int) -> PipelineFactory:
     from gen_data.sensors.mounting import warn_of_early_readings
 
     general, stated = loaded.general, loaded.document.get("splits")
-    scenes = -(-n // (general.views_per_scene * general.steps_per_scene))
+    scenes = -(-n // general.samples_per_scene)
     warn_of_empty_splits(
         scenes,
         loaded.split_shares,

@@ -101,6 +101,11 @@ class GeneralSettings(Strict):
         1, ge=1, le=10_000, description="Instants of every view: samples that follow in time."
     )
     step_s: float = Field(0.1, gt=0, le=10, description="Time between two instants [s].")
+    twins: bool = Field(
+        False,
+        description="Every view twice: with a demonstration of an arm that fails, and with the one "
+        "that recovers; everything else is the same.",
+    )
     shard_size: int = Field(
         SHARD_SIZE, ge=1, le=100_000, description="Samples that are committed together."
     )
@@ -122,6 +127,11 @@ class GeneralSettings(Strict):
     splits: Splits = Splits()
     assets: AssetFolders = AssetFolders()
     dataset: DatasetSettings = DatasetSettings()
+
+    @property
+    def samples_per_scene(self) -> int:
+        """Samples of a scene: of all its views, with twins, and all their steps."""
+        return (2 if self.twins else 1) * self.views_per_scene * self.steps_per_scene
 
 
 @dataclass(frozen=True)

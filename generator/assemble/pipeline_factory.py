@@ -91,7 +91,7 @@ class PipelineFactory:
                 no rectified pair, or a format cannot hold the data set; all of it at once.
         """
         refused, config = Refusals(), self.config
-        for check in (_check_durations, _check_engine):
+        for check in (_check_durations, _check_twins, _check_engine):
             with refused.collected():
                 check(config)
         with refused.collected():
@@ -215,13 +215,14 @@ def dataset_info(config: Config, n: int, categories: tuple[str, ...]) -> interfa
         name=config.name,
         seed=config.general.seed,
         n=n,
-        views_per_scene=config.general.views_per_scene,
+        views_per_scene=config.general.samples_per_scene // config.general.steps_per_scene,
         categories=categories,
         sensors=tuple(sorted((s.describe() for s in config.sensors), key=lambda s: s.name)),
         depth_scale_m=config.general.depth_scale_m,
         steps_per_scene=config.general.steps_per_scene,
         step_s=config.general.step_s,
         publication=interfaces.Publication(**config.general.dataset.model_dump()),
+        twins=config.general.twins,
     )
 
 
@@ -239,6 +240,19 @@ def _check_durations(config: Config) -> None:
                         f"than the sequences, {steps} steps of {step_s:g} s; "
                         f"expected at least {lasts_s:g}"
                     )
+
+
+def _check_twins(config: Config) -> None:
+    """Raise ConfigError if there is no task that twins could fail at."""
+    kinds = {getattr(r, "type", "") for scene in config.probes for r in scene.randomizers}
+    node = config.document.get("twins")
+    if config.general.twins and node is not None and "arm_task" not in kinds:
+        refuse(
+            node.position,
+            "twins",
+            "no arm demonstrates a task; expected an element of type robot and the randomizer "
+            "arm_task, or twins: false",
+        )
 
 
 def _check_engine(config: Config) -> None:
@@ -295,6 +309,7 @@ def nominal_scene(
         shared=scene_config.shared,
         step_s=config.general.step_s,
         box3d=config.general.labels.box3d,
+        twins=config.general.twins,
     )
     refused = Refusals()
     for sensor in scene_config.sensors:

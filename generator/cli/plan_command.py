@@ -68,13 +68,12 @@ def _rows(config: "Config", n: int) -> Iterator[tuple[str, str]]:
     from gen_data.runner.identity import possible_assets
 
     general = config.general
-    per_scene = general.views_per_scene * general.steps_per_scene
-    scenes = -(-n // per_scene)
+    scenes = -(-n // general.samples_per_scene)
     factory = PipelineFactory(config, n)
     factory.check()
     info = factory.info
     exporters = {exporter.type: exporter for exporter in config.exporters}
-    yield "scenes", _product(scenes, general.views_per_scene, general.steps_per_scene)
+    yield "scenes", _product(scenes, info.views_per_scene, general.steps_per_scene)
     yield "shards", f"{-(-n // general.shard_size)} of {general.shard_size} samples"
     counted = min(scenes, 10_000)
     splits = Counter(

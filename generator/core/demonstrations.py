@@ -26,6 +26,7 @@ class DemonstrationStep:
         contact_points_m: Point of each of them in the world.
         succeeded: Whether physics confirmed the whole demonstration.
         failure: Why it failed; empty = it did not.
+        recovered: The failure that happened in a success; empty = none.
     """
 
     positions: tuple[float, ...]
@@ -40,6 +41,7 @@ class DemonstrationStep:
     contact_points_m: tuple[se3.Vec3, ...]
     succeeded: bool
     failure: str
+    recovered: str
 
 
 def demonstration_step(
@@ -75,6 +77,7 @@ def demonstration_step(
         tuple(point_m for _, point_m in touching),
         episode.succeeded,
         episode.failure,
+        episode.recovered,
     )
 
 

@@ -507,8 +507,10 @@ class DatasetInfo:
         categories: Names; category id ``k`` is ``categories[k - 1]``.
         sensors: Every sensor, sorted by name.
         depth_scale_m: Metres per unit of the 16-bit depth images.
+        views_per_scene: Views of a scene; twins count as two.
         steps_per_scene: Length of a sequence: instants per view.
         step_s: Time between them [s].
+        twins: Whether each view is there twice, with another demonstration.
         publication: Title, licence and creators.
     """
 
@@ -522,6 +524,18 @@ class DatasetInfo:
     steps_per_scene: int = 1
     step_s: float = 0.1
     publication: Publication = Publication()
+    twins: bool = False
+
+    def view_streams(self, scene: int, view: int, attempt: int) -> streams.Streams:
+        """Random streams that draw a view of a scene: the same for twins."""
+        twins = 2 if self.twins else 1
+        drawn = view // twins
+        number = scene * (self.views_per_scene // twins) + drawn
+        return streams.Streams(self.seed, scene, view=drawn, attempt=attempt, index=number)
+
+    def twin(self, view: int) -> int:
+        """Which twin a view is: 0 fails, 1 recovers; 0 without twins."""
+        return view % 2 if self.twins else 0
 
     @property
     def cameras(self) -> tuple[str, ...]:

@@ -222,7 +222,8 @@ class ArmGoal:
             grasp frame in the world. ``hold``: like reach, with ``grasped_object`` between the
             fingers. In tasks only: ``grasp`` picks up one of ``objects``, ``place`` puts the held
             object down, ``move`` passes ``waypoints`` in straight lines, ``grip`` opens or closes
-            the fingers, or closes them on the first of ``objects``, and lets go of a held one.
+            the fingers, or closes them on the first of ``objects``, and lets go of a held one;
+            with ``carries`` it then holds that object where it is.
         joint_candidates: One tuple per candidate [rad or m], arm joints in order.
         pose_candidates: ``T_world_grasp`` per candidate; for ``place``, a point on a surface and
             a rotation about Z of the object from its former pose at rest.
@@ -238,6 +239,8 @@ class ArmGoal:
         pivots: Whether a ``move`` leads the hand's origin along the waypoints without turning the
             hand; what it holds turns about the line between the fingers as contacts make it.
         phase: Name of this part of a demonstration in labels; empty = the kind.
+        arms: Names of the arms that pursue it, in demonstrations; several move together. Empty =
+            the arm whose task it is part of.
     """
 
     kind: Literal["joints", "reach", "hold", "grasp", "place", "move", "grip"]
@@ -252,10 +255,11 @@ class ArmGoal:
     touches: tuple[str, ...] = ()
     pivots: bool = False
     phase: str = ""
+    arms: tuple[str, ...] = field(default=(), metadata={serialization.SPARSE: True})
 
 
 Measure = Literal["distance", "offset", "height", "gap", "tilt", "travel"]
-FailureKind = Literal["", "slip", "miss", "collision"]
+FailureKind = Literal["", "slip", "miss", "collision", "late", "wrong_object"]
 HAND = "hand"
 """Stands for the origin of the grasp frame where conditions name a body."""
 
@@ -298,6 +302,9 @@ class Assignment:
         success: Conditions that physics must confirm.
         failure: Failure that is to happen; empty = none.
         joints: Joints of bodies of the task, such as drawers.
+        recovers: Whether the arm notices the failure, recovers from it and succeeds.
+        deadline_s: Time within which the conditions must hold; None = at the end of the program.
+        mistaken: Name of the body that the arm takes first if it fails by ``wrong_object``.
     """
 
     name: str
@@ -305,6 +312,9 @@ class Assignment:
     success: tuple[Condition, ...] = ()
     failure: FailureKind = ""
     joints: "tuple[BodyJoint, ...]" = ()
+    recovers: bool = field(default=False, metadata={serialization.SPARSE: True})
+    deadline_s: float | None = field(default=None, metadata={serialization.SPARSE: True})
+    mistaken: str = field(default="", metadata={serialization.SPARSE: True})
 
 
 @dataclass(frozen=True, slots=True)
@@ -374,6 +384,7 @@ class Episode:
         phases: Parts of the program, one after the other.
         held: Times at which a body is in the hand; the label is its name.
         contacts: Times at which two bodies touch, one of them in motion or of the arm.
+        recovered: The failure that happened in a success; empty = none.
     """
 
     succeeded: bool
@@ -381,6 +392,7 @@ class Episode:
     phases: tuple[Span, ...] = ()
     held: tuple[Span, ...] = ()
     contacts: tuple[ContactSpan, ...] = ()
+    recovered: FailureKind = field(default="", metadata={serialization.SPARSE: True})
 
     def __post_init__(self) -> None:
         """Raise ValueError for a success that is labelled as a failure."""
@@ -413,6 +425,14 @@ class Articulation:
     joint_track: JointTrajectory | None = None
     assignment: Assignment | None = None
     episode: Episode | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """The motion of a settled scene: one of those that may follow from its time 0."""
+
+    articulations: tuple[Articulation, ...]
+    tracks: tuple[Trajectory, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -667,6 +687,10 @@ class Scene:
         changes: Changes of state, in order of time.
         relief: Height of its ground above the level world of its layout; None = it is level. A
             view is lifted once, after it was drawn.
+        twins: Whether each view comes twice: with a demonstration that fails, and with the one
+            that recovers.
+        recovery: The motion with which demonstrations recover, of settled scenes with twins; the
+            scene itself has the one that fails. None in views.
     """
 
     template: str
@@ -692,6 +716,17 @@ class Scene:
     changes: tuple[StateChange, ...] = ()
     box3d: Box3dExtent = "all"
     relief: Relief | None = field(default=None, metadata={serialization.SPARSE: True})
+    twins: bool = field(default=False, metadata={serialization.SPARSE: True})
+    recovery: Outcome | None = field(default=None, metadata={serialization.SPARSE: True})
+
+    def twin(self, number: int) -> "Scene":
+        """The scene with one of its two outcomes: 0 fails, 1 recovers; itself without twins."""
+        if self.recovery is None:
+            return self
+        motion = self.recovery if number else Outcome(self.articulations, self.tracks)
+        return replace(
+            self, articulations=motion.articulations, tracks=motion.tracks, recovery=None
+        )
 
     def body(self, name: str) -> Body:
         """The body of that name; KeyError if there is none."""

@@ -7,7 +7,7 @@ from gen_data.core.bounded_cache import CountCache
 from gen_data.core.errors import Rejection
 from gen_data.core.interfaces import AssetLibrary, DerivedArrays, Settled
 from gen_data.core.kinematics import make_link_bodies
-from gen_data.core.scene import Articulation, Body, BodyJoint, Episode, Scene
+from gen_data.core.scene import Articulation, Body, BodyJoint, Episode, Outcome, Scene
 from gen_data.physics import collision_shapes, physics_config, settling
 from gen_data.physics.manipulation.arm_goals import Arm, ArmState
 from gen_data.physics.manipulation.arm_simulation import ArmSimulation, Servo, SimulatedBodies
@@ -70,7 +70,9 @@ class Engine:
         if rejection is not None:
             return Settled(scene, rejection)
         settled = self._update_poses(scene, falling, [state for _, state in arms])
-        shown = self._demonstrate(settled, fixed, [body.name for body in falling], arms)
+        names = [body.name for body in falling]
+        demonstrate = self._demonstrate_twins if scene.twins else self._demonstrate
+        shown = demonstrate(settled, fixed, names, arms)
         return Settled(scene, shown) if isinstance(shown, Rejection) else Settled(shown)
 
     def weigh(self, scene: Scene) -> Scene:
@@ -182,6 +184,29 @@ class Engine:
         shapes = {link: self._shape(asset) for link, asset in robot.collisions.items()}
         return Arm(articulation, robot, shapes, self._world)
 
+    def _demonstrate_twins(
+        self, scene: Scene, fixed: list[str], fallen: list[str], arms: list[tuple[Arm, ArmState]]
+    ) -> Scene | Rejection:
+        """The scene with demonstrations that fail, and with those that recover as ``recovery``.
+
+        Both begin in a world that was filled with the same bodies: nothing of the one is in the
+        other.
+        """
+        shown: list[Scene] = []
+        for recovers in (False, True):
+            asked = replace(
+                scene, articulations=tuple(_asked(a, recovers) for a in scene.articulations)
+            )
+            self._fill(asked, [asked.body(name) for name in fallen], fixed)
+            states = [state for _, state in arms]
+            again = [(self._arm(a), s) for a, s in zip(asked.articulations, states, strict=True)]
+            one = self._demonstrate(asked, fixed, fallen, again)
+            if isinstance(one, Rejection):
+                return one
+            shown.append(one)
+        failing, recovering = shown
+        return replace(failing, recovery=Outcome(recovering.articulations, recovering.tracks))
+
     def _demonstrate(
         self, scene: Scene, fixed: list[str], fallen: list[str], arms: list[tuple[Arm, ArmState]]
     ) -> Scene | Rejection:
@@ -197,23 +222,33 @@ class Engine:
         recording = TrajectoryRecording(dict(resting))
         episodes: dict[str, Episode] = {}
         for arm, state in at_work:
-            others = [name for other, _ in arms if other is not arm for name in other.bodies]
-            obstacles = [*fixed, *others]
-            planner = TaskPlanner(arm, state, self._world, obstacles, resting, scene.surfaces)
-            parts = [link for link in arm.robot.links if link in arm.robot.visuals]
+            named = {name for goal in arm.articulation.task for name in goal.arms}
+            partners = [(a, s) for a, s in arms if a is not arm and a.articulation.name in named]
+            planners = [
+                TaskPlanner(
+                    one,
+                    its_state,
+                    self._world,
+                    [*fixed, *(n for a, _ in arms if a is not one for n in a.bodies)],
+                    resting,
+                    scene.surfaces,
+                )
+                for one, its_state in ((arm, state), *partners)
+            ]
             if arm.articulation.assignment is not None:
-                shown = demonstrate(planner, arm, self._world, self._config.time_step_s)
+                shown = demonstrate(planners, self._world, self._config.time_step_s)
                 if isinstance(shown, Rejection):
                     return shown
                 episodes[arm.articulation.name] = shown.episode(recording.end_s)
-                recording.add(arm, shown.legs, parts, shown.poses)
+                recording.add([(a, legs, _parts(a)) for a, legs in shown.legs], shown.poses)
                 resting = shown.poses[-1]
                 continue
+            planner = planners[0]
             plan = planner.plan()
             if isinstance(plan, Rejection):
                 return plan
             resting = planner.resting
-            recording.add(arm, plan, parts)
+            recording.add([(arm, plan, _parts(arm))])
         return replace(
             scene,
             tracks=(*scene.tracks, *recording.tracks()),
@@ -259,6 +294,18 @@ def _solids(scene: Scene) -> list[Body]:
     """Bodies that collide, without links of robots, whose geometry comes from their robot."""
     prefixes = tuple(f"{articulation.name}/" for articulation in scene.articulations)
     return [b for b in scene.bodies if b.collides and not b.name.startswith(prefixes)]
+
+
+def _parts(arm: Arm) -> list[str]:
+    """Links with a body in the scene."""
+    return [link for link in arm.robot.links if link in arm.robot.visuals]
+
+
+def _asked(arm: Articulation, recovers: bool) -> Articulation:
+    """The arm, whose failure it recovers from or not."""
+    if arm.assignment is None or not arm.assignment.failure:
+        return arm
+    return replace(arm, assignment=replace(arm.assignment, recovers=recovers))
 
 
 def _held(scene: Scene) -> set[str]:

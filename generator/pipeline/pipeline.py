@@ -199,7 +199,7 @@ class Pipeline:
         return Sample(
             index=view.number * self.info.steps_per_scene + step_index,
             scene_index=streams.scene,
-            view_index=streams.view,
+            view_index=view.number % self.info.views_per_scene,
             step_index=step_index,
             split=self.split(streams.scene),
             scene=scene,
@@ -289,11 +289,12 @@ class Pipeline:
             return self._view
 
         def draw(attempt: int) -> DrawnView:
-            streams = Streams(
-                self.info.seed, accepted.index, view=view_index, attempt=attempt, index=number
-            )
+            streams = self.info.view_streams(accepted.index, view_index, attempt)
             scene = self._randomize(
-                accepted.scene, accepted.randomizers, interfaces.Stage.VIEW, streams
+                accepted.scene.twin(self.info.twin(view_index)),
+                accepted.randomizers,
+                interfaces.Stage.VIEW,
+                streams,
             )
             scene = finish_view(scene, self.assets, self._category_ids)
             # Renderers keep what they packed of the same tuple; views on one relief share it.

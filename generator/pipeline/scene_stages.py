@@ -1,9 +1,10 @@
 """Scenes as the two stages of randomizers leave them, made ready for sensors and labels."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 from gen_data.core.interfaces import AssetLibrary
-from gen_data.core.scene import Scene
+from gen_data.core.scene import Outcome, Scene
 from gen_data.core.scene_time import place_sensors
 from gen_data.pipeline.finalize_scene import finalize_scene
 from gen_data.pipeline.lift_scene import lift_scene
@@ -12,7 +13,11 @@ from gen_data.pipeline.separate_pieces import separate_pieces
 
 def finish_settled(scene: Scene, assets: AssetLibrary, category_ids: Mapping[str, int]) -> Scene:
     """The scene that its views share: settled by physics, then with a body for every piece."""
-    return finalize_scene(separate_pieces(scene), assets, category_ids)
+    finished = finalize_scene(separate_pieces(scene), assets, category_ids)
+    if scene.recovery is None:
+        return finished
+    other = finish_settled(scene.twin(1), assets, category_ids)
+    return replace(finished, recovery=Outcome(other.articulations, other.tracks))
 
 
 def finish_view(scene: Scene, assets: AssetLibrary, category_ids: Mapping[str, int]) -> Scene:

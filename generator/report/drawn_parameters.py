@@ -194,9 +194,9 @@ class Replay:
             samples = range(begin, min(begin + info.steps_per_scene, self._stored.plan.n))
             kept = self._stored.kept_scene(begin)
 
-            def draw_view(attempt: int, view: int = view, index: int = index) -> Scene:
-                streams = Streams(info.seed, number, view=view, attempt=attempt, index=index)
-                drawn = self._randomize(scene, observed, Stage.VIEW, streams)
+            def draw_view(attempt: int, view: int = view) -> Scene:
+                streams = info.view_streams(number, view, attempt)
+                drawn = self._randomize(scene.twin(info.twin(view)), observed, Stage.VIEW, streams)
                 return finish_view(drawn, self._library, self._category_ids)
 
             views.append((kept, self._accept(kept.view_attempts, draw_view, log, samples)))

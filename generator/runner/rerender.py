@@ -97,18 +97,16 @@ class RerenderedScenes:
         )
         nominal, randomizers, sensors = self.pipeline.config.open_scene(streams)
         scene = self._with_sensors(first.scene, nominal, sensors)
-        view_streams = replace(
-            streams,
-            view=first.view_index,
-            attempt=first.view_attempts - 1,
-            index=first.scene_index * self.info.views_per_scene + first.view_index,
+        view_streams = self.info.view_streams(
+            first.scene_index, first.view_index, first.view_attempts - 1
         )
         scene = self._redraw(scene, randomizers, {Stage.BUILD: streams, Stage.VIEW: view_streams})
         if scene.box3d != nominal.box3d:
             ids = {name: number for number, name in enumerate(self.info.categories, 1)}
             scene = replace(scene, box3d=nominal.box3d)
             scene = finalize_scene(scene, self.pipeline.assets, ids)
-        view = DrawnView(view_streams.index, scene_time.place_sensors(scene), view_streams)
+        number = first.scene_index * self.info.views_per_scene + first.view_index
+        view = DrawnView(number, scene_time.place_sensors(scene), view_streams)
         return replace(
             self.pipeline.read_sensors(view, sensors, step_index),
             split=first.split,

@@ -14,10 +14,12 @@ from tfrecord import example_pb2
 from tfrecord.reader import tfrecord_iterator
 
 from gen_data.core.demonstrations import demonstration_step
+from gen_data.core.sample import EgoTruth, Relation
 from gen_data.core.scene import Assignment, ContactSpan, Episode, Span
 from gen_data.core.se3 import SE3
 from gen_data.exporters.lerobot import LeRobot
 from gen_data.exporters.rlds import Rlds
+from gen_data.exporters.step_geometry import Part
 from tests.exporters.drives import drive_info
 from tests.randomizers.doubles import two_link_arm
 
@@ -148,3 +150,135 @@ def test_the_hand_of_a_step_is_that_of_its_joints_and_without_a_task_there_is_no
     assert step.phase == "place"
     (arm,) = world.reach()[0].scene.articulations
     assert demonstration_step(arm, two_link_arm(), 0.0, 0.1) is None
+
+
+PARTS: tuple[Part, ...] = ("depth", "instances", "poses", "contacts", "relations", "calibration")
+
+
+@pytest.fixture(scope="module")
+def related(samples: Any) -> Any:
+    """The same steps with a scene graph: the crate is on something, at the first step only."""
+    edges = [(Relation(1, "on", 2), Relation(1, "near", 3)), *[()] * (len(samples) - 1)]
+    frames = [EgoTruth(relations=found) for found in edges]
+    return [replace(s, frame=frame) for s, frame in zip(samples, frames, strict=True)]
+
+
+@pytest.mark.parametrize("version", ["v3.0", "v2.1"])
+def test_geometry_of_every_step_is_in_lerobot_as_arrays(
+    world: Any, related: Any, tmp_path: Path, version: Any
+) -> None:
+    """Depths and ids of the images, poses, contacts, relations, K and poses of cameras.
+
+    The crate touches a finger and then the table, too: two rows, of which the first steps fill one
+    or none. Predicates count from 0 in the list of ``info.json``.
+    """
+    exporter = LeRobot(geometry=PARTS, version=version)
+    folder = world.export(exporter, drive_info(world), related, tmp_path) / "train/toys_arm"
+    (path,) = (folder / "data").rglob("*.parquet")
+    rows = pyarrow.parquet.read_table(path).to_pylist()
+    features = json.loads((folder / "meta/info.json").read_text())["features"]
+
+    for row, sample in zip(rows, related, strict=False):
+        objects = [i for i in sample.scene.instances if i.annotated]
+        assert row["annotation.objects"] == ", ".join(i.category for i in objects)
+        assert np.atleast_1d(row["annotation.object_id"]).tolist() == [
+            i.instance_id for i in objects
+        ]
+        poses = [(*i.T_world_instance.translation_m, *i.T_world_instance.quaternion_wxyz)
+                 for i in objects]  # fmt: skip
+        assert np.allclose(row["annotation.object_pose"], poses, atol=1e-6)
+        for camera, truth in sample.truth.items():
+            channels = {c.value: a for c, a in sample.capture.readings[camera].channels.items()}
+            depth = np.array(row[f"annotation.depth.{camera}"])
+            unit_m = features[f"annotation.depth.{camera}"]["unit_m"]
+            shown = np.isfinite(channels["depth"]) & (channels["depth"] < 65535.5 * unit_m)
+            assert np.abs(depth * unit_m - channels["depth"])[shown].max() < 0.51 * unit_m
+            assert not depth[~shown].any()
+            ids = np.array(row[f"annotation.instance.{camera}"])
+            assert np.array_equal(ids, channels["instance"])
+            pose = truth.camera.T_world_camera.matrix()
+            assert np.allclose(row[f"annotation.T_world_camera.{camera}"], pose, atol=1e-6)
+            K = truth.camera.intrinsics.matrix()
+            assert np.allclose(row[f"annotation.K.{camera}"], K, rtol=1e-6)
+    touching = [np.array(row["annotation.contact"]) for row in rows]
+    assert np.allclose(touching[2], [[2.5, 0.1, 0.2, 0.3], [9.81, 0.0, 0.5, 0.75]], atol=1e-6)
+    assert [int(one.any(axis=1).sum()) for one in touching] == [0, 1, 2, 0]
+    names = features["annotation.relation"]["predicates"]
+    first = [(a, names[p], b) for a, p, b in rows[0]["annotation.relation"]]
+    assert first == [(1, "on", 2), (1, "near", 3)]
+    assert not np.any(rows[1]["annotation.relation"])
+    for name, feature in features.items():
+        if feature["dtype"] not in ("image", "string"):
+            assert np.shape(rows[0][name]) in ((tuple(feature["shape"])), ()), name
+
+
+def test_geometry_of_every_step_is_in_rlds_as_lists_and_images(
+    world: Any, related: Any, tmp_path: Path
+) -> None:
+    """Arrays of the steps follow one another in the shape of ``features.json``."""
+    exporter = Rlds(geometry=PARTS)
+    folder = world.export(exporter, drive_info(world), related, tmp_path) / "train/toys_arm"
+    example, facts = read_episode(folder), json.loads((folder / "features.json").read_text())
+    assert_written(folder, related)
+
+    contacts = np.reshape(values(example, "steps/contact"), (4, *facts["steps/contact"]["shape"]))
+    assert np.allclose(contacts[2], [[2.5, 0.1, 0.2, 0.3], [9.81, 0.0, 0.5, 0.75]], atol=1e-6)
+    edge = values(example, "steps/relation")[:3]
+    assert (edge[0], facts["steps/relation"]["predicates"][edge[1]], edge[2]) == (1, "on", 2)
+    camera = next(iter(related[0].truth))
+    file = values(example, f"steps/observation/instance/{camera}")[1]
+    channels = related[1].capture.readings[camera].channels
+    (ids,) = (a for c, a in channels.items() if c.value == "instance")
+    assert np.array_equal(np.asarray(Image.open(io.BytesIO(file))), ids)
+
+
+def test_a_task_of_two_arms_has_the_joints_and_hands_of_both(
+    world: Any, samples: Any, tmp_path: Path
+) -> None:
+    """One after the other, named by arm; the episode is that of the arm with the task."""
+
+    def joined(sample: Any) -> Any:
+        (arm,) = sample.scene.articulations
+        other = replace(arm, name="other", task=(), assignment=None, episode=None)
+        goals = (*arm.task, replace(arm.task[0], arms=("arm", "other")))
+        arms = (replace(arm, task=goals), other)
+        return replace(sample, scene=replace(sample.scene, articulations=arms))
+
+    pairs = [joined(sample) for sample in samples]
+    folder = world.export(LeRobot(), drive_info(world), pairs, tmp_path) / "train/toys_arm+toys_arm"
+    rows = pyarrow.parquet.read_table(folder / "data/chunk-000/file-000.parquet").to_pylist()
+    features = json.loads((folder / "meta/info.json").read_text())["features"]
+
+    names = features["observation.state"]["names"]
+    assert names == ["arm.shoulder", "arm.elbow", "other.shoulder", "other.elbow"]
+    assert features["observation.ee_pose"]["names"][6:8] == ["arm.qz", "other.x"]
+    for row, sample in zip(rows, samples, strict=False):
+        positions = sample.scene.articulations[0].joint_track.positions(sample.scene.time_s)
+        assert np.allclose(row["observation.state"], [*positions, *positions], atol=1e-6)
+        assert len(row["observation.gripper"]) == 2
+        assert row["annotation.failure"] == "slip"
+
+
+def test_twins_name_the_failure_that_they_recovered_from(
+    world: Any, samples: Any, tmp_path: Path
+) -> None:
+    """Sequence 0 fails, sequence 1 recovers; both in one data set."""
+
+    def twin(sample: Any, k: int) -> Any:
+        (arm,) = sample.scene.articulations
+        episode = (
+            EPISODE if k < 4 else replace(EPISODE, succeeded=True, failure="", recovered="slip")
+        )
+        scene = replace(sample.scene, twins=True, articulations=(replace(arm, episode=episode),))
+        return replace(sample, split="train", scene=scene)
+
+    given = [twin(sample, k) for k, sample in enumerate(samples)]
+    folder = world.export(LeRobot(), drive_info(world), given, tmp_path) / "train/toys_arm"
+    rows = pyarrow.parquet.read_table(folder / "data/chunk-000/file-000.parquet").to_pylist()
+    assert [(row["annotation.failure"], row["annotation.recovered"]) for row in rows] == [
+        *[("slip", "")] * 4, *[("", "slip")] * 4]  # fmt: skip
+
+    records = world.export(Rlds(), drive_info(world), given, tmp_path / "rlds") / "train/toys_arm"
+    found = tfrecord_iterator(str(next(records.glob("*.tfrecord"))))
+    episodes = [example_pb2.Example.FromString(bytes(record)) for record in found]
+    assert [values(one, "episode_metadata/recovered") for one in episodes] == [[b""], [b"slip"]]

@@ -24,6 +24,8 @@ PINHOLES = [*("bop", "cityscapes", "kitti", "kitti_raw", "kitti_tracking", "nusc
             *("semantickitti", "solo", "tum_rgbd")]  # fmt: skip
 NO_PHOTOGRAPH = r"no sensor of color writes the rgb channel"
 TOO_LONG = "there are 10001; expected at most 40000 samples"
+NO_DEPTH = "'color' does not write the channel depth; add it .* leave 'depth' out"
+NO_INSTANCES = "'color' does not write the channel instance; add it .* leave 'instances' out"
 NO_RANGE = "expected both, with near_m < far_m, or neither"
 
 ROWS: list[tuple[str, dict[str, Any], dict[str, Any], str]] = [
@@ -56,6 +58,8 @@ ROWS: list[tuple[str, dict[str, Any], dict[str, Any], str]] = [
     ("kitti_tracking", {"camera": "middle"}, DRIVE, "camera 'middle'.*left, right"),
     ("kitti_tracking", {"lidar": "velo"}, DRIVE, "no lidar 'velo'"),
     ("lerobot", {}, {}, "steps_per_scene is 1; set steps_per_scene"),
+    ("lerobot", {"geometry": ("depth",)}, RGB_ONLY | {"steps_per_scene": 4}, NO_DEPTH),
+    ("rlds", {"geometry": ("instances",)}, RGB_ONLY | {"steps_per_scene": 4}, NO_INSTANCES),
     ("mcap", {}, {"cameras": ()}, "neither camera nor lidar"),
     ("motchallenge", {}, TRAFFIC, r"no category .* has a class.*pedestrian"),
     ("motchallenge", {}, LONG, TOO_LONG),

@@ -90,7 +90,21 @@ def test_an_arm_through_the_table_is_refused(engine: Engine) -> None:
     assert asked.rejection is not None
     assert asked.rejection.reason == "arm collides"
     assert given.rejection is not None
-    assert given.rejection.reason == "arm collides"
+    assert given.rejection.reason == "arm 'arm' at rest collides with 'table'"
+    assert "elements.arm.at_m" in given.rejection.remedy
+
+
+def test_two_arms_that_collide_at_rest_are_refused_by_name(engine: Engine) -> None:
+    """At 5 cm from each other, with the element to move."""
+    scene = armed(table_scene(), None)
+    near = scene.articulations[0].T_world_base @ SE3((0.0, 0.05, 0.0))
+    other = replace(scene.articulations[0], name="other", instance_id=8, T_world_base=near)
+
+    settled = engine.settle(replace(scene, articulations=(*scene.articulations, other)))
+
+    assert settled.rejection is not None
+    assert settled.rejection.reason.startswith("arm 'other' at rest collides with 'arm/panda_")
+    assert "move robot 'other' (elements.other.at_m)" in settled.rejection.remedy
 
 
 def test_an_arm_folded_into_itself_is_refused(engine: Engine) -> None:

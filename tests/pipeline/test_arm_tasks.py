@@ -8,13 +8,14 @@ import pytest
 import trimesh
 
 from gen_data.assemble.config import load_config
-from gen_data.assemble.pipeline_factory import open_pipeline
+from gen_data.assemble.pipeline_factory import PipelineFactory, open_pipeline
 from gen_data.core.errors import ConfigError, SceneRejected
 from gen_data.core.sample import Sample
 from gen_data.core.scene import Scene
+from gen_data.core.scene_time import scene_at
 from gen_data.core.serialization import canonical_json
 from gen_data.randomizers.arm_task_table import tasks
-from tests.tiers import cases
+from tests.tiers import cases, exhaustive
 
 SMALL = ("sensors.color.size_px=[96,72]", "sensors.wrist.size_px=[96,72]")
 OWN = """nudge:
@@ -33,30 +34,90 @@ NONE_FAIL = ("randomizers.things.failures={}", "shared.robot=franka_panda")
 
 
 def demonstrated(task: str, scene_index: int = 0, failures: str = "{}") -> Scene:
+    config = "arm_pair.yaml" if tasks()[task].arms else "arm_tasks.yaml"
     robot = "franka_panda_suction" if tasks()[task].hand == "suction" else "franka_panda"
     changes = (
-        f"shared.task={task}", f"randomizers.things.failures={failures}", f"shared.robot={robot}",
-    )  # fmt: skip
-    with open_pipeline(load_config("arm_tasks.yaml", overrides=(*SMALL, *changes))) as pipeline:
+        f"shared.task={task}",
+        f"randomizers.things.failures={failures}",
+        f"shared.robot={robot}",
+    )
+    with open_pipeline(load_config(config, overrides=(*SMALL, *changes))) as pipeline:
         return pipeline.accepted_scene(scene_index).scene
 
 
 QUICK = ("open_drawer",)
 
 
-@pytest.mark.parametrize("task", cases(sorted(tasks()), QUICK))
+SLOW = ("hold_and_open", "lift_tray", "pass_rod", "pivot", "stack", "stir")
+
+
+@pytest.mark.parametrize(
+    "task",
+    [
+        *cases((*QUICK, *SLOW), QUICK),
+        *(pytest.param(t, marks=exhaustive) for t in sorted({*tasks()} - {*QUICK, *SLOW})),
+    ],
+)
 def test_every_task_is_demonstrated_with_success(task: str) -> None:
     """Its phases are those of the program; things are named in the instruction, not braced."""
-    (arm,) = demonstrated(task).articulations
+    scene = demonstrated(task)
+    arm = scene.articulations[0]
     assert arm.episode is not None
     assert arm.assignment is not None
     assert (arm.assignment.name, arm.episode.succeeded, arm.episode.failure) == (task, True, "")
     assert "{" not in arm.assignment.instruction
     program = [step.phase for step in tasks()[task].program]
     assert [span.label for span in arm.episode.phases] == [*program, "settle"]
-    grasped = any(step.verb == "grasp" for step in tasks()[task].program)
+    grasped = any(s.verb == "grasp" or s.carries for s in tasks()[task].program)
     assert bool(arm.episode.held) == grasped
     assert arm.episode.phases[-1].end_s <= 15.0, "the sequence of arm_tasks.yaml is shorter"
+
+
+@pytest.mark.slow
+def test_a_rod_passes_from_one_hand_to_the_other() -> None:
+    """Both hold it for a moment, each has it alone before or after; it never falls in between.
+
+    The rod of 3 cm is at least 15 cm above the plate while both touch it.
+    """
+    scene = demonstrated("pass_rod")
+    episode = scene.articulations[0].episode
+    assert episode is not None
+    (first, other) = episode.held
+    assert first.label == other.label == "things/0"
+    assert first.start_s < other.start_s < first.end_s < other.end_s
+    track = scene.track("things/0")
+    assert track is not None
+    heights = [track.pose(t).translation_m[2] for t in (other.start_s, first.end_s)]
+    assert min(heights) > 0.74 + 0.15
+    assert heights[0] == pytest.approx(heights[1], abs=1e-3)
+
+
+@pytest.mark.slow
+def test_a_tray_stays_level_between_two_hands_and_in_both() -> None:
+    """Hands move as one: the distance between them and each one's pose on the tray never change."""
+    scene = demonstrated("lift_tray")
+    episode = scene.articulations[0].episode
+    assert episode is not None
+    lift = next(span for span in episode.phases if span.label == "lift")
+    relative = []
+    for share in (0.05, 0.3, 0.6, 1.0):
+        at = scene_at(scene, lift.start_s + share * (lift.end_s - lift.start_s))
+        tray = at.body("things/0").T_world_body
+        hands = [at.body(f"{arm}/panda_hand").T_world_body for arm in ("arm", "right")]
+        relative.append([v for h in hands for v in (tray.inverse() @ h).translation_m])
+        up = tray.rotation()[:, 2]
+        assert up[2] == pytest.approx(1.0, abs=1e-4)
+    for other in relative[1:]:
+        assert other == pytest.approx(relative[0], abs=1.5e-3)
+
+
+def test_a_task_of_two_arms_is_refused_with_one() -> None:
+    """By its name, the number of arms and the configuration that has them."""
+    config = load_config("arm_tasks.yaml", overrides=("shared.task=pass_rod",))
+    with pytest.raises(
+        ConfigError, match=r"'pass_rod' needs 2 arms, but the scene has 1; expected .* arm_pair"
+    ):
+        PipelineFactory(config, 1).check()
 
 
 @pytest.mark.slow

@@ -1,5 +1,6 @@
 """Tasks of arms: the table, and what is drawn from it."""
 
+import json
 from collections import Counter
 from dataclasses import replace
 from typing import Any
@@ -36,13 +37,14 @@ MINIMAL = """{"instruction": "Move over the {it}.",
 
 
 def test_the_table_has_tasks_of_many_kinds() -> None:
-    """Twenty or more; every verb and every measure is used by some."""
+    """Forty or more, three of them for two arms; every verb and measure is used by some."""
     table = tasks()
-    assert len(table) >= 20
+    assert len(table) >= 40
+    assert {n for n, t in table.items() if t.arms} == {"pass_rod", "lift_tray", "hold_and_open"}
     assert {s.verb for t in table.values() for s in t.program} == {
         "reach", "move", "grasp", "place", "grip"}  # fmt: skip
     assert {c.measure for t in table.values() for c in t.success} == {
-        "offset", "height", "gap", "tilt", "travel"}  # fmt: skip
+        "distance", "offset", "height", "gap", "tilt", "travel"}  # fmt: skip
     # The hand is no body of the scene.
     assert any(c.body == HAND for c in table["reach"].success)
 
@@ -80,6 +82,30 @@ def test_a_task_that_cannot_be_is_refused_by_its_field(make: Any, error: Any, me
     assert Task.model_validate_json(MINIMAL % "it")
     with pytest.raises(error, match=message):
         make()
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"arms": ["left"], "program": [{"verb": "reach", "at": "it", "phase": "reach",
+          "arms": ["right"]}]}, "there is no arm 'right'; expected one of .* left"),
+        ({"arms": ["a", "b"], "program": [{"verb": "reach", "at": "it", "phase": "reach",
+          "arms": ["a", "b"]}]}, "several arms can only 'move' together"),
+        ({"recovers_from": ["slip"]}, "cannot fail by 'slip'; expected some of: late"),
+    ],
+)  # fmt: skip
+def test_arms_and_causes_of_a_task_must_fit_it(change: dict[str, Any], message: str) -> None:
+    plain = json.loads(MINIMAL % "it") | change
+    with pytest.raises(ValidationError, match=message):
+        Task.model_validate_json(json.dumps(plain))
+
+
+def test_causes_follow_from_the_program() -> None:
+    """Without a grasp a task can only be late; another object must be loose to be mistaken."""
+    assert tasks()["press_button"].causes == ("late",)
+    assert tasks()["lift"].causes == ("slip", "miss", "collision", "late")
+    assert tasks()["stack"].causes == ("slip", "miss", "collision", "late", "wrong_object")
+    assert (tasks()["stack"].mistaken, tasks()["lift"].mistaken) == ("lower", "")
 
 
 FREE = Task.model_validate_json(

@@ -102,8 +102,8 @@ class Arm:
         if goal is None:
             state = ArmState(kinematics.round_positions(self.articulation.joint_positions))
             self._show_state(state, "")
-            collides = self._touches_any(self.moving, fixed)
-            return self._reject(Failure.COLLIDES, goal) if collides else state
+            hit = next((name for name in fixed if self._touches_any(self.moving, [name])), "")
+            return self._reject(Failure.COLLIDES, goal, hit) if hit else state
         obstacles = [name for name in (*fixed, *placed) if name != goal.grasped_object]
         failures = {Failure.CANNOT_REACH}
         for candidate in self._candidates(goal):
@@ -186,15 +186,18 @@ class Arm:
     def _touches(self, name: str, others: Sequence[str]) -> bool:
         return any(self._world.gap_m(name, other, limit_m=0.0) < 0.0 for other in others)
 
-    def _reject(self, failure: Failure, goal: scene.ArmGoal | None) -> errors.Rejection:
-        name = self.articulation.name
+    def _reject(
+        self, failure: Failure, goal: scene.ArmGoal | None, hit: str = ""
+    ) -> errors.Rejection:
+        name, reason = self.articulation.name, failure.value
         if failure is Failure.DOES_NOT_FIT:
             remedy = f"let arm '{name}' hold smaller objects, or lower their scale"
         elif goal is None:
-            remedy = f"move robot '{name}' (at_m) or give it other joint positions"
+            reason = f"arm '{name}' at rest collides with '{hit}'"
+            remedy = f"move robot '{name}' (elements.{name}.at_m), or give it other joint positions"
         else:
             remedy = (
                 f"more candidates for arm '{name}', a smaller workspace, "
                 "or fewer objects around it (count)"
             )
-        return errors.Rejection(failure.value, remedy)
+        return errors.Rejection(reason, remedy)

@@ -119,9 +119,11 @@ class Hand:
             return None
         return Grasp(0.0, T_world_grasp.inverse() @ T_world_held)
 
-    def opening_around(self, body: str, T_world_grasp: SE3) -> float:
-        """Opening of fingers about a body where it is; 0 if they do not meet it."""
+    def opening_around(self, body: str, T_world_grasp: SE3, play: bool = True) -> float:
+        """Opening of fingers about a body where it is, with some play; 0 if they do not meet it."""
         met = self._narrowest(body, T_world_grasp)
+        if not play:
+            return met
         return min(1.0, met + 2.0 * _PLAY_M / self._gripper.stroke_m) if met > 0.0 else 0.0
 
     def palm_height_m(self) -> float:

@@ -159,39 +159,36 @@ class TrajectoryRecording:
 
     def add(
         self,
-        arm: Arm,
-        legs: Sequence[Leg],
-        parts: Sequence[str],
+        arms: Sequence[tuple[Arm, Sequence[Leg], Sequence[str]]],
         simulated: Sequence[Mapping[str, SE3]] = (),
     ) -> None:
-        """Record the legs of an arm after everything recorded so far.
+        """Record arms that move at the same time, after everything recorded so far.
 
         Args:
-            arm: The robot.
-            legs: Timed legs.
-            parts: Links with a body in the scene.
+            arms: Each with its timed legs, which last equally long, and the links with a body in
+                the scene.
             simulated: ``{name: T_world_body}`` of all movable bodies at every knot, where physics
                 tells them; without it only held bodies move.
         """
-        knots = sample_positions(legs)
-        if not knots:
-            return
         start = self._knot
-        name = arm.articulation.name
-        for number, (leg, positions) in enumerate(knots, start):
-            poses = link_poses(arm.robot, arm.articulation.T_world_base, positions)
-            for link in parts:
-                self._add_knot(f"{name}/{link}", number, poses[link])
-            if simulated:
-                for body, pose in simulated[number - start].items():
-                    self._add_knot(body, number, pose)
-            elif leg.held is not None:
-                pose = arm.grasp_pose(positions) @ leg.held.T_grasp_held
-                self._add_knot(leg.held.body, number, pose)
-        self._knot = start + len(knots) - 1
-        self.joint_tracks[name] = JointTrajectory(
-            STEP_S, tuple(positions for _, positions in knots), round(start * STEP_S, 6)
-        )
+        for arm, legs, parts in arms:
+            name, knots = arm.articulation.name, sample_positions(legs)
+            if not knots:
+                continue
+            for number, (leg, positions) in enumerate(knots, start):
+                poses = link_poses(arm.robot, arm.articulation.T_world_base, positions)
+                for link in parts:
+                    self._add_knot(f"{name}/{link}", number, poses[link])
+                if not simulated and leg.held is not None:
+                    pose = arm.grasp_pose(positions) @ leg.held.T_grasp_held
+                    self._add_knot(leg.held.body, number, pose)
+            self._knot = start + len(knots) - 1
+            self.joint_tracks[name] = JointTrajectory(
+                STEP_S, tuple(positions for _, positions in knots), round(start * STEP_S, 6)
+            )
+        for number, bodies in enumerate(simulated, start):
+            for body, pose in bodies.items():
+                self._add_knot(body, number, pose)
 
     def tracks(self) -> tuple[Trajectory, ...]:
         """One trajectory per body that moved; each body is at rest before and after its own."""

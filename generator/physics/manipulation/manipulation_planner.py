@@ -18,6 +18,7 @@ from gen_data.physics.world import World
 CANNOT_REACH = "its pose or joint positions are out of reach"
 NOTHING_TO_GRASP = "no listed object lies free and fits between the fingers"
 NOTHING_TO_SUCK = "on no listed object that lies free can the suction cup seal and bear the load"
+NOTHING_BETWEEN = "there is nothing between the fingers to close them around"
 NOTHING_HELD = "the gripper holds nothing to place"
 NO_PLACE = "no candidate is a free and stable place for the held object"
 
@@ -63,6 +64,7 @@ class TaskPlanner:
         surfaces: Surfaces that objects may be placed on.
 
     Attributes:
+        arm: The robot.
         positions: Of all joints after the legs planned so far.
         resting: Poses of bodies after the legs planned so far, without the held one.
     """
@@ -76,7 +78,7 @@ class TaskPlanner:
         resting: Mapping[str, SE3],
         surfaces: Sequence[scene.SupportSurface],
     ) -> None:
-        self._arm = arm
+        self.arm = self._arm = arm
         self._world = world
         self._fixed = list(fixed)
         self._surfaces = surfaces
@@ -128,6 +130,22 @@ class TaskPlanner:
             T_grasp_world = self._arm.grasp_pose(self.positions).inverse()
             moved = T_grasp_world @ poses[self._held.body]
             self._held = replace(self._held, T_grasp_held=moved)
+
+    def look(self, poses: Mapping[str, SE3]) -> None:
+        """Plan from here on with all poses that physics tells, and with an empty hand."""
+        if self._held is not None:
+            self.resting[self._held.body] = poses[self._held.body]
+            self._held = None
+        self.observe(poses)
+
+    def return_goal(self, body: str, speed: float) -> scene.ArmGoal:
+        """The goal of putting a body, once it is grasped, back to where it rests now."""
+        pose = self.resting[body]
+        self._restore_world()
+        rest = self._rest_on_surface(body)
+        x, y, z = pose.translation_m
+        spot = SE3((x, y, z - (rest.translation_m[2] if rest else 0.0)))
+        return scene.ArmGoal("place", pose_candidates=(spot,), speed=speed)
 
     def plan_blow(self, goal: scene.ArmGoal, number: int) -> list[Leg] | errors.Rejection:
         """Timed legs of a closed hand that knock away the first object of a grasp.
@@ -182,7 +200,7 @@ class TaskPlanner:
         if goal.kind == "place":
             return self._plan_place(goal, number)
         if goal.kind == "grip":
-            return self._plan_grip(goal)
+            return self._plan_grip(goal, number)
         if goal.carries and self._held is None:
             return self._reject([], NOTHING_HELD, number)
         if goal.kind == "move":
@@ -229,8 +247,10 @@ class TaskPlanner:
         leg = Leg(self.positions, way[-1], held=self._held, via=via, pivots=goal.pivots)
         # How far a thing that pivots has turned on the way, physics will tell.
         checked = None if goal.pivots else self._held
+        # Arms that move together keep their distance.
+        partners = tuple(f"{arm}/" for arm in goal.arms)
         obstacles = Obstacles(
-            [name for name in self._fixed if name not in goal.touches],
+            [n for n in self._fixed if n not in goal.touches and not n.startswith(partners)],
             [name for name in self.resting if name not in goal.touches],
             clearance_m=0.0,
         )
@@ -241,18 +261,29 @@ class TaskPlanner:
                 return self._reject([collision], CANNOT_REACH, number)
         return [leg]
 
-    def _plan_grip(self, goal: scene.ArmGoal) -> list[Leg]:
-        """One leg of the fingers; what they hold rests from then on where it is."""
-        opening = goal.gripper_opening
+    def _plan_grip(self, goal: scene.ArmGoal, number: int) -> list[Leg] | errors.Rejection:
+        """A leg of the fingers; what they hold rests from then on where it is, or is held."""
+        opening, taken = goal.gripper_opening, goal.objects[0] if goal.carries else ""
         if goal.objects and self._hand is not None:
             T_world_grasp = self._arm.grasp_pose(self.positions)
-            opening = self._hand.opening_around(goal.objects[0], T_world_grasp)
+            opening = self._hand.opening_around(goal.objects[0], T_world_grasp, play=not taken)
         if self._held is not None:
             pose = self._arm.grasp_pose(self.positions) @ self._held.T_grasp_held
             self.resting[self._held.body] = pose.rounded()
             self._held = None
-        end = self._motion.with_opening(self.positions, opening)
-        return [Leg(self.positions, kinematics.round_positions(end))]
+        end = kinematics.round_positions(self._motion.with_opening(self.positions, opening))
+        leg = Leg(self.positions, end)
+        if taken:
+            if opening <= 0.0:
+                return self._reject([], NOTHING_BETWEEN, number)
+            self._restore_world()
+            pose = self.resting.pop(taken)
+            height_m = pose.translation_m[2] - float(self._world.bounds_m(taken)[0][2])
+            rest = SE3((0.0, 0.0, height_m), pose.quaternion_wxyz)
+            T_grasp_held = self._arm.grasp_pose(end).inverse() @ pose
+            self._held = Held(taken, T_grasp_held, rest, opening)
+            return [leg, Leg(end, end, held=self._held)]
+        return [leg]
 
     def _plan_path(self, end: Positions) -> list[Leg] | str:
         """Legs from the current configuration to another, clear of all resting bodies."""
