@@ -198,7 +198,7 @@ def recipe_text(values: Mapping[str, Any]) -> str:
         comment = f"# {COMMENTS[key]}\n" if key in COMMENTS else ""
         if key == "checksums" and "dataset_id" not in values:
             parts.append(NOT_GENERATED)
-        parts.append(comment + "".join(f"{line}\n" for line in _lines({key: value})))
+        parts.append(comment + "".join(f"{line}\n" for line in yaml_lines({key: value})))
     return "".join(parts)
 
 
@@ -245,7 +245,7 @@ def _digest(value: Any) -> str:
     return hashlib.sha256(serialization.canonical_json(value).encode()).hexdigest()
 
 
-def _lines(value: Mapping[str, Any] | list[Any]) -> Iterator[str]:
+def yaml_lines(value: Mapping[str, Any] | list[Any]) -> Iterator[str]:
     """Lines of YAML of a list or mapping, with short values on one line."""
     items = value.items() if isinstance(value, Mapping) else [(None, item) for item in value]
     for key, item in items:
@@ -255,12 +255,12 @@ def _lines(value: Mapping[str, Any] | list[Any]) -> Iterator[str]:
         if is_short or not isinstance(item, (Mapping, list)) or not item:
             yield line
         elif key is None:
-            first, *rest = _lines(item)
+            first, *rest = yaml_lines(item)
             yield f"- {first}"
             yield from (f"  {line}" for line in rest)
         else:
             yield head
-            yield from (f"  {line}" for line in _lines(item))
+            yield from (f"  {line}" for line in yaml_lines(item))
 
 
 def _flow(value: Any) -> str:

@@ -11,8 +11,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-import yaml
-
 from gen_data.api.config import load_config
 from gen_data.assemble.config import Config
 from gen_data.assemble.pipeline_factory import PipelineFactory
@@ -23,6 +21,7 @@ from gen_data.core.errors import ConfigError, GenDataError
 from gen_data.core.temporary_folders import temporary_folder
 from gen_data.lab.write.language_model import LanguageModel, Message
 from gen_data.lab.write.vocabulary import Vocabulary, choose_vocabulary
+from gen_data.runner.recipe import yaml_lines
 
 TURNS = 4
 SENTENCE_CHARS_MAX = 2000
@@ -33,7 +32,6 @@ MEGAPIXELS_MAX = 40.0
 
 _OUTSIDE = re.compile(r"^[/~\\]|^[A-Za-z]:[\\/]|(^|[/\\])\.\.([/\\]|$)|://|\0")
 """Beginnings and parts of texts that are paths out of a folder, or URLs."""
-_WIDTH = 100
 
 
 @dataclass(frozen=True)
@@ -120,12 +118,9 @@ def as_yaml(reply: str, sentence: str, name: str) -> str:
     body = (fenced[-1] if fenced else answer).strip()
     if len(body) > CONFIG_CHARS_MAX:
         raise ConfigError(f"{name}: has {len(body)} characters; expected {CONFIG_CHARS_MAX}")
-    plain = parse_yaml(body, name).plain()
-    dumped = yaml.safe_dump(
-        plain, sort_keys=False, allow_unicode=True, width=_WIDTH, default_flow_style=None
-    )
     comment = " ".join(sentence.split())
-    return f"# Written by gen-data write, from this sentence:\n# {comment}\n{dumped}"
+    head = ("# Written by gen-data write, from this sentence:", f"# {comment}")
+    return "\n".join((*head, *yaml_lines(parse_yaml(body, name).plain()), ""))
 
 
 def check(text: str, out: Path) -> Config:

@@ -145,6 +145,6 @@ def test_the_command_prints_the_digest_and_replaces_nothing_unasked(
     cli.main(["assets", "pack", "meshes"], standalone_mode=False)
     assert f"meshes.zip: 0.0 MB, sha256 {SHA256}" in capsys.readouterr().out
 
-    with pytest.raises(StorageError, match="meshes.zip: exists; choose another --out"):
+    with pytest.raises(StorageError, match=r"meshes\.zip: exists; choose another --out"):
         cli.main(["assets", "pack", "meshes"], standalone_mode=False)
     cli.main(["assets", "pack", "meshes", "--force"], standalone_mode=False)
