@@ -194,7 +194,7 @@ def _asset_line(sentence: str) -> str:
 def _fields(name: str, summary: str) -> Iterator[str]:
     key, _, plugin = name.partition("/")
     yield summary
-    model = (ANNOTATIONS if key == "annotations" else PLUGIN_LISTS[key]).load(plugin)
+    model: Any = (ANNOTATIONS if key == "annotations" else PLUGIN_LISTS[key]).load(plugin)
     if hasattr(model, "model_fields"):
         for row in describe_fields(model):
             default = "required" if row.default == "required" else f"default {row.default}"
