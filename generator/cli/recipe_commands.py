@@ -19,7 +19,7 @@ RECIPE_HELP = """Print the recipe of a data set, from which `gen-data pull` make
 gen-data recipe out/tabletop > recipe.yaml
 gen-data recipe tabletop.yaml --n 1000 > recipe.yaml   before it is generated
 gen-data recipe recipe.yaml --lock requirements.txt    its versions, for pip
-gen-data recipe out/tabletop --pack meshes.zip         with a pack of your assets
+gen-data recipe out/tabletop --pack meshes.zip         with your own assets
 
 The recipe has the resolved configuration, versions, and digests of assets and shards.
 """

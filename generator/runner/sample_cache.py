@@ -2,7 +2,7 @@
 
 One file holds all files of a sample. It begins with the SHA-256 of its key and of the rest: a
 length [4 bytes, little-endian], that many bytes of JSON, ``{path: bytes}``, and the contents. It is
-written beside its place and renamed, is read as a whole, and is never changed; any number of
+written next to its place and renamed, is read as a whole, and is never changed; any number of
 processes may share the folder.
 """
 

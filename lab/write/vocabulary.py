@@ -1,7 +1,7 @@
-"""What a language model is told: names, fields and assets that fit a sentence, within a bound.
+"""The knowledge of a language model: names, fields and assets that fit a sentence, within a bound.
 
 The whole vocabulary has a megabyte. Everything is named; fields, and one shipped configuration, are
-shown of what shares the most and the rarest words with the sentence.
+shown of the plug-ins that share the most and the rarest words with the sentence.
 """
 
 import math
@@ -47,7 +47,7 @@ Reply with one configuration as a JSON or YAML mapping, and nothing else.
 - After an error, reply with the whole corrected configuration."""
 
 _DROPPED = {"assets", "depth_scale_m", "skip_failed", "sample_timeout_s"}
-"""Sections that are no part of a reply: files of the user, and options of a run."""
+"""Sections that a reply lacks: files of the user, and options of a run."""
 _ANNOTATING = frozenset(
     {"description", "title", "default", "examples", "pattern", "format", "$schema"}
 )
@@ -56,7 +56,7 @@ _ANNOTATING = frozenset(
 
 @dataclass(frozen=True)
 class Vocabulary:
-    """What a model is told about one sentence.
+    """The knowledge of a model for one sentence.
 
     Attributes:
         prompt: The first message.
@@ -214,7 +214,7 @@ def _references(schema: Any) -> Iterator[str]:
 
 
 def _without_annotations(schema: Any, are_names: bool = False) -> Any:
-    """The schema without what constrains nothing; keys of ``properties`` are names."""
+    """The schema without keywords that constrain nothing; keys of ``properties`` are names."""
     if isinstance(schema, Mapping):
         return {
             key: _without_annotations(value, not are_names and key in ("properties", "$defs"))

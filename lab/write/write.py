@@ -7,14 +7,13 @@ an empty folder, texts that could be paths out of it are refused, and nothing is
 import os
 import re
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 from gen_data.api.config import load_config
 from gen_data.assemble.config import Config
 from gen_data.assemble.pipeline_factory import PipelineFactory
-from gen_data.assets.paths import OFFLINE
+from gen_data.assets.paths import offline
 from gen_data.config.problems import Problems, format_path
 from gen_data.config.yaml_tree import Node, parse_yaml
 from gen_data.core.errors import ConfigError, GenDataError
@@ -28,7 +27,7 @@ SENTENCE_CHARS_MAX = 2000
 CONFIG_CHARS_MAX = 20_000
 ERRORS_CHARS_MAX = 4000
 MEGAPIXELS_MAX = 40.0
-"""Of all images of one sample: more are no preview."""
+"""Of all images of one sample; a preview is to be quick."""
 
 _OUTSIDE = re.compile(r"^[/~\\]|^[A-Za-z]:[\\/]|(^|[/\\])\.\.([/\\]|$)|://|\0")
 """Beginnings and parts of texts that are paths out of a folder, or URLs."""
@@ -62,7 +61,7 @@ def write_config(
     """Ask a model for a configuration until it is right; nothing is written.
 
     Args:
-        sentence: What the data set should show.
+        sentence: Content of the data set, in words.
         model: Answers.
         out: File of the configuration, for messages; shipped files must not be hidden by its
             neighbours.
@@ -77,7 +76,7 @@ def write_config(
     sentence = sentence.strip()
     if not 0 < len(sentence) <= SENTENCE_CHARS_MAX:
         raise ConfigError(f"expected a sentence of 1 to {SENTENCE_CHARS_MAX} characters")
-    with _offline():
+    with offline():
         told = choose_vocabulary(sentence) if vocabulary is None else vocabulary
         begin = (Message("system", told.prompt), Message("user", sentence))
         # A conversation keeps its latest reply only: its length is bounded.
@@ -106,12 +105,12 @@ def as_yaml(reply: str, sentence: str, name: str) -> str:
     """The configuration in a reply as a YAML file, whose lines messages refer to.
 
     Args:
-        reply: JSON or YAML; a fence, and what a model thought before it, are left out.
+        reply: JSON or YAML; a fence, and thoughts before it, are left out.
         sentence: Becomes a comment.
-        name: Of the file, in messages.
+        name: The file's, in messages.
 
     Raises:
-        ConfigError: it is no mapping, or is too long.
+        ConfigError: it has no mapping, or is too long.
     """
     answer = reply.rpartition("</think>")[2]
     fenced = re.findall(r"```[a-z]*\s*\n(.*?)```", answer, re.DOTALL)
@@ -151,7 +150,7 @@ def check(text: str, out: Path) -> Config:
     return config
 
 
-def _refuse_files(document: Node, beside: Path) -> None:
+def _refuse_files(document: Node, neighbours: Path) -> None:
     """Refuse texts that name files which are not shipped.
 
     Raises:
@@ -167,7 +166,7 @@ def _refuse_files(document: Node, beside: Path) -> None:
             if _OUTSIDE.search(text):
                 fact = "is a path or a URL; expected a name of the vocabulary"
                 problems.add(node.position, format_path(path), fact)
-            elif _is_file(beside / text) or _is_file(beside / f"{text}.yaml"):
+            elif _is_file(neighbours / text) or _is_file(neighbours / f"{text}.yaml"):
                 fact = f"names a file next to {document.position.file}; expected shipped ones only"
                 problems.add(node.position, format_path(path), fact)
     problems.raise_if_any()
@@ -186,17 +185,3 @@ def _is_file(path: Path) -> bool:
         return path.is_file()
     except (OSError, ValueError):
         return False
-
-
-@contextmanager
-def _offline() -> Iterator[None]:
-    """Fetch no packs in the block: a reply must not decide what is fetched."""
-    before = os.environ.get(OFFLINE)
-    os.environ[OFFLINE] = "1"
-    try:
-        yield
-    finally:
-        if before is None:
-            del os.environ[OFFLINE]
-        else:
-            os.environ[OFFLINE] = before

@@ -16,11 +16,11 @@ if TYPE_CHECKING:
 KEY = "GEN_DATA_WRITE_KEY"
 HELP = """Write a configuration from a sentence, by a language model of your choice.
 
-Its replies are checked as files of strangers. Errors are sent back to it, a few times; what is
-valid is planned and drawn on a contact sheet, and written after your consent.
+Its replies are checked as files of strangers. Errors are sent back to it, a few times; a valid
+configuration is planned and drawn on a contact sheet, and written after your consent.
 
 \b
-gen-data write "mugs on a table, seen from above" --url http://localhost:8080/v1
+gen-data write "mugs on a table" --url http://localhost:8080/v1
 gen-data write "a wet street at night" --url https://HOST/v1 --model NAME
 gen-data write "parts in a bin" --command "llm -m MODEL"
 
