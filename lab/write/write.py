@@ -98,7 +98,7 @@ def write_config(
                 Message("assistant", text[:CONFIG_CHARS_MAX]),
                 Message("user", f"{errors}\nReply with the whole corrected configuration."),
             )
-    raise ConfigError(f"no valid configuration after {turns} replies; nothing was written")
+    raise ConfigError(f"no valid configuration (replies: {turns}); nothing was written")
 
 
 def as_yaml(reply: str, sentence: str, name: str) -> str:

@@ -103,7 +103,7 @@ def write(
         if not yes and not click.confirm(f"write {out}?"):
             raise click.Abort
         write_whole({out: written.text.encode()})
-    click.echo(f"{out}: written after {written.turns} replies; gen-data --config {out} --n 100")
+    click.echo(f"{out}: written (replies: {written.turns}); gen-data --config {out} --n 100")
 
 
 def _open_model(

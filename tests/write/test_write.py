@@ -63,7 +63,7 @@ def ask(script: Scripted, out: Path, **options: Any) -> Written:
 def errors_of(reply: str, out: Path) -> str:
     """What a model is told of its only reply."""
     told: list[str] = []
-    with serve([reply]) as script, pytest.raises(ConfigError, match="after 1 replies; nothing was"):
+    with serve([reply]) as script, pytest.raises(ConfigError, match=r"\(replies: 1\); nothing was"):
         ask(script, out, turns=1, on_errors=told.append)
     (errors,) = told
     return errors
@@ -117,7 +117,7 @@ def test_a_stubborn_model_is_asked_a_few_times(out: Path) -> None:
         ask(script, out, turns=3)
 
     assert len(script.requests) == 3
-    assert str(error.value) == "no valid configuration after 3 replies; nothing was written"
+    assert str(error.value) == "no valid configuration (replies: 3); nothing was written"
     assert max(len(json.dumps(request)) for request in script.requests) < 2 * CONFIG_CHARS_MAX
 
 
@@ -340,7 +340,7 @@ def test_the_command_shows_before_it_writes(
     assert "sk-secret" not in printed.out + printed.err + out.read_text()
     assert script.heads[-1]["Authorization"] == "Bearer sk-secret"
     assert "expected a mapping of settings" in printed.err
-    assert "scene.yaml: written after 1 replies" in printed.out
+    assert "scene.yaml: written (replies: 1)" in printed.out
     assert (out.parent / "scene.png").read_bytes().startswith(b"\x89PNG")
     assert gen_data.Dataset(out, n=1).categories == ("mug",)
 
