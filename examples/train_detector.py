@@ -2,10 +2,11 @@
 
     python examples/train_detector.py out/train --eval out/test/coco --save detector.pt
     python examples/train_detector.py tabletop.yaml --minutes 15 --eval photographs
+    python examples/train_detector.py recipe.yaml --eval photographs
     python examples/train_detector.py --load detector.pt --eval photographs
 
-The source is a finished data set, or a configuration, which is rendered while training; only
-images of the split ``train`` are trained on. ``--eval`` is a folder with annotations in COCO's
+The source is a finished data set, or a recipe or configuration, which is rendered while training;
+only images of the split ``train`` are trained on. ``--eval`` is a folder with annotations in COCO's
 format (``annotations/*.json`` or ``*.json``, of which ``--split`` names one) and their images
 anywhere below it. Classes are matched by name. The result is COCO's AP with a 95 % confidence
 interval from bootstrapping over images.
@@ -27,6 +28,7 @@ from gen_data.lab.study.detector import Detector
 from gen_data.lab.study.evaluation import evaluate
 from gen_data.lab.study.real_pictures import read_real
 from gen_data.lab.study.training import detect_all, fit
+from gen_data.runner.recipe import is_recipe
 from gen_data.targets import detection_target
 
 KEPT_MAX = 4000
@@ -36,7 +38,7 @@ KEPT_MAX = 4000
 def open_source(args: argparse.Namespace) -> gen_data.SampleSequence:
     """The samples of the split train, with the classes of their label map if they have one."""
     source = Path(args.source)
-    if (source / "manifest.json").is_file():
+    if (source / "manifest.json").is_file() or is_recipe(source):
         samples: gen_data.SampleSequence = gen_data.open(source)
     else:
         samples = gen_data.Dataset(args.source, seed=args.seed)
@@ -112,7 +114,7 @@ def evaluate_on(model: Detector, args: argparse.Namespace) -> dict[str, Any]:
 def parse_arguments() -> argparse.Namespace:
     """Arguments of the command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("source", nargs="?", help="configuration, or folder of a finished data set")
+    parser.add_argument("source", nargs="?", help="configuration, recipe, or folder of a data set")
     parser.add_argument("--load", type=Path, help="evaluate this detector instead of training one")
     parser.add_argument("--eval", type=Path, required=True, help="COCO-style folder")
     parser.add_argument("--split", default="", help="part of the name of the annotation file")

@@ -159,7 +159,11 @@ PIXELS = {
 
 
 def read_image(
-    path: Path, channel: Channel, depth_scale_m: float, size_px: tuple[int, int] | None = None
+    path: Path,
+    channel: Channel,
+    depth_scale_m: float,
+    size_px: tuple[int, int] | None = None,
+    read: Callable[[Path], bytes] = Path.read_bytes,
 ) -> NDArray[Any]:
     """Read one channel from its file (rounded): the inverse of ``encode_channel``.
 
@@ -168,6 +172,7 @@ def read_image(
         channel: Channel of the image.
         depth_scale_m: Metres per unit of depth and range images.
         size_px: Expected width and height; None = any.
+        read: Reads a file.
 
     Returns:
         Array as listed at ``Channel``, including its values for "nothing".
@@ -175,7 +180,7 @@ def read_image(
     Raises:
         StorageError: the file is missing, no image, or one of another channel or size.
     """
-    pixels = read_pixels(path)
+    pixels = read_pixels(path, read=read)
     kind, components = PIXELS.get(channel, (np.uint16, 1))
     width_px, height_px = size_px or (pixels.shape[1], pixels.shape[0])
     shape = (height_px, width_px) if components == 1 else (height_px, width_px, components)
@@ -188,7 +193,9 @@ def read_image(
     return _decode_pixels(channel, pixels, depth_scale_m)
 
 
-def read_pixels(path: Path, is_bgr: bool = False) -> NDArray[Any]:
+def read_pixels(
+    path: Path, is_bgr: bool = False, read: Callable[[Path], bytes] = Path.read_bytes
+) -> NDArray[Any]:
     """Read the pixels of an image file, uint8 or uint16, [h, w] or RGB [h, w, 3].
 
     ``is_bgr`` is for encoders of OpenCV, which take BGR.
@@ -197,7 +204,7 @@ def read_pixels(path: Path, is_bgr: bool = False) -> NDArray[Any]:
         StorageError: the file is missing or no image.
     """
     try:
-        data = path.read_bytes()
+        data = read(path)
     except OSError:
         data = b""
     pixels = decode_png(data, is_bgr)

@@ -27,10 +27,10 @@ if TYPE_CHECKING:
     from typing import Any
 
     from gen_data.api.dataset import Dataset, SampleSequence, StoredDataset
-    from gen_data.api.dataset import open_dataset as open  # noqa: A004
     from gen_data.api.export import export
     from gen_data.api.generate import generate
     from gen_data.api.loader import Loader
+    from gen_data.api.open_dataset import open_dataset as open  # noqa: A004
     from gen_data.api.recipes import pull, recipe
     from gen_data.api.rerender import rerender
     from gen_data.api.sample import Box2d, Box3d, CameraReading, Sample
@@ -137,7 +137,7 @@ def __getattr__(name: str) -> "Any":
     if name in ("targets", "torch"):
         return import_module(f"gen_data.{name}")
     if name == "open":
-        return import_module("gen_data.api.dataset").open_dataset
+        return import_module("gen_data.api.open_dataset").open_dataset
     if name not in _HOMES:
         raise AttributeError(f"module 'gen_data' has no attribute '{name}'")
     return getattr(import_module(_HOMES[name]), name)

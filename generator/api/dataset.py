@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.api.config import ConfigLike, check_whole, load_config, path_text
+from gen_data.api.config import ConfigLike, check_whole, load_config
 from gen_data.api.relabelling import LabelMapLike, RelabelledSamples, load_label_map
 from gen_data.api.sample import Sample, SampleRecord, SampleSource
 from gen_data.core import errors
@@ -25,6 +25,7 @@ from gen_data.runner.stored_objects import open_stored
 if TYPE_CHECKING:
     from threadpoolctl import ThreadpoolController
 
+    from gen_data.assemble.pipeline_factory import PipelineFactory
     from gen_data.core.capture import Channel
     from gen_data.pipeline import Pipeline
     from gen_data.pipeline.splits import Splits
@@ -348,7 +349,10 @@ class Dataset(SampleSequence):
             check_whole("n", n, least=0)
         loaded = load_config(config, seed=seed, overrides=overrides, without=without)
         indices = UNBOUNDED if n is None else range(n)
-        super().__init__(GeneratedSamples(loaded, _parse_channels(channels)), indices)
+        from gen_data.assemble.pipeline_factory import PipelineFactory
+
+        factory = PipelineFactory(loaded, n=1, extra_channels=_parse_channels(channels))
+        super().__init__(GeneratedSamples(factory), indices)
         self._select(split)
 
     def __repr__(self) -> str:
@@ -360,10 +364,8 @@ class Dataset(SampleSequence):
 class GeneratedSamples:
     """Samples of a pipeline in this process, which starts with the first access."""
 
-    def __init__(self, config: Any, channels: frozenset[Channel]) -> None:
-        from gen_data.assemble.pipeline_factory import PipelineFactory
-
-        self.make_pipeline = PipelineFactory(config, n=1, extra_channels=channels)
+    def __init__(self, make_pipeline: PipelineFactory) -> None:
+        self.make_pipeline = make_pipeline
         self._pipeline: Pipeline | None = None
         self._thread_pools: tuple[int, ThreadpoolController] | None = None
         self._resources = ExitStack()
@@ -469,23 +471,6 @@ class StoredDataset(SampleSequence):
     def __repr__(self) -> str:
         """Folder and size."""
         return f"<StoredDataset '{self.folder}'{self._split_note}: {len(self)} samples>"
-
-
-def open_dataset(folder: str | PathLike[str], split: str = "") -> StoredDataset:
-    """Open a finished data set in a folder or at a URL; its samples equal the generated ones.
-
-    Colours, ids and labels are exact; other quantities have the resolution of their files.
-    Shards at a URL are copied to a cache in the user's cache folder when their samples are read.
-
-    Args:
-        folder: Folder of the data set, or its URL.
-        split: Only the samples of this split; see ``SampleSequence.split``. Empty = all.
-
-    Raises:
-        StorageError: the folder holds no finished data set.
-        UnknownNameError: its configuration has no such split.
-    """
-    return StoredDataset(path_text("folder", folder), split)
 
 
 def _parse_channels(names: Sequence[str]) -> frozenset[Channel]:

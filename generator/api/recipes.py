@@ -32,6 +32,7 @@ def recipe(
     seed: int | None = None,
     overrides: Sequence[str] = (),
     without: Sequence[str] = (),
+    packs: Sequence[str | PathLike[str]] = (),
 ) -> str:
     """The recipe of a data set: YAML of a few kilobytes, from which ``pull`` makes it again.
 
@@ -42,6 +43,8 @@ def recipe(
         seed: See ``generate``.
         overrides: See ``generate``.
         without: See ``generate``.
+        packs: Files of ``gen-data assets pack`` with the author's folders of assets, whose names
+            they have; of any source.
 
     Raises:
         ConfigError: the configuration or an argument is wrong, or the data set was re-rendered.
@@ -52,6 +55,7 @@ def recipe(
         describe_dataset,
         describe_plan,
         is_recipe,
+        name_packs,
         read_recipe,
         recipe_text,
     )
@@ -66,9 +70,10 @@ def recipe(
             raise errors.ConfigError(
                 f"{path}: states n, seed and all values itself; expected no others with it"
             )
-        if is_kept:
-            return read_recipe(path).path.read_text("utf-8")
-        return recipe_text(describe_dataset(path))
+        if is_made:
+            return recipe_text(name_packs(describe_dataset(path), packs))
+        file = read_recipe(path)
+        return recipe_text(name_packs(file.values(), packs)) if packs else path.read_text("utf-8")
     if n is None:
         raise errors.ConfigError("--n is missing: how many samples has the data set?")
     check_whole("n", n, 1)
@@ -79,7 +84,7 @@ def recipe(
     factory = generation.make_factory(loaded, n)
     plan = make_plan(factory)
     licences = licences_in(format_licences(factory, tuple(plan.assets)))
-    return recipe_text(describe_plan(plan, licences))
+    return recipe_text(name_packs(describe_plan(plan, licences), packs))
 
 
 def requirements(recipe_text: str) -> str:
@@ -95,7 +100,7 @@ def requirements(recipe_text: str) -> str:
 
 
 def pull(  # noqa: PLR0913  (keywords of one front door)
-    recipe: str | PathLike[str],
+    recipe: str | PathLike[str] | RecipeFile,
     *,
     out: str | PathLike[str] | None = None,
     workers: int | None = None,
@@ -113,7 +118,7 @@ def pull(  # noqa: PLR0913  (keywords of one front door)
     configuration has nothing to compare with.
 
     Args:
-        recipe: File with the recipe.
+        recipe: File with the recipe; the command has read it already.
         out: Folder or URL; None = ``out/<name in the recipe>``.
         workers: See ``generate``.
         shards: See ``generate``; ``merge`` gathers the parts.
@@ -137,12 +142,12 @@ def pull(  # noqa: PLR0913  (keywords of one front door)
         ConfigWarning: with ``semantic``, the differences of this installation.
     """
     with generation.standby_worker(cluster, workers) as standby:
-        file = _read(Path(path_text("recipe", recipe)), semantic)
+        file = _read(recipe, semantic)
         out = Path("out") / file.recipe.name if out is None else out
         if against is not None and urls.is_url(out):
             raise errors.ConfigError("against: compares folders; expected out without a URL")
-        generation.check_arguments(recipe, file.recipe.n, out, workers, False)
-        factory, plan = _prepare(file, semantic, trust)
+        generation.check_arguments(file.path, file.recipe.n, out, workers, False)
+        factory, plan = prepare(file, semantic, trust)
         settings = generation.make_settings(factory, bool(file.recipe.failed), None)
         settings = replace(settings, proof=file.recipe.proof(semantic))
         choice = generation.RunChoice(out, workers, shards, cluster, on_progress, resume_command)
@@ -160,15 +165,17 @@ def pull(  # noqa: PLR0913  (keywords of one front door)
     return summary
 
 
-def _read(path: Path, semantic: bool) -> RecipeFile:
+def _read(recipe: str | PathLike[str] | RecipeFile, semantic: bool) -> RecipeFile:
     """Read a recipe. Raises ConfigError if it is wrong, or has no labels to compare."""
-    from gen_data.runner.recipe import read_recipe
+    from gen_data.runner.recipe import RecipeFile, read_recipe
 
-    file = read_recipe(path)
+    if not isinstance(recipe, RecipeFile):
+        recipe = read_recipe(Path(path_text("recipe", recipe)))
+    file = recipe
     if semantic and not file.recipe.labels:
         raise errors.ConfigError(
-            f"{path}: names no digests of labels, which semantic compares; expected the recipe of "
-            "a finished data set"
+            f"{file.path}: names no digests of labels, which semantic compares; expected the "
+            "recipe of a finished data set"
         )
     return file
 
@@ -182,18 +189,24 @@ def _check_identity(summary: Summary, expected: str) -> None:
         )
 
 
-def _prepare(file: RecipeFile, semantic: bool, trust: bool) -> tuple[PipelineFactory, Plan]:
-    """Check that this installation can make the data set, before anything is generated."""
+def prepare(file: RecipeFile, semantic: bool, trust: bool) -> tuple[PipelineFactory, Plan]:
+    """Check that this installation can make the data set, before anything is generated.
+
+    Raises:
+        AssetError: packs or assets are missing or others, one line each.
+        DeterminismError: packages have other versions, one line each.
+        ConfigError: the configuration is not valid here.
+    """
     from gen_data.runner.identity import make_plan
 
     versions, assets = list(_other_versions(file)), [*_other_packs(file, semantic)]
-    folders = list(_other_folders(file, trust))
+    places, folders = _find_folders(file, trust)
     assets += folders
     invalid: list[str] = []
     made: tuple[PipelineFactory, Plan] | None = None
     try:
         if not folders:
-            loaded = file.config()
+            loaded = file.config(places)
             own = list(_other_own_assets(file, loaded))
             assets += own
             if not own:
@@ -245,20 +258,35 @@ def _other_packs(file: RecipeFile, semantic: bool) -> Iterator[str]:
             yield file.line(f"{fact}; gen-data assets install {name}", "assets", "packs", name)
 
 
-def _other_folders(file: RecipeFile, trust: bool) -> Iterator[str]:
-    """Lines on folders of the configuration that are missing, or that a recipe may not read."""
-    listed = file.document.get("config", "assets", "folders")
-    base = file.path.parent.resolve()
-    for number, node in enumerate(listed.items if listed else ()):
-        path = (base / node.text).resolve()
-        place = "config", "assets", "folders", number
-        is_outside = node.text.startswith("~") or not path.is_relative_to(base)
-        if is_outside and not trust:
-            yield file.line(f"{node.text} is outside of {base}; --trust reads it", *place)
-        elif not is_outside and not path.is_dir():
-            origin = file.recipe.assets.urls.get(node.text)
-            remedy = f"; get it from {origin}" if origin else "; get it from the author"
-            yield file.line(f"there is no folder {path}{remedy}", *place)
+def _find_folders(file: RecipeFile, trust: bool) -> tuple[dict[str, Path], list[str]]:
+    """Folders of the packs that take the places of the author's, and lines on missing folders."""
+    from gen_data.packs.own_pack import SUFFIX, unpacked
+    from gen_data.runner.durable_files import storage_errors
+
+    listed, stated = file.document.get("config", "assets", "folders"), file.recipe.assets
+    base, lines = file.path.parent.resolve(), []
+    places: dict[str, Path] = {}
+    for number, name in enumerate(node.text for node in (listed.items if listed else ())):
+        path = (base / name).resolve()
+        is_outside = name.startswith("~") or not path.is_relative_to(base)
+        digest, pack = stated.archives.get(name), base / f"{Path(name).name}{SUFFIX}"
+        may_read = trust or not is_outside
+        if may_read and (path.is_dir() or (is_outside and digest is None)):
+            continue
+        origin = stated.urls.get(name) or "the author"
+        if digest is None and is_outside:
+            fact = f"{name} is outside of {base}; --trust reads it"
+        elif digest is None:
+            fact = f"there is no folder {path}; get it from {origin}"
+        else:
+            try:
+                with storage_errors(pack, ""):
+                    places[name] = unpacked(pack, digest)
+                continue
+            except errors.AssetError as error:
+                fact = f"{error}; get it from {origin}"
+        lines.append(file.line(fact, "config", "assets", "folders", number))
+    return places, lines
 
 
 def _other_own_assets(file: RecipeFile, loaded: Config) -> Iterator[str]:

@@ -184,6 +184,7 @@ class Config:
         annotations: Annotators by name, in order.
         probes: Configurations of scenes that cover the shared values; one if there are none.
         document: The merged document, the source of configurations of scenes.
+        asset_places: Folders that take the places of the user's, by their names.
     """
 
     name: str
@@ -194,6 +195,7 @@ class Config:
     exporters: tuple[interfaces.Exporter, ...]
     probes: tuple[SceneConfig, ...]
     document: Node = field(compare=False)
+    asset_places: Mapping[str, Path] = field(default_factory=dict, compare=False)
 
     @property
     def sensors(self) -> tuple[interfaces.Sensor, ...]:
@@ -245,7 +247,8 @@ class Config:
         """
         listed = self.document.get("assets", "folders")
         return tuple(
-            find_path(node.text, node.position, f"assets.folders[{k}]", "folder", is_folder=True)
+            self.asset_places.get(node.text)
+            or find_path(node.text, node.position, f"assets.folders[{k}]", "folder", is_folder=True)
             for k, node in enumerate(listed.items if listed else ())
         )
 
@@ -271,12 +274,14 @@ class Changes(TypedDict, total=False):
         without: Names of randomizers to leave out.
         first_scene_only: Check the first scene instead of all outcomes of shared values: for a
             data set whose scenes exist.
+        asset_places: See ``Config``.
     """
 
     seed: int | None
     overrides: Sequence[str]
     without: Sequence[str]
     first_scene_only: bool
+    asset_places: Mapping[str, Path]
 
 
 def load_config(source: str, **changes: Unpack[Changes]) -> Config:
@@ -344,7 +349,10 @@ def config_of(document: Node, name: str, **changes: Unpack[Changes]) -> Config:
     problems.raise_if_any()
     assert head is not None
     assert render is not None
-    config = Config(name, document.plain(), head, render, annotations, exporters, probes, document)
+    config = Config(
+        name, document.plain(), head, render, annotations, exporters, probes, document,
+        changes.get("asset_places", {}),
+    )  # fmt: skip
     _ = config.asset_folders  # Missing folders are refused before a run.
     return config
 

@@ -208,8 +208,8 @@ def _drop_items(
     for name in names:
         if str(name.content) not in kept:
             fact = f"nothing inherited is named {quote_value(name.plain())}; expected one of "
-            fact += ", ".join(kept) + did_you_mean(str(name.content), kept)
-            problems.add(name.position, field, fact)
+            fact += ", ".join(kept) or "none: nothing of this section is inherited"
+            problems.add(name.position, field, fact + did_you_mean(str(name.content), kept))
         kept.pop(str(name.content), None)
     is_mapping = isinstance(section.content, Mapping)
     return Node(section.position, kept if is_mapping else tuple(kept.values()))

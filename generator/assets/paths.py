@@ -1,6 +1,8 @@
 """Location of installed asset packs, and whether one may be fetched without being asked for."""
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 VARIABLE = "GEN_DATA_ASSETS"
@@ -22,3 +24,17 @@ def packs_dir() -> Path:
 def may_fetch() -> bool:
     """Whether files that are needed may be fetched without a command of the user."""
     return os.environ.get(OFFLINE, "") in ("", "0")
+
+
+@contextmanager
+def offline() -> Iterator[None]:
+    """Fetch nothing in the block, in this process and those that it starts."""
+    before = os.environ.get(OFFLINE)
+    os.environ[OFFLINE] = "1"
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[OFFLINE]
+        else:
+            os.environ[OFFLINE] = before

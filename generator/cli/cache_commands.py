@@ -30,15 +30,23 @@ class Cache:
 
 def _asset_folders() -> list[Path]:
     from gen_data.assets.library import default_cache_dir
+    from gen_data.packs.own_pack import own_packs_dir
 
     # Every version of the format; the files next to them are digests of users' files.
-    return [*default_cache_dir().glob("format-*"), *default_cache_dir().glob("*.json")]
+    found = [*default_cache_dir().glob("format-*"), *default_cache_dir().glob("*.json")]
+    return found + [own_packs_dir()] * own_packs_dir().is_dir()
 
 
 def _url_folders() -> list[Path]:
     from gen_data.runner.stored_objects import url_cache_dir
 
     return [url_cache_dir()]
+
+
+def _sample_folders() -> list[Path]:
+    from gen_data.runner.sample_cache import sample_cache_dir
+
+    return [sample_cache_dir()]
 
 
 def _kernel_folders() -> list[Path]:
@@ -50,13 +58,14 @@ def _kernel_folders() -> list[Path]:
 CACHES = (
     Cache("assets", "meshes, textures and shapes, ready for use", _asset_folders),
     Cache("urls", "files of data sets that were opened at a URL", _url_folders),
+    Cache("samples", "samples of recipes that were opened", _sample_folders),
     Cache("kernels", "compiled kernels of the renderer", _kernel_folders),
 )
 
 
 @click.group()
 def cache() -> None:
-    """Show or clear the caches between runs: assets, files from URLs, compiled kernels."""
+    """Show or clear the caches between runs: assets, files from URLs, samples, compiled kernels."""
 
 
 @cache.command()
@@ -100,7 +109,8 @@ def _remove(path: Path) -> None:
 
 
 def _place(folder: Path) -> Path:
-    return folder if folder.is_dir() and not folder.name.startswith("format-") else folder.parent
+    is_part = folder.name.startswith("format-") or folder.name == "own-packs"
+    return folder if folder.is_dir() and not is_part else folder.parent
 
 
 def _file_sizes(folder: Path) -> list[int]:

@@ -36,6 +36,7 @@ class LazyCommands(click.Group):
 
     modules = {  # noqa: RUF012
         "init": "gen_data.cli.init_command:init",
+        "write": "gen_data.lab.write.write_command:write",
         "plan": "gen_data.cli.plan_command:plan",
         "sample": "gen_data.cli.sample_command:sample",
         "export": "gen_data.cli.export_command:export",
@@ -65,6 +66,7 @@ class LazyCommands(click.Group):
     }
     summaries = {  # noqa: RUF012
         "init": "Write a commented configuration and template to start from.",
+        "write": "Write a configuration from a sentence, by a language model.",
         "plan": "Print shards, size, categories and exports of a run, without rendering.",
         "sample": "Write one sample of a configuration or of a data set.",
         "export": "Write a finished data set in other formats, without rendering.",

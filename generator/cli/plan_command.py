@@ -52,13 +52,14 @@ def plan(
 
     choice = options.ConfigurationOptions(source, seed, overrides, without)
     config = choice.config()
-    facts = list(_rows(config, n))
+    facts = list(plan_rows(config, n))
     if probe is not None:
         facts += cost_estimate.estimate_rows(_measure(choice, probe), n, usable_cores(), prices)
     tables.print_facts(Console(), f"{config.name}: {n} samples", facts)
 
 
-def _rows(config: "Config", n: int) -> Iterator[tuple[str, str]]:
+def plan_rows(config: "Config", n: int) -> Iterator[tuple[str, str]]:
+    """Names and values of the facts about ``n`` samples of a configuration."""
     from gen_data.assemble.pipeline_factory import PipelineFactory
     from gen_data.assemble.size_estimate import estimate_image_bytes
     from gen_data.assets.file_remarks import collect_remarks

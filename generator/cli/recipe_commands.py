@@ -19,6 +19,7 @@ RECIPE_HELP = """Print the recipe of a data set, from which `gen-data pull` make
 gen-data recipe out/tabletop > recipe.yaml
 gen-data recipe tabletop.yaml --n 1000 > recipe.yaml   before it is generated
 gen-data recipe recipe.yaml --lock requirements.txt    its versions, for pip
+gen-data recipe out/tabletop --pack meshes.zip         with your own assets
 
 The recipe has the resolved configuration, versions, and digests of assets and shards.
 """
@@ -42,11 +43,19 @@ assets, 5 versions or other bytes, 7 other labels or images.
 @click.option(
     "--lock", type=click.Path(path_type=Path), help="Also write a requirements file for pip."
 )
+@click.option(
+    "--pack",
+    "packs",
+    multiple=True,
+    type=click.Path(path_type=Path),
+    help="File of `gen-data assets pack`, named by its digest.",
+)
 @configuration_options
 def recipe(
     source: str,
     n: int | None,
     lock: Path | None,
+    packs: tuple[Path, ...],
     seed: int | None,
     overrides: tuple[str, ...],
     without: tuple[str, ...],
@@ -55,7 +64,7 @@ def recipe(
     from gen_data.api.recipes import recipe as make_recipe
     from gen_data.api.recipes import requirements
 
-    text = make_recipe(source, n, seed=seed, overrides=overrides, without=without)
+    text = make_recipe(source, n, seed=seed, overrides=overrides, without=without, packs=packs)
     if lock is not None:
         from gen_data.runner.durable_files import storage_errors
 
@@ -103,7 +112,7 @@ def pull(
     file = read_recipe(path)
     with progress_bar(file.recipe.n) as show:
         summary = make_again(
-            path,
+            file,
             out=out,
             workers=workers,
             shards=shards,

@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +17,17 @@ from gen_data.config.validation import validate
 from gen_data.config.yaml_scalars import json_as_yaml, to_flow_yaml
 from gen_data.config.yaml_tree import Node, load_yaml
 from gen_data.core import errors, path_names, serialization
-from gen_data.runner import failed_sample, labels, layout, licence_table, plan, proof, seal, verify
+from gen_data.runner import (
+    durable_files,
+    failed_sample,
+    labels,
+    layout,
+    licence_table,
+    plan,
+    proof,
+    seal,
+    verify,
+)
 
 FORMAT = 1
 SHARDS_MAX = 5_000
@@ -54,12 +65,14 @@ class Assets(Strict):
         packs: ``{name: "version digest"}`` of installed packs.
         own: ``{id: sha256}`` of the user's assets.
         urls: Where to get the user's folders, by their names in the configuration; empty = unknown.
+        archives: SHA-256 of their packs, by the same names, if they travel as packs.
     """
 
     shared: SharedAssets
     packs: dict[Package, Annotated[str, Field(pattern=r"^\S+ [0-9a-f]{16}$")]]
     own: dict[str, Digest]
     urls: dict[str, Url]
+    archives: dict[str, Digest] = Field(default_factory=dict)
 
 
 class Recipe(Strict):
@@ -185,8 +198,29 @@ def recipe_text(values: Mapping[str, Any]) -> str:
         comment = f"# {COMMENTS[key]}\n" if key in COMMENTS else ""
         if key == "checksums" and "dataset_id" not in values:
             parts.append(NOT_GENERATED)
-        parts.append(comment + "".join(f"{line}\n" for line in _lines({key: value})))
+        parts.append(comment + "".join(f"{line}\n" for line in yaml_lines({key: value})))
     return "".join(parts)
+
+
+def name_packs(values: dict[str, Any], packs: Sequence[str | os.PathLike[str]]) -> dict[str, Any]:
+    """Values of a recipe with the digests of packs of the user's folders.
+
+    Raises:
+        ConfigError: a pack has the name of none of the folders, or cannot be read.
+    """
+    folders = {Path(name).name: name for name in values["assets"]["urls"]}
+    found = {}
+    for pack in map(Path, packs):
+        if pack.stem not in folders:
+            raise errors.ConfigError(
+                f"{pack}: has the name of no folder of the configuration; expected "
+                f"{', '.join(f'{name}.zip' for name in folders) or 'none: it has no own assets'}"
+            )
+        try:
+            found[folders[pack.stem]] = durable_files.hash_file(pack)
+        except OSError as error:
+            raise errors.ConfigError(f"{pack}: {error.strerror}; expected a pack") from None
+    return {**values, "assets": {**values["assets"], "archives": found}} if found else values
 
 
 def checksums_of(values: Mapping[str, Any]) -> dict[str, str]:
@@ -211,7 +245,7 @@ def _digest(value: Any) -> str:
     return hashlib.sha256(serialization.canonical_json(value).encode()).hexdigest()
 
 
-def _lines(value: Mapping[str, Any] | list[Any]) -> Iterator[str]:
+def yaml_lines(value: Mapping[str, Any] | list[Any]) -> Iterator[str]:
     """Lines of YAML of a list or mapping, with short values on one line."""
     items = value.items() if isinstance(value, Mapping) else [(None, item) for item in value]
     for key, item in items:
@@ -221,12 +255,12 @@ def _lines(value: Mapping[str, Any] | list[Any]) -> Iterator[str]:
         if is_short or not isinstance(item, (Mapping, list)) or not item:
             yield line
         elif key is None:
-            first, *rest = _lines(item)
+            first, *rest = yaml_lines(item)
             yield f"- {first}"
             yield from (f"  {line}" for line in rest)
         else:
             yield head
-            yield from (f"  {line}" for line in _lines(item))
+            yield from (f"  {line}" for line in yaml_lines(item))
 
 
 def _flow(value: Any) -> str:
@@ -250,13 +284,22 @@ class RecipeFile:
         """One line on a field: its place, its name, and a fact."""
         return f"{_place(self.document, field)}: {format_path(field)}: {fact}"
 
-    def config(self) -> Config:
+    def values(self) -> dict[str, Any]:
+        """Plain values in the order of the file; see ``recipe_text``."""
+        plain: dict[str, Any] = self.document.plain()
+        return {key: value for key, value in plain.items() if key != "checksums"}
+
+    def config(self, places: Mapping[str, Path]) -> Config:
         """Its configuration.
+
+        Args:
+            places: Other folders of assets than those in the recipe's folder, by their names.
 
         Raises:
             ConfigError: it is not valid here.
         """
-        return config_of(self.document.entries["config"], self.recipe.name)
+        document = self.document.entries["config"]
+        return config_of(document, self.recipe.name, asset_places=places)
 
 
 def read_recipe(path: Path) -> RecipeFile:

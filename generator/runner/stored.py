@@ -1,5 +1,6 @@
 """Samples read back from a finished data set."""
 
+import io
 import json
 import re
 import shlex
@@ -115,7 +116,8 @@ class StoredSamples:
         folder = self._folder_of(index)
         with self._damage(folder / LABELS_NAME):
             labels = parse_labels(self._line(LABELS_NAME, index))
-        return LabelledImages(self, labels, self._capture(folder, labels, has_points))
+        capture = read_capture(self.info, labels, folder, has_points=has_points)
+        return LabelledImages(self.kept_scene, labels, capture)
 
     def sample(self, index: int, has_points: bool = True) -> Sample:
         """The whole sample of that number, see ``labelled``, with its scene.
@@ -187,42 +189,6 @@ class StoredSamples:
                 f"{path}: cannot be read ({fact}); check the data set with:"
                 f"\n    gen-data verify {self.folder} --full"
             ) from error
-
-    def _capture(self, folder: Path, labels: Labels, has_points: bool) -> Capture:
-        index = labels.index
-        readings = {
-            name: SensorReading(
-                name,
-                labels.truth[name].camera,
-                ImageFiles(self.info, folder, labels.truth[name].camera, index),
-                time_s=image.time_s,
-                ev100=image.ev100,
-            )
-            for name, image in labels.images.items()
-        }
-
-        def cloud(name: str) -> PointCloud:
-            scan = labels.scans[name]
-            if not has_points:
-                return PointCloud(name, scan.lidar, np.zeros(0, POINT), scan.time_s)
-            path = cloud_path(folder, name, index)
-            points = _load(path, POINT)
-            if not np.isfinite(points["position_m"]).all():
-                raise StorageError(
-                    f"{path}: holds a position that is no finite number; generate the data set "
-                    "again"
-                )
-            return PointCloud(name, scan.lidar, points, scan.time_s)
-
-        def table(name: str) -> Measurements:
-            info = labels.tables[name]
-            columns = self.info.sensor(name).columns
-            rows = _load(table_path(folder, name, index), measurement_dtypes.columns_dtype(columns))
-            return Measurements(name, info.device, rows, info.time_s)
-
-        return Capture(
-            readings, ReadOnAccess(labels.scans, cloud), ReadOnAccess(labels.tables, table)
-        )
 
     def shard_dir(self, shard: int) -> Path:
         """Folder of the files of a shard."""
@@ -317,14 +283,64 @@ def parse_dataset_id(manifest: Mapping[str, Any], place: object) -> str:
     return identity
 
 
+def read_capture(
+    info: DatasetInfo,
+    labels: Labels,
+    folder: Path,
+    *,
+    has_points: bool = True,
+    read: Callable[[Path], bytes] = Path.read_bytes,
+) -> Capture:
+    """The readings of a sample, whose images, points and rows are read on access.
+
+    Args:
+        info: Facts about the data set.
+        labels: Of the sample.
+        folder: Folder of its shard.
+        has_points: Whether scans have their points; those that exporters receive have none.
+        read: Reads a file below the folder.
+    """
+    index = labels.index
+    readings = {
+        name: SensorReading(
+            name,
+            labels.truth[name].camera,
+            ImageFiles(info, folder, labels.truth[name].camera, index, read),
+            time_s=image.time_s,
+            ev100=image.ev100,
+        )
+        for name, image in labels.images.items()
+    }
+
+    def cloud(name: str) -> PointCloud:
+        scan = labels.scans[name]
+        if not has_points:
+            return PointCloud(name, scan.lidar, np.zeros(0, POINT), scan.time_s)
+        path = cloud_path(folder, name, index)
+        points = _load(path, POINT, read)
+        if not np.isfinite(points["position_m"]).all():
+            raise StorageError(
+                f"{path}: holds a position that is no finite number; generate the data set again"
+            )
+        return PointCloud(name, scan.lidar, points, scan.time_s)
+
+    def table(name: str) -> Measurements:
+        kept = labels.tables[name]
+        dtype = measurement_dtypes.columns_dtype(info.sensor(name).columns)
+        rows = _load(table_path(folder, name, index), dtype, read)
+        return Measurements(name, kept.device, rows, kept.time_s)
+
+    return Capture(readings, ReadOnAccess(labels.scans, cloud), ReadOnAccess(labels.tables, table))
+
+
 @dataclass(frozen=True, eq=False)
 class LabelledImages:
     """A stored sample, which is read in parts: training needs no scene.
 
-    Attributes: see ``Sample``.
+    Attributes: see ``Sample``; ``read_scene`` returns the scene of an index.
     """
 
-    stored: StoredSamples
+    read_scene: Callable[[int], KeptScene]
     labels: Labels
     capture: Capture
 
@@ -351,7 +367,7 @@ class LabelledImages:
     @cached_property
     def scene(self) -> Scene:
         """The scene; read on first access."""
-        return self.stored.kept_scene(self.index).scene
+        return self.read_scene(self.index).scene
 
 
 class ReadOnAccess(Mapping[str, T], Generic[T]):
@@ -383,7 +399,14 @@ class ReadOnAccess(Mapping[str, T], Generic[T]):
 class ImageFiles(Mapping[Channel, NDArray[Any]]):
     """Images of one reading by channel, decoded at each access."""
 
-    def __init__(self, info: DatasetInfo, folder: Path, camera: Camera, index: int) -> None:
+    def __init__(
+        self,
+        info: DatasetInfo,
+        folder: Path,
+        camera: Camera,
+        index: int,
+        read: Callable[[Path], bytes] = Path.read_bytes,
+    ) -> None:
         name, intrinsics = camera.name, camera.intrinsics
         self._paths = {
             c: info.media_path(folder, name, c, index) for c in info.sensor(name).channels
@@ -391,13 +414,14 @@ class ImageFiles(Mapping[Channel, NDArray[Any]]):
         self._size_px = (intrinsics.width_px, intrinsics.height_px)
         self._depth_scale_m = info.depth_scale_m
         self._categories = len(info.categories)
+        self._read = read
 
     def __getitem__(self, channel: Channel) -> NDArray[Any]:
         """Decode one image."""
         from gen_data.exporters.image_files import read_image
 
         path = self._paths[channel]
-        image = read_image(path, channel, self._depth_scale_m, self._size_px)
+        image = read_image(path, channel, self._depth_scale_m, self._size_px, self._read)
         if channel is Channel.CATEGORY and image.max() > self._categories:
             raise StorageError(
                 f"{path}: holds the category {image.max()}; expected 0 to {self._categories}; "
@@ -418,9 +442,9 @@ class ImageFiles(Mapping[Channel, NDArray[Any]]):
         return len(self._paths)
 
 
-def _load(path: Path, dtype: np.dtype[np.void]) -> NDArray[np.void]:
+def _load(path: Path, dtype: np.dtype[np.void], read: Callable[[Path], bytes]) -> NDArray[np.void]:
     try:
-        records: NDArray[np.void] = np.load(path, allow_pickle=False)
+        records: NDArray[np.void] = np.load(io.BytesIO(read(path)), allow_pickle=False)
     except (OSError, ValueError) as error:
         raise StorageError(
             f"{path}: cannot be read ({error}); generate the data set again"

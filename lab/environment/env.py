@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from gen_data.api.config import ConfigLike, load_config, read_document, read_model
 from gen_data.api.dataset import GeneratedSamples
+from gen_data.assemble.pipeline_factory import PipelineFactory
 from gen_data.core import capture, interfaces, optional_packages, streams
 from gen_data.core.errors import ConfigError
 from gen_data.lab.environment import choices, control
@@ -85,7 +86,7 @@ class Env(gymnasium.Env[Observation, control.Action]):
         self.settings = read_model(document, EnvSettings)
         self.metadata = {**self.metadata, "render_fps": round(1.0 / self.settings.step_s)}
         self.render_mode = render_mode
-        self._samples = GeneratedSamples(loaded, CHANNELS)
+        self._samples = GeneratedSamples(PipelineFactory(loaded, n=1, extra_channels=CHANNELS))
         factory = self._samples.make_pipeline
         arm = choices.choose_arm(factory, self.settings.arm, document)
         robot = factory.library.robot(arm.asset)

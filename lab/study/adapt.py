@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gen_data.api.config import load_config
-from gen_data.api.dataset import SampleSequence, open_dataset
+from gen_data.api.dataset import SampleSequence
+from gen_data.api.open_dataset import open_dataset
 from gen_data.api.sample import Sample
 from gen_data.config.yaml_scalars import to_flow_yaml
 from gen_data.core.errors import ConfigError, StorageError, VerificationError

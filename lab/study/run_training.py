@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import torch
 
-from gen_data.api.dataset import open_dataset
+from gen_data.api.open_dataset import open_dataset
 from gen_data.lab.study.detector import Detector
 from gen_data.lab.study.experiment import RESULTS
 from gen_data.lab.study.real_pictures import read_real

@@ -21,9 +21,8 @@ def caches(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     kernels = tmp_path / "warp"
     kernels.mkdir()
     (kernels / "module.o").write_bytes(b"x" * 1_000_000)
-    _, urls, old = cache_commands.CACHES
-    assets = cache_commands.CACHES[0]
-    known = (assets, urls, Cache("kernels", old.content, lambda: [kernels]))
+    *others, old = cache_commands.CACHES
+    known = (*others, Cache("kernels", old.content, lambda: [kernels]))
     monkeypatch.setattr(cache_commands, "CACHES", known)
     return tmp_path
 
@@ -64,5 +63,5 @@ def test_an_unknown_name_is_refused_with_the_known_ones(caches: Path) -> None:
     done = CliRunner().invoke(cache, ["clear", "kernel"])
 
     assert done.exit_code != 0
-    assert "'assets', 'urls', 'kernels'" in done.output
+    assert "'assets', 'urls', 'samples', 'kernels'" in done.output
     assert (caches / "warp").exists()

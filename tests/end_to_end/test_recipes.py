@@ -498,3 +498,89 @@ def test_the_recipe_of_a_thousand_tables_is_small() -> None:
     digests = 2 * 50 * len(f'  - "{64 * "0"}"\n')
 
     assert len(gen_data.recipe("tabletop.yaml", 1000).encode()) + digests < 20_000
+
+
+@pytest.fixture
+def packed(author: Path, reader: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Folder of a reader with a recipe that names a pack, which lies next to it."""
+    monkeypatch.setattr("gen_data.packs.own_pack.default_cache_dir", lambda: reader / "cache")
+    cli.main(["assets", "pack", "meshes"], standalone_mode=False)
+    (reader / "meshes" / "block.obj").unlink()
+    (reader / "meshes").rmdir()
+    edit(reader, 'meshes: ""', "meshes: https://example.org/meshes.zip")
+    text = gen_data.recipe("recipe.yaml", packs=["meshes.zip"])
+    (reader / "recipe.yaml").write_text(text)
+    return reader
+
+
+@pytest.mark.parametrize("name", ["meshes", "../meshes", "~/meshes"])
+def test_a_pack_takes_the_place_of_the_authors_folder(
+    author: Path, packed: Path, name: str
+) -> None:
+    """Wherever the author had it. Once unpacked, the file is not needed any more."""
+    if name == "meshes":
+        gen_data.pull("recipe.yaml", out="out", workers=0)
+        assert sums(packed / "out") == sums(author / "set")
+        (packed / "meshes.zip").unlink()
+        assert gen_data.open("recipe.yaml").categories == ("meshes",)
+        return
+    plain = read_recipe(packed / "recipe.yaml").values()
+    plain["config"]["assets"]["folders"] = [name]
+    for key in ("urls", "archives"):
+        plain["assets"][key] = {name: plain["assets"][key].pop("meshes")}
+    (packed / "recipe.yaml").write_text(recipe_text(plain))
+
+    assert gen_data.open("recipe.yaml").categories == ("meshes",)
+
+
+def test_a_pack_is_named_by_a_finished_data_set_and_a_configuration_too(
+    author: Path, packed: Path
+) -> None:
+    made = gen_data.recipe(author / "set", packs=["meshes.zip"])
+    planned = gen_data.recipe(author / "tiny.yaml", N, packs=["meshes.zip"])
+
+    digests = parse_yaml((packed / "recipe.yaml").read_text(), "r").plain()["assets"]["archives"]
+    for text in (made, planned):
+        assert parse_yaml(text, "r").plain()["assets"]["archives"] == digests
+    with pytest.raises(ConfigError, match=r"other\.zip: has the name of no folder .* meshes\.zip"):
+        gen_data.recipe(author / "set", packs=["other.zip"])
+    (packed / "meshes.zip").unlink()
+    with pytest.raises(ConfigError, match=r"meshes\.zip: No such file"):
+        gen_data.recipe(author / "set", packs=["meshes.zip"])
+
+
+@pytest.mark.parametrize(
+    ("data", "fact"),
+    [
+        (None, "is missing"),
+        (b"", r"was changed or cut off: its digest is e3b0c44298fc1c14, expected \w{16}"),
+        (b"PK\x03\x04", r"was changed or cut off: its digest is \w{16}, expected \w{16}"),
+    ],
+)
+def test_a_pack_that_does_not_fit_is_one_line_with_its_remedy(
+    packed: Path, data: bytes | None, fact: str
+) -> None:
+    if data is None:
+        (packed / "meshes.zip").unlink()
+    else:
+        (packed / "meshes.zip").write_bytes(data)
+
+    line, end = refused(packed, AssetError, 3)
+
+    assert re.fullmatch(
+        rf"recipe\.yaml:\d+:\d+: config\.assets\.folders\[0\]: {packed}/meshes\.zip: {fact}; "
+        r"get it from https://example\.org/meshes\.zip",
+        line,
+    )
+    assert end == "1 difference(s); nothing was generated"
+
+
+def test_a_pack_with_other_meshes_names_them(packed: Path) -> None:
+    """The author packed another state of the folder."""
+    (packed / "other").mkdir()
+    (packed / "other" / "block.obj").write_text(BLOCK.replace(".1", ".2"))
+    cli.main(["assets", "pack", "other", "-o", "meshes.zip", "--force"], standalone_mode=False)
+    text = gen_data.recipe("recipe.yaml", packs=["meshes.zip"])
+    (packed / "recipe.yaml").write_text(text)
+
+    assert "own.user/block: was changed" in refused(packed, AssetError, 3)[0]

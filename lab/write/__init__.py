@@ -1,0 +1,1 @@
+"""Configurations from a sentence, by any language model; its replies are foreign input."""
