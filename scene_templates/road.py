@@ -16,7 +16,8 @@ from gen_data.core.errors import ConfigError, did_you_mean
 from gen_data.core.interfaces import AssetIndex
 from gen_data.core.scene import Lane, Scene
 from gen_data.core.se3 import SE3
-from gen_data.roads.cross_section import RoadShape, non_default_fields
+from gen_data.roads import alignment
+from gen_data.roads.cross_section import RoadShape, non_default_fields, strips
 from gen_data.roads.junction_shape import JunctionShape, arm_pose
 from gen_data.roads.lane_graph import link_lanes, road_lanes
 from gen_data.roads.roundabout_shape import RoundaboutShape
@@ -72,6 +73,20 @@ class RoadSurface(Strict):
         return {name: value for name, value in named if value != getattr(default, name)}
 
 
+class Bend(Strict):
+    """A bend of a road: an arc between two clothoids.
+
+    Attributes:
+        to: Side to which it turns.
+        radius_m: Radius of the arc.
+        turn_deg: Change of the heading over the bend.
+    """
+
+    to: Literal["left", "right"] = "left"
+    radius_m: float = Field(ge=alignment.RADIUS_MIN_M, examples=[80.0])
+    turn_deg: float = Field(gt=0, le=150, examples=[40.0])
+
+
 class Road(RoadSurface, Element):
     """A road along its own +X axis; pairs are (left, right) as seen along it.
 
@@ -82,6 +97,9 @@ class Road(RoadSurface, Element):
         yaw_deg: Direction at the start.
         length_m: Length of the centre line.
         curvature_per_m: Curvature, 1 / radius, positive to the left; 0 = straight.
+        bends: Bends, each in the middle of an equal share of the road; both ends are straight for
+            12 m. Lengths of their clothoids follow from radius and speed, by RASt 06, RAL and RAA.
+            Where its share of the road is too short, a bend turns less.
         lanes: Number of lanes against its direction and along it.
         lane_width_m: Width of each driving lane.
         median_m: Width of the strip between the directions; 0 = only a line.
@@ -119,6 +137,7 @@ class Road(RoadSurface, Element):
     yaw_deg: float = 0.0
     length_m: float = Field(160.0, ge=1, le=2000)
     curvature_per_m: float = Field(0.0, ge=-0.2, le=0.2)
+    bends: tuple[Bend, ...] = Field((), max_length=8)
     lanes: tuple[int, int] = (1, 1)
     lane_width_m: float = Field(3.5, ge=2, le=6)
     median_m: float = Field(0.0, ge=0, le=30)
@@ -173,6 +192,11 @@ class Road(RoadSurface, Element):
         own = set(Road.model_fields)
         values = {f.name: getattr(self, f.name) for f in fields(RoadShape) if f.name in own}
         values["lanes"] = _numbers(self.lanes)
+        bends = [
+            (bend.radius_m if bend.to == "left" else -bend.radius_m, math.radians(bend.turn_deg))
+            for bend in self.bends
+        ]
+        values["bends"] = alignment.lay_out(self.length_m, bends, self.speed_m_s)
         kinds = self.parking_kinds()
         values["parking_m"] = (PARKING_M[kinds[0]], PARKING_M[kinds[1]])
         values["bay_angle_deg"] = (BAY_ANGLE_DEG[kinds[0]], BAY_ANGLE_DEG[kinds[1]])
@@ -180,12 +204,18 @@ class Road(RoadSurface, Element):
         where = f"elements.{self.name}"
         check_widths(where, shape)
         reach = max(shape.carriageway_m(side) for side in (1, -1)) + 6.0
-        if abs(shape.curvature_per_m) * reach >= 1.0:
+        if self.bends:
+            reach = max(row[-1].outer_m for side in (1, -1) if (row := strips(shape, side)))
+        low, high = shape.curvature_range(0.0, shape.length_m)
+        sharpest = max(-low, high)
+        if sharpest * reach >= 1.0:
+            field = "bends" if any(self.bends) else "curvature_per_m"
             raise ConfigError(
-                f"{where}.curvature_per_m: a radius of {1 / abs(shape.curvature_per_m):.1f} m is "
+                f"{where}.{field}: a radius of {1 / sharpest:.1f} m is "
                 f"less than the width of the road; expected a curvature below {1 / reach:.3g}"
             )
-        if abs(shape.curvature_per_m) * shape.length_m >= math.tau:
+        headings = shape.line().poses(np.linspace(0.0, shape.length_m, 100))[:, 2]
+        if np.ptp(headings) >= math.tau:
             raise ConfigError(
                 f"{where}.length_m: the bend closes on itself; expected a shorter road"
             )

@@ -10,7 +10,7 @@ from gen_data.assets.family import Solid, check_option
 from gen_data.content.procedural.patches import Array, Patch
 from gen_data.content.procedural.surface_shapes import block
 from gen_data.content.roads import road_materials
-from gen_data.content.roads.deck import PAINT_LIFT_M, Deck, surface
+from gen_data.content.roads.deck import PAINT_LIFT_M, Deck, common_rows, surface
 from gen_data.content.roads.markings import ZEBRA_BAR_M, bay_lines, paint_stripe, stripes
 from gen_data.content.roads.painted_signs import ARROW_M, arrow, bicycle, hatching
 from gen_data.content.roads.road_wear import gutters, lane_tiles, wear_patches
@@ -93,9 +93,7 @@ def make_deck(profile: RoadShape, look: road_materials.StreetLook) -> Deck:
             if strip.kind == "driving":
                 for track in (strip.middle_m - _TRACK_M, strip.middle_m + _TRACK_M):
                     z = z - look.wear * _RUT_M * np.exp(-(((t - track) / _RUT_WIDTH_M) ** 2))
-    return Deck(
-        profile.line(), t, z, abs(profile.curvature_per_m), road_materials.number_slots(look)
-    )
+    return Deck(profile.line(), t, z, common_rows(profile), road_materials.number_slots(look))
 
 
 def _columns(profile: RoadShape) -> Iterator[float]:

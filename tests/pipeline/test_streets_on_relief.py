@@ -31,7 +31,7 @@ from tests.embree import RayCaster
 from tests.streets import thin_street
 
 STREET = (
-    "shared.district=residential", "shared.junction=none", "shared.curvature_per_m=0",
+    "shared.district=residential", "shared.junction=none", "shared.course=straight", "shared.course_on=straight",
     "shared.landmark=none", "randomizers.parked.count=8", "randomizers.traffic.count=8",
     "randomizers.people.count=12", "sensors.color.size_px=[160, 96]",
 )  # fmt: skip
