@@ -38,8 +38,11 @@ TURN_LANE_M = 2.5
 """Smallest width of a lane for turning vehicles (assumed, 10 %)."""
 BAY_ANGLE_DEG = {"none": 0.0, "parallel": 0.0, "angled": 60.0, "perpendicular": 90.0}
 
+Rails = bool | Literal["bends"]
 Ground = Literal["grass", "paving", "cobbles", "gravel", "earth", "asphalt"]
 Parking = bool | Literal["none", "parallel", "angled", "perpendicular"]
+
+_RAILS = {False: 0.0, True: 1.0, "bends": 2.0}
 
 
 class RoadSurface(Strict):
@@ -117,14 +120,15 @@ class Road(RoadSurface, Element):
         setback_m: Width of the land between sidewalk and house fronts, covered with ``ground``; a
             lane of kind ``garden``; 0 = none.
         kerb_m: Height of the kerbs; 0 = none, as on country roads and motorways.
-        crown: Cross slope of the carriageway, from its middle to its gutters.
+        crown: Cross slope of the carriageway, from its middle to its gutters; 2.5 % in RASt 06, RAL
+            and RAA.
         traffic: Side on which vehicles drive.
         markings: Style of the centre line.
         edge_lines: Whether the carriageway has edge lines.
         dash_m: Length of dashes and of the gaps between them: 3, 6 in towns; 4, 8 on country
             roads; 6, 12 on motorways.
         line_m: Width of narrow lines: 0.12; 0.15 on motorways.
-        rails: Whether there are guard rails.
+        rails: Whether there are guard rails, left and right; ``bends`` = outside of bends only.
         arrows: Whether lanes that lead to the start and to the end of the road have arrows there.
         tram: Whether the lanes next to the middle have the rails of a tramway.
         apron_m: Width of the land next to the road that slopes down to the ground.
@@ -150,13 +154,13 @@ class Road(RoadSurface, Element):
     sidewalk_m: tuple[Width, Width] = (2.5, 2.5)
     setback_m: tuple[Width, Width] = (0.0, 0.0)
     kerb_m: float = Field(0.12, ge=0, le=0.3)
-    crown: float = Field(0.02, ge=0, le=0.08)
+    crown: float = Field(0.025, ge=0, le=0.08)
     traffic: Literal["right", "left"] = "right"
     markings: Literal["dashed", "solid", "double", "none"] = "dashed"
     edge_lines: bool = False
     dash_m: tuple[float, float] = (3.0, 6.0)
     line_m: float = Field(0.12, ge=0.05, le=0.5)
-    rails: tuple[bool, bool] = (False, False)
+    rails: tuple[Rails, Rails] = (False, False)
     arrows: tuple[bool, bool] = (False, False)
     tram: bool = False
     apron_m: float = Field(6.0, ge=0, le=100)
@@ -176,7 +180,7 @@ class Road(RoadSurface, Element):
             "edge_lines": ("solid" if self.edge_lines else "none", "none"),
             "dash_m": (self.dash_m, (3.0, 6.0)),
             "line_m": (self.line_m, 0.12),
-            "rails": (_numbers(self.rails), (0.0, 0.0)),
+            "rails": (_numbers(tuple(_RAILS[side] for side in self.rails)), (0.0, 0.0)),
             "apron_m": (self.apron_m, 6.0),
             "arrows": (_numbers(self.arrows), (0.0, 0.0)),
             "tram": (float(self.tram), 0.0),

@@ -62,7 +62,7 @@ class RoadShape:
     verge_m: Pair = (0.0, 0.0)
     sidewalk_m: Pair = (2.5, 2.5)
     curvature_per_m: float = 0.0
-    crown: float = 0.02
+    crown: float = 0.025
     traffic: str = "right"
     setback_m: Pair = (0.0, 0.0)
     median_kerb_m: float = 0.0

@@ -123,7 +123,7 @@ def test_normals_are_those_of_the_raised_surface(library: Library) -> None:
     ("text", "message"),
     [
         ("paved_area?relief=1,2,3", "expected at=x,y,yaw,scale"),
-        ("paved_area?at=0,0,0,1&relief=1,2,3", "3 numbers are no relief; expected 19 per road"),
+        ("paved_area?at=0,0,0,1&relief=1,2,3", "3 numbers are no relief; expected 20 per road"),
         ("car?at=0,0,0,1&relief=1,2,3", "has no parameter"),
     ],
 )
