@@ -104,6 +104,24 @@ def test_lanes_of_a_road_follow_its_bends() -> None:
     assert math.degrees(math.atan2(turned[1], turned[0])) == pytest.approx(-60.0, abs=0.01)
 
 
+def test_guard_rails_stand_outside_of_bends() -> None:
+    """Of a bend to the left, on the right: steel along 80.9 m, none on the other side."""
+    road = Road(
+        name="main", length_m=150, speed_m_s=8.3, bends=(Bend(radius_m=100, turn_deg=40),),
+        rails=("bends", "bends"),
+    )  # fmt: skip
+    scene = build_scene("street", [road], library())
+    mesh = library().mesh(scene.body("main").asset)
+    points = mesh.vertices_m[mesh.vertices_m[:, 2] > 0.6]
+    line = road.shape().line().poses(np.linspace(0.0, 150.0, 1501))
+    k = np.hypot(*(points[:, None, :2] - line[None, :, :2]).T).argmin(axis=0)
+    ahead = np.column_stack([np.cos(line[k, 2]), np.sin(line[k, 2])])
+    delta = points[:, :2] - line[k, :2]
+    left = ahead[:, 0] * delta[:, 1] - ahead[:, 1] * delta[:, 0]
+    assert (left < -3.9).all()
+    assert np.ptp(0.1 * k) == pytest.approx(math.radians(40.0) * 100.0 + 100.0 / 9.0, abs=0.3)
+
+
 @pytest.mark.parametrize(
     ("given", "message"),
     [
