@@ -74,7 +74,7 @@ S_CURVE = (10.0, 30.0, 30.0, 0.005, 0.05, 100.0, 30.0, 30.0, -0.005, 0.04)
 def test_roads_follow_clothoids_and_slope_down_to_the_inside_of_arcs(left_m: float) -> None:
     """Beside a line found by summing small steps: grade times arc length, and bank times distance.
 
-    Cells of 4 m bend the ground where clothoids begin: 6 m off the middle, its grade changes by 1 %.
+    Cells of 4 m bend the ground where clothoids begin: 6 m beside it, the grade changes by 1 %.
     """
     steps = 40_000
     ds = 200.0 / steps
