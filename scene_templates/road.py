@@ -180,7 +180,7 @@ class Road(RoadSurface, Element):
             "edge_lines": ("solid" if self.edge_lines else "none", "none"),
             "dash_m": (self.dash_m, (3.0, 6.0)),
             "line_m": (self.line_m, 0.12),
-            "rails": (_numbers(tuple(_RAILS[side] for side in self.rails)), (0.0, 0.0)),
+            "rails": ((_RAILS[self.rails[0]], _RAILS[self.rails[1]]), (0.0, 0.0)),
             "apron_m": (self.apron_m, 6.0),
             "arrows": (_numbers(self.arrows), (0.0, 0.0)),
             "tram": (float(self.tram), 0.0),

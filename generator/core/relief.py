@@ -251,7 +251,7 @@ class Relief:
             bends = at + plain + 10
             end = bends + 5 * int(numbers[bends - 1])
             curves, row = numbers[at + plain : bends - 1], numbers[bends:end]
-            roads.append(RoadProfile(*numbers[at : at + plain], tuple(curves), tuple(row)))  # type: ignore[arg-type]
+            roads.append(RoadProfile(*numbers[at : at + plain], tuple(curves), tuple(row)))  # type: ignore[call-arg, arg-type]
             at = end
         if not roads or at != len(numbers):
             raise ValueError(

@@ -56,7 +56,7 @@ def bank(radius_m: float, speed_m_s: float) -> float:
     if rule is None or 3.6 * speed_m_s < BANKED_FROM_KM_H or radius_m >= rule[3]:
         return 0.0
     share = math.log(max(radius_m / rule[1], 1.0)) / math.log(rule[3] / rule[1])
-    return BANK_MAX * (BANK_MIN / BANK_MAX) ** share
+    return float(BANK_MAX * (BANK_MIN / BANK_MAX) ** share)
 
 
 def _rule(speed_m_s: float) -> tuple[float, float, float, float] | None:

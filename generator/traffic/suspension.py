@@ -44,5 +44,5 @@ def _settled(values: Array) -> Array:
     """Means [t, n] of the neighbouring instants of each one; ends go on."""
     half = _SETTLING // 2
     padded = np.concatenate([values[:1]] * half + [values] + [values[-1:]] * half)
-    means: Array = sum(padded[k : k + len(values)] for k in range(_SETTLING)) / _SETTLING
+    means: Array = np.mean([padded[k : k + len(values)] for k in range(_SETTLING)], axis=0)
     return means

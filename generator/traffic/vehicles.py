@@ -242,7 +242,7 @@ def _banks(graph: LaneGraph, vehicle: Vehicle, grid: Array) -> Array:
     banks = np.array([lane.bank for lane in _lanes_along(graph, vehicle, grid)])
     count = 1 + 2 * round(0.5 * vehicle.wheelbase_m / STATION_M)
     padded = np.pad(banks, (count // 2, count // 2), mode="edge")
-    means: Array = sum(padded[k : k + len(banks)] for k in range(count)) / count
+    means: Array = np.mean([padded[k : k + len(banks)] for k in range(count)], axis=0)
     return means
 
 
