@@ -1,6 +1,7 @@
 """Cameras on lanes: dash cameras, cameras of pedestrians, cameras on poles."""
 
 import math
+from collections import Counter
 from dataclasses import replace
 from typing import Annotated, Literal
 
@@ -32,6 +33,8 @@ class CameraOnLane(RandomizerBase):
     Attributes:
         lanes: Kinds of lanes to use.
         roads: Names of the elements whose lanes to use; empty = all.
+        junctions: Whether lanes across junctions count, too, as often as drives pass them: of lanes
+            with a common start, a vehicle takes one.
         height_m: Height above the ground.
         lateral: Position across the lane: -1 right edge, 0 middle, 1 left edge.
         yaw_deg: Rotation to the left of the lane's direction.
@@ -57,6 +60,7 @@ class CameraOnLane(RandomizerBase):
     stage: Literal["scene", "view"] = "view"
     lanes: tuple[LaneKind, ...] = ("driving",)
     roads: tuple[str, ...] = ()
+    junctions: bool = False
     height_m: dist.Positive = dist.Constant(1.65)
     lateral: Annotated[dist.Scalar, dist.Bounds(-1, 1)] = dist.Constant(0.0)
     yaw_deg: dist.Scalar = dist.Normal(0.0, 1.0, clip=(-3.0, 3.0))
@@ -80,7 +84,8 @@ class CameraOnLane(RandomizerBase):
         lines = [
             line
             for line in lines
-            if not line.lane.junction and (not self.roads or line.lane.road in self.roads)
+            if (self.junctions or not line.lane.junction)
+            and (not self.roads or line.lane.road in self.roads)
         ]
         if not lines:
             known = ", ".join(sorted({lane.kind for lane in scene.lanes})) or "none"
@@ -139,7 +144,8 @@ class CameraOnLane(RandomizerBase):
         rng: Rng,
     ) -> tuple[SE3, SE3] | None:
         """Draw ``T_world_rig`` on the ground and ``T_world_camera``; None if not free."""
-        weights = [line.length_m for line in lines]
+        starts = Counter(line.lane.center_m[0] for line in lines)
+        weights = [line.length_m / starts[line.lane.center_m[0]] for line in lines]
         line = lines[pick_by_weight(weights, float(rng.uniform()))]
         turned = self.reversed.draw(rng)
         ahead_m = min(self.ahead_m, 0.5 * line.length_m)

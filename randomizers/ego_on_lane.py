@@ -28,7 +28,8 @@ class EgoOnLane(RandomizerBase):
         roads: Names of the elements whose lanes to use; empty = all.
         route: Lanes, or points (x, y) in metres; the vehicle starts on the first. Give
             traffic_flow the same route. Empty = start on any lane.
-        ahead_m: Smallest length of lane ahead of the vehicle; at most half of the lane.
+        ahead_m: Smallest length of road ahead of the vehicle, on any way through junctions; at most
+            half of the lane it starts on.
         lateral_m: Offset to the left of the lane's centre line.
         min_clearance_m: Smallest distance to any other object.
     """
@@ -45,7 +46,8 @@ class EgoOnLane(RandomizerBase):
     def __call__(self, scene: Scene, assets: interfaces.AssetIndex, rng: streams.Rng) -> Scene:
         """Return the scene with the ego vehicle moved."""
         body = find_ego(scene, self.ego, f"randomizers.{self.name}.ego")
-        lines = self._select_lanes(scene)
+        graph = LaneGraph.of(scene.lanes, "driving")
+        lines = self._select_lanes(graph)
         axles = find_axles(assets, body.asset, body.scale)
         ground = make_ground((b for b in standing_bodies(scene) if b.name != body.name), assets)
         total_m = sum(line.length_m for line in lines)
@@ -53,7 +55,8 @@ class EgoOnLane(RandomizerBase):
             place, left_m = float(rng.uniform()) * total_m, self.lateral_m.draw(rng)
             share = float(rng.uniform())
             line = next((one for one in lines if (place := place - one.length_m) < 0.0), lines[-1])
-            ahead_m = min(self.ahead_m, 0.5 * line.length_m)
+            beyond_m = _road_beyond_m(graph, line.lane.name, self.ahead_m)
+            ahead_m = max(min(self.ahead_m, 0.5 * line.length_m) - beyond_m, 0.0)
             last_m = line.length_m - ahead_m - axles.front_m
             if last_m <= axles.rear_m:
                 continue
@@ -65,9 +68,8 @@ class EgoOnLane(RandomizerBase):
         remedy = "other roads, a smaller ahead_m or min_clearance_m"
         raise self.reject("no free place for the ego vehicle", remedy)
 
-    def _select_lanes(self, scene: Scene) -> list[lane_geometry.LaneLine]:
+    def _select_lanes(self, graph: LaneGraph) -> list[lane_geometry.LaneLine]:
         """Select the lanes to start on."""
-        graph = LaneGraph.of(scene.lanes, "driving")
         if self.route:
             names = lanes_through_point(graph, self.route, f"randomizers.{self.name}.route")
             return [graph.lines[names[0]]]
@@ -83,6 +85,16 @@ class EgoOnLane(RandomizerBase):
                 f"{' or '.join(self.roads) or 'any road'}; there is {', '.join(known) or 'none'}"
             )
         return lines
+
+
+def _road_beyond_m(graph: LaneGraph, name: str, wanted_m: float) -> float:
+    """Length of the shortest way from the end of a lane to the end of the network, or enough."""
+    ways = graph.successors(name) if wanted_m > 0.0 else ()
+    lengths = [(graph.lines[way].length_m, way) for way in ways]
+    return min(
+        (length + _road_beyond_m(graph, way, wanted_m - length) for length, way in lengths),
+        default=0.0,
+    )
 
 
 def find_ego(scene: Scene, name: str, field: str) -> Body:

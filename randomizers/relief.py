@@ -14,7 +14,7 @@ from gen_data.config import distributions as dist
 from gen_data.core import errors, interfaces, relief, se3, streams
 from gen_data.core.scene import Body, Scene
 from gen_data.randomizers.base import RandomizerBase
-from gen_data.roads import junction_shape, roundabout_shape
+from gen_data.roads import alignment, junction_shape, roundabout_shape
 from gen_data.roads.cross_section import RoadShape, strips
 
 GRADE_MAX = 0.15
@@ -46,6 +46,8 @@ class ReliefOfRoads(RandomizerBase):
     Attributes:
         grade: Rise per metre of the straight grades; steeper ones are cut to ``grade_max``.
         grade_max: Steepest grade of any road.
+        banked: Whether roads of 60 km/h and more slope down to the inside of their bends, by 2.5 to
+            6 % (RASt 06, RAA).
         side_slope: Rise per metre of the land on each side of a road, away from it.
     """
 
@@ -54,6 +56,7 @@ class ReliefOfRoads(RandomizerBase):
         0.0, 0.04, clip=(-0.12, 0.12)
     )
     grade_max: float = Field(0.12, gt=0, le=GRADE_MAX)
+    banked: bool = True
     side_slope: Annotated[dist.Scalar, dist.Bounds(-0.3, 0.3)] = dist.Normal(
         0.0, 0.06, clip=(-0.15, 0.15)
     )
@@ -88,7 +91,9 @@ class ReliefOfRoads(RandomizerBase):
             height_m = float(profile.height(np.array([course.length_m]))[0])
             known[end.name] = _End(height_m, profile.slope(course.length_m), end.is_level)
             profiles.append(profile)
-        if all(not any((p.grade, p.left, p.right, *p.curves[2::3])) for p in profiles):
+        if all(
+            not any((p.grade, p.left, p.right, *p.curves[2::3], *p.bends[4::5])) for p in profiles
+        ):
             return scene
         return replace(scene, relief=relief.Relief(tuple(profiles)))
 
@@ -134,6 +139,7 @@ class ReliefOfRoads(RandomizerBase):
             round(start.height_m, 4),
             round(start.grade, 4),
             flat + rest,  # type: ignore[arg-type]
+            course.bends if self.banked else _level(course.bends),
         )
 
     def _draw_curves(
@@ -195,6 +201,7 @@ class _Course:
     curvature_per_m: float
     half_width_m: float
     speed_m_s: float
+    bends: tuple[float, ...]
 
     @classmethod
     def of(cls, body: Body, speed_m_s: float) -> _Course:
@@ -210,6 +217,17 @@ class _Course:
             shape.curvature_per_m,
             half_m,
             speed_m_s,
+            tuple(
+                number
+                for start, spiral, arc, curvature in alignment.unpack(shape.bends)
+                for number in (
+                    start,
+                    spiral,
+                    arc,
+                    curvature,
+                    round(alignment.bank(1.0 / abs(curvature), speed_m_s), 4),
+                )
+            ),
         )
 
     def reversed(self) -> _Course:
@@ -220,7 +238,18 @@ class _Course:
             T_world_start=self.T_world_end @ back,
             T_world_end=self.T_world_start @ back,
             curvature_per_m=-self.curvature_per_m,
+            bends=tuple(
+                number
+                for k in range(len(self.bends) - 5, -1, -5)
+                for number in self._bend_reversed(*self.bends[k : k + 5])
+            ),
         )
+
+    def _bend_reversed(
+        self, start_m: float, spiral_m: float, arc_m: float, curvature_per_m: float, bank: float
+    ) -> tuple[float, ...]:
+        start_m = round(self.length_m - start_m - 2.0 * spiral_m - arc_m, 3)
+        return (start_m, spiral_m, arc_m, -curvature_per_m, bank)
 
     def curve_m(self, change: float) -> float:
         """Length of a vertical curve that changes the grade, by stopping sight distance.
@@ -235,6 +264,11 @@ class _Course:
         sight_m = 5.0 * math.ceil(sight_m / 5.0 - 1e-9)
         rate = sight_m**2 / (658.0 if change < 0.0 else 120.0 + 3.5 * sight_m)
         return max(100.0 * rate * abs(change), 0.6 * speed_km_h, 1.0)
+
+
+def _level(bends: tuple[float, ...]) -> tuple[float, ...]:
+    """The same bends without cross slopes."""
+    return tuple(0.0 if k % 5 == 4 else number for k, number in enumerate(bends))
 
 
 def _edge_m(shape: RoadShape, side: int) -> float:

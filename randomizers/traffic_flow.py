@@ -15,11 +15,14 @@ from gen_data.core.scene import Body, Scene
 from gen_data.core.streams import Rng
 from gen_data.randomizers import base, traffic_actors, traffic_lights, traffic_states
 from gen_data.randomizers.ego_on_lane import Stop
+from gen_data.traffic import suspension
 from gen_data.traffic.lane_routes import LaneGraph, draw_route, lanes_through_point
 from gen_data.traffic.pedestrian_paths import WalkNetwork, draw_path, make_walk_network
 from gen_data.traffic.pedestrians import Pedestrian
 from gen_data.traffic.signal_cycles import Approach, Cycle
 from gen_data.traffic.simulation import (
+    KNOT_S,
+    STEP_S,
     SimulatedMotion,
     first_overlap,
     make_upright_trajectories,
@@ -310,13 +313,23 @@ def _make_trajectories(
     backs = [member.axles.T_body_rear.inverse().translation_m for member in drivers]
     wheelbases = np.array([member.axles.wheelbase_m for member in drivers])
     bodies = [m.body for m in drivers] + [m.body for m in people]
+    is_sprung = np.array([_has_four_wheels(member.body, assets) for member in drivers], bool)
+    kept = slice(None, None, round(KNOT_S / STEP_S))
+    lift_m, sway_right = is_sprung * np.array(
+        suspension.sway(
+            motion.speed_m_s[kept], motion.acceleration_m_s2[kept], motion.ahead, KNOT_S
+        )
+    )
+    # About the middle between the axles: neither leaves the ground by more than half of it.
+    axle_m = motion.axle_m - 0.5 * lift_m[..., None] * np.array([0.0, 0.0, 1.0])
     made = make_upright_trajectories(
         [member.body.name for member in drivers],
-        motion.axle_m,
+        axle_m,
         motion.ahead,
         # Small-angle pitch; the floor on the wheelbase avoids a division by zero.
-        np.clip(motion.rise / np.maximum(wheelbases, 0.1), -0.3, 0.3),
+        np.clip((motion.rise + lift_m) / np.maximum(wheelbases, 0.1), -0.3, 0.3),
         backs,
+        sway_right + is_sprung * motion.bank,
     ) + make_upright_trajectories(
         [member.body.name for member in people],
         motion.feet_m,
@@ -325,6 +338,10 @@ def _make_trajectories(
         [(0.0, 0.0, -m.body.scale * assets.bounds_m(m.body.asset)[0][2]) for m in people],
     )
     return list(zip(bodies, made, strict=True))
+
+
+def _has_four_wheels(body: Body, assets: AssetIndex) -> bool:
+    return sum(p.name.startswith("wheel") for p in assets.keypoints(body.asset)) == 4
 
 
 def _reject_collisions(

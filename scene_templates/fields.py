@@ -77,13 +77,15 @@ class Fields(Element):
         edge_m, edge_z_m = (row[-1].outer_m, row[-1].outer_z_m) if row else (0.0, 0.0)
         shape = FieldsShape(
             road.length_m, road.curvature_per_m, float(side), round(edge_m + self.gap_m, 6),
-            self.depth_m, "_".join(self.crops), self.seed,
+            self.depth_m, "_".join(self.crops), self.seed, road.bends,
         )  # fmt: skip
         reach_m = shape.inner_m + shape.depth_m
-        if road.curvature_per_m * side * reach_m >= 0.95:
+        low, high = road.curvature_range(0.0, road.length_m)
+        inner = high if side > 0 else -low
+        if inner * reach_m >= 0.95:
             raise ConfigError(
                 f"elements.{self.name}.depth_m: fields of {self.depth_m:g} m would meet inside "
-                f"the bend of '{self.road}', whose radius is {1 / abs(road.curvature_per_m):.0f} m"
+                f"the bend of '{self.road}', whose radius is {1 / inner:.0f} m"
             )
         return shape, round(max(edge_z_m, _LOWEST_M) + _LIFT_M, 6)
 

@@ -49,7 +49,7 @@ class Intersection(road.RoadSurface, element.Element):
     setback_m: float = Field(0.0, ge=0, le=50)
     kerb_m: float = Field(0.12, ge=0, le=0.3)
     radius_m: float = Field(7.0, ge=1, le=50)
-    crown: float = Field(0.02, ge=0, le=0.08)
+    crown: float = Field(0.025, ge=0, le=0.08)
     traffic: Literal["right", "left"] = "right"
     crossings: Literal["zebra", "ladder", "lines", "none"] = "zebra"
 

@@ -91,7 +91,7 @@ class PetrolStation(element.Element):
             here = replace(place, station_m=place.station_m + along)
             edge_m = place.edge_m(side, land=False)[0] + place.sagitta_m(side, 0.5 * LENGTH_M)
             # On the inside of bends the road comes nearer to the forecourt's edge.
-            bent_m = 0.5 * side * place.shape.curvature_per_m * along * along
+            bent_m = place.sagitta_m(side, abs(along)) - place.sagitta_m(-side, abs(along))
             asset = element.parametric_id(
                 "driveway", seed=self.seed % 4, width_m=_DRIVEWAY_M,
                 depth_m=round(edge_m - foot_m - min(bent_m, edge_m - foot_m - 0.5) + 0.3, 3),

@@ -16,7 +16,8 @@ from gen_data.core.errors import ConfigError, did_you_mean
 from gen_data.core.interfaces import AssetIndex
 from gen_data.core.scene import Lane, Scene
 from gen_data.core.se3 import SE3
-from gen_data.roads.cross_section import RoadShape, non_default_fields
+from gen_data.roads import alignment
+from gen_data.roads.cross_section import RoadShape, non_default_fields, strips
 from gen_data.roads.junction_shape import JunctionShape, arm_pose
 from gen_data.roads.lane_graph import link_lanes, road_lanes
 from gen_data.roads.roundabout_shape import RoundaboutShape
@@ -37,8 +38,11 @@ TURN_LANE_M = 2.5
 """Smallest width of a lane for turning vehicles (assumed, 10 %)."""
 BAY_ANGLE_DEG = {"none": 0.0, "parallel": 0.0, "angled": 60.0, "perpendicular": 90.0}
 
+Rails = bool | Literal["bends"]
 Ground = Literal["grass", "paving", "cobbles", "gravel", "earth", "asphalt"]
 Parking = bool | Literal["none", "parallel", "angled", "perpendicular"]
+
+_RAILS = {False: 0.0, True: 1.0, "bends": 2.0}
 
 
 class RoadSurface(Strict):
@@ -72,6 +76,20 @@ class RoadSurface(Strict):
         return {name: value for name, value in named if value != getattr(default, name)}
 
 
+class Bend(Strict):
+    """A bend of a road: an arc between two clothoids.
+
+    Attributes:
+        to: Side to which it turns.
+        radius_m: Radius of the arc.
+        turn_deg: Change of the heading over the bend.
+    """
+
+    to: Literal["left", "right"] = "left"
+    radius_m: float = Field(ge=alignment.RADIUS_MIN_M, examples=[80.0])
+    turn_deg: float = Field(gt=0, le=150, examples=[40.0])
+
+
 class Road(RoadSurface, Element):
     """A road along its own +X axis; pairs are (left, right) as seen along it.
 
@@ -82,6 +100,9 @@ class Road(RoadSurface, Element):
         yaw_deg: Direction at the start.
         length_m: Length of the centre line.
         curvature_per_m: Curvature, 1 / radius, positive to the left; 0 = straight.
+        bends: Bends, each in the middle of an equal share of the road; both ends are straight for
+            12 m. Lengths of their clothoids follow from radius and speed, by RASt 06, RAL and RAA.
+            Where its share of the road is too short, a bend turns less.
         lanes: Number of lanes against its direction and along it.
         lane_width_m: Width of each driving lane.
         median_m: Width of the strip between the directions; 0 = only a line.
@@ -99,14 +120,15 @@ class Road(RoadSurface, Element):
         setback_m: Width of the land between sidewalk and house fronts, covered with ``ground``; a
             lane of kind ``garden``; 0 = none.
         kerb_m: Height of the kerbs; 0 = none, as on country roads and motorways.
-        crown: Cross slope of the carriageway, from its middle to its gutters.
+        crown: Cross slope of the carriageway, from its middle to its gutters; 2.5 % in RASt 06, RAL
+            and RAA.
         traffic: Side on which vehicles drive.
         markings: Style of the centre line.
         edge_lines: Whether the carriageway has edge lines.
         dash_m: Length of dashes and of the gaps between them: 3, 6 in towns; 4, 8 on country
             roads; 6, 12 on motorways.
         line_m: Width of narrow lines: 0.12; 0.15 on motorways.
-        rails: Whether there are guard rails.
+        rails: Whether there are guard rails, left and right; ``bends`` = outside of bends only.
         arrows: Whether lanes that lead to the start and to the end of the road have arrows there.
         tram: Whether the lanes next to the middle have the rails of a tramway.
         apron_m: Width of the land next to the road that slopes down to the ground.
@@ -119,6 +141,7 @@ class Road(RoadSurface, Element):
     yaw_deg: float = 0.0
     length_m: float = Field(160.0, ge=1, le=2000)
     curvature_per_m: float = Field(0.0, ge=-0.2, le=0.2)
+    bends: tuple[Bend, ...] = Field((), max_length=8)
     lanes: tuple[int, int] = (1, 1)
     lane_width_m: float = Field(3.5, ge=2, le=6)
     median_m: float = Field(0.0, ge=0, le=30)
@@ -131,13 +154,13 @@ class Road(RoadSurface, Element):
     sidewalk_m: tuple[Width, Width] = (2.5, 2.5)
     setback_m: tuple[Width, Width] = (0.0, 0.0)
     kerb_m: float = Field(0.12, ge=0, le=0.3)
-    crown: float = Field(0.02, ge=0, le=0.08)
+    crown: float = Field(0.025, ge=0, le=0.08)
     traffic: Literal["right", "left"] = "right"
     markings: Literal["dashed", "solid", "double", "none"] = "dashed"
     edge_lines: bool = False
     dash_m: tuple[float, float] = (3.0, 6.0)
     line_m: float = Field(0.12, ge=0.05, le=0.5)
-    rails: tuple[bool, bool] = (False, False)
+    rails: tuple[Rails, Rails] = (False, False)
     arrows: tuple[bool, bool] = (False, False)
     tram: bool = False
     apron_m: float = Field(6.0, ge=0, le=100)
@@ -157,7 +180,7 @@ class Road(RoadSurface, Element):
             "edge_lines": ("solid" if self.edge_lines else "none", "none"),
             "dash_m": (self.dash_m, (3.0, 6.0)),
             "line_m": (self.line_m, 0.12),
-            "rails": (_numbers(self.rails), (0.0, 0.0)),
+            "rails": ((_RAILS[self.rails[0]], _RAILS[self.rails[1]]), (0.0, 0.0)),
             "apron_m": (self.apron_m, 6.0),
             "arrows": (_numbers(self.arrows), (0.0, 0.0)),
             "tram": (float(self.tram), 0.0),
@@ -173,6 +196,11 @@ class Road(RoadSurface, Element):
         own = set(Road.model_fields)
         values = {f.name: getattr(self, f.name) for f in fields(RoadShape) if f.name in own}
         values["lanes"] = _numbers(self.lanes)
+        bends = [
+            (bend.radius_m if bend.to == "left" else -bend.radius_m, math.radians(bend.turn_deg))
+            for bend in self.bends
+        ]
+        values["bends"] = alignment.lay_out(self.length_m, bends, self.speed_m_s)
         kinds = self.parking_kinds()
         values["parking_m"] = (PARKING_M[kinds[0]], PARKING_M[kinds[1]])
         values["bay_angle_deg"] = (BAY_ANGLE_DEG[kinds[0]], BAY_ANGLE_DEG[kinds[1]])
@@ -180,12 +208,18 @@ class Road(RoadSurface, Element):
         where = f"elements.{self.name}"
         check_widths(where, shape)
         reach = max(shape.carriageway_m(side) for side in (1, -1)) + 6.0
-        if abs(shape.curvature_per_m) * reach >= 1.0:
+        if self.bends:
+            reach = max(row[-1].outer_m for side in (1, -1) if (row := strips(shape, side)))
+        low, high = shape.curvature_range(0.0, shape.length_m)
+        sharpest = max(-low, high)
+        if sharpest * reach >= 1.0:
+            field = "bends" if any(self.bends) else "curvature_per_m"
             raise ConfigError(
-                f"{where}.curvature_per_m: a radius of {1 / abs(shape.curvature_per_m):.1f} m is "
+                f"{where}.{field}: a radius of {1 / sharpest:.1f} m is "
                 f"less than the width of the road; expected a curvature below {1 / reach:.3g}"
             )
-        if abs(shape.curvature_per_m) * shape.length_m >= math.tau:
+        headings = shape.line().poses(np.linspace(0.0, shape.length_m, 100))[:, 2]
+        if np.ptp(headings) >= math.tau:
             raise ConfigError(
                 f"{where}.length_m: the bend closes on itself; expected a shorter road"
             )

@@ -49,7 +49,8 @@ class RoadPlace:
 
     def sagitta_m(self, side: int, half_m: float) -> float:
         """How far the road bends into a straight rectangle of half a length at its side."""
-        return 0.5 * max(0.0, side * self.shape.curvature_per_m) * half_m * half_m
+        low, high = self.shape.curvature_range(self.station_m - half_m, self.station_m + half_m)
+        return 0.5 * max(0.0, high if side > 0 else -low) * half_m * half_m
 
 
 def find_place(scene: Scene, road: str, station_m: float, half_m: float, where: str) -> RoadPlace:

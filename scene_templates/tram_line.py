@@ -41,8 +41,9 @@ class TramLine(element.Element):
         """Add wires and poles. Raises ConfigError if the road bends or has no track."""
         where = f"elements.{self.name}"
         shape, parameters, T_world_road = find_road(scene, self.road, f"{where}.road")
-        if shape.curvature_per_m or not parameters.get("tram"):
-            fact = "bends" if shape.curvature_per_m else "has no track"
+        bends = any(shape.curvature_range(0.0, shape.length_m))
+        if bends or not parameters.get("tram"):
+            fact = "bends" if bends else "has no track"
             raise errors.ConfigError(
                 f"{where}.road: '{self.road}' {fact}; expected a straight road with tram: true"
             )

@@ -24,7 +24,7 @@ _SHAPE, _JUNCTION, _ROUNDABOUT, _PARKING = (
 )
 _FIELDS: dict[str, object] = {
     "length_m": 150.0, "curvature_per_m": 0.0, "side": 1.0, "inner_m": 8.0, "depth_m": 80.0,
-    "crops": "maize_wheat_meadow", "seed": 0,
+    "crops": "maize_wheat_meadow", "seed": 0, "bends": (),
 }  # fmt: skip
 """Fields of ``roads.fields_shape.FieldsShape``, which needs no import of numpy here."""
 _LOOKS: dict[str, object] = {

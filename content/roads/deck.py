@@ -9,13 +9,15 @@ import numpy as np
 
 from gen_data.content.procedural.patches import Array, Patch
 from gen_data.content.roads import lane_textures, painted_signs, road_materials
+from gen_data.roads.cross_section import RoadShape
 from gen_data.roads.reference_line import ReferenceLine
 
 PAINT_LIFT_M = 0.003
 SAGITTA_M = 0.008
 """How far a chord of the mesh may stray from the curve."""
 ROW_M = 12.0
-"""Distance of the rows of straight roads: tiles of ``lane_textures`` end at rows."""
+"""Distance of the rows of straight roads, which bends divide: tiles of ``lane_textures`` end at
+rows."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -26,7 +28,7 @@ class Deck:
         line: The reference line.
         t_m: Distances to the left of it, rising, shape [k].
         z_m: Heights at them, shape [k].
-        bend_per_m: Largest curvature of the line.
+        rows_m: Arc lengths of the rows of its mesh, rising.
         slots: Number of each material slot by name.
 
     Rows of the mesh lie at the same arc lengths for all strips and patches, so that neighbours
@@ -36,7 +38,7 @@ class Deck:
     line: ReferenceLine
     t_m: Array
     z_m: Array
-    bend_per_m: float
+    rows_m: Array
     slots: dict[str, int]
 
     def at(self, s_m: Array, t_m: Array, lift_m: float = 0.0) -> Array:
@@ -47,13 +49,8 @@ class Deck:
 
     def rows(self, start_m: float, end_m: float) -> Array:
         """Arc lengths from start to end with the common rows between them."""
-        step = ROW_M
-        if self.bend_per_m > 0.0:
-            needed = math.sqrt(8.0 * SAGITTA_M / self.bend_per_m)
-            step = ROW_M / max(1, math.ceil(ROW_M / needed - 1e-9))
         # Rows next to an end would make slivers.
-        first, last = math.floor((start_m + 0.02) / step) + 1, math.ceil((end_m - 0.02) / step)
-        inside = step * np.arange(first, last)
+        inside = self.rows_m[(self.rows_m > start_m + 0.02) & (self.rows_m < end_m - 0.02)]
         return np.concatenate([[start_m], inside, [end_m]])
 
     def columns_between(self, low_m: float, high_m: float) -> tuple[float, ...]:
@@ -160,6 +157,17 @@ class Deck:
         uvs = [np.stack([np.array([0.5, 0.5]), a, b]) for a, b in pairwise(uv)]
         slots = np.full(sides, self.slots[slot], dtype=np.int64)
         return Patch(np.stack(corners), np.stack(uvs), slots)
+
+
+def common_rows(shape: RoadShape) -> Array:
+    """Arc lengths of the rows of a road's mesh, closer to each other on its bends."""
+    rows = []
+    for start in np.arange(0.0, shape.length_m, ROW_M):
+        low, high = shape.curvature_range(float(start), float(start) + ROW_M)
+        needed = math.sqrt(8.0 * SAGITTA_M / max(-low, high, 1e-9))
+        count = max(1, math.ceil(ROW_M / needed - 1e-9))
+        rows.append(start + ROW_M / count * np.arange(count))
+    return np.concatenate(rows)
 
 
 def surface(points: Array, plan_m: Array, slot: str, number: int) -> Patch:

@@ -12,6 +12,7 @@ from gen_data.content.roads import deck, lane_textures
 from gen_data.content.roads.crop_textures import CROP_TILE_M, CROPS, STAND_TILE_M
 from gen_data.core.asset_types import Material
 from gen_data.core.variant_rng import VariantRng, variant_rng
+from gen_data.roads.alignment import curvature_range
 from gen_data.roads.fields_shape import TRACK_M, FieldsShape, Parcel
 
 HEIGHTS_M = {"maize": 2.3, "wheat": 0.82, "rape": 1.4}
@@ -104,7 +105,8 @@ def _cover(
 
 def _rows(plan: FieldsShape, parcel: Parcel) -> Array:
     """Arc lengths of the mesh's rows: two on straight roads."""
-    bend = abs(plan.curvature_per_m)
+    low, high = curvature_range(plan.curvature_per_m, plan.bends, parcel.start_m, parcel.end_m)
+    bend = max(-low, high)
     step = math.sqrt(8.0 * 0.05 / bend) if bend else math.inf
     count = max(1, math.ceil((parcel.end_m - parcel.start_m) / step))
     return np.linspace(parcel.start_m, parcel.end_m, count + 1)

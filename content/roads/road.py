@@ -10,11 +10,12 @@ from gen_data.assets.family import Solid, check_option
 from gen_data.content.procedural.patches import Array, Patch
 from gen_data.content.procedural.surface_shapes import block
 from gen_data.content.roads import road_materials
-from gen_data.content.roads.deck import PAINT_LIFT_M, Deck, surface
+from gen_data.content.roads.deck import PAINT_LIFT_M, Deck, common_rows, surface
 from gen_data.content.roads.markings import ZEBRA_BAR_M, bay_lines, paint_stripe, stripes
 from gen_data.content.roads.painted_signs import ARROW_M, arrow, bicycle, hatching
 from gen_data.content.roads.road_wear import gutters, lane_tiles, wear_patches
 from gen_data.core.variant_rng import VariantRng, variant_rng
+from gen_data.roads.alignment import unpack
 from gen_data.roads.cross_section import (
     APRON_DROPS,
     APRON_FALL_M,
@@ -52,7 +53,7 @@ def road(  # noqa: PLR0913 - a family's parameters are its function's
         dash_m: Length of dashes and of the gaps between them.
         line_m: Width of narrow lines.
         apron_m: Width of the land beside it; 0 = none.
-        rails: Whether there are guard rails, left and right.
+        rails: Guard rails, left and right: 0 = none, 1 = along the road, 2 = outside of bends.
         arrows: Whether lanes that lead to its start and to its end have arrows.
         tram: Whether the lanes next to the middle have the rails of a tramway.
         others: Fields of ``StreetLook`` and of ``RoadShape``.
@@ -79,8 +80,8 @@ def road(  # noqa: PLR0913 - a family's parameters are its function's
         for strip in strips(profile, side) if paved else ():
             if strip.kind == "parking":
                 patches += bay_lines(deck, strip, profile)
-        if rails[0 if side > 0 else 1]:
-            patches += _guard_rail(deck, profile, side)
+        for span in _railed(profile, side, rails[0 if side > 0 else 1]):
+            patches += _guard_rail(deck, profile, side, span)
     return road_materials.make_street_solid(patches, look, _hulls(deck, profile))
 
 
@@ -93,9 +94,7 @@ def make_deck(profile: RoadShape, look: road_materials.StreetLook) -> Deck:
             if strip.kind == "driving":
                 for track in (strip.middle_m - _TRACK_M, strip.middle_m + _TRACK_M):
                     z = z - look.wear * _RUT_M * np.exp(-(((t - track) / _RUT_WIDTH_M) ** 2))
-    return Deck(
-        profile.line(), t, z, abs(profile.curvature_per_m), road_materials.number_slots(look)
-    )
+    return Deck(profile.line(), t, z, common_rows(profile), road_materials.number_slots(look))
 
 
 def _columns(profile: RoadShape) -> Iterator[float]:
@@ -316,7 +315,18 @@ def _covers(deck: Deck, profile: RoadShape, rng: VariantRng) -> Iterator[Patch]:
                 s += rng.between(25.0, 60.0)
 
 
-def _guard_rail(deck: Deck, profile: RoadShape, side: int) -> Iterator[Patch]:
+def _railed(profile: RoadShape, side: int, rails: float) -> Iterator[tuple[float, float]]:
+    """Spans of the road with a guard rail on one side."""
+    if rails == 1.0:
+        yield (0.0, profile.length_m)
+    for start, spiral, arc, curvature in unpack(profile.bends) if rails == 2.0 else ():
+        if side * curvature < 0.0:
+            yield (start, start + 2.0 * spiral + arc)
+
+
+def _guard_rail(
+    deck: Deck, profile: RoadShape, side: int, span_m: tuple[float, float]
+) -> Iterator[Patch]:
     """A W-beam 0.75 m high on posts every 4 m, half a metre beyond the carriageway.
 
     The usual size of EN 1317 systems such as ESP 4.0.
@@ -325,14 +335,14 @@ def _guard_rail(deck: Deck, profile: RoadShape, side: int) -> Iterator[Patch]:
     base = float(np.interp(t, deck.t_m, deck.z_m))
     depths = np.array([0.0, 0.08, 0.08, 0.0, 0.08, 0.08, 0.0]) - 0.08
     heights = base + 0.44 + np.array([0.0, 0.05, 0.11, 0.155, 0.2, 0.26, 0.31])
-    s = deck.rows(0.0, profile.length_m)
+    s = deck.rows(*span_m)
     flat = [deck.line.points(s, np.full(len(s), t + side * d)) for d in depths]
     points = np.stack(
         [np.column_stack([f, np.full(len(s), z)]) for f, z in zip(flat, heights, strict=True)],
         axis=1,
     )
     yield surface(points, np.zeros((*points.shape[:2], 2)), "steel", deck.slots["steel"])
-    for station in np.arange(1.0, profile.length_m, 4.0):
+    for station in np.arange(span_m[0] + 1.0, span_m[1], 4.0):
         heading = deck.line.poses(np.array([station]))[0, 2]
         post = block((-0.03, -0.05, base - 0.1), (0.03, 0.05, base + 0.74), 0.0, 0)
         foot = deck.line.points(np.array([station]), np.array([t + side * 0.06]))[0]

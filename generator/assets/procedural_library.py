@@ -282,11 +282,14 @@ def _merge_arguments(
 
 
 def _check_type(asset_id: AssetId, key: str, value: ParameterValue, default: Any) -> ParameterValue:
-    """Check that a value has the default's type; convert integers to float where needed."""
+    """Check that a value has the default's type; convert integers to float where needed.
+
+    A default without numbers stands for any number of them.
+    """
     if key == "seed" and not (isinstance(value, int) and 0 <= value <= _MAX_SEED):
         raise AssetError(f"asset '{asset_id}': seed is not an integer from 0 to {_MAX_SEED}")
     if isinstance(default, tuple):
-        if isinstance(value, tuple) and len(value) == len(default):
+        if isinstance(value, tuple) and (not default or len(value) == len(default)):
             return value
         raise AssetError(
             f"asset '{asset_id}': {key} expects {len(default)} comma-separated numbers"

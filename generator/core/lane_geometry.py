@@ -126,8 +126,8 @@ def border_line(lane: Lane, side: Side) -> tuple[Vec3, ...]:
     sign = 1.0 if side == "left" else -1.0
     center = np.asarray(lane.center_m, dtype=np.float64)
     half_m = 0.5 * lane.width_m * sign
-    lift = np.array([0.0, 0.0, lane.bank * half_m])
-    points = center + half_m * left_normals(center) + lift
+    points = center + half_m * left_normals(center)
+    points[:, 2] += half_m * np.asarray(lane.banks or lane.bank)
     return tuple((float(x), float(y), float(z)) for x, y, z in np.round(points, 6) + 0.0)
 
 

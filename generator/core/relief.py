@@ -6,7 +6,7 @@ all layers of a street, such as asphalt and paint, follow the same planes; no cr
 layer sinks into another one.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields
 from functools import lru_cache
 
@@ -25,6 +25,9 @@ _REACH_M = 160.0
 """Distance from all roads beyond which the ground has the height of its rim."""
 _SOFT_M2 = 0.25
 """Squared distance at which the weight of a road falls to a quarter."""
+_INSIDE = (0.4, 0.9)
+"""Distances, in radii of a bend, between which the land inside it takes its height from all of the
+road instead of the nearest point."""
 _BANK_M, _SHOULDER_M = 25.0, 70.0
 """Next to a road, the land bends to its slope over the first distance, and back to level from there
 to the second one."""
@@ -45,6 +48,9 @@ class RoadProfile:
         grade: Rise per metre at its start.
         curves: Three vertical curves, in order, each ``start_m, length_m, change``: parabolas
             along which the grade changes by so much.
+        bends: Of its reference line in plan, in order, each ``start_m, spiral_m, arc_m,
+            curvature_per_m, bank``: between two clothoids, an arc, in which the road slopes down to
+            the inside by ``bank``.
     """
 
     x_m: float
@@ -58,6 +64,7 @@ class RoadProfile:
     start_m: float
     grade: float
     curves: tuple[float, float, float, float, float, float, float, float, float]
+    bends: tuple[float, ...] = ()
 
     def height(self, s_m: Array) -> Array:
         """Heights [n] at arc lengths [n] of the reference line, constant beyond its ends.
@@ -82,34 +89,112 @@ class RoadProfile:
 
     def line(self) -> Array:
         """Points [n, 2] of its reference line, a few metres apart."""
-        s = np.linspace(0.0, self.length_m, 2 + int(self.length_m / CELL_M))
-        turn = self.curvature_per_m * s
-        chord = s * np.sinc(turn / (2.0 * np.pi))
-        heading = self.yaw_rad + 0.5 * turn
-        return np.column_stack(
-            [self.x_m + chord * np.cos(heading), self.y_m + chord * np.sin(heading)]
-        )
+        return self._stations()[:, 1:3]
 
     def weigh(self, x_m: Array, y_m: Array) -> tuple[Array, Array]:
-        """Its heights at places [n], and their weights, which fall with the distance from it."""
-        s, t = self._along_and_left(x_m, y_m)
+        """Its heights at places [m, n], and their weights, which fall with the distance from it."""
+        s, t, far_m = self._along_and_left(x_m, y_m)
         beyond = s - np.clip(s, 0.0, self.length_m)
         aside = np.maximum(np.abs(t) - self.half_width_m, 0.0)
-        rise = np.where(t > 0.0, self.left, self.right)
-        bank = _bend(aside, _BANK_M) - _bend(aside - _BANK_M, _SHOULDER_M - _BANK_M)
         weight = 1.0 / np.square(beyond * beyond + aside * aside + _SOFT_M2)
-        return self.height(s) + rise * bank, weight
+        height = self.height(s) + self._bank(s, t) + self._land(t)
+        if far_m is not None:
+            # Where legs of the road are equally near, the nearest one would change at a step.
+            first, last = self._inside_m()
+            share = np.clip((np.abs(t) - first) / (last - first), 0.0, 1.0)
+            share = share * share * (3.0 - 2.0 * share)
+            height = (1.0 - share) * height + share * far_m
+        return height, weight
 
-    def _along_and_left(self, x_m: Array, y_m: Array) -> tuple[Array, Array]:
-        """Arc lengths and distances to the left of the nearest points of the line."""
+    def _land(self, t_m: Array) -> Array:
+        """Rise of the land above the road at distances to its left."""
+        aside = np.maximum(np.abs(t_m) - self.half_width_m, 0.0)
+        rise = np.where(t_m > 0.0, self.left, self.right)
+        land: Array = rise * (_bend(aside, _BANK_M) - _bend(aside - _BANK_M, _SHOULDER_M - _BANK_M))
+        return land
+
+    def _bank(self, s_m: Array, t_m: Array) -> Array:
+        """Rise above the reference line by superelevation, which grows along the clothoids."""
+        across = np.clip(t_m, -self.half_width_m, self.half_width_m)
+        slope = np.zeros(np.shape(s_m))
+        for start, spiral, arc, curvature, bank in self._turns():
+            ends = (start, start + spiral, start + spiral + arc, start + 2.0 * spiral + arc)
+            slope = slope - np.sign(curvature) * bank * np.interp(s_m, ends, (0.0, 1.0, 1.0, 0.0))
+        rise: Array = slope * across
+        return rise
+
+    def _turns(self) -> Iterator[tuple[float, float, float, float, float]]:
+        return zip(*(self.bends[k::5] for k in range(5)), strict=True)
+
+    def _inside_m(self) -> tuple[float, float]:
+        """Distances from the line between which the land inside its sharpest bend is blended."""
+        sharpest = max(abs(self.curvature_per_m + k) for _, _, _, k, _ in self._turns())
+        # Next to the road, its own profile decides even in bends that are hardly wider.
+        first = max(_INSIDE[0] / sharpest, self.half_width_m)
+        return first, max(_INSIDE[1] / sharpest, first + CELL_M)
+
+    def _heading(self, s_m: Array) -> Array:
+        heading: Array = self.yaw_rad + self.curvature_per_m * s_m
+        for start, spiral, arc, curvature, _ in self._turns():
+            ramp = _bend(s_m - start, spiral) - _bend(s_m - start - spiral - arc, spiral)
+            heading = heading + curvature * ramp
+        return heading
+
+    def _stations(self) -> Array:
+        """Arc lengths, points, headings and curvatures [n, 5] of its reference line."""
+        s = np.linspace(0.0, self.length_m, 2 + int(self.length_m / CELL_M))
+        if not self.bends:
+            turn = self.curvature_per_m * s
+            chord = s * np.sinc(turn / (2.0 * np.pi))
+            heading = self.yaw_rad + 0.5 * turn
+            x, y = self.x_m + chord * np.cos(heading), self.y_m + chord * np.sin(heading)
+        else:
+            x, y = (
+                start + np.concatenate([[0.0], np.cumsum(_simpson(of, self._heading, s))])
+                for start, of in ((self.x_m, np.cos), (self.y_m, np.sin))
+            )
+        step = 0.5
+        bent = (self._heading(s + step) - self._heading(s - step)) / (2.0 * step)
+        return np.column_stack([s, x, y, self._heading(s), bent])
+
+    def _along_and_left(self, x_m: Array, y_m: Array) -> tuple[Array, Array, Array | None]:
+        """Arc lengths and distances to the left of the nearest points of the line.
+
+        With bends also the smooth height of land far from the line, by Shepard's weights.
+        """
+        if self.bends:
+            return self._near_bends(x_m, y_m)
         c, s = np.cos(self.yaw_rad), np.sin(self.yaw_rad)
         u = c * (x_m - self.x_m) + s * (y_m - self.y_m)
         v = c * (y_m - self.y_m) - s * (x_m - self.x_m)
         if self.curvature_per_m == 0.0:
-            return u, v
+            return u, v, None
         side, radius = np.sign(self.curvature_per_m), 1.0 / abs(self.curvature_per_m)
         along = radius * np.arctan2(u, radius - side * v)
-        return along, side * (radius - np.hypot(u, radius - side * v))
+        return along, side * (radius - np.hypot(u, radius - side * v)), None
+
+    def _near_bends(self, x_m: Array, y_m: Array) -> tuple[Array, Array, Array]:
+        stations = self._stations()
+        best, nearest = np.full(x_m.shape, np.inf), np.zeros(x_m.shape, np.int64)
+        total, heights = np.zeros(x_m.shape), np.zeros(x_m.shape)
+        z = self.height(stations[:, 0])
+        for number, (_, x, y, heading, _) in enumerate(stations):
+            dx, dy = x_m - x, y_m - y
+            square = dx * dx + dy * dy
+            nearest = np.where(square < best, number, nearest)
+            best = np.minimum(square, best)
+            weight = 1.0 / np.square(square + CELL_M * CELL_M)
+            total += weight
+            heights += weight * (
+                z[number] + self._land(np.cos(heading) * dy - np.sin(heading) * dx)
+            )
+        at, x, y, heading, bent = np.moveaxis(stations[nearest], -1, 0)
+        c, s = np.cos(heading), np.sin(heading)
+        u, v = c * (x_m - x) + s * (y_m - y), c * (y_m - y) - s * (x_m - x)
+        # The line near a station is its arc of curvature.
+        side, radius = np.where(bent < 0.0, -1.0, 1.0), 1.0 / np.maximum(np.abs(bent), 1e-7)
+        along = at + radius * np.arctan2(u, radius - side * v)
+        return along, side * (radius - np.hypot(u, radius - side * v)), heights / total
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,23 +235,39 @@ class Relief:
         return blended
 
     def numbers(self) -> tuple[float, ...]:
-        """All values in a row, for ids of assets."""
-        return tuple(
-            float(number)
-            for road in self.roads
-            for field in fields(road)
-            for number in np.atleast_1d(getattr(road, field.name))
-        )
+        """All values in a row, for ids of assets; before its bends each road has their number."""
+        rows = []
+        for road in self.roads:
+            *plain, curves, bends = (getattr(road, field.name) for field in fields(road))
+            rows += [*plain, *curves, len(bends) // 5, *bends]
+        return tuple(float(number) for number in rows)
 
     @classmethod
     def of(cls, numbers: Sequence[float]) -> "Relief":
         """The inverse of ``numbers``. Raises ValueError if they are of another number."""
-        plain = len(fields(RoadProfile)) - 1
-        each = plain + 9
-        if not numbers or len(numbers) % each:
-            raise ValueError(f"{len(numbers)} numbers are no relief; expected {each} per road")
-        rows = [tuple(numbers[k : k + each]) for k in range(0, len(numbers), each)]
-        return cls(tuple(RoadProfile(*row[:plain], row[plain:]) for row in rows))  # type: ignore[call-arg, arg-type]
+        plain = len(fields(RoadProfile)) - 2
+        roads, at = [], 0
+        while at + plain + 9 < len(numbers):
+            bends = at + plain + 10
+            end = bends + 5 * int(numbers[bends - 1])
+            curves, row = numbers[at + plain : bends - 1], numbers[bends:end]
+            roads.append(RoadProfile(*numbers[at : at + plain], tuple(curves), tuple(row)))  # type: ignore[call-arg, arg-type]
+            at = end
+        if not roads or at != len(numbers):
+            raise ValueError(
+                f"{len(numbers)} numbers are no relief; expected {plain + 10} per road, the last "
+                "of them that of its bends, and 5 per bend"
+            )
+        return cls(tuple(roads))
+
+
+def _simpson(of: Callable[[Array], Array], angle: Callable[[Array], Array], s_m: Array) -> Array:
+    """Integrals [n - 1] of a function of an angle between arc lengths [n]."""
+    a, b = s_m[:-1], s_m[1:]
+    quarters = [of(angle(a + share * (b - a))) for share in (0.0, 0.25, 0.5, 0.75, 1.0)]
+    weights = (1.0, 4.0, 2.0, 4.0, 1.0)
+    pieces: Array = (b - a) / 12.0 * sum(w * q for w, q in zip(weights, quarters, strict=True))
+    return pieces
 
 
 def _bend(past_m: Array, length_m: float) -> Array:

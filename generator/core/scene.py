@@ -173,6 +173,7 @@ class Lane:
         speed_m_s: Usual speed; 0 = for standing objects.
         junction: Whether it crosses a junction, where nothing may stop.
         bank: Rise from its right to its left side, per metre of width.
+        banks: The same at each point, where it changes along the lane; empty = ``bank``.
     """
 
     name: str
@@ -186,6 +187,7 @@ class Lane:
     speed_m_s: float = 0.0
     junction: bool = False
     bank: float = 0.0
+    banks: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -46,6 +46,8 @@ are narrower than the building by the third."""
 _CONCRETE = asset_types.Material((0.36, 0.35, 0.33), 0.9, role="facade")
 _TURN = 5e-4
 """Points of a lane are kept where its grade has changed by this much since the last one."""
+_TWIST = 1e-3
+"""Cross slopes of a lane that change by less than this are one."""
 _FLYING = frozenset({"drone", "gimbal"})
 _HOUSES = frozenset({"building", "garage"})
 
@@ -318,14 +320,25 @@ def _lifted_lane(lane: Lane, relief: Relief) -> Lane:
     points[:, 2] += relief.height(points)
     rise = relief.height(points + half) - relief.height(points - half)
     bank = lane.bank + float(rise.mean()) / across_m
+    banks = lane.bank + rise / across_m
+    is_twisted = np.ptp(banks) > _TWIST
     steps = np.diff(points, axis=0)
     grades = steps[:, 2] / np.hypot(steps[:, 0], steps[:, 1])
     turned = np.floor(np.concatenate([[0.0], np.cumsum(np.abs(np.diff(grades)))]) / _TURN)
     given[1:-1] |= np.diff(turned) > 0.0
+    if is_twisted:
+        twisted = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(banks)))])
+        given[1:] |= np.diff(np.floor(twisted / _TURN)) > 0.0
     center = [
         (round(float(x), 6), round(float(y), 6), round(float(z), 6)) for x, y, z in points[given]
     ]
-    return replace(lane, center_m=tuple(center), bank=round(bank, 9) + 0.0)
+    given_banks = np.round(banks[given], 9) + 0.0
+    return replace(
+        lane,
+        center_m=tuple(center),
+        bank=round(bank, 9) + 0.0,
+        banks=tuple(given_banks.tolist()) if is_twisted else (),
+    )
 
 
 def _refined(points: Array) -> tuple[Array, NDArray[np.bool_]]:

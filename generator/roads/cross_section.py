@@ -10,7 +10,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from gen_data.roads.reference_line import Array, ReferenceLine, bend_line
+from gen_data.roads.alignment import bent_line, curvature_range
+from gen_data.roads.reference_line import Array, ReferenceLine
 
 StripKind = Literal[
     "median", "driving", "bicycle", "shoulder", "parking", "kerb", "verge", "sidewalk", "garden"
@@ -47,6 +48,7 @@ class RoadShape:
         traffic: Side on which vehicles drive, ``right`` or ``left``.
         turn_m: Lengths of the lanes in the median for those who turn across, at the start and at
             the end; 0 = none. With such a lane, the rest of the median is a blocked area.
+        bends: Numbers of ``alignment.Bend``, one bend after the other.
     """
 
     length_m: float = 100.0
@@ -60,16 +62,21 @@ class RoadShape:
     verge_m: Pair = (0.0, 0.0)
     sidewalk_m: Pair = (2.5, 2.5)
     curvature_per_m: float = 0.0
-    crown: float = 0.02
+    crown: float = 0.025
     traffic: str = "right"
     setback_m: Pair = (0.0, 0.0)
     median_kerb_m: float = 0.0
     bay_angle_deg: Pair = (0.0, 0.0)
     turn_m: Pair = (0.0, 0.0)
+    bends: tuple[float, ...] = ()
 
     def line(self) -> ReferenceLine:
         """Reference line, from the origin along +X."""
-        return bend_line(self.length_m, self.curvature_per_m)
+        return bent_line(self.length_m, self.curvature_per_m, self.bends)
+
+    def curvature_range(self, start_m: float, end_m: float) -> Pair:
+        """Least and largest curvature of the reference line between two arc lengths."""
+        return curvature_range(self.curvature_per_m, self.bends, start_m, end_m)
 
     def lanes_on(self, side: int) -> int:
         """Number of driving lanes left (+1) or right (-1) of the middle."""

@@ -6,7 +6,8 @@ import numpy as np
 
 from gen_data.core.se3 import Array
 from gen_data.core.variant_rng import variant_rng
-from gen_data.roads.reference_line import ReferenceLine, bend_line
+from gen_data.roads.alignment import bent_line
+from gen_data.roads.reference_line import ReferenceLine
 
 TRACK_M = 3.0
 
@@ -32,7 +33,7 @@ class FieldsShape:
     """Fields on one side of a road.
 
     Attributes:
-        length_m, curvature_per_m: The road's reference line.
+        length_m, curvature_per_m, bends: The road's reference line.
         side: 1 = left, -1 = right.
         inner_m: Distance from the reference line to their edge.
         depth_m: Width across the road.
@@ -47,10 +48,11 @@ class FieldsShape:
     depth_m: float = 80.0
     crops: str = "maize_wheat_meadow"
     seed: int = 0
+    bends: tuple[float, ...] = ()
 
     def line(self) -> ReferenceLine:
         """Reference line of the road."""
-        return bend_line(self.length_m, self.curvature_per_m)
+        return bent_line(self.length_m, self.curvature_per_m, self.bends)
 
     def parcels(self) -> tuple[Parcel, ...]:
         """Parcels from the road's start to its end; tracks of 3 m or nothing lie between them."""

@@ -152,7 +152,7 @@ class JunctionShape(ArmsShape):
     sidewalk_m: float = 2.5
     beside_m: float = 0.0
     radius_m: float = 7.0
-    crown: float = 0.02
+    crown: float = 0.025
     traffic: str = "right"
     setback_m: float = 0.0
     median_m: float = 0.0

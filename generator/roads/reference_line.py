@@ -151,11 +151,6 @@ class ReferenceLine:
         return np.stack([x - t_m * np.sin(heading), y + t_m * np.cos(heading)], axis=1)
 
 
-def bend_line(length_m: float, curvature_per_m: float) -> ReferenceLine:
-    """An arc (or, without curvature, a straight line) from the origin along +X."""
-    return ReferenceLine((Placed(0.0, 0.0, 0.0, 0.0, Arc(length_m, curvature_per_m)),))
-
-
 def cubic(coefficients: Sequence[float], x: Array) -> Array:
     """``a + b x + c x^2 + d x^3``."""
     a, b, c, d = coefficients

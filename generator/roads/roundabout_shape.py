@@ -35,7 +35,7 @@ class RoundaboutShape(ArmsShape):
     sidewalk_m: float = 2.5
     beside_m: float = 0.0
     radius_m: float = 12.0
-    crown: float = 0.02
+    crown: float = 0.025
     traffic: str = "right"
     diameter_m: float = 30.0
     ring_m: float = 7.0

@@ -27,6 +27,7 @@ class SimulatedMotion:
         axle_m: Middles of the rear axles on the ground [t, n, 3].
         ahead: Directions of vehicles [t, n, 2].
         rise: Height of the ground at the front axle above that at the rear axle [t, n].
+        bank: Rise of the lane to its left per metre [t, n].
         station_m: Stations of rear axles on their routes [t', n].
         speed_m_s, acceleration_m_s2: Motion of vehicles along their routes [t', n].
         feet_m: Positions of pedestrians on the ground [t, p, 3].
@@ -38,6 +39,7 @@ class SimulatedMotion:
     axle_m: Array
     ahead: Array
     rise: Array
+    bank: Array
     station_m: Array
     speed_m_s: Array
     acceleration_m_s2: Array
@@ -101,31 +103,31 @@ def _collect_motion(
     if fleet is None:
         none = np.zeros((len(people), 0))
         station = speed = acceleration = none
-        knots, rise = len(none[kept]), none[kept]
+        knots, rise, bank = len(none[kept]), none[kept], none[kept]
         axle, ahead = np.zeros((knots, 0, 3)), np.zeros((knots, 0, 2))
     else:
         station, speed, acceleration = (np.stack(column) for column in zip(*cars, strict=True))
-        axle, ahead, rise = _vehicle_poses(fleet, station[kept])
+        axle, ahead, rise, bank = _vehicle_poses(fleet, station[kept])
     return SimulatedMotion(
-        axle, ahead, rise, station, speed, acceleration, feet, look[kept], walked, pace
+        axle, ahead, rise, bank, station, speed, acceleration, feet, look[kept], walked, pace
     )
 
 
-def _vehicle_poses(fleet: vehicles.Vehicles, station_m: Array) -> tuple[Array, Array, Array]:
-    """Compute rear axles [t, n, 3], directions [t, n, 2] and rises [t, n] at stations [t, n]."""
+def _vehicle_poses(fleet: vehicles.Vehicles, station_m: Array) -> tuple[Array, Array, Array, Array]:
+    """Compute rear axles [t, n, 3], directions [t, n, 2], rises and banks at stations [t, n]."""
     along = (station_m - fleet.first_m) / lane_routes.STATION_M
     xy, ahead = fleet.courses.poses(along)
-    low, high = _interpolate(fleet.height_m, along)
-    return np.concatenate([xy, low[..., None]], axis=2), ahead, high - low
+    low, high, bank = _interpolate(np.dstack([fleet.height_m, fleet.bank]), along)
+    return np.concatenate([xy, low[..., None]], axis=2), ahead, high - low, bank
 
 
-def _interpolate(values: Array, along: Array) -> tuple[Array, Array]:
-    """Interpolate two values per station [n, m, 2] at stations [t, n]."""
+def _interpolate(values: Array, along: Array) -> Array:
+    """Interpolate k values per station [n, m, k] at stations [t, n]: [k, t, n]."""
     k: NDArray[np.int64] = np.clip(along.astype(np.int64), 0, values.shape[1] - 2)
     f = np.clip(along - k, 0.0, 1.0)[..., None]
     rows = np.arange(len(values))
-    mixed = (1.0 - f) * values[rows, k] + f * values[rows, k + 1]
-    return mixed[..., 0], mixed[..., 1]
+    mixed: Array = (1.0 - f) * values[rows, k] + f * values[rows, k + 1]
+    return np.moveaxis(mixed, -1, 0)
 
 
 def first_overlap(
@@ -173,7 +175,12 @@ def _near_pairs(moving: Array, every: Array, reach_m: Array) -> list[tuple[int, 
 
 
 def make_upright_trajectories(
-    names: Sequence[str], ground_m: Array, ahead: Array, climb: Array, offsets_m: Sequence[Vec3]
+    names: Sequence[str],
+    ground_m: Array,
+    ahead: Array,
+    climb: Array,
+    offsets_m: Sequence[Vec3],
+    roll: Array | None = None,
 ) -> list[motion.Trajectory | None]:
     """Make trajectories of bodies on the ground; None for bodies that never move.
 
@@ -183,12 +190,16 @@ def make_upright_trajectories(
         ahead: Horizontal directions, unit [t, n, 2].
         climb: Sines of the upward pitch angles [t, n].
         offsets_m: Origin of each body [n], in a frame at that point with X ahead and Z up.
+        roll: Sines of the roll angles to the right [t, n]; None = no roll.
     """
-    quaternions = _quaternions(ahead, climb)
+    roll = np.zeros_like(climb) if roll is None else roll
+    quaternions = _rolled(_quaternions(ahead, climb), roll)
     level = np.sqrt(1.0 - climb * climb)[..., None]
     c, s = ahead[..., :1], ahead[..., 1:]
     rise = climb[..., None]
     x, y, z = np.asarray(offsets_m).reshape(-1, 3).T[:, None, :, None]
+    sine, cosine = roll[..., None], np.sqrt(1.0 - roll * roll)[..., None]
+    y, z = y * cosine - z * sine, y * sine + z * cosine
     origin = ground_m + np.concatenate(
         [
             x * c * level - y * s - z * c * rise,
@@ -217,6 +228,13 @@ def _quaternions(ahead: Array, climb: Array) -> Array:
     w, z = _half_angle(c, s)
     up_w, up_y = _half_angle(np.sqrt(1.0 - climb * climb), -climb)
     return np.stack([w * up_w, -z * up_y, w * up_y, z * up_w], axis=-1)
+
+
+def _rolled(quaternions: Array, roll: Array) -> Array:
+    """Quaternions [..., 4] after a roll about their own X axis, given by its sine."""
+    c, s = _half_angle(np.sqrt(1.0 - roll * roll), roll)
+    w, x, y, z = np.moveaxis(quaternions, -1, 0)
+    return np.stack([w * c - x * s, w * s + x * c, y * c + z * s, z * c - y * s], axis=-1)
 
 
 def _half_angle(c: Array, s: Array) -> tuple[Array, Array]:

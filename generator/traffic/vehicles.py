@@ -8,6 +8,7 @@ from itertools import permutations, takewhile
 import numpy as np
 
 from gen_data.core.boxes import rectangles_overlap
+from gen_data.core.scene import Lane
 from gen_data.core.se3 import Array
 from gen_data.traffic import idm, steering
 from gen_data.traffic.conflict_zones import Overlap, Zone, crosswalk_zones, find_overlaps, heading
@@ -91,6 +92,7 @@ class Vehicles:
         first_m: Station of the rear axle at time 0.
         allowed_m_s: Speed limits from lanes, bends and drivers [n, m].
         height_m: Height of the ground at the rear and the front axle [n, m, 2].
+        bank: Rise of the lane to its left per metre [n, m].
         offset_m: Offset from stations of vehicle j to stations of vehicle i [n, n].
         from_m, to_m: Stations of i between which j shares i's route [n, n].
         end_m: Station of the network's end, or of the first obstacle; ``inf`` = neither.
@@ -104,6 +106,7 @@ class Vehicles:
     courses: steering.Courses
     allowed_m_s: Array
     height_m: Array
+    bank: Array
     offset_m: Array
     from_m: Array
     to_m: Array
@@ -161,6 +164,7 @@ def make_vehicles(
         courses=courses,
         allowed_m_s=allowed,
         height_m=_heights(lines[..., 2], [v.wheelbase_m for v in vehicles], m),
+        bank=np.stack([_banks(graph, v, grid[:m]) for v in vehicles]),
         offset_m=offset,
         from_m=low,
         to_m=high,
@@ -187,6 +191,7 @@ def _followed_line(graph: LaneGraph, vehicle: Vehicle, grid: Array) -> Array:
     if vehicle.left_m:
         way = steering.normalize(np.gradient(points[:, :2], axis=0))
         points[:, :2] += vehicle.left_m * np.column_stack([-way[:, 1], way[:, 0]])
+        points[:, 2] += vehicle.left_m * _banks(graph, vehicle, grid)
     return points
 
 
@@ -228,10 +233,23 @@ def _free_station_m(vehicle: Vehicle, courses: steering.Courses, k: int, obstacl
 
 def _speed_limits(graph: LaneGraph, vehicle: Vehicle, grid: Array) -> Array:
     """Speed limits [m] from lanes and the driver."""
-    speeds = np.array([graph.lines[name].lane.speed_m_s for name in vehicle.route.lanes])
-    starts = np.array(vehicle.route.starts_m)
-    at = np.searchsorted(starts, vehicle.station_m + grid, side="right") - 1
-    return np.minimum(speeds[np.maximum(at, 0)] * vehicle.speed_factor, vehicle.speed_max_m_s)
+    speeds = np.array([lane.speed_m_s for lane in _lanes_along(graph, vehicle, grid)])
+    return np.minimum(speeds * vehicle.speed_factor, vehicle.speed_max_m_s)
+
+
+def _banks(graph: LaneGraph, vehicle: Vehicle, grid: Array) -> Array:
+    """Cross slopes [m] of its lanes, as between its axles: it turns over that length."""
+    banks = np.array([lane.bank for lane in _lanes_along(graph, vehicle, grid)])
+    count = 1 + 2 * round(0.5 * vehicle.wheelbase_m / STATION_M)
+    padded = np.pad(banks, (count // 2, count // 2), mode="edge")
+    means: Array = np.mean([padded[k : k + len(banks)] for k in range(count)], axis=0)
+    return means
+
+
+def _lanes_along(graph: LaneGraph, vehicle: Vehicle, grid: Array) -> list[Lane]:
+    """The lane at each of some distances from where it is at time 0."""
+    at = np.searchsorted(vehicle.route.starts_m, vehicle.station_m + grid, side="right") - 1
+    return [graph.lines[vehicle.route.lanes[k]].lane for k in np.maximum(at, 0)]
 
 
 def _drivers(vehicles: Sequence[Vehicle]) -> idm.Drivers:

@@ -66,6 +66,43 @@ def test_profile_follows_the_bend_of_its_road(curvature: float) -> None:
     np.testing.assert_allclose(Relief((road,)).height(points[inside]), 0.05 * s[inside], atol=0.012)
 
 
+S_CURVE = (10.0, 30.0, 30.0, 0.005, 0.05, 100.0, 30.0, 30.0, -0.005, 0.04)
+"""Two bends of R = 200 m: 30 m of clothoid, 30 m of arc, 30 m of clothoid; banks of 5 and 4 %."""
+
+
+@pytest.mark.parametrize("left_m", [0.0, 6.0, -6.0])
+def test_roads_follow_clothoids_and_slope_down_to_the_inside_of_arcs(left_m: float) -> None:
+    """Beside a line found by summing small steps: grade times arc length, and bank times distance.
+
+    Cells of 4 m bend the ground where clothoids begin: 6 m beside it, the grade changes by 1 %.
+    """
+    steps = 40_000
+    ds = 200.0 / steps
+    s = ds * (np.arange(steps) + 0.5)
+    knots = [10, 40, 70, 100, 100, 130, 160, 190]
+    curvature = np.interp(s, knots, [0, 0.005, 0.005, 0, 0, -0.005, -0.005, 0])
+    slope = np.interp(s, knots, [0, -0.05, -0.05, 0, 0, 0.04, 0.04, 0])
+    heading = 0.7 + np.cumsum(curvature) * ds
+    way = np.column_stack([np.cos(heading), np.sin(heading)])
+    places = np.cumsum(way, axis=0) * ds + left_m * np.column_stack([-way[:, 1], way[:, 0]])
+    road = RoadProfile(0.0, 0.0, 0.7, 0.0, 200.0, 14.0, 0.1, -0.1, 2.0, 0.05, NOTHING * 3, S_CURVE)
+    relief = Relief((road,))
+    inside = slice(1000, -1000, 200)
+    expected = 2.0 + 0.05 * s + slope * left_m
+    np.testing.assert_allclose(relief.height(places[inside]), expected[inside], atol=0.015)
+    assert Relief.of(relief.numbers()) == relief
+
+
+def test_land_inside_a_bend_has_no_step_where_both_legs_are_equally_near() -> None:
+    """A turn of 150 degrees on a grade of 10 %: legs differ by 10 m in height, cells by a slope."""
+    turn = (60.0, 10.0, 121.0, 0.02, 0.0)
+    road = RoadProfile(0.0, 0.0, 0.0, 0.0, 300.0, 12.0, 0.0, 0.0, 0.0, 0.1, NOTHING * 3, turn)
+    x, y = np.meshgrid(np.arange(60.0, 120.0, CELL_M), np.arange(10.0, 90.0, CELL_M))
+    ground = Relief((road,)).height(np.column_stack([x.ravel(), y.ravel()])).reshape(x.shape)
+    for axis in (0, 1):
+        assert np.abs(np.diff(ground, axis=axis)).max() < 0.5 * CELL_M
+
+
 def test_two_roads_keep_their_own_heights_where_they_do_not_meet() -> None:
     """On a road, another one 30 m away changes the height by less than a millimetre."""
     other = RoadProfile(
@@ -80,5 +117,5 @@ def test_numbers_of_a_relief_make_the_same_relief() -> None:
     """Asset ids hold them."""
     relief = Relief((CREST, CREST))
     assert Relief.of(relief.numbers()) == relief
-    with pytest.raises(ValueError, match="41 numbers are no relief"):
-        Relief.of((*relief.numbers(), *(0.0,) * (41 - len(relief.numbers()))))
+    with pytest.raises(ValueError, match="51 numbers are no relief"):
+        Relief.of((*relief.numbers(), *(0.0,) * (51 - len(relief.numbers()))))

@@ -13,20 +13,22 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from gen_data.assemble.config import load_config
 from gen_data.assemble.pipeline_factory import PipelineFactory, open_pipeline
-from gen_data.core import errors, interfaces, lane_geometry, scene_time, se3, serialization
+from gen_data.core import errors, lane_geometry, scene_time, se3, serialization
 from gen_data.core.capture import Channel
 from gen_data.core.sample import Sample
-from gen_data.core.scene import Instance, Scene
+from gen_data.core.scene import Scene
 from gen_data.pipeline import Pipeline
 from tests.embree import RayCaster
+from tests.street_ground import Street, wheels_m
 from tests.streets import thin_street
 
 STREET = (
-    "shared.district=residential", "shared.junction=none", "shared.curvature_per_m=0",
+    "shared.district=residential", "shared.junction=none", "shared.course=straight",
+    "shared.course_on=straight",
     "shared.landmark=none", "randomizers.parked.count=8", "randomizers.traffic.count=8",
     "randomizers.people.count=12", "sensors.color.size_px=[160, 96]",
 )  # fmt: skip
@@ -37,44 +39,6 @@ HILLS = (
     "randomizers.relief.side_slope={uniform: [-0.15, 0.15]}",
 )
 FLAT = ("relief",)
-
-
-class Street:
-    """A view of a street with its ground."""
-
-    def __init__(self, scene: Scene, assets: interfaces.AssetLibrary) -> None:
-        self.scene = scene
-        ground = [
-            b for b in self.scene.bodies
-            if b.instance_id == 0 and b.asset.partition("?")[0] in ("road", "junction", "ground")
-        ]  # fmt: skip
-        meshes = [assets.mesh(b.asset) for b in ground]
-        self._caster = RayCaster(*(
-            (b.T_world_body.apply(m.vertices_m.astype(np.float64)), m.faces)
-            for b, m in zip(ground, meshes, strict=True)
-        ))  # fmt: skip
-
-    @classmethod
-    def first(cls, pipeline: Pipeline) -> Street:
-        return cls(pipeline.drawn_view(pipeline.accepted_scene(0), 0).scene, pipeline.assets)
-
-    def ground_m(self, places_m: ArrayLike) -> NDArray[np.float64]:
-        """Height of the uppermost ground at places [n, 2 or more]."""
-        places = np.asarray(places_m, np.float64)
-        above = np.column_stack([places[:, :2], np.full(len(places), 60.0)])
-        return np.asarray(60.0 - self._caster.cast(above, (0.0, 0.0, -1.0)).distance, np.float64)
-
-    def vehicles(self) -> list[Instance]:
-        return [i for i in self.scene.instances if _wheels_m(i) is not None]
-
-
-def _wheels_m(instance: Instance) -> NDArray[np.float64] | None:
-    """Lowest points of four wheels in the world, [4, 3]; None for what has none."""
-    hubs = [k.position_m for k in instance.keypoints if k.name.startswith("wheel")]
-    if len(hubs) != 4:
-        return None
-    low = np.array([(x, y, instance.box_min_m[2]) for x, y, _ in hubs])
-    return instance.T_world_instance.apply(low)
 
 
 @pytest.fixture(scope="module")
@@ -139,7 +103,7 @@ def test_all_wheels_of_cars_stand_on_the_ground(streets: dict[str, Street], reli
     assert len(cars) >= 8
     assert {i.name for i in cars} == set(level)
     for car in cars:
-        before, after = _wheels_m(level[car.name]), _wheels_m(car)
+        before, after = wheels_m(level[car.name]), wheels_m(car)
         assert before is not None
         assert after is not None
         gap_m = after[:, 2] - on.ground_m(after)
@@ -317,7 +281,7 @@ def test_traffic_follows_the_ground_at_every_instant() -> None:
         scene = scene_time.scene_at(street.scene, float(time_s))
         moved = replace(scene, instances=scene.instances)
         for instance in moved.instances:
-            wheels = _wheels_m(instance)
+            wheels = wheels_m(instance)
             if wheels is None or instance.name not in names:
                 continue
             gap_m = wheels[:, 2] - street.ground_m(wheels)

@@ -159,6 +159,21 @@ def test_the_camera_rides_where_nothing_stands() -> None:
 TOWARDS = {"towards": "things", "towards_m": Constant(12.0)}
 
 
+def test_cameras_may_be_in_the_middle_of_a_turn() -> None:
+    """Three lanes of 40 m leave the end of a road of 40 m: half of the views are on one of them."""
+    road = Lane("in", "driving", ((0.0, 0.0, 0.0), (40.0, 0.0, 0.0)), 3.0)
+    ways = [
+        Lane(f"out{k}", "driving", ((40.0, 0.0, 0.0), (72.0, y, 0.0)), 3.0, junction=True)
+        for k, y in enumerate((-24.0, 24.0))
+    ] + [Lane("on", "driving", ((40.0, 0.0, 0.0), (80.0, 0.0, 0.0)), 3.0, junction=True)]
+    scene = replace(street(), lanes=(road, *ways))
+    for junctions, low, high in ((False, 0, 0), (True, 60, 140)):
+        rider = CameraOnLane(name="dash", ahead_m=0.0, junctions=junctions, lateral=Constant(0.0))
+        views = [rider(scene, FakeAssets(), rng_of(f"{k}")).camera("color") for k in range(200)]
+        beyond = sum(view.T_world_camera.translation_m[0] > 40.0 for view in views)
+        assert low <= beyond <= high
+
+
 def test_a_camera_is_as_far_before_a_member_of_the_group_as_drawn() -> None:
     """One brick on the verge: the cameras of both lanes have it 12 m ahead, to their side."""
     aimed = {"yaw_deg": Constant(0.0), **TOWARDS}

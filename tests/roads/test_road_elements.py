@@ -101,7 +101,7 @@ def test_cross_section_adds_up(library: Library) -> None:
     assert y_of("main/sidewalk_right") == pytest.approx(-(5.7 + 0.15 + 1.5 + 1.25))
     assert y_of("main/furniture_right") == pytest.approx(-(5.7 + 0.15 + 1.5 + 0.5))
     assert y_of("main/frontage_left") == pytest.approx(5.7 + 0.15 + 2.5)
-    assert lanes["main/forward0"].center_m[0][2] == pytest.approx(0.02 * 1.75)
+    assert lanes["main/forward0"].center_m[0][2] == pytest.approx(0.025 * 1.75)
     assert lanes["main/sidewalk_left"].center_m[0][2] == pytest.approx(0.12 + 0.025 * 1.25)
 
 
@@ -143,7 +143,7 @@ def test_kerbed_median_has_a_lane_for_plants(library: Library) -> None:
     lane = by_name(built(library, {**ROAD, **median}))["main/verge_median"]
 
     assert (lane.kind, lane.width_m) == ("verge", pytest.approx(2.7))
-    assert lane.center_m[0] == pytest.approx((0.0, 0.0, 0.02 * 3.5 + 0.12))
+    assert lane.center_m[0] == pytest.approx((0.0, 0.0, 0.025 * 3.5 + 0.12))
     assert "main/verge_median" not in by_name(built(library, {**ROAD, "median_m": 3.0}))
 
 
@@ -203,7 +203,7 @@ def test_crosswalk_spans_the_carriageway_at_its_station(library: Library) -> Non
     lane = by_name(built(library, ROAD, walk))["zebra/crosswalk"]
 
     assert lane.center_m[0] == pytest.approx((40.0, -3.5, 0.0))
-    assert lane.center_m[3] == pytest.approx((40.0, 0.0, 0.07))
+    assert lane.center_m[3] == pytest.approx((40.0, 0.0, 0.0875))
     assert lane.center_m[-1] == pytest.approx((40.0, 3.5, 0.0))
 
 

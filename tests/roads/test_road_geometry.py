@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 from scipy.special import fresnel
 
-from gen_data.roads import reference_line
+from gen_data.roads import alignment, reference_line
 
 CURVATURES = st.floats(-0.2, 0.2, allow_nan=False)
 
@@ -107,7 +107,7 @@ def test_pieces_follow_one_another() -> None:
 @given(st.floats(-0.05, 0.05), st.floats(-8.0, 8.0))
 def test_offset_is_measured_at_right_angles(curvature: float, t: float) -> None:
     """Points beside the line are |t| away from it, on the side of t's sign."""
-    line = reference_line.bend_line(30.0, curvature)
+    line = alignment.bent_line(30.0, curvature, ())
     s = np.array([12.0])
     x, y, heading = line.poses(s)[0]
     px, py = line.points(s, np.array([t]))[0]

@@ -63,7 +63,7 @@ def test_crown_and_kerb_have_their_heights() -> None:
     vertices = mesh_of("road", length_m=20.0, wear=0.0, apron_m=0.0).vertices_m
     of_asphalt = vertices[np.abs(vertices[:, 1]) < 1e-4]
 
-    assert of_asphalt[:, 2].min() == pytest.approx(0.07, abs=1e-5)
+    assert of_asphalt[:, 2].min() == pytest.approx(0.0875, abs=1e-5)
     assert vertices[:, 2].max() == pytest.approx(0.12 + 0.025 * 2.5, abs=1e-5)
 
 
@@ -93,7 +93,7 @@ def test_markings_lie_on_the_road() -> None:
     painted = [k for k, m in enumerate(mesh.materials) if m.role == "marking"]
     faces = mesh.faces[np.isin(mesh.face_slots, painted)]
     points = mesh.vertices_m[np.unique(faces)]
-    crown = 0.02 * (3.5 - np.abs(points[:, 1]))
+    crown = 0.025 * (3.5 - np.abs(points[:, 1]))
 
     assert (points[:, 2] - crown > -0.007).all()
     assert (points[:, 2] - crown < 0.004).all()
@@ -114,7 +114,7 @@ def test_junction_mouths_meet_the_roads() -> None:
     reach = shape.reach_m()
     at = np.array([[reach, 0.0], [0.0, reach], [reach, 1.75], [-reach, -3.5 + 1e-9]])
 
-    assert fan.height_m(at) == pytest.approx([0.07, 0.07, 0.035, 0.0], abs=1e-6)
+    assert fan.height_m(at) == pytest.approx([0.0875, 0.0875, 0.04375, 0.0], abs=1e-6)
     assert reach == pytest.approx(3.5 + 7.0 + 6.5)
 
 
@@ -256,7 +256,7 @@ def test_kerbed_median_stands_above_the_lanes() -> None:
     heights = height_m(shape, np.array([0.0, 1.3, 1.5, 5.0]))
 
     assert heights[0] == heights[1] == pytest.approx(heights[2] + 0.12)
-    assert (heights[2], heights[3]) == (pytest.approx(0.02 * 3.5), pytest.approx(0.0))
+    assert (heights[2], heights[3]) == (pytest.approx(0.025 * 3.5), pytest.approx(0.0))
 
 
 def test_roundabout_has_the_area_of_its_plan() -> None:

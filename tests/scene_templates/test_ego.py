@@ -8,9 +8,11 @@ from gen_data.assemble.config import load_config
 from gen_data.assets.library import Library
 from gen_data.core.errors import ConfigError
 from gen_data.core.scene import Scene
+from gen_data.randomizers.ego_on_lane import EgoOnLane
 from gen_data.scene_templates.builder import build_scene
 from gen_data.scene_templates.ego import Ego
 from gen_data.scene_templates.road import Road
+from tests.randomizers.doubles import rng_of
 
 
 def street(library: Library, ego: Ego) -> Scene:
@@ -56,3 +58,19 @@ def test_a_configuration_adds_an_element_that_its_template_lacks(tmp_path: Path)
     assert load_config(str(tmp_path / "more.yaml")).probes[0].elements[-1] == Ego(name="ego")
     with pytest.raises(ConfigError, match="the template has no element 'ego'"):
         load_config(str(tmp_path / "wrong.yaml"))
+
+
+@pytest.mark.parametrize(("after", "reached"), [("main", True), ("", False)])
+def test_the_ego_vehicle_starts_anywhere_with_enough_road_ahead(
+    library: Library, after: str, reached: bool
+) -> None:
+    """40 m before the end of a road, or nearer where another one goes on."""
+    on = [Road(name="on", after=after, length_m=80.0)] if after else []
+    main = Road(name="main", length_m=80.0, lanes=(0, 1))
+    scene = build_scene("test", [main, *on, Ego(name="ego", lane="main/forward0")], library)
+    start = EgoOnLane(name="start", ahead_m=40.0, roads=("main",))
+    places = [
+        start(scene, library, rng_of("start", scene=k)).rig_pose("ego").translation_m[0]
+        for k in range(25)
+    ]
+    assert (max(places) > 45.0) == reached
