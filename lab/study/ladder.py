@@ -14,8 +14,8 @@ import numpy as np
 import yaml
 
 from gen_data.api.config import load_config
-from gen_data.api.dataset import open_dataset
 from gen_data.api.generate import generate
+from gen_data.api.open_dataset import open_dataset
 from gen_data.config.yaml_scalars import to_flow_yaml
 from gen_data.core.errors import ConfigError, StorageError
 from gen_data.lab.study import study

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from gen_data.api.dataset import open_dataset
+from gen_data.api.open_dataset import open_dataset
 from gen_data.core.errors import ConfigError, StorageError
 from gen_data.lab.study import ladder as ladders
 
