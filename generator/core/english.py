@@ -73,6 +73,11 @@ def count(name: str, number: int) -> str:
     return f"{word} {plural(name)}"
 
 
-def join(names: Sequence[str]) -> str:
-    """An enumeration: "a", "a and b", "a, b and c"."""
-    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+def join(names: Sequence[str], word: str = "and") -> str:
+    """An enumeration: "a", "a and b", "a, b and c"; with another word than "and"."""
+    return f" {word} ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+
+
+def sentence(text: str) -> str:
+    """A text with a capital letter."""
+    return f"{text[0].upper()}{text[1:]}"
