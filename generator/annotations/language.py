@@ -21,6 +21,9 @@ from gen_data.core.interfaces import AssetLibrary
 from gen_data.core.sample import ImageTruth, ObjectTruth, Utterance, both_ways
 from gen_data.core.scene import Body, ObjectGroup, Scene
 
+TRIES = 3
+"""Groups of objects that are tried for each utterance of a kind: margins leave some out."""
+
 
 class Language(base_model.Strict):
     """Captions, relations, referring expressions, and questions with their answers.
@@ -73,7 +76,7 @@ class Language(base_model.Strict):
         present = {in_words(i.category) for i in scene.instances}
         edges = frozenset(both_ways(graph.relations or ()))
         placeable = _placeable(scene.groups, assets)
-        view = View(things, edges, present, placeable, scene, reading, assets)
+        view = View(things, edges, present, placeable, scene, reading, assets, TRIES * self.most)
         return replace(truth, utterances=tuple(self._utterances(view)))
 
     def _utterances(self, view: View) -> Iterator[Utterance]:

@@ -27,8 +27,6 @@ CONTACTS = ("inside", "on", "held_by")
 SIDES = ("left_of", "right_of")
 LARGER = 1.25
 """Smallest ratio of the diagonals of two boxes of which one object is called the larger."""
-PICKS_MAX = 96
-"""Groups of objects that a kind of question tries at most, before margins are compared."""
 DECIMALS = 6
 POINT = OrientedBox(SE3(), (0.0, 0.0, 0.0))
 UP = np.array([0.0, 0.0, 1.0])
@@ -82,6 +80,7 @@ class View:
         scene: At the image's instant.
         reading: With the channels INSTANCE and AMODAL.
         assets: Geometry.
+        tries: Groups of objects that a kind of question tries at most.
     """
 
     things: tuple[Thing, ...]
@@ -91,6 +90,7 @@ class View:
     scene: Scene
     reading: SensorReading
     assets: AssetLibrary
+    tries: int = 36
 
     @cached_property
     def by_id(self) -> Mapping[int, Thing]:
@@ -199,7 +199,7 @@ class View:
         choose = itertools.permutations if ordered else itertools.combinations
         groups = list(choose(self.sighted, size))
         groups.sort(key=lambda group: self.key(kind, *(t.instance_id for t, _ in group)))
-        return groups[:PICKS_MAX]
+        return groups[: self.tries]
 
     def asked(
         self, kind: str, forms: tuple[str, str], things: Sequence[Thing], words: Words, holds: bool
