@@ -36,6 +36,11 @@ def test_names_and_mappings_may_be_mixed(tmp_path: Path) -> None:
         ("[{type: bev_map, pxm: 0.5}]", r"annotations\[0\].pxm: unknown key .*'px_m'"),
         ("[{type: bev_map, px_m: -1}]", r"annotations\[0\].px_m: "),
         ("[{type: boxes2d, px_m: 1}]", r"annotations\[0\].px_m: unknown key"),
+        (
+            "[{type: language, kinds: [distanse]}]",
+            r"annotations\[0\].kinds: unknown kind 'distanse'; .*'distance'",
+        ),
+        ("[{type: language, kinds: []}]", r"annotations\[0\].kinds: "),
         ("[lanes, {type: lanes, far_m: 9}]", "the annotation 'lanes' is listed twice"),
         ("[{type: bev_mpa}]", "unknown annotation 'bev_mpa'; .*did you mean 'bev_map'"),
         ("[{px_m: 1}]", "unknown annotation"),

@@ -203,44 +203,47 @@ def _heights_m(thing: Thing) -> tuple[float, float]:
 
 
 def footprint(thing: Thing) -> se3.Array:
-    """Corners of the horizontal outline of a 3D box [m], counter-clockwise, [n, 2]."""
+    """Corners of the horizontal outline of a 3D box [m] in their order, [n, 2]."""
     import cv2
 
-    corners = thing.solid.corners()[:, :2].astype(np.float32)
-    hull = cv2.convexHull(corners, returnPoints=False)[::-1, 0]
-    return thing.solid.corners()[hull, :2]
+    corners = thing.solid.corners()[:, :2]
+    return corners[cv2.convexHull(corners.astype(np.float32), returnPoints=False)[:, 0]]
 
 
 def gap(a: se3.Array, b: se3.Array) -> tuple[float, se3.Array]:
-    """Distance of two convex outlines [m] and its direction, world; 0 if they overlap."""
-    best, across = math.inf, UP
-    inside = False
-    for points, ring in ((a, b), (b, a)):
-        starts, ends = ring, np.roll(ring, -1, axis=0)
-        edges = ends - starts
-        offsets = points[:, None] - starts
-        share = np.clip(
-            (offsets * edges).sum(-1) / np.maximum((edges * edges).sum(-1), 1e-18), 0.0, 1.0
-        )
-        away = offsets - share[..., None] * edges
-        lengths = np.hypot(away[..., 0], away[..., 1])
-        inside |= bool(
-            (edges[:, 0] * offsets[..., 1] >= edges[:, 1] * offsets[..., 0]).all(1).any()
-        )
-        k = np.unravel_index(int(lengths.argmin()), lengths.shape)
-        if lengths[k] < best:
-            best, across = float(lengths[k]), np.array([*away[k], 0.0])
-    return (0.0, UP) if inside or best == 0.0 else (best, across / best)
+    """Distance of two convex outlines [m] and its direction, world; 0 and up if they overlap."""
+    normals = np.concatenate([_normals(a), _normals(b)])
+    along_a, along_b = normals @ a.T, normals @ b.T
+    between = np.maximum(along_b.min(1) - along_a.max(1), along_a.min(1) - along_b.max(1))
+    if between.max() <= 0.0:
+        return 0.0, UP
+    away = np.concatenate([_from_edges(a, b), _from_edges(b, a)])
+    lengths = np.hypot(away[:, 0], away[:, 1])
+    k = int(lengths.argmin())
+    return float(lengths[k]), np.array([*away[k] / lengths[k], 0.0])
+
+
+def _from_edges(points: se3.Array, ring: se3.Array) -> se3.Array:
+    """Vectors from the nearest points of all edges of an outline to some points, [n, 2]."""
+    edges = np.roll(ring, -1, axis=0) - ring
+    offsets = points[:, None] - ring
+    share = (offsets * edges).sum(-1) / np.maximum((edges * edges).sum(-1), 1e-18)
+    away: se3.Array = offsets - np.clip(share, 0.0, 1.0)[..., None] * edges
+    return away.reshape(-1, 2)
+
+
+def _normals(ring: se3.Array) -> se3.Array:
+    """Unit normals of the edges of an outline, [n, 2]."""
+    edges = np.roll(ring, -1, axis=0) - ring
+    lengths = np.hypot(edges[:, 0], edges[:, 1])
+    normals: se3.Array = np.stack([-edges[:, 1], edges[:, 0]], axis=1)[lengths > 0.0]
+    return normals / lengths[lengths > 0.0, None]
 
 
 def least_width_m(ring: se3.Array) -> float:
     """Smallest distance of two parallel lines that enclose a convex outline [m]."""
-    edges = np.roll(ring, -1, axis=0) - ring
-    normals = np.stack([-edges[:, 1], edges[:, 0]], axis=1)
-    lengths = np.hypot(normals[:, 0], normals[:, 1])
-    normals = normals[lengths > 0.0] / lengths[lengths > 0.0, None]
-    spread = ring @ normals.T
-    return float((spread.max(0) - spread.min(0)).min())
+    along = ring @ _normals(ring).T
+    return float((along.max(0) - along.min(0)).min())
 
 
 def reach(view: View) -> Iterator[Utterance]:
