@@ -179,7 +179,7 @@ def unit(v: Any) -> Any:
 
 @dataclass(frozen=True)
 class Result:
-    """A recomputed answer; ``least`` is its resolution, ``holds`` whether the first form is true."""
+    """A recomputed answer; ``least`` is its resolution, ``holds`` if the first form is true."""
 
     numbers: tuple[float, ...]
     margin: float
