@@ -14,8 +14,6 @@ from gen_data.annotations.language import Language
 from gen_data.annotations.questions import instants, metres
 from gen_data.annotations.questions.resolution import sight
 from gen_data.annotations.questions.view import Thing, View
-from gen_data.assemble.config import load_config
-from gen_data.assemble.pipeline_factory import open_pipeline
 from gen_data.core import plugins
 from gen_data.core.boxes import BoxPx, OrientedBox
 from gen_data.core.capture import Channel, SensorReading
@@ -127,11 +125,9 @@ def test_the_narrowest_width_of_an_outline() -> None:
     assert metres.least_width_m(triangle) == pytest.approx(math.sqrt(0.75))
 
 
-def test_the_reach_of_a_panda_follows_from_its_dimensions() -> None:
+def test_the_reach_of_a_panda_follows_from_its_dimensions(library: Any) -> None:
     """By Franka Robotics' parameters: 0.333 m to the shoulder, then three links in one line."""
-    config = load_config("tabletop", overrides=("exporters=[]", "annotations=[]"))
-    with open_pipeline(config, frozenset()) as made:
-        found = metres.shoulder_and_reach("franka_panda", made.assets)
+    found = metres.shoulder_and_reach("franka_panda", library)
 
     links_m = (
         math.hypot(0.316, 0.0825), math.hypot(0.384, 0.0825), math.hypot(0.088, 0.107 + 0.1034),
