@@ -207,7 +207,8 @@ def footprint(thing: Thing) -> se3.Array:
     import cv2
 
     corners = thing.solid.corners()[:, :2]
-    return corners[cv2.convexHull(corners.astype(np.float32), returnPoints=False)[:, 0]]
+    hull = cv2.convexHull(corners.astype(np.float32), returnPoints=False)[:, 0]
+    return np.asarray(corners[hull])
 
 
 def gap(a: se3.Array, b: se3.Array) -> tuple[float, se3.Array]:
