@@ -45,6 +45,7 @@ CLEAR_MAX = 0.1
 """Metals, and what light goes through, have the colour of something else above this share."""
 
 
+@lru_cache(maxsize=4096)
 def color_word(rgb: se3.Vec3) -> str:
     """Basic word for a surface of a linear RGB reflectance; empty if none is beyond doubt."""
     words, centroids = _centroids()

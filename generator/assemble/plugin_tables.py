@@ -21,8 +21,8 @@ TABLES: Mapping[str, PluginTable[Any]] = {
 }
 """All tables by kind, for ``gen-data describe`` and the JSON Schema."""
 
-CONTENT_KINDS = ("asset_family", "room_place", "room_type")
-"""Kinds of plug-ins that elements and randomizers find by name or tag."""
+CONTENT_KINDS = ("asset_family", "question", "room_place", "room_type")
+"""Kinds of plug-ins that other plug-ins find by name or tag."""
 
 P = TypeVar("P")
 

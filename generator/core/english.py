@@ -1,22 +1,14 @@
-"""English words for things and numbers."""
+"""English words for objects and numbers; plurals and articles by inflect."""
 
-import re
 from collections.abc import Sequence
+from functools import cache, lru_cache
+from typing import Any
 
 NUMBERS = (
     "no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven",
     "twelve",
 )  # fmt: skip
 """Words of small numbers; ``many`` above."""
-
-IRREGULAR = {
-    "person": "people", "man": "men", "woman": "women", "child": "children", "foot": "feet",
-    "tooth": "teeth", "goose": "geese", "mouse": "mice", "knife": "knives", "loaf": "loaves",
-    "leaf": "leaves", "shelf": "shelves", "half": "halves", "calf": "calves", "wolf": "wolves",
-    "tomato": "tomatoes", "potato": "potatoes", "mango": "mangoes", "sheep": "sheep",
-    "deer": "deer", "fish": "fish", "aircraft": "aircraft",
-}  # fmt: skip
-"""Plurals without a rule."""
 
 MEASURES = {
     "bunch": ("grapes", "keys"),
@@ -34,29 +26,28 @@ MEASURES = {
 """Names that are plurals or cannot be counted, by the word that counts them."""
 
 _MEASURE_OF = {name: measure for measure, names in MEASURES.items() for name in names}
-_AN = re.compile(r"hour|heir|honest|x-ray|(?!uni[cfqtv]|u[st][aei]|eu|one\b|once)[aeiou]", re.I)
-"""Begins with the sound of a vowel: an hour, an umbrella, but a unicorn, a utensil."""
 
 
+@cache
+def _engine() -> Any:
+    """The library of English inflections; it takes a second or two to import."""
+    import inflect
+
+    return inflect.engine()
+
+
+@lru_cache(maxsize=1024)
 def article(name: str) -> str:
     """The indefinite article of a name."""
-    return "an" if _AN.match(name) else "a"
+    return str(_engine().a(name)).partition(" ")[0]
 
 
+@lru_cache(maxsize=1024)
 def plural(name: str) -> str:
     """The plural of a name; of its last word, if it has several: "mugs", "pairs of scissors"."""
     if name in _MEASURE_OF:
         return f"{plural(_MEASURE_OF[name])} of {name}"
-    head, _, last = name.rpartition(" ")
-    if last in IRREGULAR:
-        form = IRREGULAR[last]
-    elif last.endswith(("s", "x", "ch", "sh")):
-        form = f"{last}es"
-    elif last.endswith("y") and last[-2:-1] not in "aeiou":
-        form = f"{last[:-1]}ies"
-    else:
-        form = f"{last}s"
-    return f"{head} {form}".strip()
+    return str(_engine().plural_noun(name))
 
 
 def singular(name: str) -> str:
@@ -73,6 +64,11 @@ def count(name: str, number: int) -> str:
     return f"{word} {plural(name)}"
 
 
-def join(names: Sequence[str]) -> str:
-    """An enumeration: "a", "a and b", "a, b and c"."""
-    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+def join(names: Sequence[str], word: str = "and") -> str:
+    """An enumeration: "a", "a and b", "a, b and c"; with another word than "and"."""
+    return f" {word} ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+
+
+def sentence(text: str) -> str:
+    """A text with a capital letter."""
+    return f"{text[0].upper()}{text[1:]}"

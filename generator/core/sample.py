@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.core import boxes, lane_geometry, se3
+from gen_data.core import boxes, lane_geometry, se3, serialization
 from gen_data.core.capture import Capture
 from gen_data.core.motion import STILL, Twist
 from gen_data.core.scene import Camera, Instance, Scene
@@ -185,21 +185,55 @@ def both_ways(relations: Iterable[Relation]) -> set[tuple[int, str, int]]:
 
 
 @dataclass(frozen=True, slots=True)
+class Measured:
+    """The numbers that decide an answer.
+
+    Attributes:
+        numbers: In the order in which the question names them; see the question's kind.
+        unit: ``m``, ``deg``, ``px``, or ``1`` for counts.
+        margin: Change of the deciding number that would make the answer wrong, in the unit.
+        resolution: Smallest difference that the sensor could measure, in the unit: expanded
+            uncertainty, coverage factor 2. It is at most the margin.
+    """
+
+    numbers: tuple[float, ...]
+    unit: str
+    margin: float
+    resolution: float
+
+
+_SPARSE = {serialization.SPARSE: True}
+
+
+@dataclass(frozen=True, slots=True)
 class Utterance:
     """A sentence, expression or question about one image, in English.
 
     Attributes:
-        kind: ``caption`` of the image; ``relation``, a sentence about two things; ``expression``
-            that refers to one thing and no other; the others are questions.
-        text: The sentence, expression or question.
+        kind: Name in the table of questions, such as ``caption`` of the image, ``relation``
+            between two objects, or ``expression`` that refers to one object and no other.
+        text: The sentence, expression or question. Pixels in texts are written ``(x, y)``.
         answer: To a question; else empty.
-        instances: Ids of the things it is about: the mask of an answer is the union of theirs.
+        instances: Ids of the objects it is about: the mask of an answer is the union of theirs.
+        measured: The numbers behind the answer; None = it follows from no measurement.
+        points_px: Points that answer the question, image coordinates.
+        region: All pixels that answer the question, if they are not the objects' masks.
+        other: The second image that it is about: the name of another camera at the same instant,
+            or ``FIRST``; empty = none.
     """
 
-    kind: Literal["caption", "relation", "expression", "counting", "existence", "spatial", "color"]
+    kind: str
     text: str
     answer: str = ""
     instances: tuple[int, ...] = ()
+    measured: Measured | None = field(default=None, metadata=_SPARSE)
+    points_px: tuple[PointPx, ...] = field(default=(), metadata=_SPARSE)
+    region: MaskPx | None = field(default=None, metadata=_SPARSE)
+    other: str = field(default="", metadata=_SPARSE)
+
+
+FIRST = "<first>"
+"""The image of the same camera at the beginning of the sequence; not the name of a camera."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)

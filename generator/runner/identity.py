@@ -26,6 +26,7 @@ BYTES_DEPEND_ON = {
     "google": "protobuf",
     "google_crc32c": "google-crc32c",
     "h5py": "h5py",
+    "inflect": "inflect",
     "mapbox_earcut": "mapbox-earcut",
     "mcap": "mcap",
     "mcap_protobuf": "mcap-protobuf-support",

@@ -13,16 +13,22 @@ import pytest
 from gen_data.annotations.annotate import Thresholds, annotate_reading
 from gen_data.annotations.color_words import cielab, color_word
 from gen_data.annotations.instance_masks import InstanceMasks
-from gen_data.annotations.language import Language, Thing, View, kin
+from gen_data.annotations.language import Language
+from gen_data.annotations.questions import words
+from gen_data.annotations.questions.view import Thing, View, kin
 from gen_data.annotations.relations import Relations
 from gen_data.assemble.config import load_config
 from gen_data.assemble.pipeline_factory import open_pipeline
 from gen_data.core.boxes import BoxPx
-from gen_data.core.capture import Channel
+from gen_data.core.capture import Channel, SensorReading
 from gen_data.core.colorimetry import srgb_decode
+from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.sample import ImageTruth, Utterance
-from gen_data.core.scene import Scene
+from gen_data.core.scene import Camera, Scene
+from gen_data.core.se3 import SE3
 from tests.tiers import cases
+
+WORDS = ("caption", "relation", "expression", "counting", "existence", "spatial", "color")
 
 
 @dataclass(frozen=True)
@@ -50,7 +56,7 @@ def picture(config: str, index: int) -> Picture:
     with open_pipeline(load_config(config, overrides=small), wanted) as made:
         sample = made.sample(index)
         reading = next(iter(sample.capture.readings.values()))
-        annotators = (InstanceMasks(), Relations(), Language(most=1000))
+        annotators = (InstanceMasks(), Relations(), Language(most=1000, kinds=WORDS))
         truth = annotate_reading(sample.scene, reading, annotators, Thresholds(), made.assets)
     image = np.asarray(reading.channels[Channel.INSTANCE])
     ids = [int(n) for n in np.unique(image) if n]
@@ -212,12 +218,19 @@ def thing(number: int, category: str, x_min: int, x_max: int, **changes: Any) ->
     return Thing(number, category, BoxPx(x_min, 0, x_max, 10), **facts)
 
 
+CAMERA = Camera("color", SE3(), Intrinsics.from_hfov(320, 240, 1.0))
+READING = SensorReading("color", CAMERA, {})
+PLACEABLE = ("candle", "cup")
+ASSETS: Any = None
+
+
 def view(*things: Thing, edges: set[tuple[int, str, int]] | None = None) -> View:
-    return View(things, frozenset(edges or ()), {t.category for t in things}, ("candle", "cup"))
+    present = {t.category for t in things}
+    return View(things, frozenset(edges or ()), present, PLACEABLE, Scene("table"), READING, ASSETS)
 
 
 def texts(of: View, kind: str) -> list[str]:
-    return [u.text for u in of.utterances() if u.kind == kind]
+    return [u.text for u in getattr(words, kind)(of)]
 
 
 def test_a_barely_visible_thing_takes_the_name_from_the_others() -> None:
@@ -306,13 +319,11 @@ def test_cielab_is_that_of_opencv() -> None:
     assert np.abs(cielab(rgb[0].astype(float)) - expected[0]).max() < 0.2
 
 
-@pytest.mark.slow
 def test_most_limits_each_kind() -> None:
-    """Spread evenly over what could be said."""
-    seen = picture("tabletop", 5)
-    kinds = {u.kind for u in seen.truth.utterances or ()}
-    limited = list(Language(most=2)._spread(seen.truth.utterances or ()))
+    """Spread evenly over all possible ones."""
+    row = view(*(thing(k, f"thing {k}", 20 * k, 20 * k + 10) for k in range(7)))
+    every = list(Language(most=100, kinds=("expression",))._utterances(row))
 
-    assert {kind: sum(u.kind == kind for u in limited) for kind in kinds} == {
-        kind: min(2, len(seen.said(kind))) for kind in kinds
-    }
+    assert list(Language(most=3, kinds=("expression",))._utterances(row)) == [
+        every[k] for k in (0, 2, 4)
+    ]

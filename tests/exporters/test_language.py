@@ -31,7 +31,7 @@ def test_lines_refer_to_their_objects_and_are_every_utterance_in_order(
     rows = json_lines(folder / "train.jsonl")
     images = {image["image_id"]: image for image in json_lines(folder / "train_images.jsonl")}
     assert len({row["id"] for row in rows}) == len(rows)
-    assert {row["kind"] for row in rows} >= {"scene_caption", "caption", "counting", "existence"}
+    assert {row["kind"] for row in rows} >= {"scene_caption", "caption", "counting", "distance"}
     for row in rows:
         image = images[row["image_id"]]
         known = {thing["object_id"] for thing in image["objects"]}
