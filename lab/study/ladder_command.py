@@ -13,8 +13,8 @@ With --factor, CONFIG is generated once per value: all scenes agree but for the 
 become a table of AP by step, with differences paired by picture.
 
 \b
-gen-data ladder street.yaml --factor "shared.weather=[ClearNoon, HardRainNoon]" -n 50
-gen-data ladder tabletop.yaml --factor randomizers.orbit.distance_m=0.6..2.2 --steps 5 -n 50
+gen-data ladder street.yaml --factor "shared.weather=[ClearNoon, ClearNight]"
+gen-data ladder tabletop.yaml --factor randomizers.orbit.distance_m=0.6..2
 gen-data ladder out/ladder --results 'results/{step}.json'
 """
 
