@@ -60,8 +60,8 @@ def edit(
     from gen_data.lab.edit.files import Folders
     from gen_data.lab.edit.server import Desk, serve
 
-    source = None if config is None else _find(config)
-    home = Path.cwd() if source is None else source.parent
+    source = None if config is None else Path(config)
+    home = Path() if source is None else source.parent
     roots = dict.fromkeys(path.resolve() for path in (home, *folders, *([real] if real else [])))
 
     def announce(url: str) -> None:
@@ -71,8 +71,3 @@ def edit(
 
     desk = Desk(Folders(tuple(roots)), source, real, secrets.token_urlsafe(16))
     serve(desk, host, port, workers or min(usable_cores(), 4), announce)
-
-
-def _find(name: str) -> Path:
-    """Path of a file or folder; a shipped name without such a file is edited as a new file."""
-    return Path(name).resolve()

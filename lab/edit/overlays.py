@@ -1,12 +1,13 @@
 """Pictures of a sample: its photograph with labels, depth, normals, a scan from above."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from gen_data.core import plugins
 from gen_data.core.capture import Channel
 from gen_data.core.interfaces import Modality, SensorInfo
 from gen_data.core.sample import Sample
+from gen_data.runner.stored import LabelledImages
 from gen_data.preview.overlay import Image, channel_image, draw_labels
 from gen_data.preview.sensor_views import top_view
 
@@ -50,6 +51,10 @@ class View:
         """Kind of the picture that a sensor of this view has anyway."""
         return "photo" if KINDS[self.kind] else self.kind
 
+    def of(self, sensor: str) -> "View":
+        """The same view of a sensor."""
+        return replace(self, sensor=sensor)
+
 
 def first_kind(sensor: SensorInfo) -> str:
     """Kind of the picture that every reading of a sensor has; empty = none, as for odometers."""
@@ -57,7 +62,9 @@ def first_kind(sensor: SensorInfo) -> str:
     return "" if has_none else _MODALITIES[sensor.modality]
 
 
-def draw_view(sample: Sample, view: View, views: Mapping[str, str], unit: float) -> Image:
+def draw_view(
+    sample: Sample | LabelledImages, view: View, views: Mapping[str, str], unit: float
+) -> Image:
     """Draw what a view shows, uint8 [h, w, 3].
 
     Args:

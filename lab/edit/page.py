@@ -14,14 +14,18 @@ from nicegui import context, run, ui
 from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 
+from gen_data.assemble.documents import shipped_text
 from gen_data.core.errors import GenDataError
 from gen_data.lab.edit import completion, controls
+from gen_data.lab.edit.browse_page import BrowsePage
+from gen_data.lab.edit.data_sets import is_data_set
 from gen_data.lab.edit.document import find_item, list_origins
 from gen_data.lab.edit.files import read_file
 from gen_data.lab.edit.overlays import KINDS, LAYERS
 from gen_data.lab.edit.panels import ControlsPanel, ObjectsPanel, show_full
 from gen_data.lab.edit.samples import Shown
 from gen_data.lab.edit.session import EACH, SLOTS, Session
+from gen_data.lab.edit.start_page import StartPage
 from gen_data.lab.edit.workers import Refused, Ticket
 
 if TYPE_CHECKING:
@@ -77,19 +81,36 @@ def _plain_proposal(one: completion.Proposal) -> dict[str, str]:
 
 
 def build(desk: Desk) -> None:
-    """Build the page of one tab."""
+    """Build the page of one tab: an editor, a data set, or the start page."""
     ui.add_head_html('<link rel="stylesheet" href="/edit/editor.css">')
-    source = desk.source
-    assert source is not None
-    tab = EditorTab(desk, open_session(desk, source))
-    TABS[tab.key] = tab
-    tab.build()
+    asked = context.client.request.query_params.get("open", "")
+    source = Path(asked) if asked else desk.source
+    if asked and not _may_open(desk, source):
+        ui.label(f"{asked} is outside of the folders of this page, or no shipped configuration")
+        return
+    if source is None:
+        StartPage(desk).build()
+    elif is_data_set(source):
+        BrowsePage(desk, source).build()
+    else:
+        try:
+            tab = EditorTab(desk, open_session(desk, source))
+        except GenDataError as error:
+            ui.label(str(error)).classes("gd-refused")
+            return
+        TABS[tab.key] = tab
+        tab.build()
+
+
+def _may_open(desk: Desk, source: Path | None) -> bool:
+    is_shipped = (
+        source is not None and source.name == str(source) and bool(shipped_text(str(source)))
+    )
+    return source is not None and (is_shipped or desk.folders.contains(source))
 
 
 def open_session(desk: Desk, source: Path) -> Session:
     """Read the file of a tab; a shipped configuration begins a new file of its name."""
-    from gen_data.assemble.documents import shipped_text
-
     file = read_file(source)
     text = shipped_text(source.name) if file.content is None else ""
     return Session(file, desk.folders.with_references(file.text, source), text)

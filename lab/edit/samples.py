@@ -145,7 +145,7 @@ class Studio:
         unit = 1.0 if order.width_px else 1.5
         image = draw_view(taken.sample, view, opened.info.views, unit)
         return Shown(
-            _jpeg(image),
+            encode(image),
             order.index,
             opened.sensors,
             tuple(_objects(taken, view.sensor)),
@@ -325,6 +325,7 @@ def _brightness(sample: Sample, sensor: str) -> float | None:
     return measure_look(np.asarray(cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY), np.uint8)).brightness
 
 
-def _jpeg(image: Image) -> bytes:
+def encode(image: Image) -> bytes:
+    """A picture as JPEG."""
     _, data = cv2.imencode(".jpg", image[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
     return data.tobytes()

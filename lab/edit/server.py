@@ -126,6 +126,7 @@ class Desk:
     Attributes:
         source: File or data set to open; None = the start page.
         real: Folder of real pictures; None without one.
+        gallery: Pictures of shipped configurations by file name.
         listeners: Receivers of results by client of the workers.
     """
 
@@ -134,6 +135,7 @@ class Desk:
     real: Path | None
     token: str
     pictures: Pictures = field(default_factory=Pictures)
+    gallery: dict[str, bytes] = field(default_factory=dict)
     listeners: dict[str, Callable[[Ticket, Any], None]] = field(default_factory=dict)
     loop: asyncio.AbstractEventLoop | None = None
     workers: Workers | None = None
