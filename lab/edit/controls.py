@@ -260,3 +260,20 @@ def low_middle_high(distribution: Distribution[Any]) -> tuple[Any, Any, Any] | N
         return None
     low, middle, high = np.quantile(values, (0.02, 0.5, 0.98), method="nearest").tolist()
     return low, middle, high
+
+
+def three_values(
+    control: Control, distribution: Distribution[Any] | None
+) -> tuple[Any, Any, Any] | None:
+    """Low, middle and high value of a field: of its distribution, else half and twice its number."""
+    if distribution is not None:
+        return low_middle_high(distribution)
+    if control.kind != "number":
+        return None
+    value = float(control.value)
+    if value == 0.0:
+        values = (control.low, 0.5 * (control.low + control.high), control.high)
+    else:
+        values = (0.5 * value, value, 2.0 * value)
+    low, middle, high = (control.yaml(min(max(one, control.low), control.high)) for one in values)
+    return low, middle, high

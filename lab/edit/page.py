@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import secrets
+import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -15,16 +16,23 @@ from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 
 from gen_data.assemble.documents import shipped_text
+from gen_data.config.yaml_scalars import to_flow_yaml
 from gen_data.core.errors import GenDataError
 from gen_data.lab.edit import completion, controls
 from gen_data.lab.edit.browse_page import BrowsePage
 from gen_data.lab.edit.data_sets import is_data_set
-from gen_data.lab.edit.document import find_item, list_origins
+from gen_data.lab.edit.document import find_item
 from gen_data.lab.edit.files import read_file
 from gen_data.lab.edit.overlays import KINDS, LAYERS
-from gen_data.lab.edit.panels import ControlsPanel, ObjectsPanel, show_full
+from gen_data.lab.edit.panels import (
+    ControlsPanel,
+    OwnFilesPanel,
+    ResolvedPanel,
+    StatisticsPanel,
+    show_full,
+)
 from gen_data.lab.edit.samples import Shown
-from gen_data.lab.edit.session import EACH, SLOTS, Session
+from gen_data.lab.edit.session import EACH, SLOTS, Session, Variation
 from gen_data.lab.edit.start_page import StartPage
 from gen_data.lab.edit.workers import Refused, Ticket
 
@@ -125,13 +133,14 @@ class EditorTab:
         self._changed = asyncio.Event()
         self._orders: list[Any] = []
         self._tiles: list[Tile] = []
-        self._line = 1
+        self.chosen: Shown | None = None
+        self.scratch: list[Path] = []
         desk.listeners[self.key] = self._receive
 
     def build(self) -> None:
         """Make all widgets, and begin."""
-        self._client = context.client
-        self._client.on_delete(self._leave)
+        self.client = context.client
+        self.client.on_delete(self._leave)
         with ui.element("header").classes("gd-bar"):
             self._build_bar()
         with ui.element("main").classes("gd-main"):
@@ -200,18 +209,31 @@ class EditorTab:
 
     def _build_panels(self) -> None:
         with ui.tabs().props("dense no-caps align=left") as tabs:
-            for name in ("Controls", "Statistics", "Resolved"):
+            for name in ("Controls", "Statistics", "Own files", "Resolved"):
                 ui.tab(name)
-        with ui.tab_panels(tabs, value="Controls").props("animated=false").style("width: 100%"):
+        panels = ui.tab_panels(tabs, value="Controls").props("animated=false keep-alive")
+        with panels.style("width: 100%"):
             with ui.tab_panel("Controls"):
                 self.controls = ControlsPanel(self)
             with ui.tab_panel("Statistics"):
-                self.objects = ObjectsPanel(self)
+                self.statistics = StatisticsPanel(self)
+            with ui.tab_panel("Own files"):
+                OwnFilesPanel(self)
             with ui.tab_panel("Resolved"):
-                self._origins = ui.element("div").classes("gd-table")
+                self.resolved = ResolvedPanel(self)
+        tabs.on_value_change(lambda e: e.value == "Resolved" and self.resolved.refresh())
+
+    @property
+    def base(self) -> Shown | None:
+        """The sample that `vary` changes: the chosen one, else the first."""
+        return self.chosen or next(iter(self.session.shown), None)
+
+    def vary(self, variation: Variation) -> None:
+        """Show one sample with several values of a field."""
+        self._set_grid(variation=variation)
 
     async def _begin(self) -> None:
-        await self._client.connected()
+        await self.client.connected()
         key = f"gen-data:{self.session.name}"
         script = (
             "new Promise((done) => { const go = () => done(window.genDataEdit.attach("
@@ -223,7 +245,7 @@ class EditorTab:
             self.editor.set_value(draft)
             ui.notify("unsaved text of this file was restored; Ctrl-Z brings back the file's")
         self._changed.set()
-        await self._follow()
+        self._task = asyncio.create_task(self._follow())
 
     async def _follow(self) -> None:
         """Read the text whenever it has changed, the newest only."""
@@ -251,12 +273,18 @@ class EditorTab:
     def _receive(self, ticket: Ticket, result: Shown | Refused) -> None:
         self.session.accept(ticket, result)
         if ticket.slot < len(self._tiles):
-            self._tiles[ticket.slot].show(result, self.desk)
+            self._tiles[ticket.slot].show(result, self.desk, self._caption(ticket.slot))
         if isinstance(result, Refused):
             self._show_faults()
         if not self.session.outdated and len(self.session.results) == len(self._orders):
             self.controls.refresh_plots()
-            self.objects.refresh()
+            self.statistics.refresh()
+
+    def _caption(self, slot: int) -> str:
+        varied = self.session.grid.variation
+        if varied is None or slot >= len(varied.values):
+            return ""
+        return f"{varied.field.rpartition('.')[2]}: {to_flow_yaml(varied.values[slot])}"
 
     def _show_tiles(self) -> None:
         while len(self._tiles) > max(len(self._orders), 1):
@@ -307,8 +335,7 @@ class EditorTab:
         self._changed.set()
 
     def _moved(self, event: Any) -> None:
-        self._line = int(event.args)
-        found = find_item(self.editor.value, self.session.name, self._line)
+        found = find_item(self.editor.value, self.session.name, int(event.args))
         if found is not None:
             self.controls.choose(*found)
 
@@ -331,7 +358,7 @@ class EditorTab:
     def _open_full(self, slot: int) -> None:
         result = self.session.results.get(slot)
         if isinstance(result, Shown) and slot < len(self._orders):
-            with self._client.content:
+            with self.client.content:
                 show_full(self, self._orders[slot], result)
 
     async def _save(self, *, overwrite: bool = False) -> None:
@@ -346,7 +373,7 @@ class EditorTab:
         ui.run_javascript(f"window.genDataEdit.forget({f'gen-data:{self.session.name}'!r})")
 
     def _refuse_save(self, text: str) -> None:
-        with self._client.content, ui.dialog(value=True), ui.card():
+        with self.client.content, ui.dialog(value=True), ui.card():
             ui.label(text)
             with ui.element("div").classes("gd-row"):
                 ui.button("Reload the file", on_click=self._reload).props("no-caps flat")
@@ -359,7 +386,7 @@ class EditorTab:
         self.edit(self.session.file.text)
 
     def _save_as(self) -> None:
-        with self._client.content, ui.dialog(value=True) as dialog, ui.card():
+        with self.client.content, ui.dialog(value=True) as dialog, ui.card():
             name = ui.input("File", value=str(self.session.file.path)).style("width: 60vw")
 
             def save() -> None:
@@ -378,9 +405,13 @@ class EditorTab:
 
     def _leave(self) -> None:
         TABS.pop(self.key, None)
-        self.desk.listeners.pop(self.key, None)
         assert self.desk.workers is not None
-        self.desk.workers.submit(self.key, ())
+        for client in [name for name in self.desk.listeners if name.startswith(self.key)]:
+            self.desk.listeners.pop(client)
+            self.desk.workers.submit(client, ())
+        for folder in self.scratch:
+            shutil.rmtree(folder, ignore_errors=True)
+        self._task.cancel()
 
 
 def _word(text: str) -> str:
@@ -405,12 +436,12 @@ class Tile:
             with ui.element("small"):
                 self._caption = ui.label("...")
 
-    def show(self, result: Shown | Refused, desk: Desk) -> None:
+    def show(self, result: Shown | Refused, desk: Desk, caption: str = "") -> None:
         """Show a result."""
         if isinstance(result, Shown):
             self._image.props["src"] = desk.pictures.put(result.jpeg)
             self._image.update()
-            self._caption.text = f"sample {result.index}"
+            self._caption.text = caption or f"sample {result.index}"
             self._refused.text = ""
         else:
             self._refused.text = result.text

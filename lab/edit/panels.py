@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
-from collections import Counter
+import asyncio
+import html
+import sys
+import tempfile
+from dataclasses import replace
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from urllib.parse import quote
 
 from nicegui import run, ui
 
 from gen_data.config.yaml_scalars import to_flow_yaml
-from gen_data.core.errors import GenDataError
-from gen_data.lab.edit import controls
+from gen_data.core import processes
+from gen_data.core.errors import ConfigError, GenDataError
+from gen_data.lab.edit import controls, own_files, statistics
 from gen_data.lab.edit.document import list_origins
+from gen_data.lab.edit.samples import Recording
 from gen_data.lab.edit.session import drawn_values, vary
 
 if TYPE_CHECKING:
@@ -85,6 +93,10 @@ class ControlsPanel:
             with ui.element("div").classes("gd-row"):
                 ui.label(control.field).classes("gd-name").tooltip(control.help)
                 ui.label(control.place or "default").classes("gd-place")
+                if control.kind in ("number", "range", "normal"):
+                    ui.button("vary", on_click=partial(self._vary, control)).props(
+                        f'dense flat no-caps size=sm aria-label="Vary {control.field}"'
+                    ).tooltip("one sample with a low, middle and high value of this field")
             self._build_input(control)
             if control.form and controls.find_distribution(
                 self._tab.session.config, *self._item, control.field
@@ -182,6 +194,19 @@ class ControlsPanel:
         session.text = text
         self._tab.edit(text)
 
+    def _vary(self, control: controls.Control) -> None:
+        """Show one sample with three values of a field."""
+        session = self._tab.session
+        section, name = self._item
+        config, base = session.config, self._tab.base
+        found = config and controls.find_distribution(config, section, name, control.field)
+        values = controls.three_values(control, found)
+        if base is None or values is None:
+            ui.notify("there is no picture to vary yet, or the field is no number")
+            return
+        place = "" if section == controls.GENERAL else section
+        self._tab.vary(vary(base, place, name, control.field, values))
+
     def refresh_plots(self) -> None:
         """Draw what the shown samples drew beside the declared densities."""
         config = self._tab.session.config
@@ -231,47 +256,195 @@ def _plot(shown: controls.Density | None) -> dict[str, Any]:
     }
 
 
-class ObjectsPanel:
-    """Statistics of the shown samples."""
+class StatisticsPanel:
+    """Statistics of the shown samples beside those of real pictures, and the fit to them."""
 
     def __init__(self, tab: EditorTab) -> None:
         self._tab = tab
+        self._real: statistics.Summary | None = None
+        self._note = ui.label("")
+        if tab.desk.real is not None:
+            ui.button("Fit to the real pictures", on_click=self._fit).props("dense no-caps outline")
+            self._progress = ui.label("").props('role="status"')
+            ui.timer(0.0, self._read, once=True)
         self._body = ui.element("div").classes("gd-table")
+
+    async def _read(self) -> None:
+        assert self._tab.desk.real is not None
+        try:
+            self._real = await run.io_bound(statistics.read_summary, self._tab.desk.real)
+        except GenDataError as error:
+            self._progress.text = str(error)
+        self.refresh()
 
     def refresh(self) -> None:
         """Show the statistics of the pictures that are complete."""
         shown = self._tab.session.shown
-        objects = [item for one in shown for item in one.objects]
-        counts = Counter(item.category for item in objects)
+        ours = statistics.summarise(shown)
+        sides = [("shown", ours), *([("real", self._real)] if self._real else [])]
+        lights = [f"{n} {s.brightness:.2f}" for n, s in sides if s.brightness is not None]
+        self._note.text = (
+            f"brightness (mean grey value, 0 to 1): {', '.join(lights)}" if lights else ""
+        )
+        header = ["class"]
+        for name, side in sides:
+            header += [f"{name} ({side.pictures}): boxes per picture", "median px", "occlusion"]
         self._body.clear()
         with self._body:
-            lights = [one.brightness for one in shown if one.brightness is not None]
-            if lights:
-                ui.label(f"brightness {sum(lights) / len(lights):.2f} (mean grey value, 0 to 1)")
+            table(tuple(header), statistics.rows(ours, self._real)[:60])
+
+    async def _fit(self) -> None:
+        """Run the command match on the saved file; its result is a file that extends it."""
+        session, real = self._tab.session, self._tab.desk.real
+        path = session.file.path
+        if session.is_changed or session.file.content is None:
+            self._progress.text = "save the file first: the fit extends it"
+            return
+        out = path.with_name(f"{path.stem}_matched.yaml")
+        command = (
+            sys.executable,
+            "-m",
+            "gen_data",
+            "match",
+            str(real),
+            str(path),
+            "--out",
+            str(out),
+        )
+        self._progress.text = "fitting; this takes some minutes ..."
+        process = await asyncio.create_subprocess_exec(
+            *processes.tie(command), stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE
+        )
+        _, said = await process.communicate()
+        if process.returncode:
+            self._progress.text = said.decode(errors="replace").strip()[-500:]
+            return
+        self._progress.text = f"wrote {out.name}, its report {out.with_suffix('.html').name}"
+        with self._note.parent_slot or self._body:
+            ui.link(f"open {out.name}", f"/?open={quote(str(out))}")
+
+
+class OwnFilesPanel:
+    """Drop of meshes and photographs."""
+
+    def __init__(self, tab: EditorTab) -> None:
+        self._tab = tab
+        ui.label(
+            "Drop a mesh or a photograph here: it is checked, copied to assets/ next to the file, and "
+            "put into the scene."
+        )
+        most = own_files.SIZE_MAX_BYTES
+        ui.upload(
+            on_upload=self._take,
+            on_rejected=lambda: ui.notify(
+                f"larger than {most // 1_000_000} MB: copy it to {own_files.ASSETS}/ and list it in "
+                "assets.yaml",
+                type="negative",
+            ),
+            max_file_size=most,
+            auto_upload=True,
+            multiple=True,
+            label="meshes and photographs",
+        ).style("width: 100%").props('flat bordered aria-label="Meshes and photographs"')
+        self._body = ui.element("div")
+
+    async def _take(self, event: Any) -> None:
+        name = Path(event.file.name).name
+        folder = Path(tempfile.mkdtemp(prefix="gen-data-edit-"))
+        self._tab.scratch.append(folder)
+        path = folder / name
+        await event.file.save(path)
+        with self._body:
+            card = ui.element("div").classes("gd-field").props(f'data-file="{html.escape(name)}"')
+        self._check(path, card, ())
+
+    def _check(self, path: Path, card: Any, entry: tuple[tuple[str, Any], ...]) -> None:
+        card.clear()
+        with card:
+            ui.label(f"{path.name}: being checked ...")
+        client = f"{self._tab.key}/file/{path}"
+        self._tab.desk.listeners[client] = partial(self._show, path, card)
+        assert self._tab.desk.workers is not None
+        self._tab.desk.workers.submit(client, [own_files.CheckFile(path, entry)])
+
+    def _show(self, path: Path, card: Any, ticket: Any, found: Any) -> None:
+        self._tab.desk.listeners.pop(ticket.client, None)
+        card.clear()
+        with card:
+            if not isinstance(found, own_files.Checked):
+                ui.label(f"{path.name}: {found.text}").classes("gd-refused")
+                return
+            finding = found.finding
+            size = " x ".join(f"{edge:.3g}" for edge in finding.size_m or ())
+            with ui.element("div").classes("gd-row"):
+                ui.element("img").props(
+                    f'src="{self._tab.desk.pictures.put(found.jpeg)}" alt="{finding.asset_id}"'
+                ).style("width: 200px")
+                with ui.element("div"):
+                    ui.label(finding.asset_id).classes("gd-name")
+                    if size:
+                        ui.label(f"{size} m; unit {finding.unit}; up {finding.up}")
+                        self._build_choice(path, card, found)
+                    for text in finding.warnings:
+                        ui.label(text)
+                    ui.button(
+                        "Add to the scene", on_click=partial(self._add, path, card, found)
+                    ).props("dense no-caps")
+
+    def _build_choice(self, path: Path, card: Any, found: own_files.Checked) -> None:
+        now = {key: found.entry.get(key) for key in ("unit", "up")}
+
+        def again(key: str, event: Any) -> None:
+            chosen = {k: v for k, v in {**now, key: event.value}.items() if v}
+            self._check(path, card, tuple(chosen.items()))
+
+        with ui.element("div").classes("gd-row"):
+            for key, options in (
+                ("unit", ["mm", "cm", "m", "in", "ft"]),
+                ("up", ["z", "y", "x", "-z", "-y", "-x"]),
+            ):
+                ui.select(options, value=now[key], label=key, on_change=partial(again, key)).props(
+                    "dense options-dense"
+                ).style("min-width: 70px")
+
+    async def _add(self, path: Path, card: Any, found: own_files.Checked) -> None:
+        session = self._tab.session
+        folder = session.file.path.parent / own_files.ASSETS
+        try:
+            if session.config is None:
+                raise ConfigError("the text has faults; correct them first")
+            if not session.folders.contains(folder):
+                raise ConfigError(f"{folder} is outside of the folders of this page")
+            text = own_files.add_to_scene(session.text, session.config, found)
+            await run.io_bound(own_files.keep_file, folder, path, found)
+        except GenDataError as error:
+            ui.notify(str(error), type="negative", multi_line=True)
+            return
+        self._tab.edit(text)
+        card.clear()
+        with card:
+            ui.label(f"{path.name}: added to the scene")
+
+
+class ResolvedPanel:
+    """Every value of the resolved configuration with the file and line that give it."""
+
+    def __init__(self, tab: EditorTab) -> None:
+        self._tab = tab
+        self._search = ui.input("field, value or file", on_change=self.refresh).props(
+            "dense clearable"
+        )
+        self._body = ui.element("div").classes("gd-table")
+
+    def refresh(self) -> None:
+        """Show the values of the latest valid configuration."""
+        config, wanted = self._tab.session.config, str(self._search.value or "")
+        rows = [] if config is None else [(o.field, o.value, o.place) for o in list_origins(config)]
+        self._body.clear()
+        with self._body:
             table(
-                ("category", "objects", "width px", "height px", "occlusion"),
-                [
-                    (
-                        name,
-                        str(count),
-                        _mean([o.width_px for o in objects if o.category == name]),
-                        _mean([o.height_px for o in objects if o.category == name]),
-                        _mean(
-                            [
-                                o.occlusion
-                                for o in objects
-                                if o.category == name and o.occlusion is not None
-                            ],
-                            2,
-                        ),
-                    )
-                    for name, count in counts.most_common(40)
-                ],
+                ("field", "value", "from"), [row for row in rows if wanted in " ".join(row)][:150]
             )
-
-
-def _mean(values: list[float], digits: int = 0) -> str:
-    return f"{sum(values) / len(values):.{digits}f}" if values else ""
 
 
 def table(header: tuple[str, ...], rows: list[tuple[str, ...]]) -> None:
@@ -290,13 +463,17 @@ def table(header: tuple[str, ...], rows: list[tuple[str, ...]]) -> None:
 
 def show_full(tab: EditorTab, order: Order, shown: Shown) -> None:
     """Show a sample in full size with its draws."""
-    from dataclasses import replace
-
     assert tab.desk.workers is not None
     with ui.dialog(value=True).props("maximized") as dialog, ui.card().style("width: 100%"):
         with ui.element("div").classes("gd-row"):
             ui.label(f"sample {shown.index}").classes("gd-name")
             ui.button("Close", on_click=dialog.close).props("dense no-caps flat")
+            ui.button("Vary this one", on_click=partial(_choose_base, tab, shown, dialog)).props(
+                "dense no-caps flat"
+            ).tooltip("the buttons 'vary' of the controls change this sample")
+            ui.button("Recording for Rerun", on_click=partial(_record, tab, order)).props(
+                "dense no-caps flat"
+            )
         with ui.element("div").classes("gd-full"):
             image = ui.element("img").props(f'alt="sample {shown.index}"')
             state = ui.label("rendering ...")
@@ -334,3 +511,26 @@ def show_full(tab: EditorTab, order: Order, shown: Shown) -> None:
     client = f"{tab.key}/full"
     tab.desk.listeners[client] = receive
     tab.desk.workers.submit(client, [replace(order, width_px=0)])
+
+
+def _choose_base(tab: EditorTab, shown: Shown, dialog: Any) -> None:
+    tab.chosen = shown
+    dialog.close()
+    ui.notify(f"sample {shown.index} is the one that 'vary' changes")
+
+
+def _record(tab: EditorTab, order: Order) -> None:
+    """Hand a recording of the sample to the browser; `rerun FILE` opens it."""
+
+    def receive(ticket: Any, result: Any) -> None:
+        tab.desk.listeners.pop(ticket.client, None)
+        with tab.client.content:
+            if isinstance(result, bytes):
+                ui.download.content(result, f"sample_{order.index:06}.rrd")
+            else:
+                ui.notify(result.text, type="negative")
+
+    client = f"{tab.key}/rerun"
+    tab.desk.listeners[client] = receive
+    assert tab.desk.workers is not None
+    tab.desk.workers.submit(client, [Recording(order)])

@@ -23,10 +23,11 @@ from gen_data.assemble.config import parse_config
 from gen_data.assemble.pipeline_factory import PipelineFactory
 from gen_data.config.distributions import Constant
 from gen_data.config.schema import to_plain_yaml
-from gen_data.core import errors, plates
+from gen_data.core import errors, optional_packages, plates
 from gen_data.core.bounded_cache import CountCache
 from gen_data.core.capture import Channel
 from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.temporary_folders import temporary_folder
 from gen_data.lab.edit.overlays import KINDS, LAYERS, View, draw_view, first_kind
 from gen_data.packs.provision import open_assets
 from gen_data.report.drawn_parameters import Draw, observe_randomizer, shared_draws
@@ -72,6 +73,17 @@ class Order:
     def run(self, studio: Studio) -> Shown:
         """Render and draw it."""
         return studio.show(self)
+
+
+@dataclass(frozen=True, slots=True)
+class Recording:
+    """Order of one sample with all sensors in full size, for the Rerun viewer."""
+
+    order: Order
+
+    def run(self, studio: Studio) -> bytes:
+        """Content of a ``.rrd`` file."""
+        return studio.record(self.order)
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,6 +168,25 @@ class Studio:
             time.process_time() - started_s,
         )
 
+    def record(self, order: Order) -> bytes:
+        """Record a sample for the Rerun viewer.
+
+        Raises:
+            ConfigError: its package is not installed.
+            GenDataError: as a run of the configuration would.
+        """
+        missing = optional_packages.missing_packages("rerun")
+        if missing:
+            raise errors.ConfigError(f"a recording {missing}")
+        from gen_data.preview.rerun_recording import save_recording
+
+        opened = self._open(order)
+        with temporary_folder("edit") as folder:
+            path = folder / "sample.rrd"
+            sample = opened.sample(order.index)
+            save_recording(path, [sample], opened.library, info=opened.info)
+            return path.read_bytes()
+
     def _open(self, order: Order) -> OpenedText:
         name, changes = Path(order.file).stem, order.overrides
         config = parse_config(order.text, order.file, name, overrides=changes)
@@ -169,6 +200,7 @@ class OpenedText:
 
     Attributes:
         info: Facts about its data set.
+        library: Its assets.
         sensors: First kind of picture by name of every sensor that has one.
     """
 
@@ -177,7 +209,7 @@ class OpenedText:
         factory = PipelineFactory(replace(config, exporters=()), n=1)
         # Assets stay open from text to text: opening them takes longer than a sample.
         vars(factory)["library"] = library
-        self._config, self._library = config, library
+        self._config, self.library = config, library
         self._draws: dict[str, list[Draw]] = {}
         self._pipeline: Pipeline = factory()
         self._settings = self._pipeline.config
@@ -210,6 +242,11 @@ class OpenedText:
         table = plugin_tables.ANNOTATIONS
         own = self._config.annotations
         return {n: own[n] if n in own else plugin_tables.default_plugin(table, n) for n in names}
+
+    def sample(self, index: int) -> Sample:
+        """A whole sample, as in a data set."""
+        self._pipeline.config = self._settings
+        return self._pipeline.sample(index)
 
     def take(self, index: int, view: View, width_px: int) -> Taken:
         """Take a sample with one sensor.
@@ -249,7 +286,7 @@ class OpenedText:
                 "min_box_px": max(1, round(limits.min_box_px * factor)),
             }
         )
-        return annotate_reading(scene, reading, annotators, smaller, self._library)
+        return annotate_reading(scene, reading, annotators, smaller, self.library)
 
     def _observed_scene(self, streams: Streams) -> Any:
         nominal, randomizers, sensors = self._settings.open_scene(streams)

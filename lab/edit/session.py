@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gen_data.config.yaml_scalars import to_flow_yaml
-from gen_data.core.errors import GenDataError
+from gen_data.core.errors import GenDataError, StorageError
 from gen_data.lab.edit import text_edits
 from gen_data.lab.edit.document import Analysis, Fault, analyse, find_faults
 from gen_data.lab.edit.files import Folders, OpenedFile
@@ -169,53 +169,38 @@ class Session:
         Raises:
             StorageError: it is outside, exists, or cannot be written.
         """
-        from gen_data.core.errors import StorageError
-
         if not self.folders.contains(path):
             raise StorageError(f"{path} is outside of the folders of this page")
         self.file = OpenedFile(path, None).save(self.text, overwrite=overwrite)
 
 
-def vary(shown: Shown, config: Config, field_: str, values: Sequence[Any]) -> Variation:
-    """The sample of a picture with several values of one field of a randomizer.
+def vary(shown: Shown, section: str, name: str, field_: str, values: Sequence[Any]) -> Variation:
+    """The sample of a picture with several values of one field of an item.
 
     Other draws of the same randomizer are fixed where it drew one number each; those of other
-    plug-ins have streams of their own and stay anyway.
+    plug-ins have streams of their own, and stay anyway.
 
     Args:
         shown: Picture of the sample.
-        config: Its configuration.
-        field_: Name of the randomizer and field: ``orbit.distance_m``.
-        values: Values of the field.
+        section, name: Place of the item; no name for a field of the configuration itself.
+        field_: The field that varies.
+        values: Its values.
     """
-    name = field_.partition(".")[0]
     frozen = tuple(
         f"randomizers.{drawn}={to_flow_yaml(found[0])}"
         for drawn, found in shown.draws.items()
-        if drawn.partition(".")[0] == name
-        and drawn != field_
+        if section == "randomizers"
+        and drawn.rpartition(".")[0] == name
+        and drawn != f"{name}.{field_}"
         and len(found) == 1
         and isinstance(found[0], (int, float))
         and not isinstance(found[0], bool)
         and "[" not in drawn
     )
-    del config
-    return Variation(shown.index, f"randomizers.{field_}", tuple(values), frozen)
+    place = ".".join(part for part in (section, name, field_) if part)
+    return Variation(shown.index, place, tuple(values), frozen)
 
 
 def drawn_values(shown: Sequence[Shown], parameter: str) -> list[Any]:
     """Values of a parameter in all pictures, in order."""
     return [value for one in shown for value in one.draws.get(parameter, ())]
-
-
-def count_objects(shown: Sequence[Shown]) -> Mapping[str, int]:
-    """Number of labelled objects by category, sorted."""
-    counts: dict[str, int] = {}
-    for item in (item for one in shown for item in one.objects):
-        counts[item.category] = counts.get(item.category, 0) + 1
-    return dict(sorted(counts.items(), key=lambda entry: (-entry[1], entry[0])))
-
-
-def parameters(shown: Sequence[Shown]) -> Iterator[str]:
-    """Names of the parameters that were drawn."""
-    yield from dict.fromkeys(name for one in shown for name in one.draws)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
 import secrets
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,6 +12,8 @@ from urllib.parse import quote
 
 from nicegui import context, ui
 
+from gen_data.core.version import __version__
+from gen_data.core.whole_files import write_whole
 from gen_data.lab.edit.data_sets import find_data_sets
 from gen_data.lab.edit.overlays import View
 from gen_data.lab.edit.samples import Order, Shown
@@ -32,6 +36,23 @@ def headline(text: str) -> str:
     """First sentence of the comment at the head of a configuration."""
     lines = (line.removeprefix("#").strip() for line in text.splitlines() if line.startswith("#"))
     return next((line for line in lines if line and not line.startswith("yaml-language")), "")
+
+
+def _cache_file(name: str, text: str) -> Path:
+    """Place of the picture of a configuration of this version."""
+    import platformdirs
+
+    digest = hashlib.sha256(f"{__version__}\n{text}".encode()).hexdigest()[:16]
+    folder = Path(platformdirs.user_cache_path("gen-data")) / "gallery"
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder / f"{name}.{digest}.jpg"
+
+
+def _is_kept(gallery: dict[str, bytes], name: str, text: str) -> bool:
+    """Whether the picture was rendered by an earlier server; it is read then."""
+    with suppress(OSError):
+        gallery[name] = _cache_file(name, text).read_bytes()
+    return name in gallery
 
 
 class StartPage:
@@ -80,10 +101,12 @@ class StartPage:
     def _order(self) -> None:
         waiting = []
         for name, text in shipped_configurations().items():
-            if name in self.desk.gallery:
+            if name in self.desk.gallery or _is_kept(self.desk.gallery, name, text):
                 self._show(name)
             else:
                 waiting.append((name, Order(text, name, 0, View(layers=frozenset()), (), WIDTH_PX)))
+        # Short configurations first: their scenes tend to be simple.
+        waiting.sort(key=lambda one: len(one[1].text))
         names = [name for name, _ in waiting]
         self.desk.listeners[self.key] = partial(self._receive, names)
         assert self.desk.workers is not None
@@ -93,6 +116,8 @@ class StartPage:
         name = names[ticket.slot]
         if isinstance(result, Shown):
             self.desk.gallery[name] = result.jpeg
+            with suppress(OSError):
+                write_whole({_cache_file(name, shipped_configurations()[name]): result.jpeg})
             self._show(name)
         else:
             self._tiles[name][1].text = result.text[:300]
