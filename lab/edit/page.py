@@ -187,7 +187,7 @@ class EditorTab:
                 value=grid.slots,
                 label="pictures",
                 on_change=lambda e: self._set_grid(slots=e.value),
-            ).props("dense options-dense")
+            ).props('dense options-dense data-grid="slots"').style("min-width: 70px")
             ui.select(
                 list(EACH),
                 value=grid.each,

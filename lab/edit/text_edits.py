@@ -74,8 +74,8 @@ class _Text:
                     item = {"name": part, **_mapping(path[depth + 1 :], value)}
                     return self._insert(node, to_flow_yaml(item))
                 _refuse(path)
-            if child.start_mark.index < node.start_mark.index:
-                _refuse(path)  # An alias: its value stands elsewhere.
+            if self._is_shared(node, child):
+                _refuse(path)
             node, tree = child, tree.get(key) or tree
         if self._is_nothing(node):
             return self._fill(node, value)
@@ -106,6 +106,17 @@ class _Text:
         if isinstance(node, yaml.SequenceNode) and isinstance(key, int) and key < len(node.value):
             return node.value[key]
         return None
+
+    def _is_shared(self, node: Any, child: Any) -> bool:
+        """Whether a value is an alias, or has an anchor, which an alias may name."""
+        start = child.start_mark.index
+        if isinstance(node, yaml.MappingNode):
+            least = next(key.end_mark.index for key, value in node.value if value is child)
+        else:
+            place = next(k for k, value in enumerate(node.value) if value is child)
+            before = node.value[place - 1] if place else None
+            least = node.start_mark.index if before is None else before.start_mark.index + 1
+        return bool(start < least) or self.text.startswith("&", start)
 
     @staticmethod
     def _is_nothing(node: Any) -> bool:

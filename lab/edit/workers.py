@@ -51,6 +51,14 @@ class Job(Protocol):
 
 
 @dataclass(frozen=True)
+class Ready:
+    """A job that tells that the process has imported everything."""
+
+    def run(self, studio: Studio) -> None:
+        """Nothing."""
+
+
+@dataclass(frozen=True)
 class Ticket:
     """A job of a tab.
 
@@ -172,25 +180,21 @@ class Workers:
         """Loop of the thread of one process."""
         child = self._start(number)
         while (ticket := self._wait(number, child)) is not None:
-            timer = self._end_later(ticket, child, LIMIT_S)
+            ended = self._end_later(ticket, child, LIMIT_S)
             reply = _ask(child, ticket.job)
-            timer.cancel()
             with self._changed:
                 self._running.pop(number, None)
-                if self._closed:
-                    break
-                is_current = self._queue.is_current(ticket)
-                if reply is None and is_current and ticket.tries + 1 < TRIES and timer.is_alive():
+                is_current = self._queue.is_current(ticket) and not self._closed
+                if reply is None and is_current and ticket.tries + 1 < TRIES and not ended.is_set():
                     self._queue.put_back(ticket, replace(ticket, tries=ticket.tries + 1))
                     self._changed.notify_all()
                     is_current = False
-            status = 0 if reply else child.wait()
-            if is_current:
-                self._deliver(ticket, reply.result if reply else Refused(_describe(status)))
             if reply is None or reply.memory_bytes > MEMORY_BYTES:
                 child.kill()
-                child.wait()
+                status = child.wait()
                 child = self._start(number)
+            if is_current:
+                self._deliver(ticket, reply.result if reply else Refused(_describe(status)))
 
     def _wait(self, number: int, child: subprocess.Popen[bytes]) -> Ticket | None:
         """The next job; None when the workers are closed."""
@@ -205,19 +209,21 @@ class Workers:
 
     def _end_later(
         self, ticket: Ticket, child: subprocess.Popen[bytes], delay_s: float
-    ) -> threading.Timer:
-        """End a process if it still does this job after a time."""
+    ) -> threading.Event:
+        """End a process if it still does this job after a time; the event tells that it was."""
+        ended = threading.Event()
 
         def end() -> None:
             with self._changed:
-                runs = (ticket, child) in self._running.values()
+                runs = any(t is ticket and c is child for t, c in self._running.values())
             if runs:
+                ended.set()
                 child.kill()
 
         timer = threading.Timer(delay_s, end)
         timer.daemon = True
         timer.start()
-        return timer
+        return ended
 
     def _start(self, number: int) -> subprocess.Popen[bytes]:
         command = processes.tie([sys.executable, "-c", _START, *sys.path])
@@ -227,6 +233,7 @@ class Workers:
             self._children[number] = child
             if self._closed:
                 child.kill()
+        _ask(child, Ready())  # Others take the jobs while this one imports.
         return child
 
 
@@ -244,7 +251,7 @@ def _ask(child: subprocess.Popen[bytes], job: Job) -> Reply | None:
 
 
 def _describe(status: int) -> str:
-    if -status == KILLED:
+    if status == KILLED:
         return (
             f"the process of this picture was ended: it took longer than {LIMIT_S:g} s, or the "
             "machine ran out of memory; the page goes on with another process"
