@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import asyncio
 import secrets
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from nicegui import context, run, ui
+from nicegui import context, ui
 
 from gen_data.core.errors import GenDataError
 from gen_data.lab.edit import data_sets, statistics
@@ -17,7 +18,7 @@ from gen_data.lab.edit.panels import table
 from gen_data.lab.edit.samples import Shown
 
 if TYPE_CHECKING:
-    from gen_data.lab.edit.server import Desk
+    from gen_data.lab.edit.desk import Desk
 
 PAGE = 24
 """Pictures shown at once, of one data set; half of it of each of two."""
@@ -38,7 +39,7 @@ class BrowsePage:
 
     def build(self) -> None:
         """Make all widgets, and begin."""
-        context.client.on_delete(self._leave)
+        context.client.on_delete(partial(self.desk.forget, self.key))
         with ui.element("header").classes("gd-bar"):
             ui.label(str(self.folders[0])).classes("gd-title")
             others = [
@@ -64,7 +65,7 @@ class BrowsePage:
             if folder in self.rows:
                 continue
             try:
-                self.rows[folder] = await run.io_bound(data_sets.list_rows, folder)
+                self.rows[folder] = await asyncio.to_thread(data_sets.list_rows, folder)
             except GenDataError as error:
                 self._state.text = str(error)
                 return
@@ -149,9 +150,7 @@ class BrowsePage:
                         )
                         self._build_tile(jobs[-1], row)
         self._show_table(chosen)
-        self.desk.listeners[self.key] = self._receive
-        assert self.desk.workers is not None
-        self.desk.workers.submit(self.key, jobs)
+        self.desk.order(self.key, jobs, self._receive)
 
     def _build_tile(self, job: data_sets.StoredOrder, row: data_sets.Row) -> None:
         tile = ui.element("button").classes("gd-tile").props('type="button"')
@@ -181,7 +180,7 @@ class BrowsePage:
                 image = ui.element("img").props(f'alt="sample {job.index}"')
             body = ui.element("div").classes("gd-table")
 
-        def receive(ticket: Any, result: Any) -> None:
+        def receive(_: Any, result: Any) -> None:
             if not isinstance(result, Shown):
                 return
             image.props["src"] = self.desk.pictures.put(result.jpeg)
@@ -199,10 +198,7 @@ class BrowsePage:
                     ],
                 )
 
-        client = f"{self.key}/full"
-        self.desk.listeners[client] = receive
-        assert self.desk.workers is not None
-        self.desk.workers.submit(client, [replace(job, width_px=0)])
+        self.desk.order(f"{self.key}/full", [replace(job, width_px=0)], receive)
 
     def _show_table(self, chosen: dict[Path, list[data_sets.Row]]) -> None:
         found = [statistics.summarise_rows(rows) for rows in chosen.values()]
@@ -214,9 +210,3 @@ class BrowsePage:
             table(
                 tuple(header), statistics.rows(found[0], found[1] if len(found) > 1 else None)[:60]
             )
-
-    def _leave(self) -> None:
-        for client in (self.key, f"{self.key}/full"):
-            self.desk.listeners.pop(client, None)
-            assert self.desk.workers is not None
-            self.desk.workers.submit(client, ())

@@ -122,7 +122,7 @@ def _control(model: FieldSchema, name: str, node: Node | None) -> Control:
     place = ""
     if node is not None and node.position.file != "(default)":
         place = f"{node.position.file.rpartition('/')[2]}:{node.position.line}"
-    known = {"value": value, "help": describe_field(model, name), "place": place}
+    known: dict[str, Any] = {"value": value, "help": describe_field(model, name), "place": place}
     form = next(iter(value)) if isinstance(value, Mapping) and len(value) == 1 else ""
     kind, choices = _kind(field, value, form)
     if kind in ("choice", "weights"):
@@ -242,10 +242,10 @@ def _shares(values: Sequence[str], names: Sequence[str]) -> tuple[float, ...]:
 
 
 def find_distribution(
-    config: "Config", section: str, name: str, field: str
+    config: "Config | None", section: str, name: str, field: str
 ) -> Distribution[Any] | None:
-    """Distribution of a field of an item in the first scene; None if it is constant."""
-    listed: Sequence[Any] = getattr(config.probes[0], section, ())
+    """Distribution of a field of an item in the first scene; None if it is constant or absent."""
+    listed: Sequence[Any] = getattr(config.probes[0], section, ()) if config else ()
     item = next((one for one in listed if getattr(one, "name", None) == name), None)
     value = getattr(item, field, None) if isinstance(item, BaseModel) else None
     is_drawn = isinstance(value, Distribution) and not isinstance(value, Constant)
@@ -265,7 +265,7 @@ def low_middle_high(distribution: Distribution[Any]) -> tuple[Any, Any, Any] | N
 def three_values(
     control: Control, distribution: Distribution[Any] | None
 ) -> tuple[Any, Any, Any] | None:
-    """Low, middle and high value of a field: of its distribution, else half and twice its number."""
+    """Low, middle and high value of a field: of its distribution, or half and twice a number."""
     if distribution is not None:
         return low_middle_high(distribution)
     if control.kind != "number":

@@ -108,7 +108,7 @@ def choose(
     least: int = 0,
     order: str = "number",
 ) -> list[Row]:
-    """Images with an object of a category (empty = any), in a split, with enough objects, sorted."""
+    """Images in a split with enough objects, one of a category (empty = any), sorted."""
     found = [
         row
         for row in rows
@@ -150,7 +150,7 @@ class StoredOrder:
         sample = stored.labelled(self.index)
         unit = 1.5 if not self.width_px else 2.0
         reading = sample.capture.readings[self.camera]
-        image = draw_view(sample, self.view.of(self.camera), {}, unit)  # type: ignore[arg-type]
+        image = draw_view(sample, self.view.of(self.camera), {}, unit)
         if 0 < self.width_px < image.shape[1]:
             size_px = self.width_px, max(1, round(image.shape[0] * self.width_px / image.shape[1]))
             image = np.asarray(cv2.resize(image, size_px, interpolation=cv2.INTER_AREA), np.uint8)

@@ -57,8 +57,9 @@ def edit(
     import secrets
     import webbrowser
 
+    from gen_data.lab.edit.desk import Desk
     from gen_data.lab.edit.files import Folders
-    from gen_data.lab.edit.server import Desk, serve
+    from gen_data.lab.edit.server import serve
 
     source = None if config is None else Path(config)
     home = Path() if source is None else source.parent

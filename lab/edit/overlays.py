@@ -7,9 +7,9 @@ from gen_data.core import plugins
 from gen_data.core.capture import Channel
 from gen_data.core.interfaces import Modality, SensorInfo
 from gen_data.core.sample import Sample
-from gen_data.runner.stored import LabelledImages
 from gen_data.preview.overlay import Image, channel_image, draw_labels
 from gen_data.preview.sensor_views import top_view
+from gen_data.runner.stored import LabelledImages
 
 LAYERS: Mapping[str, str] = {
     "boxes": "boxes2d",

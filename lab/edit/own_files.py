@@ -178,8 +178,12 @@ def add_to_scene(text: str, config: Config, checked: Checked) -> str:
         raise ConfigError("elements: no surface holds the object; add one, such as a table")
     name = "".join(c if c.isalnum() else "_" for c in _category(str(checked.entry["file"])))
     group = {
-        "type": "objects", "on": surface, "count": 2, "assets": {"ids": [asset_id]}, "placement": "drop",
-    }  # fmt: skip
+        "type": "objects",
+        "on": surface,
+        "count": 2,
+        "assets": {"ids": [asset_id]},
+        "placement": "drop",
+    }
     listed = _own_list(text)
     if listed:
         return text_edits.append_item(text, "elements", {"name": f"own_{name}", **group})
@@ -198,8 +202,8 @@ def _on_walls(text: str, config: Config, tag: str) -> str:
     backdrop = _first(config, "randomizers", ("backdrop",))
     if backdrop is None:
         raise ConfigError(
-            "randomizers: none of them draws walls; add {type: backdrop, name: room}, or put objects "
-            "on the photograph itself: docs/tutorials/photo_plates.md"
+            "randomizers: none of them draws walls; add {type: backdrop, name: room}, or put "
+            "objects on the photograph itself: docs/tutorials/photo_plates.md"
         )
     values = {"walls": [tag], "painted": False, "wall_scale_m": 2.8}
     for field, value in values.items():

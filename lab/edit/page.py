@@ -11,19 +11,18 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from nicegui import context, run, ui
+from nicegui import context, ui
 from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 
 from gen_data.assemble.documents import shipped_text
 from gen_data.config.yaml_scalars import to_flow_yaml
 from gen_data.core.errors import GenDataError
-from gen_data.lab.edit import completion, controls
+from gen_data.lab.edit import completion
 from gen_data.lab.edit.browse_page import BrowsePage
 from gen_data.lab.edit.data_sets import is_data_set
 from gen_data.lab.edit.document import find_item
 from gen_data.lab.edit.files import read_file
-from gen_data.lab.edit.overlays import KINDS, LAYERS
 from gen_data.lab.edit.panels import (
     ControlsPanel,
     OwnFilesPanel,
@@ -37,7 +36,7 @@ from gen_data.lab.edit.start_page import StartPage
 from gen_data.lab.edit.workers import Refused, Ticket
 
 if TYPE_CHECKING:
-    from gen_data.lab.edit.server import Desk
+    from gen_data.lab.edit.desk import Desk
 
 HERE = Path(__file__).parent
 PAUSE_S = 0.04
@@ -63,7 +62,7 @@ def add_routes(app: Any, desk: Desk) -> None:
     @app.post("/edit/complete")  # type: ignore[untyped-decorator]
     async def complete(request: Request) -> Response:
         text, offset, inherited = await _asked(request)
-        start, found = await run.io_bound(completion.complete, text, offset, inherited)
+        start, found = await asyncio.to_thread(completion.complete, text, offset, inherited)
         return JSONResponse(
             {"start": start, "proposals": [_plain_proposal(one) for one in found[:200]]}
         )
@@ -71,7 +70,7 @@ def add_routes(app: Any, desk: Desk) -> None:
     @app.post("/edit/explain")  # type: ignore[untyped-decorator]
     async def explain(request: Request) -> Response:
         text, offset, inherited = await _asked(request)
-        name, found = await run.io_bound(completion.explain, text, offset, inherited)
+        name, found = await asyncio.to_thread(completion.explain, text, offset, inherited)
         return JSONResponse({"name": name, "text": found})
 
 
@@ -135,7 +134,6 @@ class EditorTab:
         self._tiles: list[Tile] = []
         self.chosen: Shown | None = None
         self.scratch: list[Path] = []
-        desk.listeners[self.key] = self._receive
 
     def build(self) -> None:
         """Make all widgets, and begin."""
@@ -221,7 +219,7 @@ class EditorTab:
                 OwnFilesPanel(self)
             with ui.tab_panel("Resolved"):
                 self.resolved = ResolvedPanel(self)
-        tabs.on_value_change(lambda e: e.value == "Resolved" and self.resolved.refresh())
+        tabs.on_value_change(lambda: self.resolved.refresh() if tabs.value == "Resolved" else None)
 
     @property
     def base(self) -> Shown | None:
@@ -254,7 +252,7 @@ class EditorTab:
             await asyncio.sleep(PAUSE_S)
             self._changed.clear()
             text = self.editor.value
-            await run.io_bound(self.session.set_text, text)
+            await asyncio.to_thread(self.session.set_text, text)
             if self._changed.is_set():
                 continue
             self._order()
@@ -265,8 +263,7 @@ class EditorTab:
     def _order(self) -> None:
         """Order all pictures of the current text."""
         orders = self.session.orders()
-        assert self.desk.workers is not None
-        self.desk.workers.submit(self.key, orders)
+        self.desk.order(self.key, orders, self._receive)
         self._orders = orders or self._orders
         self._show_tiles()
 
@@ -405,10 +402,7 @@ class EditorTab:
 
     def _leave(self) -> None:
         TABS.pop(self.key, None)
-        assert self.desk.workers is not None
-        for client in [name for name in self.desk.listeners if name.startswith(self.key)]:
-            self.desk.listeners.pop(client)
-            self.desk.workers.submit(client, ())
+        self.desk.forget(self.key)
         for folder in self.scratch:
             shutil.rmtree(folder, ignore_errors=True)
         self._task.cancel()

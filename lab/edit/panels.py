@@ -1,4 +1,4 @@
-"""Panels below the grid: controls of an item, statistics of the pictures, a picture in full size."""
+"""Panels below the grid: controls, statistics, own files, origins; a picture in full size."""
 
 from __future__ import annotations
 
@@ -6,13 +6,14 @@ import asyncio
 import html
 import sys
 import tempfile
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 from urllib.parse import quote
 
-from nicegui import run, ui
+from nicegui import ui
 
 from gen_data.config.yaml_scalars import to_flow_yaml
 from gen_data.core import processes
@@ -23,14 +24,41 @@ from gen_data.lab.edit.samples import Recording
 from gen_data.lab.edit.session import drawn_values, vary
 
 if TYPE_CHECKING:
-    from gen_data.lab.edit.page import EditorTab
+    from gen_data.lab.edit.desk import Desk
     from gen_data.lab.edit.samples import Order, Shown
+    from gen_data.lab.edit.session import Session, Variation
+
+
+class Tab(Protocol):
+    """Parts of a tab that its panels use.
+
+    Attributes:
+        key: Name of the tab.
+        client: Its connection to a browser.
+        base: The sample that `vary` changes; None without pictures.
+        chosen: The sample that the user has chosen for it.
+        scratch: Folders that are removed with the tab.
+    """
+
+    key: str
+    desk: Desk
+    session: Session
+    client: Any
+    chosen: Shown | None
+    scratch: list[Path]
+
+    @property
+    def base(self) -> Shown | None: ...  # noqa: D102
+
+    def edit(self, text: str) -> None: ...  # noqa: D102
+
+    def vary(self, variation: Variation) -> None: ...  # noqa: D102
 
 
 class ControlsPanel:
     """Controls of one item, and plots of what it draws."""
 
-    def __init__(self, tab: EditorTab) -> None:
+    def __init__(self, tab: Tab) -> None:
         self._tab = tab
         self._item = (controls.GENERAL, "")
         self._shown: list[controls.Control] = []
@@ -100,7 +128,7 @@ class ControlsPanel:
             self._build_input(control)
             if control.form and controls.find_distribution(
                 self._tab.session.config, *self._item, control.field
-            ):  # type: ignore[arg-type]
+            ):
                 self._plots[control.field] = ui.echart(_plot(None)).classes("gd-plot")
 
     def _build_input(self, control: controls.Control) -> None:
@@ -199,7 +227,7 @@ class ControlsPanel:
         session = self._tab.session
         section, name = self._item
         config, base = session.config, self._tab.base
-        found = config and controls.find_distribution(config, section, name, control.field)
+        found = controls.find_distribution(config, section, name, control.field)
         values = controls.three_values(control, found)
         if base is None or values is None:
             ui.notify("there is no picture to vary yet, or the field is no number")
@@ -211,7 +239,7 @@ class ControlsPanel:
         """Draw what the shown samples drew beside the declared densities."""
         config = self._tab.session.config
         for field, chart in self._plots.items():
-            found = config and controls.find_distribution(config, *self._item, field)
+            found = controls.find_distribution(config, *self._item, field)
             if not found:
                 continue
             drawn = drawn_values(self._tab.session.shown, f"{self._item[1]}.{field}")
@@ -259,7 +287,7 @@ def _plot(shown: controls.Density | None) -> dict[str, Any]:
 class StatisticsPanel:
     """Statistics of the shown samples beside those of real pictures, and the fit to them."""
 
-    def __init__(self, tab: EditorTab) -> None:
+    def __init__(self, tab: Tab) -> None:
         self._tab = tab
         self._real: statistics.Summary | None = None
         self._note = ui.label("")
@@ -272,7 +300,7 @@ class StatisticsPanel:
     async def _read(self) -> None:
         assert self._tab.desk.real is not None
         try:
-            self._real = await run.io_bound(statistics.read_summary, self._tab.desk.real)
+            self._real = await asyncio.to_thread(statistics.read_summary, self._tab.desk.real)
         except GenDataError as error:
             self._progress.text = str(error)
         self.refresh()
@@ -327,18 +355,18 @@ class StatisticsPanel:
 class OwnFilesPanel:
     """Drop of meshes and photographs."""
 
-    def __init__(self, tab: EditorTab) -> None:
+    def __init__(self, tab: Tab) -> None:
         self._tab = tab
         ui.label(
-            "Drop a mesh or a photograph here: it is checked, copied to assets/ next to the file, and "
-            "put into the scene."
+            "Drop a mesh or a photograph here: it is checked, copied to assets/ next to the file, "
+            "and put into the scene."
         )
         most = own_files.SIZE_MAX_BYTES
         ui.upload(
             on_upload=self._take,
             on_rejected=lambda: ui.notify(
-                f"larger than {most // 1_000_000} MB: copy it to {own_files.ASSETS}/ and list it in "
-                "assets.yaml",
+                f"larger than {most // 1_000_000} MB: copy it to {own_files.ASSETS}/ and list it "
+                "in assets.yaml",
                 type="negative",
             ),
             max_file_size=most,
@@ -363,9 +391,8 @@ class OwnFilesPanel:
         with card:
             ui.label(f"{path.name}: being checked ...")
         client = f"{self._tab.key}/file/{path}"
-        self._tab.desk.listeners[client] = partial(self._show, path, card)
-        assert self._tab.desk.workers is not None
-        self._tab.desk.workers.submit(client, [own_files.CheckFile(path, entry)])
+        job = own_files.CheckFile(path, entry)
+        self._tab.desk.order(client, [job], partial(self._show, path, card))
 
     def _show(self, path: Path, card: Any, ticket: Any, found: Any) -> None:
         self._tab.desk.listeners.pop(ticket.client, None)
@@ -416,7 +443,7 @@ class OwnFilesPanel:
             if not session.folders.contains(folder):
                 raise ConfigError(f"{folder} is outside of the folders of this page")
             text = own_files.add_to_scene(session.text, session.config, found)
-            await run.io_bound(own_files.keep_file, folder, path, found)
+            await asyncio.to_thread(own_files.keep_file, folder, path, found)
         except GenDataError as error:
             ui.notify(str(error), type="negative", multi_line=True)
             return
@@ -429,7 +456,7 @@ class OwnFilesPanel:
 class ResolvedPanel:
     """Every value of the resolved configuration with the file and line that give it."""
 
-    def __init__(self, tab: EditorTab) -> None:
+    def __init__(self, tab: Tab) -> None:
         self._tab = tab
         self._search = ui.input("field, value or file", on_change=self.refresh).props(
             "dense clearable"
@@ -447,7 +474,7 @@ class ResolvedPanel:
             )
 
 
-def table(header: tuple[str, ...], rows: list[tuple[str, ...]]) -> None:
+def table(header: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> None:
     """A plain table; all cells are text."""
     with ui.element("table"):
         with ui.element("tr"):
@@ -461,9 +488,8 @@ def table(header: tuple[str, ...], rows: list[tuple[str, ...]]) -> None:
                         ui.label(cell)
 
 
-def show_full(tab: EditorTab, order: Order, shown: Shown) -> None:
+def show_full(tab: Tab, order: Order, shown: Shown) -> None:
     """Show a sample in full size with its draws."""
-    assert tab.desk.workers is not None
     with ui.dialog(value=True).props("maximized") as dialog, ui.card().style("width: 100%"):
         with ui.element("div").classes("gd-row"):
             ui.label(f"sample {shown.index}").classes("gd-name")
@@ -501,7 +527,7 @@ def show_full(tab: EditorTab, order: Order, shown: Shown) -> None:
                 ],
             )
 
-    def receive(ticket: Any, result: Any) -> None:
+    def receive(_: Any, result: Any) -> None:
         jpeg = getattr(result, "jpeg", None)
         state.text = "" if jpeg else result.text
         if jpeg:
@@ -513,13 +539,13 @@ def show_full(tab: EditorTab, order: Order, shown: Shown) -> None:
     tab.desk.workers.submit(client, [replace(order, width_px=0)])
 
 
-def _choose_base(tab: EditorTab, shown: Shown, dialog: Any) -> None:
+def _choose_base(tab: Tab, shown: Shown, dialog: Any) -> None:
     tab.chosen = shown
     dialog.close()
     ui.notify(f"sample {shown.index} is the one that 'vary' changes")
 
 
-def _record(tab: EditorTab, order: Order) -> None:
+def _record(tab: Tab, order: Order) -> None:
     """Hand a recording of the sample to the browser; `rerun FILE` opens it."""
 
     def receive(ticket: Any, result: Any) -> None:
@@ -530,7 +556,4 @@ def _record(tab: EditorTab, order: Order) -> None:
             else:
                 ui.notify(result.text, type="negative")
 
-    client = f"{tab.key}/rerun"
-    tab.desk.listeners[client] = receive
-    assert tab.desk.workers is not None
-    tab.desk.workers.submit(client, [Recording(order)])
+    tab.desk.order(f"{tab.key}/rerun", [Recording(order)], receive)

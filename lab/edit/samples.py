@@ -331,7 +331,7 @@ def _with_small_camera(scene: Scene, name: str, width_px: int) -> tuple[Scene, f
 
 
 def shrink(lens: Intrinsics, width_px: int) -> Intrinsics:
-    """The same field of view with ``width_px`` columns; pixels keep their shape but for rounding."""
+    """The same field of view with ``width_px`` columns; pixels keep their shape, rounded."""
     height_px = max(1, round(lens.height_px * width_px / lens.width_px))
     x, y = width_px / lens.width_px, height_px / lens.height_px
     return Intrinsics(

@@ -4,26 +4,20 @@ from __future__ import annotations
 
 import asyncio
 import hmac
-import secrets
 import socket
 from collections.abc import Awaitable, Callable, MutableMapping
-from dataclasses import dataclass, field
 from http.cookies import SimpleCookie
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qs
 
 from gen_data.core.errors import ConfigError
-from gen_data.lab.edit.files import Folders
-from gen_data.lab.edit.workers import Refused, Ticket, Workers
+from gen_data.lab.edit.workers import Workers
 
 if TYPE_CHECKING:
-    from gen_data.lab.edit.samples import Shown
+    from gen_data.lab.edit.desk import Desk
 
 LOOPBACK = "127.0.0.1"
 COOKIE = "gen_data_edit"
-PICTURES_BYTES = 96 << 20
-"""Encoded pictures that are kept for browsers."""
 POLICY = (
     "default-src 'self'; img-src 'self' data: blob:; font-src 'self' data:; "
     "script-src 'self' 'unsafe-inline' 'unsafe-eval'; style-src 'self' 'unsafe-inline'; "
@@ -34,24 +28,6 @@ POLICY = (
 Scope = MutableMapping[str, Any]
 Receive = Callable[[], Awaitable[MutableMapping[str, Any]]]
 Send = Callable[[MutableMapping[str, Any]], Awaitable[None]]
-
-
-@dataclass
-class Pictures:
-    """Encoded pictures by unguessable name; the oldest go first."""
-
-    limit_bytes: int = PICTURES_BYTES
-    held: dict[str, bytes] = field(default_factory=dict)
-    size_bytes: int = 0
-
-    def put(self, data: bytes) -> str:
-        """Keep a picture; its path on the server."""
-        name = secrets.token_urlsafe(12)
-        self.held[name] = data
-        self.size_bytes += len(data)
-        while self.size_bytes > self.limit_bytes and len(self.held) > 1:
-            self.size_bytes -= len(self.held.pop(next(iter(self.held))))
-        return f"/edit/picture/{name}"
 
 
 class Guard:
@@ -117,34 +93,6 @@ def _with_policy(send: Send) -> Send:
 async def _reply(send: Send, status: int, headers: list[tuple[bytes, bytes]], body: bytes) -> None:
     await send({"type": "http.response.start", "status": status, "headers": headers})
     await send({"type": "http.response.body", "body": body})
-
-
-@dataclass
-class Desk:
-    """Everything that the tabs share.
-
-    Attributes:
-        source: File or data set to open; None = the start page.
-        real: Folder of real pictures; None without one.
-        gallery: Pictures of shipped configurations by file name.
-        listeners: Receivers of results by client of the workers.
-    """
-
-    folders: Folders
-    source: Path | None
-    real: Path | None
-    token: str
-    pictures: Pictures = field(default_factory=Pictures)
-    gallery: dict[str, bytes] = field(default_factory=dict)
-    listeners: dict[str, Callable[[Ticket, Any], None]] = field(default_factory=dict)
-    loop: asyncio.AbstractEventLoop | None = None
-    workers: Workers | None = None
-
-    def deliver(self, ticket: Ticket, result: Shown | Refused) -> None:
-        """Hand a result to its tab, in the loop of the server."""
-        listener = self.listeners.get(ticket.client)
-        if listener is not None and self.loop is not None and not self.loop.is_closed():
-            self.loop.call_soon_threadsafe(listener, ticket, result)
 
 
 def free_port(host: str, port: int) -> int:

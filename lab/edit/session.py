@@ -53,7 +53,7 @@ class Grid:
     slots: int = 8
     first: int = 0
     each: str = "scene"
-    view: View = View()
+    view: View = field(default_factory=View)
     variation: Variation | None = None
 
     def indices(self, config: Config) -> list[int]:
@@ -79,8 +79,8 @@ class Session:
     file: OpenedFile
     folders: Folders
     text: str = ""
-    grid: Grid = Grid()
-    analysis: Analysis = Analysis(None)
+    grid: Grid = field(default_factory=Grid)
+    analysis: Analysis = field(default_factory=lambda: Analysis(None))
     config: Config | None = None
     results: dict[int, Shown | Refused] = field(default_factory=dict)
     outdated: set[int] = field(default_factory=set)
@@ -182,7 +182,8 @@ def vary(shown: Shown, section: str, name: str, field_: str, values: Sequence[An
 
     Args:
         shown: Picture of the sample.
-        section, name: Place of the item; no name for a field of the configuration itself.
+        section: Section of the item; empty for a field of the configuration itself.
+        name: Name of the item.
         field_: The field that varies.
         values: Its values.
     """

@@ -19,7 +19,7 @@ from gen_data.lab.edit.overlays import View
 from gen_data.lab.edit.samples import Order, Shown
 
 if TYPE_CHECKING:
-    from gen_data.lab.edit.server import Desk
+    from gen_data.lab.edit.desk import Desk
 
 WIDTH_PX = 280
 
@@ -65,7 +65,7 @@ class StartPage:
 
     def build(self) -> None:
         """Make all widgets, and begin."""
-        context.client.on_delete(self._leave)
+        context.client.on_delete(partial(self.desk.forget, self.key))
         with ui.element("header").classes("gd-bar"):
             ui.label("gen-data: begin with").classes("gd-title")
         with ui.element("main").style("padding: 8px 12px"):
@@ -107,10 +107,8 @@ class StartPage:
                 waiting.append((name, Order(text, name, 0, View(layers=frozenset()), (), WIDTH_PX)))
         # Short configurations first: their scenes tend to be simple.
         waiting.sort(key=lambda one: len(one[1].text))
-        names = [name for name, _ in waiting]
-        self.desk.listeners[self.key] = partial(self._receive, names)
-        assert self.desk.workers is not None
-        self.desk.workers.submit(self.key, [order for _, order in waiting])
+        receive = partial(self._receive, [name for name, _ in waiting])
+        self.desk.order(self.key, [order for _, order in waiting], receive)
 
     def _receive(self, names: list[str], ticket: Any, result: Any) -> None:
         name = names[ticket.slot]
@@ -126,8 +124,3 @@ class StartPage:
         image = self._tiles[name][0]
         image.props["src"] = self.desk.pictures.put(self.desk.gallery[name])
         image.update()
-
-    def _leave(self) -> None:
-        self.desk.listeners.pop(self.key, None)
-        assert self.desk.workers is not None
-        self.desk.workers.submit(self.key, ())

@@ -160,7 +160,7 @@ class _Text:
         if self.root is not None and self.root.flow_style:
             return self._insert(self.root, f"{_plain(section)}: {_nested(rest, value)}")
         if section in ("randomizers", "sensors") and rest:
-            body = [{"name": rest[0], **_mapping(rest[1:], value)}]
+            body: Any = [{"name": rest[0], **_mapping(rest[1:], value)}]
         else:
             body = _mapping(rest, value) if rest else value
         joint = "" if not self.text or self.text[-1] in "\r\n" else self.line_end

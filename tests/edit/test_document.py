@@ -107,9 +107,7 @@ def test_a_field_is_explained_by_its_type_default_and_description() -> None:
 def test_the_item_at_the_cursor_is_found() -> None:
     """By the line of the cursor, in lists and sections."""
     lines = TABLETOP.splitlines()
-    orbit = lines.index(
-        "    azimuth_deg: {uniform: [-145, 145]}          # not from behind the arm, which stands at -X"
-    )
+    orbit = lines.index("    elevation_deg: {uniform: [22, 65]}")
     assert find_item(TABLETOP, "x", orbit + 1) == ("randomizers", "orbit")
     assert find_item(TABLETOP, "x", lines.index("seed: 7") + 1) == ("seed", "")
 

@@ -14,9 +14,10 @@ import pytest
 from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.lens import Lens
 from gen_data.lab.edit import data_sets
+from gen_data.lab.edit.desk import Pictures
 from gen_data.lab.edit.files import Folders, OpenedFile
 from gen_data.lab.edit.samples import Labelled, Shown, shrink
-from gen_data.lab.edit.server import COOKIE, Guard, Pictures
+from gen_data.lab.edit.server import COOKIE, Guard
 from gen_data.lab.edit.session import Session, vary
 from gen_data.lab.edit.statistics import rows, summarise
 from gen_data.lab.edit.workers import Queue, Ready, Refused, Ticket
