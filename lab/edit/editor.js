@@ -37,6 +37,33 @@ function completions(tab) {
   };
 }
 
+// Faults are marks of the browser: a property of the server's element would bring its text along,
+// which is older than the latest keys.
+const setFaults = CM.StateEffect.define();
+const faults = CM.StateField.define({
+  create: () => CM.Decoration.none,
+  update(marks, transaction) {
+    marks = marks.map(transaction.changes);
+    for (const effect of transaction.effects)
+      if (effect.is(setFaults)) marks = markAll(transaction.state.doc, effect.value);
+    return marks;
+  },
+  provide: (field) => CM.EditorView.decorations.from(field),
+});
+
+function markAll(doc, listed) {
+  const ranges = [];
+  for (const fault of listed.filter((one) => one.line >= 1 && one.line <= doc.lines)) {
+    const line = doc.line(fault.line);
+    ranges.push(CM.Decoration.line({ class: "gd-wrong-line" }).range(line.from));
+    const from = line.from + toUnits(line.text, fault.column - 1);
+    const word = /^.[^ ,:{}[\]#]*/.exec(doc.sliceString(from, line.to));
+    const mark = CM.Decoration.mark({ class: "gd-wrong", attributes: { title: fault.text } });
+    if (word) ranges.push(mark.range(from, from + word[0].length));
+  }
+  return CM.Decoration.set(ranges, true);
+}
+
 function explanation(tab) {
   return CM.hoverTooltip(async (view, unit) => {
     const reply = await ask("explain", tab, view.state.doc.toString(), unit);
@@ -74,12 +101,17 @@ window.genDataEdit = {
     editor.dispatch({
       effects: CM.StateEffect.appendConfig.of([
         CM.EditorState.languageData.of(() => [{ autocomplete: source }]),
+        faults,
         explanation(tab),
         keepDraft(key),
         CM.EditorView.contentAttributes.of({ "aria-label": "Configuration in YAML" }),
       ]),
     });
     return sessionStorage.getItem(key);
+  },
+  async mark(id, listed) {
+    const editor = await getElement(id).editorPromise;
+    editor.dispatch({ effects: setFaults.of(listed) });
   },
   forget(key) {
     sessionStorage.removeItem(key);

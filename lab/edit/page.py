@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import secrets
 import shutil
 from collections.abc import Callable
@@ -303,20 +304,10 @@ class EditorTab:
                     .on("click", partial(self.editor.reveal_line, max(fault.line, 1)))
                 ):
                     ui.label(fault.text)
-        lines = self.editor.value.split("\n")
-        marked = [f for f in faults if 0 < f.line <= len(lines)]
-        starts = [0]
-        for line in lines:
-            starts.append(starts[-1] + len(line) + 1)
-        decorations: list[dict[str, Any]] = []
-        for fault in marked:
-            decorations.append({"kind": "line", "line": fault.line, "class": "gd-wrong-line"})
-            begin = min(starts[fault.line - 1] + fault.column - 1, starts[fault.line] - 1)
-            end = begin + len(_word(lines[fault.line - 1][fault.column - 1 :]))
-            if end > begin:
-                decorations.append({"kind": "mark", "from": begin, "to": end, "class": "gd-wrong"})
-        self.editor.decorations = decorations
-        self.editor.line_tooltips = {fault.line: fault.text for fault in marked}
+        listed = [{"line": f.line, "column": f.column, "text": f.text} for f in faults if f.line]
+        self.client.run_javascript(
+            f"window.genDataEdit.mark({self.editor.id}, {json.dumps(listed)})"
+        )
         count = len(faults)
         self._state.text = f"{count} fault{'s' * (count != 1)}" if count else self._saved_words()
 
@@ -406,12 +397,6 @@ class EditorTab:
         for folder in self.scratch:
             shutil.rmtree(folder, ignore_errors=True)
         self._task.cancel()
-
-
-def _word(text: str) -> str:
-    """What is underlined: up to a separator, at least one character."""
-    end = next((k for k, char in enumerate(text) if char in " ,:{}[]#" and k > 0), len(text))
-    return text[:end]
 
 
 class Tile:
