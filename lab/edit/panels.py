@@ -534,9 +534,7 @@ def show_full(tab: Tab, order: Order, shown: Shown) -> None:
             image.props["src"] = tab.desk.pictures.put(jpeg)
             image.update()
 
-    client = f"{tab.key}/full"
-    tab.desk.listeners[client] = receive
-    tab.desk.workers.submit(client, [replace(order, width_px=0)])
+    tab.desk.order(f"{tab.key}/full", [replace(order, width_px=0)], receive)
 
 
 def _choose_base(tab: Tab, shown: Shown, dialog: Any) -> None:

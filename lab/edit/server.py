@@ -37,8 +37,10 @@ class Guard:
     are refused, as a page of another site may have its name resolved to this machine.
     """
 
-    def __init__(self, app: Any, token: str, hosts: frozenset[str]) -> None:
+    def __init__(self, app: Any, token: str, hosts: frozenset[str], port: int) -> None:
         self.app, self.token, self.hosts = app, token, hosts
+        # Cookies hold for all ports of a host: each server has a name for its own.
+        self.cookie = f"{COOKIE}_{port}"
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve a request, or refuse it."""
@@ -54,7 +56,7 @@ class Guard:
         is_same = not origin or origin.partition("://")[2] == headers.get("host", "")
         if is_ours and is_same and self._fits(given) and scope["type"] == "http":
             await self._enter(scope, send)
-        elif is_ours and is_same and self._fits(_cookie(headers.get("cookie", ""))):
+        elif is_ours and is_same and self._fits(_cookie(headers.get("cookie", ""), self.cookie)):
             await self.app(scope, receive, _with_policy(send) if scope["type"] == "http" else send)
         elif scope["type"] == "websocket":
             await send({"type": "websocket.close", "code": 1008})
@@ -66,13 +68,13 @@ class Guard:
         return hmac.compare_digest(given.encode(), self.token.encode())
 
     async def _enter(self, scope: Scope, send: Send) -> None:
-        cookie = f"{COOKIE}={self.token}; HttpOnly; SameSite=Strict; Path=/"
+        cookie = f"{self.cookie}={self.token}; HttpOnly; SameSite=Strict; Path=/"
         headers = [(b"location", scope["path"].encode()), (b"set-cookie", cookie.encode())]
         await _reply(send, 303, headers, b"")
 
 
-def _cookie(header: str) -> str:
-    found = SimpleCookie(header).get(COOKIE)
+def _cookie(header: str, name: str) -> str:
+    found = SimpleCookie(header).get(name)
     return found.value if found else ""
 
 
@@ -122,7 +124,7 @@ def serve(desk: Desk, host: str, port: int, workers: int, announce: Callable[[st
     port = free_port(host, port)
     names = (LOOPBACK, "localhost") if host == LOOPBACK else ()
     hosts = frozenset(f"{name}:{port}" for name in names)
-    app.add_middleware(Guard, token=desk.token, hosts=hosts)
+    app.add_middleware(Guard, token=desk.token, hosts=hosts, port=port)
     page.add_routes(app, desk)
 
     def start() -> None:

@@ -11,9 +11,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from tests.browser import Opened, open_browser
+from tests.report.handmade import HOSTILE_NAME, make_image, make_object, write_dataset
 
 pytestmark = pytest.mark.slow
 
@@ -169,3 +171,26 @@ def test_the_page_fits_a_phone_and_asks_nobody_else(opened: Opened) -> None:
     hosts = {url.split("/")[2].partition(":")[0] for url in opened.requests if url[:4] == "http"}
     assert hosts == {"127.0.0.1"}
     assert opened.messages == []
+
+
+def test_a_data_set_is_filtered_and_shown(tmp_path: Path) -> None:
+    """By class; names are shown as text."""
+    pytest.importorskip("nicegui")
+    samples = [
+        [make_object(1, HOSTILE_NAME), make_object(2, "bus", 40, 16)],
+        [make_object(1, "car")],
+    ]
+    image = make_image(np.random.default_rng(5))
+    write_dataset(tmp_path / "set", samples, ("bus", "car", HOSTILE_NAME), [image])
+    with open_browser() as opened, served(tmp_path, "set") as url:
+        page = opened.page
+        page.set_default_timeout(WAIT_MS)
+        page.goto(url)
+        page.wait_for_function(
+            "[...document.querySelectorAll('.gd-tile img')].every(i => i.naturalWidth)"
+        )
+        page.click("label:has([data-filter=category])")
+        page.click(".q-item:has-text('bus')")
+        page.wait_for_selector("[role=status]:has-text('set: 1 of 2 images')")
+        assert HOSTILE_NAME in page.inner_text(".gd-table")
+        assert page.evaluate("document.querySelector('img[onerror]')") is None

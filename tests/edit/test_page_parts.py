@@ -95,7 +95,7 @@ def ask(kind: str, query: str = "", **headers: str) -> tuple[list[MutableMapping
         "query_string": query.encode(),
         "headers": [(k.encode(), v.encode()) for k, v in headers.items()],
     }
-    guard = Guard(app, "secret", frozenset({"127.0.0.1:80"}))
+    guard = Guard(app, "secret", frozenset({"127.0.0.1:80"}), 80)
     asyncio.run(guard(scope, receive, send))
     return sent, bool(reached)
 
@@ -103,17 +103,17 @@ def ask(kind: str, query: str = "", **headers: str) -> tuple[list[MutableMapping
 def test_a_request_needs_the_token_and_a_host_of_this_machine() -> None:
     """The token of the printed address becomes a cookie; other sites and names are refused."""
     ours = {"host": "127.0.0.1:80"}
-    cookie = {"cookie": f"{COOKIE}=secret"}
+    cookie = {"cookie": f"{COOKIE}_80=secret"}
     sent, reached = ask("http", "token=secret", **ours)
     assert (sent[0]["status"], reached) == (303, False)
     assert dict(sent[0]["headers"])[b"set-cookie"].startswith(
-        b"gen_data_edit=secret; HttpOnly; SameSite"
+        b"gen_data_edit_80=secret; HttpOnly; SameSite"
     )
     assert ask("http", **ours, **cookie)[1]
     assert ask("websocket", **ours, **cookie, origin="http://127.0.0.1:80")[1]
     for headers in (
         ours,
-        {**ours, "cookie": f"{COOKIE}=guess"},
+        {**ours, "cookie": f"{COOKIE}_80=guess"},
         {"host": "evil.example:80", **cookie},
         {**ours, **cookie, "origin": "http://evil.example"},
     ):
