@@ -173,17 +173,18 @@ def test_the_page_fits_a_phone_and_asks_nobody_else(opened: Opened) -> None:
     assert opened.messages == []
 
 
-def test_a_data_set_is_filtered_and_shown(tmp_path: Path) -> None:
+def test_a_data_set_is_filtered_and_shown(opened: Opened, tmp_path: Path) -> None:
     """By class; names are shown as text."""
-    pytest.importorskip("nicegui")
+    browser = opened.page.context.browser
+    assert browser is not None
     samples = [
         [make_object(1, HOSTILE_NAME), make_object(2, "bus", 40, 16)],
         [make_object(1, "car")],
     ]
     image = make_image(np.random.default_rng(5))
     write_dataset(tmp_path / "set", samples, ("bus", "car", HOSTILE_NAME), [image])
-    with open_browser() as opened, served(tmp_path, "set") as url:
-        page = opened.page
+    with served(tmp_path, "set") as url:
+        page = browser.new_page()
         page.set_default_timeout(WAIT_MS)
         page.goto(url)
         page.wait_for_function(
@@ -194,3 +195,4 @@ def test_a_data_set_is_filtered_and_shown(tmp_path: Path) -> None:
         page.wait_for_selector("[role=status]:has-text('set: 1 of 2 images')")
         assert HOSTILE_NAME in page.inner_text(".gd-table")
         assert page.evaluate("document.querySelector('img[onerror]')") is None
+        page.close()
