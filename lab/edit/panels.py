@@ -119,12 +119,12 @@ class ControlsPanel:
     def _build(self, control: controls.Control) -> None:
         with ui.element("div").classes("gd-field").props(f'data-field="{control.field}"'):
             with ui.element("div").classes("gd-row"):
-                ui.label(control.field).classes("gd-name").tooltip(control.help)
+                ui.label(control.field).classes("gd-name").props["title"] = control.help
                 ui.label(control.place or "default").classes("gd-place")
                 if control.kind in ("number", "range", "normal"):
                     ui.button("vary", on_click=partial(self._vary, control)).props(
                         f'dense flat no-caps size=sm aria-label="Vary {control.field}"'
-                    ).tooltip("one sample with a low, middle and high value of this field")
+                    ).props["title"] = "one sample with a low, middle and high value of this field"
             self._build_input(control)
             if control.form and controls.find_distribution(
                 self._tab.session.config, *self._item, control.field
@@ -496,7 +496,7 @@ def show_full(tab: Tab, order: Order, shown: Shown) -> None:
             ui.button("Close", on_click=dialog.close).props("dense no-caps flat")
             ui.button("Vary this one", on_click=partial(_choose_base, tab, shown, dialog)).props(
                 "dense no-caps flat"
-            ).tooltip("the buttons 'vary' of the controls change this sample")
+            ).props["title"] = "the buttons 'vary' of the controls change this sample"
             ui.button("Recording for Rerun", on_click=partial(_record, tab, order)).props(
                 "dense no-caps flat"
             )
