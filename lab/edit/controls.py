@@ -11,7 +11,9 @@ from pydantic import BaseModel
 from gen_data.config.distributions import Constant, Distribution
 from gen_data.config.merging import node_name
 from gen_data.config.schema import FieldSchema
+from gen_data.config.yaml_scalars import to_flow_yaml
 from gen_data.config.yaml_tree import Node
+from gen_data.core.bounded_cache import CountCache
 from gen_data.core.streams import Streams
 from gen_data.lab.edit.completion import describe_field, item_schema, root_schema
 
@@ -211,11 +213,8 @@ class Density:
 
 def density(distribution: Distribution[Any], drawn: Sequence[Any]) -> Density | None:
     """Density of a distribution of numbers or names beside drawn values; None for others."""
-    rng = Streams(0, 0).rng("edit/density")
-    expected = []
-    for turn in range(DRAWS):
-        rng.index = turn  # A sequence takes its values in turn.
-        expected.append(distribution.draw(rng))
+    key = to_flow_yaml(distribution.to_yaml())
+    expected = _EXPECTED.get(key, lambda: _draw_many(distribution))
     if not all(isinstance(one, (int, float, str)) for one in expected):
         return None
     if isinstance(expected[0], (str, bool)):
@@ -235,6 +234,18 @@ def density(distribution: Distribution[Any], drawn: Sequence[Any]) -> Density | 
     centers = tuple(f"{c:.4g}" for c in 0.5 * (edges[1:] + edges[:-1]))
     declared, seen = (np.histogram(one, edges)[0] / max(len(one), 1) for one in (numbers, found))
     return Density(centers, tuple(declared.tolist()), tuple(seen.tolist()), len(drawn))
+
+
+_EXPECTED: CountCache[list[Any]] = CountCache(64)
+
+
+def _draw_many(distribution: Distribution[Any]) -> list[Any]:
+    rng = Streams(0, 0).rng("edit/density")
+    drawn = []
+    for turn in range(DRAWS):
+        rng.index = turn  # A sequence takes its values in turn.
+        drawn.append(distribution.draw(rng))
+    return drawn
 
 
 def _shares(values: Sequence[str], names: Sequence[str]) -> tuple[float, ...]:

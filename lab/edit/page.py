@@ -220,7 +220,13 @@ class EditorTab:
                 OwnFilesPanel(self)
             with ui.tab_panel("Resolved"):
                 self.resolved = ResolvedPanel(self)
-        tabs.on_value_change(lambda: self.resolved.refresh() if tabs.value == "Resolved" else None)
+        self._tabs = tabs
+        tabs.on_value_change(self._refresh_panel)
+
+    def _refresh_panel(self) -> None:
+        """Refresh the panel that is shown; others wait until they are."""
+        shown = {"Controls": self.controls.refresh_plots, "Statistics": self.statistics.refresh}
+        shown.get(str(self._tabs.value), self.resolved.refresh)()
 
     @property
     def base(self) -> Shown | None:
@@ -275,8 +281,7 @@ class EditorTab:
         if isinstance(result, Refused):
             self._show_faults()
         if not self.session.outdated and len(self.session.results) == len(self._orders):
-            self.controls.refresh_plots()
-            self.statistics.refresh()
+            self._refresh_panel()
 
     def _caption(self, slot: int) -> str:
         varied = self.session.grid.variation
