@@ -105,6 +105,12 @@ def load_config_document(name: str) -> Node:
     return _complete(load_yaml(path), (path,))
 
 
+def shipped_text(name: str) -> str:
+    """Text of a shipped configuration; empty if there is none of that name."""
+    found = (path for path in _shipped_files(configs) if name in (path.name, path.stem))
+    return next((path.read_text("utf-8") for path in found), "")
+
+
 def parse_config_document(text: str, file: str) -> Node:
     """Parse the text of a configuration, and load everything that it extends.
 

@@ -26,7 +26,7 @@ from gen_data.core import errors, processes, version
 from gen_data.core.urls import is_url, needs_folder
 
 FOLDERS_ONLY = frozenset(
-    "adapt certify contact-sheet diff export match merge preview recipe repair report".split()  # noqa: SIM905
+    "adapt certify contact-sheet diff edit export match merge preview recipe repair report".split()  # noqa: SIM905
 ) | {"ladder", "repro", "rerender", "sample", "study"}
 """Commands that read no data set at a URL."""
 
@@ -41,6 +41,7 @@ class LazyCommands(click.Group):
         "sample": "gen_data.cli.sample_command:sample",
         "export": "gen_data.cli.export_command:export",
         "rerender": "gen_data.cli.rerender_command:rerender",
+        "edit": "gen_data.lab.edit.edit_command:edit",
         "preview": "gen_data.cli.preview_commands:preview",
         "contact-sheet": "gen_data.cli.preview_commands:contact_sheet",
         "assets": "gen_data.cli.asset_commands:assets",
@@ -71,6 +72,7 @@ class LazyCommands(click.Group):
         "sample": "Write one sample of a configuration or of a data set.",
         "export": "Write a finished data set in other formats, without rendering.",
         "rerender": "Render the scenes of a data set again: other sensors, weather, light.",
+        "edit": "Edit a configuration, or browse a data set, in the browser, with live samples.",
         "preview": "Show samples in Rerun: live, in a browser, or as a .rrd file.",
         "contact-sheet": "Draw samples with their labels on one PNG.",
         "assets": "Install, list, show, verify and remove packs of assets.",

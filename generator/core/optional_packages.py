@@ -13,6 +13,7 @@ EXTRAS = {
     "h5py": ("h5py", "formats"),
     "mcap": ("mcap", "formats"),
     "mcap_protobuf": ("mcap-protobuf-support", "formats"),
+    "nicegui": ("nicegui", "edit"),
     "pxr": ("usd-core", "usd"),
     "pyarrow": ("pyarrow", "formats"),
     "rerun": ("rerun-sdk", "preview"),

@@ -1,6 +1,6 @@
 """Drawing of labels on images: tinted or outlined masks, boxes, skeletons and names."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -39,8 +39,17 @@ NEAR_M = 0.01
 """Edges are clipped at this distance from the camera plane."""
 
 
-def draw_labels(reading: SensorReading, truth: sample.ImageTruth, unit: float = 1.0) -> Image:
-    """Draw every label on the RGB image, uint8 [h, w, 3].
+LAYERS = ("masks", "boxes3d", "boxes", "keypoints", "names")
+"""Kinds of labels, in the order of drawing."""
+
+
+def draw_labels(
+    reading: SensorReading,
+    truth: sample.ImageTruth,
+    unit: float = 1.0,
+    layers: Collection[str] = LAYERS,
+) -> Image:
+    """Draw labels on the RGB image, uint8 [h, w, 3].
 
     What surrounds the scene, walls and floors, is outlined and named only.
 
@@ -49,26 +58,29 @@ def draw_labels(reading: SensorReading, truth: sample.ImageTruth, unit: float = 
         truth: Its labels.
         unit: Width of lines [px]; names have ten times its height. For an image that is shown at a
             third of its size, 3.
+        layers: Kinds to draw, some of ``LAYERS``.
     """
     image: Image = np.array(reading.channels[Channel.RGB], np.uint8, order="C")
     width = max(1, round(unit))
     around = [item for item in truth.objects if _surrounds(image, item)]
     things = [item for item in truth.objects if not _surrounds(image, item)]
-    for item in things:
-        _tint(image, item)
-    for item in around:
-        _outline(image, item, width)
+    if "masks" in layers:
+        for item in things:
+            _tint(image, item)
+        for item in around:
+            _outline(image, item, width)
     for item in things:
         color = id_color(item.instance.instance_id)
-        if item.box3d_camera is not None:
+        if "boxes3d" in layers and item.box3d_camera is not None:
             draw_box3d(image, item.box3d_camera, truth.camera.intrinsics, color, width)
-        if item.box is not None:
+        if "boxes" in layers and item.box is not None:
             b = item.box
             cv2.rectangle(image, (b.x_min, b.y_min), (b.x_max - 1, b.y_max - 1), color, width)
-        draw_keypoints(image, item.keypoints or (), _lighter(color))
+        if "keypoints" in layers:
+            draw_keypoints(image, item.keypoints or (), _lighter(color))
     places: list[boxes.BoxPx] = []
     # Names of things first: those of their surroundings make room.
-    for item in (*things, *around):
+    for item in (*things, *around) if "names" in layers else ():
         if item.box is not None:
             _write(image, item, unit, places)
     return image

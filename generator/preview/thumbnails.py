@@ -38,9 +38,16 @@ def thumbnail(asset: Asset, library: AssetLibrary, renderer: Renderer, size_px: 
         radiance = library.environment(asset.asset_id)
         shown = np.power(radiance / (1.0 + radiance), 1.0 / 2.2)
         return _fit_in_square((255.0 * shown).astype(np.uint8), size_px)
+    return picture_of(_bodies(asset, library), library, renderer, size_px)
+
+
+def picture_of(
+    bodies: tuple[Body, ...], library: AssetLibrary, renderer: Renderer, size_px: int
+) -> Image:
+    """Render bodies from the front, the left and above, uint8 [size_px, size_px, 3]."""
     scene = Scene(
         "thumbnail",
-        _bodies(asset, library),
+        bodies,
         lights=(Light("key", "sun", direction=(-0.36, -0.48, -0.8), illuminance_lux=600.0),),
         environment=Environment(luminance_cd_m2=120.0, visible=False),
     )

@@ -176,8 +176,8 @@ class Replay:
         def settle(attempt: int) -> tuple[Scene, Sequence[Randomizer]]:
             streams = Streams(info.seed, number, attempt=attempt, index=number)
             nominal, randomizers, _ = self._open_scene(streams)
-            log.extend(self._shared_draws(nominal))
-            observed = tuple(_observe_randomizer(randomizer, log) for randomizer in randomizers)
+            log.extend(shared_draws(self._config, nominal))
+            observed = tuple(observe_randomizer(randomizer, log) for randomizer in randomizers)
             drawn = self._randomize(nominal, observed, Stage.BUILD, streams)
             settled = physics.settle(drawn)
             if settled.rejection is not None:
@@ -234,14 +234,6 @@ class Replay:
                 scene = randomizer(scene, self._library, rng)
         return scene
 
-    def _shared_draws(self, scene: Scene) -> Iterator[Draw]:
-        """Values of the section ``shared``."""
-        values: shared_values.Shared = dict(scene.shared)
-        if values:
-            section = self._config.document.entries["shared"]
-            for name, distribution in shared_values.read_shared(section, values).items():
-                yield f"shared.{name}", distribution, values[name]
-
     def _keep(self, draws: Sequence[Draw], samples: range) -> None:
         for name, distribution, value in draws:
             if isinstance(distribution, Constant):
@@ -283,7 +275,17 @@ def _snap(was: Any, now: Any) -> Any:
     return now
 
 
-def _observe_randomizer(randomizer: Randomizer, log: list[Draw]) -> Randomizer:
+def shared_draws(config: Config, scene: Scene) -> Iterator[Draw]:
+    """Values of the section ``shared`` of a scene, with their distributions."""
+    values: shared_values.Shared = dict(scene.shared)
+    if values:
+        section = config.document.entries["shared"]
+        for name, distribution in shared_values.read_shared(section, values).items():
+            yield f"shared.{name}", distribution, values[name]
+
+
+def observe_randomizer(randomizer: Randomizer, log: list[Draw]) -> Randomizer:
+    """A randomizer with the same results that records its draws."""
     if not isinstance(randomizer, BaseModel):
         return randomizer
     observed: Randomizer = _observe(randomizer, randomizer.name, log)

@@ -3,49 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 
 from gen_data.report.html_page import format_page
 from gen_data.report.report_data import describe_dataset
+from tests.browser import Opened, open_browser
 from tests.report.handmade import HOSTILE, HOSTILE_NAME, make_image, make_object, write_dataset
 
-if TYPE_CHECKING:
-    from playwright.sync_api import Page
-
 pytestmark = pytest.mark.slow
-
-CHROMIUM = ("/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome")
-
-
-@dataclass
-class Opened:
-    """A page in a browser, with all its messages and requests."""
-
-    page: Page
-    messages: list[str] = field(default_factory=list)
-    requests: list[str] = field(default_factory=list)
-
-    @property
-    def shown(self) -> str:
-        return self.page.inner_text("#shown")
-
-    def pixels(self) -> str:
-        """The image with its overlays, as a data URL."""
-        text: str = self.page.evaluate("document.querySelector('.stage canvas').toDataURL()")
-        return text
 
 
 @pytest.fixture(scope="module")
 def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Opened]:
-    playwright = pytest.importorskip("playwright.sync_api")
-    program = next((path for path in CHROMIUM if Path(path).exists()), None)
-    if program is None:
-        pytest.skip("needs Chromium")
     folder = tmp_path_factory.mktemp("sets")
     rng = np.random.default_rng(5)
     samples = [[make_object(1, "car"), make_object(2, "bus", 40, 16)]] * 14 + [[]]
@@ -56,25 +28,28 @@ def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Opened]:
     path = folder / "index.html"
     text = format_page([describe_dataset(one, scenes_max=0) for one in sets])
     path.write_text(text, encoding="utf-8")
-    flags = ["--no-sandbox", "--disable-gpu", "--disable-background-networking"]
-    with playwright.sync_playwright() as driver:
-        browser = driver.chromium.launch(executable_path=program, args=flags)
-        opened = Opened(browser.new_page(viewport={"width": 1440, "height": 900}))
-        opened.page.on("console", lambda message: opened.messages.append(message.text))
-        opened.page.on("pageerror", lambda error: opened.messages.append(str(error)))
-        opened.page.on("request", lambda request: opened.requests.append(request.url))
+    with open_browser(width=1440) as opened:
         opened.page.goto(path.as_uri())
         opened.page.wait_for_selector(".stage canvas[data-layers]")
         yield opened
-        browser.close()
+
+
+def shown(opened: Opened) -> str:
+    return opened.page.inner_text("#shown")
+
+
+def pixels(opened: Opened) -> str:
+    """The image with its overlays, as a data URL."""
+    text: str = opened.page.evaluate("document.querySelector('.stage canvas').toDataURL()")
+    return text
 
 
 def test_layers_and_filters_change_the_shown_image(opened: Opened) -> None:
     """By buttons and by keys; no message and no request but for the page itself."""
     page = opened.page
-    assert opened.shown.startswith("1 of 15: sample 0, color")
+    assert shown(opened).startswith("1 of 15: sample 0, color")
     for layer in ("boxes", "boxes3d", "masks", "keypoints", "points", "depth"):
-        before = opened.pixels()
+        before = pixels(opened)
         page.click(f"button[data-layer={layer}]")
         page.wait_for_function(
             "before => document.querySelector('.stage canvas').toDataURL() !== before", arg=before
@@ -87,11 +62,11 @@ def test_layers_and_filters_change_the_shown_image(opened: Opened) -> None:
     page.wait_for_function("document.querySelector('#shown').textContent.startsWith('2 of 15')")
     page.fill("input[data-filter=size]", "100000")
     page.wait_for_selector(".stage p:not([hidden])")
-    assert opened.shown == "0 images"
+    assert shown(opened) == "0 images"
     page.fill("input[data-filter=size]", "")
     page.select_option("select[aria-label='Category of the objects']", "bus")
     page.wait_for_function("document.querySelector('#shown').textContent.includes('1 of 14')")
-    assert opened.shown.endswith("1 of 2 objects")
+    assert shown(opened).endswith("1 of 2 objects")
     assert opened.messages == []
     assert [url.partition(":")[0] for url in opened.requests if url[:5] != "data:"] == ["file"]
 

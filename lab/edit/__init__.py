@@ -1,0 +1,1 @@
+"""A live page for configurations and data sets: ``gen-data edit``."""

@@ -1,0 +1,87 @@
+"""Pictures of a sample: its photograph with labels, depth, normals, a scan from above."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from gen_data.core import plugins
+from gen_data.core.capture import Channel
+from gen_data.core.interfaces import Modality, SensorInfo
+from gen_data.core.sample import Sample
+from gen_data.preview.overlay import Image, channel_image, draw_labels
+from gen_data.preview.sensor_views import top_view
+from gen_data.runner.stored import LabelledImages
+
+LAYERS: Mapping[str, str] = {
+    "boxes": "boxes2d",
+    "masks": "instance_masks",
+    "keypoints": "keypoints",
+    "boxes3d": "boxes3d",
+    "names": "boxes2d",
+}
+"""Annotation that each kind of label on a photograph needs."""
+
+KINDS: Mapping[str, tuple[Channel, ...]] = {
+    "photo": (Channel.RGB,),
+    "depth": (Channel.Z_DEPTH, Channel.RANGE),
+    "normals": (Channel.NORMALS,),
+    "scan": (),
+    "device": (),
+}
+"""Pictures of a sample, and the channels of cameras that they need."""
+
+_MODALITIES = {Modality.CAMERA: "photo", Modality.LIDAR: "scan", Modality.DEVICE: "device"}
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """What a picture shows.
+
+    Attributes:
+        kind: One of ``KINDS``.
+        sensor: Name; empty = the first that has such a picture.
+        layers: Labels that are drawn on a photograph.
+    """
+
+    kind: str = "photo"
+    sensor: str = ""
+    layers: frozenset[str] = frozenset({"boxes"})
+
+    @property
+    def modality(self) -> str:
+        """Kind of the picture that a sensor of this view has anyway."""
+        return "photo" if KINDS[self.kind] else self.kind
+
+    def of(self, sensor: str) -> "View":
+        """The same view of a sensor."""
+        return replace(self, sensor=sensor)
+
+
+def first_kind(sensor: SensorInfo) -> str:
+    """Kind of the picture that every reading of a sensor has; empty = none, as for odometers."""
+    has_none = sensor.modality is Modality.DEVICE and not sensor.view
+    return "" if has_none else _MODALITIES[sensor.modality]
+
+
+def draw_view(
+    sample: Sample | LabelledImages, view: View, views: Mapping[str, str], unit: float
+) -> Image:
+    """Draw what a view shows, uint8 [h, w, 3].
+
+    Args:
+        sample: With a reading of the view's sensor.
+        view: Its sensor has a name.
+        views: ``module:function`` that draws the readings of a device, by its name.
+        unit: Width of lines [px].
+    """
+    name = view.sensor
+    if name in sample.capture.clouds:
+        return top_view(sample.capture.clouds[name], sample.scene, 1.0)
+    if name in sample.capture.tables:
+        draw = plugins.loaded(views[name], f"view of '{name}'")
+        image: Image = draw(sample.capture.tables[name], sample.scene, 1.0)
+        return image
+    reading = sample.capture.readings[name]
+    if view.kind == "photo" and Channel.RGB in reading.channels:
+        return draw_labels(reading, sample.truth[name], unit, view.layers)
+    shown = next((c for c in KINDS[view.kind] if c in reading.channels), None)
+    return channel_image(reading, shown or next(iter(reading.channels)))

@@ -1,0 +1,557 @@
+"""Panels below the grid: controls, statistics, own files, origins; a picture in full size."""
+
+from __future__ import annotations
+
+import asyncio
+import html
+import sys
+import tempfile
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+from urllib.parse import quote
+
+from nicegui import ui
+
+from gen_data.config.yaml_scalars import to_flow_yaml
+from gen_data.core import processes
+from gen_data.core.errors import ConfigError, GenDataError
+from gen_data.lab.edit import controls, own_files, statistics
+from gen_data.lab.edit.document import list_origins
+from gen_data.lab.edit.samples import Recording
+from gen_data.lab.edit.session import drawn_values, vary
+
+if TYPE_CHECKING:
+    from gen_data.lab.edit.desk import Desk
+    from gen_data.lab.edit.samples import Order, Shown
+    from gen_data.lab.edit.session import Session, Variation
+
+
+class Tab(Protocol):
+    """Parts of a tab that its panels use.
+
+    Attributes:
+        key: Name of the tab.
+        client: Its connection to a browser.
+        base: The sample that `vary` changes; None without pictures.
+        chosen: The sample that the user has chosen for it.
+        scratch: Folders that are removed with the tab.
+    """
+
+    key: str
+    desk: Desk
+    session: Session
+    client: Any
+    chosen: Shown | None
+    scratch: list[Path]
+
+    @property
+    def base(self) -> Shown | None: ...  # noqa: D102
+
+    def edit(self, text: str) -> None: ...  # noqa: D102
+
+    def vary(self, variation: Variation) -> None: ...  # noqa: D102
+
+
+class ControlsPanel:
+    """Controls of one item, and plots of what it draws."""
+
+    def __init__(self, tab: Tab) -> None:
+        self._tab = tab
+        self._item = (controls.GENERAL, "")
+        self._shown: list[controls.Control] = []
+        self._plots: dict[str, Any] = {}
+        self._select = (
+            ui.select({}, on_change=self._picked, label="item")
+            .props('dense options-dense aria-label="Item"')
+            .style("min-width: 220px")
+        )
+        self._fields = ui.element("div").classes("gd-fields")
+        self._is_picking = False
+
+    def choose(self, section: str, name: str) -> None:
+        """Show the item at the cursor."""
+        item = (section, name) if section in controls.SECTIONS and name else (controls.GENERAL, "")
+        if item != self._item:
+            self._item = item
+            self.refresh()
+
+    def _picked(self, event: Any) -> None:
+        if event.value is not None and not self._is_picking:
+            section, _, name = event.value.partition("/")
+            self._item = section, name
+            self.refresh()
+
+    def refresh(self) -> None:
+        """Show the controls of the latest valid configuration."""
+        config = self._tab.session.config
+        if config is None:
+            return
+        names = ["/".join(item) for item in controls.list_items(config)]
+        current = "/".join(self._item)
+        self._is_picking = True
+        self._select.set_options(
+            {n: n.strip("/").replace("/", ": ") for n in names},
+            value=current if current in names else names[0],
+        )
+        self._is_picking = False
+        if current not in names:
+            self._item = (controls.GENERAL, "")
+        found = controls.list_controls(config, *self._item)
+        if found == self._shown:
+            return
+        # While a slider is dragged, it must not be replaced under the hand.
+        same = [(c.field, c.kind, c.form) for c in found] == [
+            (c.field, c.kind, c.form) for c in self._shown
+        ]
+        self._shown = found
+        if same and self._fields.default_slot.children:
+            return
+        self._fields.clear()
+        self._plots = {}
+        with self._fields:
+            for control in found:
+                self._build(control)
+        self.refresh_plots()
+
+    def _build(self, control: controls.Control) -> None:
+        with ui.element("div").classes("gd-field").props(f'data-field="{control.field}"'):
+            with ui.element("div").classes("gd-row"):
+                ui.label(control.field).classes("gd-name").props["title"] = control.help
+                ui.label(control.place or "default").classes("gd-place")
+                if control.kind in ("number", "range", "normal"):
+                    ui.button("vary", on_click=partial(self._vary, control)).props(
+                        f'dense flat no-caps size=sm aria-label="Vary {control.field}"'
+                    ).props["title"] = "one sample with a low, middle and high value of this field"
+            self._build_input(control)
+            if control.form and controls.find_distribution(
+                self._tab.session.config, *self._item, control.field
+            ):
+                self._plots[control.field] = ui.echart(_plot(None)).classes("gd-plot")
+
+    def _build_input(self, control: controls.Control) -> None:
+        change = partial(self._change, control)
+        named = f'aria-label="{control.field}"'
+        if control.kind == "flag":
+            ui.switch(value=bool(control.value), on_change=lambda e: change(e.value)).props(
+                f"dense {named}"
+            )
+        elif control.kind in ("choice", "weights"):
+            self._build_chips(control, change)
+        elif control.kind == "text":
+            text = "" if control.value is None else to_flow_yaml(control.value)
+            ui.label(text).style("overflow-wrap: anywhere")
+        elif control.kind == "range":
+            low, high = control.value[control.form]
+            ui.range(
+                min=control.low,
+                max=control.high,
+                step=control.step,
+                value={"min": low, "max": high},
+            ).props(f"label dense {named}").on(
+                "update:model-value",
+                lambda e: change((e.args["min"], e.args["max"])),
+                throttle=0.1,
+                leading_events=False,
+            )
+        elif control.kind == "normal":
+            now = control.value["normal"]
+            for name in ("mean", "stddev"):
+                ui.number(
+                    name,
+                    value=now.get(name),
+                    step=control.step,
+                    on_change=lambda e, name=name: (
+                        e.value is not None
+                        and change(tuple(({**now, name: e.value})[k] for k in ("mean", "stddev")))
+                    ),
+                ).props("dense")
+        else:
+            value = control.value["probability"] if control.form == "probability" else control.value
+            with ui.element("div").style(
+                "display: grid; grid-template-columns: 1fr 84px; gap: 10px"
+            ):
+                slider = ui.slider(
+                    min=control.low, max=control.high, step=control.step, value=value
+                ).props(f"label dense {named}")
+                number = ui.number(value=value, step=control.step).props("dense").bind_value(slider)
+                del number
+                slider.on(
+                    "update:model-value",
+                    lambda e: change(e.args),
+                    throttle=0.1,
+                    leading_events=False,
+                )
+
+    def _build_chips(self, control: controls.Control, change: Any) -> None:
+        chosen = (
+            set(controls.outcomes(control.value)) if control.kind == "weights" else {control.value}
+        )
+        with ui.element("div").classes("gd-row").style("gap: 0"):
+            for option in control.options:
+
+                def toggle(event: Any, option: Any = option) -> None:
+                    if control.kind == "choice":
+                        change(option)
+                        return
+                    (chosen.add if event.value else chosen.discard)(option)
+                    if chosen:
+                        change([one for one in control.options if one in chosen])
+
+                ui.chip(
+                    str(option),
+                    selectable=True,
+                    selected=option in chosen,
+                    on_selection_change=toggle,
+                ).props("dense tabindex=0")
+
+    def _change(self, control: controls.Control, value: Any) -> None:
+        session = self._tab.session
+        section, name = self._item
+        try:
+            plain = control.yaml(value)
+            if section == controls.GENERAL:
+                text = session.set_field(control.field, "", [], plain)
+            else:
+                text = session.set_field(section, name, [control.field], plain)
+        except GenDataError as error:
+            ui.notify(str(error), type="negative")
+            return
+        session.text = text
+        self._tab.edit(text)
+
+    def _vary(self, control: controls.Control) -> None:
+        """Show one sample with three values of a field."""
+        session = self._tab.session
+        section, name = self._item
+        config, base = session.config, self._tab.base
+        found = controls.find_distribution(config, section, name, control.field)
+        values = controls.three_values(control, found)
+        if base is None or values is None:
+            ui.notify("there is no picture to vary yet, or the field is no number")
+            return
+        place = "" if section == controls.GENERAL else section
+        self._tab.vary(vary(base, place, name, control.field, values))
+
+    def refresh_plots(self) -> None:
+        """Draw what the shown samples drew beside the declared densities."""
+        config = self._tab.session.config
+        for field, chart in self._plots.items():
+            found = controls.find_distribution(config, *self._item, field)
+            if not found:
+                continue
+            drawn = drawn_values(self._tab.session.shown, f"{self._item[1]}.{field}")
+            chart.options.clear()
+            chart.options.update(_plot(controls.density(found, drawn)))
+            chart.update()
+
+
+def _plot(shown: controls.Density | None) -> dict[str, Any]:
+    """Options of a chart: declared density as an area, drawn values as bars."""
+    series = (
+        []
+        if shown is None
+        else [
+            {
+                "type": "line",
+                "data": shown.declared,
+                "areaStyle": {"opacity": 0.25},
+                "symbol": "none",
+                "step": "middle",
+                "name": "declared",
+            },
+            {
+                "type": "bar",
+                "data": shown.drawn,
+                "name": f"drawn ({shown.count})",
+                "barWidth": "45%",
+            },
+        ]
+    )
+    return {
+        "animation": False,
+        "grid": {"left": 4, "right": 4, "top": 6, "bottom": 18},
+        "tooltip": {"trigger": "axis"},
+        "xAxis": {
+            "type": "category",
+            "data": list(shown.labels) if shown else [],
+            "axisTick": {"show": False},
+        },
+        "yAxis": {"show": False},
+        "series": series,
+    }
+
+
+class StatisticsPanel:
+    """Statistics of the shown samples beside those of real pictures, and the fit to them."""
+
+    def __init__(self, tab: Tab) -> None:
+        self._tab = tab
+        self._real: statistics.Summary | None = None
+        self._note = ui.label("")
+        if tab.desk.real is not None:
+            ui.button("Fit to the real pictures", on_click=self._fit).props("dense no-caps outline")
+            self._progress = ui.label("").props('role="status"')
+            ui.timer(0.0, self._read, once=True)
+        self._body = ui.element("div").classes("gd-table")
+
+    async def _read(self) -> None:
+        assert self._tab.desk.real is not None
+        try:
+            self._real = await asyncio.to_thread(statistics.read_summary, self._tab.desk.real)
+        except GenDataError as error:
+            self._progress.text = str(error)
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Show the statistics of the pictures that are complete."""
+        shown = self._tab.session.shown
+        ours = statistics.summarise(shown)
+        sides = [("shown", ours), *([("real", self._real)] if self._real else [])]
+        lights = [f"{n} {s.brightness:.2f}" for n, s in sides if s.brightness is not None]
+        self._note.text = (
+            f"brightness (mean grey value, 0 to 1): {', '.join(lights)}" if lights else ""
+        )
+        header = ["class"]
+        for name, side in sides:
+            header += [f"{name} ({side.pictures}): boxes per picture", "median px", "occlusion"]
+        self._body.clear()
+        with self._body:
+            table(tuple(header), statistics.rows(ours, self._real)[:60])
+
+    async def _fit(self) -> None:
+        """Run the command match on the saved file; its result is a file that extends it."""
+        session, real = self._tab.session, self._tab.desk.real
+        path = session.file.path
+        if session.is_changed or session.file.content is None:
+            self._progress.text = "save the file first: the fit extends it"
+            return
+        out = path.with_name(f"{path.stem}_matched.yaml")
+        command = (
+            sys.executable,
+            "-m",
+            "gen_data",
+            "match",
+            str(real),
+            str(path),
+            "--out",
+            str(out),
+        )
+        self._progress.text = "fitting; this takes some minutes ..."
+        process = await asyncio.create_subprocess_exec(
+            *processes.tie(command), stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE
+        )
+        _, said = await process.communicate()
+        if process.returncode:
+            self._progress.text = said.decode(errors="replace").strip()[-500:]
+            return
+        self._progress.text = f"wrote {out.name}, its report {out.with_suffix('.html').name}"
+        with self._note.parent_slot or self._body:
+            ui.link(f"open {out.name}", f"/?open={quote(str(out))}")
+
+
+class OwnFilesPanel:
+    """Drop of meshes and photographs."""
+
+    def __init__(self, tab: Tab) -> None:
+        self._tab = tab
+        ui.label(
+            "Drop a mesh or a photograph here: it is checked, copied to assets/ next to the file, "
+            "and put into the scene."
+        )
+        most = own_files.SIZE_MAX_BYTES
+        ui.upload(
+            on_upload=self._take,
+            on_rejected=lambda: ui.notify(
+                f"larger than {most // 1_000_000} MB: copy it to {own_files.ASSETS}/ and list it "
+                "in assets.yaml",
+                type="negative",
+            ),
+            max_file_size=most,
+            auto_upload=True,
+            multiple=True,
+            label="meshes and photographs",
+        ).style("width: 100%").props('flat bordered aria-label="Meshes and photographs"')
+        self._body = ui.element("div")
+
+    async def _take(self, event: Any) -> None:
+        name = Path(event.file.name).name
+        folder = Path(tempfile.mkdtemp(prefix="gen-data-edit-"))
+        self._tab.scratch.append(folder)
+        path = folder / name
+        await event.file.save(path)
+        with self._body:
+            card = ui.element("div").classes("gd-field").props(f'data-file="{html.escape(name)}"')
+        self._check(path, card, ())
+
+    def _check(self, path: Path, card: Any, entry: tuple[tuple[str, Any], ...]) -> None:
+        card.clear()
+        with card:
+            ui.label(f"{path.name}: being checked ...")
+        client = f"{self._tab.key}/file/{path}"
+        job = own_files.CheckFile(path, entry)
+        self._tab.desk.order(client, [job], partial(self._show, path, card))
+
+    def _show(self, path: Path, card: Any, ticket: Any, found: Any) -> None:
+        self._tab.desk.listeners.pop(ticket.client, None)
+        card.clear()
+        with card:
+            if not isinstance(found, own_files.Checked):
+                ui.label(f"{path.name}: {found.text}").classes("gd-refused")
+                return
+            finding = found.finding
+            size = " x ".join(f"{edge:.3g}" for edge in finding.size_m or ())
+            with ui.element("div").classes("gd-row"):
+                ui.element("img").props(
+                    f'src="{self._tab.desk.pictures.put(found.jpeg)}" alt="{finding.asset_id}"'
+                ).style("width: 200px")
+                with ui.element("div"):
+                    ui.label(finding.asset_id).classes("gd-name")
+                    if size:
+                        ui.label(f"{size} m; unit {finding.unit}; up {finding.up}")
+                        self._build_choice(path, card, found)
+                    for text in finding.warnings:
+                        ui.label(text)
+                    ui.button(
+                        "Add to the scene", on_click=partial(self._add, path, card, found)
+                    ).props("dense no-caps")
+
+    def _build_choice(self, path: Path, card: Any, found: own_files.Checked) -> None:
+        now = {key: found.entry.get(key) for key in ("unit", "up")}
+
+        def again(key: str, event: Any) -> None:
+            chosen = {k: v for k, v in {**now, key: event.value}.items() if v}
+            self._check(path, card, tuple(chosen.items()))
+
+        with ui.element("div").classes("gd-row"):
+            for key, options in (
+                ("unit", ["mm", "cm", "m", "in", "ft"]),
+                ("up", ["z", "y", "x", "-z", "-y", "-x"]),
+            ):
+                ui.select(options, value=now[key], label=key, on_change=partial(again, key)).props(
+                    "dense options-dense"
+                ).style("min-width: 70px")
+
+    async def _add(self, path: Path, card: Any, found: own_files.Checked) -> None:
+        session = self._tab.session
+        folder = session.file.path.parent / own_files.ASSETS
+        try:
+            if session.config is None:
+                raise ConfigError("the text has faults; correct them first")
+            if not session.folders.contains(folder):
+                raise ConfigError(f"{folder} is outside of the folders of this page")
+            text = own_files.add_to_scene(session.text, session.config, found)
+            await asyncio.to_thread(own_files.keep_file, folder, path, found)
+        except GenDataError as error:
+            ui.notify(str(error), type="negative", multi_line=True)
+            return
+        self._tab.edit(text)
+        card.clear()
+        with card:
+            ui.label(f"{path.name}: added to the scene")
+
+
+class ResolvedPanel:
+    """Every value of the resolved configuration with the file and line that give it."""
+
+    def __init__(self, tab: Tab) -> None:
+        self._tab = tab
+        self._search = ui.input("field, value or file", on_change=self.refresh).props(
+            "dense clearable"
+        )
+        self._body = ui.element("div").classes("gd-table")
+
+    def refresh(self) -> None:
+        """Show the values of the latest valid configuration."""
+        config, wanted = self._tab.session.config, str(self._search.value or "")
+        rows = [] if config is None else [(o.field, o.value, o.place) for o in list_origins(config)]
+        self._body.clear()
+        with self._body:
+            table(
+                ("field", "value", "from"), [row for row in rows if wanted in " ".join(row)][:150]
+            )
+
+
+def table(header: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> None:
+    """A plain table; all cells are text."""
+    with ui.element("table"):
+        with ui.element("tr"):
+            for name in header:
+                with ui.element("th"):
+                    ui.label(name)
+        for row in rows:
+            with ui.element("tr"):
+                for cell in row:
+                    with ui.element("td"):
+                        ui.label(cell)
+
+
+def show_full(tab: Tab, order: Order, shown: Shown) -> None:
+    """Show a sample in full size with its draws."""
+    with ui.dialog(value=True).props("maximized") as dialog, ui.card().style("width: 100%"):
+        with ui.element("div").classes("gd-row"):
+            ui.label(f"sample {shown.index}").classes("gd-name")
+            ui.button("Close", on_click=dialog.close).props("dense no-caps flat")
+            ui.button("Vary this one", on_click=partial(_choose_base, tab, shown, dialog)).props(
+                "dense no-caps flat"
+            ).props["title"] = "the buttons 'vary' of the controls change this sample"
+            ui.button("Recording for Rerun", on_click=partial(_record, tab, order)).props(
+                "dense no-caps flat"
+            )
+        with ui.element("div").classes("gd-full"):
+            image = ui.element("img").props(f'alt="sample {shown.index}"')
+            state = ui.label("rendering ...")
+        with ui.element("div").classes("gd-table"):
+            table(
+                ("category", "size px", "occlusion"),
+                [
+                    (
+                        o.category,
+                        f"{o.width_px:.0f} x {o.height_px:.0f}",
+                        "" if o.occlusion is None else f"{o.occlusion:.2f}",
+                    )
+                    for o in shown.objects
+                ],
+            )
+            table(
+                ("parameter", "drawn"),
+                [
+                    (
+                        name,
+                        ", ".join(to_flow_yaml(v) for v in values[:12])
+                        + (" ..." if len(values) > 12 else ""),
+                    )
+                    for name, values in shown.draws.items()
+                ],
+            )
+
+    def receive(_: Any, result: Any) -> None:
+        jpeg = getattr(result, "jpeg", None)
+        state.text = "" if jpeg else result.text
+        if jpeg:
+            image.props["src"] = tab.desk.pictures.put(jpeg)
+            image.update()
+
+    tab.desk.order(f"{tab.key}/full", [replace(order, width_px=0)], receive)
+
+
+def _choose_base(tab: Tab, shown: Shown, dialog: Any) -> None:
+    tab.chosen = shown
+    dialog.close()
+    ui.notify(f"sample {shown.index} is the one that 'vary' changes")
+
+
+def _record(tab: Tab, order: Order) -> None:
+    """Hand a recording of the sample to the browser; `rerun FILE` opens it."""
+
+    def receive(ticket: Any, result: Any) -> None:
+        tab.desk.listeners.pop(ticket.client, None)
+        with tab.client.content:
+            if isinstance(result, bytes):
+                ui.download.content(result, f"sample_{order.index:06}.rrd")
+            else:
+                ui.notify(result.text, type="negative")
+
+    tab.desk.order(f"{tab.key}/rerun", [Recording(order)], receive)

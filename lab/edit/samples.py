@@ -1,0 +1,368 @@
+"""One picture of the grid: a sample of a text, rendered small, with its draws.
+
+A view is drawn with the camera of the configuration, as in a data set, and only then rendered with
+fewer pixels: every thumbnail shows the sample that the run will contain.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import cv2
+import numpy as np
+
+from gen_data.annotations.annotate import annotate_reading
+from gen_data.assemble import plugin_tables
+from gen_data.assemble.config import parse_config
+from gen_data.assemble.pipeline_factory import PipelineFactory
+from gen_data.config.distributions import Constant
+from gen_data.config.schema import to_plain_yaml
+from gen_data.core import errors, optional_packages, plates
+from gen_data.core.bounded_cache import CountCache
+from gen_data.core.capture import Channel
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.temporary_folders import temporary_folder
+from gen_data.lab.edit.overlays import KINDS, LAYERS, View, draw_view, first_kind
+from gen_data.packs.provision import open_assets
+from gen_data.report.drawn_parameters import Draw, observe_randomizer, shared_draws
+from gen_data.report.image_statistics import measure_look
+
+if TYPE_CHECKING:
+    from gen_data.assemble.config import Config
+    from gen_data.assets.library import Library
+    from gen_data.core.interfaces import AnyAnnotator, AssetLibrary, Randomizer
+    from gen_data.core.sample import Sample
+    from gen_data.core.scene import Scene
+    from gen_data.core.streams import Rng, Streams
+    from gen_data.pipeline import Pipeline
+    from gen_data.preview.overlay import Image
+
+TEXTS_KEPT = 4
+"""Latest texts whose pipelines are kept: variants of one field share most of their assets."""
+SAMPLES_KEPT = 32
+"""Latest small samples, on which other labels are drawn without rendering."""
+DRAWS_MAX = 300
+"""Parameters of a sample whose draws are listed."""
+QUALITY = 85
+
+
+@dataclass(frozen=True, slots=True)
+class Order:
+    """Order of one picture.
+
+    Attributes:
+        text, file: Of the configuration, as for ``document.analyse``.
+        index: Number of the sample.
+        overrides: ``KEY=VALUE`` each.
+        width_px: Largest width of the rendered image; 0 = as configured.
+    """
+
+    text: str
+    file: str
+    index: int
+    view: View
+    overrides: tuple[str, ...] = ()
+    width_px: int = 240
+
+    def run(self, studio: Studio) -> Shown:
+        """Render and draw it."""
+        return studio.show(self)
+
+
+@dataclass(frozen=True, slots=True)
+class Recording:
+    """Order of one sample with all sensors in full size, for the Rerun viewer."""
+
+    order: Order
+
+    def run(self, studio: Studio) -> bytes:
+        """Content of a ``.rrd`` file."""
+        return studio.record(self.order)
+
+
+@dataclass(frozen=True, slots=True)
+class Labelled:
+    """A labelled object of a picture, in pixels of the configured image."""
+
+    category: str
+    width_px: float
+    height_px: float
+    occlusion: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """A picture with the facts of its sample.
+
+    Attributes:
+        jpeg: Encoded picture.
+        sensors: First kind of picture by name of every sensor that has one.
+        draws: Drawn values by parameter, as plain data.
+        brightness: Mean grey value of the photograph in [0, 1]; None without one.
+        per_scene, per_view: Numbers of samples.
+        cpu_s: Processor time.
+    """
+
+    jpeg: bytes
+    index: int
+    sensors: Mapping[str, str]
+    objects: tuple[Labelled, ...]
+    draws: Mapping[str, tuple[Any, ...]]
+    brightness: float | None
+    per_scene: int
+    per_view: int
+    cpu_s: float = 0.0
+
+
+@dataclass(frozen=True)
+class Taken:
+    """A sample with the reading of one sensor.
+
+    Attributes:
+        factor: Columns of the rendered image over those of the configured one.
+    """
+
+    sample: Sample
+    draws: Mapping[str, tuple[Any, ...]]
+    factor: float
+
+
+class Studio:
+    """Renders orders in one process; keeps assets, engines, pipelines and the latest samples."""
+
+    def __init__(self) -> None:
+        self._libraries: CountCache[Library] = CountCache(2)
+        self._opened: CountCache[OpenedText] = CountCache(TEXTS_KEPT)
+        self._taken: CountCache[Taken] = CountCache(SAMPLES_KEPT)
+
+    def show(self, order: Order) -> Shown:
+        """Render and draw an order.
+
+        Raises:
+            GenDataError: as a run of the configuration would.
+        """
+        started_s = time.process_time()
+        text = repr((order.text, order.file, order.overrides))
+        opened = self._opened.get(text, lambda: self._open(order))
+        view = opened.choose_sensor(order.view)
+        needed = opened.annotations(view)
+        place = (text, order.index, order.width_px, view.sensor, KINDS[view.kind], sorted(needed))
+        taken = self._taken.get(repr(place), lambda: opened.take(order.index, view, order.width_px))
+        unit = 1.0 if order.width_px else 1.5
+        image = draw_view(taken.sample, view, opened.info.views, unit)
+        return Shown(
+            encode(image),
+            order.index,
+            opened.sensors,
+            tuple(_objects(taken, view.sensor)),
+            taken.draws,
+            _brightness(taken.sample, view.sensor),
+            opened.info.views_per_scene * opened.info.steps_per_scene,
+            opened.info.steps_per_scene,
+            time.process_time() - started_s,
+        )
+
+    def record(self, order: Order) -> bytes:
+        """Record a sample for the Rerun viewer.
+
+        Raises:
+            ConfigError: its package is not installed.
+            GenDataError: as a run of the configuration would.
+        """
+        missing = optional_packages.missing_packages("rerun")
+        if missing:
+            raise errors.ConfigError(f"a recording {missing}")
+        from gen_data.preview.rerun_recording import save_recording
+
+        opened = self._open(order)
+        with temporary_folder("edit") as folder:
+            path = folder / "sample.rrd"
+            sample = opened.sample(order.index)
+            save_recording(path, [sample], opened.library, info=opened.info)
+            return path.read_bytes()
+
+    def _open(self, order: Order) -> OpenedText:
+        name, changes = Path(order.file).stem, order.overrides
+        config = parse_config(order.text, order.file, name, overrides=changes)
+        folders = config.asset_folders
+        library = self._libraries.get(repr(folders), lambda: open_assets(folders))
+        return OpenedText(config, library)
+
+
+class OpenedText:
+    """The pipeline of one text, whose randomizers record their draws.
+
+    Attributes:
+        info: Facts about its data set.
+        library: Its assets.
+        sensors: First kind of picture by name of every sensor that has one.
+    """
+
+    def __init__(self, config: Config, library: Library) -> None:
+        # Formats have no pictures: whether they can hold the data set is checked before a run.
+        factory = PipelineFactory(replace(config, exporters=()), n=1)
+        # Assets stay open from text to text: opening them takes longer than a sample.
+        vars(factory)["library"] = library
+        self._config, self.library = config, library
+        self._draws: dict[str, list[Draw]] = {}
+        self._pipeline: Pipeline = factory()
+        self._settings = self._pipeline.config
+        self._resources = ExitStack()
+        self._resources.enter_context(self._pipeline)
+        self.info = self._pipeline.info
+        kinds = {sensor.name: first_kind(sensor) for sensor in self.info.sensors}
+        self.sensors = {name: kind for name, kind in kinds.items() if kind}
+
+    def choose_sensor(self, view: View) -> View:
+        """The view with the name of a sensor: the first that has such pictures, else the first.
+
+        Raises:
+            ConfigError: no sensor has pictures.
+        """
+        names = [name for name, kind in self.sensors.items() if kind == view.modality]
+        if view.sensor in names:
+            return view
+        if names:
+            return replace(view, sensor=names[0])
+        if not self.sensors:
+            raise errors.ConfigError("sensors: none of them has pictures; expected a camera")
+        name, kind = next(iter(self.sensors.items()))
+        return replace(view, sensor=name, kind=kind)
+
+    def annotations(self, view: View) -> dict[str, AnyAnnotator]:
+        """Annotators that a view shows, and those of the statistics."""
+        names = {LAYERS[layer] for layer in view.layers} | {"boxes2d"}
+        names |= {"visibility"} & self._config.annotations.keys()
+        table = plugin_tables.ANNOTATIONS
+        own = self._config.annotations
+        return {n: own[n] if n in own else plugin_tables.default_plugin(table, n) for n in names}
+
+    def sample(self, index: int) -> Sample:
+        """A whole sample, as in a data set."""
+        self._pipeline.config = self._settings
+        return self._pipeline.sample(index)
+
+    def take(self, index: int, view: View, width_px: int) -> Taken:
+        """Take a sample with one sensor.
+
+        Raises:
+            GenDataError: as a run would.
+        """
+        pipeline, info = self._pipeline, self.info
+        number, step = divmod(index, info.steps_per_scene)
+        scene_index, view_index = divmod(number, info.views_per_scene)
+        annotators = list(self.annotations(view).values())
+        needed = frozenset().union(KINDS[view.kind], *(one.channels for one in annotators))
+        pipeline.config = replace(
+            self._settings, open_scene=self._observed_scene, channels=needed, frame_truth=None
+        )
+        with pipeline.config.located_errors():
+            accepted = pipeline.accepted_scene(scene_index)
+            drawn = pipeline.drawn_view(accepted, view_index)
+            scene, factor = _with_small_camera(drawn.scene, view.sensor, width_px)
+            pipeline.config = replace(
+                pipeline.config, image_truth=partial(self._annotate, annotators, factor)
+            )
+            every = pipeline.config.strides.get(view.sensor, 1)
+            sensors = [one for one in accepted.sensors if one.name == view.sensor]
+            read = pipeline.read_sensors(
+                replace(drawn, scene=scene), sensors, step // every * every
+            )
+        return Taken(read, self._plain_draws(), factor)
+
+    def _annotate(
+        self, annotators: list[AnyAnnotator], factor: float, scene: Scene, reading: Any
+    ) -> Any:
+        limits = self._config.general.labels
+        smaller = limits.model_copy(
+            update={
+                "min_visible_px": max(1, round(limits.min_visible_px * factor**2)),
+                "min_box_px": max(1, round(limits.min_box_px * factor)),
+            }
+        )
+        return annotate_reading(scene, reading, annotators, smaller, self.library)
+
+    def _observed_scene(self, streams: Streams) -> Any:
+        nominal, randomizers, sensors = self._settings.open_scene(streams)
+        self._draws["shared"] = list(shared_draws(self._config, nominal))
+        return nominal, [Observed(one, self._draws) for one in randomizers], sensors
+
+    def _plain_draws(self) -> dict[str, tuple[Any, ...]]:
+        found: dict[str, list[Any]] = {}
+        for name, distribution, value in (draw for log in self._draws.values() for draw in log):
+            if not isinstance(distribution, Constant):
+                found.setdefault(name, []).append(to_plain_yaml(value))
+        return {name: tuple(values) for name, values in list(found.items())[:DRAWS_MAX]}
+
+
+class Observed:
+    """A randomizer whose latest draws are kept: those of rejected attempts are forgotten."""
+
+    motion_duration_s: float | None = None
+
+    def __init__(self, randomizer: Randomizer, draws: dict[str, list[Draw]]) -> None:
+        self.name, self.stage = randomizer.name, randomizer.stage
+        self._log: list[Draw] = []
+        self._draws = draws
+        self._randomizer = observe_randomizer(randomizer, self._log)
+
+    def __call__(self, scene: Scene, assets: AssetLibrary, rng: Rng) -> Scene:
+        """Apply the randomizer."""
+        self._log.clear()
+        self._draws[self.name] = self._log
+        return self._randomizer(scene, assets, rng)
+
+
+def _with_small_camera(scene: Scene, name: str, width_px: int) -> tuple[Scene, float]:
+    """The scene whose camera has at most ``width_px`` columns (0 = its own), and their share."""
+    camera = next((one for one in scene.cameras if one.name == name), None)
+    # A photograph behind a scene fits its own camera only.
+    if camera is None or not 0 < width_px < camera.intrinsics.width_px or plates.has_plate(scene):
+        return scene, 1.0
+    small = replace(camera, intrinsics=shrink(camera.intrinsics, width_px))
+    cameras = tuple(small if one is camera else one for one in scene.cameras)
+    return replace(scene, cameras=cameras), width_px / camera.intrinsics.width_px
+
+
+def shrink(lens: Intrinsics, width_px: int) -> Intrinsics:
+    """The same field of view with ``width_px`` columns; pixels keep their shape, rounded."""
+    height_px = max(1, round(lens.height_px * width_px / lens.width_px))
+    x, y = width_px / lens.width_px, height_px / lens.height_px
+    return Intrinsics(
+        width_px,
+        height_px,
+        lens.fx_px * x,
+        lens.fy_px * y,
+        lens.cx_px * x,
+        lens.cy_px * y,
+        lens.lens,
+    )
+
+
+def _objects(taken: Taken, sensor: str) -> Iterator[Labelled]:
+    truth = taken.sample.truth.get(sensor)
+    for item in truth.objects if truth else ():
+        if item.box is not None:
+            width, height = item.box.x_max - item.box.x_min, item.box.y_max - item.box.y_min
+            kind, factor = item.instance.category, taken.factor
+            yield Labelled(kind, width / factor, height / factor, item.occlusion)
+
+
+def _brightness(sample: Sample, sensor: str) -> float | None:
+    reading = sample.capture.readings.get(sensor)
+    if reading is None or Channel.RGB not in reading.channels:
+        return None
+    rgb = np.asarray(reading.channels[Channel.RGB], np.uint8)
+    return measure_look(np.asarray(cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY), np.uint8)).brightness
+
+
+def encode(image: Image) -> bytes:
+    """A picture as JPEG."""
+    _, data = cv2.imencode(".jpg", image[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
+    return data.tobytes()

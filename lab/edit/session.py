@@ -1,0 +1,207 @@
+"""State of one tab without its widgets: the text, its meaning, the grid and its results."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from gen_data.config.yaml_scalars import to_flow_yaml
+from gen_data.core.errors import GenDataError, StorageError
+from gen_data.lab.edit import text_edits
+from gen_data.lab.edit.document import Analysis, Fault, analyse, find_faults
+from gen_data.lab.edit.files import Folders, OpenedFile
+from gen_data.lab.edit.overlays import View
+from gen_data.lab.edit.samples import Order, Shown
+from gen_data.lab.edit.workers import Refused
+
+if TYPE_CHECKING:
+    from gen_data.assemble.config import Config
+    from gen_data.lab.edit.workers import Ticket
+
+SLOTS = (4, 6, 8, 12, 16, 24)
+EACH = ("scene", "view", "step")
+"""What differs from one picture to the next."""
+
+
+@dataclass(frozen=True)
+class Variation:
+    """One sample, drawn with several values of one field; all its other draws stay.
+
+    Attributes:
+        field: Dotted path, as for ``--set``.
+        values: Plain data, one a picture.
+        frozen: ``KEY=VALUE`` texts of the other draws of the same plug-in.
+    """
+
+    index: int
+    field: str
+    values: tuple[Any, ...]
+    frozen: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Samples of the grid.
+
+    Attributes:
+        first: Number of the first scene, view or step.
+        each: One of ``EACH``.
+    """
+
+    slots: int = 8
+    first: int = 0
+    each: str = "scene"
+    view: View = field(default_factory=View)
+    variation: Variation | None = None
+
+    def indices(self, config: Config) -> list[int]:
+        """Numbers of the samples."""
+        general = config.general
+        per_view = general.steps_per_scene
+        stride = {"scene": per_view * general.views_per_scene, "view": per_view, "step": 1}
+        return [(self.first + k) * stride[self.each] for k in range(self.slots)]
+
+
+@dataclass
+class Session:
+    """One tab.
+
+    Attributes:
+        file: The file as it was last read or written.
+        text: Text of the editor.
+        analysis: Of the text; its configuration is the latest valid one.
+        results: By slot; a result stays until that of a newer text replaces it.
+        outdated: Slots whose result is of an older text.
+    """
+
+    file: OpenedFile
+    folders: Folders
+    text: str = ""
+    grid: Grid = field(default_factory=Grid)
+    analysis: Analysis = field(default_factory=lambda: Analysis(None))
+    config: Config | None = None
+    results: dict[int, Shown | Refused] = field(default_factory=dict)
+    outdated: set[int] = field(default_factory=set)
+
+    def __post_init__(self) -> None:
+        """Begin with the text of the file."""
+        self.text = self.text or self.file.text
+
+    @property
+    def name(self) -> str:
+        """Name of the file in messages."""
+        return str(self.file.path)
+
+    @property
+    def is_changed(self) -> bool:
+        """Whether the text differs from the file."""
+        return self.text != self.file.text
+
+    def set_text(self, text: str) -> None:
+        """Take a text and find its faults; the latest valid configuration stays."""
+        self.text = text
+        try:
+            self.folders.refuse_outside(text, self.name)
+        except GenDataError as error:
+            self.analysis = Analysis(None, tuple(find_faults(str(error), self.name)))
+            return
+        self.analysis = analyse(text, self.name)
+        self.config = self.analysis.config or self.config
+
+    def orders(self) -> list[Order]:
+        """Orders of all pictures; none for a text with faults, whose pictures are outdated then."""
+        self.outdated = set(self.results)
+        config = self.analysis.config
+        if config is None:
+            return []
+        order = Order(self.text, self.name, 0, self.grid.view)
+        varied = self.grid.variation
+        if varied is None:
+            orders = [replace(order, index=index) for index in self.grid.indices(config)]
+        else:
+            changed = [(*varied.frozen, f"{varied.field}={to_flow_yaml(v)}") for v in varied.values]
+            orders = [replace(order, index=varied.index, overrides=texts) for texts in changed]
+        self.results = {k: r for k, r in self.results.items() if k < len(orders)}
+        self.outdated &= set(self.results)
+        return orders
+
+    def accept(self, ticket: Ticket, result: Shown | Refused) -> None:
+        """Take the result of an order."""
+        self.results[ticket.slot] = result
+        self.outdated.discard(ticket.slot)
+
+    @property
+    def faults(self) -> tuple[Fault, ...]:
+        """Errors of the text, and those of the scenes that its pictures could not be made of."""
+        if self.analysis.faults:
+            return self.analysis.faults
+        refused = (r for k, r in sorted(self.results.items()) if k not in self.outdated)
+        texts = dict.fromkeys(one.text for one in refused if isinstance(one, Refused))
+        return tuple(fault for text in texts for fault in find_faults(text, self.name))
+
+    @property
+    def shown(self) -> list[Shown]:
+        """Pictures of the current text, in their order."""
+        results = sorted(self.results.items())
+        return [r for k, r in results if isinstance(r, Shown) and k not in self.outdated]
+
+    def set_field(self, section: str, name: str, path: Sequence[str | int], value: Any) -> str:
+        """The text with another value of a field of a named item, or of a section (no name).
+
+        Raises:
+            ConfigError: the field has no place of its own in the text.
+        """
+        return text_edits.set_value(self.text, [section, *([name] if name else []), *path], value)
+
+    def save(self, *, overwrite: bool = False) -> None:
+        """Write the file.
+
+        Raises:
+            StorageError: it has changed since it was read, or cannot be written.
+        """
+        self.file = self.file.save(self.text, overwrite=overwrite)
+
+    def save_as(self, path: Path, *, overwrite: bool = False) -> None:
+        """Write another file in the folders of the page, which is edited from now on.
+
+        Raises:
+            StorageError: it is outside, exists, or cannot be written.
+        """
+        if not self.folders.contains(path):
+            raise StorageError(f"{path} is outside of the folders of this page")
+        self.file = OpenedFile(path, None).save(self.text, overwrite=overwrite)
+
+
+def vary(shown: Shown, section: str, name: str, field_: str, values: Sequence[Any]) -> Variation:
+    """The sample of a picture with several values of one field of an item.
+
+    Other draws of the same randomizer are fixed where it drew one number each; those of other
+    plug-ins have streams of their own, and stay anyway.
+
+    Args:
+        shown: Picture of the sample.
+        section: Section of the item; empty for a field of the configuration itself.
+        name: Name of the item.
+        field_: The field that varies.
+        values: Its values.
+    """
+    frozen = tuple(
+        f"randomizers.{drawn}={to_flow_yaml(found[0])}"
+        for drawn, found in shown.draws.items()
+        if section == "randomizers"
+        and drawn.rpartition(".")[0] == name
+        and drawn != f"{name}.{field_}"
+        and len(found) == 1
+        and isinstance(found[0], (int, float))
+        and not isinstance(found[0], bool)
+        and "[" not in drawn
+    )
+    place = ".".join(part for part in (section, name, field_) if part)
+    return Variation(shown.index, place, tuple(values), frozen)
+
+
+def drawn_values(shown: Sequence[Shown], parameter: str) -> list[Any]:
+    """Values of a parameter in all pictures, in order."""
+    return [value for one in shown for value in one.draws.get(parameter, ())]

@@ -1,0 +1,301 @@
+"""Processes that render for the page: the newest jobs of a tab replace its waiting ones.
+
+A job that nobody waits for any more is left to finish for a moment, because most take less time
+than a new process; then its process is ended. A process that crashes costs one picture.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import subprocess
+import sys
+import threading
+import traceback
+from collections import OrderedDict, deque
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, Protocol
+
+from gen_data.core import errors, processes
+from gen_data.core.system_calls import KILLED
+
+if TYPE_CHECKING:
+    from gen_data.lab.edit.samples import Studio
+
+GRACE_S = 1.5
+"""Time that a job has after it was replaced."""
+LIMIT_S = 120.0
+"""Longest time of a job."""
+TRIES = 2
+"""A job whose process crashes is tried once more: the kernel may have run out of memory."""
+MEMORY_BYTES = 3 << 30
+"""Resident memory from which a process is replaced between two jobs."""
+NICENESS = 0
+"""Of the processes, for the page and the browser to go first."""
+
+_START = (
+    "import os, sys; sys.path[:] = sys.argv[1:]; "
+    f"os.environ.update(dict.fromkeys({processes.SINGLE_THREADED!r}, '1')); "
+    "from gen_data.lab.edit.workers import work; work()"
+)
+
+
+class Job(Protocol):
+    """Work for a process; picklable."""
+
+    def run(self, studio: Studio) -> Any:
+        """Do it, with the engines of the process."""
+        ...
+
+
+@dataclass(frozen=True)
+class Ready:
+    """A job that tells that the process has imported everything."""
+
+    def run(self, studio: Studio) -> None:
+        """Nothing."""
+
+
+@dataclass(frozen=True)
+class Ticket:
+    """A job of a tab.
+
+    Attributes:
+        client: Key of the tab, or of one of its tasks.
+        slot: Place of the result.
+        tries: How often its process has ended.
+    """
+
+    client: str
+    slot: int
+    job: Job
+    tries: int = 0
+
+
+@dataclass(frozen=True)
+class Refused:
+    """Result of a job without one: the message of its error."""
+
+    text: str
+
+
+@dataclass(frozen=True)
+class Reply:
+    """Answer of a process: the result, and its resident memory in bytes (0 = unknown)."""
+
+    result: Any
+    memory_bytes: int
+
+
+@dataclass
+class Queue:
+    """Waiting jobs by tab; tabs take turns."""
+
+    waiting: OrderedDict[str, deque[Ticket]] = field(default_factory=OrderedDict)
+    current: dict[str, frozenset[Ticket]] = field(default_factory=dict)
+
+    def replace(self, client: str, tickets: Sequence[Ticket]) -> None:
+        """Replace all jobs of a client; those that run are outdated then."""
+        self.current[client] = frozenset(tickets)
+        self.waiting.pop(client, None)
+        if tickets:
+            self.waiting[client] = deque(tickets)
+        else:
+            self.current.pop(client)
+
+    def put_back(self, ticket: Ticket, again: Ticket) -> None:
+        """Try a job once more, before the others of its client."""
+        self.current[ticket.client] = self.current[ticket.client] - {ticket} | {again}
+        self.waiting.setdefault(ticket.client, deque()).appendleft(again)
+
+    def take(self) -> Ticket | None:
+        """The next job, of the client that was served longest ago; None if none waits."""
+        if not self.waiting:
+            return None
+        client, tickets = self.waiting.popitem(last=False)
+        ticket = tickets.popleft()
+        if tickets:
+            self.waiting[client] = tickets
+        return ticket
+
+    def is_current(self, ticket: Ticket) -> bool:
+        """Whether somebody waits for the result."""
+        return ticket in self.current.get(ticket.client, ())
+
+
+class Workers:
+    """Processes and the jobs that wait for them. A context manager: leaves no process behind.
+
+    Args:
+        count: Number of processes.
+        deliver: Receives each ticket that is current, and its result; called in threads.
+    """
+
+    def __init__(self, count: int, deliver: Callable[[Ticket, Any], None]) -> None:
+        self._deliver = deliver
+        self._queue = Queue()
+        self._changed = threading.Condition()
+        self._closed = False
+        self._running: dict[int, tuple[Ticket, subprocess.Popen[bytes]]] = {}
+        self._children: dict[int, subprocess.Popen[bytes]] = {}
+        self._threads = [
+            threading.Thread(target=self._serve, args=(number,), daemon=True)
+            for number in range(count)
+        ]
+
+    def __enter__(self) -> Workers:
+        """Start the processes, which import while the page opens."""
+        for thread in self._threads:
+            thread.start()
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        """End all processes."""
+        with self._changed:
+            self._closed = True
+            children = list(self._children.values())
+            self._changed.notify_all()
+        for child in children:
+            child.kill()
+        for thread in self._threads:
+            thread.join(5.0)
+
+    def submit(self, client: str, jobs: Sequence[Job]) -> None:
+        """Replace all jobs of a client by new ones; none forgets the client."""
+        with self._changed:
+            self._queue.replace(client, [Ticket(client, k, job) for k, job in enumerate(jobs)])
+            outdated = [r for r in self._running.values() if not self._queue.is_current(r[0])]
+            self._changed.notify_all()
+        for ticket, child in outdated:
+            self._end_later(ticket, child, GRACE_S)
+
+    @property
+    def process_ids(self) -> list[int]:
+        """Ids of the processes."""
+        return [child.pid for child in self._children.values()]
+
+    def _serve(self, number: int) -> None:
+        """Loop of the thread of one process."""
+        child = self._start(number)
+        while (ticket := self._wait(number, child)) is not None:
+            ended = self._end_later(ticket, child, LIMIT_S)
+            reply = _ask(child, ticket.job)
+            with self._changed:
+                self._running.pop(number, None)
+                is_current = self._queue.is_current(ticket) and not self._closed
+                if reply is None and is_current and ticket.tries + 1 < TRIES and not ended.is_set():
+                    self._queue.put_back(ticket, replace(ticket, tries=ticket.tries + 1))
+                    self._changed.notify_all()
+                    is_current = False
+            if reply is None or reply.memory_bytes > MEMORY_BYTES:
+                child.kill()
+                status = child.wait()
+                child = self._start(number)
+            if is_current:
+                self._deliver(ticket, reply.result if reply else Refused(_describe(status)))
+
+    def _wait(self, number: int, child: subprocess.Popen[bytes]) -> Ticket | None:
+        """The next job; None when the workers are closed."""
+        with self._changed:
+            while not self._closed:
+                ticket = self._queue.take()
+                if ticket is not None:
+                    self._running[number] = ticket, child
+                    return ticket
+                self._changed.wait()
+        return None
+
+    def _end_later(
+        self, ticket: Ticket, child: subprocess.Popen[bytes], delay_s: float
+    ) -> threading.Event:
+        """End a process if it still does this job after a time; the event tells that it was."""
+        ended = threading.Event()
+
+        def end() -> None:
+            with self._changed:
+                runs = any(t is ticket and c is child for t, c in self._running.values())
+            if runs:
+                ended.set()
+                child.kill()
+
+        timer = threading.Timer(delay_s, end)
+        timer.daemon = True
+        timer.start()
+        return ended
+
+    def _start(self, number: int) -> subprocess.Popen[bytes]:
+        command = processes.tie([sys.executable, "-c", _START, *sys.path])
+        with self._changed:
+            with processes.interrupts_blocked():
+                child = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+            self._children[number] = child
+            if self._closed:
+                child.kill()
+        _ask(child, Ready())  # Others take the jobs while this one imports.
+        return child
+
+
+def _ask(child: subprocess.Popen[bytes], job: Job) -> Reply | None:
+    """Reply of a process to a job; None if the process ends."""
+    assert child.stdin is not None
+    assert child.stdout is not None
+    try:
+        pickle.dump(job, child.stdin)
+        child.stdin.flush()
+        reply: Reply = pickle.load(child.stdout)
+    except (OSError, EOFError, pickle.UnpicklingError):
+        return None
+    return reply
+
+
+def _describe(status: int) -> str:
+    if status == KILLED:
+        return (
+            f"the process of this picture was ended: it took longer than {LIMIT_S:g} s, or the "
+            "machine ran out of memory; the page goes on with another process"
+        )
+    return f"the process of this picture crashed (exit status {status}); the page goes on"
+
+
+def work() -> None:
+    """Loop of a process: jobs from standard input, replies to standard output."""
+    from gen_data.lab.edit.samples import Studio
+
+    with suppress(AttributeError, OSError):  # Windows has no nice.
+        os.nice(NICENESS)
+    processes.forbid_core_dumps()
+    source, replies = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
+    # What native code prints must not reach the replies.
+    os.dup2(2, 1)
+    studio = Studio()
+    while True:
+        try:
+            job: Job = pickle.load(source)
+        except EOFError:
+            return
+        pickle.dump(Reply(_run(job, studio), _memory_bytes()), replies)
+        replies.flush()
+
+
+def _run(job: Job, studio: Studio) -> Any:
+    try:
+        return job.run(studio)
+    except errors.GenDataError as refused:
+        return Refused(str(refused))
+    except MemoryError:
+        raise
+    except Exception as error:
+        traceback.print_exc()
+        lacking = errors.lack_of_memory(error)
+        return Refused(lacking or f"{type(error).__name__}: {error} (a fault of gen-data)")
+
+
+def _memory_bytes() -> int:
+    """Resident memory of this process; 0 where the system has no such file."""
+    try:
+        with open("/proc/self/statm", encoding="ascii") as file:  # noqa: PTH123
+            return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+    except OSError:
+        return 0

@@ -1,0 +1,206 @@
+"""Parts of the page without a browser: the queue, the guard, the session, small cameras."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import MutableMapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gen_data.core.intrinsics import Intrinsics
+from gen_data.core.lens import Lens
+from gen_data.lab.edit import data_sets
+from gen_data.lab.edit.desk import Pictures
+from gen_data.lab.edit.files import Folders, OpenedFile
+from gen_data.lab.edit.samples import Labelled, Shown, shrink
+from gen_data.lab.edit.server import COOKIE, Guard
+from gen_data.lab.edit.session import Session, vary
+from gen_data.lab.edit.statistics import rows, summarise
+from gen_data.lab.edit.workers import Queue, Ready, Refused, Ticket
+
+SHOWN = Shown(
+    b"jpeg",
+    5,
+    {"color": "photo"},
+    (Labelled("cup", 10, 20, 0.5), Labelled("Cup", 30, 40, None)),
+    {"orbit.distance_m": (1.2,), "orbit.roll_deg": (3.0,), "lamps.count": (2,), "orbit.at": (1, 2)},
+    0.25,
+    5,
+    1,
+)
+
+
+def tickets(client: str, count: int) -> list[Ticket]:
+    return [Ticket(client, slot, Ready()) for slot in range(count)]
+
+
+def test_newer_jobs_replace_those_that_wait() -> None:
+    """And those that run are outdated; a result of theirs reaches nobody."""
+    queue = Queue()
+    queue.replace("a", tickets("a", 3))
+    running = queue.take()
+    assert running is not None
+    newer = [replace(ticket, slot=ticket.slot + 10) for ticket in tickets("a", 2)]
+    queue.replace("a", newer)
+    assert not queue.is_current(running)
+    assert [queue.take(), queue.take(), queue.take()] == [*newer, None]
+    assert queue.is_current(newer[0])
+    queue.replace("a", [])
+    assert not queue.is_current(newer[0])
+
+
+def test_tabs_take_turns() -> None:
+    """A tab with many pictures does not hold up another one."""
+    queue = Queue()
+    queue.replace("a", tickets("a", 3))
+    queue.replace("b", tickets("b", 2))
+    order = [ticket.client for ticket in iter(queue.take, None)]
+    assert order == ["a", "b", "a", "b", "a"]
+
+
+def test_a_job_whose_process_crashed_comes_first_again() -> None:
+    """It stays current under its new ticket."""
+    queue = Queue()
+    queue.replace("a", tickets("a", 2))
+    crashed = queue.take()
+    assert crashed is not None
+    again = replace(crashed, tries=1)
+    queue.put_back(crashed, again)
+    assert queue.take() == again
+    assert queue.is_current(again)
+    assert not queue.is_current(crashed)
+
+
+def ask(kind: str, query: str = "", **headers: str) -> tuple[list[MutableMapping[str, Any]], bool]:
+    """What a guard sends for a request, and whether the request has reached the page."""
+    reached: list[bool] = []
+    sent: list[MutableMapping[str, Any]] = []
+
+    async def app(scope: Any, receive: Any, send: Any) -> None:
+        reached.append(True)
+
+    async def send(message: MutableMapping[str, Any]) -> None:
+        sent.append(message)
+
+    async def receive() -> MutableMapping[str, Any]:
+        return {}
+
+    scope = {
+        "type": kind,
+        "path": "/",
+        "query_string": query.encode(),
+        "headers": [(k.encode(), v.encode()) for k, v in headers.items()],
+    }
+    guard = Guard(app, "secret", frozenset({"127.0.0.1:80"}), 80)
+    asyncio.run(guard(scope, receive, send))
+    return sent, bool(reached)
+
+
+def test_a_request_needs_the_token_and_a_host_of_this_machine() -> None:
+    """The token of the printed address becomes a cookie; other sites and names are refused."""
+    ours = {"host": "127.0.0.1:80"}
+    cookie = {"cookie": f"{COOKIE}_80=secret"}
+    sent, reached = ask("http", "token=secret", **ours)
+    assert (sent[0]["status"], reached) == (303, False)
+    assert dict(sent[0]["headers"])[b"set-cookie"].startswith(
+        b"gen_data_edit_80=secret; HttpOnly; SameSite"
+    )
+    assert ask("http", **ours, **cookie)[1]
+    assert ask("websocket", **ours, **cookie, origin="http://127.0.0.1:80")[1]
+    for headers in (
+        ours,
+        {**ours, "cookie": f"{COOKIE}_80=guess"},
+        {"host": "evil.example:80", **cookie},
+        {**ours, **cookie, "origin": "http://evil.example"},
+    ):
+        sent, reached = ask("http", **headers)
+        assert (sent[0]["status"], reached) == (403, False)
+        sent, reached = ask("websocket", **headers)
+        assert (sent, reached) == ([{"type": "websocket.close", "code": 1008}], False)
+    assert not ask("http", "token=guess", **ours)[1]
+
+
+def test_pictures_are_bounded_by_their_bytes() -> None:
+    """The oldest go first; the newest stays, whatever its size."""
+    pictures = Pictures(limit_bytes=10)
+    first, second = pictures.put(b"12345"), pictures.put(b"12345")
+    third = pictures.put(b"1")
+    assert [f"/edit/picture/{name}" for name in pictures.held] == [second, third]
+    assert first not in pictures.held
+    large = pictures.put(bytes(99))
+    assert [f"/edit/picture/{name}" for name in pictures.held] == [large]
+
+
+@pytest.mark.parametrize("lens", [Lens("pinhole"), Lens("kannala_brandt", (0.01, 0.0, 0.0, 0.0))])
+def test_a_smaller_camera_sees_the_same(lens: Lens) -> None:
+    """Every direction has its image at the same share of width and height."""
+    camera = Intrinsics(640, 480, 500.0, 510.0, 300.0, 250.0, lens)
+    small = shrink(camera, 200)
+    assert (small.width_px, small.height_px) == (200, 150)
+    points = np.array([[0.1, 0.2, 1.0], [-0.3, 0.0, 2.0]])
+    shares = camera.project(points) / (640, 480)
+    np.testing.assert_allclose(small.project(points) / (200, 150), shares, rtol=1e-12)
+
+
+def make_session(tmp_path: Path, text: str) -> Session:
+    session = Session(OpenedFile(tmp_path / "a.yaml", text), Folders((tmp_path,)))
+    session.set_text(text)
+    return session
+
+
+def test_pictures_stay_until_newer_ones_come(tmp_path: Path) -> None:
+    """A text with a fault orders none, and marks those that are shown as outdated."""
+    session = make_session(tmp_path, "extends: tabletop.yaml\n")
+    orders = session.orders()
+    assert [order.index for order in orders] == [0, 5, 10, 15, 20, 25, 30, 35]
+    session.accept(Ticket("a", 0, orders[0]), SHOWN)
+    assert (session.shown, session.outdated) == ([SHOWN], set())
+    session.set_text("extends: tabletop.yaml\nseed: x\n")
+    assert session.orders() == []
+    assert (session.shown, session.outdated) == ([], {0})
+    assert session.results == {0: SHOWN}
+    assert session.config is not None
+    assert [fault.line for fault in session.faults] == [2]
+
+
+def test_faults_of_scenes_are_faults_of_the_text(tmp_path: Path) -> None:
+    """Each once, with its place if it has one."""
+    session = make_session(tmp_path, "extends: tabletop.yaml\n")
+    for slot, order in enumerate(session.orders()[:2]):
+        session.accept(Ticket("a", slot, order), Refused(f"{session.name}:1:10: a: is wrong"))
+    assert [(fault.line, fault.column) for fault in session.faults] == [(1, 10)]
+
+
+def test_one_field_varies_and_all_other_draws_stay(tmp_path: Path) -> None:
+    """Draws of the same randomizer are fixed if it drew one number; others have own streams."""
+    session = make_session(tmp_path, "extends: tabletop.yaml\n")
+    varied = vary(SHOWN, "randomizers", "orbit", "distance_m", (0.9, 1.2))
+    session.grid = replace(session.grid, variation=varied)
+    assert [(order.index, order.overrides) for order in session.orders()] == [
+        (5, ("randomizers.orbit.roll_deg=3", "randomizers.orbit.distance_m=0.9")),
+        (5, ("randomizers.orbit.roll_deg=3", "randomizers.orbit.distance_m=1.2")),
+    ]
+
+
+def test_statistics_count_boxes_per_picture() -> None:
+    """By class without regard to case; medians of sizes, mean of stated occlusion."""
+    assert rows(summarise([SHOWN, SHOWN]), None) == [("cup", "2", "20 x 30", "0.50")]
+
+
+def test_images_of_a_data_set_are_chosen_and_sorted() -> None:
+    """By class, split and number of objects."""
+    cup, tall = Labelled("cup", 5, 6, 0.1), Labelled("vase", 5, 60, None)
+    listed = [
+        data_sets.Row(0, "color", "train", (cup,)),
+        data_sets.Row(1, "color", "val", (cup, tall)),
+        data_sets.Row(2, "color", "train", ()),
+    ]
+    indices = lambda found: [row.index for row in found]  # noqa: E731
+    assert indices(data_sets.choose(listed, order="largest box")) == [1, 0, 2]
+    assert indices(data_sets.choose(listed, category="cup", split="train")) == [0]
+    assert indices(data_sets.choose(listed, least=2)) == [1]
+    assert data_sets.count_categories(listed) == {"cup": 2, "vase": 1}
