@@ -88,7 +88,8 @@ def test_four_pixels_sampled_at_once_equal_each_sampled_alone() -> None:
     at[500:600] *= 1.0e7
     with wp.ScopedDevice(device):
         world = World()
-        world.textures = wp.array([_random_texture(rng)], dtype=TextureRecord)
+        texture = _random_texture(rng)  # The array holds its address, and does not keep it alive.
+        world.textures = wp.array([texture], dtype=TextureRecord)
         points = wp.array(at, dtype=wp.vec2)
         for level in (0.0, 0.4, 1.9, 2.5, 6.0):
             each, four = (wp.zeros(_POINTS, dtype=Values) for _ in range(2))
