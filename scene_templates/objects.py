@@ -25,7 +25,6 @@ MARGIN_M = 0.02
 """Gap between objects and other elements on the surface."""
 _GAPS_M = (0.24, 0.18, 0.12, 0.08, 0.05, 0.03, 0.015, 0.005)
 _STEP_M = 0.02
-"""Of the latest library: a street has dozens of groups, and a library thousands of assets."""
 _TURNS_MAX = 100_000
 """Limit on the steps, rows and layers tried for one object; large surfaces need fewer."""
 

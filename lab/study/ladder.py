@@ -91,7 +91,7 @@ def build(
     """
     facts = {"factor": ladder.factor, "values": list(ladder.values), "config": str(config), "n": n}
     index = out / INDEX
-    if index.exists() and json.loads(index.read_text("utf-8")) != facts:
+    if index.exists() and _read_index(out) != facts:
         raise StorageError(f"{out}: holds another ladder; choose another folder")
     overrides = [[f"{ladder.factor}={value}", ONE_SPLIT] for value in ladder.values]
     for changed in overrides:  # All steps are valid before the first one is generated.
@@ -102,13 +102,11 @@ def build(
             )
     out.mkdir(parents=True, exist_ok=True)
     index.write_text(json.dumps(facts, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
-    same: list[int] = []
-    for step, changed in enumerate(overrides):
-        folder = ladder.folder(out, step)
+    folders = [ladder.folder(out, step) for step in range(len(overrides))]
+    for step, (folder, changed) in enumerate(zip(folders, overrides, strict=True)):
         report(f"step {step}: {changed[0]}")
         generate(config, n, out=folder, workers=workers, overrides=changed)
-        same.append(_count_same(ladder.folder(out, 0), folder))
-    return same
+    return _count_same(folders)
 
 
 def judge(out: Path, pattern: str) -> dict[str, Any]:
@@ -134,11 +132,17 @@ def judge(out: Path, pattern: str) -> dict[str, Any]:
 
 def read_ladder(out: Path) -> Ladder:
     """The ladder of a folder. Raises StorageError if there is none."""
+    facts = _read_index(out)
+    return Ladder(facts["factor"], tuple(facts["values"]))
+
+
+def _read_index(out: Path) -> dict[str, Any]:
     try:
-        facts = json.loads((out / INDEX).read_text("utf-8"))
-        return Ladder(facts["factor"], tuple(facts["values"]))
+        facts: dict[str, Any] = json.loads((out / INDEX).read_text("utf-8"))
+        facts["factor"], facts["values"]
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise StorageError(f"{out}: no ladder ({INDEX}); make one with --factor") from error
+    return facts
 
 
 def table_of(ladder: Ladder, same: Sequence[int], n: int) -> Table:
@@ -151,9 +155,13 @@ def table_of(ladder: Ladder, same: Sequence[int], n: int) -> Table:
     return {"title": "ladder", "header": header, "rows": rows, "note": ""}
 
 
-def _count_same(first: Path, other: Path) -> int:
-    with open_dataset(first) as one, open_dataset(other) as two:
-        return sum(_poses(a) == _poses(b) for a, b in zip(one, two, strict=True))
+def _count_same(folders: Sequence[Path]) -> list[int]:
+    """Samples of each data set whose objects stand as in the first one, which is read once."""
+    poses = []
+    for folder in folders:
+        with open_dataset(folder) as samples:
+            poses.append([_poses(sample) for sample in samples])
+    return [sum(a == b for a, b in zip(poses[0], other, strict=True)) for other in poses]
 
 
 def _poses(sample: Any) -> list[tuple[str, Any]]:

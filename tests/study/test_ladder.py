@@ -102,4 +102,7 @@ def test_folders_and_configurations_that_do_not_fit_are_refused(
         ladders.judge(out, "results.json")
     with pytest.raises(StorageError, match="no ladder"):
         ladders.judge(tmp_path, "{step}.json")
+    (tmp_path / ladders.INDEX).write_text('{"factor":')
+    with pytest.raises(StorageError, match="no ladder"):
+        ladders.build(str(config), FAR, 4, tmp_path, report=tell)
     assert not (tmp_path / "new").exists()
