@@ -11,9 +11,9 @@ from gen_data.core.se3 import Array
 
 Rows = NDArray[np.intp]
 
-OFF_LATTICE = 0.4871
-"""Place of a column in its cell: away from the round coordinates that edges of meshes have, which
-two triangles share."""
+PLACE = np.array([0.4871, 0.4871, 0.5], np.float32)
+"""Place of a lattice point in its cell. Columns keep away from round coordinates, where meshes have
+edges, which two triangles share."""
 
 
 def sample_surface(corners_m: Array, pitch_m: float) -> tuple[Array, Rows]:
@@ -78,18 +78,23 @@ def split_long(corners_m: Array, side_m: float, low_m: Array, high_m: Array) -> 
 
 
 def inside_lattice(
-    corners_m: Array, low_m: Array, pitch_m: float, shape: tuple[int, int, int]
+    corners_m: Array,
+    low_m: Array,
+    pitch_m: float,
+    shape: tuple[int, int, int],
+    open_below: bool = False,
 ) -> NDArray[np.bool_]:
     """Whether lattice points are inside the solids that triangles bound, bool ``shape``.
 
-    Point (i, j, k) is in cell (i, j, k) from ``low_m``, in its middle along Z. It is inside if
+    Point (i, j, k) is at ``PLACE`` in cell (i, j, k) from ``low_m``. It is inside if
     surfaces above it that face up outnumber those that face down: the winding number of closed
     surfaces, which may overlap. Columns in which the two do not balance cross an open surface, and
-    are outside.
+    are outside; with ``open_below`` also the columns count that only lack a face below, as those of
+    a house without a bottom.
     """
     nx, ny, nz = shape
     cells = (corners_m - low_m) / pitch_m
-    cells[..., :2] += 0.5 - OFF_LATTICE
+    cells[..., :2] += 0.5 - PLACE[:2].astype(np.float64)
     cells = cells[_reach_into(cells[..., :2], (0.0, 0.0), (nx, ny))]
     row, first, last, owner = raster_spans(cells, (nx, ny))
     counts = last - first
@@ -105,10 +110,11 @@ def inside_lattice(
     steps = np.bincount(column * (nz + 1) + below, sign, nx * ny * (nz + 1))
     steps = steps.reshape(nx, ny, nz + 1)
     winding = np.cumsum(steps[..., ::-1], axis=-1)[..., ::-1]
-    return np.asarray((winding[..., 1:] > 0.5) & (np.abs(winding[..., :1]) < 0.5))
+    lacking = winding[..., :1]
+    return np.asarray((winding[..., 1:] > 0.5) & (lacking > -0.5) & (lacking < 0.5 + open_below))
 
 
-def closed(corners_m: Array) -> bool:
+def is_closed(corners_m: Array) -> bool:
     """Whether triangles can bound a solid: the area vectors of a closed surface add up to zero."""
     areas = _cross(corners_m[:, 1] - corners_m[:, 0], corners_m[:, 2] - corners_m[:, 0])
     return bool(np.abs(areas.sum(axis=0)).max() < 1e-4 * np.abs(areas).sum())

@@ -1,0 +1,134 @@
+"""Voxels of bodies: where their surfaces are, and what these enclose."""
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gen_data.annotations import voxel_samples
+from gen_data.annotations.voxel_box import VoxelBox
+from gen_data.core import asset_types, interfaces
+from gen_data.core.scene import Body
+from gen_data.core.se3 import IDENTITY, SE3
+
+SAMPLES_PER_VOXEL = 2.0
+"""Samples of a surface along the side of a voxel: a disc whose radius is 0.36 of it holds one."""
+LONG = 0.5
+"""Bodies longer than this share of the box are sampled within it; assets of others once, whole."""
+PIECE_VOXELS = 20
+"""Longest edge of the pieces that triangles of long bodies are cut into."""
+STEPS_PER_OCTAVE = 8
+"""Pitches of samples of assets, which scaled bodies share; the next smaller one is taken."""
+BOTTOMLESS = frozenset({"building"})
+"""Tags of assets whose solids the ground closes."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class BodyVoxels:
+    """Voxels of a body that are in a box, by their numbers; some appear several times.
+
+    Attributes:
+        surface: Voxels with a sample of its surface, [n].
+        kinds: Index in ``asset_types.SURFACES`` of each, uint8 [n].
+        inside: Voxels with a point inside it, [m].
+        is_sheet: Whether it is a long surface that encloses nothing, such as the ground.
+    """
+
+    surface: NDArray[np.intp]
+    kinds: NDArray[np.uint8]
+    inside: NDArray[np.intp]
+    is_sheet: bool = False
+
+
+def find_body_voxels(
+    body: Body, T_frame_body: SE3, box: VoxelBox, assets: interfaces.AssetLibrary
+) -> BodyVoxels | None:
+    """Voxels of a body; None if its bounds are beside the box."""
+    low_m, high_m = assets.bounds_m(body.asset)
+    if not box.may_contain(T_frame_body, low_m, high_m, body.scale):
+        return None
+    longest_m = body.scale * max(b - a for a, b in zip(low_m, high_m, strict=True))
+    kinds = _surface_kinds(body.materials or assets.materials(body.asset))
+    if longest_m > LONG * box.voxel_m * max(box.shape):
+        return _voxels_of_long(body, T_frame_body, box, assets, kinds)
+    pitch_m = box.voxel_m / SAMPLES_PER_VOXEL / body.scale
+    shared_m = 2.0 ** (math.floor(STEPS_PER_OCTAVE * math.log2(pitch_m)) / STEPS_PER_OCTAVE)
+    samples = _sample_asset(body.asset, shared_m, assets)
+    surface = box.numbers(T_frame_body, samples.surface_m, body.scale)
+    inside = box.numbers(T_frame_body, samples.inside_m, body.scale)
+    kept = surface >= 0
+    return BodyVoxels(surface[kept], kinds[samples.slots[kept]], inside[inside >= 0])
+
+
+def _voxels_of_long(
+    body: Body,
+    T_frame_body: SE3,
+    box: VoxelBox,
+    assets: interfaces.AssetLibrary,
+    kinds: NDArray[np.uint8],
+) -> BodyVoxels:
+    mesh = assets.mesh(body.asset)
+    vertices = T_frame_body.apply(mesh.vertices_m.astype(np.float64) * body.scale)
+    corners = vertices[mesh.faces]
+    low_m, high_m = np.asarray(box.low_m), np.asarray(box.high_m)
+    pieces, owner = voxel_samples.split_long(corners, PIECE_VOXELS * box.voxel_m, low_m, high_m)
+    points, piece = voxel_samples.sample_surface(pieces, box.voxel_m / SAMPLES_PER_VOXEL)
+    surface = box.numbers(IDENTITY, points)
+    kept = surface >= 0
+    slots = mesh.face_slots[owner[piece[kept]]]
+    if not voxel_samples.is_closed(corners):
+        return BodyVoxels(surface[kept], kinds[slots], np.zeros(0, np.intp), is_sheet=True)
+    inside = voxel_samples.inside_lattice(corners, low_m, box.voxel_m, box.shape)
+    return BodyVoxels(surface[kept], kinds[slots], np.flatnonzero(inside))
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Samples:
+    """Samples of an asset in its own frame [m].
+
+    Attributes:
+        surface_m: On its surface, float32 [n, 3].
+        slots: Slot of the material of each, int16 [n].
+        inside_m: In its solids, float32 [m, 3].
+    """
+
+    surface_m: NDArray[np.float32]
+    slots: NDArray[np.int16]
+    inside_m: NDArray[np.float32]
+
+
+@lru_cache(maxsize=2048)
+def _sample_asset(asset: str, pitch_m: float, assets: interfaces.AssetLibrary) -> _Samples:
+    if not isinstance(assets, interfaces.DerivedArrays):
+        return _Samples(**_compute_samples(asset, pitch_m, assets))
+    name = f"samples of solids 1 {pitch_m:.6g}"
+    return _Samples(**assets.derived(asset, name, lambda: _compute_samples(asset, pitch_m, assets)))
+
+
+def _compute_samples(
+    asset: str, pitch_m: float, assets: interfaces.AssetLibrary
+) -> dict[str, NDArray[np.generic]]:
+    mesh = assets.mesh(asset)
+    corners = mesh.vertices_m.astype(np.float64)[mesh.faces]
+    surface, triangle = voxel_samples.sample_surface(corners, pitch_m)
+    slots = mesh.face_slots[triangle].astype(np.int16)
+    kept = voxel_samples.thin_out(surface, slots, 0.5 * pitch_m)
+    low_m, high_m = (np.asarray(end) for end in mesh.bounds_m())
+    nx, ny, nz = (int(n) for n in np.ceil((high_m - low_m) / pitch_m) + 1)
+    bottomless = not BOTTOMLESS.isdisjoint(assets.get(asset).tags)
+    inside = voxel_samples.inside_lattice(corners, low_m, pitch_m, (nx, ny, nz), bottomless)
+    return {
+        "surface_m": surface[kept].astype(np.float32),
+        "slots": slots[kept],
+        "inside_m": (np.argwhere(inside) * pitch_m + low_m).astype(np.float32)
+        + np.float32(pitch_m) * voxel_samples.PLACE,
+    }
+
+
+@lru_cache(maxsize=4096)
+def _surface_kinds(materials: tuple[asset_types.Material, ...]) -> NDArray[np.uint8]:
+    """Index of the surface of every slot."""
+    known = {role: number for number, role in enumerate(asset_types.SURFACES)}
+    return np.array([known.get(material.role, 0) for material in materials], np.uint8)
