@@ -26,17 +26,18 @@ from gen_data.core.se3 import IDENTITY, SE3, Vec3
 VOXELS_MAX = 1 << 26
 """2^26 voxels take 0.8 GB in a worker, with the masks of three sensors."""
 BYTES_PER_VOXEL = 12
+WORLD = "world"
 SURFACE, INTERIOR = VOXEL_STATES.index("surface"), VOXEL_STATES.index("interior")
 
 
 class VoxelOccupancy(Strict):
     """Voxels of a box around the ego: state, instance, surface, and which sensors observe them.
 
-    A voxel is ``surface`` if it contains a sample of an object's surface, ``interior`` if it
-    contains no surface and a point inside a closed one, or is below the ground, else ``free``.
+    A voxel is ``surface`` if it contains a sample of an object's surface, else ``interior`` if it
+    is within an object, as in a wall or in a closed car, or below the ground, else ``free``.
     Where several objects share a voxel, instances win over the unlabelled background, and smaller
-    ones over larger ones. The object that carries the sensors is left out. Cut-outs of textures
-    count as surface.
+    ones over larger ones. The object that carries the ego's rig is left out, unless the frame is
+    the world. Cut-outs of textures count as surface.
 
     A camera observes a voxel if a pixel shows a surface in it, or if the pixel at its centre shows
     something behind it. A scanner observes the voxels that the lines to its returns pass and end
@@ -47,8 +48,8 @@ class VoxelOccupancy(Strict):
         voxel_m: Side of a voxel.
         from_m: Lowest corner of the box in its frame; null = the box is centred on the frame's
             origin along X and Y, and begins 1 m below it.
-        frame: Name of the scanner whose frame it is; empty = the ego's rig, or the world in scenes
-            without one.
+        frame: Name of the scanner whose frame it is, or ``world``; empty = the ego's rig, or the
+            world in scenes without one.
     """
 
     channels: ClassVar[frozenset[capture.Channel]] = frozenset({capture.Channel.RANGE})
@@ -97,7 +98,8 @@ class VoxelOccupancy(Strict):
         scene = scenes[""]
         box = VoxelBox(self._pose(scene), self._low_m(), self.voxel_m, self.shape)
         rig = ego_rig(scene)
-        own = scene.body(rig.body).instance_id if rig is not None and rig.body else 0
+        carried = rig is not None and rig.body and self.frame != WORLD
+        own = scene.body(rig.body).instance_id if rig is not None and carried else 0
         state, owner, surface = _fill(box, scene, assets, own)
         readings, clouds = capture.readings, capture.clouds
         observed = {name: seen_by_camera(box, scene, readings[name]) for name in sorted(readings)}
@@ -115,14 +117,16 @@ class VoxelOccupancy(Strict):
         return self.from_m or (-0.5 * x, -0.5 * y, -1.0)
 
     def _pose(self, scene: Scene) -> SE3:
+        if self.frame == WORLD:
+            return IDENTITY
         if self.frame:
             for lidar in scene.lidars:
                 if lidar.name == self.frame:
                     return lidar.T_world_lidar
-            known = ", ".join(sorted(lidar.name for lidar in scene.lidars)) or "none"
+            known = ", ".join([WORLD, *sorted(lidar.name for lidar in scene.lidars)])
             raise errors.ConfigError(
                 f"annotation 'occupancy': frame: there is no scanner '{self.frame}';"
-                f" scanners are: {known}"
+                f" expected one of: {known}"
             )
         rig = ego_rig(scene)
         return scene.rig_pose(rig.name).rounded() if rig is not None else IDENTITY
@@ -155,9 +159,9 @@ def _by_rank(scene: Scene, own: int) -> Iterator[Body]:
     """Bodies without the carrier's; background first, then instances by falling volume."""
     volumes = {i.instance_id: math.prod(i.box3d.size_m) for i in scene.instances}
     numbers = sorted(volumes, key=lambda k: (-volumes[k], k))
-    ranks = {0: -1, **{number: rank for rank, number in enumerate(numbers)}}
+    ranks = {number: rank for rank, number in enumerate(numbers)}
     kept = (b for b in scene.bodies if not own or b.instance_id != own)
-    return iter(sorted(kept, key=lambda body: ranks[body.instance_id]))
+    return iter(sorted(kept, key=lambda body: ranks.get(body.instance_id, -1)))
 
 
 def _below_ground(box: VoxelBox, background: Sequence[BodyVoxels]) -> NDArray[np.bool_]:

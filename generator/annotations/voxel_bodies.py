@@ -15,10 +15,11 @@ from gen_data.core.se3 import IDENTITY, SE3
 
 SAMPLES_PER_VOXEL = 2.0
 """Samples of a surface along the side of a voxel: a disc whose radius is 0.36 of it holds one."""
-LONG = 0.5
-"""Bodies longer than this share of the box are sampled within it; assets of others once, whole."""
+SAMPLES_MAX, CELLS_MAX = 400_000, 16_000_000
+"""Samples on the faces of the bounds, and cells in them, of assets that are sampled once, as a
+whole. Of larger ones, such as the ground or a room, the part in the box is sampled each time."""
 PIECE_VOXELS = 20
-"""Longest edge of the pieces that triangles of long bodies are cut into."""
+"""Longest edge of the pieces that triangles of large bodies are cut into."""
 STEPS_PER_OCTAVE = 8
 """Pitches of samples of assets, which scaled bodies share; the next smaller one is taken."""
 BOTTOMLESS = frozenset({"building"})
@@ -33,7 +34,7 @@ class BodyVoxels:
         surface: Voxels with a sample of its surface, [n].
         kinds: Index in ``asset_types.SURFACES`` of each, uint8 [n].
         inside: Voxels with a point inside it, [m].
-        is_sheet: Whether it is a long surface that encloses nothing, such as the ground.
+        is_sheet: Whether it is a large surface that encloses nothing, such as the ground.
     """
 
     surface: NDArray[np.intp]
@@ -49,11 +50,11 @@ def find_body_voxels(
     low_m, high_m = assets.bounds_m(body.asset)
     if not box.may_contain(T_frame_body, low_m, high_m, body.scale):
         return None
-    longest_m = body.scale * max(b - a for a, b in zip(low_m, high_m, strict=True))
     kinds = _surface_kinds(body.materials or assets.materials(body.asset))
-    if longest_m > LONG * box.voxel_m * max(box.shape):
-        return _voxels_of_long(body, T_frame_body, box, assets, kinds)
     pitch_m = box.voxel_m / SAMPLES_PER_VOXEL / body.scale
+    x, y, z = ((b - a) / pitch_m for a, b in zip(low_m, high_m, strict=True))
+    if 2.0 * (x * y + y * z + z * x) > SAMPLES_MAX or x * y * z > CELLS_MAX:
+        return _voxels_of_large(body, T_frame_body, box, assets, kinds)
     shared_m = 2.0 ** (math.floor(STEPS_PER_OCTAVE * math.log2(pitch_m)) / STEPS_PER_OCTAVE)
     samples = _sample_asset(body.asset, shared_m, assets)
     surface = box.numbers(T_frame_body, samples.surface_m, body.scale)
@@ -62,7 +63,7 @@ def find_body_voxels(
     return BodyVoxels(surface[kept], kinds[samples.slots[kept]], inside[inside >= 0])
 
 
-def _voxels_of_long(
+def _voxels_of_large(
     body: Body,
     T_frame_body: SE3,
     box: VoxelBox,
@@ -103,7 +104,7 @@ class _Samples:
 def _sample_asset(asset: str, pitch_m: float, assets: interfaces.AssetLibrary) -> _Samples:
     if not isinstance(assets, interfaces.DerivedArrays):
         return _Samples(**_compute_samples(asset, pitch_m, assets))
-    name = f"samples of solids 1 {pitch_m:.6g}"
+    name = f"samples of solids 2 {pitch_m:.6g}"
     return _Samples(**assets.derived(asset, name, lambda: _compute_samples(asset, pitch_m, assets)))
 
 
@@ -117,8 +118,12 @@ def _compute_samples(
     kept = voxel_samples.thin_out(surface, slots, 0.5 * pitch_m)
     low_m, high_m = (np.asarray(end) for end in mesh.bounds_m())
     nx, ny, nz = (int(n) for n in np.ceil((high_m - low_m) / pitch_m) + 1)
+    inside = voxel_samples.inside_lattice(corners, low_m, pitch_m, (nx, ny, nz))
+    dense, _ = voxel_samples.sample_surface(corners, 0.5 * pitch_m)
+    shell = np.zeros((nx, ny, nz), np.bool_)
+    shell[tuple(np.floor((dense - low_m) / pitch_m).astype(np.intp).T)] = True
     bottomless = not BOTTOMLESS.isdisjoint(assets.get(asset).tags)
-    inside = voxel_samples.inside_lattice(corners, low_m, pitch_m, (nx, ny, nz), bottomless)
+    inside |= voxel_samples.enclosed_cells(shell, bottomless)
     return {
         "surface_m": surface[kept].astype(np.float32),
         "slots": slots[kept],

@@ -82,15 +82,13 @@ def inside_lattice(
     low_m: Array,
     pitch_m: float,
     shape: tuple[int, int, int],
-    open_below: bool = False,
 ) -> NDArray[np.bool_]:
     """Whether lattice points are inside the solids that triangles bound, bool ``shape``.
 
     Point (i, j, k) is at ``PLACE`` in cell (i, j, k) from ``low_m``. It is inside if
     surfaces above it that face up outnumber those that face down: the winding number of closed
     surfaces, which may overlap. Columns in which the two do not balance cross an open surface, and
-    are outside; with ``open_below`` also the columns count that only lack a face below, as those of
-    a house without a bottom.
+    are outside.
     """
     nx, ny, nz = shape
     cells = (corners_m - low_m) / pitch_m
@@ -110,8 +108,23 @@ def inside_lattice(
     steps = np.bincount(column * (nz + 1) + below, sign, nx * ny * (nz + 1))
     steps = steps.reshape(nx, ny, nz + 1)
     winding = np.cumsum(steps[..., ::-1], axis=-1)[..., ::-1]
-    lacking = winding[..., :1]
-    return np.asarray((winding[..., 1:] > 0.5) & (lacking > -0.5) & (lacking < 0.5 + open_below))
+    return np.asarray((winding[..., 1:] > 0.5) & (np.abs(winding[..., :1]) < 0.5))
+
+
+def enclosed_cells(shell: NDArray[np.bool_], closed_below: bool = False) -> NDArray[np.bool_]:
+    """Cells of a lattice that are neither in a shell nor reached from outside, bool [x, y, z].
+
+    Outside is beyond the lattice, above it and at its sides, below it unless it is closed there;
+    paths lead through faces of cells. So also surfaces that do not join enclose something, such as
+    the walls and roof of a house.
+    """
+    from scipy import ndimage
+
+    padded = np.pad(shell, ((1, 1), (1, 1), (0 if closed_below else 1, 1)))
+    regions, _ = ndimage.label(~padded)
+    inner = regions[1:-1, 1:-1, : -1 if closed_below else None]
+    inner = inner if closed_below else inner[..., 1:-1]
+    return np.asarray((inner != regions[0, 0, -1]) & ~shell)
 
 
 def is_closed(corners_m: Array) -> bool:

@@ -385,7 +385,7 @@ class EgoTruth:
     boxes3d: Mapping[str, Mapping[int, boxes.OrientedBox]] | None = None
     borders: tuple[lane_geometry.LaneBorder, ...] | None = None
     birdseye: BirdseyeMap | None = None
-    occupancy: Occupancy | None = None
+    occupancy: Occupancy | None = field(default=None, metadata={serialization.SPARSE: True})
     relations: tuple[Relation, ...] | None = None
     grasps: tuple[Grasp, ...] | None = None
     suctions: tuple[Suction, ...] | None = None
