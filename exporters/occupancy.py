@@ -16,15 +16,16 @@ Arrays of ``grids`` are [x, y, z] along the axes of the frame ``T_world_frame``,
 their velocities along the axes of the frame.
 
 * **occ3d**: ``semantics``, ``mask_lidar``, ``mask_camera`` uint8, as Occ3D-nuScenes has them, and
-  ``flow`` float16 [x, y, z, 2], velocity along X and Y [m/s] as in OpenOcc. Classes are those of
+  ``flow`` float16 [x, y, z, 2], velocity along X and Y [m/s] as in OpenOcc. Classes are the ones of
   nuScenes' lidarseg challenge, 0 = others, 17 = free; the inside of an object has its class, and
-  the land below the ground is free and in no mask, as there. Scenes and tokens are those of ``nuscenes``. Its grid is 200 x 200 x 16 from (-40, -40, -1) m.
-* **surroundocc**: rows ``x, y, z, class`` of voxels with a surface, int64 [n, 4], and these classes.
-  Its grid is 200 x 200 x 16 from (-50, -50, -5) m, 0.5 m each, in the scanner's frame.
+  the land below the ground is free and in no mask, as there. Scenes and tokens agree with
+  ``nuscenes``. Its grid is 200 x 200 x 16 from (-40, -40, -1) m.
+* **surroundocc**: rows ``x, y, z, class`` of voxels with a surface, int64 [n, 4], with the same
+  classes. Its grid is 200 x 200 x 16 from (-50, -50, -5) m, 0.5 m each, in the scanner's frame.
 * **semantickitti**: flags of 8 voxels share a byte, the first one in its highest bit; ``label`` is
   uint16, 0 = free. ``bin``: voxels with a point of the scan. ``invalid``: interiors, which no scan
   can show.
-  ``occluded``: voxels that the scan does not observe. Sequences are numbered as those of
+  ``occluded``: voxels that the scan does not observe. Sequences are numbered as in
   ``semantickitti``. Its grid is 256 x 256 x 32 from (0, -25.6, -2) m, 0.2 m each, in the scanner's
   frame.
 
@@ -186,7 +187,7 @@ def driving_classes(scene: Scene, grid: Occupancy) -> NDArray[np.uint8]:
 def completion_files(
     scene: Scene, grid: Occupancy, p_world: se3.Array, lidar: str
 ) -> dict[str, bytes]:
-    """Files of SemanticKITTI's scene completion by their ending; points are those of the scan."""
+    """Files of SemanticKITTI's scene completion by their ending; the points are its scan's."""
     shape = grid.state.shape
     occupied = _objects(grid)
     labels = np.zeros(shape, "<u2")
