@@ -207,7 +207,7 @@ def completion_files(
 
 def _objects(grid: Occupancy) -> NDArray[np.bool_]:
     """Occupied voxels without the land below the ground, which has no surface and no object."""
-    return (grid.state == VOXEL_STATES.index("surface")) | (grid.instance_id > 0)
+    return np.asarray((grid.state == VOXEL_STATES.index("surface")) | (grid.instance_id > 0))
 
 
 def _records(grid: Occupancy, chosen: NDArray[np.bool_]) -> NDArray[np.void]:

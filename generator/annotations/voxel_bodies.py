@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -102,15 +103,17 @@ class _Samples:
 
 @lru_cache(maxsize=2048)
 def _sample_asset(asset: str, pitch_m: float, assets: interfaces.AssetLibrary) -> _Samples:
-    if not isinstance(assets, interfaces.DerivedArrays):
-        return _Samples(**_compute_samples(asset, pitch_m, assets))
-    name = f"samples of solids 2 {pitch_m:.6g}"
-    return _Samples(**assets.derived(asset, name, lambda: _compute_samples(asset, pitch_m, assets)))
+    def compute() -> dict[str, NDArray[Any]]:
+        return _compute_samples(asset, pitch_m, assets)
+
+    if isinstance(assets, interfaces.DerivedArrays):
+        return _Samples(**assets.derived(asset, f"voxel solids 1 {pitch_m:.6g}", compute))
+    return _Samples(**compute())
 
 
 def _compute_samples(
     asset: str, pitch_m: float, assets: interfaces.AssetLibrary
-) -> dict[str, NDArray[np.generic]]:
+) -> dict[str, NDArray[Any]]:
     mesh = assets.mesh(asset)
     corners = mesh.vertices_m.astype(np.float64)[mesh.faces]
     surface, triangle = voxel_samples.sample_surface(corners, pitch_m)

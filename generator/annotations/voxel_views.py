@@ -82,9 +82,13 @@ def seen_by_scanner(box: VoxelBox, scene: Scene, cloud: PointCloud) -> Mask:
     """Voxels that a scanner observes, bool [x, y, z]; the scene is at the middle of its sweep."""
     T_frame_lidar = box.T_world_frame.inverse() @ cloud.lidar.T_world_lidar
     observed = np.zeros(math.prod(box.shape), np.bool_)
-    end = T_frame_lidar.apply(cloud.points["position_m"].astype(np.float64))
-    start = T_frame_lidar.apply(_origins_m(scene, cloud.lidar, cloud.points["time_s"]))
-    start, end = (((p - box.low_m) / box.voxel_m).astype(np.float32) for p in (start, end))
+    places_m = (
+        _origins_m(scene, cloud.lidar, cloud.points["time_s"]),
+        cloud.points["position_m"].astype(np.float64),
+    )
+    start, end = (
+        ((T_frame_lidar.apply(p) - box.low_m) / box.voxel_m).astype(np.float32) for p in places_m
+    )
     inside = ((end >= 0.0) & (end < box.shape)).all(axis=1)
     x, y, z = end[inside].T.astype(np.intp)
     _, ny, nz = box.shape

@@ -213,12 +213,12 @@ def _decode_array(plain: Mapping[str, Any]) -> NDArray[Any]:
     if "runs" in plain:
         runs = plain["runs"]
         values = np.arange(len(runs)) % 2 == 1
-        return np.repeat(values, runs).reshape(plain["size"])
+        return np.asarray(np.repeat(values, runs).reshape(plain["size"]))
     data = zlib.decompress(base64.b64decode(plain["zlib"]))
     if plain["dtype"] != "bool":
-        return np.frombuffer(data, plain["dtype"]).reshape(plain["shape"])
+        return np.asarray(np.frombuffer(data, plain["dtype"]).reshape(plain["shape"]))
     bits = np.unpackbits(np.frombuffer(data, np.uint8), count=math.prod(plain["shape"]))
-    return bits.reshape(plain["shape"]).astype(np.bool_)
+    return np.asarray(bits.reshape(plain["shape"]).astype(np.bool_))
 
 
 def _one_of(allowed: tuple[Any, ...], plain: Any) -> Any:

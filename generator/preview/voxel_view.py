@@ -25,7 +25,7 @@ def voxel_colors(grid: Occupancy, scene: Scene) -> NDArray[np.uint8]:
     top = max((i.instance_id for i in scene.instances), default=0)
     of_instance = np.zeros((top + 1, 3), np.uint8)
     for instance in scene.instances:
-        of_instance[instance.instance_id] = id_color(instance.category_id) or UNLABELLED
+        of_instance[instance.instance_id] = id_color(instance.category_id)
     of_surface = [COLORS.get(name, UNLABELLED) for name in asset_types.SURFACES]
     colors: NDArray[np.uint8] = np.array(of_surface, np.uint8)[grid.surface]
     labelled = (grid.instance_id > 0) & (of_instance[grid.instance_id].any(axis=-1))
