@@ -12,15 +12,15 @@ from gen_data.annotations import voxel_samples
 from gen_data.annotations.voxel_box import VoxelBox
 from gen_data.core import asset_types, interfaces
 from gen_data.core.scene import Body
-from gen_data.core.se3 import IDENTITY, SE3
+from gen_data.core.se3 import SE3
 
 SAMPLES_PER_VOXEL = 2.0
 """Samples of a surface along the side of a voxel: a disc whose radius is 0.36 of it holds one."""
 SAMPLES_MAX, CELLS_MAX = 400_000, 16_000_000
 """Samples on the faces of the bounds, and cells in them, of assets that are sampled once, as a
-whole. Of larger ones, such as the ground or a room, the part in the box is sampled each time."""
-PIECE_VOXELS = 20
-"""Longest edge of the pieces that triangles of large bodies are cut into."""
+whole. Larger ones, such as the ground or a room, are sampled in columns that the box overlaps."""
+TILE_SAMPLES = 160
+"""Samples along the side of such a column."""
 STEPS_PER_OCTAVE = 8
 """Pitches of samples of assets, which scaled bodies share; the next smaller one is taken."""
 BOTTOMLESS = frozenset({"building"})
@@ -54,9 +54,10 @@ def find_body_voxels(
     kinds = _surface_kinds(body.materials or assets.materials(body.asset))
     pitch_m = box.voxel_m / SAMPLES_PER_VOXEL / body.scale
     x, y, z = ((b - a) / pitch_m for a, b in zip(low_m, high_m, strict=True))
-    if 2.0 * (x * y + y * z + z * x) > SAMPLES_MAX or x * y * z > CELLS_MAX:
-        return _voxels_of_large(body, T_frame_body, box, assets, kinds)
     shared_m = 2.0 ** (math.floor(STEPS_PER_OCTAVE * math.log2(pitch_m)) / STEPS_PER_OCTAVE)
+    if 2.0 * (x * y + y * z + z * x) > SAMPLES_MAX or x * y * z > CELLS_MAX:
+        voxels, slots, solid, is_sheet = _voxels_of_large(body, T_frame_body, box, shared_m, assets)
+        return BodyVoxels(voxels, kinds[slots], solid, is_sheet)
     samples = _sample_asset(body.asset, shared_m, assets)
     surface = box.numbers(T_frame_body, samples.surface_m, body.scale)
     inside = box.numbers(T_frame_body, samples.inside_m, body.scale)
@@ -65,25 +66,54 @@ def find_body_voxels(
 
 
 def _voxels_of_large(
-    body: Body,
-    T_frame_body: SE3,
-    box: VoxelBox,
-    assets: interfaces.AssetLibrary,
-    kinds: NDArray[np.uint8],
-) -> BodyVoxels:
-    mesh = assets.mesh(body.asset)
-    vertices = T_frame_body.apply(mesh.vertices_m.astype(np.float64) * body.scale)
-    corners = vertices[mesh.faces]
-    low_m, high_m = np.asarray(box.low_m), np.asarray(box.high_m)
-    pieces, owner = voxel_samples.split_long(corners, PIECE_VOXELS * box.voxel_m, low_m, high_m)
-    points, piece = voxel_samples.sample_surface(pieces, box.voxel_m / SAMPLES_PER_VOXEL)
-    surface = box.numbers(IDENTITY, points)
-    kept = surface >= 0
-    slots = mesh.face_slots[owner[piece[kept]]]
-    if not voxel_samples.is_closed(corners):
-        return BodyVoxels(surface[kept], kinds[slots], np.zeros(0, np.intp), is_sheet=True)
-    inside = voxel_samples.inside_lattice(corners, low_m, box.voxel_m, box.shape)
-    return BodyVoxels(surface[kept], kinds[slots], np.flatnonzero(inside))
+    body: Body, T_frame_body: SE3, box: VoxelBox, pitch_m: float, assets: interfaces.AssetLibrary
+) -> tuple[NDArray[np.intp], NDArray[np.int16], NDArray[np.intp], bool]:
+    """Voxels of its surface in the box, their slots, voxels inside it, whether it is a sheet."""
+    side_m = TILE_SAMPLES * pitch_m
+    corners = np.stack([box.low_m, box.high_m])[np.indices((2, 2, 2)).reshape(3, -1).T, range(3)]
+    ends = T_frame_body.inverse().apply(corners) / (body.scale * side_m)
+    first, last = (np.floor(ends.min(axis=0)), np.floor(ends.max(axis=0)))
+    (x, y), (u, v) = first[:2].astype(int), last[:2].astype(int)
+    tiles = [
+        _sample_tile(body.asset, pitch_m, (i, j), assets)
+        for i in range(x, u + 1)
+        for j in range(y, v + 1)
+    ]
+    surface, slots = (np.concatenate(part) for part in zip(*tiles, strict=True))
+    voxels = box.numbers(T_frame_body, surface, body.scale)
+    kept = voxels >= 0
+    inside = np.zeros(0, np.intp)
+    is_sheet = _is_sheet(body.asset, assets)
+    if not is_sheet:
+        mesh = assets.mesh(body.asset)
+        placed = T_frame_body.apply(mesh.vertices_m.astype(np.float64) * body.scale)[mesh.faces]
+        low_m = np.asarray(box.low_m)
+        solid = voxel_samples.inside_lattice(placed, low_m, box.voxel_m, box.shape)
+        inside = np.flatnonzero(solid)
+    return voxels[kept], slots[kept], inside, is_sheet
+
+
+@lru_cache(maxsize=256)
+def _sample_tile(
+    asset: str, pitch_m: float, tile: tuple[int, int], assets: interfaces.AssetLibrary
+) -> tuple[NDArray[np.float32], NDArray[np.int16]]:
+    """Samples [m] of the surface of an asset in a column of its own frame, and their slots."""
+    mesh = assets.mesh(asset)
+    corners = mesh.vertices_m.astype(np.float64)[mesh.faces]
+    side_m = TILE_SAMPLES * pitch_m
+    low_m = np.array([tile[0] * side_m, tile[1] * side_m, -np.inf])
+    high_m = np.array([low_m[0] + side_m, low_m[1] + side_m, np.inf])
+    pieces, owner = voxel_samples.split_long(corners, 0.25 * side_m, low_m, high_m)
+    points, piece = voxel_samples.sample_surface(pieces, pitch_m)
+    kept = ((points >= low_m) & (points < high_m)).all(axis=1)
+    slots = mesh.face_slots[owner[piece[kept]]].astype(np.int16)
+    return points[kept].astype(np.float32), slots
+
+
+@lru_cache(maxsize=256)
+def _is_sheet(asset: str, assets: interfaces.AssetLibrary) -> bool:
+    mesh = assets.mesh(asset)
+    return not voxel_samples.is_closed(mesh.vertices_m.astype(np.float64)[mesh.faces])
 
 
 @dataclass(frozen=True, eq=False, slots=True)

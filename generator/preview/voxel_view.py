@@ -47,7 +47,9 @@ def oblique_view(grid: Occupancy, scene: Scene) -> Image:
     if not len(centers):
         return image
     shown = grid.state == VOXEL_STATES.index("surface")
-    seen = np.logical_or.reduce([mask[shown] for mask in grid.observed.values()] or [shown[shown]])
+    # Without a sensor, none is dark.
+    masks = [mask[shown] for mask in grid.observed.values()]
+    seen = np.logical_or.reduce(masks) if masks else np.ones(len(centers), np.bool_)
     shade = np.where(seen, 1.0, UNSEEN)[:, None]
     c, s = np.cos(AROUND), np.sin(AROUND)
     right = np.array([-s, c, 0.0]) * -1.0
