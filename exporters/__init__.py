@@ -33,6 +33,7 @@ TABLE = PluginTable[Exporter](
         "mcap": "gen_data.exporters.mcap:Mcap",
         "motchallenge": "gen_data.exporters.motchallenge:MotChallenge",
         "nuscenes": "gen_data.exporters.nuscenes:NuScenes",
+        "occupancy": "gen_data.exporters.occupancy:OccupancyGrids",
         "pointclouds": "gen_data.exporters.pointclouds:PointClouds",
         "rerun": "gen_data.exporters.rerun:Rerun",
         "scannet": "gen_data.exporters.scannet:ScanNet",

@@ -34,12 +34,14 @@ class Classes:
         attributes: Description by name.
         things: Category by our ``category`` or ``category/subcategory``.
         surfaces: Category by surface.
+        challenge: Categories of each class of the lidarseg challenge, from class 1.
     """
 
     categories: tuple[tuple[str, str], ...]
     attributes: Mapping[str, str]
     things: Mapping[str, str]
     surfaces: Mapping[str, str]
+    challenge: tuple[tuple[str, ...], ...]
 
     def index(self, name: str) -> int:
         """Index of a category."""
@@ -52,7 +54,10 @@ def classes() -> Classes:
     text = files("gen_data.exporters").joinpath("nuscenes_classes.yaml").read_text("utf-8")
     tables = yaml.safe_load(text)
     categories = tuple((name, meaning) for name, meaning in tables["categories"])
-    return Classes(categories, tables["attributes"], tables["things"], tables["surfaces"])
+    challenge = tuple(map(tuple, tables["challenge"]))
+    return Classes(
+        categories, tables["attributes"], tables["things"], tables["surfaces"], challenge
+    )
 
 
 def category_of(instance: Instance) -> str:
@@ -124,6 +129,16 @@ def point_classes(
         named[ego_id] = _index(EGO)
     labels: NDArray[np.uint8] = np.where(members > 0, named[members], of_surface[points["surface"]])
     return labels
+
+
+@cache
+def challenge_classes() -> NDArray[np.uint8]:
+    """Class of the lidarseg challenge by category, uint8 [categories]; 0 = ignored there."""
+    found = np.zeros(len(classes().categories), np.uint8)
+    for number, names in enumerate(classes().challenge, 1):
+        for name in names:
+            found[_index(name)] = number
+    return found
 
 
 @cache

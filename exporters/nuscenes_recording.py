@@ -17,6 +17,11 @@ PAUSE_US = 10_000_000
 """Time between sequences."""
 
 
+def scene_name(sequence: int) -> str:
+    """Name of the scene of a sequence; unlike official names, it is in no official split."""
+    return f"gen-scene-{sequence:06d}"
+
+
 @dataclass(frozen=True, eq=False)
 class Recording:
     """One sequence: a scene of nuScenes.
@@ -40,8 +45,8 @@ class Recording:
 
     @property
     def name(self) -> str:
-        """Name of the scene; unlike official names, it is in no official split."""
-        return f"gen-scene-{self.number:06d}"
+        """Name of the scene."""
+        return scene_name(self.number)
 
     def rows(self) -> Iterator[tuple[str, Row]]:
         """Yield all rows, each with its table; sensors' calibrations may repeat."""

@@ -24,7 +24,7 @@ and numbers. Vans are cars there; masts are poles, also of signs and lights.
 """
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import ClassVar, Literal
 
@@ -167,9 +167,7 @@ class SemanticKitti(base.ExporterBase):
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Number the scans of each sequence, and the instances in them."""
-        sequences = read_sequences(shard_dirs, self.type)
-        if info.steps_per_scene == 1:
-            sequences = _group_by_split(sequences)
+        sequences = numbered_sequences(info, shard_dirs, self.type)
         splits: dict[str, list[int]] = {}
         for number, scans in sequences.items():
             _write_sequence(info, scans, dataset_dir / f"sequences/{number:02d}")
@@ -212,8 +210,13 @@ def _calib(scene: Scene, camera: str, lidar: str) -> str:
     return kitti.matrix_lines(projections | {"Tr": calib["Tr_velo_to_cam"]})
 
 
-def _group_by_split(sequences: Mapping[int, Sequence[Frame]]) -> dict[int, list[Frame]]:
-    """Join the scans of views of one instant by split."""
+def numbered_sequences(
+    info: DatasetInfo, shard_dirs: Sequence[Path], exporter: str
+) -> dict[int, list[Frame]]:
+    """Scans by the number of their sequence: by view, or by split in views of one instant."""
+    sequences = read_sequences(shard_dirs, exporter)
+    if info.steps_per_scene > 1:
+        return sequences
     frames = [frame for scans in sequences.values() for frame in scans]
     together = {
         number: [frame for frame in frames if frame.row["split"] == split]

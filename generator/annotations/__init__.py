@@ -4,7 +4,13 @@ Each annotator is one file and one line in this table; ``annotate`` runs them. T
 determine what they annotate, see ``gen_data.core.interfaces``.
 """
 
-from gen_data.core.interfaces import Annotator, AnyAnnotator, FrameAnnotator, ImageAnnotator
+from gen_data.core.interfaces import (
+    Annotator,
+    AnyAnnotator,
+    CaptureAnnotator,
+    FrameAnnotator,
+    ImageAnnotator,
+)
 from gen_data.core.plugins import PluginTable
 
 TABLE = PluginTable[AnyAnnotator](
@@ -21,6 +27,7 @@ TABLE = PluginTable[AnyAnnotator](
         "lanes": "gen_data.annotations.lanes:Lanes",
         "language": "gen_data.annotations.language:Language",
         "motion": "gen_data.annotations.motion:Motion",
+        "occupancy": "gen_data.annotations.occupancy:VoxelOccupancy",
         "oriented_boxes2d": "gen_data.annotations.oriented_boxes2d:OrientedBoxes2d",
         "part_masks": "gen_data.annotations.part_masks:PartMasks",
         "poses": "gen_data.annotations.poses:Poses",
@@ -28,5 +35,5 @@ TABLE = PluginTable[AnyAnnotator](
         "semantic_masks": "gen_data.annotations.semantic_masks:SemanticMasks",
         "visibility": "gen_data.annotations.visibility:Visibility",
     },
-    (Annotator, ImageAnnotator, FrameAnnotator),
+    (Annotator, ImageAnnotator, FrameAnnotator, CaptureAnnotator),
 )

@@ -7,10 +7,12 @@ from pydantic import Field
 from gen_data.annotations import consistency_checks, instance_extents
 from gen_data.config.base_model import Strict
 from gen_data.core import errors, interfaces
-from gen_data.core.capture import Channel, SensorReading
+from gen_data.core.capture import Capture, Channel, SensorReading
 from gen_data.core.sample import EgoTruth, ImageTruth, ObjectTruth
 from gen_data.core.scene import Scene
 from gen_data.core.scene_time import ego_rig, rig_twist
+
+NO_READINGS = Capture({})
 
 
 class Thresholds(Strict):
@@ -52,21 +54,25 @@ def annotate_ego(
     scenes: Mapping[str, Scene],
     annotators: Sequence[interfaces.AnyAnnotator],
     assets: interfaces.AssetLibrary,
+    capture: Capture = NO_READINGS,
 ) -> EgoTruth | None:
     """Annotate one sample as a whole; None without an annotator of samples.
 
     ``scenes`` are as in ``FrameAnnotator``.
     """
-    of_frames = [a for a in annotators if isinstance(a, interfaces.FrameAnnotator)]
-    if not of_frames:
+    whole = (interfaces.FrameAnnotator, interfaces.CaptureAnnotator)
+    if not any(isinstance(a, whole) for a in annotators):
         return None
     scene = scenes[""]
     rig = ego_rig(scene)
     truth = EgoTruth()
     if rig is not None:
         truth = EgoTruth(rig.name, scene.rig_pose(rig.name).rounded(), rig_twist(scene, rig))
-    for annotator in of_frames:
-        truth = annotator.annotate_frame(scenes, assets, truth)
+    for annotator in annotators:
+        if isinstance(annotator, interfaces.FrameAnnotator):
+            truth = annotator.annotate_frame(scenes, assets, truth)
+        if isinstance(annotator, interfaces.CaptureAnnotator):
+            truth = annotator.annotate_capture(scenes, assets, capture, truth)
     return truth
 
 

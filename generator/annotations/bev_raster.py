@@ -48,12 +48,12 @@ def heights_m(grid: Grid, triangles_m: Array) -> Float32:
     """
     high = np.full((grid.count, grid.count), -np.inf, np.float32)
     corners = _near(grid, triangles_m)
-    row, first, last, owner = _spans(corners, grid.count)
+    row, first, last, owner = raster_spans(corners, (grid.count, grid.count))
     counts = last - first
     rows = np.repeat(row, counts)
     offsets = np.arange(len(rows)) - np.repeat(np.cumsum(counts) - counts, counts)
     columns = np.repeat(first, counts) + offsets
-    slope = _slopes(corners)[np.repeat(owner, counts)]
+    slope = plane_slopes(corners)[np.repeat(owner, counts)]
     origin = corners[np.repeat(owner, counts), 0]
     z = origin[:, 2] + slope[:, 0] * (rows + 0.5 - origin[:, 0])
     z += slope[:, 1] * (columns + 0.5 - origin[:, 1])
@@ -63,7 +63,7 @@ def heights_m(grid: Grid, triangles_m: Array) -> Float32:
 
 def covered_cells(grid: Grid, triangles_m: Array) -> NDArray[np.bool_]:
     """Whether a cell's centre is covered by a triangle of [n, 3, 3], world; [count, count]."""
-    row, first, last, _ = _spans(_near(grid, triangles_m), grid.count)
+    row, first, last, _ = raster_spans(_near(grid, triangles_m), (grid.count, grid.count))
     # Difference array along rows; one more column for spans that end after the last cell.
     steps = np.zeros((grid.count, grid.count + 1), np.int32)
     np.add.at(steps, (row, first), 1)
@@ -78,12 +78,17 @@ def _near(grid: Grid, triangles_m: Array) -> Array:
     return np.asarray(corners[((high > 0.0) & (low < grid.count)).all(axis=1)])
 
 
-def _spans(
-    corners: Array, count: int
+def raster_spans(
+    corners: Array, shape: tuple[int, int]
 ) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
-    """Spans of covered cells: row, first column, column after the last, index of the triangle."""
+    """Spans of cells whose centres are covered by triangles, as (row, column, height) [n, 3, 3].
+
+    Row, first column, column after the last, index of the triangle, each [m]; ``shape`` is the
+    number of rows and columns.
+    """
+    count_rows, count = shape
     top = np.maximum(np.ceil(corners[..., 0].min(axis=1) - 0.5), 0).astype(np.intp)
-    bottom = np.minimum(np.floor(corners[..., 0].max(axis=1) - 0.5), count - 1).astype(np.intp)
+    bottom = np.minimum(np.floor(corners[..., 0].max(axis=1) - 0.5), count_rows - 1).astype(np.intp)
     rows_of = np.maximum(bottom - top + 1, 0)
     owner = np.repeat(np.arange(len(corners)), rows_of)
     row = np.arange(len(owner)) - np.repeat(np.cumsum(rows_of) - rows_of, rows_of) + top[owner]
@@ -104,7 +109,7 @@ def _spans(
     return row[some], first[some], last[some], owner[some]
 
 
-def _slopes(corners: Array) -> Array:
+def plane_slopes(corners: Array) -> Array:
     """Slope of every triangle along rows and columns, per cell, [n, 2]; 0 for vertical ones."""
     u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     area = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]

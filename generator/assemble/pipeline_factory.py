@@ -199,7 +199,7 @@ def pipeline_config(
             thresholds=config.general.labels,
             assets=library,
         ),
-        frame_truth=partial(annotate_ego, annotators=annotators, assets=library),
+        frame_truth=lambda scenes, capture: annotate_ego(scenes, annotators, library, capture),
         split_shares=config.split_shares,
         split_assignment=config.general.splits.assign,
         layout_attempts_max=config.general.physics.layout_attempts_max,

@@ -34,6 +34,7 @@ from numpy.typing import NDArray
 from gen_data.core import asset_types, errors, measurement_dtypes, plates, se3, streams
 from gen_data.core.capture import (
     PNG,
+    Capture,
     Channel,
     ImageEncoding,
     LidarHits,
@@ -467,7 +468,34 @@ class FrameAnnotator(Protocol):
         ...
 
 
-AnyAnnotator = Annotator | ImageAnnotator | FrameAnnotator
+@runtime_checkable
+class CaptureAnnotator(Protocol):
+    """Annotates a sample as a whole from the readings of all its sensors, without randomness."""
+
+    @property
+    def channels(self) -> frozenset[Channel]:
+        """Channels that it requires."""
+        ...
+
+    def annotate_capture(
+        self,
+        scenes: Mapping[str, Scene],
+        assets: AssetLibrary,
+        capture: Capture,
+        truth: EgoTruth,
+    ) -> EgoTruth:
+        """The truth with this annotator's fields filled in.
+
+        Args:
+            scenes: As in ``FrameAnnotator``.
+            assets: Geometry.
+            capture: The sample's readings.
+            truth: Annotations so far.
+        """
+        ...
+
+
+AnyAnnotator = Annotator | ImageAnnotator | FrameAnnotator | CaptureAnnotator
 """An annotation plug-in has ``channels`` and the method of one of these Protocols, or of several.
 
 It fills in its own fields of the truth and leaves the rest as it is; it changes no argument.

@@ -276,6 +276,55 @@ class BirdseyeMap:
     layers: Mapping[str, NDArray[np.bool_]]
 
 
+VOXEL_STATES = ("free", "surface", "interior")
+"""What is at a voxel, by index."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Occupancy:
+    """Voxels around the ego: what is in them, and which sensors have observed them.
+
+    Attributes:
+        T_world_frame: Frame of the voxels' coordinates.
+        low_m: Lowest corner of the first voxel in that frame [m].
+        voxel_m: Side of a voxel.
+        state: Index in ``VOXEL_STATES``, uint8 [x, y, z]: along the axes of the frame.
+        instance_id: uint16 [x, y, z]; 0 = none.
+        surface: Index in ``asset_types.SURFACES``, uint8 [x, y, z]; 0 = any other, and none.
+        observed: By sensor, whether a ray of its reading has passed or ended there, bool [x, y, z].
+    """
+
+    T_world_frame: se3.SE3
+    low_m: se3.Vec3
+    voxel_m: float
+    state: NDArray[np.uint8]
+    instance_id: NDArray[np.uint16]
+    surface: NDArray[np.uint8]
+    observed: Mapping[str, NDArray[np.bool_]]
+
+    def centers_m(self, voxels: NDArray[np.integer]) -> se3.Array:
+        """Centres of voxels, numbers [n, 3], in the frame [m], [n, 3]."""
+        return np.asarray((voxels + 0.5) * self.voxel_m + self.low_m)
+
+    def velocities_m_s(self, instances: Iterable[Instance]) -> NDArray[np.float32]:
+        """Velocity of what is in each voxel, axes of the frame, [x, y, z, 3]; 0 = at rest or free.
+
+        That of rigid bodies at the voxels' centres: limbs of a person move with the person.
+        """
+        velocities = np.zeros((*self.state.shape, 3), np.float32)
+        T_frame_world = self.T_world_frame.inverse()
+        for instance in instances:
+            if instance.twist == STILL:
+                continue
+            voxels = np.argwhere(self.instance_id == instance.instance_id)
+            p_world = self.T_world_frame.apply(self.centers_m(voxels))
+            arm = p_world - instance.T_world_instance.translation_m
+            spin = np.cross(instance.twist.angular_velocity_rad_s, arm)
+            velocity = T_frame_world.rotate(spin + instance.twist.velocity_m_s)
+            velocities[tuple(voxels.T)] = velocity
+        return velocities
+
+
 @dataclass(frozen=True, slots=True)
 class Grasp:
     """A pose at which a parallel gripper can hold an instance.
@@ -323,6 +372,7 @@ class EgoTruth:
             laser scanner at the instant of its own sweep (boxes3d).
         borders: Of lanes, world (lanes).
         birdseye: The ground from above (bev_map).
+        occupancy: Voxels around the ego (occupancy).
         relations: Of annotated instances in space, whoever sees them, in order (relations).
         grasps: Of annotated loose instances, by instance and falling score (grasps).
         suctions: The same for suction cups (grasps).
@@ -335,6 +385,7 @@ class EgoTruth:
     boxes3d: Mapping[str, Mapping[int, boxes.OrientedBox]] | None = None
     borders: tuple[lane_geometry.LaneBorder, ...] | None = None
     birdseye: BirdseyeMap | None = None
+    occupancy: Occupancy | None = field(default=None, metadata={serialization.SPARSE: True})
     relations: tuple[Relation, ...] | None = None
     grasps: tuple[Grasp, ...] | None = None
     suctions: tuple[Suction, ...] | None = None

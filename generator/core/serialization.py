@@ -2,20 +2,24 @@
 
 Canonical JSON: sorted keys, shortest round-trip floats, no NaN, UTF-8 (in the spirit of RFC 8785).
 A binary mask becomes ``{"size": [height, width], "runs": [...]}``: lengths of its row-major runs,
-beginning with the unset pixels.
+beginning with the unset pixels. Any other array becomes ``{"dtype": "<u2", "shape": [...], "zlib":
+"..."}`` in base64; 8 values of a bool array share a byte, the first one in its highest bit.
 """
 
+import base64
 import dataclasses
 import json
 import math
 import operator
 import types
 import typing
+import zlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from enum import Enum
 from functools import cache, partial
 from typing import Any, TypeVar
 
+import deflate
 import numpy as np
 from numpy.typing import NDArray
 
@@ -42,6 +46,8 @@ def to_plain(value: Any) -> Any:
         return sorted(to_plain(item) for item in value)
     if isinstance(value, np.ndarray) and value.dtype == bool and value.ndim == 2:
         return {"size": list(value.shape), "runs": _encode_runs(value)}
+    if isinstance(value, np.ndarray):
+        return _encode_array(value)
     return value
 
 
@@ -130,7 +136,7 @@ def _builder(kind: Any) -> Callable[[Any], Any]:
     if origin is Mapping and arguments[0] in (str, int):
         return _mapping_builder(*arguments)
     if origin is np.ndarray:
-        return _decode_runs
+        return _decode_array
     if isinstance(kind, type) and issubclass(kind, Enum):
         return kind
     return float if kind is float else _itself
@@ -190,11 +196,29 @@ def _encode_runs(mask: NDArray[np.bool_]) -> list[int]:
     return [0, *runs] if flat.size and flat[0] else runs
 
 
-def _decode_runs(plain: Mapping[str, list[int]]) -> NDArray[np.bool_]:
-    """The mask of ``_encode_runs``, bool [height, width]."""
-    runs = plain["runs"]
-    values = np.arange(len(runs)) % 2 == 1
-    return np.repeat(values, runs).reshape(plain["size"])
+def _encode_array(array: NDArray[Any]) -> dict[str, Any]:
+    raw = np.packbits(array) if array.dtype == bool else array
+    little = raw.astype(raw.dtype.newbyteorder("<"), copy=False)
+    # zlib's output depends on its build, libdeflate's on its release, which data sets state.
+    packed = deflate.zlib_compress(little.tobytes(), 6)
+    return {
+        "dtype": "bool" if array.dtype == bool else little.dtype.str,
+        "shape": list(array.shape),
+        "zlib": base64.b64encode(packed).decode("ascii"),
+    }
+
+
+def _decode_array(plain: Mapping[str, Any]) -> NDArray[Any]:
+    """An array as ``to_plain`` writes it; masks are bool [height, width]."""
+    if "runs" in plain:
+        runs = plain["runs"]
+        values = np.arange(len(runs)) % 2 == 1
+        return np.asarray(np.repeat(values, runs).reshape(plain["size"]))
+    data = zlib.decompress(base64.b64decode(plain["zlib"]))
+    if plain["dtype"] != "bool":
+        return np.asarray(np.frombuffer(data, plain["dtype"]).reshape(plain["shape"]))
+    bits = np.unpackbits(np.frombuffer(data, np.uint8), count=math.prod(plain["shape"]))
+    return np.asarray(bits.reshape(plain["shape"]).astype(np.bool_))
 
 
 def _one_of(allowed: tuple[Any, ...], plain: Any) -> Any:

@@ -41,7 +41,8 @@ class PipelineConfig:
         channels: Channels that annotators need.
         image_truth: Annotates one reading.
         frame_truth: Annotates a sample as a whole, given the scene at the sample's instant by
-            ``""`` and at each laser scanner's by its name; None = no such annotations.
+            ``""`` and at each laser scanner's by its name, and the readings; None = no such
+            annotations.
         split_shares: ``{split: share}`` in order; shares sum to 1.
         split_assignment: How scenes are assigned to splits.
         layout_attempts_max: Largest number of attempts at one scene.
@@ -57,7 +58,7 @@ class PipelineConfig:
     layout_attempts_max: int
     exporters: Mapping[str, interfaces.Exporter]
     strides: Mapping[str, int] = field(default_factory=dict)
-    frame_truth: Callable[[Mapping[str, Scene]], EgoTruth | None] | None = None
+    frame_truth: Callable[[Mapping[str, Scene], Capture], EgoTruth | None] | None = None
     split_assignment: splits.Assignment = "random"
     located_errors: Callable[[], AbstractContextManager[None]] = nullcontext
 
@@ -195,7 +196,7 @@ class Pipeline:
             swept = {name: timeline.at(c.time_s) for name, c in capture.clouds.items()}
             seen = {name: timeline.at(r.time_s) for name, r in capture.readings.items()}
             described = self.config.frame_truth
-            frame = described({"": scene, **swept}) if described is not None else None
+            frame = described({"": scene, **swept}, capture) if described is not None else None
         return Sample(
             index=view.number * self.info.steps_per_scene + step_index,
             scene_index=streams.scene,

@@ -13,6 +13,7 @@ from gen_data.core import capture, errors, plugins, whole_files
 from gen_data.core.sample import Sample
 from gen_data.preview.overlay import Image, channel_image, draw_labels
 from gen_data.preview.sensor_views import range_view, top_view
+from gen_data.preview.voxel_view import oblique_view
 from gen_data.sensors.lidar import pseudo_lidar
 
 GAP_PX = 4
@@ -38,7 +39,7 @@ def make_tiles(
     views: Mapping[str, str] = MappingProxyType({}),
     width_px: int = 0,
 ) -> Iterator[Tile]:
-    """Yield one tile per sample, camera and channel, and two per scan.
+    """Yield one tile per sample, camera and channel, two per scan, and one of its occupancy.
 
     Args:
         samples: Samples to show.
@@ -69,6 +70,8 @@ def make_tiles(
             if name in views:
                 draw = plugins.loaded(views[name], f"view of '{name}'")
                 yield Tile(name, draw(table, sample.scene, aspect))
+        if sample.frame is not None and sample.frame.occupancy is not None:
+            yield Tile("occupancy", oblique_view(sample.frame.occupancy, sample.scene))
 
 
 def render_tiles(shown: Iterable[Tile], width_px: int, *, captions: bool) -> list[Image]:

@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from gen_data.core import asset_types, errors, interfaces, intrinsics, se3, skeletons, whole_files
 from gen_data.core.boxes import OrientedBox
 from gen_data.core.capture import Channel, PointCloud, SensorReading
-from gen_data.core.sample import ImageTruth, Sample
+from gen_data.core.sample import ImageTruth, Occupancy, Sample
 from gen_data.core.scene import Body, Instance, Scene
-from gen_data.preview import overlay, palette, sensor_views
+from gen_data.preview import overlay, palette, sensor_views, voxel_view
 
 TIMELINE = "sample"
 TIME = "time"
@@ -109,6 +109,8 @@ class Recorder:
         self._record_ways(sample)
         if sample.truth:
             self.stream.log("world/boxes", boxes_3d(sample))
+        if sample.frame is not None and sample.frame.occupancy is not None:
+            self._record_voxels(sample.frame.occupancy, sample.scene)
         for name, reading in sorted(sample.capture.readings.items()):
             self._set_time(sample, reading.time_s)
             self._record_image(name, reading, sample.truth[name])
@@ -147,6 +149,15 @@ class Recorder:
         } | {f"world/devices/{device.name}": device.T_world_device for device in scene.devices}
         for path, pose in frames.items():
             self.stream.log(path, transform(pose), rr.TransformAxes3D(AXES_M))
+
+    def _record_voxels(self, grid: Occupancy, scene: Scene) -> None:
+        """Log voxels with a surface as boxes that touch."""
+        centers_m, colors = voxel_view.surface_voxels(grid, scene)
+        self.stream.log("world/occupancy", transform(grid.T_world_frame))
+        half_m = np.full_like(centers_m, 0.5 * grid.voxel_m)
+        solid = rr.components.FillMode.Solid
+        voxels = rr.Boxes3D(centers=centers_m, half_sizes=half_m, colors=colors, fill_mode=solid)
+        self.stream.log("world/occupancy/voxels", voxels)
 
     def _record_ways(self, sample: Sample) -> None:
         sequence = sample.index // self.info.steps_per_scene

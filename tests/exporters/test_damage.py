@@ -17,7 +17,7 @@ import pytest
 from gen_data.core.boxes import BoxPx, OrientedBox
 from gen_data.core.capture import Channel, Measurements, PointCloud, SensorReading
 from gen_data.core.motion import JointTrajectory
-from gen_data.core.sample import BirdseyeMap, EgoTruth, Grasp, ObjectTruth, Utterance
+from gen_data.core.sample import BirdseyeMap, EgoTruth, Grasp, ObjectTruth, Occupancy, Utterance
 from gen_data.core.scene import Camera, Instance, Scene
 from gen_data.core.se3 import SE3
 from gen_data.exporters import TABLE
@@ -42,6 +42,7 @@ from tests.exporters import (
     test_mcap,
     test_motchallenge,
     test_nuscenes,
+    test_occupancy,
     test_rerun,
     test_rgbd_sequences,
     test_scans,
@@ -157,6 +158,7 @@ CHANGES: dict[str, tuple[Callable[[Any], Any], ...]] = {
     "surroundings": (everywhere(EgoTruth, boxes3d=everywhere(OrientedBox, size_m=narrow)),),
     "texts": (everywhere(Utterance, answer=lambda _: "many"),),
     "times": (everywhere(Scene, PointCloud, SensorReading, time_s=lambda t: 1.5 * t + 0.05),),
+    "voxels": (everywhere(Occupancy, instance_id=lambda a: np.roll(a, 1, axis=0)),),
 }
 """Changed facts."""
 
@@ -241,6 +243,11 @@ def reach(world: Any) -> tuple[Any, Any]:
     return drive_info(world), world.reach()
 
 
+def gridded(world: Any) -> tuple[Any, Any]:
+    """The drive with occupancy."""
+    return drive_info(world), test_occupancy.gridded(world)
+
+
 def slips(world: Any) -> tuple[Any, Any]:
     return drive_info(world), test_demonstrations.demonstrated(world)
 
@@ -313,6 +320,8 @@ ROWS = {
         test_nuscenes.test_poses_intrinsics_and_scans_are_those_of_the_sensors,
         test_nuscenes.test_boxes_count_the_pulses_that_hit_and_points_are_labelled,
         test_nuscenes.test_boxes_are_in_the_global_frame_with_width_first, key_frame_s=0.1),
+    "occupancy": row(gridded, "voxels, categories",
+        lambda m: test_occupancy.problems(m.folder, m.samples)),
     "pointclouds": row(scans, "point ids, points, solids",
         test_scans.test_a_ply_file_is_what_its_header_says_and_points_in_boxes),
     "rerun": row(street, "boxes, cameras, categories, centres, solids",

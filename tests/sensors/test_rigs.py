@@ -129,7 +129,7 @@ def sampled(
         annotated[reading.sensor] = scene.time_s
         return ImageTruth(reading.camera, ())
 
-    def frame_truth(scenes: Any) -> EgoTruth:
+    def frame_truth(scenes: Any, capture: Any) -> EgoTruth:
         swept.update({name: scene.time_s for name, scene in scenes.items()})
         return EgoTruth()
 

@@ -1,0 +1,177 @@
+"""Occupancy: what is in the voxels of a box around the ego, and what its sensors observe of it.
+
+Voxels come from the geometry, not from points of a scanner: hidden ones are known, and moving
+objects leave no trails. Readings tell only which voxels a sensor has observed.
+"""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from gen_data.annotations.voxel_bodies import BodyVoxels, find_body_voxels
+from gen_data.annotations.voxel_box import VoxelBox
+from gen_data.annotations.voxel_views import seen_by_camera, seen_by_scanner
+from gen_data.config.base_model import Strict
+from gen_data.core import capture, errors, interfaces
+from gen_data.core.sample import VOXEL_STATES, EgoTruth, Occupancy
+from gen_data.core.scene import Body, Scene
+from gen_data.core.scene_time import ego_rig
+from gen_data.core.se3 import IDENTITY, SE3, Vec3
+
+VOXELS_MAX = 1 << 26
+"""2^26 voxels take 0.8 GB in a worker, with the masks of three sensors."""
+BYTES_PER_VOXEL = 12
+WORLD = "world"
+SURFACE, INTERIOR = VOXEL_STATES.index("surface"), VOXEL_STATES.index("interior")
+
+
+class VoxelOccupancy(Strict):
+    """Voxels of a box around the ego: state, instance, surface, and which sensors observe them.
+
+    A voxel is ``surface`` if it contains a sample of an object's surface, else ``interior`` if it
+    is within an object, as in a wall or in a closed car, or below the ground, else ``free``.
+    Where several objects share a voxel, instances win over the unlabelled background, and smaller
+    ones over larger ones. The object that carries the ego's rig is left out, unless the frame is
+    the world. Cut-outs of textures count as surface.
+
+    A camera observes a voxel if a pixel shows a surface in it, or if the pixel at its centre shows
+    something behind it. A scanner observes the voxels that the lines to its returns pass and end
+    in. Air that no return came from is not observed.
+
+    Attributes:
+        size_m: Of the box, along the axes of the frame.
+        voxel_m: Side of a voxel.
+        from_m: Lowest corner of the box in its frame; null = the box is centred on the frame's
+            origin along X and Y, and begins 1 m below it.
+        frame: Name of the scanner whose frame it is, or ``world``; empty = the ego's rig, or the
+            world in scenes without one.
+    """
+
+    channels: ClassVar[frozenset[capture.Channel]] = frozenset({capture.Channel.RANGE})
+    type: Literal["occupancy"] = "occupancy"
+    size_m: Vec3 = (80.0, 80.0, 6.4)
+    voxel_m: float = Field(0.4, ge=0.001, le=10)
+    from_m: Vec3 | None = None
+    frame: str = ""
+
+    @model_validator(mode="after")
+    def _check(self) -> "VoxelOccupancy":
+        if min(self.size_m) < self.voxel_m:
+            raise ValueError(f"size_m: {list(self.size_m)} m is less than a voxel along an axis")
+        for side_m in self.size_m:
+            count = side_m / self.voxel_m
+            if abs(count - round(count)) > 1e-6 * count:
+                raise ValueError(
+                    f"size_m: {side_m:g} m is no multiple of voxel_m, {self.voxel_m:g} m"
+                )
+        total = math.prod(self.shape)
+        if total > VOXELS_MAX:
+            raise ValueError(
+                f"size_m: {total:,} voxels need {total * BYTES_PER_VOXEL / 1e9:.1f} GB in every"
+                f" worker; at most {VOXELS_MAX:,} are possible: raise voxel_m or lower size_m"
+            )
+        return self
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Voxels along X, Y and Z."""
+        nx, ny, nz = (round(side_m / self.voxel_m) for side_m in self.size_m)
+        return nx, ny, nz
+
+    def annotate_capture(
+        self,
+        scenes: Mapping[str, Scene],
+        assets: interfaces.AssetLibrary,
+        capture: capture.Capture,
+        truth: EgoTruth,
+    ) -> EgoTruth:
+        """Fill in ``occupancy``.
+
+        Raises:
+            ConfigError: the scene has no scanner of the name ``frame``.
+        """
+        scene = scenes[""]
+        box = VoxelBox(self._pose(scene), self._low_m(), self.voxel_m, self.shape)
+        rig = ego_rig(scene)
+        carried = rig is not None and rig.body and self.frame != WORLD
+        own = scene.body(rig.body).instance_id if rig is not None and carried else 0
+        state, owner, surface = _fill(box, scene, assets, own)
+        readings, clouds = capture.readings, capture.clouds
+        observed = {name: seen_by_camera(box, scene, readings[name]) for name in sorted(readings)}
+        for name in sorted(clouds):
+            observed[name] = seen_by_scanner(box, scenes.get(name, scene), clouds[name])
+        return replace(
+            truth,
+            occupancy=Occupancy(
+                box.T_world_frame, box.low_m, self.voxel_m, state, owner, surface, observed
+            ),
+        )
+
+    def _low_m(self) -> Vec3:
+        x, y, _ = self.size_m
+        return self.from_m or (-0.5 * x, -0.5 * y, -1.0)
+
+    def _pose(self, scene: Scene) -> SE3:
+        if self.frame == WORLD:
+            return IDENTITY
+        if self.frame:
+            for lidar in scene.lidars:
+                if lidar.name == self.frame:
+                    return lidar.T_world_lidar
+            known = ", ".join([WORLD, *sorted(lidar.name for lidar in scene.lidars)])
+            raise errors.ConfigError(
+                f"annotation 'occupancy': frame: there is no scanner '{self.frame}';"
+                f" expected one of: {known}"
+            )
+        rig = ego_rig(scene)
+        return scene.rig_pose(rig.name).rounded() if rig is not None else IDENTITY
+
+
+def _fill(
+    box: VoxelBox, scene: Scene, assets: interfaces.AssetLibrary, own: int
+) -> tuple[NDArray[np.uint8], NDArray[np.uint16], NDArray[np.uint8]]:
+    """State, instance and surface of all voxels."""
+    state, surface = (np.zeros(math.prod(box.shape), np.uint8) for _ in range(2))
+    owner = np.zeros(math.prod(box.shape), np.uint16)
+    T_frame_world = box.T_world_frame.inverse()
+    found = [
+        (body.instance_id, voxels)
+        for body in _by_rank(scene, own)
+        if (voxels := find_body_voxels(body, T_frame_world @ body.T_world_body, box, assets))
+    ]
+    # Later ones overwrite earlier ones: interiors first, then what matters most last.
+    state[_below_ground(box, [v for number, v in found if number == 0])] = INTERIOR
+    for number, voxels in found:
+        state[voxels.inside], owner[voxels.inside] = INTERIOR, number
+    for number, voxels in found:
+        state[voxels.surface], owner[voxels.surface] = SURFACE, number
+        surface[voxels.surface] = voxels.kinds
+    surface[state == INTERIOR] = 0
+    return state.reshape(box.shape), owner.reshape(box.shape), surface.reshape(box.shape)
+
+
+def _by_rank(scene: Scene, own: int) -> Iterator[Body]:
+    """Bodies without the carrier's; background first, then instances by falling volume."""
+    volumes = {i.instance_id: math.prod(i.box3d.size_m) for i in scene.instances}
+    numbers = sorted(volumes, key=lambda k: (-volumes[k], k))
+    ranks = {number: rank for rank, number in enumerate(numbers)}
+    kept = (b for b in scene.bodies if not own or b.instance_id != own)
+    return iter(sorted(kept, key=lambda body: ranks.get(body.instance_id, -1)))
+
+
+def _below_ground(box: VoxelBox, background: Sequence[BodyVoxels]) -> NDArray[np.bool_]:
+    """Voxels below the lowest one of sheets such as streets and fields, bool [x * y * z]."""
+    nz = box.shape[2]
+    lowest = np.zeros(math.prod(box.shape) // nz, np.intp)
+    ground = [voxels.surface for voxels in background if voxels.is_sheet]
+    if ground:
+        column, level = np.divmod(np.concatenate(ground), nz)
+        lowest[:] = nz
+        np.minimum.at(lowest, column, level)
+        lowest[lowest == nz] = 0
+    return np.asarray((np.arange(nz) < lowest[:, None]).reshape(-1))

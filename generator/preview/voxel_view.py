@@ -1,0 +1,83 @@
+"""Views of occupancy: voxels with a surface, coloured by category, else by surface."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gen_data.core import asset_types, se3
+from gen_data.core.sample import VOXEL_STATES, Occupancy
+from gen_data.core.scene import Scene
+from gen_data.preview.overlay import Image
+from gen_data.preview.palette import id_color
+from gen_data.preview.sensor_views import COLORS, UNLABELLED, empty_view
+
+DOWN, AROUND = np.radians(40.0), np.radians(-70.0)
+"""Pitch of the view, and its direction over the ground, from X: from behind, from the left."""
+FACES = ((2, 1.0), (0, 0.78), (1, 0.6))
+"""Axes of the visible faces of a voxel, and their shades."""
+ASPECT = 1.6
+"""Width over height."""
+UNSEEN = 0.35
+"""Brightness of voxels that no sensor observes."""
+
+
+def voxel_colors(grid: Occupancy, scene: Scene) -> NDArray[np.uint8]:
+    """SRGB colour of every voxel, uint8 [x, y, z, 3]."""
+    top = max((i.instance_id for i in scene.instances), default=0)
+    of_instance = np.zeros((top + 1, 3), np.uint8)
+    for instance in scene.instances:
+        of_instance[instance.instance_id] = id_color(instance.category_id)
+    of_surface = [COLORS.get(name, UNLABELLED) for name in asset_types.SURFACES]
+    colors: NDArray[np.uint8] = np.array(of_surface, np.uint8)[grid.surface]
+    labelled = (grid.instance_id > 0) & (of_instance[grid.instance_id].any(axis=-1))
+    colors[labelled] = of_instance[grid.instance_id[labelled]]
+    return colors
+
+
+def surface_voxels(grid: Occupancy, scene: Scene) -> tuple[se3.Array, NDArray[np.uint8]]:
+    """Centres in the frame [m], [n, 3], and colours, uint8 [n, 3], of voxels with a surface."""
+    shown = grid.state == VOXEL_STATES.index("surface")
+    return grid.centers_m(np.argwhere(shown)), voxel_colors(grid, scene)[shown]
+
+
+def oblique_view(grid: Occupancy, scene: Scene) -> Image:
+    """Draw voxels with a surface from behind and above, uint8 [h, w, 3]; unobserved ones dark."""
+    image = empty_view(ASPECT)
+    height, width = image.shape[:2]
+    centers, colors = surface_voxels(grid, scene)
+    if not len(centers):
+        return image
+    shown = grid.state == VOXEL_STATES.index("surface")
+    # Without a sensor, none is dark.
+    masks = [mask[shown] for mask in grid.observed.values()]
+    seen = np.logical_or.reduce(masks) if masks else np.ones(len(centers), np.bool_)
+    shade = np.where(seen, 1.0, UNSEEN)[:, None]
+    c, s = np.cos(AROUND), np.sin(AROUND)
+    right = np.array([-s, c, 0.0]) * -1.0
+    up = np.array([-c * np.sin(DOWN), -s * np.sin(DOWN), np.cos(DOWN)]) * np.array([-1, -1, 1])
+    near = np.cross(right, up)
+    scale = 0.97 * min(width / np.ptp(centers @ right), height / np.ptp(centers @ up))
+    steps = int(np.ceil(scale * grid.voxel_m)) + 1
+    across = (np.arange(steps) + 0.5) / steps - 0.5
+    parts = []
+    for axis, brightness in FACES:
+        one, other = np.eye(3)[(axis + 1) % 3], np.eye(3)[(axis + 2) % 3]
+        out = np.sign(near[axis]) * 0.5 * np.eye(3)[axis]
+        places = out + across[:, None, None] * one + across[:, None] * other
+        parts.append((places.reshape(-1, 3) * grid.voxel_m, brightness))
+    middle = 0.5 * (centers.max(axis=0) + centers.min(axis=0))
+    depth = np.full((height, width), -np.inf)
+    for places, brightness in parts:
+        ink = (brightness * shade * colors).astype(np.uint8)
+        for place in places:
+            p = centers + place - middle
+            column = np.floor(0.5 * width + scale * (p @ right)).astype(np.intp)
+            row = np.floor(0.5 * height - scale * (p @ up)).astype(np.intp)
+            away = p @ near
+            inside = (column >= 0) & (column < width) & (row >= 0) & (row < height)
+            order = np.flatnonzero(inside)[np.argsort(away[inside], kind="stable")]
+            u, v, z = column[order], row[order], away[order]
+            nearest = z >= depth[v, u]
+            u, v, z, order = u[nearest], v[nearest], z[nearest], order[nearest]
+            depth[v, u] = z
+            image[v, u] = ink[order]
+    return image
