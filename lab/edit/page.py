@@ -24,11 +24,12 @@ from gen_data.lab.edit.browse_page import BrowsePage
 from gen_data.lab.edit.data_sets import is_data_set
 from gen_data.lab.edit.document import find_item
 from gen_data.lab.edit.files import read_file
+from gen_data.lab.edit.own_files_panel import OwnFilesPanel
 from gen_data.lab.edit.panels import (
     ControlsPanel,
-    OwnFilesPanel,
     ResolvedPanel,
     StatisticsPanel,
+    home_link,
     show_full,
 )
 from gen_data.lab.edit.samples import Shown
@@ -91,8 +92,9 @@ def _plain_proposal(one: completion.Proposal) -> dict[str, str]:
 def build(desk: Desk) -> None:
     """Build the page of one tab: an editor, a data set, or the start page."""
     ui.add_head_html('<link rel="stylesheet" href="/edit/editor.css">')
-    asked = context.client.request.query_params.get("open", "")
-    source = Path(asked) if asked else desk.source
+    query = context.client.request.query_params
+    asked = query.get("open", "")
+    source = Path(asked) if asked else None if "start" in query else desk.source
     if asked and not _may_open(desk, source):
         ui.label(f"{asked} is outside of the folders of this page, or no shipped configuration")
         return
@@ -162,6 +164,7 @@ class EditorTab:
         ui.timer(0.0, self._begin, once=True)
 
     def _build_bar(self) -> None:
+        home_link()
         self._title = ui.label(self.session.file.path.name).classes("gd-title")
         self._state = ui.label("").props('role="status"')
         ui.button("Save", on_click=self._save).props("dense no-caps unelevated")
