@@ -9,7 +9,7 @@ from __future__ import annotations
 import shutil
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from pathlib import Path, PurePath
+from pathlib import Path, PurePath, PurePosixPath
 from typing import TYPE_CHECKING, Any
 
 import cv2
@@ -84,6 +84,12 @@ class CheckFile:
             if is_photograph(name):
                 return check_photograph(folder, name, self.standpoint)
             return check_mesh(folder, name, dict(self.entry))
+
+
+def plain_name(given: str) -> str:
+    """Name of a file without the folders that a browser, or a stranger, puts before it."""
+    name = PurePosixPath(given.replace("\\", "/")).name
+    return "" if name.startswith(".") or not name.isprintable() else name
 
 
 def is_photograph(name: str) -> bool:

@@ -6,7 +6,7 @@ import asyncio
 import tempfile
 from dataclasses import replace
 from functools import partial
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from nicegui import ui
@@ -44,11 +44,13 @@ class OwnFilesPanel:
             auto_upload=True,
             multiple=True,
             label="meshes and photographs",
-        ).style("width: 100%").props('flat bordered no-thumbnails aria-label="Meshes and photographs"')
+        ).style("width: 100%").props(
+            'flat bordered no-thumbnails aria-label="Meshes and photographs"'
+        )
         self._body = ui.element("div")
 
     async def _take(self, event: Any) -> None:
-        name = plain_name(event.file.name)
+        name = own_files.plain_name(event.file.name)
         if not name:
             ui.notify("the file has no name that could be kept", type="negative")
             return
@@ -58,12 +60,6 @@ class OwnFilesPanel:
         event.sender.reset()  # Its own list of files says nothing that the card does not.
         with self._body:
             OwnFile(self._tab, folder / name)
-
-
-def plain_name(given: str) -> str:
-    """Name of a file without the folders that a browser, or a stranger, puts before it."""
-    name = PurePosixPath(given.replace("\\", "/")).name
-    return "" if name.startswith(".") or not name.isprintable() else name
 
 
 class OwnFile:

@@ -284,7 +284,7 @@ class OpenedText:
         return Taken(read, self._plain_draws(), factor)
 
     def _with_small_camera(self, scene: Scene, name: str, width_px: int) -> tuple[Scene, float]:
-        """The scene with a camera of at most ``width_px`` columns (0 = its own), and their share."""
+        """The scene with at most ``width_px`` columns of a camera (0 = its own); their share."""
         camera = next((one for one in scene.cameras if one.name == name), None)
         if camera is None or not 0 < width_px < camera.intrinsics.width_px:
             return scene, 1.0
