@@ -100,9 +100,11 @@ class BrowsePage:
                 on_change=lambda e: self._filter("least", int(e.value or 0)),
             ).props('dense data-filter="least"').style("width: 110px")  # fmt: skip
             ui.select(
-                KINDS, value=self.view.kind,
+                KINDS,
+                value=self.view.kind,
+                label="picture",
                 on_change=lambda e: self._look(replace(self.view, kind=e.value)),
-            ).props('dense options-dense aria-label="Picture"')  # fmt: skip
+            ).props("dense options-dense").style("min-width: 110px")
             for layer, name in LAYERS.items():
                 ui.checkbox(
                     name, value=layer in self.view.layers, on_change=partial(self._layer, layer)

@@ -219,8 +219,9 @@ def keep_file(folder: Path, path: Path, checked: Checked) -> None:
 def add_to_scene(text: str, config: Config | None, checked: Checked) -> str:
     """The text of a configuration with a checked file in its scene.
 
-    A mesh becomes a group of objects on the first surface. A photograph stands behind the scene,
-    and begins one in an empty text; as a texture, it covers the walls.
+    A mesh becomes a group of objects on the first surface, of which scenes draw one to three. A
+    photograph stands behind the scene, and begins one in an empty text; as a texture, it covers
+    the walls.
 
     Args:
         text: Of the editor.
@@ -260,10 +261,13 @@ def add_to_scene(text: str, config: Config | None, checked: Checked) -> str:
         "assets": {"ids": [asset_id]},
         "placement": "scatter" if surface in _named(config, "elements", ("plate",)) else "drop",
     }
-    listed = _own_list(text)
-    if listed:
-        return text_edits.append_item(text, "elements", {"name": f"own_{name}", **group})
-    return text_edits.set_value(text, ("elements", f"own_{name}"), group)
+    if _own_list(text):
+        text = text_edits.append_item(text, "elements", {"name": f"own_{name}", **group})
+    else:
+        text = text_edits.set_value(text, ("elements", f"own_{name}"), group)
+    # Without a randomizer, it would lie in one place in every scene.
+    drawn = {"type": "objects", "name": f"own_{name}", "count": {"uniform_integer": [1, 3]}}
+    return text_edits.append_item(text, "randomizers", drawn)
 
 
 def _own_list(text: str) -> bool:

@@ -45,7 +45,7 @@ class OwnFilesPanel:
             multiple=True,
             label="meshes and photographs",
         ).style("width: 100%").props(
-            'flat bordered no-thumbnails aria-label="Meshes and photographs"'
+            'flat bordered no-thumbnails color=grey-9 aria-label="Meshes and photographs"'
         )
         self._body = ui.element("div")
 
@@ -114,7 +114,7 @@ class OwnFile:
             elif self._found is not None:
                 self._build_axes(self._found.entry)
             with ui.element("div").classes("gd-row"):
-                ui.button("Add to the scene", on_click=self._add).props("dense no-caps")
+                ui.button("Add to the scene", on_click=self._add).props("dense no-caps outline")
                 if own_files.is_photograph(self._path.name):
                     ui.button(
                         "Cover the walls with it", on_click=partial(self._add, walls=True)
@@ -153,7 +153,7 @@ class OwnFile:
             ("down", "ground from top to bottom [%]", now.down),
         ):
             ui.label(label)
-            ends = dict(zip(("min", "max"), (round(100 * one) for one in share), strict=True))
+            ends = dict(zip(("min", "max"), (100.0 * one for one in share), strict=True))
             ui.range(
                 min=0,
                 max=100,

@@ -167,7 +167,7 @@ class EditorTab:
         home_link()
         self._title = ui.label(self.session.file.path.name).classes("gd-title")
         self._state = ui.label("").props('role="status"')
-        ui.button("Save", on_click=self._save).props("dense no-caps unelevated")
+        ui.button("Save", on_click=self._save).props("dense no-caps outline")
         ui.button("Save as", on_click=self._save_as).props("dense no-caps flat")
         dark = ui.dark_mode()
         ui.button(icon="contrast", on_click=dark.toggle).props(
@@ -177,9 +177,9 @@ class EditorTab:
     def _build_view_bar(self) -> None:
         grid = self.session.grid
         with ui.element("div").classes("gd-row"):
-            ui.select(VIEWS, value=grid.view.kind, on_change=self._set_kind).props(
-                'dense options-dense aria-label="Picture"'
-            )
+            ui.select(VIEWS, value=grid.view.kind, label="picture", on_change=self._set_kind).props(
+                "dense options-dense"
+            ).style("min-width: 110px")
             for layer, name in LAYER_NAMES.items():
                 ui.checkbox(
                     name, value=layer in grid.view.layers, on_change=partial(self._set_layer, layer)
@@ -374,7 +374,7 @@ class EditorTab:
             with ui.element("div").classes("gd-row"):
                 ui.button("Reload the file", on_click=self._reload).props("no-caps flat")
                 ui.button("Overwrite", on_click=partial(self._save, overwrite=True)).props(
-                    "no-caps"
+                    "no-caps outline"
                 )
 
     def _reload(self) -> None:
@@ -397,7 +397,7 @@ class EditorTab:
                 self._title.text = self.session.file.path.name
                 self._state.text = self._saved_words()
 
-            ui.button("Save", on_click=save).props("no-caps")
+            ui.button("Save", on_click=save).props("no-caps outline")
 
     def _leave(self) -> None:
         TABS.pop(self.key, None)

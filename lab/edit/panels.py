@@ -174,8 +174,7 @@ class ControlsPanel:
                 slider = ui.slider(
                     min=control.low, max=control.high, step=control.step, value=value
                 ).props(f"label dense {named}")
-                number = ui.number(value=value, step=control.step).props("dense").bind_value(slider)
-                del number
+                ui.number(value=value, step=control.step).props(f"dense {named}").bind_value(slider)
                 slider.on(
                     "update:model-value",
                     lambda e: change(e.args),

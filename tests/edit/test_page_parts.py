@@ -288,6 +288,10 @@ def test_folders_follow_links(tmp_path: Path) -> None:
     assert not folders.contains(inside / "link.yaml")
     assert not folders.contains(inside / "up/out.yaml")
     assert not folders.contains(inside / "../out.yaml")
+    for named in ("link.yaml", "up/out.yaml", str(tmp_path / "out.yaml")):
+        with pytest.raises(ConfigError, match="outside of the folders of this page"):
+            folders.refuse_outside(f"extends: {named}\n", str(inside / "a.yaml"))
+    folders.refuse_outside("extends: tabletop.yaml\n", str(inside / "a.yaml"))
     session = Session(OpenedFile(inside / "a.yaml", None), folders, "seed: 2\n")
     with pytest.raises(StorageError, match="outside"):
         session.save_as(inside / "link.yaml", overwrite=True)
