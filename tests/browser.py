@@ -24,6 +24,13 @@ class Opened:
     messages: list[str] = field(default_factory=list)
     requests: list[str] = field(default_factory=list)
 
+    def watch(self, page: Page) -> Page:
+        """Keep messages and requests of a page, too."""
+        page.on("console", lambda message: self.messages.append(message.text))
+        page.on("pageerror", lambda error: self.messages.append(str(error)))
+        page.on("request", lambda request: self.requests.append(request.url))
+        return page
+
 
 @contextmanager
 def open_browser(width: int = 1280, height: int = 900) -> Iterator[Opened]:
@@ -35,9 +42,8 @@ def open_browser(width: int = 1280, height: int = 900) -> Iterator[Opened]:
     flags = ["--no-sandbox", "--disable-gpu", "--disable-background-networking"]
     with playwright.sync_playwright() as driver:
         browser = driver.chromium.launch(executable_path=program, args=flags)
-        opened = Opened(browser.new_page(viewport={"width": width, "height": height}))
-        opened.page.on("console", lambda message: opened.messages.append(message.text))
-        opened.page.on("pageerror", lambda error: opened.messages.append(str(error)))
-        opened.page.on("request", lambda request: opened.requests.append(request.url))
+        context = browser.new_context(viewport={"width": width, "height": height})
+        opened = Opened(context.new_page())
+        opened.watch(opened.page)
         yield opened
         browser.close()

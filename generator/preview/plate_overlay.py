@@ -11,6 +11,8 @@ from gen_data.preview.overlay import Image
 _HORIZON, _CORNERS, _GRID, _LANE = (255, 60, 60), (255, 220, 0), (0, 220, 255), (120, 255, 80)
 _LINES_MAX = 60
 """Lines of the grid along each axis; larger grounds get a grid of several metres."""
+_SMALL_M, _FINE_M = 4.0, 0.1
+"""Longest edge of grounds with a grid finer than a metre, as on the top of a table; its step."""
 _POINTS = 40
 _SHIFT = 4
 """Fractional bits of drawn coordinates."""
@@ -31,10 +33,11 @@ def plate_overlay(plate: plates.Plate, rgb: asset_types.UInt8) -> Image:
 
 
 def _grid_lines(plate: plates.Plate) -> list[se3.Array]:
-    """Image points of lines 1 m (or more) apart on the ground, around its corners."""
+    """Image points of lines on the ground, around its corners: 0.1 m, 1 m or more apart."""
     corners = plates.ground_points(plate, np.array(plate.ground_px))
     low, high = corners.min(axis=0), corners.max(axis=0)
-    step = max(1, math.ceil(float((high - low).max()) / _LINES_MAX))
+    extent = float((high - low).max())
+    step = _FINE_M if extent < _SMALL_M else max(1, math.ceil(extent / _LINES_MAX))
     lines = []
     for axis in (0, 1):
         first, end = math.floor(low[axis] / step), math.ceil(high[axis] / step)

@@ -14,7 +14,7 @@ from nicegui import context, ui
 from gen_data.core.errors import GenDataError
 from gen_data.lab.edit import data_sets, statistics
 from gen_data.lab.edit.overlays import View
-from gen_data.lab.edit.panels import table
+from gen_data.lab.edit.panels import home_link, table
 from gen_data.lab.edit.samples import Shown
 
 if TYPE_CHECKING:
@@ -41,6 +41,7 @@ class BrowsePage:
         """Make all widgets, and begin."""
         context.client.on_delete(partial(self.desk.forget, self.key))
         with ui.element("header").classes("gd-bar"):
+            home_link()
             ui.label(str(self.folders[0])).classes("gd-title")
             others = [
                 p for p in data_sets.find_data_sets(self.desk.folders.roots) if p != self.folders[0]
@@ -99,9 +100,11 @@ class BrowsePage:
                 on_change=lambda e: self._filter("least", int(e.value or 0)),
             ).props('dense data-filter="least"').style("width: 110px")  # fmt: skip
             ui.select(
-                KINDS, value=self.view.kind,
+                KINDS,
+                value=self.view.kind,
+                label="picture",
                 on_change=lambda e: self._look(replace(self.view, kind=e.value)),
-            ).props('dense options-dense aria-label="Picture"')  # fmt: skip
+            ).props("dense options-dense").style("min-width: 110px")
             for layer, name in LAYERS.items():
                 ui.checkbox(
                     name, value=layer in self.view.layers, on_change=partial(self._layer, layer)

@@ -286,5 +286,7 @@ def three_values(
         values = (control.low, 0.5 * (control.low + control.high), control.high)
     else:
         values = (0.5 * value, value, 2.0 * value)
-    low, middle, high = (control.yaml(min(max(one, control.low), control.high)) for one in values)
+    is_whole = isinstance(control.value, int) and control.step >= 1
+    limited = (min(max(one, control.low), control.high) for one in values)
+    low, middle, high = (control.yaml(round(one) if is_whole else one) for one in limited)
     return low, middle, high

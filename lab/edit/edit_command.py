@@ -36,7 +36,7 @@ gen-data edit out/tabletop
     help="A further folder that the page may read and write [default: that of CONFIG].",
 )
 @click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen on.")
-@click.option("--port", type=int, default=0, help="Port [default: a free one].")
+@click.option("--port", type=int, default=0, help="Port [default: one of the file, if free].")
 @click.option("--workers", "-w", type=int, help="Processes that render [default: one per core].")
 @click.option("--browser/--no-browser", default=True, help="Open the page in the browser.")
 def edit(

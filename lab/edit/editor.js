@@ -94,10 +94,21 @@ function keepDraft(key) {
   });
 }
 
+// The colours of CodeMirror's own style, mixed with white in the dark by editor.css: the themes of
+// the package have less contrast than WCAG asks for.
+const colors = CM.HighlightStyle.define(
+  CM.defaultHighlightStyle.specs.map((spec) =>
+    spec.color ? { ...spec, color: `color-mix(in srgb, ${spec.color} var(--gd-own), white)` } : spec,
+  ),
+);
+
 window.genDataEdit = {
   async attach(id, tab, key) {
     const editor = await getElement(id).editorPromise;
     const source = completions(tab);
+    editor.dispatch({
+      effects: getElement(id).themeConfig.reconfigure(CM.syntaxHighlighting(colors)),
+    });
     editor.dispatch({
       effects: CM.StateEffect.appendConfig.of([
         CM.EditorState.languageData.of(() => [{ autocomplete: source }]),

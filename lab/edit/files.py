@@ -60,7 +60,8 @@ def _references(tree: Node, folder: Path) -> Iterator[tuple[Position, Path]]:
     for child in tree.children.values():
         yield from _references(child, folder)
     text = tree.content
-    if isinstance(text, str) and (text in ("..", "~") or "/" in text or "\\" in text):
+    # Not only texts with slashes: a link next to the file may lead anywhere.
+    if isinstance(text, str) and text:
         try:
             path = folder / Path(text).expanduser()
             if path.exists():

@@ -1,22 +1,27 @@
 """Meshes and photographs that are dropped into the page: checked, kept, and put into the scene.
 
-A mesh becomes an object with a class of its name; a photograph becomes a texture, which the walls
-of a room can show. Both are copied to ``assets/`` next to the configuration.
+A mesh becomes an object with a class of its name; a photograph becomes the background of the scene,
+or the walls of its room. Both are copied to ``assets/`` next to the configuration.
 """
 
 from __future__ import annotations
 
 import shutil
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from pathlib import Path, PurePath
+from pathlib import Path, PurePath, PurePosixPath
 from typing import TYPE_CHECKING, Any
+
+import cv2
+import numpy as np
 
 from gen_data.config.merging import node_name
 from gen_data.core.errors import AssetError, ConfigError
 from gen_data.core.temporary_folders import temporary_folder
 from gen_data.core.whole_files import write_whole
-from gen_data.lab.edit import text_edits
+from gen_data.lab.edit import photographs, text_edits
 from gen_data.lab.edit.files import read_file
+from gen_data.lab.edit.photographs import Standpoint
 
 if TYPE_CHECKING:
     from gen_data.assemble.config import Config
@@ -29,6 +34,8 @@ ASSETS = "assets"
 PHOTOS = frozenset({".jpg", ".jpeg", ".png", ".webp"})
 SIZE_MAX_BYTES = 200_000_000
 """Larger files are copied to the folder by hand: a browser reads them into memory."""
+PICTURE_PX = 480
+"""Longest edge of the picture of a checked file."""
 PERSON, MUG = "simple_person?seed=0", "mug?seed=0"
 PERSON_FROM_M = 0.4
 """Longest edge from which a person stands next to an object, not only a mug."""
@@ -41,13 +48,18 @@ class Checked:
     Attributes:
         entry: Its entry in the index, in the section.
         finding: Size, unit, axis and doubts.
-        jpeg: Picture with a mug, and for large objects a person, for scale; empty without one.
+        jpeg: Picture: of a mesh with a mug, and for large objects a person, for scale; of a
+            photograph with its horizon and a grid on its ground.
+        size_px: Width and height of a photograph; None for a mesh.
+        standpoint: That the entry of a photograph follows from.
     """
 
     section: str
     entry: dict[str, Any]
     finding: Finding
     jpeg: bytes
+    size_px: tuple[int, int] | None = None
+    standpoint: Standpoint = photographs.UNKNOWN
 
 
 @dataclass(frozen=True)
@@ -55,49 +67,92 @@ class CheckFile:
     """Check of one file in a process of its own limits.
 
     Attributes:
-        entry: Entry of the index without the file, such as ``{unit: mm, up: y}``.
+        entry: Entry of a mesh in the index without the file, such as ``{unit: mm, up: y}``.
+        standpoint: Of a photograph.
     """
 
     path: Path
     entry: tuple[tuple[str, Any], ...] = ()
+    standpoint: Standpoint = photographs.UNKNOWN
 
     def run(self, studio: Studio) -> Checked:
         """Import the file as a run would, in a folder of its own."""
         del studio
         with temporary_folder("edit") as folder:
             shutil.copyfile(self.path, folder / self.path.name)
-            return check_file(folder, self.path.name, dict(self.entry))
+            name = self.path.name
+            if is_photograph(name):
+                return check_photograph(folder, name, self.standpoint)
+            return check_mesh(folder, name, dict(self.entry))
 
 
-def check_file(folder: Path, name: str, changes: dict[str, Any]) -> Checked:
-    """Check a file in a folder without an index, which is written.
+def plain_name(given: str) -> str:
+    """Name of a file without the folders that a browser, or a stranger, puts before it."""
+    name = PurePosixPath(given.replace("\\", "/")).name
+    return "" if name.startswith(".") or not name.isprintable() else name
+
+
+def is_photograph(name: str) -> bool:
+    """Whether a file is a photograph by its name."""
+    return Path(name).suffix.lower() in PHOTOS
+
+
+def check_mesh(folder: Path, name: str, changes: dict[str, Any]) -> Checked:
+    """Check a mesh in a folder without an index, which is written.
 
     Raises:
         AssetError: it cannot be used; the text tells why.
     """
-    from gen_data.assets.checking import check_folder
     from gen_data.assets.readers import MESH_SUFFIXES
     from gen_data.cli.own_meshes import guess_unit
-    from gen_data.packs.provision import open_assets
 
-    suffix = Path(name).suffix.lower()
-    if suffix in PHOTOS:
-        section, entry = "textures", {"file": name, "tags": [_word(name)]}
-    elif suffix in MESH_SUFFIXES:
-        section, entry = "assets", {"file": name, "category": _category(name), **changes}
-    else:
+    if Path(name).suffix.lower() not in MESH_SUFFIXES:
         known = ", ".join(sorted({*PHOTOS, *MESH_SUFFIXES}))
         raise AssetError(f"{name}: is neither a mesh nor a photograph; expected {known}")
+    checked = _check(folder, "assets", {"file": name, "category": _category(name), **changes})
+    if checked.finding.unit == "m (assumed)" and checked.finding.size_m and not changes:
+        unit = guess_unit(max(checked.finding.size_m))
+        if unit != "m":
+            return check_mesh(folder, name, {"unit": unit})
+    return checked
+
+
+def check_photograph(folder: Path, name: str, standpoint: Standpoint) -> Checked:
+    """Check a photograph in a folder without an index, which is written.
+
+    Without a tilt, its horizon is found from its edges; where it has none, a tilt is assumed.
+
+    Raises:
+        AssetError: it cannot be used; the text tells why.
+    """
+    data = (folder / name).read_bytes()
+    size_px = photographs.upright_size_px(data, name)
+    try:
+        checked = _check(folder, "plates", standpoint.entry(name, data, size_px))
+    except AssetError as error:
+        if standpoint.tilt_deg is not None or "no horizon was found" not in str(error):
+            raise
+        standpoint = standpoint.tilted()
+        checked = _check(folder, "plates", standpoint.entry(name, data, size_px))
+    return replace(checked, size_px=size_px, standpoint=standpoint)
+
+
+def _check(folder: Path, section: str, entry: dict[str, Any]) -> Checked:
+    from gen_data.assets.checking import check_folder
+    from gen_data.packs.provision import open_assets
+
     _write_index(folder, section, entry)
     library = open_assets([folder])
     finding = next(iter(check_folder(folder, library)))
-    if not finding.error and finding.unit == "m (assumed)" and finding.size_m and not changes:
-        unit = guess_unit(max(finding.size_m))
-        if unit != "m":
-            return check_file(folder, name, {"unit": unit})
     if finding.error:
         raise AssetError(finding.error.replace(f"{folder}/", ""))
     return Checked(section, entry, finding, _picture(finding, library))
+
+
+def as_walls(checked: Checked) -> Checked:
+    """A checked photograph as a texture, which walls show."""
+    name = str(checked.entry["file"])
+    return replace(checked, section="textures", entry={"file": name, "tags": [_word(name)]})
 
 
 def _category(name: str) -> str:
@@ -120,14 +175,18 @@ def _picture(finding: Finding, library: Library) -> bytes:
     from gen_data.core.scene import Body
     from gen_data.core.se3 import SE3
     from gen_data.lab.edit.samples import encode
-    from gen_data.preview.thumbnails import picture_of, thumbnail
+    from gen_data.preview.plate_overlay import plate_overlay
+    from gen_data.preview.thumbnails import picture_of
     from gen_data.renderers.warp.renderer import WarpRenderer
     from gen_data.renderers.warp.settings import RenderSettings
 
+    if finding.size_m is None:
+        photo = library.texture(finding.asset_id).albedo
+        image = plate_overlay(library.plate(finding.asset_id), photo)
+        scale = PICTURE_PX / max(image.shape[:2])
+        size_px = [max(1, round(edge * scale)) for edge in image.shape[1::-1]]
+        return encode(np.asarray(cv2.resize(image, size_px, interpolation=cv2.INTER_AREA)))
     renderer = WarpRenderer(library, "auto", RenderSettings())
-    asset = library.get(finding.asset_id)
-    if asset.kind != "object" or finding.size_m is None:
-        return encode(thumbnail(asset, library, renderer, 320))
     names = [finding.asset_id, MUG, *([PERSON] if max(finding.size_m) > PERSON_FROM_M else [])]
     bodies, y_m = [], 0.0
     for name in names:
@@ -137,7 +196,7 @@ def _picture(finding: Finding, library: Library) -> bytes:
         place = (0.0, y_m - low[1], -low[2])
         bodies.append(Body(name, name, SE3(place)))
         y_m += high[1] - low[1] + gap_m
-    return encode(picture_of(tuple(bodies), library, renderer, 320))
+    return encode(picture_of(tuple(bodies), library, renderer, PICTURE_PX))
 
 
 def keep_file(folder: Path, path: Path, checked: Checked) -> None:
@@ -157,23 +216,41 @@ def keep_file(folder: Path, path: Path, checked: Checked) -> None:
     index.save(text_edits.append_item(text, checked.section, checked.entry))
 
 
-def add_to_scene(text: str, config: Config, checked: Checked) -> str:
+def add_to_scene(text: str, config: Config | None, checked: Checked) -> str:
     """The text of a configuration with a checked file in its scene.
 
-    A mesh becomes a group of objects on the first surface; a photograph covers the walls.
+    A mesh becomes a group of objects on the first surface, of which scenes draw one to three. A
+    photograph stands behind the scene, and begins one in an empty text; as a texture, it covers
+    the walls.
+
+    Args:
+        text: Of the editor.
+        config: What it means; None for a text with faults, or an empty one.
+        checked: The file.
 
     Raises:
-        ConfigError: the scene has no surface or no walls for it.
+        ConfigError: the scene has no surface, plate or walls for it, or the text has faults.
     """
+    asset_id = checked.finding.asset_id
+    if photographs.is_empty(text):
+        if checked.section == "plates" and checked.size_px is not None:
+            return text + photographs.begin_scene(ASSETS, asset_id, checked.size_px)
+        raise ConfigError(
+            "the file is empty: begin with a line such as 'extends: tabletop.yaml', or with a "
+            "photograph"
+        )
+    if config is None:
+        raise ConfigError("the text has faults; correct them first")
     folders = [
         node.text for node in (config.document.get("assets", "folders") or config.document).items
     ]
     if ASSETS not in folders:
         text = text_edits.set_value(text, ("assets", "folders"), [*folders, ASSETS])
-    asset_id = checked.finding.asset_id
+    if checked.section == "plates":
+        return photographs.show_behind(text, config.document, asset_id)
     if checked.section == "textures":
         return _on_walls(text, config, checked.entry["tags"][0])
-    surface = _first(config, "elements", ("surface", "bin", "shelf", "plate"))
+    surface = next(_named(config, "elements", ("surface", "bin", "shelf", "plate")), None)
     if surface is None:
         raise ConfigError("elements: no surface holds the object; add one, such as a table")
     name = "".join(c if c.isalnum() else "_" for c in _category(str(checked.entry["file"])))
@@ -182,12 +259,15 @@ def add_to_scene(text: str, config: Config, checked: Checked) -> str:
         "on": surface,
         "count": 2,
         "assets": {"ids": [asset_id]},
-        "placement": "drop",
+        "placement": "scatter" if surface in _named(config, "elements", ("plate",)) else "drop",
     }
-    listed = _own_list(text)
-    if listed:
-        return text_edits.append_item(text, "elements", {"name": f"own_{name}", **group})
-    return text_edits.set_value(text, ("elements", f"own_{name}"), group)
+    if _own_list(text):
+        text = text_edits.append_item(text, "elements", {"name": f"own_{name}", **group})
+    else:
+        text = text_edits.set_value(text, ("elements", f"own_{name}"), group)
+    # Without a randomizer, it would lie in one place in every scene.
+    drawn = {"type": "objects", "name": f"own_{name}", "count": {"uniform_integer": [1, 3]}}
+    return text_edits.append_item(text, "randomizers", drawn)
 
 
 def _own_list(text: str) -> bool:
@@ -199,11 +279,11 @@ def _own_list(text: str) -> bool:
 
 
 def _on_walls(text: str, config: Config, tag: str) -> str:
-    backdrop = _first(config, "randomizers", ("backdrop",))
+    backdrop = next(_named(config, "randomizers", ("backdrop",)), None)
     if backdrop is None:
         raise ConfigError(
-            "randomizers: none of them draws walls; add {type: backdrop, name: room}, or put "
-            "objects on the photograph itself: docs/tutorials/photo_plates.md"
+            "randomizers: none of them draws walls; add {type: backdrop, name: room} to a scene "
+            "with a room"
         )
     values = {"walls": [tag], "painted": False, "wall_scale_m": 2.8}
     for field, value in values.items():
@@ -211,14 +291,9 @@ def _on_walls(text: str, config: Config, tag: str) -> str:
     return text
 
 
-def _first(config: Config, section: str, kinds: tuple[str, ...]) -> str | None:
+def _named(config: Config, section: str, kinds: tuple[str, ...]) -> Iterator[str]:
+    """Names of the items of a section that have one of these types."""
     for item in config.document.entries[section].items:
         kind = item.get("type")
         if kind is not None and kind.content in kinds:
-            return node_name(item)
-    return None
-
-
-def with_entry(checked: Checked, **changes: Any) -> Checked:
-    """The same file with other values of its entry, such as the unit."""
-    return replace(checked, entry={**checked.entry, **changes})
+            yield node_name(item)

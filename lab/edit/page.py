@@ -24,11 +24,12 @@ from gen_data.lab.edit.browse_page import BrowsePage
 from gen_data.lab.edit.data_sets import is_data_set
 from gen_data.lab.edit.document import find_item
 from gen_data.lab.edit.files import read_file
+from gen_data.lab.edit.own_files_panel import OwnFilesPanel
 from gen_data.lab.edit.panels import (
     ControlsPanel,
-    OwnFilesPanel,
     ResolvedPanel,
     StatisticsPanel,
+    home_link,
     show_full,
 )
 from gen_data.lab.edit.samples import Shown
@@ -91,8 +92,9 @@ def _plain_proposal(one: completion.Proposal) -> dict[str, str]:
 def build(desk: Desk) -> None:
     """Build the page of one tab: an editor, a data set, or the start page."""
     ui.add_head_html('<link rel="stylesheet" href="/edit/editor.css">')
-    asked = context.client.request.query_params.get("open", "")
-    source = Path(asked) if asked else desk.source
+    query = context.client.request.query_params
+    asked = query.get("open", "")
+    source = Path(asked) if asked else None if "start" in query else desk.source
     if asked and not _may_open(desk, source):
         ui.label(f"{asked} is outside of the folders of this page, or no shipped configuration")
         return
@@ -162,9 +164,10 @@ class EditorTab:
         ui.timer(0.0, self._begin, once=True)
 
     def _build_bar(self) -> None:
+        home_link()
         self._title = ui.label(self.session.file.path.name).classes("gd-title")
         self._state = ui.label("").props('role="status"')
-        ui.button("Save", on_click=self._save).props("dense no-caps unelevated")
+        ui.button("Save", on_click=self._save).props("dense no-caps outline")
         ui.button("Save as", on_click=self._save_as).props("dense no-caps flat")
         dark = ui.dark_mode()
         ui.button(icon="contrast", on_click=dark.toggle).props(
@@ -174,9 +177,9 @@ class EditorTab:
     def _build_view_bar(self) -> None:
         grid = self.session.grid
         with ui.element("div").classes("gd-row"):
-            ui.select(VIEWS, value=grid.view.kind, on_change=self._set_kind).props(
-                'dense options-dense aria-label="Picture"'
-            )
+            ui.select(VIEWS, value=grid.view.kind, label="picture", on_change=self._set_kind).props(
+                "dense options-dense"
+            ).style("min-width: 110px")
             for layer, name in LAYER_NAMES.items():
                 ui.checkbox(
                     name, value=layer in grid.view.layers, on_change=partial(self._set_layer, layer)
@@ -371,7 +374,7 @@ class EditorTab:
             with ui.element("div").classes("gd-row"):
                 ui.button("Reload the file", on_click=self._reload).props("no-caps flat")
                 ui.button("Overwrite", on_click=partial(self._save, overwrite=True)).props(
-                    "no-caps"
+                    "no-caps outline"
                 )
 
     def _reload(self) -> None:
@@ -394,7 +397,7 @@ class EditorTab:
                 self._title.text = self.session.file.path.name
                 self._state.text = self._saved_words()
 
-            ui.button("Save", on_click=save).props("no-caps")
+            ui.button("Save", on_click=save).props("no-caps outline")
 
     def _leave(self) -> None:
         TABS.pop(self.key, None)

@@ -1,11 +1,9 @@
-"""Panels below the grid: controls, statistics, own files, origins; a picture in full size."""
+"""Panels below the grid: controls, statistics, origins; a picture in full size."""
 
 from __future__ import annotations
 
 import asyncio
-import html
 import sys
-import tempfile
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
@@ -17,8 +15,8 @@ from nicegui import ui
 
 from gen_data.config.yaml_scalars import to_flow_yaml
 from gen_data.core import processes
-from gen_data.core.errors import ConfigError, GenDataError
-from gen_data.lab.edit import controls, own_files, statistics
+from gen_data.core.errors import GenDataError
+from gen_data.lab.edit import controls, statistics
 from gen_data.lab.edit.document import list_origins
 from gen_data.lab.edit.samples import Recording
 from gen_data.lab.edit.session import drawn_values, vary
@@ -176,8 +174,7 @@ class ControlsPanel:
                 slider = ui.slider(
                     min=control.low, max=control.high, step=control.step, value=value
                 ).props(f"label dense {named}")
-                number = ui.number(value=value, step=control.step).props("dense").bind_value(slider)
-                del number
+                ui.number(value=value, step=control.step).props(f"dense {named}").bind_value(slider)
                 slider.on(
                     "update:model-value",
                     lambda e: change(e.args),
@@ -352,107 +349,6 @@ class StatisticsPanel:
             ui.link(f"open {out.name}", f"/?open={quote(str(out))}")
 
 
-class OwnFilesPanel:
-    """Drop of meshes and photographs."""
-
-    def __init__(self, tab: Tab) -> None:
-        self._tab = tab
-        ui.label(
-            "Drop a mesh or a photograph here: it is checked, copied to assets/ next to the file, "
-            "and put into the scene."
-        )
-        most = own_files.SIZE_MAX_BYTES
-        ui.upload(
-            on_upload=self._take,
-            on_rejected=lambda: ui.notify(
-                f"larger than {most // 1_000_000} MB: copy it to {own_files.ASSETS}/ and list it "
-                "in assets.yaml",
-                type="negative",
-            ),
-            max_file_size=most,
-            auto_upload=True,
-            multiple=True,
-            label="meshes and photographs",
-        ).style("width: 100%").props('flat bordered aria-label="Meshes and photographs"')
-        self._body = ui.element("div")
-
-    async def _take(self, event: Any) -> None:
-        name = Path(event.file.name).name
-        folder = Path(tempfile.mkdtemp(prefix="gen-data-edit-"))
-        self._tab.scratch.append(folder)
-        path = folder / name
-        await event.file.save(path)
-        with self._body:
-            card = ui.element("div").classes("gd-field").props(f'data-file="{html.escape(name)}"')
-        self._check(path, card, ())
-
-    def _check(self, path: Path, card: Any, entry: tuple[tuple[str, Any], ...]) -> None:
-        card.clear()
-        with card:
-            ui.label(f"{path.name}: being checked ...")
-        client = f"{self._tab.key}/file/{path}"
-        job = own_files.CheckFile(path, entry)
-        self._tab.desk.order(client, [job], partial(self._show, path, card))
-
-    def _show(self, path: Path, card: Any, ticket: Any, found: Any) -> None:
-        self._tab.desk.listeners.pop(ticket.client, None)
-        card.clear()
-        with card:
-            if not isinstance(found, own_files.Checked):
-                ui.label(f"{path.name}: {found.text}").classes("gd-refused")
-                return
-            finding = found.finding
-            size = " x ".join(f"{edge:.3g}" for edge in finding.size_m or ())
-            with ui.element("div").classes("gd-row"):
-                ui.element("img").props(
-                    f'src="{self._tab.desk.pictures.put(found.jpeg)}" alt="{finding.asset_id}"'
-                ).style("width: 200px")
-                with ui.element("div"):
-                    ui.label(finding.asset_id).classes("gd-name")
-                    if size:
-                        ui.label(f"{size} m; unit {finding.unit}; up {finding.up}")
-                        self._build_choice(path, card, found)
-                    for text in finding.warnings:
-                        ui.label(text)
-                    ui.button(
-                        "Add to the scene", on_click=partial(self._add, path, card, found)
-                    ).props("dense no-caps")
-
-    def _build_choice(self, path: Path, card: Any, found: own_files.Checked) -> None:
-        now = {key: found.entry.get(key) for key in ("unit", "up")}
-
-        def again(key: str, event: Any) -> None:
-            chosen = {k: v for k, v in {**now, key: event.value}.items() if v}
-            self._check(path, card, tuple(chosen.items()))
-
-        with ui.element("div").classes("gd-row"):
-            for key, options in (
-                ("unit", ["mm", "cm", "m", "in", "ft"]),
-                ("up", ["z", "y", "x", "-z", "-y", "-x"]),
-            ):
-                ui.select(options, value=now[key], label=key, on_change=partial(again, key)).props(
-                    "dense options-dense"
-                ).style("min-width: 70px")
-
-    async def _add(self, path: Path, card: Any, found: own_files.Checked) -> None:
-        session = self._tab.session
-        folder = session.file.path.parent / own_files.ASSETS
-        try:
-            if session.config is None:
-                raise ConfigError("the text has faults; correct them first")
-            if not session.folders.contains(folder):
-                raise ConfigError(f"{folder} is outside of the folders of this page")
-            text = own_files.add_to_scene(session.text, session.config, found)
-            await asyncio.to_thread(own_files.keep_file, folder, path, found)
-        except GenDataError as error:
-            ui.notify(str(error), type="negative", multi_line=True)
-            return
-        self._tab.edit(text)
-        card.clear()
-        with card:
-            ui.label(f"{path.name}: added to the scene")
-
-
 class ResolvedPanel:
     """Every value of the resolved configuration with the file and line that give it."""
 
@@ -472,6 +368,11 @@ class ResolvedPanel:
             table(
                 ("field", "value", "from"), [row for row in rows if wanted in " ".join(row)][:150]
             )
+
+
+def home_link() -> None:
+    """A link to the start page."""
+    ui.link("gen-data", "/?start=1").classes("gd-home").props["title"] = "start page"
 
 
 def table(header: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> None:

@@ -191,8 +191,15 @@ class Studio:
         name, changes = Path(order.file).stem, order.overrides
         config = parse_config(order.text, order.file, name, overrides=changes)
         folders = config.asset_folders
-        library = self._libraries.get(repr(folders), lambda: open_assets(folders))
+        opened = repr([(folder, _index_time_ns(folder)) for folder in folders])
+        library = self._libraries.get(opened, lambda: open_assets(folders))
         return OpenedText(config, library)
+
+
+def _index_time_ns(folder: Path) -> int:
+    """When the index of a folder was written last; 0 without one. A newer one has other assets."""
+    index = folder / "assets.yaml"
+    return index.stat().st_mtime_ns if index.exists() else 0
 
 
 class OpenedText:
@@ -265,7 +272,7 @@ class OpenedText:
         with pipeline.config.located_errors():
             accepted = pipeline.accepted_scene(scene_index)
             drawn = pipeline.drawn_view(accepted, view_index)
-            scene, factor = _with_small_camera(drawn.scene, view.sensor, width_px)
+            scene, factor = self._with_small_camera(drawn.scene, view.sensor, width_px)
             pipeline.config = replace(
                 pipeline.config, image_truth=partial(self._annotate, annotators, factor)
             )
@@ -275,6 +282,18 @@ class OpenedText:
                 replace(drawn, scene=scene), sensors, step // every * every
             )
         return Taken(read, self._plain_draws(), factor)
+
+    def _with_small_camera(self, scene: Scene, name: str, width_px: int) -> tuple[Scene, float]:
+        """The scene with at most ``width_px`` columns of a camera (0 = its own); their share."""
+        camera = next((one for one in scene.cameras if one.name == name), None)
+        if camera is None or not 0 < width_px < camera.intrinsics.width_px:
+            return scene, 1.0
+        small = replace(camera, intrinsics=shrink(camera.intrinsics, width_px))
+        if plates.has_plate(scene) and scene.environment is not None:
+            # The part of the photograph behind a scene follows from the size of the image.
+            small = plates.fit_camera(small, self.library.plate(scene.environment.image))
+        cameras = tuple(small if one is camera else one for one in scene.cameras)
+        return replace(scene, cameras=cameras), width_px / camera.intrinsics.width_px
 
     def _annotate(
         self, annotators: list[AnyAnnotator], factor: float, scene: Scene, reading: Any
@@ -317,17 +336,6 @@ class Observed:
         self._log.clear()
         self._draws[self.name] = self._log
         return self._randomizer(scene, assets, rng)
-
-
-def _with_small_camera(scene: Scene, name: str, width_px: int) -> tuple[Scene, float]:
-    """The scene whose camera has at most ``width_px`` columns (0 = its own), and their share."""
-    camera = next((one for one in scene.cameras if one.name == name), None)
-    # A photograph behind a scene fits its own camera only.
-    if camera is None or not 0 < width_px < camera.intrinsics.width_px or plates.has_plate(scene):
-        return scene, 1.0
-    small = replace(camera, intrinsics=shrink(camera.intrinsics, width_px))
-    cameras = tuple(small if one is camera else one for one in scene.cameras)
-    return replace(scene, cameras=cameras), width_px / camera.intrinsics.width_px
 
 
 def shrink(lens: Intrinsics, width_px: int) -> Intrinsics:

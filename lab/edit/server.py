@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import asyncio
+import hashlib
 import hmac
 import socket
 from collections.abc import Awaitable, Callable, MutableMapping
+from contextlib import suppress
 from http.cookies import SimpleCookie
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qs
 
@@ -97,12 +100,24 @@ async def _reply(send: Send, status: int, headers: list[tuple[bytes, bytes]], bo
     await send({"type": "http.response.body", "body": body})
 
 
-def free_port(host: str, port: int) -> int:
-    """The port, or a free one for 0.
+def usual_port(source: Path | None) -> int:
+    """A port of the dynamic range (RFC 6335) that stays the same for a file.
+
+    Browsers keep drafts by address and port: those of a server that was started again are found.
+    """
+    digest = hashlib.sha256(str(source and source.resolve()).encode()).digest()
+    return 49152 + int.from_bytes(digest[:4], "big") % 16384
+
+
+def free_port(host: str, port: int, wish: int = 0) -> int:
+    """The port; for 0 the wished one if it is free, else any.
 
     Raises:
         ConfigError: it is taken, or the address is none of this machine.
     """
+    if not port and wish:
+        with suppress(ConfigError):
+            return free_port(host, wish)
     try:
         with socket.socket(socket.AF_INET) as probe:
             probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -115,22 +130,38 @@ def free_port(host: str, port: int) -> int:
         ) from error
 
 
+async def _wait_for(host: str, port: int) -> None:
+    """Until the server accepts connections."""
+    while True:
+        with suppress(OSError):
+            _, writer = await asyncio.open_connection(host, port)
+            writer.close()
+            return
+        await asyncio.sleep(0.02)
+
+
 def serve(desk: Desk, host: str, port: int, workers: int, announce: Callable[[str], None]) -> None:
     """Serve the page until it is interrupted."""
     from nicegui import app, ui
 
     from gen_data.lab.edit import page
 
-    port = free_port(host, port)
+    port = free_port(host, port, usual_port(desk.source))
     names = (LOOPBACK, "localhost") if host == LOOPBACK else ()
     hosts = frozenset(f"{name}:{port}" for name in names)
     app.add_middleware(Guard, token=desk.token, hosts=hosts, port=port)
     page.add_routes(app, desk)
 
-    def start() -> None:
-        desk.loop = asyncio.get_running_loop()
+    async def tell() -> None:
+        await _wait_for(host, port)
         announce(f"http://{host}:{port}/?token={desk.token}")
 
+    def start() -> None:
+        desk.loop = asyncio.get_running_loop()
+        # The server listens only after its start: a browser would be refused until then.
+        waiting.append(desk.loop.create_task(tell()))
+
+    waiting: list[asyncio.Task[None]] = []
     app.on_startup(start)
     with Workers(workers, desk.deliver) as desk.workers:
         ui.run(

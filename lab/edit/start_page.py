@@ -38,14 +38,18 @@ def headline(text: str) -> str:
     return next((line for line in lines if line and not line.startswith("yaml-language")), "")
 
 
+def picture_name(name: str, text: str) -> str:
+    """File name of the picture of a configuration of this version."""
+    digest = hashlib.sha256(f"{__version__}\n{text}".encode()).hexdigest()[:16]
+    return f"{name}.{digest}.jpg"
+
+
 def _cache_file(name: str, text: str) -> Path:
-    """Place of the picture of a configuration of this version."""
     import platformdirs
 
-    digest = hashlib.sha256(f"{__version__}\n{text}".encode()).hexdigest()[:16]
     folder = Path(platformdirs.user_cache_path("gen-data")) / "gallery"
     folder.mkdir(parents=True, exist_ok=True)
-    return folder / f"{name}.{digest}.jpg"
+    return folder / picture_name(name, text)
 
 
 def _is_kept(gallery: dict[str, bytes], name: str, text: str) -> bool:

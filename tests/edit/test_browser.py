@@ -1,194 +1,232 @@
-"""The page in Chromium: typing, faults, help, controls, layers, own files, narrow windows."""
+"""The page in Chromium: typing, faults, controls, layers, lost processes and connections."""
 
 from __future__ import annotations
 
 import os
-import re
 import signal
-import subprocess
-import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import numpy as np
 import pytest
 
-from tests.browser import Opened, open_browser
-from tests.report.handmade import HOSTILE_NAME, make_image, make_object, write_dataset
+from tests.edit.live_page import (
+    COUNTS,
+    DRAWN,
+    LINES,
+    TEXT,
+    Live,
+    pictures,
+    put_cursor,
+    set_text,
+    text_of,
+    type_behind,
+    wait_for_pictures,
+)
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Page
 
 pytestmark = pytest.mark.slow
 
-TEXT = """\
-# My table.\r
-extends: tabletop.yaml
-without: {randomizers: [pose, distractors], sensors: [pseudo_lidar]}
-elements: {arm: {present: false}, hands: {present: false}}
-randomizers:
-  - {name: clutter, count: 3}
-views_per_scene: 1
-"""
-WAIT_MS = 120_000
-"""Other tests may hold the cores: nothing here depends on a clock."""
-COUNTS = "[...document.querySelectorAll('.gd-tile')].map(tile => +tile.dataset.shown || 0)"
-FRESH = f"before => {COUNTS}.every((count, slot) => count > (before[slot] || 0))"
+
+def save(page: Page) -> None:
+    """By the key, until the page says so."""
+    page.keyboard.press("Control+s")
+    page.wait_for_selector("[role=status]:text-is('saved')")
 
 
-@contextmanager
-def served(folder: Path, *arguments: str) -> Iterator[str]:
-    """The address of a page of its own process."""
-    command = [sys.executable, "-m", "gen_data", "edit", *arguments, "--no-browser", "-w", "1"]
-    # NiceGUI serves its own test port where it sees pytest.
-    variables = {k: v for k, v in os.environ.items() if not k.startswith(("PYTEST", "NICEGUI"))}
-    with subprocess.Popen(
-        command, cwd=folder, env=variables, stdout=subprocess.PIPE, text=True
-    ) as server:
-        assert server.stdout is not None
-        found = re.search(r"http://\S+", server.stdout.readline())
-        assert found is not None
-        try:
-            yield found[0]
-        finally:
-            server.send_signal(signal.SIGINT)
-            assert server.wait(30) == 130
+def erase(page: Page, count: int) -> None:
+    """Characters before the cursor."""
+    for _ in range(count):
+        page.keyboard.press("Backspace")
 
 
-def wait_for_pictures(opened: Opened, before: list[int]) -> None:
-    """Until every tile has a newer picture."""
-    opened.page.wait_for_function(FRESH, arg=before, timeout=WAIT_MS)
-
-
-def type_behind(opened: Opened, text: str, typed: str) -> None:
-    """Put the cursor behind a text of a line, and type."""
-    opened.page.evaluate(
-        """async ([text]) => {
-          const element = document.querySelector('.nicegui-codemirror');
-          const editor = await getElement(+element.id.slice(1)).editorPromise;
-          const at = editor.state.doc.toString().indexOf(text) + text.length;
-          editor.dispatch({ selection: { anchor: at } });
-          editor.focus();
-        }""",
-        [text],
-    )
-    opened.page.keyboard.type(typed)
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    pytest.importorskip("nicegui")
-    folder = tmp_path_factory.mktemp("edit")
-    (folder / "mine.yaml").write_bytes(TEXT.encode())
-    return folder
-
-
-@pytest.fixture(scope="module")
-def opened(folder: Path) -> Iterator[Opened]:
-    with open_browser() as opened, served(folder, "mine.yaml") as url:
-        page = opened.page
-        page.set_default_timeout(WAIT_MS)
-        page.goto(url)
-        page.wait_for_selector(".gd-tile")
-        page.click("[data-grid=slots]")
-        page.click(".q-item:has-text('4')")
-        page.wait_for_function(f"{COUNTS}.length === 4 && {COUNTS}.every(n => n > 0)")
-        yield opened
-
-
-def test_pictures_follow_the_text(opened: Opened, folder: Path) -> None:
+def test_pictures_follow_the_text(live: Live, page: Page) -> None:
     """A fault is told with its place, and pictures stay; a valid text draws all of them again."""
-    page = opened.page
-    before = page.evaluate(COUNTS)
-    type_behind(opened, "count: 3", ", cuont: 1")
+    type_behind(page, "count: 3", ", cuont: 1")
     page.wait_for_selector(".gd-fault:has-text('mine.yaml:6:31: randomizers[0].cuont')")
     page.wait_for_selector(".gd-wrong:has-text('cuont')")
-    assert page.locator(".gd-old").count() == 4
-    assert page.evaluate(COUNTS) == before
-    for _ in ", cuont: 1":
-        page.keyboard.press("Backspace")
+    page.wait_for_function("document.querySelectorAll('.gd-old img[src]').length === 4")
+    before = page.evaluate(COUNTS)
+    erase(page, len(", cuont: 1"))
     page.keyboard.type(", sc")
     # Not by Enter, which is a line break until the list has been open for a moment.
     page.click(".cm-tooltip-autocomplete li:has-text('scale')")
     page.keyboard.type("1.5")
     page.wait_for_function("!document.querySelector('.gd-fault')")
-    wait_for_pictures(opened, before)
-    page.keyboard.press("Control+s")
-    page.wait_for_selector("[role=status]:has-text('saved')")
-    saved = TEXT.replace("count: 3}", "count: 3, scale: 1.5}").encode()
-    assert (folder / "mine.yaml").read_bytes() == saved
+    wait_for_pictures(page, before)
+    save(page)
+    assert live.read() == TEXT.replace("count: 3}", "count: 3, scale: 1.5}").encode()
 
 
-def test_controls_layers_and_kinds_change_the_pictures(opened: Opened) -> None:
-    """A slider edits the text; labels are drawn again; depth is rendered."""
-    page = opened.page
-    page.wait_for_selector(".gd-field[data-field=scale]")
+def test_a_text_that_is_no_yaml_has_its_fault(page: Page) -> None:
+    """With the words of the parser at its line; pictures stay."""
+    type_behind(page, "views_per_scene: 1", ": [")
+    page.wait_for_selector(".gd-fault:has-text('mine.yaml:7:')")
+    assert page.locator(".gd-tile img[src]").count() == 4
+    erase(page, 3)
+    page.wait_for_function("!document.querySelector('.gd-fault')")
+
+
+def test_fast_keys_arrive_in_order_and_the_last_text_is_drawn(page: Page) -> None:
+    """Thirty keys while pictures are rendered; the page takes each at once."""
     before = page.evaluate(COUNTS)
+    type_behind(page, "count: 3", ", scale: 1.1")
+    wait_for_pictures(page, before)
+    page.wait_for_function(DRAWN)
+    expected, text = pictures(page), text_of(page)
+    before = page.evaluate(COUNTS)
+    erase(page, 1)
+    page.keyboard.type("8")
+    wait_for_pictures(page, before)
+    page.wait_for_function(DRAWN)
+    assert all(a != b for a, b in zip(pictures(page), expected, strict=True))
+    for digit in "234567892345671":
+        erase(page, 1)
+        page.keyboard.type(digit)
+    assert text_of(page) == text
+    while pictures(page) != expected:
+        page.wait_for_timeout(200)
+
+
+def test_controls_and_layers_change_the_pictures(page: Page) -> None:
+    """A slider edits the text; labels are drawn again."""
+    put_cursor(page, "count: 3")
     thumb = page.locator(".gd-field[data-field=scale] .q-slider__thumb")
+    thumb.scroll_into_view_if_needed()
+    before = page.evaluate(COUNTS)
     place = thumb.bounding_box()
     assert place is not None
     page.mouse.move(place["x"] + 5, place["y"] + 5)
     page.mouse.down()
     page.mouse.move(place["x"] + 60, place["y"] + 5, steps=4)
     page.mouse.up()
-    page.wait_for_function("!document.querySelector('.cm-content').textContent.includes('1.5}')")
-    wait_for_pictures(opened, before)
-    before = page.evaluate(COUNTS)
-    page.click("[data-layer=masks]")
-    wait_for_pictures(opened, before)
+    page.wait_for_function("document.querySelector('.cm-content').textContent.includes('scale: ')")
+    wait_for_pictures(page, before)
+    page.wait_for_function(DRAWN)
+    drawn = pictures(page)
+    for _ in range(2):
+        before = page.evaluate(COUNTS)
+        page.click("[data-layer=masks]")
+        wait_for_pictures(page, before)
+        page.wait_for_function(DRAWN)
+        assert (pictures(page) == drawn) == (
+            page.locator("[data-layer=masks][aria-checked=true]").count() == 0
+        )
+
+
+def test_a_sample_in_full_size_has_its_draws_and_a_recording(page: Page) -> None:
+    """The recording is a file for the Rerun viewer."""
     page.click(".gd-tile >> nth=1")
     page.wait_for_selector(".q-dialog td:has-text('clutter.upright')")
     page.wait_for_selector(".q-dialog img[src]")
-    page.click("button:has-text('Close')")
+    with page.expect_download() as download:
+        page.click("button:has-text('Recording for Rerun')")
+    assert download.value.suggested_filename == "sample_000001.rrd"
+    assert Path(download.value.path()).read_bytes()[:4] == b"RRF2"
+    page.click(".q-dialog button:has-text('Close')")
 
 
-def test_a_killed_process_costs_nothing(opened: Opened) -> None:
+def test_one_sample_has_a_low_a_middle_and_a_high_value(page: Page) -> None:
+    """Of the sample that was chosen; then all samples come back."""
+    put_cursor(page, "count: 3")
+    page.click(".gd-tile >> nth=1")
+    page.click("button:has-text('Vary this one')")
+    page.click("button[aria-label='Vary count']")
+    for slot, count in enumerate((2, 3, 6)):
+        page.wait_for_selector(f"[data-slot='{slot}'] :text-is('count: {count}')")
+    assert page.locator(".gd-tile").count() == 3
+    page.click(".gd-tile >> nth=2")
+    page.wait_for_selector(".q-dialog .gd-name:text-is('sample 1')")
+    assert page.locator(".q-dialog table").first.locator("tr").count() == 1 + 6
+    page.click(".q-dialog button:has-text('Close')")
+    page.click("button:has-text('All samples')")
+    page.wait_for_function(DRAWN)
+
+
+def test_real_pictures_stand_beside_the_shown_ones(page: Page) -> None:
+    """By class, with the brightness of both; the fit wants a saved file."""
+    page.click(".q-tab:has-text('Statistics')")
+    page.wait_for_selector(".gd-table th:has-text('real (3): boxes per picture')")
+    row = page.locator(".gd-table tr", has=page.locator("td", has_text="mug")).first
+    assert float(row.locator("td").nth(4).inner_text()) >= 1
+    page.wait_for_selector("text=/brightness .*: shown 0[.]\\d\\d, real 0[.]\\d\\d/")
+    type_behind(page, "# My table", ", changed")
+    page.click("button:has-text('Fit to the real pictures')")
+    page.wait_for_selector("[role=status]:has-text('save the file first')")
+
+
+def test_a_scene_that_cannot_settle_is_told_and_the_page_lives(page: Page) -> None:
+    """Its reasons and fields to change are in its tile and in the list of faults."""
+    text = text_of(page)
+    crowded = text.replace("elements: {", "elements: {table: {top_size_m: [0.3, 0.3]}, ")
+    crowded = crowded.replace("count: 3", "count: 40") + "physics: {layout_attempts_max: 1}\n"
+    before = page.evaluate(COUNTS)
+    set_text(page, crowded)
+    page.wait_for_selector(".gd-tile .gd-refused:has-text('no valid layout in 1 attempt')")
+    page.wait_for_selector(".gd-fault:has-text('Try: 1.')")
+    wait_for_pictures(page, before)
+    before = page.evaluate(COUNTS)
+    set_text(page, text)
+    page.wait_for_function("!document.querySelector('.gd-fault')")
+    wait_for_pictures(page, before)
+
+
+def test_keys_of_a_lost_connection_are_not_lost(live: Live, page: Page) -> None:
+    """Typed while the server is out of reach: the page begins anew when it is back, with them."""
+    page.evaluate("window.socket.disconnect()")
+    type_behind(page, "# My table", " again")
+    page.evaluate("window.socket.connect()")
+    page.wait_for_selector(".q-notification:has-text('unsaved text of this file was restored')")
+    live.show_four()
+    put_cursor(page, "# My table")
+    save(page)
+    # A line that was edited ends as most others do.
+    assert live.read() == TEXT.replace("# My table.\r", "# My table again.").encode()
+
+
+def test_unsaved_text_outlives_a_reload(live: Live, page: Page) -> None:
+    """With a notice; the file is as it was saved."""
+    saved = live.read()
+    type_behind(page, "# My table", ", once")
+    page.reload()
+    page.wait_for_selector(".q-notification:has-text('unsaved text of this file was restored')")
+    assert text_of(page).startswith("# My table, once")
+    assert live.read() == saved
+    live.show_four()
+
+
+def test_the_second_of_two_tabs_to_save_is_asked(live: Live, page: Page) -> None:
+    """Each has its own text; the second may take that of the file, or write over it."""
+    with live.tab("?open=mine.yaml") as other:
+        other.wait_for_selector(".gd-tile[data-shown]")
+        type_behind(other, "# My table", ", other")
+        save(other)
+        assert "other" not in text_of(page)
+        put_cursor(page, "# My table")
+        page.keyboard.press("Control+s")
+        page.wait_for_selector(".q-dialog:has-text('has changed since it was read')")
+        assert b"# My table, other" in live.read()
+        page.click("button:has-text('Overwrite')")
+        page.wait_for_selector("[role=status]:text-is('saved')")
+        assert live.read().decode().replace("\r\n", "\n") == LINES
+
+
+def test_a_killed_process_costs_nothing(live: Live, page: Page) -> None:
     """The job is done by the next process; the page stays."""
     children = Path(f"/proc/{os.getpid()}/task/{os.getpid()}/children")
     if not children.exists():
         pytest.skip("needs /proc")
-    page = opened.page
     before = page.evaluate(COUNTS)
-    type_behind(opened, "# My table", "s")
+    type_behind(page, "# My table", "s")
     (server,) = (int(pid) for pid in children.read_text().split() if _is_server(pid))
     workers = Path(f"/proc/{server}/task/{server}/children").read_text().split()
     for tid in Path(f"/proc/{server}/task").iterdir():
         workers += (tid / "children").read_text().split()
     for pid in set(workers):
         os.kill(int(pid), signal.SIGKILL)
-    wait_for_pictures(opened, before)
+    wait_for_pictures(page, before)
 
 
 def _is_server(pid: str) -> bool:
     return b"edit" in Path(f"/proc/{pid}/cmdline").read_bytes().split(b"\0")
-
-
-def test_the_page_fits_a_phone_and_asks_nobody_else(opened: Opened) -> None:
-    """It does not scroll sideways; every request is to its own server, without a message."""
-    page = opened.page
-    page.set_viewport_size({"width": 400, "height": 860})
-    for _ in range(2):
-        page.click("button[aria-label='Dark or light']")
-        assert page.evaluate("document.documentElement.scrollWidth") <= 400
-    hosts = {url.split("/")[2].partition(":")[0] for url in opened.requests if url[:4] == "http"}
-    assert hosts == {"127.0.0.1"}
-    assert opened.messages == []
-
-
-def test_a_data_set_is_filtered_and_shown(opened: Opened, folder: Path) -> None:
-    """By class; names are shown as text."""
-    samples = [
-        [make_object(1, HOSTILE_NAME), make_object(2, "bus", 40, 16)],
-        [make_object(1, "car")],
-    ]
-    image = make_image(np.random.default_rng(5))
-    write_dataset(folder / "set", samples, ("bus", "car", HOSTILE_NAME), [image])
-    page = opened.page
-    page.set_viewport_size({"width": 1280, "height": 900})
-    page.goto(f"{page.url}?open=set")
-    page.wait_for_function(
-        "[...document.querySelectorAll('.gd-tile img')].every(i => i.naturalWidth)"
-    )
-    page.click("label:has([data-filter=category])")
-    page.click(".q-item:has-text('bus')")
-    page.wait_for_selector("[role=status]:has-text('set: 1 of 2 images')")
-    assert HOSTILE_NAME in page.inner_text(".gd-table")
-    assert page.evaluate("document.querySelector('img[onerror]')") is None

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import ast
 import asyncio
+import re
+import socket
 from collections.abc import MutableMapping
 from dataclasses import replace
 from pathlib import Path
@@ -11,13 +14,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+from gen_data.core.errors import ConfigError, StorageError
 from gen_data.core.intrinsics import Intrinsics
 from gen_data.core.lens import Lens
-from gen_data.lab.edit import data_sets
+from gen_data.lab.edit import data_sets, own_files, server
 from gen_data.lab.edit.desk import Pictures
 from gen_data.lab.edit.files import Folders, OpenedFile
 from gen_data.lab.edit.samples import Labelled, Shown, shrink
-from gen_data.lab.edit.server import COOKIE, Guard
+from gen_data.lab.edit.server import COOKIE, Guard, free_port, usual_port
 from gen_data.lab.edit.session import Session, vary
 from gen_data.lab.edit.statistics import rows, summarise
 from gen_data.lab.edit.workers import Queue, Ready, Refused, Ticket
@@ -75,7 +79,12 @@ def test_a_job_whose_process_crashed_comes_first_again() -> None:
     assert not queue.is_current(crashed)
 
 
-def ask(kind: str, query: str = "", **headers: str) -> tuple[list[MutableMapping[str, Any]], bool]:
+def ask(
+    kind: str,
+    query: str = "",
+    hosts: frozenset[str] = frozenset({"127.0.0.1:80"}),
+    **headers: str,
+) -> tuple[list[MutableMapping[str, Any]], bool]:
     """What a guard sends for a request, and whether the request has reached the page."""
     reached: list[bool] = []
     sent: list[MutableMapping[str, Any]] = []
@@ -95,7 +104,7 @@ def ask(kind: str, query: str = "", **headers: str) -> tuple[list[MutableMapping
         "query_string": query.encode(),
         "headers": [(k.encode(), v.encode()) for k, v in headers.items()],
     }
-    guard = Guard(app, "secret", frozenset({"127.0.0.1:80"}), 80)
+    guard = Guard(app, "secret", hosts, 80)
     asyncio.run(guard(scope, receive, send))
     return sent, bool(reached)
 
@@ -204,3 +213,86 @@ def test_images_of_a_data_set_are_chosen_and_sorted() -> None:
     assert indices(data_sets.choose(listed, category="cup", split="train")) == [0]
     assert indices(data_sets.choose(listed, least=2)) == [1]
     assert data_sets.count_categories(listed) == {"cup": 2, "vase": 1}
+
+
+def test_our_own_scripts_stay_small() -> None:
+    """Fewer than 300 lines of JavaScript: files, and texts of Python that the page runs."""
+    folder = Path(server.__file__).parent
+    lines = sum(len(path.read_text().splitlines()) for path in folder.glob("*.js"))
+    inline = [
+        node.value
+        for path in folder.glob("*.py")
+        for node in ast.walk(ast.parse(path.read_text()))
+        if isinstance(node, ast.Constant)
+        and isinstance(node.value, str)
+        and re.search(r"window\.|document\.|<script", node.value)
+    ]
+    assert 5 <= len(inline) < 20
+    assert 100 < lines + sum(text.count("\n") + 1 for text in inline) < 300
+
+
+def test_a_server_for_a_network_wants_the_token_too() -> None:
+    """It does not know its own names; a page of another origin is refused as well."""
+    other = {"host": "192.168.0.7:80"}
+    sent, reached = ask("http", **other, hosts=frozenset())
+    assert (sent[0]["status"], reached) == (403, False)
+    cookie = {"cookie": f"{COOKIE}_80=secret"}
+    assert ask("http", **other, **cookie, hosts=frozenset())[1]
+    assert ask("websocket", **other, **cookie, origin="http://192.168.0.7:80", hosts=frozenset())[1]
+    for kind in ("http", "websocket"):
+        assert not ask(kind, **other, **cookie, origin="http://evil.example", hosts=frozenset())[1]
+        assert not ask(kind, **other, **cookie, origin="null", hosts=frozenset())[1]
+
+
+def test_the_port_of_a_file_stays_the_same_while_it_is_free(tmp_path: Path) -> None:
+    """Browsers keep drafts by port; a second server of the file takes another one."""
+    port = usual_port(tmp_path / "a.yaml")
+    assert port == usual_port(tmp_path / "b" / ".." / "a.yaml") != usual_port(tmp_path / "b.yaml")
+    assert 49152 <= port <= 65535
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        number = taken.getsockname()[1]
+        assert free_port("127.0.0.1", 0, wish=number) != number
+        with pytest.raises(ConfigError, match="a free port"):
+            free_port("127.0.0.1", number)
+    assert free_port("127.0.0.1", 0, wish=number) == number
+
+
+@pytest.mark.parametrize(
+    ("given", "kept"),
+    [
+        ("mug.stl", "mug.stl"),
+        ("../../mug.stl", "mug.stl"),
+        ("C:\\users\\me\\mug.stl", "mug.stl"),
+        ("/etc/passwd", "passwd"),
+        ("..", ""),
+        (".bashrc", ""),
+        ("a\nb.stl", ""),
+        ("", ""),
+    ],
+)
+def test_names_of_dropped_files_have_no_folders(given: str, kept: str) -> None:
+    """A name that hides the file, or could not be shown, is refused."""
+    assert own_files.plain_name(given) == kept
+
+
+def test_folders_follow_links(tmp_path: Path) -> None:
+    """A link that leads out of the folders is outside, for reading and for saving."""
+    inside = tmp_path / "in"
+    inside.mkdir()
+    (tmp_path / "out.yaml").write_text("seed: 1\n")
+    (inside / "link.yaml").symlink_to(tmp_path / "out.yaml")
+    (inside / "up").symlink_to(tmp_path)
+    folders = Folders((inside.resolve(),))
+    assert not folders.contains(inside / "link.yaml")
+    assert not folders.contains(inside / "up/out.yaml")
+    assert not folders.contains(inside / "../out.yaml")
+    for named in ("link.yaml", "up/out.yaml", str(tmp_path / "out.yaml")):
+        with pytest.raises(ConfigError, match="outside of the folders of this page"):
+            folders.refuse_outside(f"extends: {named}\n", str(inside / "a.yaml"))
+    folders.refuse_outside("extends: tabletop.yaml\n", str(inside / "a.yaml"))
+    session = Session(OpenedFile(inside / "a.yaml", None), folders, "seed: 2\n")
+    with pytest.raises(StorageError, match="outside"):
+        session.save_as(inside / "link.yaml", overwrite=True)
+    assert (tmp_path / "out.yaml").read_text() == "seed: 1\n"

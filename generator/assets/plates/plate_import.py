@@ -33,7 +33,10 @@ def import_plate(folder: Folder, entry: PlateEntry) -> plates.Plate:
     data = folder.read(entry.file)
     rgb = decode_image(data, place)
     height_px, width_px = rgb.shape[:2]
-    focal_px = _focal_px(entry, data, width_px, height_px)
+    if entry.hfov_deg is None:
+        focal_px = exif_focal_px(data, width_px, height_px)
+    else:
+        focal_px = 0.5 * width_px / math.tan(math.radians(0.5 * entry.hfov_deg))
     try:
         zenith, focal_px, estimate = _find_zenith(entry, rgb, focal_px)
         pose = plates.upright_pose(zenith, entry.camera_height_m)
@@ -59,14 +62,12 @@ def import_plate(folder: Folder, entry: PlateEntry) -> plates.Plate:
     return surroundings(replace(plate, lanes=lanes, ground_color=color), rgb)[0]
 
 
-def _focal_px(entry: PlateEntry, data: bytes, width_px: int, height_px: int) -> float | None:
-    """Focal length by the entry or the photograph's EXIF data; None = neither has it."""
+def exif_focal_px(data: bytes, width_px: int, height_px: int) -> float | None:
+    """Focal length by the EXIF data of a photograph of this size; None = they do not have it."""
     from PIL import Image
 
     with Image.open(io.BytesIO(data)) as image:
         exif = image.getexif()
-    if entry.hfov_deg is not None:
-        return 0.5 * width_px / math.tan(math.radians(0.5 * entry.hfov_deg))
     film_mm = float(exif.get_ifd(_EXIF_IFD).get(_FOCAL_35MM, 0) or 0)
     # The 35 mm equivalent has the same diagonal angle of view (CIPA DCG-001).
     return film_mm * math.hypot(width_px, height_px) / _FILM_DIAGONAL_MM if film_mm > 0 else None

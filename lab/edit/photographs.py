@@ -1,0 +1,161 @@
+"""Photographs that are dropped into the page, as backgrounds of scenes: their entries and scenes.
+
+A photograph does not tell how high its camera was, nor where things may stand in it. Both have
+sliders; the picture of the check shows the horizon and a grid on the ground that follow from them.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+from gen_data.config.merging import node_name
+from gen_data.config.yaml_tree import Node
+from gen_data.core.errors import ConfigError
+from gen_data.lab.edit import text_edits
+
+HFOV_DEG = 65.0
+"""Assumed along the longest edge without EXIF data: main cameras of phones, 28 mm equivalent."""
+TILT_DEG = 30.0
+"""Assumed where the photograph has no edges that show its horizon."""
+SCENE = """\
+# Objects on a photograph.
+assets: {{folders: [{folder}]}}
+elements:
+  - {{type: plate, name: plate, photos: [{photo}]}}
+  - type: objects
+    name: things
+    on: plate
+    count: 4
+    placement: scatter
+    assets: {{ids: [mug, banana, apple, bowl]}}
+randomizers:
+  - {{type: plate, name: plate, photos: [{photo}]}}
+  - {{type: objects, name: things, count: {{uniform_integer: [2, 6]}}}}
+sensors:
+  - {{type: plate_camera, name: color, size_px: [{width}, {height}]}}
+annotations: [boxes2d, instance_masks, visibility]
+exporters:
+  - {{type: coco}}
+"""
+"""Text for an empty file."""
+IMAGE_PX = 640
+"""Longest edge of the images of that text."""
+RENDERED = "rendered"
+"""Tag of the photographs that come with gen-data, which an own one replaces."""
+
+
+@dataclass(frozen=True)
+class Standpoint:
+    """What a photograph does not tell of its camera and ground.
+
+    Attributes:
+        height_m: Height of the camera above the ground, which may be the top of a table.
+        tilt_deg: How far it looks down; None = found from straight edges.
+        hfov_deg: Horizontal field of view; None = of the EXIF data, else ``HFOV_DEG``.
+        across, down: Extent of the ground, shares of the photograph's width from the left and
+            height from the top.
+    """
+
+    height_m: float = 0.5
+    tilt_deg: float | None = None
+    hfov_deg: float | None = None
+    across: tuple[float, float] = (0.1, 0.9)
+    down: tuple[float, float] = (0.45, 0.95)
+
+    def entry(self, name: str, data: bytes, size_px: tuple[int, int]) -> dict[str, Any]:
+        """Entry of the photograph under ``plates`` of an index.
+
+        Args:
+            name: Name of its file.
+            data: Content of the file, for its EXIF data.
+            size_px: Width and height of the upright photograph.
+        """
+        from gen_data.assets.plates.plate_import import exif_focal_px
+
+        width_px, height_px = size_px
+        focal_px = None if self.hfov_deg else exif_focal_px(data, *size_px)
+        entry: dict[str, Any] = {"file": name, "camera_height_m": self.height_m}
+        if focal_px is None:
+            hfov_deg = self.hfov_deg or _assumed_hfov_deg(width_px / max(size_px))
+            entry["hfov_deg"] = hfov_deg
+            focal_px = 0.5 * width_px / math.tan(math.radians(0.5 * hfov_deg))
+        if self.tilt_deg is not None:
+            row_px = 0.5 * height_px - focal_px * math.tan(math.radians(self.tilt_deg))
+            entry["horizon"] = {"height_px": round(row_px, 1)}
+        (left, right), (top, bottom) = self.across, self.down
+        corners = ((left, bottom), (left, top), (right, top), (right, bottom))
+        entry["ground"] = [[round(x * width_px), round(y * height_px)] for x, y in corners]
+        return entry
+
+    def tilted(self) -> Standpoint:
+        """The same with the assumed tilt."""
+        return replace(self, tilt_deg=TILT_DEG)
+
+
+UNKNOWN = Standpoint()
+"""Before the user has said anything."""
+
+
+def _assumed_hfov_deg(share: float) -> float:
+    """Field of view across a photograph whose width is a share of its longest edge."""
+    half = math.atan(share * math.tan(math.radians(0.5 * HFOV_DEG)))
+    return round(math.degrees(2.0 * half), 1)
+
+
+def upright_size_px(data: bytes, name: str) -> tuple[int, int]:
+    """Width and height of a photograph as labelling tools show it.
+
+    Raises:
+        AssetError: it is no image.
+    """
+    from gen_data.assets.image_decoding import decode_image
+
+    height_px, width_px = decode_image(data, name).shape[:2]
+    return width_px, height_px
+
+
+def begin_scene(folder: str, photo: str, size_px: tuple[int, int]) -> str:
+    """Text of a configuration with household objects on a photograph.
+
+    Args:
+        folder: Folder of the assets, as the text names it.
+        photo: Id of the photograph.
+        size_px: Its width and height; images have their shape.
+    """
+    scale = min(1.0, IMAGE_PX / max(size_px))
+    # Video encoders, and many networks, want multiples of 16.
+    width, height = (max(16, round(edge * scale / 16) * 16) for edge in size_px)
+    return SCENE.format(folder=folder, photo=photo, width=width, height=height)
+
+
+def show_behind(text: str, document: Node, photo: str) -> str:
+    """The text of a configuration with one more photograph behind its scenes.
+
+    Raises:
+        ConfigError: its scenes have no plate, or its photographs have no place in the text.
+    """
+    found = [
+        (section, item)
+        for section in ("elements", "randomizers")
+        for item in document.entries[section].items
+        if (kind := item.get("type")) is not None and kind.content == "plate"
+    ]
+    if not any(section == "elements" for section, _ in found):
+        raise ConfigError(
+            "elements: this scene is built of meshes and has no {type: plate}, behind which a "
+            "photograph could stand; begin an empty file with the photograph, or cover the walls "
+            "with it"
+        )
+    for section, item in found:
+        listed = item.get("photos")
+        old = [node.text for node in listed.items] if listed else []
+        photos = [name for name in old if name not in (RENDERED, photo)]
+        text = text_edits.set_value(text, (section, node_name(item), "photos"), [*photos, photo])
+    return text
+
+
+def is_empty(text: str) -> bool:
+    """Whether a text has nothing but comments."""
+    return not any(line.strip() and not line.strip().startswith("#") for line in text.splitlines())
