@@ -23,7 +23,7 @@ def prepare_assets(
         on_progress: Called before each asset with its id, its number from 0 and the number of all.
 
     Returns:
-        Number of assets; those in the cache folder already are only read.
+        Number of assets; assets that the cache folder has are only read.
 
     Raises:
         ConfigError: the configuration is wrong.

@@ -253,8 +253,8 @@ def _alone_first(faces: Ints, x: Array, y: Array, z: Array) -> tuple[Ints, Ints,
     Args:
         faces: Indices [m, 3].
         x: Heights [m] of the first corners above the line.
-        y: Of the second ones.
-        z: Of the third ones.
+        y: Heights [m] of the second corners.
+        z: Heights [m] of the third corners.
     """
     above = (x > 0.0, y > 0.0, z > 0.0)
     is_above = above[0].astype(np.int8) + above[1] + above[2] == 1

@@ -157,7 +157,8 @@ class Pipeline:
         Raises:
             AssetError: the asset cannot be made or read.
         """
-        for engine in (self._bare_renderer, self._physics if collides else None):
+        engines: tuple[object, ...] = (self._bare_renderer, self._physics if collides else None)
+        for engine in engines:
             if isinstance(engine, interfaces.AssetPreparation):
                 engine.prepare_asset(asset_id)
 

@@ -18,8 +18,8 @@ Announce = Callable[[str, int, int], None]
 def prepare_assets(factory: PipelineFactory, announce: Announce) -> int:
     """Make and store the assets of a configuration, with textures, hierarchies, collision shapes.
 
-    Kernels of the renderer are compiled, too. What is stored already is only read. Ids with values
-    that each scene draws, such as those of skies and roads, are without number and are left out.
+    Kernels of the renderer are compiled, too. Stored assets are only read. Ids with values that
+    each scene draws, of skies and roads for example, are without number and are left out.
 
     Returns:
         Number of assets.
