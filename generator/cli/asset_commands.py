@@ -185,8 +185,7 @@ def prepare(
     """Make everything that CONFIG can use ahead of its first run, and keep it in the cache.
 
     For images of containers and nodes of clusters, which take the folder of `gen-data cache info`
-    along. Runs also make assets
-    themselves, each when a scene first has it.
+    along. Runs also make assets themselves, each when a scene first has it.
     """
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
