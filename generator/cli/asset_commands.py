@@ -194,16 +194,21 @@ def prepare(
 
     started_s = time.perf_counter()
     columns = (BarColumn(20), MofNCompleteColumn(), TextColumn("{task.description}"))
-    with Progress(*columns, console=Console(stderr=True)) as bar:
-        task = bar.add_task("kernels", total=None)
+    bar = Progress(*columns, console=Console(stderr=True))
+    task = bar.add_task("")
 
-        def show(asset_id: str, number: int, total: int) -> None:
-            bar.update(task, completed=number, total=total, description=asset_id[:40])
+    def show(asset_id: str, number: int, total: int) -> None:
+        # Started by the first asset, because errors of the configuration come alone.
+        bar.start()
+        bar.update(task, completed=number, total=total, description=asset_id[:40])
 
+    try:
         count = prepare_assets(
             source, seed=seed, overrides=overrides, without=without, on_progress=show
         )
         bar.update(task, completed=count, description="")
+    finally:
+        bar.stop()
     click.echo(f"{source}: {count} assets are ready, {time.perf_counter() - started_s:.0f} s")
 
 
