@@ -208,7 +208,8 @@ def prepare(
         )
         bar.update(task, completed=count, description="")
     finally:
-        bar.stop()
+        if bar.live.is_started:
+            bar.stop()
     click.echo(f"{source}: {count} assets are ready, {time.perf_counter() - started_s:.0f} s")
 
 
