@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from gen_data.api.generate import generate
     from gen_data.api.loader import Loader
     from gen_data.api.open_dataset import open_dataset as open  # noqa: A004
+    from gen_data.api.prepare import prepare_assets
     from gen_data.api.recipes import pull, recipe
     from gen_data.api.rerender import rerender
     from gen_data.api.sample import Box2d, Box3d, CameraReading, Sample
@@ -74,6 +75,7 @@ _HOMES = {
     "make_vec": "gen_data.lab.environment.env",
     "match": "gen_data.lab.matching.api",
     "pull": "gen_data.api.recipes",
+    "prepare_assets": "gen_data.api.prepare",
     "recipe": "gen_data.api.recipes",
     "rerender": "gen_data.api.rerender",
     "AssetError": "gen_data.core.errors",
@@ -125,6 +127,7 @@ __all__ = [
     "make_vec",
     "match",
     "open",
+    "prepare_assets",
     "pull",
     "recipe",
     "rerender",

@@ -38,10 +38,10 @@ class Backdrop(base.RandomizerBase):
     saturation: dist.UnitInterval = dist.Uniform(0.0, 0.35)
     value: dist.UnitInterval = dist.Uniform(0.55, 0.95)
 
-    def possible_assets(self, assets: AssetIndex) -> tuple[str, ...]:
-        """Ids of the texture files to draw from."""
+    def possible_textures(self, assets: AssetIndex) -> tuple[str, ...]:
+        """Ids of the textures to draw from."""
         floors, walls = self._find_options(assets)
-        return base.find_texture_files(assets, (*floors, *walls))
+        return tuple(sorted({*floors, *walls}))
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: streams.Rng) -> Scene:
         """Return the scene with new materials on every background body."""

@@ -35,8 +35,18 @@ class RandomizerBase(Strict):
     def possible_assets(self, assets: AssetIndex) -> tuple[str, ...]:
         """Ids of the assets that only this randomizer can add to a scene; part of the plan.
 
+        By default the files among ``possible_textures``.
+
         Raises:
             ConfigError: a field names an asset that is unknown.
+        """
+        return find_texture_files(assets, self.possible_textures(assets))
+
+    def possible_textures(self, assets: AssetIndex) -> tuple[str, ...]:
+        """Ids of the textures that it may lay on surfaces, sorted: files and generated ones.
+
+        Raises:
+            ConfigError: a field names a texture that is unknown.
         """
         del assets
         return ()
@@ -154,6 +164,8 @@ def find_texture_files(assets: AssetIndex, textures: tuple[str, ...]) -> tuple[s
 
     The release of gen-data identifies generated textures; a plan records hashes of files only.
     """
+    if not textures:
+        return ()
     files = {a.asset_id for a in assets.find((), kind="texture") if "procedural" not in a.tags}
     return tuple(texture for texture in textures if texture in files)
 

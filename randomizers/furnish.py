@@ -13,12 +13,12 @@ from gen_data.core.interfaces import AssetIndex
 from gen_data.core.scene import Region, Scene
 from gen_data.core.se3 import Vec3
 from gen_data.core.streams import Rng
-from gen_data.randomizers.base import RandomizerBase, choose, find_texture_files, find_textures
+from gen_data.randomizers.base import RandomizerBase, choose, find_textures
 from gen_data.randomizers.color_space import hsv_to_linear
 from gen_data.rooms import bodies, furnishing, layout, outlook
 from gen_data.rooms.floor_plan import Room, between, draw_plan
 from gen_data.rooms.options import families_of, find_options
-from gen_data.rooms.rules import APARTMENT, Range, find_room_type
+from gen_data.rooms.rules import APARTMENT, Range, find_room_type, room_types
 
 TRIES, TRIES_PER_ROOM = 12, 3
 """Floor plans tried before the scene is rejected, and layouts of each of their rooms."""
@@ -52,8 +52,14 @@ class Furnish(RandomizerBase):
 
     def possible_assets(self, assets: AssetIndex) -> tuple[str, ...]:
         """Ids of assets outside, and texture files; the element's group lists the furniture."""
-        floors = find_textures(assets, ("floor",), f"randomizers.{self.name}")
-        return (*find_texture_files(assets, floors), *outlook.outlook_assets())
+        return (*super().possible_assets(assets), *outlook.outlook_assets())
+
+    def possible_textures(self, assets: AssetIndex) -> tuple[str, ...]:
+        """Ids of the textures of floors and walls of any type of room."""
+        families = {"floor"}
+        for rules in room_types().values():
+            families |= {*rules.floor, *rules.walls, *rules.splashback, *rules.accent}
+        return find_textures(assets, tuple(sorted(families)), f"randomizers.{self.name}")
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
         """Return the scene with the room redrawn.

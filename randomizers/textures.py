@@ -7,7 +7,7 @@ from pydantic import Field
 from gen_data.config import distributions as dist
 from gen_data.core import interfaces, streams
 from gen_data.core.scene import Scene
-from gen_data.randomizers.base import SurfaceRandomizer, choose, find_texture_files, find_textures
+from gen_data.randomizers.base import SurfaceRandomizer, choose, find_textures
 
 
 class Textures(SurfaceRandomizer):
@@ -26,9 +26,9 @@ class Textures(SurfaceRandomizer):
     scale_m: dist.Positive = dist.Uniform(0.15, 0.6)
     slots: tuple[int, ...] = ()
 
-    def possible_assets(self, assets: interfaces.AssetIndex) -> tuple[str, ...]:
-        """Ids of the texture files to draw from."""
-        return find_texture_files(assets, self._find_options(assets))
+    def possible_textures(self, assets: interfaces.AssetIndex) -> tuple[str, ...]:
+        """Ids of the textures to draw from."""
+        return self._find_options(assets)
 
     def __call__(self, scene: Scene, assets: interfaces.AssetIndex, rng: streams.Rng) -> Scene:
         """Return the scene with one texture per target."""

@@ -85,9 +85,10 @@ class DiskCache:
         """Load the arrays of a content key; None if they are not stored."""
         return _load(self._path(key), key, self._intact)
 
-    def _path(self, key: str) -> Path:
-        # Versions of this program that store other arrays may share the folder.
-        return self.folder / f"format-{FORMAT}" / key[:2] / f"{key}.arrays"
+    def _path(self, key: str) -> str:
+        # Versions of this program that store other arrays may share the folder. As text: a scene
+        # asks for hundreds of files, and a Path takes longer than opening one.
+        return f"{self.folder}/format-{FORMAT}/{key[:2]}/{key}.arrays"
 
     def load_json(self, name: str) -> dict[str, Any]:
         """Load a JSON object by name; empty if it is missing or damaged."""
@@ -197,14 +198,14 @@ def _decode_checked(data: bytes | memoryview, key: str) -> Arrays | None:
     return arrays
 
 
-def _load(path: Path, key: str, intact: CountCache[None]) -> Arrays | None:
+def _load(path: str, key: str, intact: CountCache[None]) -> Arrays | None:
     """Load the arrays of a file; None if it is missing, damaged, or has another key.
 
     Files with a right checksum are noted in ``intact``: later loads, of which there are hundreds
     per scene, need not read them as a whole again unless they have been replaced.
     """
     try:
-        with path.open("rb") as file:
+        with open(path, "rb") as file:  # noqa: PTH123
             facts = os.fstat(file.fileno())
             version = f"{key} {facts.st_ino} {facts.st_size} {facts.st_mtime_ns}"
             if facts.st_size < _MAPPED_BYTES_MIN:
@@ -230,9 +231,9 @@ def _is_intact(file: BinaryIO) -> bool:
     return actual == expected
 
 
-def _store(path: Path, key: str, arrays: Arrays) -> None:
+def _store(path: str, key: str, arrays: Arrays) -> None:
     data = encode_arrays(key, arrays)
-    _write_atomically(path, lambda file: file.write(data))
+    _write_atomically(Path(path), lambda file: file.write(data))
 
 
 def _padding(size: int) -> int:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from gen_data.cli import options
 from gen_data.cli.tables import print_tables
 from gen_data.core.errors import AssetError, ConfigError, did_you_mean
 
@@ -173,6 +174,43 @@ def pack(folder: Path, out: Path | None, force: bool) -> None:
     with storage_errors(target, ""):
         digest = write_pack(folder, target)
         click.echo(f"{target}: {_format_mb(target.stat().st_size)}, sha256 {digest}")
+
+
+@assets.command()
+@click.argument("source", metavar="CONFIG")
+@options.configuration_options
+def prepare(
+    source: str, seed: int | None, overrides: tuple[str, ...], without: tuple[str, ...]
+) -> None:
+    """Make everything that CONFIG can use ahead of its first run, and keep it in the cache.
+
+    For images of containers and nodes of clusters, which take the folder of `gen-data cache info`
+    along. Runs also make assets themselves, each when a scene first has it.
+    """
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+
+    from gen_data.api.prepare import prepare_assets
+
+    started_s = time.perf_counter()
+    columns = (BarColumn(20), MofNCompleteColumn(), TextColumn("{task.description}"))
+    bar = Progress(*columns, console=Console(stderr=True))
+    task = bar.add_task("")
+
+    def show(asset_id: str, number: int, total: int) -> None:
+        # Started by the first asset, because errors of the configuration come alone.
+        bar.start()
+        bar.update(task, completed=number, total=total, description=asset_id[:40])
+
+    try:
+        count = prepare_assets(
+            source, seed=seed, overrides=overrides, without=without, on_progress=show
+        )
+        bar.update(task, completed=count, description="")
+    finally:
+        if bar.live.is_started:
+            bar.stop()
+    click.echo(f"{source}: {count} assets are ready, {time.perf_counter() - started_s:.0f} s")
 
 
 @assets.command()

@@ -77,6 +77,8 @@ def progress_bar(n: int) -> Iterator[Callable[[RunProgress], None]]:
         bar.update(
             task,
             completed=progress.done,
+            # A worker with empty caches makes the assets of its first scene for half a minute.
+            description="samples" if progress.samples_per_s else "first assets",
             rate=f"{progress.samples_per_s:.1f}/s",
             rejections=progress.rejections,
         )

@@ -183,6 +183,18 @@ class DerivedArrays(Protocol):
         ...
 
 
+@runtime_checkable
+class AssetPreparation(Protocol):
+    """An engine that computes arrays from assets, which ``DerivedArrays`` stores."""
+
+    def prepare_asset(self, asset_id: str) -> None:
+        """Compute and store what this engine derives from an asset and the textures on it.
+
+        Nothing where it derives nothing from assets of that kind. Raises AssetError as the library.
+        """
+        ...
+
+
 class Element(Protocol):
     """One line of a template. Draws nothing: every scene of a template has the same elements."""
 

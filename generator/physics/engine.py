@@ -75,6 +75,11 @@ class Engine:
         shown = demonstrate(settled, fixed, names, arms)
         return Settled(scene, shown) if isinstance(shown, Rejection) else Settled(shown)
 
+    def prepare_asset(self, asset_id: str) -> None:
+        """See ``AssetPreparation``: collision shapes of objects."""
+        if self._assets.get(asset_id).kind == "object":
+            self._shape(asset_id)
+
     def weigh(self, scene: Scene) -> Scene:
         """The scene with a mass for every body that collides, guessed where none is known."""
         return scene.with_bodies(*(replace(b, mass_kg=self._mass_kg(b)) for b in _solids(scene)))

@@ -60,7 +60,7 @@ def lift_scene(scene: Scene, assets: AssetLibrary) -> Scene:
     relief = scene.relief
     if relief is None:
         return scene
-    lanes = tuple(_lifted_lane(lane, relief) for lane in scene.lanes)
+    lanes = _lifted_lanes(scene.lanes, relief)
     heights_m = [point[2] for lane in lanes for point in lane.center_m] or [0.0]
     sky_m = max(heights_m)
     bodies, moves = _lift_bodies(scene, assets, relief, sky_m)
@@ -312,13 +312,41 @@ def _lifted_light(light: Light, moves: dict[str, SE3], relief: Relief) -> Light:
     return scene_time.moved_light(light, _rise(pose, relief))
 
 
-def _lifted_lane(lane: Lane, relief: Relief) -> Lane:
-    """The lane with its points on the ground, and more of them where that bends."""
-    points, given = _refined(np.asarray(lane.center_m, np.float64))
-    across_m = max(lane.width_m, 1.0)
-    half = 0.5 * across_m * lane_geometry.left_normals(points)
-    points[:, 2] += relief.height(points)
-    rise = relief.height(points + half) - relief.height(points - half)
+def _lifted_lanes(lanes: Sequence[Lane], relief: Relief) -> tuple[Lane, ...]:
+    """The lanes with their points on the ground, and more of them where that bends.
+
+    The ground is asked for all points at once: a street has a hundred lanes of a few points.
+    """
+    if not lanes:
+        return ()
+    lines = [_refined(np.asarray(lane.center_m, np.float64)) for lane in lanes]
+    halves = [
+        0.5 * _across_m(lane) * lane_geometry.left_normals(points)
+        for lane, (points, _) in zip(lanes, lines, strict=True)
+    ]
+    middle, half = np.concatenate([points for points, _ in lines]), np.concatenate(halves)
+    ends = np.cumsum([len(points) for points, _ in lines])[:-1]
+    heights, lefts, rights = (
+        np.split(relief.height(at), ends) for at in (middle, middle + half, middle - half)
+    )
+    return tuple(
+        _lifted_lane(lane, *line, height, left - right)
+        for lane, line, height, left, right in zip(
+            lanes, lines, heights, lefts, rights, strict=True
+        )
+    )
+
+
+def _across_m(lane: Lane) -> float:
+    return max(lane.width_m, 1.0)
+
+
+def _lifted_lane(
+    lane: Lane, points: Array, given: NDArray[np.bool_], height: Array, rise: Array
+) -> Lane:
+    """A lane from its refined line [n, 3], heights of the ground, and rises across it, [n]."""
+    across_m = _across_m(lane)
+    points[:, 2] += height
     bank = lane.bank + float(rise.mean()) / across_m
     banks = lane.bank + rise / across_m
     is_twisted = np.ptp(banks) > _TWIST
@@ -329,9 +357,7 @@ def _lifted_lane(lane: Lane, relief: Relief) -> Lane:
     if is_twisted:
         twisted = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(banks)))])
         given[1:] |= np.diff(np.floor(twisted / _TURN)) > 0.0
-    center = [
-        (round(float(x), 6), round(float(y), 6), round(float(z), 6)) for x, y, z in points[given]
-    ]
+    center = [(round(x, 6), round(y, 6), round(z, 6)) for x, y, z in points[given].tolist()]
     given_banks = np.round(banks[given], 9) + 0.0
     return replace(
         lane,

@@ -124,7 +124,11 @@ class Pipeline:
     @cached_property
     def renderer(self) -> interfaces.Renderer:
         """The renderer, opened by the context or on first use; merging shards needs none."""
-        return checked_renderer.CheckedRenderer(self._open_renderer())
+        return checked_renderer.CheckedRenderer(self._bare_renderer)
+
+    @cached_property
+    def _bare_renderer(self) -> interfaces.Renderer:
+        return self._open_renderer()
 
     def __enter__(self) -> "Pipeline":
         """Start the engines."""
@@ -147,6 +151,17 @@ class Pipeline:
     def numerics(self) -> Mapping[str, str]:
         """Digests of small computations with these engines; see ``numerics_digests``."""
         return numerics_digests(self.renderer, self._physics)
+
+    def prepare_asset(self, asset_id: str, *, collides: bool) -> None:
+        """Store what the renderer derives from an asset, and physics if it may collide.
+
+        Raises:
+            AssetError: the asset cannot be made or read.
+        """
+        engines: tuple[object, ...] = (self._bare_renderer, self._physics if collides else None)
+        for engine in engines:
+            if isinstance(engine, interfaces.AssetPreparation):
+                engine.prepare_asset(asset_id)
 
     def sample(self, index: int) -> Sample:
         """Generate sample number ``index``, from 0.

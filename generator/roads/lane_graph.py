@@ -137,7 +137,12 @@ def link_lanes(lanes: Sequence[Lane]) -> tuple[Lane, ...]:
     starts = [
         (lane.name, lane.kind, lane.center_m[0], _heading(lane.center_m, 0)) for lane in lanes
     ]
-    return tuple(replace(lane, successors=tuple(_find_successors(lane, starts))) for lane in lanes)
+    linked = ((lane, tuple(_find_successors(lane, starts))) for lane in lanes)
+    # A lane is measured once, as long as it is the same object.
+    return tuple(
+        lane if lane.successors == found else replace(lane, successors=found)
+        for lane, found in linked
+    )
 
 
 def _find_successors(lane: Lane, starts: Iterable[tuple[str, LaneKind, Vec3, float]]) -> list[str]:

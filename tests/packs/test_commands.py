@@ -68,3 +68,10 @@ def test_errors_have_one_message_and_their_exit_code(
     assert done.returncode == code
     assert said in done.stderr and "Traceback" not in done.stderr
     assert not (tmp_path / "packs" / "hdri").exists()
+
+
+def test_prepare_of_a_missing_configuration_says_so_alone(tmp_path: Path) -> None:
+    done = gen_data("assets", "prepare", "missing.yaml", home=tmp_path)
+    assert done.returncode == 2
+    assert done.stdout == ""
+    assert done.stderr.startswith("gen-data: there is no configuration 'missing.yaml'")

@@ -64,6 +64,10 @@ class WarpRenderer:
             tracer = PathTracer(self._cache, self._settings)
             self._context = replace(self._context, paths=tracer)
 
+    def prepare_asset(self, asset_id: str) -> None:
+        """See ``AssetPreparation``: hierarchies of meshes, levels of textures."""
+        self._cache.prepare(asset_id)
+
     def render(
         self,
         scene: Scene,

@@ -38,8 +38,12 @@ _LARGE_FACES_MAX = 256
 _CONVEXITY_FACES_MAX = 2000
 
 
+@cache
 def arrays_version() -> str:
-    """Everything but the asset that prepared arrays depend on: code and libraries."""
+    """Everything but the asset that prepared arrays depend on: code and libraries.
+
+    Read once: a street asks for hundreds of meshes and textures.
+    """
     modules = (__file__, bvh.__file__, bvh_build.__file__, colorimetry.__file__)
     return code_digests.code_digest(
         modules, native("scene/kernels/grow.h"), cv2.__version__, np.__version__, wp.__version__
@@ -264,14 +268,13 @@ def upload_texture(prepared: Arrays, device: wp.Device) -> DeviceTexture:
     fields |= dict(zip(("height", "width", "levels"), prepared["size"], strict=True))
     fields |= {f"has_{name}": int(name in prepared) for name in _OPTIONAL}
     texels = arrays["texels"].held
-    nbytes = sum(values.nbytes for values in images.values()) + cover.nbytes
     if device.is_cpu:
         texels = wp.array(texels, dtype=wp.uint32, device=device, copy=False)
     return DeviceTexture(
         _make_record(records.TextureRecord, fields),
         tuple(array.held for array in arrays.values()),
         texels,
-        nbytes,
+        sum(array.nbytes for array in arrays.values()),
         layered="shares" in prepared or "glow" in prepared,
         has_cutouts="cover" in prepared,
     )

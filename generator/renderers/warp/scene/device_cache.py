@@ -129,6 +129,17 @@ class DeviceCache:
             return compute()
         return self._store.derived(asset_id, f"{name} {device_assets.arrays_version()}", compute)
 
+    def prepare(self, asset_id: str) -> None:
+        """Store what an object with its textures, a texture or an environment needs."""
+        kind = self.assets.get(asset_id).kind
+        if kind == "environment":
+            self.assets.environment(asset_id)
+        elif kind == "texture":
+            self.texture(asset_id)
+        elif kind == "object":
+            for texture in sorted({m.texture for m in self.materials(asset_id)} - {""}):
+                self.texture(texture)
+
     def environment(self, environment_id: str) -> environment_maps.DeviceEnvironment:
         """Light of an environment, as an image."""
         return self._environments.get(

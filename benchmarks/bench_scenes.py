@@ -1,0 +1,87 @@
+"""Cost of new scenes, of this checkout and an older one: ``python -m benchmarks.bench_scenes OLD``.
+
+Both draw the same samples, one new scene each, in turns; each turn is a new process, whose first
+samples are not counted. CPU ms per sample, of all threads and with system time, is the least
+of the rounds; the ratio is this checkout's over the older one's.
+
+The first round of each build fills the caches; let it run once before for figures of warm caches.
+"""
+
+import argparse
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from benchmarks.runs import machine
+
+CONFIGS = ("street", "kitti_rig", "rooms", "pedestrians", "closeup", "tabletop")
+_HERE = Path(__file__).resolve().parent.parent
+
+
+def measure(name: str, views: int, n: int, warm_up: int) -> float:
+    """CPU ms per sample of ``n`` samples after ``warm_up`` others, with images and labels."""
+    from benchmarks.runs import cpu_s
+    from gen_data.assemble.config import load_config
+    from gen_data.assemble.pipeline_factory import PipelineFactory
+    from gen_data.runner.shard import write_images, write_records
+
+    overrides = (f"views_per_scene={views}", "steps_per_scene=1")
+    factory = PipelineFactory(load_config(f"{name}.yaml", overrides=overrides), n + warm_up)
+    with tempfile.TemporaryDirectory() as folder, factory() as pipeline:
+        for index in range(n + warm_up):
+            if index == warm_up:
+                started_s = cpu_s()
+            shard = Path(folder) / str(index)
+            shard.mkdir()
+            sample = pipeline.sample(index)
+            write_images(pipeline.info, sample, shard)
+            write_records(sample, None, shard)
+            for exporter in pipeline.exporters.values():
+                exporter.write_shard(pipeline.info, [sample], shard)
+        return 1e3 * (cpu_s() - started_s) / n
+
+
+def _measure_in(checkout: Path, *arguments: str) -> float:
+    """Run this file with the packages of a checkout."""
+    command = [sys.executable, str(Path(__file__).resolve()), "--one", *arguments]
+    # This checkout's benchmarks with the other one's packages.
+    path = os.pathsep.join((str(checkout), str(_HERE)))
+    done = subprocess.run(
+        command, env={**os.environ, "PYTHONPATH": path}, stdout=subprocess.PIPE, check=True
+    )
+    return float(done.stdout.split()[-1])
+
+
+def main() -> None:
+    """Print a row per configuration."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("old", type=Path, nargs="?", help="checkout of the older build")
+    parser.add_argument("--configs", default=",".join(CONFIGS))
+    parser.add_argument("--views", type=int, default=1, help="views per scene")
+    parser.add_argument("--n", type=int, default=40)
+    parser.add_argument("--warm-up", type=int, default=20)
+    parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--one", nargs=4, help=argparse.SUPPRESS)
+    given = parser.parse_args()
+    if given.one:
+        name, *numbers = given.one
+        print(measure(name, *map(int, numbers)))
+        return
+    if given.old is None:
+        parser.error("expected the path of an older checkout")
+    print(f"{machine()}, {given.views} views per scene, {given.n} samples, {given.rounds} rounds")
+    print(f"{'':<12} {'old, CPU ms':>12} {'new, CPU ms':>12} {'ratio':>6}")
+    numbers = [str(number) for number in (given.views, given.n, given.warm_up)]
+    for name in given.configs.split(","):
+        rounds = [
+            [_measure_in(where, name, *numbers) for where in (given.old, _HERE)]
+            for _ in range(given.rounds)
+        ]
+        old_ms, new_ms = (min(column) for column in zip(*rounds, strict=True))
+        print(f"{name:<12} {old_ms:12.0f} {new_ms:12.0f} {new_ms / old_ms:6.2f}", flush=True)
+
+
+if __name__ == "__main__":
+    main()
