@@ -56,7 +56,7 @@ def check_channels(info: DatasetInfo, channels: Iterable[Channel], exporter: str
 def require_channels(
     info: DatasetInfo, camera: str, channels: Iterable[Channel], exporter: str, remedy: str = ""
 ) -> None:
-    """Reject a camera that lacks a channel; ``remedy`` is what else helps.
+    """Reject a camera that lacks a channel; ``remedy`` ends the message.
 
     Raises:
         ConfigError: a channel is missing.

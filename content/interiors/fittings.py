@@ -9,9 +9,11 @@ from gen_data.assets.family import Solid
 from gen_data.content.interiors.parts import (
     HOUSEHOLD,
     Box,
+    Measures,
     board,
     cloth,
     disc,
+    drawn,
     front,
     lacquer,
     rod,
@@ -106,24 +108,13 @@ def tube_lamp(seed: int = 0) -> Solid:
     return _with_lamp(made, (0.0, 0.0, -0.13))
 
 
-def floor_lamp(seed: int = 0) -> Solid:
-    """A lamp on a pole. Slots: metal, shade."""
-    rng = variant_rng("floor_lamp", seed)
-    return _standing_lamp(
-        rng, rng.between(1.35, 1.65, "top_m"), rng.between(0.17, 0.24, "shade_m"), 0.14
-    )
+def standing_lamp(family: str, seed: int, measures: Measures) -> Solid:
+    """A lamp on a pole with a foot. Slots: metal, shade.
 
-
-def table_lamp(seed: int = 0) -> Solid:
-    """A lamp for tables. Slots: metal, shade."""
-    rng = variant_rng("table_lamp", seed)
-    return _standing_lamp(
-        rng, rng.between(0.34, 0.52, "top_m"), rng.between(0.1, 0.15, "shade_m"), 0.075
-    )
-
-
-def _standing_lamp(rng: VariantRng, top_m: float, shade_m: float, foot_m: float) -> Solid:
-    z, r = top_m, shade_m
+    Measures: height, radii of shade and foot.
+    """
+    rng = variant_rng(family, seed)
+    z, r, foot_m = drawn(rng, measures).values()
     h = r * rng.between(0.9, 1.3)
     paint = rng.choose(
         (
@@ -323,19 +314,9 @@ def radiator(seed: int = 0) -> Solid:
     )
 
 
-def television(seed: int = 0) -> Solid:
-    """A television on feet, on or off by its lit screen. Slots: housing, screen."""
-    rng = variant_rng("television", seed)
-    return _screen(rng.between(0.9, 1.35, "width_m"), 0.05, "television")
-
-
-def monitor(seed: int = 0) -> Solid:
-    """A monitor on a stand. Slots: housing, screen."""
-    rng = variant_rng("monitor", seed)
-    return _screen(rng.between(0.5, 0.65, "width_m"), 0.13, "monitor")
-
-
-def _screen(w: float, lift_m: float, name: str) -> Solid:
+def screen(family: str, seed: int, measures: Measures) -> Solid:
+    """A screen on its stand, on or off. Slots: housing, screen. Measures: width, lower edge."""
+    w, lift_m = drawn(variant_rng(family, seed), measures).values()
     h = w * 9 / 16 + 0.02
     y = 0.5 * w
     panel: Box = ((-0.02, -y, lift_m), (0.015, y, lift_m + h))
@@ -343,7 +324,7 @@ def _screen(w: float, lift_m: float, name: str) -> Solid:
         (0.0155, -y + 0.008, lift_m + 0.012), (0.0, w - 0.016, 0.0), (0.0, 0.0, h - 0.02)
     ).painted(1)
     patches = [shapes.block(*panel, 0.004), glass]
-    if name == "monitor":
+    if family == "monitor":
         patches += [
             shapes.block((-0.09, -0.11, 0.0), (0.09, 0.11, 0.012), 0.004),
             shapes.block((-0.045, -0.03, 0.01), (-0.02, 0.03, lift_m + 0.15), 0.004),

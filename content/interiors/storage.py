@@ -11,8 +11,10 @@ from gen_data.content.interiors.cartons import carton_looks, tape_carton
 from gen_data.content.interiors.parts import (
     LACQUERS,
     Box,
+    Measures,
     board,
     brushed_steel,
+    drawn,
     front,
     handle,
     lacquer,
@@ -64,32 +66,6 @@ def carcass(
     return made
 
 
-def _measures(family: str, seed: int) -> tuple[VariantRng, float, float, float, float, int]:
-    """Draws, depth, width, lower and upper edge of the fronts, and number of doors."""
-    rng = variant_rng(family, seed)
-    if family == "wardrobe":
-        return (
-            rng,
-            rng.between(0.55, 0.62, "depth_m"),
-            rng.turn((0.8, 1.0, 1.2), "width_m"),
-            0.08,
-            rng.between(1.9, 2.2, "height_m"),
-            2,
-        )
-    if family == "refrigerator":
-        return (
-            rng,
-            rng.between(0.6, 0.66, "depth_m"),
-            rng.between(0.56, 0.68, "width_m"),
-            0.62,
-            rng.between(1.55, 1.9, "height_m"),
-            1,
-        )
-    if family == "wall_unit":
-        return rng, rng.between(0.32, 0.36, "depth_m"), rng.turn((0.6, 0.8), "width_m"), 0.0, 0.7, 2
-    return rng, 0.58, 0.6, 0.1, 0.86, 1
-
-
 def _looks(family: str, rng: VariantRng, seed: int) -> list[Material]:
     steel = brushed_steel(seed)
     if family == "refrigerator":
@@ -107,9 +83,13 @@ def _looks(family: str, rng: VariantRng, seed: int) -> list[Material]:
     return [body, body if rng.chance(0.5) else lacquer(rng), steel]
 
 
-def cupboard(family: str, seed: int) -> Solid:
-    """A cupboard without the door that opens. Slots: carcass, front, handle, then worktop."""
-    rng, d, w, low, high, doors = _measures(family, seed)
+def cupboard(family: str, seed: int, measures: Measures) -> Solid:
+    """A cupboard without the door that opens. Slots: carcass, front, handle, then worktop.
+
+    Measures: depth, width, lower and upper edge of the fronts, number of doors.
+    """
+    rng = variant_rng(family, seed)
+    d, w, low, high, doors = drawn(rng, measures).values()
     levels = _levels_m(family, low, high)
     x, half = 0.5 * d, 0.5 * w
     boards = carcass(d, w, low, high)
@@ -167,9 +147,10 @@ def _levels_m(family: str, low_m: float, high_m: float) -> tuple[float, ...]:
     return tuple(low_m + _T + k * (high_m - low_m - _T) / count for k in range(count))
 
 
-def cupboard_door(family: str, seed: int) -> Solid:
+def cupboard_door(family: str, seed: int, measures: Measures) -> Solid:
     """The door that opens of the cupboard of the same seed. Slots: carcass, front, handle."""
-    rng, _, w, low, high, doors = _measures(family, seed)
+    rng = variant_rng(family, seed)
+    _, w, low, high, doors = drawn(rng, measures).values()
     h, width = high - low, w / doors
     thick = 0.045 if family == "refrigerator" else 0.018
     leaf: Box = ((0.0, 0.002, 0.003), (thick, width - 0.002, h - 0.003))
@@ -231,42 +212,6 @@ def _grip(low: float, high: float) -> float:
     return high - 0.14 if high < 1.0 else 1.05
 
 
-def _chest_measures(family: str, seed: int) -> tuple[VariantRng, float, float, float, float, int]:
-    """Draws, depth, width, height, height of the feet, number of drawers."""
-    rng = variant_rng(family, seed)
-    match family:
-        case "dresser":
-            return (
-                rng,
-                rng.between(0.42, 0.5, "depth_m"),
-                rng.between(0.8, 1.3, "width_m"),
-                rng.between(0.74, 1.05, "height_m"),
-                0.09,
-                rng.turn((3, 4), "drawers"),
-            )
-        case "bedside_table":
-            return (
-                rng,
-                rng.between(0.35, 0.42, "depth_m"),
-                rng.between(0.4, 0.5, "width_m"),
-                rng.between(0.42, 0.58, "height_m"),
-                0.1,
-                rng.turn((1, 2), "drawers"),
-            )
-        case "filing_cabinet":
-            drawers = rng.turn((2, 3, 4), "drawers")
-            return rng, 0.58, 0.42, (0.7, 1.02, 1.32)[drawers - 2], 0.02, drawers
-        case _:
-            return (
-                rng,
-                rng.between(0.42, 0.5, "depth_m"),
-                rng.between(0.6, 0.8, "width_m"),
-                rng.between(0.8, 0.95, "height_m"),
-                0.12,
-                5,
-            )
-
-
 def _chest_looks(family: str, rng: VariantRng) -> list[Material]:
     steel = metal_material(STAINLESS, 0.3)
     if family == "filing_cabinet":
@@ -279,9 +224,13 @@ def _chest_looks(family: str, rng: VariantRng) -> list[Material]:
     return [body, body if rng.chance(0.6) else lacquer(rng), steel]
 
 
-def chest(family: str, seed: int) -> Solid:
-    """A chest without its top drawer. Slots: carcass, front, handle."""
-    rng, d, w, z, feet, count = _chest_measures(family, seed)
+def chest(family: str, seed: int, measures: Measures) -> Solid:
+    """A chest without its top drawer. Slots: carcass, front, handle.
+
+    Measures: depth, width, height of the feet, number of drawers, height.
+    """
+    rng = variant_rng(family, seed)
+    d, w, feet, count, z = drawn(rng, measures).values()
     boards = carcass(d, w, feet, z)
     patches = [board(*b) for b in boards]
     x, h = 0.5 * d, (z - feet - _T) / count
@@ -306,9 +255,10 @@ def chest(family: str, seed: int) -> Solid:
     return replace(made, keypoints=(slide,))
 
 
-def drawer(family: str, seed: int) -> Solid:
+def drawer(family: str, seed: int, measures: Measures) -> Solid:
     """The top drawer of the chest of the same seed. Slots: carcass, front, handle."""
-    rng, d, w, z, feet, count = _chest_measures(family, seed)
+    rng = variant_rng(family, seed)
+    d, w, feet, count, z = drawn(rng, measures).values()
     h, depth, half = (z - feet - _T) / count, d - 0.04, 0.5 * w - 0.022
     boxes: list[Box] = [
         ((0.0, -half, 0.002), (0.016, half, h - _T * 0.5 - 0.003)),
