@@ -153,9 +153,8 @@ def _bent(patch: Patch, wrap_per_m: float, lumbar_m: float) -> Patch:
     return replace(patch, corners_m=p)
 
 
-def chair(seed: int = 0) -> Solid:
+def chair(rng: VariantRng) -> Solid:
     """A chair for tables, wooden, upholstered or a shell on steel. Slots: seat, legs."""
-    rng = variant_rng("chair", seed)
     w = rng.between(0.4, 0.48, "width_m")
     d = rng.between(0.42, 0.48, "depth_m")
     z = rng.between(0.44, 0.47, "seat_m")
@@ -206,9 +205,8 @@ def chair(seed: int = 0) -> Solid:
     return replace(made, keypoints=(*supports, Keypoint(BACKREST, edge)))
 
 
-def stool(seed: int = 0) -> Solid:
+def stool(rng: VariantRng) -> Solid:
     """A stool, low or at bar height. Slots: seat, legs."""
-    rng = variant_rng("stool", seed)
     z = rng.turn((0.45, 0.65), "seat_m") + rng.between(-0.02, 0.02)
     r = rng.between(0.15, 0.19, "radius_m")
     patches = [disc(0, 0, z - 0.035, z, r, 0, 32)]
@@ -223,9 +221,8 @@ def stool(seed: int = 0) -> Solid:
     )
 
 
-def office_chair(seed: int = 0) -> Solid:
+def office_chair(rng: VariantRng) -> Solid:
     """A swivel chair on five castors. Slots: cover, base."""
-    rng = variant_rng("office_chair", seed)
     w, z = rng.between(0.46, 0.52, "width_m"), rng.between(0.44, 0.52, "seat_m")
     top = z + rng.between(0.48, 0.7)
     high, half = top - z - 0.08, 0.46 * w
@@ -294,9 +291,8 @@ def table(
     return _rectangular_table(rng, **drawn(rng, sides or {}))
 
 
-def workbench(seed: int = 0) -> Solid:
+def workbench(rng: VariantRng) -> Solid:
     """A workbench with a thick top and a lower board. Slots: top, legs."""
-    rng = variant_rng("workbench", seed)
     d = rng.between(0.6, 0.75, "depth_m")
     w = rng.between(1.4, 2.0, "width_m")
     z = rng.between(0.82, 0.92, "height_m")

@@ -272,18 +272,16 @@ def drawer(family: str, seed: int, measures: Measures) -> Solid:
     return solid(patches, _chest_looks(family, rng), boxes)
 
 
-def bookcase(seed: int = 0) -> Solid:
+def bookcase(rng: VariantRng) -> Solid:
     """A bookcase. Slot: boards."""
-    rng = variant_rng("bookcase", seed)
     d = rng.between(0.26, 0.36, "depth_m")
     w = rng.turn((0.4, 0.8, 1.0), "width_m")
     z = rng.between(0.9, 2.05, "height_m")
     return _shelves(d, w, z, [front(rng)])
 
 
-def steel_rack(seed: int = 0) -> Solid:
+def steel_rack(rng: VariantRng) -> Solid:
     """A rack of steel for storage. Slots: boards, posts."""
-    rng = variant_rng("steel_rack", seed)
     d = rng.between(0.4, 0.55, "depth_m")
     w = rng.between(0.9, 1.3, "width_m")
     z = rng.between(1.7, 2.0, "height_m")
@@ -320,9 +318,8 @@ def board_levels_m(height_m: float) -> tuple[float, ...]:
     return shelf_levels_m((1.0, 1.0, height_m), max(1, round((height_m - 0.06) / PITCH_M)))
 
 
-def pallet_rack(seed: int = 0) -> Solid:
+def pallet_rack(rng: VariantRng) -> Solid:
     """A rack for pallets with three levels above the floor. Slots: uprights, beams, decks."""
-    rng = variant_rng("pallet_rack", seed)
     d, w = 1.3, rng.between(2.4, 2.8, "width_m")
     z = 3 * PALLET_PITCH_M + rng.between(0.1, 0.3)
     uprights: list[Box] = []
@@ -358,9 +355,8 @@ PALLET_PITCH_M = 1.5
 """Distance between the levels of racks for pallets."""
 
 
-def pallet(seed: int = 0) -> Solid:
+def pallet(rng: VariantRng) -> Solid:
     """A pallet of 1.2 m by 0.8 m (EN 13698-1), most with boxes. Slots: wood, boxes."""
-    rng = variant_rng("pallet", seed)
     patches: list[Patch] = []
     for y in (-0.3275, 0.0, 0.3275):
         patches.append(board((-0.6, y - 0.05, 0.0), (0.6, y + 0.05, 0.022)))
@@ -372,7 +368,7 @@ def pallet(seed: int = 0) -> Solid:
         y = -0.3275 + k * 0.16375
         patches.append(board((-0.6, y - 0.06, 0.122), (0.6, y + 0.06, 0.144)))
     boxes: list[Box] = [((-0.6, -0.4, 0.0), (0.6, 0.4, 0.144))]
-    goods, looks, high = _goods(seed, rng)
+    goods, looks, high = _goods(rng.seed, rng)
     patches += [patch.moved(0.0, 0.0, 0.144) for patch in goods]
     if high > 0.0:
         boxes.append(((-0.59, -0.39, 0.144), (0.59, 0.39, 0.144 + high)))
@@ -537,29 +533,27 @@ def _mixed(seed: int, rng: VariantRng) -> tuple[list[Patch], list[Material], flo
     return patches, _in_film(carton_looks(rng, seed)), top
 
 
-def storage_box(seed: int = 0) -> Solid:
+def storage_box(rng: VariantRng) -> Solid:
     """A closed box of cardboard or plastic. Slots: body, lid."""
-    rng = variant_rng("storage_box", seed)
     x = 0.5 * rng.between(0.28, 0.44, "depth_m")
     y = 0.5 * rng.between(0.3, 0.56, "width_m")
     z = rng.between(0.18, 0.4, "height_m")
     low: Box = ((-x, -y, 0.0), (x, y, z - 0.03))
     lid: Box = ((-x - 0.006, -y - 0.006, z - 0.06), (x + 0.006, y + 0.006, z))
     if rng.chance(0.5):
-        looks = [patterned_material(f"texture/cardboard?seed={seed % 16}", 0.5, 0.85)] * 2
+        looks = [patterned_material(f"texture/cardboard?seed={rng.seed % 16}", 0.5, 0.85)] * 2
     else:
         looks = [painted_material(rng.choose((*LACQUERS, "#2f6f9f", "#7a8f5a")), 0.4)] * 2
     whole: Box = (low[0], (x, y, z))
-    if seed % 2:
+    if rng.seed % 2:
         carton: list[Patch] = []
         tape_carton(carton, low[0], (x, y, z), rng, (0, 1, 2, 3))
-        return solid(carton, carton_looks(rng, seed), [whole])
+        return solid(carton, carton_looks(rng, rng.seed), [whole])
     return solid([shapes.block(*low, 0.008), shapes.block(*lid, 0.006, 1)], looks, [whole])
 
 
-def tv_stand(seed: int = 0) -> Solid:
+def tv_stand(rng: VariantRng) -> Solid:
     """A low board for a television. Slots: carcass, front, handle."""
-    rng = variant_rng("tv_stand", seed)
     d = rng.between(0.38, 0.45, "depth_m")
     w = rng.between(1.2, 1.9, "width_m")
     z = rng.between(0.4, 0.55, "height_m")
@@ -576,9 +570,8 @@ def tv_stand(seed: int = 0) -> Solid:
     return solid(patches, [body, body if rng.chance(0.5) else lacquer(rng)], [whole])
 
 
-def washing_machine(seed: int = 0) -> Solid:
+def washing_machine(rng: VariantRng) -> Solid:
     """A washing machine. Slots: body, ring, glass, panel."""
-    rng = variant_rng("washing_machine", seed)
     d, x = rng.between(0.52, 0.6, "depth_m"), 0.0
     x = 0.5 * d
     body: Box = ((-x, -0.3, 0.0), (x, 0.3, 0.85))

@@ -1,6 +1,7 @@
 """Families: named generators of objects, textures and environments, and their tables."""
 
 import importlib
+import inspect
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -154,6 +155,23 @@ class Lazy:
 
 
 @dataclass(frozen=True)
+class Builder(Lazy):
+    """The function that makes the objects of a family; if it takes ``rng``, that is its draws.
+
+    Attributes:
+        family: Name of the family; with the seed, it decides all draws.
+    """
+
+    family: str = ""
+
+    def __call__(self, **arguments: Any) -> Any:
+        """The object of a seed, or of other arguments."""
+        if "rng" in inspect.signature(self.value).parameters:
+            arguments["rng"] = variant_rng.variant_rng(self.family, arguments.pop("seed"))
+        return super().__call__(**arguments)
+
+
+@dataclass(frozen=True)
 class Worn:
     """A generator whose objects are worn, more or less by seed.
 
@@ -282,6 +300,7 @@ def _object_family(
     **row: Any,
 ) -> Family:
     known: Callable[..., Facts] | None = None
+    row["build"] = Builder(row["build"].path, row["build"].arguments, name)
     if isinstance(facts, Mapping):
         known = DrawnFacts(name, subcategory, facts)
     elif facts:
